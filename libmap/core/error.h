@@ -1,0 +1,40 @@
+// The one exception type of the project. It says which file, which field, which value and which
+// bound; a command prints what() as one line and ends with the exit code of its kind.
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace libmap {
+
+// bad_input: the user's file, option or data cannot be used (exit code 3).
+// failed: the run itself went wrong, for instance a full disk (exit code 1).
+enum class ErrorKind { bad_input, failed };
+
+struct ErrorContext {
+  std::string file{};   // as the user named it
+  std::string field{};  // column, key, header line or option
+  std::string value{};  // what stood there
+  std::string bound{};  // what would have been accepted, e.g. "> 0"
+};
+
+class Error : public std::runtime_error {
+ public:
+  // what() is "FILE: FIELD is VALUE: REASON (must be BOUND)"; empty parts are left out.
+  explicit Error(std::string reason, ErrorContext context = {},
+                 ErrorKind kind = ErrorKind::bad_input);
+
+  const ErrorContext& context() const { return context_; }
+  const std::string& reason() const { return reason_; }
+  ErrorKind kind() const { return kind_; }
+
+  // The same error naming `file`, unless it names one already.
+  Error in_file(const std::string& file) const;
+
+ private:
+  std::string reason_;
+  ErrorContext context_;
+  ErrorKind kind_;
+};
+
+}  // namespace libmap

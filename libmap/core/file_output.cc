@@ -1,0 +1,118 @@
+#include "libmap/core/file_output.h"
+
+#include <fcntl.h>
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <utility>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+Error failed(const fs::path& path, const std::string& what, int code) {
+  return Error(what + ": " + std::strerror(code), {.file = path.string()}, ErrorKind::failed);
+}
+
+void sync_path(const fs::path& path, int flags) {
+  const int descriptor = open(path.c_str(), flags);
+  if (descriptor < 0) throw failed(path, "cannot be opened to sync it", errno);
+  const int result = fsync(descriptor);
+  const int code = errno;
+  close(descriptor);
+  if (result != 0) throw failed(path, "cannot be synced", code);
+}
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+}  // namespace
+
+OutputFile::OutputFile(fs::path final_path) : final_path_(std::move(final_path)) {
+  if (final_path_.filename().empty() || fs::is_directory(final_path_))
+    throw Error("is a folder, not a file", {.file = final_path_.string()});
+  const fs::path folder = folder_of(final_path_);
+  if (!fs::is_directory(folder))
+    throw Error("no such folder: " + folder.string(), {.file = final_path_.string()});
+  // The extension stays at the end: writers choose the format by it.
+  temporary_path_ =
+      folder / ("." + final_path_.stem().string() + ".partial" + final_path_.extension().string());
+  lock_ = open(temporary_path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+  if (lock_ < 0) throw failed(final_path_, "cannot be written", errno);
+  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
+    close(std::exchange(lock_, -1));
+    throw Error("another process is writing it", {.file = final_path_.string()}, ErrorKind::failed);
+  }
+}
+
+OutputFile::~OutputFile() {
+  if (lock_ < 0) return;
+  std::error_code ignored;
+  fs::remove(temporary_path_, ignored);
+  close(lock_);
+}
+
+OutputFile::OutputFile(OutputFile&& other) noexcept
+    : final_path_(std::move(other.final_path_)),
+      temporary_path_(std::move(other.temporary_path_)),
+      lock_(std::exchange(other.lock_, -1)) {}
+
+void OutputFile::commit() {
+  sync_path(temporary_path_, O_RDONLY | O_CLOEXEC);
+  std::error_code code;
+  fs::rename(temporary_path_, final_path_, code);
+  if (code) throw failed(final_path_, "cannot be put in place", code.value());
+  close(std::exchange(lock_, -1));
+  sync_path(folder_of(final_path_), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+}
+
+void write_whole_file(const fs::path& path, std::string_view content) {
+  OutputFile output(path);
+  {
+    std::ofstream file(output.temporary_path(), std::ios::binary | std::ios::trunc);
+    file.write(content.data(), static_cast<std::streamsize>(content.size()));
+    file.flush();
+    if (!file) throw failed(path, "cannot be written", errno);
+  }
+  output.commit();
+}
+
+void require_readable_file(const fs::path& path) {
+  std::error_code code;
+  const fs::file_status status = fs::status(path, code);
+  if (status.type() == fs::file_type::not_found)
+    throw Error("no such file", {.file = path.string()});
+  if (code) throw Error(code.message(), {.file = path.string()});
+  if (status.type() == fs::file_type::directory)
+    throw Error("is a folder, not a file", {.file = path.string()});
+  if (status.type() != fs::file_type::regular)
+    throw Error("is not a regular file", {.file = path.string()});
+  if (access(path.c_str(), R_OK) != 0)
+    throw Error(std::string("cannot be read: ") + std::strerror(errno), {.file = path.string()});
+}
+
+std::string read_whole_file(const fs::path& path, std::uint64_t max_bytes) {
+  require_readable_file(path);
+  const std::uint64_t bytes = fs::file_size(path);
+  if (bytes > max_bytes)
+    throw Error("too large to be read whole", {.file = path.string(),
+                                               .field = "size",
+                                               .value = std::to_string(bytes) + " bytes",
+                                               .bound = "<= " + std::to_string(max_bytes)});
+  std::string content(bytes, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(content.data(), static_cast<std::streamsize>(bytes));
+  if (!file) throw Error("cannot be read", {.file = path.string()});
+  return content;
+}
+
+}  // namespace libmap

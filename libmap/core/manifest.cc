@@ -1,0 +1,193 @@
+#include "libmap/core/manifest.h"
+
+#include <openssl/evp.h>
+
+#include <array>
+#include <fstream>
+#include <memory>
+#include <nlohmann/json.hpp>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+
+namespace libmap {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+class Sha256 {
+ public:
+  Sha256() : context_(EVP_MD_CTX_new(), &EVP_MD_CTX_free) {
+    if (!context_ || EVP_DigestInit_ex(context_.get(), EVP_sha256(), nullptr) != 1)
+      throw Error("SHA-256 is not available", {}, ErrorKind::failed);
+  }
+  void update(const char* bytes, std::size_t count) {
+    EVP_DigestUpdate(context_.get(), bytes, count);
+  }
+  std::string hexadecimal() {
+    std::array<unsigned char, 32> digest{};
+    EVP_DigestFinal_ex(context_.get(), digest.data(), nullptr);
+    std::string text;
+    for (const unsigned byte : digest) {
+      text += "0123456789abcdef"[byte >> 4U];
+      text += "0123456789abcdef"[byte & 15U];
+    }
+    return text;
+  }
+
+ private:
+  std::unique_ptr<EVP_MD_CTX, decltype(&EVP_MD_CTX_free)> context_;
+};
+
+Json to_json_value(const ManifestValue& value) {
+  return std::visit([](const auto& held) { return Json(held); }, value);
+}
+
+ManifestValue from_json_value(const Json& json) {
+  if (json.is_boolean()) return json.get<bool>();
+  if (json.is_number_integer()) return json.get<std::int64_t>();
+  if (json.is_number()) return json.get<double>();
+  if (json.is_array()) return json.get<std::vector<double>>();
+  return json.get<std::string>();
+}
+
+Json to_json_object(const std::vector<std::pair<std::string, ManifestValue>>& values) {
+  Json object = Json::object();
+  for (const auto& [name, value] : values) object[name] = to_json_value(value);
+  return object;
+}
+
+std::vector<std::pair<std::string, ManifestValue>> from_json_object(const Json& object) {
+  std::vector<std::pair<std::string, ManifestValue>> values;
+  for (const auto& [name, value] : object.items())
+    values.emplace_back(name, from_json_value(value));
+  return values;
+}
+
+// Row-major 3 x 4 [R|t].
+std::vector<double> to_numbers(const Pose& pose) {
+  std::vector<double> numbers;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) numbers.push_back(pose.matrix()(row, column));
+  return numbers;
+}
+
+Pose from_numbers(const std::vector<double>& numbers) {
+  if (numbers.size() != 12)
+    throw Error("a transform has 12 numbers",
+                {.field = "transforms", .value = std::to_string(numbers.size()) + " numbers long"});
+  Pose pose = Pose::Identity();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      pose.matrix()(row, column) = numbers[static_cast<std::size_t>(row * 4 + column)];
+  return pose;
+}
+
+template <typename Pairs>
+auto find_in(const Pairs& pairs, std::string_view name) -> decltype(&pairs.front().second) {
+  for (const auto& [key, value] : pairs)
+    if (key == name) return &value;
+  return nullptr;
+}
+
+}  // namespace
+
+void Manifest::add_parameters(const ParameterTable& table) {
+  for (const Parameter& parameter : table.parameters()) {
+    const std::string text = parameter.get();
+    ManifestValue value = text;
+    if (parameter.type == ParameterType::boolean) value = parse_bool(text).value_or(false);
+    if (parameter.type == ParameterType::integer) value = parse_integer(text).value_or(0);
+    if (parameter.type == ParameterType::real) value = parse_double(text).value_or(0.0);
+    parameters.emplace_back(parameter.key, value);
+  }
+}
+
+void Manifest::add_input(const std::filesystem::path& path) {
+  inputs.push_back({path.string(), sha256_of_file(path), std::filesystem::file_size(path)});
+}
+
+const ManifestValue* Manifest::find_parameter(std::string_view name) const {
+  return find_in(parameters, name);
+}
+const ManifestValue* Manifest::find_result(std::string_view name) const {
+  return find_in(results, name);
+}
+const Pose* Manifest::find_transform(std::string_view name) const {
+  return find_in(transforms, name);
+}
+
+std::filesystem::path manifest_path(const std::filesystem::path& output) {
+  return output.string() + ".json";
+}
+
+std::string to_json(const Manifest& manifest) {
+  Json json;
+  json["made_by"] = "graspmap";
+  json["version"] = manifest.version;
+  json["command"] = manifest.command;
+  json["parameters"] = to_json_object(manifest.parameters);
+  json["inputs"] = Json::array();
+  for (const ManifestInput& input : manifest.inputs)
+    json["inputs"].push_back(
+        {{"path", input.path}, {"sha256", input.sha256}, {"bytes", input.bytes}});
+  json["units"] = {{"length", "m"}, {"angle", "deg"}};
+  json["frame"] = manifest.frame;
+  json["transforms"] = Json::object();
+  for (const auto& [name, pose] : manifest.transforms) json["transforms"][name] = to_numbers(pose);
+  json["results"] = to_json_object(manifest.results);
+  Json timings = Json::object();
+  for (const auto& [name, seconds] : manifest.timings_s) timings[name] = seconds;
+  json["run"] = {{"threads", manifest.threads}, {"timings_s", timings}};
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::optional<Manifest> read_manifest_of(const std::filesystem::path& output) {
+  const std::filesystem::path path = manifest_path(output);
+  if (!std::filesystem::exists(path)) return std::nullopt;
+  try {
+    const Json json = Json::parse(read_whole_file(path, std::uint64_t{1} << 26));
+    Manifest manifest;
+    manifest.version = json.at("version").get<std::string>();
+    manifest.command = json.at("command").get<std::string>();
+    manifest.parameters = from_json_object(json.at("parameters"));
+    for (const Json& input : json.at("inputs"))
+      manifest.inputs.push_back({input.at("path").get<std::string>(),
+                                 input.at("sha256").get<std::string>(),
+                                 input.at("bytes").get<std::uint64_t>()});
+    manifest.frame = json.at("frame").get<std::string>();
+    for (const auto& [name, numbers] : json.at("transforms").items())
+      manifest.transforms.emplace_back(name, from_numbers(numbers.get<std::vector<double>>()));
+    manifest.results = from_json_object(json.at("results"));
+    manifest.threads = json.at("run").at("threads").get<unsigned>();
+    for (const auto& [name, seconds] : json.at("run").at("timings_s").items())
+      manifest.timings_s.emplace_back(name, seconds.get<double>());
+    return manifest;
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(std::string("not a manifest of this toolkit: ") + error.what(),
+                {.file = path.string()});
+  } catch (const Error& error) {
+    throw error.in_file(path.string());
+  }
+}
+
+std::string sha256_of_file(const std::filesystem::path& path) {
+  require_readable_file(path);
+  std::ifstream file(path, std::ios::binary);
+  Sha256 hash;
+  std::vector<char> buffer(std::size_t{1} << 16);
+  while (file) {
+    file.read(buffer.data(), static_cast<std::streamsize>(buffer.size()));
+    hash.update(buffer.data(), static_cast<std::size_t>(file.gcount()));
+  }
+  return hash.hexadecimal();
+}
+
+std::string sha256_of(std::string_view bytes) {
+  Sha256 hash;
+  hash.update(bytes.data(), bytes.size());
+  return hash.hexadecimal();
+}
+
+}  // namespace libmap

@@ -1,0 +1,49 @@
+// Parallel loops whose result does not depend on the number of threads: work is cut into chunks by
+// count and grain alone, and reductions join the chunks in their order.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <memory>
+#include <utility>
+#include <vector>
+
+namespace libmap {
+
+// Calls body(begin, end) for consecutive ranges of at most `grain` items that cover 0..count-1, on
+// oneTBB's threads. An exception in a body ends the loop and is thrown here.
+void parallel_for(std::size_t count, std::size_t grain,
+                  const std::function<void(std::size_t begin, std::size_t end)>& body);
+
+// chunk(begin, end) of each range, joined left to right with join(a, b).
+template <typename T, typename Chunk, typename Join>
+T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk& chunk,
+                  const Join& join) {
+  if (grain == 0) grain = 1;
+  const std::size_t chunks = (count + grain - 1) / grain;
+  std::vector<T> parts(chunks, identity);
+  parallel_for(chunks, 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t c = first; c < last; ++c) {
+      const std::size_t begin = c * grain;
+      parts[c] = chunk(begin, begin + grain < count ? begin + grain : count);
+    }
+  });
+  T result = std::move(identity);
+  for (T& part : parts) result = join(std::move(result), std::move(part));
+  return result;
+}
+
+// Bounds the number of threads while it lives; 0 means all of the machine's.
+class ThreadLimit {
+ public:
+  explicit ThreadLimit(unsigned threads);
+  ~ThreadLimit();
+  ThreadLimit(const ThreadLimit&) = delete;
+  ThreadLimit& operator=(const ThreadLimit&) = delete;
+
+ private:
+  struct Control;
+  std::unique_ptr<Control> control_;
+};
+
+}  // namespace libmap

@@ -1,0 +1,108 @@
+// A table of the named parameters of one or more option structs: the single place where a field
+// meets its key, its description and its bound. Command-line flags, YAML files, --print-config and
+// the manifest all go through it, so that a default stands once, in the struct.
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+enum class ParameterType { boolean, integer, real, text };
+
+// What a number may be. An open end excludes its value.
+struct Range {
+  double min = -std::numeric_limits<double>::infinity();
+  double max = std::numeric_limits<double>::infinity();
+  bool min_open = false;
+  bool max_open = false;
+};
+inline constexpr Range any_number{};
+inline constexpr Range not_negative{0.0};
+inline constexpr Range positive{0.0, std::numeric_limits<double>::infinity(), true, false};
+inline constexpr Range zero_to_one{0.0, 1.0};
+std::string describe(const Range& range);  // e.g. "> 0", ">= 0 and <= 1"
+
+struct Parameter {
+  std::string key;          // as in YAML, with its unit: "voxel_size_m"
+  std::string description;  // one line
+  ParameterType type = ParameterType::text;
+  std::vector<std::string> choices{};  // for enumerations
+  std::function<std::string()> get;
+  std::function<void(std::string_view)> set;  // throws Error naming key, value and bound
+};
+
+class ParameterTable {
+ public:
+  void add(std::string key, double& field, Range range, std::string description);
+  void add(std::string key, int& field, Range range, std::string description);
+  void add(std::string key, std::uint64_t& field, Range range, std::string description);
+  void add(std::string key, bool& field, std::string description);
+  void add(std::string key, std::string& field, std::string description);
+  // An enumeration by its names.
+  template <typename Enum>
+  void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
+           std::string description);
+
+  const std::vector<Parameter>& parameters() const { return parameters_; }
+  std::vector<std::string> keys() const;
+  const Parameter* find(std::string_view key) const;
+
+  // Sets one parameter from text. Throws Error: unknown key (with the nearest known one), or a
+  // value that is not of its type or outside its bound.
+  void set(std::string_view key, std::string_view value) const;
+
+ private:
+  void add_parameter(Parameter parameter);
+  std::vector<Parameter> parameters_;
+};
+
+// "voxel_size_m" -> "--voxel-size": the flag of a key, without the unit at its end.
+std::string flag_of(std::string_view key);
+
+// A flat YAML map of scalars, `text` (named `file` in errors), into the table. A key that is not
+// in the table, stands twice or holds no scalar is an Error; nothing is set halfway: all keys are
+// known before the first is set.
+void set_from_yaml(const ParameterTable& table, const std::string& text, const std::string& file);
+
+// The table as YAML that set_from_yaml reads back, each line followed by its description.
+std::string to_yaml(const ParameterTable& table);
+
+template <typename Enum>
+void ParameterTable::add(std::string key, Enum& field,
+                         const std::vector<std::pair<std::string, Enum>>& names,
+                         std::string description) {
+  Parameter parameter;
+  parameter.key = key;
+  parameter.description = std::move(description);
+  parameter.type = ParameterType::text;
+  for (const auto& [name, value] : names) parameter.choices.push_back(name);
+  parameter.get = [&field, names] {
+    for (const auto& [name, value] : names)
+      if (value == field) return name;
+    return std::string();
+  };
+  parameter.set = [&field, names, key, choices = parameter.choices](std::string_view text) {
+    for (const auto& [name, value] : names) {
+      if (name == text) {
+        field = value;
+        return;
+      }
+    }
+    std::string bound = "one of";
+    for (const std::string& choice : choices) bound += " " + choice;
+    throw Error("unknown name" + did_you_mean(text, choices),
+                {.file = {}, .field = key, .value = std::string(text), .bound = bound});
+  };
+  add_parameter(std::move(parameter));
+}
+
+}  // namespace libmap

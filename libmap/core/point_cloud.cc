@@ -1,0 +1,78 @@
+#include "libmap/core/point_cloud.h"
+
+#include <algorithm>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+
+const ScalarField* PointCloud::find_field(std::string_view name) const {
+  const auto found = std::find_if(fields.begin(), fields.end(),
+                                  [&](const ScalarField& field) { return field.name == name; });
+  return found == fields.end() ? nullptr : &*found;
+}
+
+ScalarField* PointCloud::find_field(std::string_view name) {
+  const PointCloud& self = *this;
+  return const_cast<ScalarField*>(self.find_field(name));
+}
+
+ScalarField& PointCloud::add_field(std::string_view name, ScalarType type) {
+  ScalarField* field = find_field(name);
+  if (field == nullptr) field = &fields.emplace_back();
+  field->name = name;
+  field->type = type;
+  field->values.assign(size(), 0.0);
+  return *field;
+}
+
+void PointCloud::check() const {
+  const auto require = [&](const std::string& what, std::size_t length, bool may_be_empty) {
+    if (length == size() || (may_be_empty && length == 0)) return;
+    throw Error("the cloud has " + std::to_string(size()) + " points",
+                {.field = what, .value = std::to_string(length) + " values long"});
+  };
+  require("normals", normals.size(), true);
+  require("colors", colors.size(), true);
+  for (const ScalarField& field : fields) require(field.name, field.values.size(), false);
+}
+
+PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>& indices) {
+  const auto select = [&](const auto& from, auto& to) {
+    to.reserve(indices.size());
+    for (const std::size_t index : indices) to.push_back(from[index]);
+  };
+  PointCloud selected;
+  selected.viewpoint = cloud.viewpoint;
+  select(cloud.positions, selected.positions);
+  if (cloud.has_normals()) select(cloud.normals, selected.normals);
+  if (cloud.has_colors()) select(cloud.colors, selected.colors);
+  for (const ScalarField& field : cloud.fields) {
+    ScalarField& target = selected.fields.emplace_back();
+    target.name = field.name;
+    target.type = field.type;
+    select(field.values, target.values);
+  }
+  return selected;
+}
+
+PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source) {
+  PointCloud moved = cloud;
+  for (Eigen::Vector3d& point : moved.positions) point = target_from_source * point;
+  const Eigen::Matrix3f rotation = target_from_source.linear().cast<float>();
+  for (Eigen::Vector3f& normal : moved.normals) normal = rotation * normal;
+  moved.viewpoint = target_from_source * cloud.viewpoint;
+  return moved;
+}
+
+Bounds3d bounds_of(const std::vector<Eigen::Vector3d>& positions) {
+  if (positions.empty()) return {};
+  Bounds3d bounds{positions.front(), positions.front()};
+  for (const Eigen::Vector3d& point : positions) {
+    bounds.min = bounds.min.cwiseMin(point);
+    bounds.max = bounds.max.cwiseMax(point);
+  }
+  return bounds;
+}
+
+}  // namespace libmap

@@ -1,0 +1,45 @@
+// A triangle mesh as plain data.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
+
+// Positions in metres. `vertex_normals` and `vertex_colors` are empty or one a vertex, vertex
+// fields hold one value a vertex, face fields one a triangle.
+struct TriangleMesh {
+  std::vector<Eigen::Vector3d> vertices;
+  std::vector<Triangle> triangles;
+  std::vector<Eigen::Vector3f> vertex_normals;
+  std::vector<Color> vertex_colors;
+  std::vector<ScalarField> vertex_fields;
+  std::vector<ScalarField> face_fields;
+
+  // Throws Error naming the first array of a wrong length or index out of range.
+  void check() const;
+};
+
+// Twice-signed-area normal of a triangle, not normalised: its length is twice the area in m2.
+Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
+
+// Surface area in m2.
+double surface_area(const TriangleMesh& mesh);
+
+// Signed volume in m3 by the divergence theorem; the enclosed volume of a closed mesh.
+double signed_volume(const TriangleMesh& mesh);
+
+// Unit vertex normals: mean of the adjacent triangles' normals weighted by area.
+std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
+
+// `addition` behind `base`, its indices shifted. Normals and colours are kept where both have them;
+// fields only where both have one of that name.
+TriangleMesh join_meshes(const TriangleMesh& base, const TriangleMesh& addition);
+
+}  // namespace libmap
