@@ -1,0 +1,268 @@
+#include "libgtd/evaluate/roc.h"
+
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+namespace {
+
+// All locations of one distinct score.
+struct ScoreGroup {
+  double score = 0.0;
+  std::uint64_t positives = 0;
+  std::uint64_t negatives = 0;
+};
+
+struct Sample {
+  std::vector<ScoreGroup> groups;  // ascending
+  std::uint64_t positives = 0;
+  std::uint64_t negatives = 0;
+};
+
+Sample group_by_score(std::vector<std::pair<double, bool>> locations) {
+  std::sort(locations.begin(), locations.end());
+  Sample sample;
+  for (const auto& [score, label] : locations) {
+    if (sample.groups.empty() || sample.groups.back().score != score)
+      sample.groups.push_back({score, 0, 0});
+    ++(label ? sample.groups.back().positives : sample.groups.back().negatives);
+    ++(label ? sample.positives : sample.negatives);
+  }
+  return sample;
+}
+
+double lowest_score_at(double cutoff) { return cutoff - std::abs(cutoff) * 0x1.0p-24; }
+
+Confusion counts_from(const Sample& sample, std::uint64_t positives_below,
+                      std::uint64_t negatives_below) {
+  Confusion counts;
+  counts.true_positives = sample.positives - positives_below;
+  counts.false_negatives = positives_below;
+  counts.false_positives = sample.negatives - negatives_below;
+  counts.true_negatives = negatives_below;
+  return counts;
+}
+
+RocPoint point_at(const Sample& sample, double cutoff) {
+  const double lowest = lowest_score_at(cutoff);
+  std::uint64_t positives_below = 0, negatives_below = 0;
+  for (const ScoreGroup& group : sample.groups) {
+    if (group.score >= lowest) break;
+    positives_below += group.positives;
+    negatives_below += group.negatives;
+  }
+  return {cutoff, counts_from(sample, positives_below, negatives_below)};
+}
+
+std::vector<RocPoint> points_at_scores(const Sample& sample) {
+  std::vector<RocPoint> points;
+  points.reserve(sample.groups.size());
+  std::uint64_t positives_below = 0, negatives_below = 0;
+  for (const ScoreGroup& group : sample.groups) {
+    points.push_back({group.score, counts_from(sample, positives_below, negatives_below)});
+    positives_below += group.positives;
+    negatives_below += group.negatives;
+  }
+  return points;
+}
+
+// Pairs of a positive and a negative, counted twice where the positive scores higher and once
+// where both score the same (Mann and Whitney 1947): whole numbers, so that no order of summation
+// shows in the result.
+class PairCount {
+ public:
+  void add(std::uint64_t positives, std::uint64_t negatives) {
+    twice_ += positives * (2 * negatives_below_ + negatives);
+    negatives_below_ += negatives;
+  }
+  double area(std::uint64_t positives, std::uint64_t negatives) const {
+    return static_cast<double>(twice_) /
+           (2.0 * static_cast<double>(positives) * static_cast<double>(negatives));
+  }
+
+ private:
+  std::uint64_t twice_ = 0;
+  std::uint64_t negatives_below_ = 0;
+};
+
+double trapezoid_area(const Sample& sample) {
+  PairCount pairs;
+  for (const ScoreGroup& group : sample.groups) pairs.add(group.positives, group.negatives);
+  return pairs.area(sample.positives, sample.negatives);
+}
+
+void sum_upper(const std::vector<RocPoint>& points, AreaUnderCurve& area) {
+  const double pairs = static_cast<double>(points.front().counts.positives()) *
+                       static_cast<double>(points.front().counts.negatives());
+  std::uint64_t sum = 0;
+  for (std::size_t k = 0; k < points.size(); ++k) {
+    const Confusion& here = points[k].counts;
+    const std::size_t next =
+        k + 1 < points.size() ? points[k + 1].counts.false_positives : here.false_positives;
+    const std::uint64_t share = std::uint64_t{here.false_positives - next} * here.true_positives;
+    area.upper_sum_shares.push_back(static_cast<double>(share) / pairs);
+    sum += share;
+  }
+  area.upper_sum = static_cast<double>(sum) / pairs;
+  const Rate width = {points.front().counts.false_positives - points.back().counts.false_positives,
+                      points.front().counts.negatives()};
+  area.upper_sum_width = width.value().value();
+}
+
+// A whole number below `bound`, all equally likely: draws beyond the last whole multiple of
+// `bound` are thrown away.
+std::uint64_t draw_below(std::mt19937_64& engine, std::uint64_t bound) {
+  const std::uint64_t excess = (std::uint64_t{0} - bound) % bound;  // 2^64 mod bound
+  std::uint64_t drawn = engine();
+  while (drawn < excess) drawn = engine();
+  return drawn % bound;
+}
+
+// Hyndman and Fan 1996, definition 7.
+double quantile(const std::vector<double>& sorted, double probability) {
+  const double position = probability * static_cast<double>(sorted.size() - 1);
+  const auto below = static_cast<std::size_t>(position);
+  const std::size_t above = std::min(below + 1, sorted.size() - 1);
+  return std::lerp(sorted[below], sorted[above], position - static_cast<double>(below));
+}
+
+class Bootstrap {
+ public:
+  explicit Bootstrap(const Sample& sample) : sample_(sample) {
+    for (std::size_t g = 0; g < sample.groups.size(); ++g) {
+      group_of_positive_.insert(group_of_positive_.end(), sample.groups[g].positives, g);
+      group_of_negative_.insert(group_of_negative_.end(), sample.groups[g].negatives, g);
+    }
+  }
+
+  // Each replicate has an engine of its own: the order in which they are made does not matter.
+  double replicate(std::uint64_t seed, std::uint64_t index) const {
+    const auto halves = [](std::uint64_t value) {
+      return std::pair(static_cast<std::uint32_t>(value), static_cast<std::uint32_t>(value >> 32));
+    };
+    const auto [seed_low, seed_high] = halves(seed);
+    const auto [index_low, index_high] = halves(index);
+    std::seed_seq sequence{seed_low, seed_high, index_low, index_high};
+    std::mt19937_64 engine(sequence);
+    const auto positives = draw(engine, group_of_positive_);
+    const auto negatives = draw(engine, group_of_negative_);
+    PairCount pairs;
+    for (std::size_t g = 0; g < sample_.groups.size(); ++g) pairs.add(positives[g], negatives[g]);
+    return pairs.area(sample_.positives, sample_.negatives);
+  }
+
+ private:
+  std::vector<std::uint64_t> draw(std::mt19937_64& engine,
+                                  const std::vector<std::size_t>& groups) const {
+    std::vector<std::uint64_t> drawn(sample_.groups.size(), 0);
+    for (std::size_t i = 0; i < groups.size(); ++i)
+      ++drawn[groups[draw_below(engine, groups.size())]];
+    return drawn;
+  }
+
+  const Sample& sample_;
+  std::vector<std::size_t> group_of_positive_, group_of_negative_;
+};
+
+std::optional<Interval> bootstrap_95(const Sample& sample, const RocOptions& options) {
+  if (options.bootstrap_replicates == 0) return std::nullopt;
+  const Bootstrap bootstrap(sample);
+  std::vector<double> areas(static_cast<std::size_t>(options.bootstrap_replicates));
+  libmap::parallel_for(areas.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      areas[i] = bootstrap.replicate(options.bootstrap_seed, i);
+  });
+  std::sort(areas.begin(), areas.end());
+  return Interval{quantile(areas, 0.025), quantile(areas, 0.975)};
+}
+
+std::string why_no_area(const Sample& sample) {
+  if (sample.positives + sample.negatives == 0)
+    return "no location has both a label and a score: the area under the curve is not defined";
+  const std::string number =
+      libmap::to_text(static_cast<std::int64_t>(sample.positives + sample.negatives));
+  return "all " + number + " locations are labelled " + (sample.positives > 0 ? "true" : "false") +
+         ": the area under the curve is not defined";
+}
+
+}  // namespace
+
+void RocOptions::check() const {
+  if (cutoffs.empty()) throw libmap::Error("no cutoffs", {.field = "cutoffs"});
+  for (std::size_t k = 0; k < cutoffs.size(); ++k) {
+    if (!std::isfinite(cutoffs[k]) || (k > 0 && !(cutoffs[k] > cutoffs[k - 1])))
+      throw libmap::Error("cutoffs are not in order", {.field = "cutoffs",
+                                                       .value = libmap::to_text(cutoffs[k]),
+                                                       .bound = "finite and ascending"});
+  }
+  if (!std::isfinite(rate_cutoff))
+    throw libmap::Error("no cutoff", {.field = "rate_cutoff",
+                                      .value = libmap::to_text(rate_cutoff),
+                                      .bound = "a finite number"});
+  if (bootstrap_replicates < 0)
+    throw libmap::Error("no number of replicates",
+                        {.field = "bootstrap_replicates",
+                         .value = libmap::to_text(std::int64_t{bootstrap_replicates}),
+                         .bound = ">= 0"});
+}
+
+std::optional<double> Rate::value() const {
+  if (total == 0) return std::nullopt;
+  return static_cast<double>(count) / static_cast<double>(total);
+}
+
+std::optional<Interval> Rate::wilson_95() const {
+  if (total == 0) return std::nullopt;
+  constexpr double z = 1.959963984540054;  // the normal distribution's 0.975 quantile
+  const double n = static_cast<double>(total);
+  const double p = static_cast<double>(count) / n;
+  const double denominator = 1.0 + z * z / n;
+  const double center = (p + z * z / (2.0 * n)) / denominator;
+  const double half = z * std::sqrt(p * (1.0 - p) / n + z * z / (4.0 * n * n)) / denominator;
+  // At the ends the interval reaches them exactly; rounding must not carry it past or short.
+  return Interval{count == 0 ? 0.0 : std::max(0.0, center - half),
+                  count == total ? 1.0 : std::min(1.0, center + half)};
+}
+
+RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
+                       const std::vector<std::optional<double>>& scores,
+                       const RocOptions& options) {
+  options.check();
+  if (labels.size() != scores.size())
+    throw libmap::Error("labels and scores differ in number",
+                        {.field = "scores",
+                         .value = libmap::to_text(static_cast<std::int64_t>(scores.size())),
+                         .bound = libmap::to_text(static_cast<std::int64_t>(labels.size()))});
+  RocResult result;
+  std::vector<std::pair<double, bool>> locations;
+  for (std::size_t i = 0; i < labels.size(); ++i) {
+    if (!scores[i].has_value() || std::isnan(*scores[i])) {
+      ++result.left_out_unscored;
+    } else if (!labels[i].has_value()) {
+      ++result.left_out_unlabelled;
+    } else {
+      locations.emplace_back(*scores[i], *labels[i]);
+    }
+  }
+  const Sample sample = group_by_score(std::move(locations));
+  for (const double cutoff : options.cutoffs) result.at_cutoffs.push_back(point_at(sample, cutoff));
+  result.at_scores = points_at_scores(sample);
+  result.at_rate_cutoff = point_at(sample, options.rate_cutoff);
+  if (sample.positives == 0 || sample.negatives == 0) {
+    result.area_note = why_no_area(sample);
+    return result;
+  }
+  AreaUnderCurve area;
+  area.trapezoid = trapezoid_area(sample);
+  sum_upper(result.at_cutoffs, area);
+  area.trapezoid_bootstrap_95 = bootstrap_95(sample, options);
+  result.area = std::move(area);
+  return result;
+}
+
+}  // namespace libgtd

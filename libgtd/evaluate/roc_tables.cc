@@ -1,0 +1,365 @@
+#include "libgtd/evaluate/roc_tables.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <nlohmann/json.hpp>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+namespace {
+
+using Json = nlohmann::ordered_json;
+using libmap::Table;
+
+std::string number_text(std::size_t value) {
+  return libmap::to_text(static_cast<std::int64_t>(value));
+}
+
+std::string text_or_empty(std::optional<double> value) {
+  return value ? libmap::to_text(*value) : std::string();
+}
+
+// With so many decimals, '.' under every locale.
+std::string fixed_text(double value, int decimals) {
+  std::array<char, 64> buffer;
+  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
+                                 std::chars_format::fixed, decimals);
+  return std::string(buffer.data(), end.ptr);
+}
+
+struct NamedRate {
+  const char* name;
+  const char* symbol;
+  Rate rate;
+};
+
+std::vector<NamedRate> named_rates(const Confusion& counts) {
+  return {{"true_positive_rate", "TPR", counts.true_positive_rate()},
+          {"true_negative_rate", "TNR", counts.true_negative_rate()},
+          {"false_positive_rate", "FPR", counts.false_positive_rate()},
+          {"false_negative_rate", "FNR", counts.false_negative_rate()},
+          {"positive_predictive_value", "PPV", counts.positive_predictive_value()},
+          {"accuracy", "ACC", counts.accuracy()}};
+}
+
+bool ends_with_length(std::string_view name) {
+  for (const std::string_view unit : {"_m", "_mm", "_cm"})
+    if (name.ends_with(unit)) return true;
+  return false;
+}
+
+bool is_number_column(const Table& table, std::size_t column) {
+  bool any = false;
+  for (const std::vector<std::string>& row : table.rows) {
+    if (libmap::trim(row[column]).empty()) continue;
+    if (!libmap::parse_double(row[column])) return false;
+    any = true;
+  }
+  return any;
+}
+
+std::vector<std::optional<bool>> read_labels(const Table& table, const std::string& name) {
+  const std::size_t column = table.column(name);
+  std::vector<std::optional<bool>> labels;
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    const std::string& cell = table.rows[row][column];
+    labels.push_back(libmap::trim(cell).empty() ? std::nullopt : parse_label(cell));
+    if (!labels.back() && !libmap::trim(cell).empty())
+      throw libmap::Error("not a label",
+                          {.file = table.file,
+                           .field = "row " + number_text(row + 1) + ", column '" + name + "'",
+                           .value = "'" + cell + "'",
+                           .bound = "1/0, true/false, yes/no or graspable/not graspable"});
+  }
+  return labels;
+}
+
+std::vector<std::optional<double>> read_scores(const Table& table, const std::string& name) {
+  const std::size_t column = table.column(name);
+  std::vector<std::optional<double>> scores;
+  for (std::size_t row = 0; row < table.rows.size(); ++row)
+    scores.push_back(table.optional_number(row, column));
+  return scores;
+}
+
+std::vector<std::string> roc_row(const std::string& name, const char* at, const RocPoint& point,
+                                 std::optional<double> share) {
+  const Confusion& counts = point.counts;
+  return {name,
+          at,
+          libmap::to_text(point.cutoff),
+          number_text(counts.predicted_positives()),
+          number_text(counts.predicted_negatives()),
+          number_text(counts.true_positives),
+          number_text(counts.false_positives),
+          number_text(counts.true_negatives),
+          number_text(counts.false_negatives),
+          text_or_empty(counts.true_positive_rate().value()),
+          text_or_empty(counts.false_positive_rate().value()),
+          text_or_empty(share)};
+}
+
+Json json_of(const std::optional<Interval>& interval) {
+  if (!interval) return nullptr;
+  return Json::array({interval->low, interval->high});
+}
+
+Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+
+Json json_of(const RocResult& result) {
+  const Confusion& counts = result.at_rate_cutoff.counts;
+  Json json;
+  json["locations"] = counts.size();
+  json["positives"] = counts.positives();
+  json["negatives"] = counts.negatives();
+  json["left_out_without_score"] = result.left_out_unscored;
+  json["left_out_without_label"] = result.left_out_unlabelled;
+  Json auc;
+  if (const auto& area = result.area) {
+    auc["trapezoid"] = area->trapezoid;
+    auc["trapezoid_bootstrap_95"] = json_of(area->trapezoid_bootstrap_95);
+    auc["upper_sum"] = area->upper_sum;
+    auc["upper_sum_shares"] = area->upper_sum_shares;
+    auc["upper_sum_width"] = area->upper_sum_width;
+  } else {
+    auc["trapezoid"] = auc["trapezoid_bootstrap_95"] = auc["upper_sum"] = nullptr;
+    auc["note"] = result.area_note;
+  }
+  json["auc"] = std::move(auc);
+  Json rates;
+  for (const NamedRate& named : named_rates(counts))
+    rates[named.name] = {{"count", named.rate.count},
+                         {"total", named.rate.total},
+                         {"value", json_of(named.rate.value())},
+                         {"wilson_95", json_of(named.rate.wilson_95())}};
+  json["rates"] = std::move(rates);
+  return json;
+}
+
+std::string markdown_cell(const std::string& text) {
+  std::string cell;
+  for (const char c : text) {
+    if (c == '|') cell += '\\';
+    cell += c == '\n' || c == '\r' ? ' ' : c;
+  }
+  return cell;
+}
+
+std::string interval_text(const std::optional<Interval>& interval, int decimals) {
+  if (!interval) return "";
+  return " (" + fixed_text(interval->low, decimals) + " to " +
+         fixed_text(interval->high, decimals) + ")";
+}
+
+std::string areas_markdown(const TableEvaluation& evaluation) {
+  std::string text =
+      "| scores | locations | graspable | not visible | AUC, trapezoid | AUC, upper sum |\n"
+      "|---|---|---|---|---|---|\n";
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    const RocResult& result = column.result;
+    const Confusion& counts = result.at_rate_cutoff.counts;
+    text += "| " + markdown_cell(column.name) + " | " + number_text(counts.size()) + " | " +
+            number_text(counts.positives()) + " | " + number_text(result.left_out_unscored) + " | ";
+    if (result.area) {
+      text += fixed_text(result.area->trapezoid, 3) +
+              interval_text(result.area->trapezoid_bootstrap_95, 3) + " | " +
+              fixed_text(result.area->upper_sum, 3) + " |\n";
+    } else {
+      text += "not defined | not defined |\n";
+    }
+  }
+  return text;
+}
+
+std::string rates_markdown(const TableEvaluation& evaluation) {
+  std::string text = "| scores |", rule = "|---|";
+  for (const NamedRate& named : named_rates({})) {
+    text += std::string(" ") + named.symbol + " |";
+    rule += "---|";
+  }
+  text += "\n" + rule + "\n";
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    text += "| " + markdown_cell(column.name) + " |";
+    for (const NamedRate& named : named_rates(column.result.at_rate_cutoff.counts)) {
+      const std::optional<double> value = named.rate.value();
+      text += " " +
+              (value ? fixed_text(*value, 4) + interval_text(named.rate.wilson_95(), 2)
+                     : std::string("not defined")) +
+              " |";
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string notes_markdown(const TableEvaluation& evaluation) {
+  std::string text;
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    const RocResult& result = column.result;
+    if (!result.area) text += "- " + markdown_cell(column.name) + ": " + result.area_note + ".\n";
+    if (result.left_out_unlabelled > 0)
+      text += "- " + markdown_cell(column.name) + ": " + number_text(result.left_out_unlabelled) +
+              " locations have a score and no label and are left out.\n";
+    if (result.area && result.area->upper_sum_width < 1.0)
+      text += "- " + markdown_cell(column.name) +
+              ": some locations that are not graspable score below the first cutoff or reach the "
+              "last one; the upper sum covers only " +
+              fixed_text(result.area->upper_sum_width, 3) +
+              " of the false positive rate and can lie below the trapezoid.\n";
+  }
+  return text.empty() ? text : text + "\n";
+}
+
+}  // namespace
+
+std::optional<bool> parse_label(std::string_view text) {
+  if (const std::optional<bool> truth = libmap::parse_bool(text)) return truth;
+  if (const std::optional<double> number = libmap::parse_double(text)) {
+    if (*number == 1.0) return true;
+    if (*number == 0.0) return false;
+    return std::nullopt;
+  }
+  std::string letters;
+  for (const char c : text) {
+    if (c >= 'A' && c <= 'Z') letters += static_cast<char>(c - 'A' + 'a');
+    if (c >= 'a' && c <= 'z') letters += c;
+    if (static_cast<unsigned char>(c) >= 0x80) return std::nullopt;
+  }
+  if (letters == "graspable") return true;
+  if (letters == "notgraspable" || letters == "nongraspable" || letters == "ungraspable")
+    return false;
+  return std::nullopt;
+}
+
+std::vector<std::string> default_score_columns(const Table& table, std::string_view label_column) {
+  static constexpr std::array<std::string_view, 9> known = {"id", "point", "hold", "x", "y",
+                                                            "z",  "i",     "j",    "k"};
+  std::vector<std::string> names;
+  for (std::size_t c = 0; c < table.columns.size(); ++c) {
+    const std::string& name = table.columns[c];
+    if (name == label_column || ends_with_length(name)) continue;
+    if (std::find(known.begin(), known.end(), name) != known.end()) continue;
+    if (is_number_column(table, c)) names.push_back(name);
+  }
+  return names;
+}
+
+TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions& options) {
+  options.roc.check();
+  TableEvaluation evaluation;
+  evaluation.options = options;
+  evaluation.rows = table.rows.size();
+  const std::vector<std::optional<bool>> labels = read_labels(table, options.label_column);
+  std::vector<std::string>& names = evaluation.options.score_columns;
+  if (names.empty()) names = default_score_columns(table, options.label_column);
+  if (names.empty())
+    throw libmap::Error("no column of scores beside the label", {.file = table.file});
+  for (std::size_t n = 0; n < names.size(); ++n) {
+    if (std::find(names.begin(), names.begin() + static_cast<std::ptrdiff_t>(n), names[n]) !=
+        names.begin() + static_cast<std::ptrdiff_t>(n))
+      throw libmap::Error("named twice",
+                          {.file = table.file, .field = "column '" + names[n] + "'"});
+    evaluation.columns.push_back(
+        {names[n], evaluate_roc(labels, read_scores(table, names[n]), options.roc)});
+  }
+  return evaluation;
+}
+
+Table roc_table(const TableEvaluation& evaluation) {
+  Table table;
+  table.columns = {"scores",
+                   "at",
+                   "cutoff",
+                   "predicted_positives",
+                   "predicted_negatives",
+                   "true_positives",
+                   "false_positives",
+                   "true_negatives",
+                   "false_negatives",
+                   "true_positive_rate",
+                   "false_positive_rate",
+                   "upper_sum_share"};
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    const RocResult& result = column.result;
+    for (std::size_t k = 0; k < result.at_cutoffs.size(); ++k) {
+      std::optional<double> share;
+      if (result.area) share = result.area->upper_sum_shares[k];
+      table.rows.push_back(roc_row(column.name, "cutoff", result.at_cutoffs[k], share));
+    }
+    for (const RocPoint& point : result.at_scores)
+      table.rows.push_back(roc_row(column.name, "score", point, std::nullopt));
+  }
+  return table;
+}
+
+Table rates_table(const TableEvaluation& evaluation) {
+  Table table;
+  table.columns = {"scores", "cutoff", "rate", "count", "total", "value", "low_95", "high_95"};
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    const RocPoint& point = column.result.at_rate_cutoff;
+    for (const NamedRate& named : named_rates(point.counts)) {
+      const std::optional<Interval> interval = named.rate.wilson_95();
+      table.rows.push_back({column.name, libmap::to_text(point.cutoff), named.name,
+                            number_text(named.rate.count), number_text(named.rate.total),
+                            text_or_empty(named.rate.value()),
+                            interval ? libmap::to_text(interval->low) : std::string(),
+                            interval ? libmap::to_text(interval->high) : std::string()});
+    }
+  }
+  return table;
+}
+
+std::string to_json(const TableEvaluation& evaluation) {
+  const TableEvaluationOptions& options = evaluation.options;
+  Json json;
+  json["rows"] = evaluation.rows;
+  json["label_column"] = options.label_column;
+  json["cutoff"] = options.roc.rate_cutoff;
+  json["upper_sum_cutoffs"] = options.roc.cutoffs;
+  json["bootstrap"] = {{"method", "percentile, positives and negatives drawn apart"},
+                       {"replicates", options.roc.bootstrap_replicates},
+                       {"seed", options.roc.bootstrap_seed}};
+  Json scores = Json::array();
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    Json entry;
+    entry["name"] = column.name;
+    entry.update(json_of(column.result));
+    scores.push_back(std::move(entry));
+  }
+  json["scores"] = std::move(scores);
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string to_markdown(const TableEvaluation& evaluation, const std::string& title) {
+  const RocOptions& roc = evaluation.options.roc;
+  std::string text;
+  if (!title.empty()) text += "# " + markdown_cell(title) + "\n\n";
+  text += "Label: column `" + evaluation.options.label_column + "`, " +
+          number_text(evaluation.rows) + " rows.\n\n## Area under the ROC curve\n\n" +
+          areas_markdown(evaluation) + "\n";
+  text +=
+      "The trapezoid equals the Mann-Whitney statistic, the chance that a graspable place scores "
+      "higher than one that is not, ties counting one half";
+  if (roc.bootstrap_replicates > 0)
+    text += "; in brackets its 95 % percentile interval of " +
+            libmap::to_text(std::int64_t{roc.bootstrap_replicates}) +
+            " bootstrap replicates (seed " + std::to_string(roc.bootstrap_seed) +
+            ", graspable and other places drawn apart, so that each replicate has both)";
+  text +=
+      ". The AUC that the thesis published (0.84, 0.75, 0.72) is the upper sum over its ten "
+      "cutoffs, the sum of (FPR_k - FPR_k+1) * TPR_k, and not the trapezoid (0.745, 0.642, 0.650 "
+      "on the same scores). Where the cutoffs span the scores of all places that are not "
+      "graspable, the upper sum is never less than the trapezoid: it is no measure to compare "
+      "with other work.\n\n";
+  text += notes_markdown(evaluation);
+  text += "## Rates at cutoff " + libmap::to_text(roc.rate_cutoff) + "\n\n" +
+          rates_markdown(evaluation) +
+          "\nA place is predicted graspable where its score reaches the cutoff. In brackets the "
+          "Wilson 95 % interval.\n";
+  return text;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,40 @@
+#include "libgtd/gripper/gripper_io.h"
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+
+namespace libgtd {
+
+namespace {
+
+// A measure that a file left out is still 0 and would be reported as a bad value: say what it is.
+void require_all_keys(const libmap::ParameterTable& table, const std::string& yaml) {
+  for (const std::string& key : table.keys())
+    if (yaml.find(key + ":") == std::string::npos) throw libmap::Error("missing", {.field = key});
+}
+
+}  // namespace
+
+Gripper parse_gripper(const std::string& yaml, const std::string& file,
+                      const std::vector<std::pair<std::string, std::string>>& overrides) {
+  Gripper gripper;
+  libmap::ParameterTable table;
+  bind(table, gripper);
+  try {
+    libmap::set_from_yaml(table, yaml, file);
+    require_all_keys(table, yaml);
+    for (const auto& [key, value] : overrides) table.set(key, value);
+    gripper.check();
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file);
+  }
+  return gripper;
+}
+
+Gripper read_gripper(const std::filesystem::path& path,
+                     const std::vector<std::pair<std::string, std::string>>& overrides) {
+  return parse_gripper(libmap::read_whole_file(path, std::uint64_t{1} << 20), path.string(),
+                       overrides);
+}
+
+}  // namespace libgtd

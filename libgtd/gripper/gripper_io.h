@@ -1,0 +1,21 @@
+// Gripper files: a flat YAML map, see data/grippers/README in data/README.md.
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libgtd/gripper/gripper.h"
+
+namespace libgtd {
+
+// Reads and checks a gripper; `overrides` (key, value) replace what the file says. Throws Error
+// naming the file and the field: an unknown key, a missing one, a value outside its bound.
+Gripper read_gripper(const std::filesystem::path& path,
+                     const std::vector<std::pair<std::string, std::string>>& overrides = {});
+
+Gripper parse_gripper(const std::string& yaml, const std::string& file,
+                      const std::vector<std::pair<std::string, std::string>>& overrides = {});
+
+}  // namespace libgtd

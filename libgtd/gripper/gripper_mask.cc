@@ -1,0 +1,249 @@
+#include "libgtd/gripper/gripper_mask.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "libmap/core/error.h"
+
+namespace libgtd {
+
+namespace {
+
+double tan_deg(double degrees) { return std::tan(degrees * (std::numbers::pi / 180.0)); }
+double cos_deg(double degrees) { return std::cos(degrees * (std::numbers::pi / 180.0)); }
+
+// Distance of (x, y) from (center, center), in single precision like the author's program.
+float distance(double center, int x, int y) {
+  return static_cast<float>(std::hypot(center - x, center - y));
+}
+
+void allocate(GripperMask& mask) {
+  const double voxels = static_cast<double>(mask.side) * mask.side * mask.layers;
+  if (mask.side < 3 || mask.solid_layers < 2)
+    throw libmap::Error("the gripper is not larger than a voxel or two: its mask would have " +
+                            std::to_string(mask.side) + " voxels a side and " +
+                            std::to_string(mask.solid_layers) + " layers",
+                        {.field = "voxel_size_m", .value = libmap::to_text(mask.voxel_size_m)});
+  if (voxels > 0x1p31)
+    throw libmap::Error(
+        "the gripper mask would have " + libmap::to_text(voxels) + " voxels, more than 2^31",
+        {.field = "voxel_size_m", .value = libmap::to_text(mask.voxel_size_m)});
+  mask.solid.assign(static_cast<std::size_t>(voxels), 0);
+  mask.counted.assign(static_cast<std::size_t>(voxels), 1);
+}
+
+// Calls solid(x, y, s) for each voxel of the solid layers, s = 1 on top, and keeps the answer.
+template <typename Solid>
+void fill(GripperMask& mask, const Solid& solid) {
+  for (int s = 1; s <= mask.solid_layers; ++s)
+    for (int x = 0; x < mask.side; ++x)
+      for (int y = 0; y < mask.side; ++y)
+        mask.solid[mask.index(x, y, mask.solid_layers - s)] = solid(x, y, s) ? 1 : 0;
+}
+
+// The measures in voxels as `thesis` and `envelope` round them (eq. 3-6..3-12).
+struct VoxelMeasures {
+  float ratio = 0.0F;  // voxels a millimetre
+  double half = 0.0;
+  int H = 0;
+  double RT = 0.0;
+  double Hcl = 0.0;
+  double RB = 0.0;
+
+  double in_voxels(double millimetres) const {
+    return static_cast<double>(static_cast<float>(millimetres * static_cast<double>(ratio)));
+  }
+};
+
+VoxelMeasures measure(const Gripper& gripper, const GripperMaskOptions& options) {
+  VoxelMeasures m;
+  m.ratio = 1.0F / (static_cast<float>(options.voxel_size_m) * 1000.0F);
+  const auto rounded = [&](double millimetres) { return std::round(m.in_voxels(millimetres)); };
+  const bool exact_palm = options.method == Method::envelope;
+  const double P =
+      exact_palm ? m.in_voxels(gripper.palm_diameter_mm) : rounded(gripper.palm_diameter_mm);
+  const double mt =
+      exact_palm ? m.in_voxels(gripper.top_solid_margin_mm) : rounded(gripper.top_solid_margin_mm);
+  m.half = rounded(gripper.finger_joint_diameter_mm) / 2.0 + rounded(gripper.finger_length_mm) +
+           rounded(gripper.spine_length_mm);
+  m.H = static_cast<int>(rounded(gripper.closing_height_mm));
+  const double L = std::floor(2.0 * m.half) + (options.method == Method::climblab ? 1.0 : 0.0);
+  m.RT = std::round((P + mt) / 2.0);
+  m.Hcl = std::round((L - P) / 2.0 * tan_deg(90.0 - gripper.opening_angle_deg));
+  m.RB = std::round(P / 2.0 + m.H * tan_deg(gripper.closing_angle_deg) -
+                    rounded(gripper.bottom_void_margin_mm));
+  return m;
+}
+
+GripperMask empty_mask(const GripperMaskOptions& options, int side, int solid_layers) {
+  GripperMask mask;
+  mask.method = options.method;
+  mask.voxel_size_m = options.voxel_size_m;
+  mask.side = side;
+  mask.solid_layers = solid_layers;
+  mask.layers = solid_layers + options.extra_void_layers;
+  mask.pivot_xy = side / 2;
+  mask.pivot_z = solid_layers;
+  allocate(mask);
+  return mask;
+}
+
+GripperMask make_thesis(const Gripper& gripper, const GripperMaskOptions& options) {
+  const VoxelMeasures m = measure(gripper, options);
+  GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half), m.H);
+  const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
+  fill(mask, [&](int x, int y, int s) {
+    const float d = distance(m.half, x, y);
+    const double Rg = std::round(m.RT + (s - 1) / cone);
+    const double t = m.RB - m.H + s - 1;
+    const double Rui = std::round(std::sqrt(2.0 * m.RB * t - t * t));
+    return (s <= m.Hcl && d <= Rg) || (m.Hcl < s && s <= m.H - m.RB && d < m.half) ||
+           (m.H - m.RB < s && s < m.H && d > Rui) || (s == m.H && d > m.RB);
+  });
+  return mask;
+}
+
+// Eq. 5-1, 5-2 and the counted volume of 5.1.2.
+GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& options) {
+  const VoxelMeasures m = measure(gripper, options);
+  GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half), m.H);
+  const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
+  const double cos_closed = cos_deg(gripper.closing_angle_deg);
+  // As in `thesis`, the ring has two parts, below Hcl and below H - RB: with RB > H (HubRobo) the
+  // second begins above the cone's end.
+  const double ring_top = std::min(m.Hcl, m.H - m.RB);
+  fill(mask, [&](int x, int y, int s) {
+    const float d = distance(m.half, x, y);
+    const double q = m.H - s + 1;
+    const double depth = s - 1;
+    const double Rg = std::round(m.RT + depth / cone);
+    const double Ruo = std::round(m.RT + std::sqrt(2.0 * m.H / cos_closed * q - q * q));
+    const double Rui = std::round(std::sqrt(2.0 * (m.H - m.Hcl) * depth - depth * depth) - m.Hcl);
+    return (s <= m.Hcl && d <= Rg) || (ring_top < s && s < m.H && Rui < d && d <= Ruo) ||
+           (s == m.H && m.RB < d && d <= Ruo);
+  });
+  const double Rc = std::round(m.in_voxels(gripper.palm_diameter_mm) / 2.0);
+  for (int z = 0; z < mask.layers; ++z) {
+    const double reach =
+        std::round(Rc + std::sqrt(2.0 * (mask.layers - 1) / cos_closed * z - 1.0 * z * z));
+    for (int x = 0; x < mask.side; ++x)
+      for (int y = 0; y < mask.side; ++y)
+        mask.counted[mask.index(x, y, z)] = distance(mask.side / 2, x, y) <= reach ? 1 : 0;
+  }
+  return mask;
+}
+
+// ClimbLab v3: an odd side about the true centre, no void layers, the pivot on top.
+GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
+  options.extra_void_layers = 0;
+  const VoxelMeasures m = measure(gripper, options);
+  GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half) + 1, m.H);
+  mask.pivot_z = m.H - 1;
+  const double ROS = std::round(m.in_voxels(gripper.opening_spine_radius_mm));
+  const double DOS = std::round(m.in_voxels(gripper.opening_spine_depth_mm));
+  const double DS = std::round(m.in_voxels(gripper.spine_depth_mm));
+  fill(mask, [&](int x, int y, int s) {
+    const float d = distance(mask.side / 2, x, y);
+    const double depth = s - 1;
+    const double Rg = m.RT + (m.half - m.RT) * depth / (m.Hcl - 1.0);
+    const double outer = m.half - std::round(m.half - (ROS + DS)) * depth / (DOS - 1.0);
+    return (s <= m.Hcl && (d < Rg || d > outer)) || (m.Hcl < s && s < m.H) ||
+           (s == m.H && d > m.RB);
+  });
+  return mask;
+}
+
+// The radii of `thesis` in millimetres decide for the centre of each voxel; the pivot is the
+// centre of the top solid layer (fig. 3-11).
+GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& options) {
+  const double voxel_mm = options.voxel_size_m * 1000.0;
+  const double half =
+      gripper.finger_joint_diameter_mm / 2.0 + gripper.finger_length_mm + gripper.spine_length_mm;
+  // A hair less, so that a length of whole voxels does not depend on the last bit of a quotient.
+  const double slack = 1e-9;
+  const double rings = std::floor(half / voxel_mm + slack);
+  const double depth_layers = std::ceil(gripper.closing_height_mm / voxel_mm - slack);
+  if (!(rings < 0x1p20 && depth_layers < 0x1p20))
+    throw libmap::Error("the gripper mask would be more than 2^21 voxels wide",
+                        {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
+  GripperMask mask =
+      empty_mask(options, 2 * static_cast<int>(rings) + 1, static_cast<int>(depth_layers));
+  mask.pivot_z = mask.solid_layers - 1;
+  const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
+  const double RT = (gripper.palm_diameter_mm + gripper.top_solid_margin_mm) / 2.0;
+  const double Hcl = (2.0 * half - gripper.palm_diameter_mm) / 2.0 * cone;
+  const double H = gripper.closing_height_mm;
+  const double RB = gripper.palm_diameter_mm / 2.0 + H * tan_deg(gripper.closing_angle_deg) -
+                    gripper.bottom_void_margin_mm;
+  fill(mask, [&](int x, int y, int s) {
+    const double d = voxel_mm * std::hypot(x - mask.pivot_xy, y - mask.pivot_xy);
+    const double depth = voxel_mm * (s - 1);
+    if (s == mask.solid_layers) return d > RB;
+    if (depth < Hcl) return d <= RT + depth / cone;
+    const double t = depth - (H - RB);
+    return t <= 0.0 ? d < half : d > std::sqrt(2.0 * RB * t - t * t);
+  });
+  return mask;
+}
+
+}  // namespace
+
+const std::vector<std::pair<std::string, Method>>& method_names() {
+  static const std::vector<std::pair<std::string, Method>> names = {
+      {"thesis", Method::thesis},
+      {"envelope", Method::envelope},
+      {"climblab", Method::climblab},
+      {"corrected", Method::corrected}};
+  return names;
+}
+
+std::string name_of(Method method) {
+  for (const auto& [name, value] : method_names())
+    if (value == method) return name;
+  return {};
+}
+
+GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options) {
+  gripper.check();
+  if (!(options.voxel_size_m > 0.0) || !std::isfinite(options.voxel_size_m))
+    throw libmap::Error(
+        "out of range",
+        {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m), .bound = "> 0"});
+  if (options.extra_void_layers < 0 || options.extra_void_layers > 10000)
+    throw libmap::Error("out of range", {.field = "extra_void_layers",
+                                         .value = std::to_string(options.extra_void_layers),
+                                         .bound = ">= 0 and <= 10000"});
+  // Below this the measures in voxels would not fit their integers.
+  if (options.voxel_size_m < 1e-7)
+    throw libmap::Error("the gripper mask would be more than 2^21 voxels wide",
+                        {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
+  switch (options.method) {
+    case Method::thesis:
+      return make_thesis(gripper, options);
+    case Method::envelope:
+      return make_envelope(gripper, options);
+    case Method::climblab:
+      return make_climblab(gripper, options);
+    case Method::corrected:
+      break;
+  }
+  return make_corrected(gripper, options);
+}
+
+std::string to_text(const GripperMask& mask) {
+  std::string text =
+      "# dims nx ny nz, z = 0 is the lowest layer; a line is an x, a character a y\n";
+  text += std::to_string(mask.side) + " " + std::to_string(mask.side) + " " +
+          std::to_string(mask.layers) + "\n";
+  for (int z = 0; z < mask.layers; ++z) {
+    text += "z " + std::to_string(z) + "\n";
+    for (int x = 0; x < mask.side; ++x) {
+      for (int y = 0; y < mask.side; ++y) text += mask.is_solid(x, y, z) ? '1' : '0';
+      text += '\n';
+    }
+  }
+  return text;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,47 @@
+// Voxel matching (eq. 3-17, 3-18, listing A.6): how much of the ground around a pivot voxel lies
+// where the gripper mask wants it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "libgtd/gripper/gripper_mask.h"
+#include "libgtd/terrain/voxel_grid.h"
+#include "libmap/core/progress.h"
+
+namespace libgtd {
+
+// Sum of V * O and of V * M * O over the window of a pivot.
+struct VoxelCounts {
+  std::uint32_t ssv = 0;  // solid voxels in the sub-space
+  std::uint32_t gsv = 0;  // those of them that the mask wants
+  bool operator==(const VoxelCounts&) const = default;
+};
+
+// A square of voxel columns, [begin, end) in i and j.
+struct TileBounds {
+  int i_begin = 0;
+  int i_end = 0;
+  int j_begin = 0;
+  int j_end = 0;
+};
+
+// The pivots of `grid` within `tile`, as positions in grid.voxels, ascending. Methods other than
+// `corrected` pass over a border of half a mask: h+1 <= i <= NX-h-2 and the same in j.
+std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mask,
+                                   const TileBounds& tile);
+
+// Counts of each pivot of one tile, by population counts over rows of bits. Only the voxels of the
+// tile and of a halo of half a mask are read, and the counts of a pivot do not depend on the tile
+// that it is counted in. Throws Error if the window would take more than max_window_bytes.
+std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
+                                      const TileBounds& tile,
+                                      const std::vector<std::size_t>& pivots);
+
+// The same by the plain triple loop of listing A.6, over a dense array of the whole box, one
+// thread: the oracle of the tests and the baseline of the benchmarks.
+std::vector<VoxelCounts> match_voxels_plainly(const VoxelGrid& grid, const GripperMask& mask,
+                                              const std::vector<std::size_t>& pivots);
+
+}  // namespace libgtd

@@ -1,0 +1,82 @@
+#include "libgtd/shape/convexity.h"
+
+#include <cmath>
+#include <string>
+
+#include "libgtd/shape/point_grid.h"
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+constexpr std::size_t grain = 1024;
+
+bool is_convex(const Curvature& c, CurvatureMethod method, double height,
+               const ConvexityOptions& options) {
+  if (!c.valid) return false;
+  if (method == CurvatureMethod::corrected) return c.k2 > options.min_curvature_per_m;
+  const double gaussian = static_cast<double>(c.k1) * static_cast<double>(c.k2);  // eq. 3-19
+  return gaussian > options.min_gaussian_curvature && height > options.zero_plane_m;
+}
+
+void check_bound(const char* field, double value) {
+  if (std::isnan(value)) throw libmap::Error("not a number", {.field = field, .value = "nan"});
+}
+
+bool is_near(const Eigen::Vector3d& place, const std::vector<Eigen::Vector3d>& points,
+             const PointGrid& grid, double distance) {
+  const PointGrid::Cell cell = grid.cell_of(place);
+  PointGrid::Cell near;
+  for (near[0] = cell[0] - 1; near[0] <= cell[0] + 1; ++near[0])
+    for (near[1] = cell[1] - 1; near[1] <= cell[1] + 1; ++near[1])
+      for (near[2] = cell[2] - 1; near[2] <= cell[2] + 1; ++near[2]) {
+        const PointGrid::Range range = grid.range_of(near);
+        for (std::uint32_t k = range.first; k < range.last; ++k)
+          if ((points[grid.order()[k]] - place).squaredNorm() < distance * distance) return true;
+      }
+  return false;
+}
+
+}  // namespace
+
+std::vector<std::uint8_t> find_convex(const CurvatureResult& curvature,
+                                      const std::vector<Eigen::Vector3d>& positions,
+                                      const ConvexityOptions& options) {
+  if (positions.size() != curvature.points.size())
+    throw libmap::Error("not as many as there are curvatures",
+                        {.field = "positions",
+                         .value = std::to_string(positions.size()),
+                         .bound = std::to_string(curvature.points.size())});
+  check_bound("min_curvature_per_m", options.min_curvature_per_m);
+  check_bound("min_gaussian_curvature", options.min_gaussian_curvature);
+  check_bound("zero_plane_m", options.zero_plane_m);
+  std::vector<std::uint8_t> convex(positions.size(), 0);
+  for (std::size_t i = 0; i < positions.size(); ++i)
+    convex[i] =
+        is_convex(curvature.points[i], curvature.method, positions[i].z(), options) ? 1 : 0;
+  return convex;
+}
+
+std::vector<std::uint8_t> mark_near_convex(const std::vector<Eigen::Vector3d>& positions,
+                                           const std::vector<Eigen::Vector3d>& convex_points,
+                                           double distance_m) {
+  if (!(distance_m > 0) || std::isinf(distance_m))
+    throw libmap::Error("not a distance", {.field = "distance_m",
+                                           .value = libmap::to_text(distance_m),
+                                           .bound = "> 0 and finite"});
+  // Cells a little wider than the distance, against rounding at their borders.
+  const PointGrid grid(convex_points, distance_m * (1 + 1e-9));
+  std::vector<std::uint8_t> near(positions.size(), 0);
+  if (grid.cells().empty()) return near;
+  libmap::parallel_for(positions.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      if (grid.reaches(positions[i]))
+        near[i] = is_near(positions[i], convex_points, grid, distance_m) ? 1 : 0;
+  });
+  return near;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,334 @@
+#include "libgtd/shape/curvature.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <string>
+
+#include "libgtd/shape/pcl_curvature.h"
+#include "libgtd/shape/point_grid.h"
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using Lanes = Eigen::Array2d;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+constexpr std::size_t lanes = 2;
+constexpr std::size_t min_neighbors = 6;  // a quadric has six coefficients
+// Squares of widths relative to each other: below the first a neighbourhood is a line, above the
+// second it is a lump in which no plane is tangent.
+constexpr double min_width_ratio = 1e-6;
+constexpr double max_lump_ratio = 0.8;
+// What must be left of a column of the normal equations after the ones before it are taken out.
+constexpr double min_pivot = 1e-6;
+// A surface this near to being along `up` (0.06 deg) has no known outside.
+constexpr double min_side_cosine = 1e-3;
+
+// Coordinates one after the other, so that the loops below run on vector registers.
+struct Coordinates {
+  std::vector<double> x, y, z;
+
+  void resize(std::size_t count) {
+    x.resize(count);
+    y.resize(count);
+    z.resize(count);
+  }
+  std::size_t size() const { return x.size(); }
+};
+
+Lanes load(const std::vector<double>& values, std::size_t i) {
+  return Eigen::Map<const Lanes>(values.data() + i);
+}
+
+// The points of all cells that can hold a neighbour of a point in `cell`.
+void gather(const libmap::PointCloud& cloud, const PointGrid& grid, const PointGrid::Cell& cell,
+            Coordinates& candidates) {
+  candidates.resize(0);
+  PointGrid::Cell near;
+  for (near[0] = cell[0] - 2; near[0] <= cell[0] + 2; ++near[0])
+    for (near[1] = cell[1] - 2; near[1] <= cell[1] + 2; ++near[1])
+      for (near[2] = cell[2] - 2; near[2] <= cell[2] + 2; ++near[2]) {
+        const PointGrid::Range range = grid.range_of(near);
+        for (std::uint32_t k = range.first; k < range.last; ++k) {
+          const Vector3d& p = cloud.positions[grid.order()[k]];
+          candidates.x.push_back(p.x());
+          candidates.y.push_back(p.y());
+          candidates.z.push_back(p.z());
+        }
+      }
+}
+
+// The candidates within the radius, relative to `center` and in units of the radius; zeros follow
+// up to a full set of lanes. Returns their number.
+std::size_t select_neighbors(const Coordinates& candidates, const Vector3d& center, double radius,
+                             Coordinates& neighbors) {
+  neighbors.resize(candidates.size() + lanes);
+  const double inverse = 1 / radius;
+  const double limit = radius * radius;
+  std::size_t count = 0;
+  for (std::size_t k = 0; k < candidates.size(); ++k) {
+    const double x = candidates.x[k] - center.x();
+    const double y = candidates.y[k] - center.y();
+    const double z = candidates.z[k] - center.z();
+    neighbors.x[count] = x * inverse;
+    neighbors.y[count] = y * inverse;
+    neighbors.z[count] = z * inverse;
+    count += x * x + y * y + z * z <= limit ? 1 : 0;
+  }
+  for (std::size_t k = count; k < count + lanes; ++k)
+    neighbors.x[k] = neighbors.y[k] = neighbors.z[k] = 0;
+  return count;
+}
+
+Matrix3d covariance_of(const Coordinates& neighbors, std::size_t count) {
+  std::array<Lanes, 9> s;
+  s.fill(Lanes::Zero());
+  for (std::size_t k = 0; k < count; k += lanes) {
+    const Lanes x = load(neighbors.x, k), y = load(neighbors.y, k), z = load(neighbors.z, k);
+    s[0] += x;
+    s[1] += y;
+    s[2] += z;
+    s[3] += x * x;
+    s[4] += x * y;
+    s[5] += x * z;
+    s[6] += y * y;
+    s[7] += y * z;
+    s[8] += z * z;
+  }
+  std::array<double, 9> sum;
+  for (std::size_t i = 0; i < 9; ++i) sum[i] = s[i].sum() / static_cast<double>(count);
+  const Vector3d mean(sum[0], sum[1], sum[2]);
+  Matrix3d second;
+  second << sum[3], sum[4], sum[5], sum[4], sum[6], sum[7], sum[5], sum[7], sum[8];
+  return second - mean * mean.transpose();
+}
+
+// Columns u, v, w: the neighbourhood's widest, second and thinnest direction. False if it is a line
+// or a lump.
+bool tangent_frame(const Coordinates& neighbors, std::size_t count, Matrix3d& frame) {
+  Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
+  solver.computeDirect(covariance_of(neighbors, count));
+  const Vector3d& widths = solver.eigenvalues();
+  if (!(widths[1] > min_width_ratio * widths[2]) || widths[0] > max_lump_ratio * widths[1])
+    return false;
+  const Vector3d w = solver.eigenvectors().col(0).normalized();
+  const Vector3d wide = solver.eigenvectors().col(2);
+  const Vector3d u = (wide - wide.dot(w) * w).normalized();
+  frame << u, w.cross(u), w;
+  return frame.allFinite();
+}
+
+// The normal equations of w = f + d u + e v + a u^2 + b u v + c v^2.
+void normal_equations(const Coordinates& neighbors, std::size_t count, const Matrix3d& frame,
+                      Matrix6d& matrix, Vector6d& right) {
+  std::array<Lanes, 20> s;
+  s.fill(Lanes::Zero());
+  for (std::size_t k = 0; k < count; k += lanes) {
+    const Lanes x = load(neighbors.x, k), y = load(neighbors.y, k), z = load(neighbors.z, k);
+    const Lanes u = x * frame(0, 0) + y * frame(1, 0) + z * frame(2, 0);
+    const Lanes v = x * frame(0, 1) + y * frame(1, 1) + z * frame(2, 1);
+    const Lanes w = x * frame(0, 2) + y * frame(1, 2) + z * frame(2, 2);
+    const Lanes uu = u * u, uv = u * v, vv = v * v;
+    s[0] += u;
+    s[1] += v;
+    s[2] += uu;
+    s[3] += uv;
+    s[4] += vv;
+    s[5] += uu * u;
+    s[6] += uu * v;
+    s[7] += u * vv;
+    s[8] += vv * v;
+    s[9] += uu * uu;
+    s[10] += uu * uv;
+    s[11] += uu * vv;
+    s[12] += uv * vv;
+    s[13] += vv * vv;
+    s[14] += w;
+    s[15] += u * w;
+    s[16] += v * w;
+    s[17] += uu * w;
+    s[18] += uv * w;
+    s[19] += vv * w;
+  }
+  std::array<double, 20> m;
+  for (std::size_t i = 0; i < 20; ++i) m[i] = s[i].sum();
+  matrix << static_cast<double>(count), m[0], m[1], m[2], m[3], m[4],  //
+      m[0], m[2], m[3], m[5], m[6], m[7],                              //
+      m[1], m[3], m[4], m[6], m[7], m[8],                              //
+      m[2], m[5], m[6], m[9], m[10], m[11],                            //
+      m[3], m[6], m[7], m[10], m[11], m[12],                           //
+      m[4], m[7], m[8], m[11], m[12], m[13];
+  right << m[14], m[15], m[16], m[17], m[18], m[19];
+}
+
+// Solves by L D L^T; false where the columns are not independent.
+bool solve(const Matrix6d& matrix, const Vector6d& right, Vector6d& solution) {
+  Matrix6d l = Matrix6d::Identity();
+  Vector6d d;
+  for (int j = 0; j < 6; ++j) {
+    d[j] = matrix(j, j);
+    for (int k = 0; k < j; ++k) d[j] -= l(j, k) * l(j, k) * d[k];
+    if (!(d[j] > min_pivot * matrix(j, j))) return false;
+    for (int i = j + 1; i < 6; ++i) {
+      double value = matrix(i, j);
+      for (int k = 0; k < j; ++k) value -= l(i, k) * l(j, k) * d[k];
+      l(i, j) = value / d[j];
+    }
+  }
+  solution = right;
+  l.triangularView<Eigen::UnitLower>().solveInPlace(solution);
+  solution.array() /= d.array();
+  l.transpose().triangularView<Eigen::UnitUpper>().solveInPlace(solution);
+  return solution.allFinite();
+}
+
+// The eigenvalues of the Weingarten map of that quadric at u = v = 0, larger first; positive where
+// the surface bends towards +w (do Carmo, Differential Geometry of Curves and Surfaces, 3.3).
+std::array<double, 2> bending(const Vector6d& quadric) {
+  const double d = quadric[1], e = quadric[2];
+  const double stretch = std::sqrt(1 + d * d + e * e);
+  const double l = 2 * quadric[3] / stretch, m = quadric[4] / stretch, n = 2 * quadric[5] / stretch;
+  // I = C C^T turns I^-1 II into the symmetric C^-1 II C^-T.
+  const double c00 = std::sqrt(1 + d * d), c10 = d * e / c00;
+  const double c11 = stretch / c00;
+  const double s00 = l / (c00 * c00);
+  const double s01 = (m / c00 - c10 * s00) / c11;
+  const double s11 = (n - 2 * c10 * m / c00 + c10 * c10 * s00) / (c11 * c11);
+  const double middle = (s00 + s11) / 2;
+  const double half = std::hypot((s00 - s11) / 2, s01);
+  return {middle + half, middle - half};
+}
+
+// +1 if `normal` faces outside, -1 if inside, 0 if that is not known.
+int side_of(const Vector3d& normal, const libmap::PointCloud& cloud, std::size_t point,
+            const Vector3d& up) {
+  Vector3d outside = Vector3d::Zero();
+  if (cloud.has_normals()) outside = cloud.normals[point].cast<double>();
+  double cosine = outside.allFinite() && outside.norm() > 0 ? normal.dot(outside.normalized()) : 0;
+  if (std::abs(cosine) < min_side_cosine) cosine = normal.dot(up);
+  if (std::abs(cosine) < min_side_cosine) return 0;
+  return cosine > 0 ? 1 : -1;
+}
+
+class QuadricFitter {
+ public:
+  QuadricFitter(const libmap::PointCloud& cloud, const PointGrid& grid, double radius,
+                const Vector3d& up)
+      : cloud_(cloud), grid_(grid), radius_(radius), up_(up.normalized()) {}
+
+  void enter(const PointGrid::Cell& cell) { gather(cloud_, grid_, cell, candidates_); }
+
+  // At a point of the cell that was entered last.
+  Curvature fit(std::size_t point) {
+    const std::size_t count =
+        select_neighbors(candidates_, cloud_.positions[point], radius_, neighbors_);
+    Matrix3d frame;
+    Matrix6d matrix;
+    Vector6d right, quadric;
+    if (count < min_neighbors || !tangent_frame(neighbors_, count, frame)) return {};
+    normal_equations(neighbors_, count, frame, matrix, right);
+    if (!solve(matrix, right, quadric)) return {};
+    const Vector3d normal = (frame * Vector3d(-quadric[1], -quadric[2], 1)).normalized();
+    const int side = side_of(normal, cloud_, point, up_);
+    if (side == 0) return {};
+    const auto [toward, away] = bending(quadric);
+    Curvature result;
+    result.k1 = static_cast<float>((side > 0 ? -away : toward) / radius_);
+    result.k2 = static_cast<float>((side > 0 ? -toward : away) / radius_);
+    result.normal = (side * normal).cast<float>();
+    result.valid = std::isfinite(result.k1) && std::isfinite(result.k2);
+    return result.valid ? result : Curvature{};
+  }
+
+ private:
+  const libmap::PointCloud& cloud_;
+  const PointGrid& grid_;
+  double radius_;
+  Vector3d up_;
+  Coordinates candidates_;
+  Coordinates neighbors_;
+};
+
+// The queries of each cell of the grid, so that a cell's surroundings are gathered once.
+std::vector<std::vector<std::size_t>> queries_by_cell(const PointGrid& grid, std::size_t points,
+                                                      const std::vector<std::size_t>& queries) {
+  constexpr std::size_t nowhere = static_cast<std::size_t>(-1);
+  std::vector<std::size_t> cell_of_point(points, nowhere);
+  for (std::size_t c = 0; c < grid.cells().size(); ++c)
+    for (std::uint32_t k = grid.ranges()[c].first; k < grid.ranges()[c].last; ++k)
+      cell_of_point[grid.order()[k]] = c;
+  std::vector<std::vector<std::size_t>> groups(grid.cells().size());
+  for (std::size_t q = 0; q < queries.size(); ++q)
+    if (cell_of_point[queries[q]] != nowhere) groups[cell_of_point[queries[q]]].push_back(q);
+  return groups;
+}
+
+std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
+                                    const CurvatureOptions& options,
+                                    const std::vector<std::size_t>& queries) {
+  // Half the radius, a little more against rounding at the cells' borders.
+  const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-9));
+  const auto groups = queries_by_cell(grid, cloud.size(), queries);
+  std::vector<Curvature> results(queries.size());
+  libmap::parallel_for(groups.size(), 16, [&](std::size_t begin, std::size_t end) {
+    QuadricFitter fitter(cloud, grid, options.radius_m, options.up);
+    for (std::size_t c = begin; c < end; ++c) {
+      if (groups[c].empty()) continue;
+      fitter.enter(grid.cells()[c]);
+      for (const std::size_t q : groups[c]) results[q] = fitter.fit(queries[q]);
+    }
+  });
+  return results;
+}
+
+std::vector<std::size_t> checked_queries(const std::optional<std::vector<std::size_t>>& queries,
+                                         std::size_t points) {
+  std::vector<std::size_t> indices;
+  if (queries) {
+    indices = *queries;
+  } else {
+    indices.resize(points);
+    for (std::size_t i = 0; i < points; ++i) indices[i] = i;
+  }
+  for (const std::size_t i : indices)
+    if (i >= points)
+      throw libmap::Error("no such point", {.field = "query",
+                                            .value = std::to_string(i),
+                                            .bound = "< " + std::to_string(points)});
+  return indices;
+}
+
+}  // namespace
+
+CurvatureResult estimate_curvature(const libmap::PointCloud& cloud, const CurvatureOptions& options,
+                                   const std::optional<std::vector<std::size_t>>& queries) {
+  cloud.check();
+  if (!(options.radius_m > 0) || std::isinf(options.radius_m))
+    throw libmap::Error("not a radius", {.field = "radius_m",
+                                         .value = libmap::to_text(options.radius_m),
+                                         .bound = "> 0 and finite"});
+  if (!options.up.allFinite() || !(options.up.norm() > 0))
+    throw libmap::Error("not a direction", {.field = "up"});
+  const std::vector<std::size_t> indices = checked_queries(queries, cloud.size());
+  CurvatureResult result;
+  result.method = options.method;
+  result.points = options.method == CurvatureMethod::thesis
+                      ? estimate_pcl_curvature(cloud, options.radius_m, indices)
+                      : fit_quadrics(cloud, options, indices);
+  result.valid_count = static_cast<std::size_t>(
+      std::count_if(result.points.begin(), result.points.end(),
+                    [](const Curvature& c) { return c.valid; }));
+  return result;
+}
+
+}  // namespace libgtd

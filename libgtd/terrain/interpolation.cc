@@ -1,0 +1,334 @@
+#include "libgtd/terrain/interpolation.h"
+
+#include <CGAL/Delaunay_triangulation_2.h>
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Spatial_sort_traits_adapter_2.h>
+#include <CGAL/Triangulation_vertex_base_with_info_2.h>
+#include <CGAL/property_map.h>
+#include <CGAL/spatial_sort.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<double, Kernel>;  // the height
+using Triangulation =
+    CGAL::Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase>>;
+using Point = Kernel::Point_2;
+using Eigen::Vector3d;
+
+// Where the grid's nodes stand along one axis, in increasing order.
+using Axis = std::vector<double>;
+
+struct Box {
+  double min_x, max_x, min_y, max_y;
+  double area() const { return (max_x - min_x) * (max_y - min_y); }
+};
+
+struct Triangle {
+  std::array<Point, 3> at;
+  std::array<double, 3> z;
+};
+
+std::vector<Vector3d> finite_points(const libmap::PointCloud& cloud, InterpolationMethod method) {
+  std::vector<Vector3d> points;
+  points.reserve(cloud.size());
+  for (const Vector3d& p : cloud.positions) {
+    if (!p.allFinite()) continue;
+    points.push_back(p);
+    if (method == InterpolationMethod::thesis)
+      points.back() = p.cast<float>().cast<double>();
+  }
+  return points;
+}
+
+Box box_of(const std::vector<Vector3d>& points) {
+  Box box{points[0].x(), points[0].x(), points[0].y(), points[0].y()};
+  for (const Vector3d& p : points) {
+    box.min_x = std::min(box.min_x, p.x());
+    box.max_x = std::max(box.max_x, p.x());
+    box.min_y = std::min(box.min_y, p.y());
+    box.max_y = std::max(box.max_y, p.y());
+  }
+  return box;
+}
+
+// Of points with the same x and y the highest stays, whatever their order.
+Triangulation triangulate(const std::vector<Vector3d>& points) {
+  std::vector<Point> sites(points.size());
+  std::vector<std::size_t> order(points.size());
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    sites[i] = Point(points[i].x(), points[i].y());
+    order[i] = i;
+  }
+  const auto site_of = CGAL::make_property_map(sites);
+  CGAL::spatial_sort(order.begin(), order.end(),
+                     CGAL::Spatial_sort_traits_adapter_2<Kernel, decltype(site_of)>(site_of));
+  Triangulation triangulation;
+  Triangulation::Face_handle hint;
+  for (const std::size_t i : order) {
+    const std::size_t before = triangulation.number_of_vertices();
+    const auto vertex = triangulation.insert(sites[i], hint);
+    const bool added = triangulation.number_of_vertices() > before;
+    vertex->info() = added ? points[i].z() : std::max(vertex->info(), points[i].z());
+    hint = vertex->face();
+  }
+  if (triangulation.dimension() < 2)
+    throw libmap::Error("the points' x and y all lie on a line: nothing to interpolate between");
+  return triangulation;
+}
+
+double area_of_cells(const std::vector<Vector3d>& points, double cell) {
+  std::vector<std::pair<double, double>> cells;
+  cells.reserve(points.size());
+  for (const Vector3d& p : points)
+    cells.emplace_back(std::floor(p.x() / cell), std::floor(p.y() / cell));
+  std::sort(cells.begin(), cells.end());
+  const auto end = std::unique(cells.begin(), cells.end());
+  return static_cast<double>(end - cells.begin()) * cell * cell;
+}
+
+double occupied_area(const std::vector<Vector3d>& points, const Box& box, double cell) {
+  if (cell > 0) return area_of_cells(points, cell);
+  cell = 4 * std::sqrt(box.area() / static_cast<double>(points.size()));
+  return std::min(box.area(), area_of_cells(points, cell));
+}
+
+// The program's form of eq. 3-5: its 5/3 is a division of integers, so 1.
+double thesis_spacing(std::size_t count, const Box& box) {
+  const double density =
+      static_cast<double>(count) / ((box.max_x - box.min_x) * (box.max_y - box.min_y));
+  return 1 / (std::round(std::sqrt(density) * 10000) / 10000);
+}
+
+void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
+  const double columns = (box.max_x - box.min_x) / spacing + 1;
+  const double rows = (box.max_y - box.min_y) / spacing + 1;
+  if (!(columns * rows <= static_cast<double>(max_nodes)))
+    throw libmap::Error("the grid would have too many nodes",
+                        {.field = "grid spacing",
+                         .value = libmap::to_text(spacing) + " m",
+                         .bound = "at most " +
+                                  libmap::to_text(static_cast<std::int64_t>(max_nodes)) +
+                                  " nodes over the points' x and y"});
+  const double farthest = std::max({std::abs(box.min_x), std::abs(box.max_x),
+                                    std::abs(box.min_y), std::abs(box.max_y)});
+  if (!(spacing > farthest * 0x1.0p-50))
+    throw libmap::Error("the points lie too far from the origin for this grid spacing",
+                        {.field = "grid spacing", .value = libmap::to_text(spacing) + " m"});
+}
+
+Axis repeated_addition(double min, double max, double spacing) {
+  Axis axis;
+  for (double at = min; at < max; at += spacing) axis.push_back(at);
+  return axis;
+}
+
+Axis lattice(double min, double max, double spacing) {
+  Axis axis;
+  for (double i = std::ceil(min / spacing); i * spacing <= max; ++i) axis.push_back(i * spacing);
+  return axis;
+}
+
+// The first node of `axis` that may be >= `at`: never one too far.
+std::size_t first_node(const Axis& axis, double at, double spacing) {
+  const double index = std::floor((at - axis.front()) / spacing) - 1;
+  std::size_t i = index <= 0 ? 0 : std::min(static_cast<std::size_t>(index), axis.size());
+  while (i > 0 && axis[i - 1] >= at) --i;
+  while (i < axis.size() && axis[i] < at) ++i;
+  return i;
+}
+
+// Between which y the vertical line at `x` crosses the triangle, a little widened.
+std::pair<double, double> crossing(const Triangle& t, double x) {
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (std::size_t a = 0; a < 3; ++a) {
+    const Point& p = t.at[a];
+    const Point& q = t.at[(a + 1) % 3];
+    if (std::min(p.x(), q.x()) > x || std::max(p.x(), q.x()) < x) continue;
+    const double run = q.x() - p.x();
+    if (run == 0) {
+      low = std::min({low, p.y(), q.y()});
+      high = std::max({high, p.y(), q.y()});
+      continue;
+    }
+    const double y = p.y() + std::clamp((x - p.x()) / run, 0.0, 1.0) * (q.y() - p.y());
+    low = std::min(low, y);
+    high = std::max(high, y);
+  }
+  const double margin = 1e-14 * (std::abs(low) + std::abs(high)) + 1e-12 * (high - low);
+  return {low - margin, high + margin};
+}
+
+bool covers(const Triangle& t, const Point& node) {
+  return CGAL::orientation(t.at[0], t.at[1], node) != CGAL::RIGHT_TURN &&
+         CGAL::orientation(t.at[1], t.at[2], node) != CGAL::RIGHT_TURN &&
+         CGAL::orientation(t.at[2], t.at[0], node) != CGAL::RIGHT_TURN;
+}
+
+// From the plane's equation n . (r - r0) = 0, in the order of operations of the program.
+double plane_height(const Triangle& t, double x, double y) {
+  const Vector3d origin(t.at[0].x(), t.at[0].y(), t.z[0]);
+  const Vector3d b = Vector3d(t.at[1].x(), t.at[1].y(), t.z[1]) - origin;
+  const Vector3d c = Vector3d(t.at[2].x(), t.at[2].y(), t.z[2]) - origin;
+  const Vector3d n = c.cross(b);
+  return (n.x() * origin.x() + n.y() * origin.y() + n.z() * origin.z() - x * n.x() - y * n.y()) /
+         n.z();
+}
+
+// From coordinates relative to a corner, so that a far origin does no harm; within the corners'
+// heights even where the triangle is too thin for its area to be computed well.
+double barycentric_height(const Triangle& t, double x, double y) {
+  const double bx = t.at[1].x() - t.at[0].x(), by = t.at[1].y() - t.at[0].y();
+  const double cx = t.at[2].x() - t.at[0].x(), cy = t.at[2].y() - t.at[0].y();
+  const double px = x - t.at[0].x(), py = y - t.at[0].y();
+  const double area = bx * cy - by * cx;
+  const double u = (px * cy - py * cx) / area;
+  const double v = (bx * py - by * px) / area;
+  const double z = t.z[0] + u * (t.z[1] - t.z[0]) + v * (t.z[2] - t.z[0]);
+  const auto [low, high] = std::minmax({t.z[0], t.z[1], t.z[2]});
+  return std::isnan(z) ? t.z[0] : std::clamp(z, low, high);
+}
+
+bool longer_than(const Triangle& t, double limit) {
+  for (std::size_t a = 0; a < 3; ++a)
+    if (CGAL::squared_distance(t.at[a], t.at[(a + 1) % 3]) > limit * limit) return true;
+  return false;
+}
+
+// Heights at the grid's nodes; NaN where no triangle covers them. A node on an edge takes the
+// triangle that comes first.
+class HeightGrid {
+ public:
+  HeightGrid(Axis xs, Axis ys, double spacing)
+      : xs_(std::move(xs)),
+        ys_(std::move(ys)),
+        spacing_(spacing),
+        z_(xs_.size() * ys_.size(), std::numeric_limits<double>::quiet_NaN()) {}
+
+  template <typename Height>
+  void fill(const Triangle& t, const Height& height) {
+    if (z_.empty()) return;
+    const auto [low, high] = std::minmax({t.at[0].x(), t.at[1].x(), t.at[2].x()});
+    for (std::size_t i = first_node(xs_, low, spacing_); i < xs_.size() && xs_[i] <= high; ++i) {
+      const auto [bottom, top] = crossing(t, xs_[i]);
+      double* const column = z_.data() + i * ys_.size();
+      for (std::size_t j = first_node(ys_, bottom, spacing_); j < ys_.size() && ys_[j] <= top; ++j)
+        if (std::isnan(column[j]) && covers(t, Point(xs_[i], ys_[j])))
+          column[j] = height(t, xs_[i], ys_[j]);
+    }
+  }
+
+  template <typename Visit>
+  void visit(const Visit& visit_node) const {
+    for (std::size_t i = 0; i < xs_.size(); ++i)
+      for (std::size_t j = 0; j < ys_.size(); ++j)
+        visit_node(xs_[i], ys_[j], z_[i * ys_.size() + j]);
+  }
+
+ private:
+  Axis xs_;
+  Axis ys_;
+  double spacing_;
+  std::vector<double> z_;
+};
+
+void check_options(const InterpolationOptions& options) {
+  const auto check = [](const char* field, double value) {
+    if (!(value >= 0) || std::isinf(value))
+      throw libmap::Error("not a length", {.field = field,
+                                           .value = libmap::to_text(value),
+                                           .bound = ">= 0 and finite"});
+  };
+  check("max_edge_m", options.max_edge_m);
+  check("grid_spacing_m", options.grid_spacing_m);
+  check("area_cell_m", options.area_cell_m);
+}
+
+void fill_triangles(const Triangulation& triangulation, const InterpolationOptions& options,
+                    HeightGrid& grid, InterpolationResult& result) {
+  for (const auto& face : triangulation.finite_face_handles()) {
+    Triangle t;
+    for (int a = 0; a < 3; ++a) {
+      t.at[static_cast<std::size_t>(a)] = face->vertex(a)->point();
+      t.z[static_cast<std::size_t>(a)] = face->vertex(a)->info();
+    }
+    ++result.triangles;
+    if (options.max_edge_m > 0 && longer_than(t, options.max_edge_m)) {
+      ++result.refused_triangles;
+    } else if (options.method == InterpolationMethod::thesis) {
+      grid.fill(t, plane_height);
+    } else {
+      grid.fill(t, barycentric_height);
+    }
+  }
+}
+
+HeightGrid make_grid(const std::vector<Vector3d>& points, const InterpolationOptions& options,
+                     InterpolationResult& result) {
+  const Box box = box_of(points);
+  if (options.method == InterpolationMethod::thesis) {
+    result.area_m2 = box.area();
+    const double spacing = result.grid_spacing_m = thesis_spacing(points.size(), box);
+    check_grid(box, spacing, options.max_nodes);
+    return {repeated_addition(box.min_x, box.max_x, spacing),
+            repeated_addition(box.min_y, box.max_y, spacing), spacing};
+  }
+  result.area_m2 = occupied_area(points, box, options.area_cell_m);
+  const double density = static_cast<double>(points.size()) / result.area_m2;
+  const double spacing = result.grid_spacing_m = options.grid_spacing_m > 0
+                                                     ? options.grid_spacing_m
+                                                     : 1 / std::sqrt(density * 5 / 3);  // eq. 3-5
+  check_grid(box, spacing, options.max_nodes);
+  return {lattice(box.min_x, box.max_x, spacing), lattice(box.min_y, box.max_y, spacing), spacing};
+}
+
+}  // namespace
+
+InterpolationResult interpolate(const libmap::PointCloud& cloud,
+                                const InterpolationOptions& options) {
+  check_options(options);
+  const std::vector<Vector3d> points = finite_points(cloud, options.method);
+  if (points.size() < 3)
+    throw libmap::Error("too few finite points to interpolate between",
+                        {.field = "points",
+                         .value = libmap::to_text(static_cast<std::int64_t>(points.size())),
+                         .bound = ">= 3"});
+  const Triangulation triangulation = triangulate(points);
+  InterpolationResult result;
+  result.skipped_points = cloud.size() - triangulation.number_of_vertices();
+  HeightGrid grid = make_grid(points, options, result);
+  fill_triangles(triangulation, options, grid, result);
+
+  result.cloud.viewpoint = cloud.viewpoint;
+  grid.visit([&](double x, double y, double z) {
+    ++result.nodes;
+    const bool thesis = options.method == InterpolationMethod::thesis;
+    if (std::isnan(z)) {
+      ++result.outside_nodes;
+    } else if (thesis && z == 0) {
+      ++result.zero_nodes;
+    } else {
+      const Vector3d node(x, y, z);
+      result.cloud.positions.push_back(thesis ? node.cast<float>().cast<double>().eval() : node);
+    }
+  });
+  return result;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,258 @@
+#include "libgtd/terrain/regression_plane.h"
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+
+namespace libgtd {
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+
+constexpr std::size_t grain = 8192;
+// The input's z axis decides only where it is within 75 deg of the normal.
+constexpr double min_cosine_of_frame_z = 0.2588190451025207;
+// Below these sines two directions count as parallel.
+constexpr double parallel_sine = 1e-6;
+constexpr double in_plane_cosine = 1e-9;
+
+struct Sum {
+  Vector3d of = Vector3d::Zero();
+  std::size_t count = 0;
+};
+
+struct Moments {
+  double second = 0;
+  double third = 0;
+};
+
+template <typename T, typename Add>
+T sum_over(const libmap::PointCloud& cloud, const T& zero, const Add& add) {
+  return libmap::parallel_reduce(
+      cloud.size(), grain, zero,
+      [&](std::size_t begin, std::size_t end) {
+        T sum = zero;
+        for (std::size_t i = begin; i < end; ++i)
+          if (cloud.positions[i].allFinite()) add(sum, i);
+        return sum;
+      },
+      [](T a, const T& b) {
+        a += b;
+        return a;
+      });
+}
+
+Sum& operator+=(Sum& a, const Sum& b) {
+  a.of += b.of;
+  a.count += b.count;
+  return a;
+}
+
+Moments& operator+=(Moments& a, const Moments& b) {
+  a.second += b.second;
+  a.third += b.third;
+  return a;
+}
+
+Vector3d mean_about(const libmap::PointCloud& cloud, const Vector3d& origin, std::size_t& count) {
+  const Sum sum = sum_over(cloud, Sum{}, [&](Sum& s, std::size_t i) {
+    s.of += cloud.positions[i] - origin;
+    ++s.count;
+  });
+  count = sum.count;
+  if (count == 0) return origin;
+  return origin + sum.of / static_cast<double>(count);
+}
+
+// Eq. 2-13. The second pass takes away the rounding that a far origin leaves in the first.
+Vector3d centroid_of(const libmap::PointCloud& cloud, std::size_t& count) {
+  Vector3d first = Vector3d::Zero();
+  for (const Vector3d& p : cloud.positions) {
+    if (!p.allFinite()) continue;
+    first = p;
+    break;
+  }
+  return mean_about(cloud, mean_about(cloud, first, count), count);
+}
+
+// Eq. 2-14, 2-15: the normal without its sign, and the three variances in increasing order.
+Matrix3d principal_axes(const libmap::PointCloud& cloud, const Vector3d& centroid,
+                        std::size_t count, Vector3d& variances) {
+  Matrix3d covariance = sum_over(cloud, Matrix3d(Matrix3d::Zero()), [&](Matrix3d& s, std::size_t i) {
+    const Vector3d d = cloud.positions[i] - centroid;
+    s += d * d.transpose();
+  });
+  covariance /= static_cast<double>(count);
+  // Scaled, so that neither tiny nor huge clouds leave the numbers' range.
+  const double scale = covariance.trace();
+  if (scale > 0) covariance /= scale;
+  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(covariance);
+  variances = solver.eigenvalues().cwiseMax(0.0) * scale;
+  return solver.eigenvectors();
+}
+
+void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size_t count) {
+  if (count < 3)
+    throw libmap::Error("too few finite points for a plane",
+                        {.field = "points", .value = std::to_string(count), .bound = ">= 3"});
+  const double size = std::sqrt(variances[2]);
+  const double rounding = 1e-15 * centroid.norm();
+  if (!(size > 4 * rounding)) throw libmap::Error("all points lie in one place: no plane fits");
+  // Single-precision coordinates leave about 1e-7 of the offset as noise across a true line.
+  if (!(std::sqrt(variances[1]) > 1e-6 * size + 4 * rounding))
+    throw libmap::Error("all points lie on a line: no plane fits");
+}
+
+Moments height_moments(const libmap::PointCloud& cloud, const Vector3d& centroid,
+                       const Vector3d& normal) {
+  return sum_over(cloud, Moments{}, [&](Moments& m, std::size_t i) {
+    const double h = normal.dot(cloud.positions[i] - centroid);
+    m.second += h * h;
+    m.third += h * h * h;
+  });
+}
+
+// How far `direction` speaks for the side of `normal`: 0 if it is unknown or within the plane.
+double side_of(const Vector3d& normal, const Vector3d& direction) {
+  const double length = direction.stableNorm();
+  if (!(length > 0) || !std::isfinite(length)) return 0;
+  const double cosine = normal.dot(direction / length);
+  return std::abs(cosine) > in_plane_cosine ? cosine : 0;
+}
+
+Vector3d sum_of_normals(const libmap::PointCloud& cloud) {
+  if (!cloud.has_normals()) return Vector3d::Zero();
+  return sum_over(cloud, Vector3d(Vector3d::Zero()), [&](Vector3d& s, std::size_t i) {
+    const Vector3d n = cloud.normals[i].cast<double>();
+    if (n.allFinite() && n.norm() > 0) s += n.normalized();
+  });
+}
+
+// The sign of the normal: which of the two sides is up, and who said so.
+double choose_up(const libmap::PointCloud& cloud, const RegressionPlaneOptions& options,
+                 const Vector3d& centroid, const Vector3d& normal, double skewness,
+                 UpSource& source) {
+  if (options.up) {
+    source = UpSource::direction;
+    const double side = side_of(normal, *options.up);
+    if (side == 0)
+      throw libmap::Error("this direction does not say which side of the plane is up: it has no "
+                          "length or lies in the plane",
+                          {.field = "up"});
+    return side;
+  }
+  double side = 0;
+  if (!cloud.viewpoint.isApprox(libmap::Pose::Identity(), 1e-12)) {
+    source = UpSource::viewpoint;
+    side = side_of(normal, cloud.viewpoint.translation() - centroid);
+    if (side != 0) return side;
+  }
+  source = UpSource::normals;
+  side = side_of(normal, sum_of_normals(cloud));
+  if (side != 0) return side;
+  source = UpSource::frame_z;
+  if (std::abs(normal.z()) >= min_cosine_of_frame_z) return normal.z();
+  source = UpSource::camera_origin;
+  side = side_of(normal, -centroid);
+  if (side != 0) return side;
+  source = UpSource::relief;
+  return skewness < 0 ? -1 : 1;
+}
+
+// Eq. 2-17..2-19 with R = [x, -y, n], y = (c x n) / |c x n|, x = n x y.
+Matrix3d thesis_axes(const Vector3d& centroid, const Vector3d& normal) {
+  const Vector3d across = centroid.cross(normal);
+  if (!(across.norm() > parallel_sine * centroid.norm()) || centroid.norm() == 0)
+    throw libmap::Error(
+        "the centroid lies on the plane's normal through the origin, so eq. 2-17 gives no heading "
+        "(method thesis); use method corrected");
+  const Vector3d y = across.normalized();
+  Matrix3d axes;
+  axes << normal.cross(y), -y, normal;
+  return axes;
+}
+
+Matrix3d corrected_axes(const Vector3d& normal) {
+  Vector3d x = Vector3d::UnitX() - normal.x() * normal;
+  if (x.norm() > 1e-3) {
+    x.normalize();
+  } else {
+    const Vector3d y = (Vector3d::UnitY() - normal.y() * normal).normalized();
+    x = y.cross(normal);
+  }
+  Matrix3d axes;
+  axes << x, normal.cross(x), normal;
+  return axes;
+}
+
+}  // namespace
+
+RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
+                                     const RegressionPlaneOptions& options) {
+  cloud.check();
+  RegressionPlane plane;
+  plane.centroid = centroid_of(cloud, plane.points);
+  plane.skipped = cloud.size() - plane.points;
+  Vector3d variances = Vector3d::Zero();
+  Matrix3d axes = Matrix3d::Identity();
+  if (plane.points >= 3) axes = principal_axes(cloud, plane.centroid, plane.points, variances);
+  check_spread(variances, plane.centroid, plane.points);
+
+  Vector3d normal = axes.col(0);
+  const Moments moments = height_moments(cloud, plane.centroid, normal);
+  const double count = static_cast<double>(plane.points);
+  plane.rmse_m = std::sqrt(moments.second / count);
+  const double cube = plane.rmse_m * plane.rmse_m * plane.rmse_m;
+  double skewness = cube > 0 ? moments.third / count / cube : 0;
+  if (!std::isfinite(skewness)) skewness = 0;
+
+  if (choose_up(cloud, options, plane.centroid, normal, skewness, plane.up_source) < 0) {
+    normal = -normal;
+    skewness = -skewness;
+  }
+  plane.relief_skewness = skewness;
+  const Matrix3d rotation = options.method == PlaneMethod::thesis
+                                ? thesis_axes(plane.centroid, normal)
+                                : corrected_axes(normal);
+  plane.terrain_from_input.linear() = rotation.transpose();
+  plane.terrain_from_input.translation() = -(rotation.transpose() * plane.centroid);
+  return plane;
+}
+
+libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,
+                                        const RegressionPlane& plane, PlaneMethod method) {
+  libmap::PointCloud moved = libmap::transform_cloud(cloud, plane.terrain_from_input);
+  const Eigen::Matrix3d rotation = plane.terrain_from_input.linear();
+  if (method == PlaneMethod::thesis) {
+    const Eigen::Matrix3f turn = rotation.cast<float>();
+    const Eigen::Vector3f shift = turn * plane.centroid.cast<float>();
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      moved.positions[i] =
+          (turn * cloud.positions[i].cast<float>() - shift).eval().cast<double>();
+  } else {
+    // About the centroid: a far origin would cancel out of R^T p - R^T c.
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      moved.positions[i] = rotation * (cloud.positions[i] - plane.centroid);
+  }
+  return moved;
+}
+
+std::string_view to_text(UpSource source) {
+  switch (source) {
+    case UpSource::direction: return "direction";
+    case UpSource::viewpoint: return "viewpoint";
+    case UpSource::normals: return "normals";
+    case UpSource::frame_z: return "frame_z";
+    case UpSource::camera_origin: return "camera_origin";
+    case UpSource::relief: return "relief";
+  }
+  return "";
+}
+
+}  // namespace libgtd

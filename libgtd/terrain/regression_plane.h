@@ -1,0 +1,60 @@
+// The plane that fits a terrain best, and the terrain frame in it: origin in the points' centroid,
+// z out of the ground ("Graspable Target Detection for Hexapod Robots", 2023, eq. 2-13..2-21).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <optional>
+#include <string_view>
+
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/pose.h"
+
+namespace libgtd {
+
+// thesis: the heading is y = (c x n) / |c x n|, which turns with the distance to the input's origin.
+// corrected: x is the input frame's x axis laid into the plane, or, where that axis stands on the
+// plane, y is the input frame's y axis laid into it.
+enum class PlaneMethod { thesis, corrected };
+
+// What decided which side of the plane is up, in the order in which they are asked.
+enum class UpSource {
+  direction,      // RegressionPlaneOptions::up
+  viewpoint,      // the cloud's viewpoint, if it is not the identity, lies above
+  normals,        // the sum of the cloud's normals points up
+  frame_z,        // the input frame's z axis points up; asked if it is within 75 deg of the normal
+  camera_origin,  // eq. 2-16: a camera in the input frame's origin lies above
+  relief          // bumps point up: the heights' third moment is positive
+};
+
+struct RegressionPlaneOptions {
+  PlaneMethod method = PlaneMethod::corrected;
+  std::optional<Eigen::Vector3d> up;  // a direction of any length in the cloud's frame
+};
+
+struct RegressionPlane {
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();       // in the input frame, metres
+  libmap::Pose terrain_from_input = libmap::Pose::Identity();  // p' = R^T (p - c), R = [x, -y, n]
+  double rmse_m = 0;                                        // of the points' heights
+  UpSource up_source = UpSource::frame_z;
+  double relief_skewness = 0;  // of the heights over the plane; negative hints at upside down
+  std::size_t points = 0;      // finite points that were fitted
+  std::size_t skipped = 0;     // points with NaN or infinite coordinates
+};
+
+// Fits by the smallest eigenvector of the points' covariance (eq. 2-13..2-15). Points that are not
+// finite are skipped. Throws Error for fewer than 3 points, for points that all lie in one place or
+// on one line, for an `up` of no length or within the plane, and with `thesis` where c is parallel
+// to n.
+RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
+                                     const RegressionPlaneOptions& options = {});
+
+// The cloud in the terrain frame. `thesis` computes the positions in single precision, as the
+// author's program does: R^T p - R^T c.
+libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,
+                                        const RegressionPlane& plane, PlaneMethod method);
+
+// "direction", "viewpoint", ...
+std::string_view to_text(UpSource source);
+
+}  // namespace libgtd

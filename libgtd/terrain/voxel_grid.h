@@ -1,0 +1,38 @@
+// The terrain as a sparse set of occupied voxels.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "libgtd/terrain/voxel_lattice.h"
+
+namespace libgtd {
+
+struct VoxelGrid {
+  VoxelLattice lattice;
+  std::vector<Voxel> voxels;  // occupied, ascending, each once
+  Voxel min;                  // of the box of the grid; may be larger than that of the voxels
+  Voxel max;
+
+  double cells_in_box() const;
+};
+
+// `corrected`: index = floor(p / voxel_size_m) on the lattice through the frame's origin, so that a
+// point lies in the same voxel whatever else is in the cloud. Throws Error naming voxel_size_m if
+// an index would leave +-2^29 (it says how much memory a bit a voxel would take).
+VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
+
+// `thesis` (listing A.4), in single precision: the centroid of each cell of one lattice, put into
+// the cells of a second one that begins at the smallest coordinates of the points.
+VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
+                          double voxel_size_m);
+
+// The centroid of the points in each cell floor(p * (1 / leaf_m)) in single precision, cells in
+// ascending order of z, y, x (what the author's program does before and in the voxelization).
+std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
+                                               double leaf_m);
+
+// The largest number of bytes that the box of one tile may take as one bit a voxel.
+inline constexpr double max_window_bytes = 4.0 * 1024.0 * 1024.0 * 1024.0;
+
+}  // namespace libgtd

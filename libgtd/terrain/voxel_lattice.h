@@ -1,0 +1,60 @@
+// All arithmetic between points and voxels. Points are in the terrain frame, in metres.
+#pragma once
+
+#include <Eigen/Core>
+#include <cmath>
+#include <compare>
+
+namespace libgtd {
+
+// Ordered by i, then j, then k: the order of every list of voxels and of every map.
+struct Voxel {
+  int i = 0;
+  int j = 0;
+  int k = 0;
+  auto operator<=>(const Voxel&) const = default;
+};
+
+// Cubes of the edge voxel_size_m, voxel (0, 0, 0) with its lowest corner at `origin_m`. A point on
+// a face belongs to the voxel above it.
+struct VoxelLattice {
+  Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
+  double voxel_size_m = 0.01;
+
+  Voxel voxel_of(const Eigen::Vector3d& point_in_terrain) const {
+    const Eigen::Vector3d cell = (point_in_terrain - origin_m) / voxel_size_m;
+    return {static_cast<int>(std::floor(cell.x())), static_cast<int>(std::floor(cell.y())),
+            static_cast<int>(std::floor(cell.z()))};
+  }
+  Eigen::Vector3d center_of(const Voxel& voxel) const {
+    return origin_m +
+           voxel_size_m * (Eigen::Vector3d(voxel.i, voxel.j, voxel.k).array() + 0.5).matrix();
+  }
+};
+
+// The same in single precision, as the author's program does it (spec of method `thesis`): voxels
+// count from the cloud's smallest coordinates, and a quarter of the voxel size, in metres, is added to an
+// index before it is cut off.
+struct ThesisLattice {
+  Eigen::Vector3f min_m = Eigen::Vector3f::Zero();
+  float voxel_size_m = 0.01F;
+
+  Voxel voxel_of(const Eigen::Vector3f& centroid) const {
+    const Eigen::Vector3f index = ((centroid - min_m) / voxel_size_m).array() + voxel_size_m / 4.0F;
+    return {static_cast<int>(index.x()), static_cast<int>(index.y()), static_cast<int>(index.z())};
+  }
+  Voxel size_to(const Eigen::Vector3f& max_m) const {
+    const Eigen::Vector3f cells = (max_m - min_m) / voxel_size_m;
+    return {static_cast<int>(cells.x()) + 1, static_cast<int>(cells.y()) + 1,
+            static_cast<int>(cells.z()) + 1};
+  }
+  VoxelLattice lattice() const { return {min_m.cast<double>(), static_cast<double>(voxel_size_m)}; }
+};
+
+// Rounds toward minus infinity, unlike '/'.
+constexpr int floor_divide(int dividend, int divisor) {
+  const int quotient = dividend / divisor;
+  return dividend % divisor != 0 && (dividend < 0) != (divisor < 0) ? quotient - 1 : quotient;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,3 @@
+#include "libgtd/gripper/gripper.h"
+
+#include <gtest/gtest.h>

@@ -1,0 +1,305 @@
+#include "tools/command_line.h"
+
+#include <spdlog/sinks/stdout_color_sinks.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <iostream>
+#include <thread>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+#include "tools/progress_output.h"
+
+namespace graspmap_tools {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int exit_failed = 1;
+constexpr int exit_usage = 2;
+constexpr int exit_bad_input = 3;
+
+void start_log(const std::string& command, const RunOptions& options) {
+  auto logger = spdlog::stderr_color_st("graspmap " + command);
+  logger->set_pattern("%n: %^%l%$: %v");
+  logger->set_level(options.quiet     ? spdlog::level::warn
+                    : options.verbose ? spdlog::level::debug
+                                      : spdlog::level::info);
+  spdlog::set_default_logger(logger);
+}
+
+// A line break in a message would break the promise of one line.
+std::string one_line(std::string text) {
+  std::replace(text.begin(), text.end(), '\n', ' ');
+  return text;
+}
+
+int report(const std::string& command, const std::string& message, int exit_code) {
+  std::cerr << "graspmap " << command << ": error: " << one_line(message) << "\n";
+  return exit_code;
+}
+
+std::string unit_of(const libmap::Parameter& parameter) {
+  if (parameter.type == libmap::ParameterType::text) {
+    std::string names;
+    for (const std::string& choice : parameter.choices)
+      names += (names.empty() ? "" : "|") + choice;
+    return names.empty() ? "TEXT" : names;
+  }
+  const std::string_view key = parameter.key;
+  for (const auto& [suffix, name] :
+       {std::pair{"_mm", "MM"}, {"_m", "M"}, {"_deg", "DEG"}, {"_px", "PX"}, {"_s", "S"}})
+    if (key.ends_with(suffix)) return name;
+  return parameter.type == libmap::ParameterType::integer ? "N" : "X";
+}
+
+}  // namespace
+
+struct Command::Parts {
+  Parts(std::string command_name, const std::string& summary)
+      : name(std::move(command_name)), app(summary, "graspmap " + name) {}
+
+  std::string name;
+  CLI::App app;
+  libmap::ParameterTable table;
+  std::function<fs::path(const std::string&)> config_resolver;
+
+  RunOptions run_options;
+  std::string config;
+  std::string threads = "0";
+  std::string progress = "auto";
+  bool print_config = false;
+  CLI::Option* output_option = nullptr;
+  std::vector<std::string> overrides;                            // --set
+  std::vector<std::pair<std::string, std::string>> flag_values;  // key, text
+
+  void add_common_options();
+  void add_parameter_flags();
+  void apply_parameters();
+  int usage_error(const CLI::ParseError& error);
+};
+
+Command::Command(std::string name, std::string summary)
+    : parts_(std::make_unique<Parts>(std::move(name), summary)) {}
+Command::~Command() = default;
+
+void Command::input(const std::string& name, std::string& path, const std::string& description) {
+  parts_->app.add_option(name, path, description)->required()->type_name("");
+}
+
+void Command::optional_input(const std::string& name, std::string& path,
+                             const std::string& description) {
+  parts_->app.add_option(name, path, description)->type_name("");
+}
+
+void Command::inputs(const std::string& name, std::vector<std::string>& paths,
+                     const std::string& description) {
+  parts_->app.add_option(name, paths, description)->required()->type_name("");
+}
+
+void Command::verb(std::string& word, const std::vector<std::string>& words,
+                   const std::string& description) {
+  const auto check = [words](const std::string& given) {
+    if (std::find(words.begin(), words.end(), given) != words.end()) return std::string();
+    return "unknown word '" + given + "'" + libmap::did_you_mean(given, words);
+  };
+  std::string names;
+  for (const std::string& known : words) names += (names.empty() ? "" : "|") + known;
+  parts_->app.add_option("WHAT", word, description + ": " + names)
+      ->required()
+      ->type_name("")
+      ->check(CLI::Validator(check, "", "WHAT"));
+}
+
+void Command::output(std::string& path, const std::string& description, bool required) {
+  parts_->output_option = parts_->app.add_option("-o,--output", path, description)
+                              ->type_name("OUTPUT")
+                              ->required(required);
+}
+
+void Command::flag(const std::string& name, bool& value, const std::string& description) {
+  parts_->app.add_flag(name, value, description);
+}
+
+void Command::option(const std::string& name, const std::string& value_name, std::string& value,
+                     const std::string& description) {
+  parts_->app.add_option(name, value, description)->type_name(value_name)->capture_default_str();
+}
+
+void Command::option(const std::string& name, const std::string& value_name,
+                     std::vector<std::string>& values, const std::string& description) {
+  parts_->app.add_option(name, values, description)->type_name(value_name)->delimiter(',');
+}
+
+libmap::ParameterTable& Command::parameters() { return parts_->table; }
+
+void Command::config_resolver(std::function<fs::path(const std::string&)> resolver) {
+  parts_->config_resolver = std::move(resolver);
+}
+
+void Command::Parts::add_common_options() {
+  if (!table.parameters().empty()) {
+    app.add_option("--config", config, "YAML file of parameters; flags are stronger")
+        ->type_name("FILE.yaml");
+    app.add_option("--set", overrides, "KEY=VALUE: any key of --config (repeatable)")
+        ->type_name("KEY=VALUE")
+        ->allow_extra_args(false);
+    app.add_flag("--print-config", print_config,
+                 "print the parameters in force as YAML and do nothing else");
+  }
+  app.add_flag("--dry-run", run_options.dry_run, "check everything, write nothing");
+  app.add_flag("--force", run_options.force, "overwrite outputs that graspmap did not write");
+  app.add_option("--threads", threads, "number of threads, 0 for all")->type_name("N");
+  app.add_option("--progress", progress, "auto|json|none")->type_name("STYLE");
+  app.add_flag("--quiet", run_options.quiet, "warnings and errors only");
+  app.add_flag("--verbose", run_options.verbose, "also the time of each step");
+}
+
+void Command::Parts::add_parameter_flags() {
+  for (const libmap::Parameter& parameter : table.parameters()) {
+    const std::string flag = libmap::flag_of(parameter.key);
+    const auto keep = [this, key = parameter.key](const std::string& text) {
+      flag_values.emplace_back(key, text);
+    };
+    const std::string description = parameter.description + " [" + parameter.get() + "]";
+    if (parameter.type == libmap::ParameterType::boolean) {
+      app.add_flag_function(
+             flag + ",!--no-" + flag.substr(2),
+             [keep](std::int64_t count) { keep(count > 0 ? "true" : "false"); }, description)
+          ->group("Parameters");
+    } else {
+      app.add_option_function<std::string>(flag, keep, description)
+          ->type_name(unit_of(parameter))
+          ->group("Parameters");
+    }
+  }
+}
+
+void Command::Parts::apply_parameters() {
+  if (!config.empty()) {
+    const fs::path path = config_resolver ? config_resolver(config) : fs::path(config);
+    libmap::set_from_yaml(table, libmap::read_whole_file(path, 1U << 24U), path.string());
+  }
+  for (const auto& [key, text] : flag_values) {
+    try {
+      table.set(key, text);
+    } catch (const libmap::Error& error) {
+      libmap::ErrorContext context = error.context();
+      context.field = libmap::flag_of(key);
+      throw libmap::Error(error.reason(), context);
+    }
+  }
+  for (const std::string& override : overrides) {
+    const std::size_t equals = override.find('=');
+    if (equals == std::string::npos)
+      throw libmap::Error("no '='", {.field = "--set", .value = override, .bound = "KEY=VALUE"});
+    table.set(override.substr(0, equals), override.substr(equals + 1));
+  }
+}
+
+int Command::Parts::usage_error(const CLI::ParseError& error) {
+  std::string message = error.what();
+  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
+    std::vector<std::string> flags;
+    for (const CLI::Option* option : app.get_options())
+      for (const std::string& flag : option->get_lnames()) flags.push_back("--" + flag);
+    for (const std::string& word : app.remaining()) {
+      message = word.starts_with("-") ? "unknown flag " + word + libmap::did_you_mean(word, flags)
+                                      : "one argument too many: " + word;
+      break;
+    }
+  }
+  report(name, message, exit_usage);
+  std::cerr << "graspmap " << name << " --help shows what it takes\n";
+  return exit_usage;
+}
+
+int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
+  Parts& parts = *parts_;
+  parts.add_parameter_flags();
+  parts.add_common_options();
+  // --print-config needs no inputs: only the parameters are asked for.
+  const auto asks_for_config = [&] {
+    return std::any_of(argv, argv + argc,
+                       [](const char* word) { return std::string(word) == "--print-config"; });
+  };
+  if (!parts.table.parameters().empty() && asks_for_config())
+    for (CLI::Option* option : parts.app.get_options()) option->required(false);
+  try {
+    parts.app.parse(argc, argv);
+  } catch (const CLI::CallForHelp&) {
+    std::cout << parts.app.help();
+    return 0;
+  } catch (const CLI::ParseError& error) {
+    return parts.usage_error(error);
+  }
+  try {
+    parts.apply_parameters();
+    if (parts.print_config) {
+      std::cout << libmap::to_yaml(parts.table);
+      return 0;
+    }
+    const auto threads = libmap::parse_integer(parts.threads);
+    if (!threads || *threads < 0 || *threads > 4096)
+      throw libmap::Error(
+          "not a number of threads",
+          {.field = "--threads", .value = parts.threads, .bound = ">= 0 and <= 4096"});
+    parts.run_options.threads =
+        *threads == 0 ? std::thread::hardware_concurrency() : static_cast<unsigned>(*threads);
+    const libmap::ThreadLimit limit(parts.run_options.threads);
+    start_log(parts.name, parts.run_options);
+    const std::unique_ptr<libmap::Progress> progress =
+        make_progress(parts.run_options.quiet ? "none" : parts.progress);
+    Run run(parts.name, parts.run_options, *progress);
+    run.manifest().add_parameters(parts.table);
+    body(run);
+    progress->end();
+    return 0;
+  } catch (const libmap::Error& error) {
+    return report(parts.name, error.what(),
+                  error.kind() == libmap::ErrorKind::bad_input ? exit_bad_input : exit_failed);
+  } catch (const std::bad_alloc&) {
+    return report(parts.name, "out of memory", exit_failed);
+  } catch (const std::exception& error) {
+    return report(parts.name, error.what(), exit_failed);
+  }
+}
+
+namespace {
+
+// In the build folder the data stand in the source tree; installed, beside the program.
+fs::path toolkit_data_folder() {
+  std::error_code code;
+  const fs::path program = fs::read_symlink("/proc/self/exe", code);
+  const fs::path installed = program.parent_path() / "../../share/graspmap";
+  if (!code && fs::is_directory(installed)) return installed.lexically_normal();
+  return GRASPMAP_SOURCE_DATA;
+}
+
+}  // namespace
+
+fs::path find_data_file(const std::string& kind, const std::string& name) {
+  if (name.find('/') != std::string::npos || name.ends_with(".yaml")) {
+    libmap::require_readable_file(name);
+    return name;
+  }
+  const fs::path folder = toolkit_data_folder() / kind;
+  const fs::path file = folder / (name + ".yaml");
+  if (fs::is_regular_file(file)) return file;
+  std::vector<std::string> known;
+  if (fs::is_directory(folder))
+    for (const auto& entry : fs::directory_iterator(folder))
+      if (entry.path().extension() == ".yaml") known.push_back(entry.path().stem().string());
+  std::sort(known.begin(), known.end());
+  std::string names;
+  for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
+  throw libmap::Error("is neither a file nor one of " + names + libmap::did_you_mean(name, known),
+                      {.field = kind.substr(0, kind.size() - 1), .value = name});
+}
+
+}  // namespace graspmap_tools

@@ -1,0 +1,69 @@
+// What all commands share on the command line: inputs, the output, one flag for each parameter,
+// --config, --print-config, --dry-run, one-line errors and exit codes.
+//
+//   int main(int argc, char** argv) {
+//     ScoreOptions options;
+//     Command command("score", "graspability map of a terrain");
+//     command.input("TERRAIN", options.terrain, "cloud of the terrain");
+//     command.output(options.map, "graspability map (.pcd, .ply, .vtp, .csv)");
+//     bind(command.parameters(), options);
+//     return command.run(argc, argv, [&](Run& run) { score(options, run); });
+//   }
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "libmap/core/parameters.h"
+#include "tools/run.h"
+
+namespace graspmap_tools {
+
+class Command {
+ public:
+  Command(std::string name, std::string summary);
+  ~Command();
+  Command(const Command&) = delete;
+  Command& operator=(const Command&) = delete;
+
+  // Positional arguments, in the order in which they are added.
+  void input(const std::string& name, std::string& path, const std::string& description);
+  void optional_input(const std::string& name, std::string& path, const std::string& description);
+  void inputs(const std::string& name, std::vector<std::string>& paths,
+              const std::string& description);
+  // The first positional argument as one of a few words, for commands such as `simulate scene`.
+  void verb(std::string& word, const std::vector<std::string>& words,
+            const std::string& description);
+  // -o, --output.
+  void output(std::string& path, const std::string& description, bool required = true);
+  // Flags and options that are no parameters of a stage, such as --json or --tile.
+  void flag(const std::string& name, bool& value, const std::string& description);
+  void option(const std::string& name, const std::string& value_name, std::string& value,
+              const std::string& description);
+  void option(const std::string& name, const std::string& value_name,
+              std::vector<std::string>& values, const std::string& description);
+
+  // The parameters of the stages that the command runs: each becomes a flag and a key of --config
+  // and --print-config. --set KEY=VALUE reaches them too.
+  libmap::ParameterTable& parameters();
+
+  // Resolves the value of --config, e.g. a scenario's name to a file. Default: a path.
+  void config_resolver(std::function<std::filesystem::path(const std::string&)> resolver);
+
+  // Parses, applies --config and then the flags, runs `body`. Returns the exit code: 0 done,
+  // 1 failed, 2 wrong usage, 3 bad input.
+  int run(int argc, char** argv, const std::function<void(Run&)>& body);
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+// A file of the toolkit's own data: a path as it stands if it has a '/' or the extension, else
+// DATA/KIND/NAME.yaml, e.g. ("grippers", "scar-e"). Throws Error naming the nearest known one.
+std::filesystem::path find_data_file(const std::string& kind, const std::string& name);
+
+}  // namespace graspmap_tools

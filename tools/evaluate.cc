@@ -1,0 +1,142 @@
+// graspmap evaluate: ROC curve, areas under it and rates of the scores in a table, against the
+// labels in it.
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libgtd/evaluate/roc_tables.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/table.h"
+#include "libmap/core/text.h"
+#include "libmap/view/charts.h"
+#include "libmap/view/image_io.h"
+#include "libmap/view/virtual_display.h"
+#include "tools/command_line.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+using libgtd::ColumnEvaluation;
+using libgtd::TableEvaluation;
+
+struct EvaluateOptions {
+  std::string table;
+  std::string folder;
+  std::string scores;  // names with commas between
+  std::string title = "ROC";
+  libgtd::TableEvaluationOptions evaluation;
+};
+
+void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
+  libgtd::RocOptions& roc = options.evaluation.roc;
+  parameters.add("label", options.evaluation.label_column,
+                 "column of the truth: 1/0, true/false, yes/no, graspable/not graspable");
+  parameters.add("score", options.scores,
+                 "columns of scores, with commas between; none: every numeric column that is no "
+                 "identity, position or length");
+  parameters.add("cutoff", roc.rate_cutoff, libmap::any_number,
+                 "a place whose score reaches it is predicted graspable: for the rates");
+  parameters.add("bootstrap", roc.bootstrap_replicates, libmap::Range{0, 1e7},
+                 "replicates for the interval of the area; 0: no interval");
+  parameters.add("seed", roc.bootstrap_seed, libmap::not_negative, "of the bootstrap");
+  parameters.add("title", options.title, "title of the plot and of the summary");
+}
+
+std::vector<std::string> split_names(std::string_view text) {
+  std::vector<std::string> names;
+  while (!text.empty()) {
+    const std::size_t comma = text.find(',');
+    const std::string_view name = libmap::trim(text.substr(0, comma));
+    if (!name.empty()) names.emplace_back(name);
+    text = comma == std::string_view::npos ? std::string_view() : text.substr(comma + 1);
+  }
+  return names;
+}
+
+libmap::Chart chart_of(const TableEvaluation& evaluation, const std::string& title) {
+  std::vector<libmap::RocCurve> curves;
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    if (!column.result.area) continue;
+    libmap::RocCurve curve;
+    curve.name = column.name;
+    curve.area = column.result.area->trapezoid;
+    for (const libgtd::RocPoint& point : column.result.at_scores) {
+      curve.false_positive_rates.push_back(*point.counts.false_positive_rate().value());
+      curve.true_positive_rates.push_back(*point.counts.true_positive_rate().value());
+    }
+    curve.false_positive_rates.push_back(0.0);
+    curve.true_positive_rates.push_back(0.0);
+    curves.push_back(std::move(curve));
+  }
+  return libmap::roc_chart(curves, title);
+}
+
+void note_results(const TableEvaluation& evaluation, Run& run) {
+  auto& results = run.manifest().results;
+  results.emplace_back("rows", static_cast<std::int64_t>(evaluation.rows));
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    const libgtd::RocResult& result = column.result;
+    const std::size_t locations = result.at_rate_cutoff.counts.size();
+    results.emplace_back(column.name + ".locations", static_cast<std::int64_t>(locations));
+    if (!result.area) {
+      run.warn(column.name + ": " + result.area_note);
+      continue;
+    }
+    results.emplace_back(column.name + ".auc_trapezoid", result.area->trapezoid);
+    results.emplace_back(column.name + ".auc_upper_sum", result.area->upper_sum);
+    run.say(column.name + ": " + libmap::to_text(static_cast<std::int64_t>(locations)) +
+            " locations, AUC " + libmap::to_text(static_cast<float>(result.area->trapezoid)) +
+            " (trapezoid), " + libmap::to_text(static_cast<float>(result.area->upper_sum)) +
+            " (upper sum, as in the thesis)");
+  }
+}
+
+void write_text_in(Run& run, const fs::path& folder, const std::string& name,
+                   const std::string& text) {
+  run.write_file_in(folder, name,
+                    [&](const fs::path& temporary) { libmap::write_whole_file(temporary, text); });
+}
+
+void write_results(const EvaluateOptions& options, const TableEvaluation& evaluation, Run& run) {
+  const fs::path folder = options.folder;
+  const libmap::Chart chart = chart_of(evaluation, options.title);
+  const libmap::VirtualDisplay display;
+  const libmap::Image picture =
+      run.timed("draw", [&] { return libmap::draw_chart(chart, libmap::roc_chart_size); });
+  run.begin_output_folder(folder);
+  write_text_in(run, folder, "roc.csv", libmap::to_csv(libgtd::roc_table(evaluation)));
+  write_text_in(run, folder, "rates.csv", libmap::to_csv(libgtd::rates_table(evaluation)));
+  write_text_in(run, folder, "summary.json", libgtd::to_json(evaluation));
+  write_text_in(run, folder, "summary.md", libgtd::to_markdown(evaluation, options.title));
+  run.write_file_in(folder, "roc.png",
+                    [&](const fs::path& temporary) { libmap::write_png(temporary, picture); });
+  run.write_file_in(folder, "roc.svg", [&](const fs::path& temporary) {
+    libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
+  });
+}
+
+void evaluate(EvaluateOptions& options, Run& run) {
+  run.claim_output_folder(options.folder);
+  options.evaluation.score_columns = split_names(options.scores);
+  const libmap::Table table = libmap::read_csv(options.table);
+  run.manifest().add_input(options.table);
+  const TableEvaluation evaluation =
+      run.timed("evaluate", [&] { return libgtd::evaluate_table(table, options.evaluation); });
+  note_results(evaluation, run);
+  if (run.dry_run()) return;
+  write_results(options, evaluation, run);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  EvaluateOptions options;
+  graspmap_tools::Command command(
+      "evaluate", "ROC curve, area under it and accuracy of scores against a field test");
+  command.input("TABLE.csv", options.table, "labels and scores, one row a location");
+  command.output(options.folder,
+                 "folder of roc.csv, rates.csv, summary.json, summary.md, roc.png and roc.svg");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { evaluate(options, run); });
+}

@@ -1,0 +1,94 @@
+// `graspmap COMMAND ...` starts the program of that command with the rest of the line.
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <filesystem>
+#include <iostream>
+#include <string>
+#include <vector>
+
+#include "libmap/core/text.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CommandEntry {
+  const char* name;
+  const char* summary;
+};
+
+constexpr CommandEntry commands[] = {
+    {"simulate", "scenes of primitive shapes with their closed-form truth"},
+    {"score", "graspability map of a terrain, tile by tile"},
+    {"merge", "tiles of a map into one map"},
+    {"lookup", "the map's values at listed locations"},
+    {"evaluate", "ROC, AUC and accuracy of looked-up scores against a field test"},
+    {"render", "a picture of a cloud, a mesh or a map"},
+    {"mask", "a gripper's mask as text, cloud or picture data"},
+    {"info", "what a cloud, a mesh or a map holds"},
+    {"convert", "any format to any other"},
+};
+
+void print_help() {
+  std::cout << "graspmap " GRASPMAP_VERSION
+               ": graspability maps for robots that climb with spined grippers\n\n"
+               "Usage: graspmap COMMAND INPUT... -o OUTPUT [options]\n\nCommands:\n";
+  for (const CommandEntry& command : commands) {
+    std::string name = command.name;
+    name.resize(12, ' ');
+    std::cout << "  " << name << command.summary << "\n";
+  }
+  std::cout << "\ngraspmap COMMAND --help shows each option with its unit and default.\n"
+               "Exit codes: 0 done, 1 failed, 2 wrong usage, 3 bad input.\n";
+}
+
+bool is_known(const std::string& name) {
+  for (const CommandEntry& command : commands)
+    if (name == command.name) return true;
+  return false;
+}
+
+int unknown_command(const std::string& name) {
+  std::vector<std::string> names;
+  for (const CommandEntry& command : commands) names.emplace_back(command.name);
+  std::cerr << "graspmap: error: unknown command " << name << libmap::did_you_mean(name, names)
+            << "\n";
+  return 2;
+}
+
+// Beside this program in the build folder, in ../libexec when installed.
+fs::path find_program(const std::string& command) {
+  std::error_code code;
+  const fs::path folder = fs::read_symlink("/proc/self/exe", code).parent_path();
+  for (const char* place : {"libexec/graspmap", "../libexec/graspmap"}) {
+    const fs::path program = folder / place / ("graspmap-" + command);
+    if (fs::exists(program)) return program;
+  }
+  return folder / "libexec/graspmap" / ("graspmap-" + command);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string first = argc > 1 ? argv[1] : "";
+  if (first == "--version") {
+    std::cout << "graspmap " GRASPMAP_VERSION "\n";
+    return 0;
+  }
+  if (first == "--help" || first == "-h" || first == "help") {
+    print_help();
+    return 0;
+  }
+  if (first.empty()) {
+    std::cerr << "graspmap: error: no command: graspmap --help lists them\n";
+    return 2;
+  }
+  if (!is_known(first)) return unknown_command(first);
+  const fs::path program = find_program(first);
+  execv(program.c_str(), argv + 1);
+  std::cerr << "graspmap " << first << ": error: cannot start " << program.string() << ": "
+            << std::strerror(errno) << "\n";
+  return 1;
+}

@@ -1,0 +1,99 @@
+#include "tools/run.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+
+namespace graspmap_tools {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// "maps/" and "maps" name the same folder.
+fs::path without_trailing_slash(const fs::path& folder) {
+  return folder.has_filename() ? folder : folder.parent_path();
+}
+
+bool written_by_this_toolkit(const fs::path& output) {
+  try {
+    return libmap::read_manifest_of(output).has_value();
+  } catch (const libmap::Error&) {
+    return false;
+  }
+}
+
+}  // namespace
+
+Run::Run(std::string command, RunOptions options, libmap::Progress& progress)
+    : command_(std::move(command)), options_(options), progress_(progress) {
+  manifest_.command = command_;
+  manifest_.version = GRASPMAP_VERSION;
+  manifest_.threads = options_.threads;
+}
+
+void Run::say(const std::string& text) { spdlog::info("{}", text); }
+void Run::warn(const std::string& text) { spdlog::warn("{}", text); }
+void Run::detail(const std::string& text) { spdlog::debug("{}", text); }
+
+Run::Timing::~Timing() {
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
+  run_.manifest_.timings_s.emplace_back(name_, taken.count());
+  spdlog::debug("{}: {:.3f} s", name_, taken.count());
+}
+
+void Run::claim_output(const fs::path& path) {
+  if (fs::is_directory(path))
+    throw libmap::Error("is a folder, not a file", {.file = path.string()});
+  if (fs::exists(path) && !options_.force && !written_by_this_toolkit(path))
+    throw libmap::Error("exists and was not written by graspmap: --force overwrites it",
+                        {.file = path.string()});
+  // Made and dropped at once: a folder that is missing or read-only is found before the work.
+  if (!options_.dry_run) const libmap::OutputFile probe(path);
+}
+
+void Run::write_manifest(const fs::path& output) {
+  libmap::write_whole_file(libmap::manifest_path(output), libmap::to_json(manifest_));
+}
+
+void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
+  libmap::OutputFile output(path);
+  timed("write", [&] { writer(output.temporary_path()); });
+  // The manifest goes first: an output without one would not be recognised as ours, and `make`
+  // judges by the output, which is then still the old one.
+  write_manifest(path);
+  output.commit();
+}
+
+void Run::claim_output_folder(const fs::path& given) {
+  const fs::path folder = without_trailing_slash(given);
+  if (fs::exists(folder) && !fs::is_directory(folder))
+    throw libmap::Error("is a file, not a folder", {.file = folder.string()});
+  if (fs::exists(folder) && !fs::is_empty(folder) && !options_.force &&
+      !written_by_this_toolkit(folder))
+    throw libmap::Error("is not empty and was not written by graspmap: --force writes into it",
+                        {.file = folder.string()});
+}
+
+void Run::begin_output_folder(const fs::path& given) {
+  const fs::path folder = without_trailing_slash(given);
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code)
+    throw libmap::Error("cannot be made: " + code.message(), {.file = folder.string()},
+                        libmap::ErrorKind::failed);
+  write_manifest(folder);
+}
+
+void Run::write_file_in(const fs::path& folder, const std::string& name,
+                        const std::function<void(const fs::path&)>& writer) {
+  libmap::OutputFile output(without_trailing_slash(folder) / name);
+  writer(output.temporary_path());
+  output.commit();
+}
+
+}  // namespace graspmap_tools

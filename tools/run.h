@@ -1,0 +1,83 @@
+// One run of a command: its messages, its timings and its outputs.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <string>
+
+#include "libmap/core/manifest.h"
+#include "libmap/core/progress.h"
+
+namespace graspmap_tools {
+
+struct RunOptions {
+  bool dry_run = false;
+  bool force = false;
+  bool quiet = false;
+  bool verbose = false;
+  unsigned threads = 0;
+};
+
+class Run {
+ public:
+  Run(std::string command, RunOptions options, libmap::Progress& progress);
+
+  const RunOptions& options() const { return options_; }
+  // True with --dry-run: the command returns once everything is checked.
+  bool dry_run() const { return options_.dry_run; }
+  libmap::Progress& progress() { return progress_; }
+  libmap::Manifest& manifest() { return manifest_; }
+
+  // To stderr: unless --quiet; always; with --verbose only.
+  void say(const std::string& text);
+  void warn(const std::string& text);
+  void detail(const std::string& text);
+
+  // Runs `step` and keeps its wall time in the manifest.
+  template <typename Step>
+  auto timed(const std::string& name, const Step& step) {
+    const Timing timing(*this, name);
+    return step();
+  }
+
+  // Throws Error if `path` exists and this toolkit did not write it, unless --force, or if it
+  // cannot be written. Call it before the work.
+  void claim_output(const std::filesystem::path& path);
+
+  // writer(temporary) writes the file; it is put in place whole, with its manifest beside it.
+  void write_output(const std::filesystem::path& path,
+                    const std::function<void(const std::filesystem::path& temporary)>& writer);
+
+  // A folder of outputs: made if it is missing; its manifest FOLDER.json stands beside it, written
+  // first. The files in it are then written with write_file_in.
+  void claim_output_folder(const std::filesystem::path& folder);
+  void begin_output_folder(const std::filesystem::path& folder);
+  void write_file_in(const std::filesystem::path& folder, const std::string& name,
+                     const std::function<void(const std::filesystem::path& temporary)>& writer);
+
+ private:
+  class Timing {
+   public:
+    Timing(Run& run, std::string name)
+        : run_(run), name_(std::move(name)), start_(std::chrono::steady_clock::now()) {}
+    ~Timing();
+    Timing(const Timing&) = delete;
+    Timing& operator=(const Timing&) = delete;
+
+   private:
+    Run& run_;
+    std::string name_;
+    std::chrono::steady_clock::time_point start_;
+  };
+
+  void write_manifest(const std::filesystem::path& output);
+
+  std::string command_;
+  RunOptions options_;
+  libmap::Progress& progress_;
+  libmap::Manifest manifest_;
+};
+
+}  // namespace graspmap_tools
