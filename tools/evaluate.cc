@@ -1,6 +1,6 @@
 // graspmap evaluate: ROC curve, areas under it and rates of the scores in a table, against the
 // labels in it.
-#include <optional>
+#include <cmath>
 #include <string>
 #include <vector>
 
@@ -72,6 +72,10 @@ libmap::Chart chart_of(const TableEvaluation& evaluation, const std::string& tit
   return libmap::roc_chart(curves, title);
 }
 
+std::string rounded_text(double value) {
+  return libmap::to_text(std::round(value * 1000.0) / 1000.0);
+}
+
 void note_results(const TableEvaluation& evaluation, Run& run) {
   auto& results = run.manifest().results;
   results.emplace_back("rows", static_cast<std::int64_t>(evaluation.rows));
@@ -86,9 +90,8 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
     results.emplace_back(column.name + ".auc_trapezoid", result.area->trapezoid);
     results.emplace_back(column.name + ".auc_upper_sum", result.area->upper_sum);
     run.say(column.name + ": " + libmap::to_text(static_cast<std::int64_t>(locations)) +
-            " locations, AUC " + libmap::to_text(static_cast<float>(result.area->trapezoid)) +
-            " (trapezoid), " + libmap::to_text(static_cast<float>(result.area->upper_sum)) +
-            " (upper sum, as in the thesis)");
+            " locations, AUC " + rounded_text(result.area->trapezoid) + " (trapezoid), " +
+            rounded_text(result.area->upper_sum) + " (upper sum, as in the thesis)");
   }
 }
 

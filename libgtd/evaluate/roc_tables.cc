@@ -166,7 +166,8 @@ std::string areas_markdown(const TableEvaluation& evaluation) {
     if (result.area) {
       text += fixed_text(result.area->trapezoid, 3) +
               interval_text(result.area->trapezoid_bootstrap_95, 3) + " | " +
-              fixed_text(result.area->upper_sum, 3) + " |\n";
+              fixed_text(result.area->upper_sum, 3) +
+              (result.area->upper_sum_width < 1.0 ? " (incomplete, see below) |\n" : " |\n");
     } else {
       text += "not defined | not defined |\n";
     }

@@ -139,6 +139,8 @@ GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   options.extra_void_layers = 0;
   const VoxelMeasures m = measure(gripper, options);
   GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half) + 1, m.H);
+  // One beyond the centre: MATLAB's index (L + 1) / 2 counts from 1, the window from 0.
+  mask.pivot_xy = (mask.side + 1) / 2;
   mask.pivot_z = m.H - 1;
   const double ROS = std::round(m.in_voxels(gripper.opening_spine_radius_mm));
   const double DOS = std::round(m.in_voxels(gripper.opening_spine_depth_mm));

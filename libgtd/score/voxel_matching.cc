@@ -32,24 +32,6 @@ struct KRange {
   int max = 0;
 };
 
-// The voxels of columns [i_begin, i_end) x [j_begin, j_end), in their order.
-template <typename Visit>
-void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
-  const auto begin = grid.voxels.begin();
-  auto at = std::lower_bound(begin, grid.voxels.end(),
-                             Voxel{columns.i_begin, columns.j_begin, grid.min.k});
-  while (at != grid.voxels.end() && at->i < columns.i_end) {
-    if (at->j < columns.j_begin) {
-      at = std::lower_bound(at, grid.voxels.end(), Voxel{at->i, columns.j_begin, grid.min.k});
-    } else if (at->j >= columns.j_end) {
-      at = std::lower_bound(at, grid.voxels.end(), Voxel{at->i + 1, columns.j_begin, grid.min.k});
-    } else {
-      visit(static_cast<std::size_t>(at - begin));
-      ++at;
-    }
-  }
-}
-
 TileBounds with_halo(const TileBounds& tile, const GripperMask& mask) {
   const int below = mask.pivot_xy;
   const int above = mask.side - mask.pivot_xy - 1;
@@ -121,7 +103,7 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
                                    const TileBounds& tile) {
   TileBounds inner = tile;
   if (mask.method != Method::corrected) {
-    const int h = mask.side / 2;
+    const int h = mask.pivot_xy;
     inner.i_begin = std::max(inner.i_begin, grid.min.i + h + 1);
     inner.i_end = std::min(inner.i_end, grid.max.i - h);
     inner.j_begin = std::max(inner.j_begin, grid.min.j + h + 1);

@@ -19,14 +19,6 @@ struct VoxelCounts {
   bool operator==(const VoxelCounts&) const = default;
 };
 
-// A square of voxel columns, [begin, end) in i and j.
-struct TileBounds {
-  int i_begin = 0;
-  int i_end = 0;
-  int j_begin = 0;
-  int j_end = 0;
-};
-
 // The pivots of `grid` within `tile`, as positions in grid.voxels, ascending. Methods other than
 // `corrected` pass over a border of half a mask: h+1 <= i <= NX-h-2 and the same in j.
 std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mask,

@@ -14,10 +14,13 @@ namespace {
 
 constexpr std::size_t grain = 1024;
 
-bool is_convex(const Curvature& c, CurvatureMethod method, double height,
+constexpr double default_bend = 0.1;  // curvature times radius
+
+bool is_convex(const Curvature& c, const CurvatureResult& of, double height,
                const ConvexityOptions& options) {
   if (!c.valid) return false;
-  if (method == CurvatureMethod::corrected) return c.k2 > options.min_curvature_per_m;
+  if (of.method == CurvatureMethod::corrected)
+    return c.k2 > options.min_curvature_per_m.value_or(default_bend / of.radius_m);
   const double gaussian = static_cast<double>(c.k1) * static_cast<double>(c.k2);  // eq. 3-19
   return gaussian > options.min_gaussian_curvature && height > options.zero_plane_m;
 }
@@ -50,13 +53,12 @@ std::vector<std::uint8_t> find_convex(const CurvatureResult& curvature,
                         {.field = "positions",
                          .value = std::to_string(positions.size()),
                          .bound = std::to_string(curvature.points.size())});
-  check_bound("min_curvature_per_m", options.min_curvature_per_m);
+  check_bound("min_curvature_per_m", options.min_curvature_per_m.value_or(0));
   check_bound("min_gaussian_curvature", options.min_gaussian_curvature);
   check_bound("zero_plane_m", options.zero_plane_m);
   std::vector<std::uint8_t> convex(positions.size(), 0);
   for (std::size_t i = 0; i < positions.size(); ++i)
-    convex[i] =
-        is_convex(curvature.points[i], curvature.method, positions[i].z(), options) ? 1 : 0;
+    convex[i] = is_convex(curvature.points[i], curvature, positions[i].z(), options) ? 1 : 0;
   return convex;
 }
 
@@ -64,9 +66,9 @@ std::vector<std::uint8_t> mark_near_convex(const std::vector<Eigen::Vector3d>& p
                                            const std::vector<Eigen::Vector3d>& convex_points,
                                            double distance_m) {
   if (!(distance_m > 0) || std::isinf(distance_m))
-    throw libmap::Error("not a distance", {.field = "distance_m",
-                                           .value = libmap::to_text(distance_m),
-                                           .bound = "> 0 and finite"});
+    throw libmap::Error(
+        "not a distance",
+        {.field = "distance_m", .value = libmap::to_text(distance_m), .bound = "> 0 and finite"});
   // Cells a little wider than the distance, against rounding at their borders.
   const PointGrid grid(convex_points, distance_m * (1 + 1e-9));
   std::vector<std::uint8_t> near(positions.size(), 0);

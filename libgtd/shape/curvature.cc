@@ -302,9 +302,9 @@ std::vector<std::size_t> checked_queries(const std::optional<std::vector<std::si
   }
   for (const std::size_t i : indices)
     if (i >= points)
-      throw libmap::Error("no such point", {.field = "query",
-                                            .value = std::to_string(i),
-                                            .bound = "< " + std::to_string(points)});
+      throw libmap::Error(
+          "no such point",
+          {.field = "query", .value = std::to_string(i), .bound = "< " + std::to_string(points)});
   return indices;
 }
 
@@ -322,12 +322,12 @@ CurvatureResult estimate_curvature(const libmap::PointCloud& cloud, const Curvat
   const std::vector<std::size_t> indices = checked_queries(queries, cloud.size());
   CurvatureResult result;
   result.method = options.method;
+  result.radius_m = options.radius_m;
   result.points = options.method == CurvatureMethod::thesis
                       ? estimate_pcl_curvature(cloud, options.radius_m, indices)
                       : fit_quadrics(cloud, options, indices);
-  result.valid_count = static_cast<std::size_t>(
-      std::count_if(result.points.begin(), result.points.end(),
-                    [](const Curvature& c) { return c.valid; }));
+  result.valid_count = static_cast<std::size_t>(std::count_if(
+      result.points.begin(), result.points.end(), [](const Curvature& c) { return c.valid; }));
   return result;
 }
 

@@ -43,6 +43,7 @@ struct Curvature {
 
 struct CurvatureResult {
   CurvatureMethod method = CurvatureMethod::corrected;
+  double radius_m = 0;            // as asked for
   std::vector<Curvature> points;  // one for each query
   std::size_t valid_count = 0;
 };

@@ -31,7 +31,8 @@ Points::Ptr to_pcl(const libmap::PointCloud& cloud) {
   return points;
 }
 
-pcl::Normal normal_at(const Points& points, const pcl::Indices& neighbors, const pcl::PointXYZ& at) {
+pcl::Normal normal_at(const Points& points, const pcl::Indices& neighbors,
+                      const pcl::PointXYZ& at) {
   pcl::Normal normal;
   Eigen::Vector4f plane;
   float change = 0;

@@ -48,10 +48,9 @@ std::vector<Vector3d> finite_points(const libmap::PointCloud& cloud, Interpolati
   std::vector<Vector3d> points;
   points.reserve(cloud.size());
   for (const Vector3d& p : cloud.positions) {
-    if (!p.allFinite()) continue;
-    points.push_back(p);
-    if (method == InterpolationMethod::thesis)
-      points.back() = p.cast<float>().cast<double>();
+    const bool single = method == InterpolationMethod::thesis;
+    const Vector3d point = single ? p.cast<float>().cast<double>().eval() : p;
+    if (point.allFinite()) points.push_back(point);
   }
   return points;
 }
@@ -119,14 +118,14 @@ void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
   const double columns = (box.max_x - box.min_x) / spacing + 1;
   const double rows = (box.max_y - box.min_y) / spacing + 1;
   if (!(columns * rows <= static_cast<double>(max_nodes)))
-    throw libmap::Error("the grid would have too many nodes",
-                        {.field = "grid spacing",
-                         .value = libmap::to_text(spacing) + " m",
-                         .bound = "at most " +
-                                  libmap::to_text(static_cast<std::int64_t>(max_nodes)) +
-                                  " nodes over the points' x and y"});
-  const double farthest = std::max({std::abs(box.min_x), std::abs(box.max_x),
-                                    std::abs(box.min_y), std::abs(box.max_y)});
+    throw libmap::Error(
+        "the grid would have too many nodes",
+        {.field = "grid spacing",
+         .value = libmap::to_text(spacing) + " m",
+         .bound = "at most " + libmap::to_text(static_cast<std::int64_t>(max_nodes)) +
+                  " nodes over the points' x and y"});
+  const double farthest = std::max(
+      {std::abs(box.min_x), std::abs(box.max_x), std::abs(box.min_y), std::abs(box.max_y)});
   if (!(spacing > farthest * 0x1.0p-50))
     throw libmap::Error("the points lie too far from the origin for this grid spacing",
                         {.field = "grid spacing", .value = libmap::to_text(spacing) + " m"});
@@ -251,9 +250,9 @@ class HeightGrid {
 void check_options(const InterpolationOptions& options) {
   const auto check = [](const char* field, double value) {
     if (!(value >= 0) || std::isinf(value))
-      throw libmap::Error("not a length", {.field = field,
-                                           .value = libmap::to_text(value),
-                                           .bound = ">= 0 and finite"});
+      throw libmap::Error(
+          "not a length",
+          {.field = field, .value = libmap::to_text(value), .bound = ">= 0 and finite"});
   };
   check("max_edge_m", options.max_edge_m);
   check("grid_spacing_m", options.grid_spacing_m);

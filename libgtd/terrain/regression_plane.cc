@@ -84,10 +84,11 @@ Vector3d centroid_of(const libmap::PointCloud& cloud, std::size_t& count) {
 // Eq. 2-14, 2-15: the normal without its sign, and the three variances in increasing order.
 Matrix3d principal_axes(const libmap::PointCloud& cloud, const Vector3d& centroid,
                         std::size_t count, Vector3d& variances) {
-  Matrix3d covariance = sum_over(cloud, Matrix3d(Matrix3d::Zero()), [&](Matrix3d& s, std::size_t i) {
-    const Vector3d d = cloud.positions[i] - centroid;
-    s += d * d.transpose();
-  });
+  Matrix3d covariance =
+      sum_over(cloud, Matrix3d(Matrix3d::Zero()), [&](Matrix3d& s, std::size_t i) {
+        const Vector3d d = cloud.positions[i] - centroid;
+        s += d * d.transpose();
+      });
   covariance /= static_cast<double>(count);
   // Scaled, so that neither tiny nor huge clouds leave the numbers' range.
   const double scale = covariance.trace();
@@ -118,7 +119,7 @@ Moments height_moments(const libmap::PointCloud& cloud, const Vector3d& centroid
   });
 }
 
-// How far `direction` speaks for the side of `normal`: 0 if it is unknown or within the plane.
+// The cosine between both; 0 if `direction` is unknown or within the plane.
 double side_of(const Vector3d& normal, const Vector3d& direction) {
   const double length = direction.stableNorm();
   if (!(length > 0) || !std::isfinite(length)) return 0;
@@ -134,35 +135,43 @@ Vector3d sum_of_normals(const libmap::PointCloud& cloud) {
   });
 }
 
+// A fitted plane whose normal may still face either side.
+struct Fit {
+  Vector3d centroid;
+  Vector3d normal;
+  double rmse = 0;
+  double skewness = 0;
+};
+
 // The sign of the normal: which of the two sides is up, and who said so.
 double choose_up(const libmap::PointCloud& cloud, const RegressionPlaneOptions& options,
-                 const Vector3d& centroid, const Vector3d& normal, double skewness,
-                 UpSource& source) {
+                 const Fit& fit, UpSource& source) {
   if (options.up) {
     source = UpSource::direction;
-    const double side = side_of(normal, *options.up);
+    const double side = side_of(fit.normal, *options.up);
     if (side == 0)
-      throw libmap::Error("this direction does not say which side of the plane is up: it has no "
-                          "length or lies in the plane",
-                          {.field = "up"});
+      throw libmap::Error(
+          "this direction does not say which side of the plane is up: it has no "
+          "length or lies in the plane",
+          {.field = "up"});
     return side;
   }
   double side = 0;
   if (!cloud.viewpoint.isApprox(libmap::Pose::Identity(), 1e-12)) {
     source = UpSource::viewpoint;
-    side = side_of(normal, cloud.viewpoint.translation() - centroid);
+    side = side_of(fit.normal, cloud.viewpoint.translation() - fit.centroid);
     if (side != 0) return side;
   }
   source = UpSource::normals;
-  side = side_of(normal, sum_of_normals(cloud));
+  side = side_of(fit.normal, sum_of_normals(cloud));
   if (side != 0) return side;
   source = UpSource::frame_z;
-  if (std::abs(normal.z()) >= min_cosine_of_frame_z) return normal.z();
+  if (std::abs(fit.normal.z()) >= min_cosine_of_frame_z) return fit.normal.z();
   source = UpSource::camera_origin;
-  side = side_of(normal, -centroid);
-  if (side != 0) return side;
+  side = -fit.centroid.dot(fit.normal);
+  if (std::abs(side) > fit.rmse && side != 0) return side;
   source = UpSource::relief;
-  return skewness < 0 ? -1 : 1;
+  return fit.skewness < 0 ? -1 : 1;
 }
 
 // Eq. 2-17..2-19 with R = [x, -y, n], y = (c x n) / |c x n|, x = n x y.
@@ -204,22 +213,23 @@ RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
   if (plane.points >= 3) axes = principal_axes(cloud, plane.centroid, plane.points, variances);
   check_spread(variances, plane.centroid, plane.points);
 
-  Vector3d normal = axes.col(0);
-  const Moments moments = height_moments(cloud, plane.centroid, normal);
+  Fit fit{.centroid = plane.centroid, .normal = axes.col(0)};
+  const Moments moments = height_moments(cloud, fit.centroid, fit.normal);
   const double count = static_cast<double>(plane.points);
-  plane.rmse_m = std::sqrt(moments.second / count);
-  const double cube = plane.rmse_m * plane.rmse_m * plane.rmse_m;
-  double skewness = cube > 0 ? moments.third / count / cube : 0;
-  if (!std::isfinite(skewness)) skewness = 0;
+  fit.rmse = std::sqrt(moments.second / count);
+  const double cube = fit.rmse * fit.rmse * fit.rmse;
+  fit.skewness = cube > 0 ? moments.third / count / cube : 0;
+  if (!std::isfinite(fit.skewness)) fit.skewness = 0;
 
-  if (choose_up(cloud, options, plane.centroid, normal, skewness, plane.up_source) < 0) {
-    normal = -normal;
-    skewness = -skewness;
+  if (choose_up(cloud, options, fit, plane.up_source) < 0) {
+    fit.normal = -fit.normal;
+    fit.skewness = -fit.skewness;
   }
-  plane.relief_skewness = skewness;
+  plane.rmse_m = fit.rmse;
+  plane.relief_skewness = fit.skewness;
   const Matrix3d rotation = options.method == PlaneMethod::thesis
-                                ? thesis_axes(plane.centroid, normal)
-                                : corrected_axes(normal);
+                                ? thesis_axes(fit.centroid, fit.normal)
+                                : corrected_axes(fit.normal);
   plane.terrain_from_input.linear() = rotation.transpose();
   plane.terrain_from_input.translation() = -(rotation.transpose() * plane.centroid);
   return plane;
@@ -233,8 +243,7 @@ libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,
     const Eigen::Matrix3f turn = rotation.cast<float>();
     const Eigen::Vector3f shift = turn * plane.centroid.cast<float>();
     for (std::size_t i = 0; i < cloud.size(); ++i)
-      moved.positions[i] =
-          (turn * cloud.positions[i].cast<float>() - shift).eval().cast<double>();
+      moved.positions[i] = (turn * cloud.positions[i].cast<float>() - shift).eval().cast<double>();
   } else {
     // About the centroid: a far origin would cancel out of R^T p - R^T c.
     for (std::size_t i = 0; i < cloud.size(); ++i)
@@ -245,12 +254,18 @@ libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,
 
 std::string_view to_text(UpSource source) {
   switch (source) {
-    case UpSource::direction: return "direction";
-    case UpSource::viewpoint: return "viewpoint";
-    case UpSource::normals: return "normals";
-    case UpSource::frame_z: return "frame_z";
-    case UpSource::camera_origin: return "camera_origin";
-    case UpSource::relief: return "relief";
+    case UpSource::direction:
+      return "direction";
+    case UpSource::viewpoint:
+      return "viewpoint";
+    case UpSource::normals:
+      return "normals";
+    case UpSource::frame_z:
+      return "frame_z";
+    case UpSource::camera_origin:
+      return "camera_origin";
+    case UpSource::relief:
+      return "relief";
   }
   return "";
 }

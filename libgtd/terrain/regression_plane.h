@@ -12,9 +12,9 @@
 
 namespace libgtd {
 
-// thesis: the heading is y = (c x n) / |c x n|, which turns with the distance to the input's origin.
-// corrected: x is the input frame's x axis laid into the plane, or, where that axis stands on the
-// plane, y is the input frame's y axis laid into it.
+// thesis: the heading is y = (c x n) / |c x n|, which turns with the distance to the input's
+// origin. corrected: x is the input frame's x axis laid into the plane, or, where that axis stands
+// on the plane, y is the input frame's y axis laid into it.
 enum class PlaneMethod { thesis, corrected };
 
 // What decided which side of the plane is up, in the order in which they are asked.
@@ -23,19 +23,21 @@ enum class UpSource {
   viewpoint,      // the cloud's viewpoint, if it is not the identity, lies above
   normals,        // the sum of the cloud's normals points up
   frame_z,        // the input frame's z axis points up; asked if it is within 75 deg of the normal
-  camera_origin,  // eq. 2-16: a camera in the input frame's origin lies above
+  camera_origin,  // eq. 2-16: a camera in the input frame's origin lies above; asked if the origin
+                  // is farther from the plane than rmse_m
   relief          // bumps point up: the heights' third moment is positive
 };
 
 struct RegressionPlaneOptions {
   PlaneMethod method = PlaneMethod::corrected;
-  std::optional<Eigen::Vector3d> up;  // a direction of any length in the cloud's frame
+  std::optional<Eigen::Vector3d> up =
+      std::nullopt;  // a direction of any length in the cloud's frame
 };
 
 struct RegressionPlane {
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();       // in the input frame, metres
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();          // in the input frame, metres
   libmap::Pose terrain_from_input = libmap::Pose::Identity();  // p' = R^T (p - c), R = [x, -y, n]
-  double rmse_m = 0;                                        // of the points' heights
+  double rmse_m = 0;                                           // of the points' heights
   UpSource up_source = UpSource::frame_z;
   double relief_skewness = 0;  // of the heights over the plane; negative hints at upside down
   std::size_t points = 0;      // finite points that were fitted

@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cstddef>
 #include <vector>
 
 #include "libgtd/terrain/voxel_lattice.h"
@@ -16,6 +18,32 @@ struct VoxelGrid {
 
   double cells_in_box() const;
 };
+
+// A rectangle of voxel columns, [begin, end) in i and j.
+struct TileBounds {
+  int i_begin = 0;
+  int i_end = 0;
+  int j_begin = 0;
+  int j_end = 0;
+};
+
+// Calls visit(position in grid.voxels) for each voxel of the columns, ascending.
+template <typename Visit>
+void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
+  const auto begin = grid.voxels.begin();
+  const auto end = grid.voxels.end();
+  auto at = std::lower_bound(begin, end, Voxel{columns.i_begin, columns.j_begin, grid.min.k});
+  while (at != end && at->i < columns.i_end) {
+    if (at->j < columns.j_begin) {
+      at = std::lower_bound(at, end, Voxel{at->i, columns.j_begin, grid.min.k});
+    } else if (at->j >= columns.j_end) {
+      at = std::lower_bound(at, end, Voxel{at->i + 1, columns.j_begin, grid.min.k});
+    } else {
+      visit(static_cast<std::size_t>(at - begin));
+      ++at;
+    }
+  }
+}
 
 // `corrected`: index = floor(p / voxel_size_m) on the lattice through the frame's origin, so that a
 // point lies in the same voxel whatever else is in the cloud. Throws Error naming voxel_size_m if

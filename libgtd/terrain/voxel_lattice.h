@@ -33,8 +33,8 @@ struct VoxelLattice {
 };
 
 // The same in single precision, as the author's program does it (spec of method `thesis`): voxels
-// count from the cloud's smallest coordinates, and a quarter of the voxel size, in metres, is added to an
-// index before it is cut off.
+// count from the cloud's smallest coordinates, and a quarter of the voxel size, in metres, is added
+// to an index before it is cut off.
 struct ThesisLattice {
   Eigen::Vector3f min_m = Eigen::Vector3f::Zero();
   float voxel_size_m = 0.01F;

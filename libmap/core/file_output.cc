@@ -75,14 +75,16 @@ void OutputFile::commit() {
   sync_path(folder_of(final_path_), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
 
+void write_text(const fs::path& path, std::string_view content) {
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  file.write(content.data(), static_cast<std::streamsize>(content.size()));
+  file.flush();
+  if (!file) throw failed(path, "cannot be written", errno);
+}
+
 void write_whole_file(const fs::path& path, std::string_view content) {
   OutputFile output(path);
-  {
-    std::ofstream file(output.temporary_path(), std::ios::binary | std::ios::trunc);
-    file.write(content.data(), static_cast<std::streamsize>(content.size()));
-    file.flush();
-    if (!file) throw failed(path, "cannot be written", errno);
-  }
+  write_text(output.temporary_path(), content);
   output.commit();
 }
 

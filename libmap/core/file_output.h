@@ -30,6 +30,9 @@ class OutputFile {
   int lock_ = -1;
 };
 
+// `content` straight to `path`, for callers that hold an OutputFile. Throws Error (failed).
+void write_text(const std::filesystem::path& path, std::string_view content);
+
 // `content` as a whole file, through an OutputFile.
 void write_whole_file(const std::filesystem::path& path, std::string_view content);
 

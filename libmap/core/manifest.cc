@@ -94,13 +94,14 @@ auto find_in(const Pairs& pairs, std::string_view name) -> decltype(&pairs.front
 }  // namespace
 
 void Manifest::add_parameters(const ParameterTable& table) {
-  for (const Parameter& parameter : table.parameters()) {
-    const std::string text = parameter.get();
+  for (const auto& [key, text] : table.values()) {
+    const Parameter* parameter = table.find(key);
+    const ParameterType type = parameter == nullptr ? ParameterType::text : parameter->type;
     ManifestValue value = text;
-    if (parameter.type == ParameterType::boolean) value = parse_bool(text).value_or(false);
-    if (parameter.type == ParameterType::integer) value = parse_integer(text).value_or(0);
-    if (parameter.type == ParameterType::real) value = parse_double(text).value_or(0.0);
-    parameters.emplace_back(parameter.key, value);
+    if (type == ParameterType::boolean) value = parse_bool(text).value_or(false);
+    if (type == ParameterType::integer) value = parse_integer(text).value_or(0);
+    if (type == ParameterType::real) value = parse_double(text).value_or(0.0);
+    parameters.emplace_back(key, value);
   }
 }
 

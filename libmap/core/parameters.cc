@@ -125,8 +125,35 @@ const Parameter* ParameterTable::find(std::string_view key) const {
   return nullptr;
 }
 
+void ParameterTable::add_overrides(std::string prefix, Overrides& texts) {
+  overrides_.emplace_back(std::move(prefix) + ".", &texts);
+}
+
+ParameterTable::Overrides* ParameterTable::overrides_of(std::string_view key) const {
+  for (const auto& [prefix, texts] : overrides_)
+    if (key.size() > prefix.size() && key.starts_with(prefix)) return texts;
+  return nullptr;
+}
+
+bool ParameterTable::knows(std::string_view key) const {
+  return find(key) != nullptr || overrides_of(key) != nullptr;
+}
+
+std::vector<std::pair<std::string, std::string>> ParameterTable::values() const {
+  std::vector<std::pair<std::string, std::string>> values;
+  for (const Parameter& parameter : parameters_)
+    values.emplace_back(parameter.key, parameter.get());
+  for (const auto& [prefix, texts] : overrides_)
+    for (const auto& [key, text] : *texts) values.emplace_back(prefix + key, text);
+  return values;
+}
+
 void ParameterTable::set(std::string_view key, std::string_view value) const {
   const Parameter* parameter = find(key);
+  if (Overrides* texts = overrides_of(key); parameter == nullptr && texts != nullptr) {
+    texts->emplace_back(key.substr(key.find('.') + 1), value);
+    return;
+  }
   if (parameter == nullptr)
     throw Error("unknown key" + did_you_mean(key, keys()), {.field = std::string(key)});
   parameter->set(value);
@@ -151,7 +178,7 @@ void set_from_yaml(const ParameterTable& table, const std::string& text, const s
     std::set<std::string> seen;
     for (const auto& entry : root) {
       const std::string key = entry.first.as<std::string>();
-      if (table.find(key) == nullptr)
+      if (!table.knows(key))
         throw Error("unknown key" + did_you_mean(key, table.keys()), {.field = key});
       if (!seen.insert(key).second) throw Error("stands twice", {.field = key});
       if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
@@ -168,13 +195,16 @@ void set_from_yaml(const ParameterTable& table, const std::string& text, const s
 
 std::string to_yaml(const ParameterTable& table) {
   std::string yaml;
-  for (const Parameter& parameter : table.parameters()) {
+  for (const auto& [key, text] : table.values()) {
+    const Parameter* parameter = table.find(key);
     YAML::Emitter value;
-    // Text that would read as something else is quoted.
-    if (parameter.type == ParameterType::text && parameter.choices.empty())
+    // Free text is quoted: it might read as something else.
+    if (parameter == nullptr ||
+        (parameter->type == ParameterType::text && parameter->choices.empty()))
       value << YAML::DoubleQuoted;
-    value << parameter.get();
-    yaml += parameter.key + ": " + value.c_str() + "  # " + parameter.description + "\n";
+    value << text;
+    yaml += key + ": " + value.c_str();
+    yaml += parameter == nullptr ? "\n" : "  # " + parameter->description + "\n";
   }
   return yaml;
 }

@@ -52,17 +52,29 @@ class ParameterTable {
   void add(std::string key, Enum& field, const std::vector<std::pair<std::string, Enum>>& names,
            std::string description);
 
+  // Keys "PREFIX.KEY" are collected as text, for a second table that is filled from a file first
+  // ("gripper.opening_angle_deg"); who applies them checks their names.
+  void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
+
   const std::vector<Parameter>& parameters() const { return parameters_; }
   std::vector<std::string> keys() const;
   const Parameter* find(std::string_view key) const;
+  // Whether set() takes this key: a parameter, or one with the prefix of overrides.
+  bool knows(std::string_view key) const;
+  // Every key and its value as text, overrides included, as set_from_yaml would take them.
+  std::vector<std::pair<std::string, std::string>> values() const;
 
   // Sets one parameter from text. Throws Error: unknown key (with the nearest known one), or a
   // value that is not of its type or outside its bound.
   void set(std::string_view key, std::string_view value) const;
 
  private:
+  using Overrides = std::vector<std::pair<std::string, std::string>>;
   void add_parameter(Parameter parameter);
+  Overrides* overrides_of(std::string_view key) const;
+
   std::vector<Parameter> parameters_;
+  std::vector<std::pair<std::string, Overrides*>> overrides_;  // by prefix
 };
 
 // "voxel_size_m" -> "--voxel-size": the flag of a key, without the unit at its end.

@@ -1,0 +1,55 @@
+// The whole detection of graspable targets: terrain in, graspability map out ("Graspable Target
+// Detection for Hexapod Robots", 2023, chapters 2.5 and 3.2).
+#pragma once
+
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libgtd/gripper/gripper.h"
+#include "libgtd/score/graspability_map.h"
+#include "libgtd/score/scenario.h"
+#include "libgtd/terrain/regression_plane.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/progress.h"
+
+namespace libgtd {
+
+// fit: thin the cloud (`thesis` alone), fit the regression plane and carry the cloud into its
+// frame. none: the cloud is already in the terrain frame and taken as it is.
+enum class PlaneSource { fit, none };
+const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names();
+
+struct DetectionOptions {
+  Scenario scenario;
+  Gripper gripper;
+  PlaneSource plane = PlaneSource::fit;
+  std::optional<Eigen::Vector3d> up;  // in the cloud's frame: which side of the plane is outside
+  TileShare share;                    // score only these tiles
+};
+
+struct DetectionResult {
+  GraspabilityMap map;
+  GripperMask mask;
+  std::optional<RegressionPlane> plane;
+  std::size_t points = 0;          // of the input
+  std::size_t thinned_points = 0;  // after thinning, which only `thesis` does
+  std::size_t interpolated_points = 0;
+  double grid_spacing_m = 0.0;  // of the interpolation
+  std::size_t occupied_voxels = 0;
+  Voxel grid_min;
+  Voxel grid_max;
+  std::size_t tiles = 0;             // that were scored
+  std::size_t curvature_points = 0;  // whose curvature was measured
+  std::size_t convex_points = 0;
+  std::size_t graspable_voxels = 0;
+  std::size_t edge_voxels = 0;
+  std::vector<std::pair<std::string, double>> timings_s;  // wall time of each step
+};
+
+// Throws Error for an empty cloud, options out of their bounds, and what the steps throw.
+DetectionResult detect(const libmap::PointCloud& terrain, const DetectionOptions& options,
+                       libmap::Progress& progress = libmap::no_progress());
+
+}  // namespace libgtd

@@ -1,0 +1,106 @@
+#include "libgtd/score/graspability_map.h"
+
+#include <algorithm>
+#include <numeric>
+
+#include "libmap/core/error.h"
+#include "libmap/core/score_color.h"
+
+namespace libgtd {
+
+namespace {
+
+using libmap::PointCloud;
+using libmap::ScalarField;
+using libmap::ScalarType;
+
+template <typename Value>
+void add_values(PointCloud& cloud, const char* name, ScalarType type,
+                const std::vector<MapVoxel>& voxels, const Value& value) {
+  ScalarField& field = cloud.add_field(name, type);
+  for (std::size_t n = 0; n < voxels.size(); ++n)
+    field.values[n] = static_cast<double>(value(voxels[n]));
+}
+
+const std::vector<double>& index_values(const PointCloud& cloud, const char* name) {
+  const ScalarField* field = cloud.find_field(name);
+  if (field == nullptr)
+    throw libmap::Error("not a graspability map: it has no such field", {.field = name});
+  return field->values;
+}
+
+void append(PointCloud& whole, const PointCloud& part) {
+  const auto add = [](auto& to, const auto& from) {
+    to.insert(to.end(), from.begin(), from.end());
+  };
+  for (ScalarField& field : whole.fields) {
+    const ScalarField* other = part.find_field(field.name);
+    if (other == nullptr || part.fields.size() != whole.fields.size())
+      throw libmap::Error("the parts have different fields", {.field = field.name});
+    add(field.values, other->values);
+  }
+  if (whole.has_colors() != part.has_colors() && !whole.empty() && !part.empty())
+    throw libmap::Error("only some parts have colours");
+  add(whole.positions, part.positions);
+  add(whole.colors, part.colors);
+}
+
+}  // namespace
+
+const std::vector<std::pair<std::string, MapFrame>>& map_frame_names() {
+  static const std::vector<std::pair<std::string, MapFrame>> names = {
+      {"terrain", MapFrame::terrain}, {"input", MapFrame::input}};
+  return names;
+}
+
+PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
+  PointCloud cloud;
+  const libmap::Pose input_from_terrain = map.terrain_from_input.inverse();
+  for (const MapVoxel& one : map.voxels) {
+    const Eigen::Vector3d center = map.lattice.center_of(one.voxel);
+    cloud.positions.push_back(frame == MapFrame::input ? input_from_terrain * center : center);
+    cloud.colors.push_back(center.z() < map.zero_plane_m ? libmap::below_plane_color
+                                                         : libmap::score_color(one.score));
+  }
+  const auto add = [&](const char* name, ScalarType type, const auto& value) {
+    add_values(cloud, name, type, map.voxels, value);
+  };
+  add("score", ScalarType::float32, [](const MapVoxel& one) { return one.score; });
+  add("ssv", ScalarType::uint32, [](const MapVoxel& one) { return one.counts.ssv; });
+  add("gsv", ScalarType::uint32, [](const MapVoxel& one) { return one.counts.gsv; });
+  add("convex", ScalarType::uint8, [](const MapVoxel& one) { return one.convex; });
+  add("graspable", ScalarType::uint8, [](const MapVoxel& one) { return one.graspable; });
+  add("edge", ScalarType::uint8, [](const MapVoxel& one) { return one.edge; });
+  add("i", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.i; });
+  add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
+  add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
+  return cloud;
+}
+
+PointCloud merge_map_clouds(const std::vector<PointCloud>& parts) {
+  PointCloud whole;
+  for (std::size_t n = 0; n < parts.size(); ++n) {
+    if (n == 0)
+      whole = parts[n];
+    else
+      append(whole, parts[n]);
+  }
+  const std::vector<double>& i = index_values(whole, "i");
+  const std::vector<double>& j = index_values(whole, "j");
+  const std::vector<double>& k = index_values(whole, "k");
+  const auto key = [&](std::size_t n) { return std::array{i[n], j[n], k[n]}; };
+  std::vector<std::size_t> order(whole.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(),
+            [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+  for (std::size_t n = 1; n < order.size(); ++n)
+    if (key(order[n - 1]) == key(order[n]))
+      throw libmap::Error(
+          "two parts hold the same voxel",
+          {.field = "i, j, k",
+           .value = libmap::to_text(i[order[n]]) + ", " + libmap::to_text(j[order[n]]) + ", " +
+                    libmap::to_text(k[order[n]])});
+  return libmap::select_points(whole, order);
+}
+
+}  // namespace libgtd

@@ -1,0 +1,41 @@
+// The result of a detection: every scored voxel of a terrain.
+#pragma once
+
+#include <vector>
+
+#include "libgtd/score/tiling.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/pose.h"
+
+namespace libgtd {
+
+struct MapVoxel {
+  Voxel voxel;
+  VoxelCounts counts;
+  double score = 0.0;      // 0..1; `thesis` can go below
+  bool convex = false;     // a convex point lies close to its centre
+  bool graspable = false;  // score, zero plane and, if it was judged, convexity say yes
+  bool edge = false;       // the mask's window leaves the scanned area
+};
+
+struct GraspabilityMap {
+  VoxelLattice lattice;  // in the terrain frame
+  libmap::Pose terrain_from_input = libmap::Pose::Identity();
+  double zero_plane_m = 0.0;     // in the terrain frame
+  std::vector<MapVoxel> voxels;  // ascending
+};
+
+// terrain: the frame of the regression plane. input: the frame of the cloud that was scored.
+enum class MapFrame { terrain, input };
+const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
+
+// A point for each voxel, at its centre, coloured by score and white below the zero plane, with the
+// fields score, ssv, gsv, convex, graspable, edge and the voxel's i, j, k on the lattice.
+libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
+
+// The points of several clouds made by to_cloud of one map, ascending by i, j, k, as to_cloud of
+// the whole map orders them. Throws Error: a cloud without the fields i, j, k, clouds of different
+// fields, or two points of one voxel.
+libmap::PointCloud merge_map_clouds(const std::vector<libmap::PointCloud>& parts);
+
+}  // namespace libgtd

@@ -1,0 +1,39 @@
+#include "libgtd/score/scenario.h"
+
+namespace libgtd {
+
+void bind(libmap::ParameterTable& table, Scenario& scenario) {
+  using libmap::not_negative;
+  using libmap::positive;
+  table.add("method", scenario.method, method_names(),
+            "corrected, or one of the programs that it follows");
+  table.add("gripper", scenario.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge of a voxel, m");
+  table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
+            "void layers on top of the gripper mask (H_add), voxels");
+  table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
+            "fewer solid voxels around a pivot lower its score (TSV)");
+  table.add("zero_plane_m", scenario.zero_plane_m, libmap::any_number,
+            "height in the terrain frame below which nothing is a target, m");
+  table.add("interpolation", scenario.interpolation, "fill gaps by Delaunay interpolation");
+  table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
+            "longest edge of a triangle that is filled, m; 0 for no limit");
+  table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
+            "least score of a graspable voxel");
+  table.add("curvature_radius_m", scenario.curvature_radius_m, not_negative,
+            "radius in which curvature is measured, m; 0: convexity is not judged");
+  table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
+            "a voxel this close to a convex point counts as convex, m");
+  table.add("tile_size_m", scenario.tile_size_m, positive, "edge of a tile, m");
+  table.add_overrides("gripper", scenario.gripper_overrides);
+}
+
+void Scenario::check() const {
+  Scenario copy = *this;
+  libmap::ParameterTable table;
+  bind(table, copy);
+  // Setting each field to its own value checks it against its own bound.
+  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+}
+
+}  // namespace libgtd

@@ -1,0 +1,178 @@
+#include "libgtd/score/tiling.h"
+
+#include <algorithm>
+
+#include "libgtd/score/scoring.h"
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+// Columns of voxels as a summed-area table (Crow 1984): how many columns of a rectangle are set.
+class ColumnSums {
+ public:
+  explicit ColumnSums(const TileBounds& bounds)
+      : bounds_(bounds),
+        width_(static_cast<std::size_t>(bounds.j_end - bounds.j_begin) + 1),
+        sums_((static_cast<std::size_t>(bounds.i_end - bounds.i_begin) + 1) * width_) {}
+
+  const TileBounds& bounds() const { return bounds_; }
+  void set(int i, int j) { sums_[at(i + 1, j + 1)] = 1; }
+
+  void accumulate() {
+    for (int i = bounds_.i_begin + 1; i <= bounds_.i_end; ++i)
+      for (int j = bounds_.j_begin + 1; j <= bounds_.j_end; ++j)
+        sums_[at(i, j)] += sums_[at(i - 1, j)] + sums_[at(i, j - 1)] - sums_[at(i - 1, j - 1)];
+  }
+
+  // Of [i_begin, i_end) x [j_begin, j_end), cut to the table.
+  std::uint32_t count(TileBounds part) const {
+    part.i_begin = std::max(part.i_begin, bounds_.i_begin);
+    part.j_begin = std::max(part.j_begin, bounds_.j_begin);
+    part.i_end = std::min(part.i_end, bounds_.i_end);
+    part.j_end = std::min(part.j_end, bounds_.j_end);
+    if (part.i_begin >= part.i_end || part.j_begin >= part.j_end) return 0;
+    return sums_[at(part.i_end, part.j_end)] - sums_[at(part.i_begin, part.j_end)] -
+           sums_[at(part.i_end, part.j_begin)] + sums_[at(part.i_begin, part.j_begin)];
+  }
+
+ private:
+  std::size_t at(int i, int j) const {
+    return static_cast<std::size_t>(i - bounds_.i_begin) * width_ +
+           static_cast<std::size_t>(j - bounds_.j_begin);
+  }
+
+  TileBounds bounds_;
+  std::size_t width_;
+  std::vector<std::uint32_t> sums_;
+};
+
+TileBounds grown(const TileBounds& bounds, int below, int above) {
+  return {bounds.i_begin - below, bounds.i_end + above, bounds.j_begin - below,
+          bounds.j_end + above};
+}
+
+TileBounds around(int i, int j, int below, int above) {
+  return {i - below, i + above + 1, j - below, j + above + 1};
+}
+
+template <typename Visit>
+void for_each_column(const TileBounds& bounds, const Visit& visit) {
+  for (int i = bounds.i_begin; i < bounds.i_end; ++i)
+    for (int j = bounds.j_begin; j < bounds.j_end; ++j) visit(i, j);
+}
+
+ColumnSums occupied_columns(const VoxelGrid& grid, const TileBounds& bounds) {
+  ColumnSums columns(bounds);
+  visit_columns(grid, bounds,
+                [&](std::size_t at) { columns.set(grid.voxels[at].i, grid.voxels[at].j); });
+  columns.accumulate();
+  return columns;
+}
+
+// The columns of `bounds` that are not in the closing of the occupied ones.
+ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds) {
+  const int gap = scan_gap_voxels;
+  const ColumnSums occupied = occupied_columns(grid, grown(bounds, 2 * gap, 2 * gap));
+  ColumnSums far(grown(bounds, gap, gap));
+  for_each_column(far.bounds(), [&](int i, int j) {
+    if (occupied.count(around(i, j, gap, gap)) == 0) far.set(i, j);
+  });
+  far.accumulate();
+  ColumnSums unscanned(bounds);
+  for_each_column(bounds, [&](int i, int j) {
+    if (far.count(around(i, j, gap, gap)) != 0) unscanned.set(i, j);
+  });
+  unscanned.accumulate();
+  return unscanned;
+}
+
+std::vector<ScoredVoxel> score_tile(const VoxelGrid& grid, const GripperMask& mask,
+                                    const TileBounds& tile, const ScoringOptions& options) {
+  const std::vector<std::size_t> pivots = pivots_in(grid, mask, tile);
+  const std::vector<VoxelCounts> counts = match_voxels(grid, mask, tile, pivots);
+  // The other methods do not score the border at all.
+  const bool flag_edges = mask.method == Method::corrected;
+  const std::vector<std::uint8_t> edges = flag_edges ? find_edges(grid, mask, tile, pivots)
+                                                     : std::vector<std::uint8_t>(pivots.size(), 0);
+  std::vector<ScoredVoxel> scored(pivots.size());
+  for (std::size_t n = 0; n < pivots.size(); ++n)
+    scored[n] = {grid.voxels[pivots[n]], counts[n],
+                 score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0,
+                 edges[n] != 0};
+  return scored;
+}
+
+}  // namespace
+
+std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
+  if (grid.voxels.empty()) return {};
+  const int i_first = floor_divide(grid.min.i, tile_voxels);
+  const int i_last = floor_divide(grid.max.i, tile_voxels);
+  const int j_first = floor_divide(grid.min.j, tile_voxels);
+  const int j_last = floor_divide(grid.max.j, tile_voxels);
+  const double count = (1.0 + i_last - i_first) * (1.0 + j_last - j_first);
+  if (count > 0x1p24)
+    throw libmap::Error("too small: the map would have " + libmap::to_text(count) + " tiles",
+                        {.field = "tile_size_m",
+                         .value = libmap::to_text(tile_voxels * grid.lattice.voxel_size_m)});
+  std::vector<TileBounds> tiles;
+  for (int i = i_first; i <= i_last; ++i)
+    for (int j = j_first; j <= j_last; ++j)
+      tiles.push_back(
+          {i * tile_voxels, (i + 1) * tile_voxels, j * tile_voxels, (j + 1) * tile_voxels});
+  return tiles;
+}
+
+std::vector<TileBounds> share_of(const std::vector<TileBounds>& tiles, const TileShare& share) {
+  if (share.count < 1 || share.number < 1 || share.number > share.count)
+    throw libmap::Error("no such share",
+                        {.field = "--tile",
+                         .value = std::to_string(share.number) + "/" + std::to_string(share.count),
+                         .bound = "K/N with 1 <= K <= N"});
+  const auto number = static_cast<std::size_t>(share.number);
+  const auto count = static_cast<std::size_t>(share.count);
+  const auto first = static_cast<std::ptrdiff_t>(tiles.size() * (number - 1) / count);
+  const auto last = static_cast<std::ptrdiff_t>(tiles.size() * number / count);
+  return {tiles.begin() + first, tiles.begin() + last};
+}
+
+std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
+                                     const TileBounds& tile,
+                                     const std::vector<std::size_t>& pivots) {
+  if (pivots.empty()) return {};
+  const int below = mask.pivot_xy;
+  const int above = mask.side - mask.pivot_xy - 1;
+  const ColumnSums unscanned = unscanned_columns(grid, grown(tile, below, above));
+  std::vector<std::uint8_t> edges;
+  edges.reserve(pivots.size());
+  for (const std::size_t at : pivots)
+    edges.push_back(
+        unscanned.count(around(grid.voxels[at].i, grid.voxels[at].j, below, above)) != 0 ? 1 : 0);
+  return edges;
+}
+
+std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& mask,
+                                     const std::vector<TileBounds>& tiles,
+                                     const ScoringOptions& options, libmap::Progress& progress) {
+  std::vector<std::vector<ScoredVoxel>> parts(tiles.size());
+  progress.begin("voxel matching", tiles.size());
+  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      parts[t] = score_tile(grid, mask, tiles[t], options);
+      progress.advance(1);
+    }
+  });
+  progress.end();
+  std::vector<ScoredVoxel> scored;
+  for (const std::vector<ScoredVoxel>& part : parts)
+    scored.insert(scored.end(), part.begin(), part.end());
+  std::sort(scored.begin(), scored.end(),
+            [](const ScoredVoxel& a, const ScoredVoxel& b) { return a.voxel < b.voxel; });
+  return scored;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,51 @@
+// A terrain's voxels scored tile by tile. A tile reads its own voxels and a halo around them, and
+// nothing that it yields depends on its size, its order or the number of threads.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "libgtd/score/voxel_matching.h"
+#include "libmap/core/progress.h"
+
+namespace libgtd {
+
+// The tiles that cover the grid's box, in rows along j; borders are whole multiples of
+// `tile_voxels` on the lattice, whatever the cloud. Throws Error for more than 2^24 tiles.
+std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
+
+// Share `number` of `count`, from 1 on: a run of neighbouring tiles; all shares together are all
+// tiles. Throws Error naming `--tile`.
+struct TileShare {
+  int number = 1;
+  int count = 1;
+};
+std::vector<TileBounds> share_of(const std::vector<TileBounds>& tiles, const TileShare& share);
+
+struct ScoredVoxel {
+  Voxel voxel;
+  VoxelCounts counts;
+  double score = 0.0;  // score_percent / 100
+  bool edge = false;   // the mask's window leaves the scanned area
+};
+
+struct ScoringOptions {
+  int solid_voxel_threshold = 120;
+};
+
+// Every pivot of the tiles, ascending by voxel. Tiles run in parallel.
+std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& mask,
+                                     const std::vector<TileBounds>& tiles,
+                                     const ScoringOptions& options,
+                                     libmap::Progress& progress = libmap::no_progress());
+
+// For each pivot whether the window of the mask holds a column outside the scanned area: the
+// columns with voxels, closed over gaps of up to 2 * scan_gap_voxels (morphological closing by a
+// square), since a cloud has empty columns between its points.
+std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
+                                     const TileBounds& tile,
+                                     const std::vector<std::size_t>& pivots);
+inline constexpr int scan_gap_voxels = 3;
+
+}  // namespace libgtd

@@ -1,0 +1,143 @@
+#include "libmap/cloud/cloud_io.h"
+
+#include <algorithm>
+#include <cerrno>
+#include <cstring>
+#include <fstream>
+#include <limits>
+#include <utility>
+
+#include "libmap/cloud/cloud_columns.h"
+#include "libmap/cloud/csv_codec.h"
+#include "libmap/cloud/pcd_codec.h"
+#include "libmap/cloud/ply_codec.h"
+#include "libmap/cloud/vtp_codec.h"
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+namespace {
+
+Error unknown_format(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  // No library of Debian 12 reads LAS, and LAZ even less.
+  if (format == ".las" || format == ".laz")
+    return Error(
+        "LAS and LAZ cannot be read or written: Debian has no library for them; convert "
+        "to .pcd, .ply, .vtp or .csv",
+        {.file = path.string()});
+  return Error("not a cloud format" + did_you_mean(format, {".pcd", ".ply", ".vtp", ".csv"}),
+               {.file = path.string(),
+                .field = "extension",
+                .value = format.empty() ? "missing" : format,
+                .bound = ".pcd, .ply, .vtp or .csv"});
+}
+
+void require_known_format(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  if (format != ".pcd" && format != ".ply" && format != ".vtp" && format != ".csv")
+    throw unknown_format(path);
+}
+
+GeometryColumns decode(const std::string& format, const std::shared_ptr<const std::string>& bytes) {
+  if (format == ".pcd") return decode_pcd(bytes);
+  if (format == ".ply") return decode_ply(bytes);
+  if (format == ".vtp") return decode_vtp(*bytes);
+  return decode_csv(*bytes, {});
+}
+
+// The file's first MiB: more than any header.
+std::string read_head(const std::filesystem::path& path) {
+  std::string head(1 << 20, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
+  return head;
+}
+
+}  // namespace
+
+std::string format_of(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension;
+}
+
+std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path) {
+  auto bytes = std::make_shared<const std::string>(
+      read_whole_file(path, std::numeric_limits<std::uint64_t>::max()));
+  if (bytes->empty()) throw Error("is empty", {.file = path.string()});
+  return bytes;
+}
+
+void write_geometry_file(const std::filesystem::path& path,
+                         const std::function<void(std::ostream&)>& write) {
+  errno = 0;
+  std::ofstream file(path, std::ios::binary | std::ios::trunc);
+  const auto require_good = [&] {
+    if (!file)
+      throw Error(std::string("cannot be written") +
+                      (errno == 0 ? "" : std::string(": ") + std::strerror(errno)),
+                  {.file = path.string()}, ErrorKind::failed);
+  };
+  require_good();
+  try {
+    write(file);
+  } catch (const Error& error) {
+    throw error.in_file(path.string());
+  }
+  file.close();
+  require_good();
+}
+
+CloudReadResult read_cloud(const std::filesystem::path& path) {
+  require_known_format(path);
+  const auto bytes = read_geometry_bytes(path);
+  try {
+    GeometryColumns content = decode(format_of(path), bytes);
+    if (content.info.faces > 0)
+      content.info.skipped.push_back(std::to_string(content.info.faces) + " faces");
+    CloudFromColumns read = cloud_from_columns(content.vertices, NotFinite::drop);
+    if (content.viewpoint) read.cloud.viewpoint = *content.viewpoint;
+    return {std::move(read.cloud), read.dropped_points, std::move(content.info)};
+  } catch (const Error& error) {
+    throw error.in_file(path.string());
+  }
+}
+
+CloudFileInfo read_cloud_info(const std::filesystem::path& path) {
+  require_known_format(path);
+  require_readable_file(path);
+  const std::string format = format_of(path);
+  try {
+    if (format == ".pcd") return pcd_info(read_head(path), std::filesystem::file_size(path));
+    if (format == ".ply") return ply_info(read_head(path), std::filesystem::file_size(path));
+    const auto bytes = read_geometry_bytes(path);
+    return format == ".vtp" ? vtp_info(*bytes) : decode_csv(*bytes, {}).info;
+  } catch (const Error& error) {
+    throw error.in_file(path.string());
+  }
+}
+
+void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
+                 const CloudWriteOptions& options) {
+  require_known_format(path);
+  const std::string format = format_of(path);
+  const NormalNames names = format == ".pcd" ? NormalNames::long_names : NormalNames::short_names;
+  write_geometry_file(path, [&](std::ostream& out) {
+    const ColumnSet columns = columns_of_cloud(cloud, names);
+    if (format == ".pcd")
+      encode_pcd(columns, cloud.viewpoint, options.encoding, out);
+    else if (format == ".ply")
+      encode_ply({.vertices = &columns, .viewpoint = &cloud.viewpoint},
+                 {options.encoding == FileEncoding::ascii, options.big_endian}, out);
+    else if (format == ".vtp")
+      encode_vtp({.vertices = &columns, .viewpoint = &cloud.viewpoint}, options.encoding, out);
+    else
+      encode_csv(columns, out);
+  });
+}
+
+}  // namespace libmap

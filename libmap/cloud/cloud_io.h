@@ -1,0 +1,66 @@
+// Clouds from and to files. The extension, in any case, says the format: .pcd .ply .vtp .csv.
+//
+//          fields and their types   viewpoint   encodings
+//   .pcd   all                      yes         ascii, binary, binary_compressed
+//   .ply   all                      comment     ascii, binary (little- or big-endian)
+//   .vtp   all                      field data  ascii, binary, binary_compressed (zlib)
+//   .csv   all, without types       no          text
+//
+// Coordinates are doubles in memory. They are written as float32 unless that moves some coordinate
+// by more than 1e-5 m, then as float64; normals as float32, colours as three bytes, integers as
+// their type. CSV: a header line; columns x y z, optionally nx ny nz and red green blue; a column
+// of integers is read as int32, any other as float64, an empty cell as NaN. Its numbers are the
+// shortest that read back as the float32 written; as doubles they may differ from it by half a unit
+// of its last digit.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <string>
+
+#include "libmap/cloud/geometry_file.h"
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+using CloudFileInfo = GeometryFileInfo;
+
+struct CloudReadResult {
+  PointCloud cloud;
+  std::size_t dropped_points = 0;  // those with a position that is NaN or infinite
+  CloudFileInfo info;
+};
+
+struct CloudWriteOptions {
+  FileEncoding encoding =
+      FileEncoding::binary;  // what a format does not have is the nearest it has
+  bool big_endian = false;   // PLY, binary
+};
+
+// Throws Error naming the file: it cannot be read, is not of its format, promises more than it
+// holds, or has no fields x, y and z. A file of no points is an empty cloud.
+CloudReadResult read_cloud(const std::filesystem::path& path);
+
+// The same of the header alone where the format has one (PCD, PLY); VTP and CSV are read whole.
+CloudFileInfo read_cloud_info(const std::filesystem::path& path);
+
+// Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
+// temporary path. Throws Error: unknown extension, a field's name that the format cannot hold or
+// that would be read back as something else, a failed write (ErrorKind::failed).
+void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
+                 const CloudWriteOptions& options = {});
+
+// The extension in lower case, e.g. ".ply".
+std::string format_of(const std::filesystem::path& path);
+
+// The file's bytes, for the codecs. Throws Error: no such file, a folder, not readable, empty.
+std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path);
+
+// Opens `path`, calls write(stream) and sees that all of it was written; names the file in Errors.
+void write_geometry_file(const std::filesystem::path& path,
+                         const std::function<void(std::ostream&)>& write);
+
+}  // namespace libmap

@@ -1,0 +1,214 @@
+#include "libmap/cloud/columns.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+namespace {
+
+struct TypeTraits {
+  const char* name;
+  std::size_t size;
+  double min;
+  double max;
+};
+
+template <typename T>
+constexpr TypeTraits traits_of(const char* name) {
+  return {name, sizeof(T), static_cast<double>(std::numeric_limits<T>::lowest()),
+          static_cast<double>(std::numeric_limits<T>::max())};
+}
+
+constexpr std::array<TypeTraits, 10> type_traits = {
+    traits_of<std::int8_t>("int8"),   traits_of<std::uint8_t>("uint8"),
+    traits_of<std::int16_t>("int16"), traits_of<std::uint16_t>("uint16"),
+    traits_of<std::int32_t>("int32"), traits_of<std::uint32_t>("uint32"),
+    traits_of<float>("float32"),      traits_of<double>("float64"),
+    traits_of<std::int64_t>("int64"), traits_of<std::uint64_t>("uint64")};
+
+const TypeTraits& traits(StoredType type) { return type_traits[static_cast<std::size_t>(type)]; }
+const TypeTraits& traits(ScalarType type) { return type_traits[static_cast<std::size_t>(type)]; }
+
+bool is_float(ScalarType type) {
+  return type == ScalarType::float32 || type == ScalarType::float64;
+}
+
+template <typename T>
+void store(double value, bool swap_bytes, char* at) {
+  std::array<char, sizeof(T)> bytes =
+      std::bit_cast<std::array<char, sizeof(T)>>(static_cast<T>(value));
+  if (swap_bytes) std::reverse(bytes.begin(), bytes.end());
+  std::memcpy(at, bytes.data(), sizeof(T));
+}
+
+void store(double value, ScalarType type, bool swap_bytes, char* at) {
+  const double held = as_type(value, type);
+  switch (type) {
+    case ScalarType::int8:
+      return store<std::int8_t>(held, swap_bytes, at);
+    case ScalarType::uint8:
+      return store<std::uint8_t>(held, swap_bytes, at);
+    case ScalarType::int16:
+      return store<std::int16_t>(held, swap_bytes, at);
+    case ScalarType::uint16:
+      return store<std::uint16_t>(held, swap_bytes, at);
+    case ScalarType::int32:
+      return store<std::int32_t>(held, swap_bytes, at);
+    case ScalarType::uint32:
+      return store<std::uint32_t>(held, swap_bytes, at);
+    case ScalarType::float32:
+      return store<float>(held, swap_bytes, at);
+    case ScalarType::float64:
+      return store<double>(held, swap_bytes, at);
+  }
+}
+
+std::string number_text(double value, ScalarType type) {
+  const double held = as_type(value, type);
+  if (type == ScalarType::float64) return to_text(held);
+  if (type == ScalarType::float32) return to_text(static_cast<float>(held));
+  return to_text(static_cast<std::int64_t>(held));
+}
+
+bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
+
+}  // namespace
+
+std::string to_text(FileEncoding encoding) {
+  switch (encoding) {
+    case FileEncoding::ascii:
+      return "ascii";
+    case FileEncoding::binary:
+      return "binary";
+    case FileEncoding::binary_compressed:
+      return "binary_compressed";
+  }
+  return {};
+}
+
+std::string to_text(ScalarType type) { return traits(type).name; }
+
+StoredType stored_as(ScalarType type) { return static_cast<StoredType>(type); }
+
+ScalarType scalar_type_of(StoredType type) {
+  const bool wide = type == StoredType::int64 || type == StoredType::uint64;
+  return wide ? ScalarType::float64 : static_cast<ScalarType>(type);
+}
+
+std::size_t size_of(StoredType type) { return traits(type).size; }
+
+const Column* ColumnSet::find(std::string_view name) const {
+  for (const Column& column : columns)
+    if (column.name == name) return &column;
+  return nullptr;
+}
+
+double* ColumnSet::add_numbers(std::string name, ScalarType type) {
+  auto numbers = std::make_shared<std::vector<double>>(rows);
+  columns.push_back({std::move(name), type, StoredType::float64,
+                     reinterpret_cast<const std::byte*>(numbers->data()), sizeof(double), false});
+  storage.push_back(numbers);
+  return numbers->data();
+}
+
+double as_type(double value, ScalarType type) {
+  if (type == ScalarType::float64) return value;
+  if (type == ScalarType::float32) {
+    if (std::isfinite(value) && std::abs(value) > traits(type).max)
+      return std::copysign(std::numeric_limits<double>::infinity(), value);
+    return static_cast<double>(static_cast<float>(value));
+  }
+  if (std::isnan(value)) return 0.0;
+  return std::clamp(std::round(value), traits(type).min, traits(type).max);
+}
+
+bool fits_type(double value, ScalarType type) {
+  return is_float(type) || as_type(value, type) == value;
+}
+
+std::size_t record_size(const std::vector<Column>& columns) {
+  std::size_t size = 0;
+  for (const Column& column : columns) size += size_of(stored_as(column.type));
+  return size;
+}
+
+void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
+                    bool swap_bytes, std::string& out) {
+  const std::size_t record = record_size(columns);
+  const std::size_t start = out.size();
+  out.resize(start + record * (end - begin));
+  std::size_t offset = start;
+  for (Column column : columns) {
+    char* const first = out.data() + offset;
+    if (begin < end) column.first += begin * column.stride;
+    for_each_value(column, end - begin, [&](std::size_t row, double value) {
+      store(value, column.type, swap_bytes, first + row * record);
+    });
+    offset += size_of(stored_as(column.type));
+  }
+}
+
+void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
+                         char separator, std::string& out) {
+  for (std::size_t row = begin; row < end; ++row) {
+    bool first_word = true;
+    for (Column column : columns) {
+      column.first += row * column.stride;
+      if (!first_word) out += separator;
+      first_word = false;
+      for_each_value(column, 1,
+                     [&](std::size_t, double value) { out += number_text(value, column.type); });
+    }
+    out += '\n';
+  }
+}
+
+bool TextRows::next(std::vector<std::string_view>& words) {
+  words.clear();
+  while (words.empty() && position_ < text_.size()) {
+    const std::size_t end = std::min(text_.find('\n', position_), text_.size());
+    std::size_t at = position_;
+    while (at < end) {
+      while (at < end && is_blank(text_[at])) ++at;
+      const std::size_t word = at;
+      while (at < end && !is_blank(text_[at])) ++at;
+      if (at > word) words.push_back(text_.substr(word, at - word));
+    }
+    position_ = std::min(end + 1, text_.size());
+    ++line_;
+  }
+  return !words.empty();
+}
+
+double TextRows::number(std::string_view word, const std::string& field, ScalarType type) const {
+  const std::optional<double> value = parse_double(word);
+  const std::string where = "line " + std::to_string(line());
+  if (!value)
+    throw Error(
+        where + " holds no number there",
+        {.file = {}, .field = field, .value = std::string(word.substr(0, 40)), .bound = {}});
+  if (!fits_type(*value, type))
+    throw Error(where + " holds a number that its type cannot hold",
+                {.file = {},
+                 .field = field,
+                 .value = std::string(word.substr(0, 40)),
+                 .bound = "of type " + to_text(type)});
+  return *value;
+}
+
+void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
+                           const std::string& what) {
+  // A word takes a character and a blank, but for the file's last one.
+  const std::uint64_t line_bytes = 2 * words;
+  if (line_bytes > 0 && rows > (bytes + 1) / line_bytes)
+    throw Error("the header promises " + std::to_string(rows) + " " + what + ", but only " +
+                std::to_string(bytes) + " bytes of text follow");
+}
+
+}  // namespace libmap

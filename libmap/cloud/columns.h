@@ -1,0 +1,149 @@
+// Numbers in named columns: what the codecs of all formats read and write. A column is a view on
+// memory that somebody else keeps, so that neither reading nor writing copies a cloud.
+#pragma once
+
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <vector>
+
+#include "libmap/cloud/geometry_file.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/pose.h"
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+// How a number lies in memory. 64-bit integers are read as float64: exact up to 2^53.
+enum class StoredType {
+  int8,
+  uint8,
+  int16,
+  uint16,
+  int32,
+  uint32,
+  float32,
+  float64,
+  int64,
+  uint64
+};
+
+StoredType stored_as(ScalarType type);
+ScalarType scalar_type_of(StoredType type);
+std::size_t size_of(StoredType type);
+
+struct Column {
+  std::string name;
+  ScalarType type = ScalarType::float32;    // as the file declares or is to declare it
+  StoredType stored = StoredType::float32;  // as it lies in memory
+  const std::byte* first = nullptr;         // of row 0
+  std::size_t stride = 0;                   // bytes from row to row
+  bool swapped = false;                     // the other byte order
+};
+
+struct ColumnSet {
+  std::size_t rows = 0;
+  std::vector<Column> columns;
+  std::vector<std::shared_ptr<const void>> storage;  // keeps alive what the columns view
+
+  const Column* find(std::string_view name) const;
+  // A new column of `rows` numbers to be filled; the set owns them.
+  double* add_numbers(std::string name, ScalarType type);
+};
+
+// A file's whole content, as its codec yields it. Faces of more than three corners are cut into
+// fans, and the fan's triangles share the face's row of `faces`.
+struct GeometryColumns {
+  GeometryFileInfo info;
+  ColumnSet vertices;
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> face_of_triangle;  // row of `faces`
+  ColumnSet faces;
+  std::optional<Pose> viewpoint;
+};
+
+// `value` as `type` holds it: integers rounded and brought into range, NaN as 0.
+double as_type(double value, ScalarType type);
+// Whether a file may say `value` for that type.
+bool fits_type(double value, ScalarType type);
+
+// Calls body(row, value) for each row.
+template <typename Body>
+void for_each_value(const Column& column, std::size_t rows, const Body& body);
+
+// Rows begin..end-1 one after another, each column as its `type`, without gaps.
+void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
+                    bool swap_bytes, std::string& out);
+std::size_t record_size(const std::vector<Column>& columns);
+// The same as text, shortest form that reads back as the same number.
+void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
+                         char separator, std::string& out);
+
+// Lines of blank-separated words; empty lines are passed over.
+class TextRows {
+ public:
+  // `line` is the number, from 1, of the line that begins at `position`.
+  TextRows(std::string_view text, std::size_t position, std::size_t line)
+      : text_(text), position_(position), line_(line) {}
+  // The next line's words, or false at the end.
+  bool next(std::vector<std::string_view>& words);
+  std::size_t line() const { return line_ - 1; }  // of the words given last
+  std::size_t remaining() const { return text_.size() - position_; }
+  // A word as a number that fits `type`. Throws Error naming field and line.
+  double number(std::string_view word, const std::string& field, ScalarType type) const;
+
+ private:
+  std::string_view text_;
+  std::size_t position_;
+  std::size_t line_;
+};
+
+// Throws Error if `rows` lines of `words` words cannot stand in `bytes` bytes.
+void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
+                           const std::string& what);
+
+template <typename T, typename Body>
+void for_each_stored(const Column& column, std::size_t rows, const Body& body) {
+  const std::byte* at = column.first;
+  for (std::size_t row = 0; row < rows; ++row, at += column.stride) {
+    std::array<std::byte, sizeof(T)> bytes;
+    std::memcpy(bytes.data(), at, sizeof(T));
+    if (column.swapped)
+      for (std::size_t i = 0; i < sizeof(T) / 2; ++i) std::swap(bytes[i], bytes[sizeof(T) - 1 - i]);
+    body(row, static_cast<double>(std::bit_cast<T>(bytes)));
+  }
+}
+
+template <typename Body>
+void for_each_value(const Column& column, std::size_t rows, const Body& body) {
+  switch (column.stored) {
+    case StoredType::int8:
+      return for_each_stored<std::int8_t>(column, rows, body);
+    case StoredType::uint8:
+      return for_each_stored<std::uint8_t>(column, rows, body);
+    case StoredType::int16:
+      return for_each_stored<std::int16_t>(column, rows, body);
+    case StoredType::uint16:
+      return for_each_stored<std::uint16_t>(column, rows, body);
+    case StoredType::int32:
+      return for_each_stored<std::int32_t>(column, rows, body);
+    case StoredType::uint32:
+      return for_each_stored<std::uint32_t>(column, rows, body);
+    case StoredType::float32:
+      return for_each_stored<float>(column, rows, body);
+    case StoredType::float64:
+      return for_each_stored<double>(column, rows, body);
+    case StoredType::int64:
+      return for_each_stored<std::int64_t>(column, rows, body);
+    case StoredType::uint64:
+      return for_each_stored<std::uint64_t>(column, rows, body);
+  }
+}
+
+}  // namespace libmap

@@ -1,0 +1,37 @@
+// The colours of graspability scores in the thesis's legend, for files and pictures alike.
+#pragma once
+
+#include <array>
+#include <limits>
+
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+struct ScoreClass {
+  double min_score = 0.0;  // of 0..1
+  Color color{};
+};
+
+// From the best to the worst: dark green, green, yellow-green, yellow, light orange, orange, red.
+inline constexpr std::array<ScoreClass, 7> score_classes{{
+    {0.9, {0, 100, 0}},
+    {0.8, {50, 180, 50}},
+    {0.7, {173, 223, 47}},
+    {0.6, {255, 235, 0}},
+    {0.5, {255, 195, 100}},
+    {0.4, {255, 130, 0}},
+    {-std::numeric_limits<double>::infinity(), {215, 25, 28}},
+}};
+inline constexpr Color below_plane_color{255, 255, 255};
+inline constexpr Color no_value_color{128, 128, 128};
+
+// A bound is met from 1e-6 below it, so that a score stored in single precision keeps its class.
+// NaN is grey.
+constexpr Color score_color(double score) {
+  for (const ScoreClass& one : score_classes)
+    if (score >= one.min_score - 1e-6) return one.color;
+  return no_value_color;
+}
+
+}  // namespace libmap

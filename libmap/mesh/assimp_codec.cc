@@ -1,0 +1,254 @@
+#include "libmap/mesh/assimp_codec.h"
+
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/Exporter.hpp>
+#include <assimp/Importer.hpp>
+#include <bit>
+#include <cmath>
+#include <memory>
+#include <new>
+#include <stdexcept>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+namespace {
+
+// A corner's numbers, bit for bit: position, normal, colour.
+using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
+
+struct CornerHash {
+  std::size_t operator()(const Corner& corner) const {
+    // FNV-1a, a word at a time.
+    std::uint64_t hash = 14695981039346656037ULL;
+    for (const std::uint32_t word : corner) hash = (hash ^ word) * 1099511628211ULL;
+    return static_cast<std::size_t>(hash ^ (hash >> 32));
+  }
+};
+
+Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& normal,
+                 const Color& color) {
+  Corner corner{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // Adding 0 makes -0 equal to 0.
+    const auto word = std::bit_cast<std::uint64_t>(position[static_cast<int>(axis)] + 0.0);
+    corner[2 * axis] = static_cast<std::uint32_t>(word);
+    corner[2 * axis + 1] = static_cast<std::uint32_t>(word >> 32);
+    corner[6 + axis] = std::bit_cast<std::uint32_t>(normal[static_cast<int>(axis)] + 0.0F);
+    corner[9] = corner[9] << 8 | color[axis];
+  }
+  return corner;
+}
+
+std::uint8_t to_byte(float fraction) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(fraction, 0.0F, 1.0F) * 255.0F));
+}
+
+Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
+  Eigen::Affine3d affine = Eigen::Affine3d::Identity();
+  affine.matrix() << static_cast<double>(m.a1), static_cast<double>(m.a2),
+      static_cast<double>(m.a3), static_cast<double>(m.a4), static_cast<double>(m.b1),
+      static_cast<double>(m.b2), static_cast<double>(m.b3), static_cast<double>(m.b4),
+      static_cast<double>(m.c1), static_cast<double>(m.c2), static_cast<double>(m.c3),
+      static_cast<double>(m.c4), 0.0, 0.0, 0.0, 1.0;
+  return affine;
+}
+
+// z up from y up.
+Eigen::Matrix3d z_up_from_y_up() {
+  Eigen::Matrix3d rotation;
+  rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return rotation;
+}
+
+// Gathers the parts of a scene into one mesh.
+class MeshBuilder {
+ public:
+  MeshBuilder(const aiScene& scene, bool with_normals) : scene_(scene) {
+    has_normals_ = with_normals;
+    has_colors_ = true;
+    for (unsigned i = 0; i < scene.mNumMeshes; ++i) {
+      has_normals_ = has_normals_ && scene.mMeshes[i]->HasNormals();
+      has_colors_ = has_colors_ && scene.mMeshes[i]->HasVertexColors(0);
+    }
+  }
+
+  void add_node(const aiNode& node, const Eigen::Affine3d& root_from_parent) {
+    const Eigen::Affine3d root_from_node = root_from_parent * to_eigen(node.mTransformation);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+      if (node.mMeshes[i] >= scene_.mNumMeshes) throw Error("a node names no mesh");
+      add_mesh(*scene_.mMeshes[node.mMeshes[i]], root_from_node);
+    }
+    for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(*node.mChildren[i], root_from_node);
+  }
+  TriangleMesh take() { return std::move(mesh_); }
+
+ private:
+  void add_mesh(const aiMesh& part, const Eigen::Affine3d& root_from_node) {
+    const Eigen::Matrix3d normal_matrix = root_from_node.linear().inverse().transpose();
+    const bool mirrored = root_from_node.linear().determinant() < 0.0;
+    std::vector<std::uint32_t> corners;
+    for (unsigned i = 0; i < part.mNumFaces; ++i) {
+      const aiFace& face = part.mFaces[i];
+      if (face.mNumIndices < 3) continue;
+      corners.clear();
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        if (face.mIndices[k] >= part.mNumVertices)
+          throw Error("a corner is no vertex", {.file = {},
+                                                .field = "face " + std::to_string(i),
+                                                .value = std::to_string(face.mIndices[k]),
+                                                .bound = {}});
+        corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
+      }
+      if (mirrored) std::reverse(corners.begin(), corners.end());
+      for (std::size_t k = 2; k < corners.size(); ++k)
+        mesh_.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+    }
+  }
+
+  // The vertex of a corner: a new one, or the one that is equal.
+  std::uint32_t vertex(const aiMesh& part, unsigned index, const Eigen::Affine3d& root_from_node,
+                       const Eigen::Matrix3d& normal_matrix) {
+    const aiVector3D& p = part.mVertices[index];
+    const Eigen::Vector3d position = root_from_node * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    if (!position.allFinite())
+      throw Error(
+          "position is not finite",
+          {.file = {}, .field = "vertex " + std::to_string(index), .value = {}, .bound = {}});
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    if (has_normals_) {
+      const aiVector3D& n = part.mNormals[index];
+      normal = (normal_matrix * Eigen::Vector3f(n.x, n.y, n.z).cast<double>()).cast<float>();
+    }
+    Color color{};
+    if (has_colors_) {
+      const aiColor4D& c = part.mColors[0][index];
+      color = {to_byte(c.r), to_byte(c.g), to_byte(c.b)};
+    }
+    const Corner corner = corner_of(position, normal, color);
+    const auto [found, is_new] =
+        known_.try_emplace(corner, static_cast<std::uint32_t>(mesh_.vertices.size()));
+    if (is_new) {
+      mesh_.vertices.push_back(position);
+      if (has_normals_) mesh_.vertex_normals.push_back(normal);
+      if (has_colors_) mesh_.vertex_colors.push_back(color);
+    }
+    return found->second;
+  }
+
+  const aiScene& scene_;
+  bool has_normals_ = false;
+  bool has_colors_ = false;
+  TriangleMesh mesh_;
+  std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
+};
+
+std::unique_ptr<aiNode> make_root(bool y_up) {
+  auto root = std::make_unique<aiNode>();
+  root->mNumMeshes = 1;
+  root->mMeshes = new unsigned[1]{0};
+  // y up from z up, as glTF's readers expect.
+  if (y_up) root->mTransformation = aiMatrix4x4(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
+  return root;
+}
+
+void copy_vertices(const TriangleMesh& mesh, aiMesh& part) {
+  const std::size_t count = mesh.vertices.size();
+  part.mNumVertices = static_cast<unsigned>(count);
+  part.mVertices = new aiVector3D[count];
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f p = mesh.vertices[i].cast<float>();
+    part.mVertices[i] = aiVector3D(p.x(), p.y(), p.z());
+  }
+  if (!mesh.vertex_normals.empty()) {
+    part.mNormals = new aiVector3D[count];
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3f& n = mesh.vertex_normals[i];
+      part.mNormals[i] = aiVector3D(n.x(), n.y(), n.z());
+    }
+  }
+  if (mesh.vertex_colors.empty()) return;
+  part.mColors[0] = new aiColor4D[count];
+  for (std::size_t i = 0; i < count; ++i) {
+    const Color& c = mesh.vertex_colors[i];
+    part.mColors[0][i] =
+        aiColor4D(static_cast<float>(c[0]) / 255.0F, static_cast<float>(c[1]) / 255.0F,
+                  static_cast<float>(c[2]) / 255.0F, 1.0F);
+  }
+}
+
+void copy_faces(const TriangleMesh& mesh, aiMesh& part) {
+  part.mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
+  part.mNumFaces = static_cast<unsigned>(mesh.triangles.size());
+  part.mFaces = new aiFace[mesh.triangles.size()];
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    part.mFaces[i].mNumIndices = 3;
+    part.mFaces[i].mIndices = new unsigned[3];
+    std::copy(mesh.triangles[i].begin(), mesh.triangles[i].end(), part.mFaces[i].mIndices);
+  }
+}
+
+// The scene owns all that is hung into it.
+std::unique_ptr<aiScene> make_scene(const TriangleMesh& mesh, bool y_up) {
+  auto scene = std::make_unique<aiScene>();
+  scene->mRootNode = make_root(y_up).release();
+  scene->mNumMaterials = 1;
+  scene->mMaterials = new aiMaterial* [1] { new aiMaterial() };
+  scene->mNumMeshes = 1;
+  scene->mMeshes = new aiMesh* [1] { new aiMesh() };
+  scene->mMeshes[0]->mMaterialIndex = 0;
+  copy_vertices(mesh, *scene->mMeshes[0]);
+  copy_faces(mesh, *scene->mMeshes[0]);
+  return scene;
+}
+
+std::string first_line(const char* text) {
+  const std::string_view reason = text == nullptr ? "" : text;
+  return std::string(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
+}
+
+}  // namespace
+
+TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format) {
+  try {
+    Assimp::Importer importer;
+    // No aiProcess_Triangulate: on some broken files it ends the program by an assertion.
+    const aiScene* const scene =
+        importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
+    if (scene == nullptr || scene->mRootNode == nullptr)
+      throw Error("not a readable " + format + " file: " + first_line(importer.GetErrorString()));
+    Eigen::Affine3d root = Eigen::Affine3d::Identity();
+    if (format == "glb") root.linear() = z_up_from_y_up();
+    MeshBuilder builder(*scene, format != "stl");
+    builder.add_node(*scene->mRootNode, root);
+    return builder.take();
+  } catch (const std::bad_alloc&) {
+    throw Error("claims more data than the memory holds");
+  } catch (const std::length_error&) {
+    throw Error("claims more data than the memory holds");
+  }
+}
+
+std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {
+  if (mesh.triangles.empty())
+    throw Error("a mesh without triangles cannot be written as " + format);
+  const bool is_glb = format == "glb";
+  const std::unique_ptr<aiScene> scene = make_scene(mesh, is_glb);
+  Assimp::Exporter exporter;
+  const aiExportDataBlob* const blob = exporter.ExportToBlob(scene.get(), is_glb  ? "glb2"
+                                                                          : ascii ? "stl"
+                                                                                  : "stlb");
+  if (blob == nullptr)
+    throw Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
+                ErrorKind::failed);
+  return std::string(static_cast<const char*>(blob->data), blob->size);
+}
+
+}  // namespace libmap

@@ -1,0 +1,159 @@
+#include "libmap/mesh/mesh_io.h"
+
+#include <algorithm>
+#include <array>
+#include <limits>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "libmap/cloud/cloud_columns.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/ply_codec.h"
+#include "libmap/cloud/vtp_codec.h"
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/assimp_codec.h"
+#include "libmap/mesh/mesh_text.h"
+
+namespace libmap {
+namespace {
+
+constexpr std::array<const char*, 6> mesh_formats = {".ply", ".obj", ".stl",
+                                                     ".off", ".glb", ".vtp"};
+
+bool is_mesh_format(const std::string& format) {
+  return std::find(mesh_formats.begin(), mesh_formats.end(), format) != mesh_formats.end();
+}
+
+void require_known_format(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  if (is_mesh_format(format)) return;
+  throw Error(
+      "not a mesh format" + did_you_mean(format, {mesh_formats.begin(), mesh_formats.end()}),
+      {.file = path.string(),
+       .field = "extension",
+       .value = format.empty() ? "missing" : format,
+       .bound = ".ply, .obj, .stl, .off, .glb or .vtp"});
+}
+
+// A field of polygons as one of triangles.
+ScalarField field_of_triangles(const ScalarField& field, const std::vector<std::uint32_t>& faces) {
+  ScalarField spread{field.name, field.type, {}};
+  spread.values.reserve(faces.size());
+  for (const std::uint32_t face : faces) spread.values.push_back(field.values[face]);
+  return spread;
+}
+
+TriangleMesh mesh_of_columns(GeometryColumns& content) {
+  PointCloud cloud = cloud_from_columns(content.vertices, NotFinite::refuse).cloud;
+  TriangleMesh mesh;
+  mesh.vertices = std::move(cloud.positions);
+  mesh.vertex_normals = std::move(cloud.normals);
+  mesh.vertex_colors = std::move(cloud.colors);
+  mesh.vertex_fields = std::move(cloud.fields);
+  mesh.triangles = std::move(content.triangles);
+  for (const ScalarField& field : fields_of_columns(content.faces))
+    mesh.face_fields.push_back(field_of_triangles(field, content.face_of_triangle));
+  return mesh;
+}
+
+// What assimp does not tell.
+GeometryFileInfo info_of(const TriangleMesh& mesh, const std::string& format,
+                         const std::string& bytes) {
+  GeometryFileInfo info;
+  info.format = format;
+  const bool is_text =
+      format == "obj" || format == "off" || (format == "stl" && bytes.starts_with("solid"));
+  info.encoding = is_text ? FileEncoding::ascii : FileEncoding::binary;
+  info.bytes = bytes.size();
+  info.points = mesh.vertices.size();
+  info.faces = mesh.triangles.size();
+  for (const char* const axis : {"x", "y", "z"})
+    info.fields.push_back({axis, ScalarType::float32, 1});
+  return info;
+}
+
+MeshReadResult decode(const std::string& format, const std::shared_ptr<const std::string>& bytes) {
+  if (format == ".ply" || format == ".vtp") {
+    GeometryColumns content = format == ".ply" ? decode_ply(bytes) : decode_vtp(*bytes);
+    TriangleMesh mesh = mesh_of_columns(content);
+    return {std::move(mesh), std::move(content.info)};
+  }
+  const std::string name = format.substr(1);
+  TriangleMesh mesh = decode_by_assimp(*bytes, name);
+  GeometryFileInfo info = info_of(mesh, name, *bytes);
+  return {std::move(mesh), std::move(info)};
+}
+
+ColumnSet columns_of_vertices(const TriangleMesh& mesh) {
+  ColumnSet set;
+  set.rows = mesh.vertices.size();
+  add_position_columns(mesh.vertices, set);
+  add_normal_columns(mesh.vertex_normals, NormalNames::short_names, set);
+  add_color_columns(mesh.vertex_colors, set);
+  add_field_columns(mesh.vertex_fields, set);
+  return set;
+}
+
+ColumnSet columns_of_faces(const TriangleMesh& mesh) {
+  ColumnSet set;
+  set.rows = mesh.triangles.size();
+  add_field_columns(mesh.face_fields, set);
+  return set;
+}
+
+void encode(const std::string& format, const TriangleMesh& mesh, const MeshWriteOptions& options,
+            std::ostream& out) {
+  const bool ascii = options.encoding == FileEncoding::ascii;
+  if (format == ".obj") return write_obj(mesh, out);
+  if (format == ".off") return write_off(mesh, out);
+  if (format == ".stl" || format == ".glb") {
+    const std::string bytes = encode_by_assimp(mesh, format.substr(1), ascii);
+    out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+    return;
+  }
+  const ColumnSet vertices = columns_of_vertices(mesh);
+  const ColumnSet faces = columns_of_faces(mesh);
+  if (format == ".ply")
+    encode_ply({&vertices, &mesh.triangles, &faces, nullptr}, {ascii, options.big_endian}, out);
+  else
+    encode_vtp({&vertices, &mesh.triangles, &faces, nullptr}, options.encoding, out);
+}
+
+}  // namespace
+
+MeshReadResult read_mesh(const std::filesystem::path& path) {
+  require_known_format(path);
+  const auto bytes = read_geometry_bytes(path);
+  try {
+    MeshReadResult result = decode(format_of(path), bytes);
+    if (result.mesh.triangles.empty()) throw Error("holds no triangle");
+    return result;
+  } catch (const Error& error) {
+    throw error.in_file(path.string());
+  }
+}
+
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
+                const MeshWriteOptions& options) {
+  require_known_format(path);
+  mesh.check();
+  write_geometry_file(path,
+                      [&](std::ostream& out) { encode(format_of(path), mesh, options, out); });
+}
+
+FileKind file_kind(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  if (format == ".ply" || format == ".vtp")
+    return read_cloud_info(path).faces > 0 ? FileKind::mesh : FileKind::cloud;
+  if (is_mesh_format(format)) return FileKind::mesh;
+  if (format == ".pcd" || format == ".csv") return FileKind::cloud;
+  throw Error("neither a cloud nor a mesh",
+              {.file = path.string(),
+               .field = "extension",
+               .value = format.empty() ? "missing" : format,
+               .bound = ".pcd, .ply, .vtp, .csv, .obj, .stl, .off or .glb"});
+}
+
+}  // namespace libmap

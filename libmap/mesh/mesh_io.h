@@ -1,0 +1,57 @@
+// Triangle meshes from and to files. The extension, in any case, says the format.
+//
+//          read by         written by      kept
+//   .ply   ply_codec       ply_codec       doubles, normals, colours, vertex and face fields
+//   .vtp   VTK             VTK             doubles, normals, colours, vertex and face fields
+//   .obj   assimp          mesh_text       doubles written, float32 read; normals, colours
+//   .off   assimp          mesh_text       doubles written, float32 read; geometry alone
+//   .stl   assimp          assimp          float32; geometry alone
+//   .glb   assimp          assimp          float32; normals, colours
+//
+// float32 holds 24 bits: at 16 m from the origin a step is 2 micrometres, at 500 km (map
+// coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp: they write float64
+// where float32 would move some coordinate by more than 1e-5 m.
+//
+// The formats that assimp reads store corners, not vertices: corners equal in every number are made
+// one vertex again, in the order of their first use, and vertices of no triangle are lost. GLB has
+// y up by its standard, this project z: writing and reading turn it about x.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+
+#include "libmap/cloud/geometry_file.h"
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+struct MeshReadResult {
+  TriangleMesh mesh;
+  GeometryFileInfo info;
+};
+
+struct MeshWriteOptions {
+  FileEncoding encoding =
+      FileEncoding::binary;  // what a format does not have is the nearest it has
+  bool big_endian = false;   // PLY, binary
+};
+
+enum class FileKind { cloud, mesh };
+
+// Polygons of more than three corners are cut into fans of triangles, each with the polygon's face
+// fields; lines and points are passed over. Throws Error naming the file: it cannot be read, is not
+// of its format, holds no triangle, promises more than it holds, has a corner that is no vertex or
+// a vertex that is not finite.
+MeshReadResult read_mesh(const std::filesystem::path& path);
+
+// Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
+// temporary path. What a format cannot keep (the table above) is left out. Throws Error: unknown
+// extension, an index out of range, a failed write (ErrorKind::failed).
+void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
+                const MeshWriteOptions& options = {});
+
+// Whether the file holds a mesh (it has faces) or a cloud: by its extension, and for .ply and .vtp
+// by its content. Throws Error: an extension of neither, or a file that cannot be read.
+FileKind file_kind(const std::filesystem::path& path);
+
+}  // namespace libmap

@@ -1,0 +1,170 @@
+#include "libmap/simulate/primitive_scene.h"
+
+#include <array>
+#include <cmath>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/simulate/scene_geometry.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr Range size_range{0.0, 1e4, true, false};
+constexpr Range position_range{-1e6, 1e6};
+constexpr Range angle_range{-360.0, 360.0};
+
+struct ParameterAdder {
+  ParameterTable& table;
+
+  void operator()(Sphere& sphere) const {
+    table.add("radius_m", sphere.radius_m, size_range, "radius");
+  }
+  void operator()(Capsule& capsule) const {
+    table.add("radius_m", capsule.radius_m, size_range, "radius: half the width");
+    table.add("length_m", capsule.length_m, size_range, "length along x with the round ends");
+  }
+  void operator()(Cone& cone) const {
+    table.add("radius_m", cone.radius_m, size_range, "radius of the base");
+    table.add("height_m", cone.height_m, size_range, "height of the apex over the base");
+  }
+  void operator()(Cylinder& cylinder) const {
+    table.add("radius_m", cylinder.radius_m, size_range, "radius");
+    table.add("height_m", cylinder.height_m, size_range, "height over the base");
+  }
+  void operator()(Box& box) const {
+    table.add("size_x_m", box.size_x_m, size_range, "length along x");
+    table.add("size_y_m", box.size_y_m, size_range, "length along y");
+    table.add("size_z_m", box.size_z_m, size_range, "height over the base");
+  }
+  void operator()(Plane& plane) const {
+    table.add("size_x_m", plane.size_x_m, size_range, "length along x");
+    table.add("size_y_m", plane.size_y_m, size_range, "length along y");
+  }
+  void operator()(Bump& bump) const {
+    table.add("height_m", bump.height_m, Range{-1e4, 1e4}, "height; negative for a hollow");
+    table.add("radius_m", bump.radius_m, size_range, "radius");
+    table.add("profile", bump.profile,
+              {{"cosine", BumpProfile::cosine}, {"gaussian", BumpProfile::gaussian}},
+              "cosine: cos^2, ends at the radius; gaussian: the radius is three deviations");
+  }
+};
+
+Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
+  ErrorContext context = error.context();
+  context.field = "shapes[" + std::to_string(i) + "]." + context.field;
+  return Error(error.reason() + " in " + shape_kind(shape), context);
+}
+
+void check_shape(const SceneShape& shape) {
+  // A table's setters know the bounds: set each parameter of a copy to what it is.
+  SceneShape copy = shape;
+  const ParameterTable table = shape_parameters(copy);
+  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
+    if (capsule->length_m < 2.0 * capsule->radius_m)
+      throw Error("shorter than wide", {.file = {},
+                                        .field = "length_m",
+                                        .value = to_text(capsule->length_m),
+                                        .bound = ">= " + to_text(2.0 * capsule->radius_m)});
+  }
+  if (std::holds_alternative<Plane>(shape.geometry)) {
+    const double up = shape.placement.pose().linear()(2, 2);
+    if (up < 1e-6)
+      throw Error(
+          "the plane does not face up (a box can stand or overhang)",
+          {.file = {},
+           .field = "roll_deg, pitch_deg",
+           .value = to_text(shape.placement.roll_deg) + ", " + to_text(shape.placement.pitch_deg),
+           .bound = "less than 90 degrees from upright"});
+  }
+}
+
+}  // namespace
+
+Pose Placement::pose() const {
+  return make_pose_from_rpy({x_m, y_m, z_m}, {roll_deg, pitch_deg, yaw_deg});
+}
+
+const std::vector<std::string>& shape_kinds() {
+  static const std::vector<std::string> kinds = {"sphere", "capsule", "cone", "cylinder",
+                                                 "box",    "plane",   "bump"};
+  return kinds;
+}
+
+const std::string& shape_kind(const SceneShape& shape) {
+  return shape_kinds()[shape.geometry.index()];
+}
+
+ShapeGeometry make_shape_geometry(const std::string& kind) {
+  static const std::array<ShapeGeometry, 7> geometries = {Sphere{}, Capsule{}, Cone{}, Cylinder{},
+                                                          Box{},    Plane{},   Bump{}};
+  for (const ShapeGeometry& geometry : geometries)
+    if (shape_kinds()[geometry.index()] == kind) return geometry;
+  std::string bound = "one of";
+  for (const std::string& known : shape_kinds()) bound += " " + known;
+  throw Error("unknown shape" + did_you_mean(kind, shape_kinds()),
+              {.file = {}, .field = "shape", .value = kind, .bound = bound});
+}
+
+ParameterTable shape_parameters(SceneShape& shape) {
+  ParameterTable table;
+  table.add("name", shape.name, "free text");
+  std::visit(ParameterAdder{table}, shape.geometry);
+  Placement& placement = shape.placement;
+  table.add("x_m", placement.x_m, position_range, "position");
+  table.add("y_m", placement.y_m, position_range, "position");
+  table.add("z_m", placement.z_m, position_range, "position");
+  table.add("roll_deg", placement.roll_deg, angle_range, "turn about the scene's x, first");
+  table.add("pitch_deg", placement.pitch_deg, angle_range, "turn about the scene's y, second");
+  table.add("yaw_deg", placement.yaw_deg, angle_range, "turn about the scene's z, third");
+  return table;
+}
+
+void PrimitiveScene::check() const {
+  bool has_plane = false;
+  bool has_bump = false;
+  for (std::size_t i = 0; i < shapes.size(); ++i) {
+    has_plane = has_plane || std::holds_alternative<Plane>(shapes[i].geometry);
+    has_bump = has_bump || std::holds_alternative<Bump>(shapes[i].geometry);
+    try {
+      check_shape(shapes[i]);
+    } catch (const Error& error) {
+      throw shape_error(i, shapes[i], error);
+    }
+  }
+  if (shapes.empty()) throw Error("a scene needs at least one shape", {.field = "shapes"});
+  if (has_bump && !has_plane) throw Error("bumps need a plane that they bend", {.field = "shapes"});
+}
+
+PrimitiveScene thesis_primitive_scene() {
+  constexpr std::array<double, 5> columns_m = {1.0, 0.5, 0.0, -0.5, -1.0};
+  constexpr std::array<double, 5> sphere_radii_m = {0.05, 0.10, 0.15, 0.20, 0.25};
+  constexpr std::array<double, 5> capsule_radii_m = {0.05, 0.075, 0.10, 0.125, 0.15};
+  constexpr std::array<double, 5> capsule_lengths_m = {0.2, 0.3, 0.4, 0.5, 0.6};
+  constexpr std::array<double, 5> cone_heights_m = {0.05, 0.0875, 0.125, 0.1625, 0.2};
+  PrimitiveScene scene;
+  scene.shapes.push_back({Plane{3.0, 3.0}, {}, "ground"});
+  for (std::size_t i = 0; i < columns_m.size(); ++i)
+    scene.shapes.push_back(
+        {Sphere{sphere_radii_m[i]}, {.x_m = columns_m[i], .y_m = -1.0}, "hemisphere"});
+  for (std::size_t i = 0; i < columns_m.size(); ++i)
+    scene.shapes.push_back({Capsule{capsule_radii_m[i], capsule_lengths_m[i]},
+                            {.x_m = columns_m[i], .yaw_deg = 90.0},
+                            "half-capsule"});
+  for (std::size_t i = 0; i < columns_m.size(); ++i)
+    scene.shapes.push_back(
+        {Cone{0.15, cone_heights_m[i]}, {.x_m = columns_m[i], .y_m = 1.0}, "cone"});
+  return scene;
+}
+
+std::optional<SurfaceTruth> truth_from_above(const PrimitiveScene& scene, double x_m, double y_m) {
+  return SceneGeometry(scene).from_above(x_m, y_m);
+}
+
+double signed_distance(const PrimitiveScene& scene, const Eigen::Vector3d& point) {
+  return SceneGeometry(scene).signed_distance(point);
+}
+
+}  // namespace libmap

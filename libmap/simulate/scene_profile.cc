@@ -1,0 +1,189 @@
+#include "libmap/simulate/scene_profile.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace libmap {
+
+namespace {
+
+using std::numbers::pi;
+
+struct Roots {
+  std::array<double, 2> values{};
+  int count = 0;
+};
+
+// Real roots of a s^2 + 2 b s + c, without cancellation.
+Roots solve_quadratic(double a, double b, double c, double scale) {
+  Roots roots;
+  if (std::abs(a) <= 1e-14 * scale) {
+    if (b != 0.0) roots = {{-c / (2.0 * b), 0.0}, 1};
+    return roots;
+  }
+  const double discriminant = b * b - a * c;
+  if (discriminant < 0.0) return roots;
+  const double q = -(b + std::copysign(std::sqrt(discriminant), b));
+  roots.count = 2;
+  roots.values = {q / a, q != 0.0 ? c / q : 0.0};
+  return roots;
+}
+
+Roots line_hits(const ProfileSegment& segment, const Eigen::Vector3d& origin,
+                const Eigen::Vector3d& direction) {
+  const Eigen::Vector2d step = segment.end - segment.start;
+  if (step.y() == 0.0) {
+    if (direction.z() == 0.0) return {};
+    return {{(segment.start.y() - origin.z()) / direction.z(), 0.0}, 1};
+  }
+  const double slope = step.x() / step.y();
+  const double rho = segment.start.x() + slope * (origin.z() - segment.start.y());
+  const double rho_step = slope * direction.z();
+  const Eigen::Vector2d o = origin.head<2>();
+  const Eigen::Vector2d d = direction.head<2>();
+  return solve_quadratic(d.squaredNorm() - rho_step * rho_step, o.dot(d) - rho * rho_step,
+                         o.squaredNorm() - rho * rho, 1.0);
+}
+
+Roots arc_hits(const ProfileSegment& segment, const Eigen::Vector3d& origin,
+               const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d o = origin - Eigen::Vector3d(0.0, 0.0, segment.centre_a);
+  return solve_quadratic(direction.squaredNorm(), o.dot(direction),
+                         o.squaredNorm() - segment.radius * segment.radius, 1.0);
+}
+
+bool lies_on(const ProfileSegment& segment, const Eigen::Vector2d& point, double tolerance) {
+  if (segment.is_arc) {
+    const double low = segment.centre_a + segment.radius * std::cos(segment.angle_end);
+    const double high = segment.centre_a + segment.radius * std::cos(segment.angle_start);
+    return point.y() >= low - tolerance && point.y() <= high + tolerance;
+  }
+  const Eigen::Vector2d low = segment.start.cwiseMin(segment.end);
+  const Eigen::Vector2d high = segment.start.cwiseMax(segment.end);
+  return (point.array() >= low.array() - tolerance).all() &&
+         (point.array() <= high.array() + tolerance).all();
+}
+
+}  // namespace
+
+ProfileSegment ProfileSegment::line(Eigen::Vector2d start, Eigen::Vector2d end) {
+  ProfileSegment segment;
+  segment.start = std::move(start);
+  segment.end = std::move(end);
+  return segment;
+}
+
+ProfileSegment ProfileSegment::arc(double centre_a, double radius, double angle_start,
+                                   double angle_end) {
+  ProfileSegment segment;
+  segment.is_arc = true;
+  segment.centre_a = centre_a;
+  segment.radius = radius;
+  segment.angle_start = angle_start;
+  segment.angle_end = angle_end;
+  return segment;
+}
+
+double ProfileSegment::length() const {
+  return is_arc ? radius * (angle_end - angle_start) : (end - start).norm();
+}
+
+double ProfileSegment::area() const { return area_between(0.0, 1.0); }
+
+double ProfileSegment::area_between(double t0, double t1) const {
+  const Eigen::Vector2d p0 = point(t0);
+  const Eigen::Vector2d p1 = point(t1);
+  // Archimedes: a zone of a sphere has the area of the cylinder around it.
+  if (is_arc) return 2.0 * pi * radius * (p0.y() - p1.y());
+  return pi * (p0.x() + p1.x()) * length() * (t1 - t0);
+}
+
+Eigen::Vector2d ProfileSegment::point(double t) const {
+  if (!is_arc) return start + t * (end - start);
+  const double angle = angle_start + t * (angle_end - angle_start);
+  return {radius * std::sin(angle), centre_a + radius * std::cos(angle)};
+}
+
+Eigen::Vector2d ProfileSegment::normal_at(const Eigen::Vector2d& at) const {
+  if (is_arc) return (at - Eigen::Vector2d(0.0, centre_a)).normalized();
+  const Eigen::Vector2d step = (end - start).normalized();
+  return {-step.y(), step.x()};
+}
+
+double ProfileSegment::curvature_along() const { return is_arc ? 1.0 / radius : 0.0; }
+
+double ProfileSegment::curvature_around(const Eigen::Vector2d& at) const {
+  if (is_arc) return 1.0 / radius;
+  const double normal_rho = normal_at(at).x();
+  // Meusnier: the circle of radius rho, seen under the angle of its normal to the surface's.
+  return normal_rho == 0.0 ? 0.0 : normal_rho / at.x();
+}
+
+double ProfileSegment::t_of_area_share(double t0, double t1, double share) const {
+  const Eigen::Vector2d p0 = point(t0);
+  const Eigen::Vector2d p1 = point(t1);
+  if (is_arc) {
+    const double cosine = (p0.y() + share * (p1.y() - p0.y()) - centre_a) / radius;
+    const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
+    return std::clamp((angle - angle_start) / (angle_end - angle_start), t0, t1);
+  }
+  const double difference = p1.x() - p0.x();
+  if (std::abs(difference) <= 1e-12 * (p0.x() + p1.x())) return t0 + share * (t1 - t0);
+  const double rho = std::sqrt(p0.x() * p0.x() + share * (p1.x() * p1.x() - p0.x() * p0.x()));
+  return t0 + (rho - p0.x()) / difference * (t1 - t0);
+}
+
+double ProfileSegment::distance(const Eigen::Vector2d& from) const {
+  if (is_arc) {
+    const Eigen::Vector2d offset = from - Eigen::Vector2d(0.0, centre_a);
+    const double angle = std::atan2(offset.x(), offset.y());
+    if (angle >= angle_start && angle <= angle_end) return std::abs(offset.norm() - radius);
+    return std::min((from - point(0.0)).norm(), (from - point(1.0)).norm());
+  }
+  const Eigen::Vector2d step = end - start;
+  const double t = std::clamp((from - start).dot(step) / step.squaredNorm(), 0.0, 1.0);
+  return (from - (start + t * step)).norm();
+}
+
+bool ProfileSegment::is_beyond(const Eigen::Vector2d& at) const {
+  if (!is_arc) return (at - start).dot(normal_at(at)) > 0.0;
+  const Eigen::Vector2d offset = at - Eigen::Vector2d(0.0, centre_a);
+  const double angle = std::atan2(offset.x(), offset.y());
+  return angle >= angle_start && angle <= angle_end && offset.norm() > radius;
+}
+
+double profile_signed_distance(const Profile& profile, const Eigen::Vector2d& point) {
+  double distance = std::numeric_limits<double>::infinity();
+  bool outside = false;
+  for (const ProfileSegment& segment : profile) {
+    distance = std::min(distance, segment.distance(point));
+    outside = outside || segment.is_beyond(point);
+  }
+  return outside ? distance : -distance;
+}
+
+bool last_hit(const Profile& profile, const Eigen::Vector3d& origin,
+              const Eigen::Vector3d& direction, ProfileHit& hit) {
+  bool found = false;
+  for (std::size_t i = 0; i < profile.size(); ++i) {
+    const ProfileSegment& segment = profile[i];
+    const Roots roots = segment.is_arc ? arc_hits(segment, origin, direction)
+                                       : line_hits(segment, origin, direction);
+    for (int k = 0; k < roots.count; ++k) {
+      const double s = roots.values[static_cast<std::size_t>(k)];
+      const Eigen::Vector3d at = origin + s * direction;
+      const Eigen::Vector2d in_profile(at.head<2>().norm(), at.z());
+      // Wide enough that no line slips through a seam.
+      if (!lies_on(segment, in_profile, 1e-12 * (1.0 + origin.norm()))) continue;
+      if (found && s <= hit.s) continue;
+      hit = {s, i};
+      found = true;
+    }
+  }
+  return found;
+}
+
+}  // namespace libmap

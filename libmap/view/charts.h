@@ -1,0 +1,83 @@
+// Charts of curves and histograms, drawn by VTK: as an image, and as SVG, whose letters are drawn
+// as outlines (every viewer shows them alike) and whose <title> and <desc> hold the names. Both
+// need an X display; hold a VirtualDisplay while calling.
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+#include "libmap/view/image_io.h"
+
+namespace libmap {
+
+struct ChartCurve {
+  std::string name;  // in the legend; empty: not in it
+  std::vector<double> x;
+  std::vector<double> y;
+  std::optional<Color> color;  // default: the next of a palette that colour-blind people can tell
+                               // apart (Okabe and Ito 2008)
+  double width_px = 2.5;
+  bool dashed = false;
+  bool markers = false;  // a dot at each point
+};
+
+// Bars side by side: bar i from first_edge + i * bin_width to the next.
+struct ChartHistogram {
+  std::string name;
+  double first_edge = 0.0;
+  double bin_width = 1.0;  // > 0
+  std::vector<double> heights;
+  std::optional<Color> color;
+};
+
+struct ChartAxis {
+  std::string title;                               // with its unit
+  std::optional<std::pair<double, double>> range;  // default: round numbers around the data
+};
+
+enum class LegendCorner { none, top_left, top_right, bottom_left, bottom_right };
+
+struct Chart {
+  std::string title;
+  ChartAxis x_axis;
+  ChartAxis y_axis;
+  std::vector<ChartCurve> curves;
+  std::vector<ChartHistogram> histograms;  // behind the curves
+  LegendCorner legend = LegendCorner::top_right;
+
+  // Throws Error naming the first field that cannot be drawn: arrays that differ in length, numbers
+  // that are not finite, an empty range.
+  void check() const;
+};
+
+struct ChartSize {
+  int width_px = 900;
+  int height_px = 700;
+};
+
+Image draw_chart(const Chart& chart, const ChartSize& size = {});
+
+void write_chart_svg(const std::filesystem::path& path, const Chart& chart,
+                     const ChartSize& size = {});
+
+// A receiver operating characteristic: false positive rates on x, true positive rates on y.
+struct RocCurve {
+  std::string name;
+  std::vector<double> false_positive_rates;
+  std::vector<double> true_positive_rates;
+  std::optional<double> area;  // of the trapezoid, for the legend
+};
+
+// All curves in one chart, 0 to 1 on both axes, with the diagonal of a score that knows nothing.
+Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title);
+// The size at which a ROC chart is square.
+inline constexpr ChartSize roc_chart_size{900, 900};
+
+// At most `most` + 1 round numbers (1, 2 or 5 times a power of ten apart) within low..high.
+std::vector<double> round_ticks(double low, double high, int most);
+
+}  // namespace libmap

@@ -1,0 +1,285 @@
+#include "libmap/view/color_map.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+namespace {
+
+struct ScoreClass {
+  double from;
+  Color color;
+  const char* text;
+};
+constexpr std::array<ScoreClass, 7> score_classes{{
+    {0.9, {0, 100, 0}, "0.9 and above"},
+    {0.8, {34, 170, 34}, "0.8 to 0.9"},
+    {0.7, {154, 205, 50}, "0.7 to 0.8"},
+    {0.6, {255, 235, 0}, "0.6 to 0.7"},
+    {0.5, {255, 200, 110}, "0.5 to 0.6"},
+    {0.4, {255, 140, 0}, "0.4 to 0.5"},
+    {-std::numeric_limits<double>::infinity(), {214, 24, 24}, "below 0.4"},
+}};
+// Single precision rounds 0.9 to 0.89999998.
+constexpr double score_tolerance = 1e-6;
+
+// Every 15th of matplotlib's 256 entries; between them the map is linear to within a byte.
+constexpr std::array<std::array<double, 3>, 18> viridis_points{{
+    {0.267004, 0.004874, 0.329415},
+    {0.281924, 0.089666, 0.412415},
+    {0.280255, 0.165693, 0.476498},
+    {0.263663, 0.237631, 0.518762},
+    {0.237441, 0.305202, 0.541921},
+    {0.208623, 0.367752, 0.552675},
+    {0.182256, 0.426184, 0.557120},
+    {0.159194, 0.482237, 0.558073},
+    {0.137770, 0.537492, 0.554906},
+    {0.121148, 0.592739, 0.544641},
+    {0.128087, 0.647749, 0.523491},
+    {0.180653, 0.701402, 0.488189},
+    {0.274149, 0.751988, 0.436601},
+    {0.395174, 0.797475, 0.367757},
+    {0.535621, 0.835785, 0.281908},
+    {0.688944, 0.865448, 0.182725},
+    {0.845561, 0.887322, 0.099702},
+    {0.993248, 0.906157, 0.143936},
+}};
+
+struct NamedColor {
+  const char* name;
+  Color color;
+};
+constexpr std::array<NamedColor, 10> named_colors{{
+    {"white", {255, 255, 255}},
+    {"black", {0, 0, 0}},
+    {"grey", {128, 128, 128}},
+    {"light-grey", {211, 211, 211}},
+    {"dark-grey", {70, 70, 70}},
+    {"red", {214, 24, 24}},
+    {"green", {34, 170, 34}},
+    {"blue", {40, 90, 220}},
+    {"yellow", {255, 235, 0}},
+    {"orange", {255, 140, 0}},
+}};
+
+const ScalarField* find(const ColorSource& source, std::string_view name) {
+  for (const ScalarField& field : source.fields)
+    if (field.name == name) return &field;
+  return nullptr;
+}
+
+[[noreturn]] void throw_unknown_field(const ColorSource& source, const std::string& name) {
+  std::vector<std::string> known;
+  for (const ScalarField& field : source.fields) known.push_back(field.name);
+  for (const char* axis : {"x", "y", "z"}) known.emplace_back(axis);
+  std::string bound = "one of";
+  for (const std::string& candidate : known) bound += " " + candidate;
+  throw Error("there is no such field to colour by" + did_you_mean(name, known),
+              {.file = {}, .field = "field", .value = name, .bound = bound});
+}
+
+std::vector<double> values_of(const ColorSource& source, const std::string& name) {
+  if (const ScalarField* field = find(source, name)) {
+    if (field->values.size() != source.positions.size())
+      throw Error("the field has not one value a point",
+                  {.file = {},
+                   .field = name,
+                   .value = std::to_string(field->values.size()) + " values",
+                   .bound = std::to_string(source.positions.size())});
+    return field->values;
+  }
+  if (name != "x" && name != "y" && name != "z") throw_unknown_field(source, name);
+  const Eigen::Index axis = name[0] - 'x';
+  std::vector<double> values;
+  values.reserve(source.positions.size());
+  for (const Eigen::Vector3d& position : source.positions) values.push_back(position[axis]);
+  return values;
+}
+
+// The 2nd and the 98th percentile, by nearest rank.
+std::pair<double, double> percentile_range(std::vector<double> values) {
+  std::erase_if(values, [](double value) { return !std::isfinite(value); });
+  if (values.empty()) return {0.0, 0.0};
+  const auto at = [&values](double share) {
+    const auto rank =
+        static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
+    std::nth_element(values.begin(), values.begin() + rank, values.end());
+    return values[static_cast<std::size_t>(rank)];
+  };
+  return {at(0.02), at(0.98)};
+}
+
+// Whites the points below the plane and says so in the legend; tells of missing values too.
+void finish(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
+  bool any_below = false;
+  for (std::size_t i = 0; i < result.colors.size(); ++i) {
+    if (!(source.positions[i].z() < coloring.zero_plane_m)) continue;
+    result.colors[i] = below_plane_color;
+    any_below = true;
+  }
+  if (any_below) result.legend.entries.push_back({below_plane_color, "below zero plane"});
+}
+
+void add_no_value(const std::vector<double>& values, Legend& legend) {
+  if (std::any_of(values.begin(), values.end(), [](double value) { return std::isnan(value); }))
+    legend.entries.push_back({no_value_color, "no value"});
+}
+
+void color_by_score(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
+  const std::string name = coloring.field.empty() ? "score" : coloring.field;
+  const std::vector<double> values = values_of(source, name);
+  for (const double value : values) result.colors.push_back(score_color(value));
+  result.legend = score_legend();
+  result.legend.title = name;
+  add_no_value(values, result.legend);
+  finish(source, coloring, result);
+}
+
+void color_by_field(const ColorSource& source, const Coloring& coloring, const std::string& name,
+                    const std::string& title, ColoredPoints& result) {
+  if (!std::isfinite(coloring.range_min) || !std::isfinite(coloring.range_max) ||
+      coloring.range_max < coloring.range_min)
+    throw Error("the range of colours is upside down or not finite",
+                {.file = {},
+                 .field = "range_max",
+                 .value = to_text(coloring.range_max),
+                 .bound = ">= range_min = " + to_text(coloring.range_min)});
+  const std::vector<double> values = values_of(source, name);
+  auto [low, high] = std::pair{coloring.range_min, coloring.range_max};
+  if (low == high) std::tie(low, high) = percentile_range(values);
+  for (const double value : values) {
+    // A constant field has the middle colour.
+    const double t = high > low ? (value - low) / (high - low) : value - value + 0.5;
+    result.colors.push_back(viridis(t));
+  }
+  result.legend = {
+      .title = title, .continuous = high > low, .min = low, .max = high, .entries = {}};
+  if (high == low)
+    result.legend.entries.push_back({viridis(0.5), to_text(static_cast<float>(low))});
+  add_no_value(values, result.legend);
+  finish(source, coloring, result);
+}
+
+void color_by_flags(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
+  const bool has_convex = find(source, "convex") != nullptr;
+  const bool has_graspable = find(source, "graspable") != nullptr;
+  if (!has_convex && !has_graspable) throw_unknown_field(source, "convex");
+  const std::size_t count = source.positions.size();
+  const std::vector<double> convex =
+      has_convex ? values_of(source, "convex") : std::vector<double>(count, 0.0);
+  const std::vector<double> graspable =
+      has_graspable ? values_of(source, "graspable") : std::vector<double>(count, 0.0);
+  for (std::size_t i = 0; i < count; ++i)
+    result.colors.push_back(graspable[i] > 0.0 ? intersection_color
+                            : convex[i] > 0.0  ? convex_color
+                                               : rest_color);
+  result.legend.title = "graspable areas";
+  if (has_graspable) result.legend.entries.push_back({intersection_color, "intersection"});
+  if (has_convex) result.legend.entries.push_back({convex_color, "convex"});
+  result.legend.entries.push_back({rest_color, "other"});
+  finish(source, coloring, result);
+}
+
+ColorMode automatic_mode(const ColorSource& source) {
+  if (find(source, "score") != nullptr) return ColorMode::score;
+  const auto& own = source.own_colors;
+  const bool varied = std::any_of(own.begin(), own.end(),
+                                  [&own](const Color& color) { return color != own.front(); });
+  return varied ? ColorMode::own : ColorMode::height;
+}
+
+std::uint8_t to_byte(double share) {
+  return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, ColorMode>> color_mode_names() {
+  return {{"automatic", ColorMode::automatic}, {"own", ColorMode::own},
+          {"score", ColorMode::score},         {"field", ColorMode::field},
+          {"flags", ColorMode::flags},         {"height", ColorMode::height},
+          {"single", ColorMode::single}};
+}
+
+ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) {
+  ColoredPoints result;
+  result.mode = coloring.mode == ColorMode::automatic ? automatic_mode(source) : coloring.mode;
+  result.colors.reserve(source.positions.size());
+  switch (result.mode) {
+    case ColorMode::own:
+      if (source.own_colors.size() != source.positions.size())
+        throw Error("the data bring no colours of their own",
+                    {.file = {}, .field = "color mode", .value = "own", .bound = {}});
+      result.colors = source.own_colors;
+      break;
+    case ColorMode::score:
+      color_by_score(source, coloring, result);
+      break;
+    case ColorMode::field:
+      if (coloring.field.empty()) throw_unknown_field(source, coloring.field);
+      color_by_field(source, coloring, coloring.field, coloring.field, result);
+      break;
+    case ColorMode::flags:
+      color_by_flags(source, coloring, result);
+      break;
+    case ColorMode::height:
+      color_by_field(source, coloring, "z", "height [m]", result);
+      break;
+    case ColorMode::single:
+    case ColorMode::automatic:
+      result.colors.assign(source.positions.size(), parse_color(coloring.color, "color"));
+      break;
+  }
+  return result;
+}
+
+Color score_color(double score) {
+  if (std::isnan(score)) return no_value_color;
+  for (const ScoreClass& entry : score_classes)
+    if (score >= entry.from - score_tolerance) return entry.color;
+  return score_classes.back().color;
+}
+
+Legend score_legend() {
+  Legend legend;
+  legend.title = "score";
+  for (const ScoreClass& entry : score_classes) legend.entries.push_back({entry.color, entry.text});
+  return legend;
+}
+
+Color viridis(double t) {
+  if (std::isnan(t)) return no_value_color;
+  const double place = std::clamp(t, 0.0, 1.0) * static_cast<double>(viridis_points.size() - 1);
+  const std::size_t below = std::min(static_cast<std::size_t>(place), viridis_points.size() - 2);
+  const double share = place - static_cast<double>(below);
+  Color color{};
+  for (std::size_t c = 0; c < 3; ++c)
+    color[c] =
+        to_byte((1.0 - share) * viridis_points[below][c] + share * viridis_points[below + 1][c]);
+  return color;
+}
+
+Color parse_color(std::string_view text, const std::string& field) {
+  for (const NamedColor& named : named_colors)
+    if (text == named.name) return named.color;
+  unsigned value = 0;
+  if (text.size() == 7 && text.front() == '#') {
+    const auto [end, status] = std::from_chars(text.data() + 1, text.data() + 7, value, 16);
+    if (status == std::errc{} && end == text.data() + 7)
+      return {static_cast<std::uint8_t>(value >> 16U), static_cast<std::uint8_t>(value >> 8U),
+              static_cast<std::uint8_t>(value)};
+  }
+  std::vector<std::string> known;
+  for (const NamedColor& named : named_colors) known.emplace_back(named.name);
+  std::string bound = "#rrggbb or one of";
+  for (const std::string& name : known) bound += " " + name;
+  throw Error("not a colour" + did_you_mean(text, known),
+              {.file = {}, .field = field, .value = std::string(text), .bound = bound});
+}
+
+}  // namespace libmap

@@ -1,0 +1,91 @@
+// What colour a point of a map gets, and the legend that says so.
+#pragma once
+
+#include <Eigen/Core>
+#include <limits>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+// automatic: score where there is a field "score", else own colours where they are not all the
+//   same, else height.
+// own:    the colours that the data bring.
+// score:  the seven classes of the graspability map's legend.
+// field:  any scalar field, or "x", "y", "z", on the perceptual colour map viridis.
+// flags:  convex points blue, intersection ("graspable") dark green, the rest light grey.
+// height: z of the terrain frame on viridis.
+// single: one colour.
+enum class ColorMode { automatic, own, score, field, flags, height, single };
+std::vector<std::pair<std::string, ColorMode>> color_mode_names();
+
+struct Coloring {
+  ColorMode mode = ColorMode::automatic;
+  std::string field;  // of mode `field`; another field than "score" in mode `score`
+  // Values at the ends of viridis. Both equal: the data's 2nd and 98th percentile.
+  double range_min = 0.0;
+  double range_max = 0.0;
+  // Points with z below it are white in the modes score, field, flags and height.
+  double zero_plane_m = -std::numeric_limits<double>::infinity();
+  std::string color = "#b0a89c";  // of mode `single`: "#rrggbb" or a name
+};
+
+// One box of a legend, or the colour at one value of a scalar bar.
+struct LegendEntry {
+  Color color{};
+  std::string text;
+};
+
+// Discrete classes from the best to the worst; before them a scalar bar from `min` to `max` if
+// `continuous`. Nothing at all where colours need no explanation.
+struct Legend {
+  std::string title;
+  bool continuous = false;
+  double min = 0.0;
+  double max = 0.0;
+  std::vector<LegendEntry> entries;
+
+  bool empty() const { return !continuous && entries.empty(); }
+};
+
+// What is to be coloured: points (or the centres of triangles) in the terrain frame, metres.
+struct ColorSource {
+  const std::vector<Eigen::Vector3d>& positions;
+  const std::vector<Color>& own_colors;  // may be empty
+  const std::vector<ScalarField>& fields;
+};
+
+struct ColoredPoints {
+  ColorMode mode = ColorMode::single;  // never `automatic`
+  std::vector<Color> colors;           // one a position
+  Legend legend;
+};
+
+// Throws Error: a field that is not there (with the nearest known one), a range upside down, own
+// colours asked of data without any, a colour that is none.
+ColoredPoints color_points(const ColorSource& source, const Coloring& coloring);
+
+// The class of a graspability score in 0..1: >= 0.9 dark green, >= 0.8 green, >= 0.7 yellow-green,
+// >= 0.6 yellow, >= 0.5 light orange, >= 0.4 orange, else red. A bound is met from 1e-6 below it,
+// so that a score that was stored in single precision keeps its class. NaN is grey.
+Color score_color(double score);
+Legend score_legend();
+
+// viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is grey.
+Color viridis(double t);
+
+// "#rrggbb", or white, black, grey, light-grey, dark-grey, red, green, blue, yellow, orange.
+// Throws Error naming `field`.
+Color parse_color(std::string_view text, const std::string& field);
+
+inline constexpr Color below_plane_color{255, 255, 255};
+inline constexpr Color no_value_color{128, 128, 128};
+inline constexpr Color convex_color{40, 90, 220};
+inline constexpr Color intersection_color{0, 100, 0};
+inline constexpr Color rest_color{211, 211, 211};
+
+}  // namespace libmap

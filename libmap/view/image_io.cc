@@ -1,0 +1,59 @@
+#include "libmap/view/image_io.h"
+
+#include <vtkImageData.h>
+#include <vtkNew.h>
+#include <vtkPNGWriter.h>
+#include <vtkUnsignedCharArray.h>
+
+#include <cstring>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+
+namespace libmap {
+namespace {
+
+void check(const Image& image) {
+  if (image.width <= 0 || image.height <= 0)
+    throw Error("an image without pixels cannot be written");
+  const std::size_t bytes =
+      3 * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  if (image.rgb.size() != bytes)
+    throw Error("the image's bytes do not fit its size",
+                {.file = {},
+                 .field = "rgb",
+                 .value = std::to_string(image.rgb.size()) + " bytes",
+                 .bound = std::to_string(bytes)});
+}
+
+}  // namespace
+
+std::string to_png(const Image& image) {
+  check(image);
+  vtkNew<vtkImageData> pixels;
+  pixels->SetDimensions(image.width, image.height, 1);
+  pixels->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+  // VTK's rows begin at the bottom.
+  const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
+  auto* target = static_cast<unsigned char*>(pixels->GetScalarPointer());
+  for (int row = 0; row < image.height; ++row) {
+    const auto from = static_cast<std::size_t>(image.height - 1 - row);
+    std::memcpy(target + static_cast<std::size_t>(row) * row_bytes,
+                image.rgb.data() + from * row_bytes, row_bytes);
+  }
+  vtkNew<vtkPNGWriter> writer;
+  writer->SetInputData(pixels);
+  writer->WriteToMemoryOn();
+  writer->Write();
+  vtkUnsignedCharArray* bytes = writer->GetResult();
+  if (bytes == nullptr || bytes->GetNumberOfValues() == 0)
+    throw Error("the picture could not be encoded as PNG", {}, ErrorKind::failed);
+  return {reinterpret_cast<const char*>(bytes->GetPointer(0)),
+          static_cast<std::size_t>(bytes->GetNumberOfValues())};
+}
+
+void write_png(const std::filesystem::path& path, const Image& image) {
+  write_whole_file(path, to_png(image));
+}
+
+}  // namespace libmap

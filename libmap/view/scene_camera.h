@@ -1,0 +1,69 @@
+// The views of a scene, and where its points fall in the picture.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace libmap {
+
+// top:     orthographic along -z; x to the right, y up.
+// front:   orthographic along +y; x to the right, z up.
+// side:    orthographic along -x; y to the right, z up.
+// oblique: perspective from the front left above.
+// camera:  perspective from a given place.
+enum class Viewpoint { top, oblique, front, side, camera };
+std::vector<std::pair<std::string, Viewpoint>> viewpoint_names();
+
+// A rectangle of pixels: left and top edge from the picture's top left corner.
+struct PixelRect {
+  double left = 0.0;
+  double top = 0.0;
+  double width = 0.0;
+  double height = 0.0;
+
+  double right() const { return left + width; }
+  double bottom() const { return top + height; }
+  bool contains(const Eigen::Vector2d& pixel) const {
+    return pixel.x() >= left && pixel.x() <= right() && pixel.y() >= top && pixel.y() <= bottom();
+  }
+  bool overlaps(const PixelRect& other) const {
+    return left < other.right() && other.left < right() && top < other.bottom() &&
+           other.top < bottom();
+  }
+};
+
+// Of Viewpoint::camera, in the frame of the points; `up` need not be orthogonal to the view.
+struct CameraPlacement {
+  Eigen::Vector3d position{-2.0, -4.0, 3.0};
+  Eigen::Vector3d focal_point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  double field_of_view_deg = 30.0;  // from the lower to the upper edge, > 0 and < 180
+};
+
+struct SceneCamera {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Vector3d right = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d up = Eigen::Vector3d::UnitY();
+  Eigen::Vector3d forward = -Eigen::Vector3d::UnitZ();
+  bool perspective = false;
+  double scale_px = 1.0;  // orthographic: pixels a metre; perspective: the focal length in pixels
+  PixelRect plot;         // its middle is the optical axis
+
+  // Metres in front of the camera's plane; negative behind it.
+  double depth_of(const Eigen::Vector3d& point) const { return (point - position).dot(forward); }
+  double pixels_per_m(double depth_m) const { return perspective ? scale_px / depth_m : scale_px; }
+  // From the picture's top left corner. In perspective only for points with a positive depth.
+  Eigen::Vector2d pixel_of(const Eigen::Vector3d& point) const;
+};
+
+// The camera whose `plot` shows all `points` (at least one, all finite), each with a margin of
+// `radius_m` around it, and a twentieth of the plot free on every side; Viewpoint::camera stands
+// where it is told to. Throws Error if the camera's place and focal point coincide, `up` is
+// parallel to the view or the field of view is out of its bound.
+SceneCamera fit_camera(Viewpoint view, const CameraPlacement& placement,
+                       const std::vector<Eigen::Vector3d>& points, double radius_m,
+                       const PixelRect& plot);
+
+}  // namespace libmap

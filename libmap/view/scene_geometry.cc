@@ -1,0 +1,343 @@
+#include "libmap/view/scene_geometry.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <nanoflann.hpp>
+
+namespace libmap {
+namespace {
+
+constexpr std::size_t spacing_samples = 2000;
+constexpr double least_width_px = 1.3;
+// Poisson-disk samples leave gaps of up to twice their spacing.
+constexpr double square_per_spacing = 1.6;
+// Neighbouring cubes overlap by a hair, so that rounding opens no gap between them.
+constexpr double cube_per_spacing = 1.005;
+constexpr double lone_point_size_m = 0.01;
+
+struct KdTreeSource {
+  const std::vector<Eigen::Vector3d>& points;
+  std::size_t kdtree_get_point_count() const { return points.size(); }
+  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
+    return points[i][static_cast<Eigen::Index>(axis)];
+  }
+  template <class Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+using KdTree =
+    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, KdTreeSource>,
+                                        KdTreeSource, 3>;
+
+// The value that the given share of the others does not exceed.
+double quantile_of(std::vector<double> values, double share) {
+  const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
+// Offsets to the nearest point that stands elsewhere, of points spread over the cloud.
+std::vector<Eigen::Vector3d> nearest_offsets(const std::vector<Eigen::Vector3d>& positions) {
+  const KdTreeSource source{positions};
+  KdTree tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+  tree.buildIndex();
+  std::vector<Eigen::Vector3d> offsets;
+  const std::size_t step = std::max<std::size_t>(1, positions.size() / spacing_samples);
+  for (std::size_t i = 0; i < positions.size(); i += step) {
+    // Several points may stand in one place.
+    std::array<std::uint32_t, 8> neighbors{};
+    std::array<double, 8> squared{};
+    const std::size_t found =
+        tree.knnSearch(positions[i].data(), neighbors.size(), neighbors.data(), squared.data());
+    for (std::size_t k = 0; k < found; ++k) {
+      if (!(squared[k] > 0.0)) continue;
+      offsets.push_back(positions[neighbors[k]] - positions[i]);
+      break;
+    }
+  }
+  return offsets;
+}
+
+PreparedLayer prepare_cloud(const PointCloud& cloud, const SceneLayer& layer,
+                            const Pose& terrain_from_scene) {
+  cloud.check();
+  std::vector<std::size_t> finite;
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    if (cloud.positions[i].allFinite()) finite.push_back(i);
+  PointCloud in_terrain = transform_cloud(
+      finite.size() == cloud.size() ? cloud : select_points(cloud, finite), terrain_from_scene);
+
+  PreparedLayer result;
+  ColoredPoints colored =
+      color_points({in_terrain.positions, in_terrain.colors, in_terrain.fields}, layer.coloring);
+  const PointSpacing spacing = estimate_spacing(in_terrain.positions);
+  result.cubes = layer.point_shape == PointShape::cube ||
+                 (layer.point_shape == PointShape::automatic && spacing.lattice);
+  result.point_size_m = layer.point_size_m;
+  if (!(result.point_size_m > 0.0)) {
+    result.point_size_m =
+        spacing.distance_m * (result.cubes ? cube_per_spacing : square_per_spacing);
+    if (!(result.point_size_m > 0.0)) result.point_size_m = lone_point_size_m;
+  }
+  result.positions = std::move(in_terrain.positions);
+  result.colors = std::move(colored.colors);
+  result.legend = std::move(colored.legend);
+  result.normals = std::move(in_terrain.normals);
+  for (Eigen::Vector3f& normal : result.normals)
+    normal = normal.allFinite() ? normal.normalized().eval() : Eigen::Vector3f::Zero();
+  const bool one_color = colored.mode == ColorMode::single && !result.normals.empty();
+  result.shaded = layer.shading != Shading::none &&
+                  (result.cubes || one_color || layer.shading == Shading::full);
+  return result;
+}
+
+bool has_field(const std::vector<ScalarField>& fields, const std::string& name) {
+  return std::any_of(fields.begin(), fields.end(),
+                     [&name](const ScalarField& field) { return field.name == name; });
+}
+
+// Whether the field that colours the mesh is one of its triangles, not of its vertices.
+bool colored_by_face(const TriangleMesh& mesh, const Coloring& coloring) {
+  if (mesh.face_fields.empty()) return false;
+  const auto only_faces = [&mesh](const std::string& name) {
+    return has_field(mesh.face_fields, name) && !has_field(mesh.vertex_fields, name);
+  };
+  switch (coloring.mode) {
+    case ColorMode::automatic:
+    case ColorMode::score:
+      return only_faces(coloring.field.empty() ? "score" : coloring.field);
+    case ColorMode::field:
+      return only_faces(coloring.field) ||
+             (mesh.vertex_fields.empty() && coloring.field.size() > 1);
+    case ColorMode::flags:
+      return only_faces("convex") || only_faces("graspable");
+    case ColorMode::own:
+    case ColorMode::height:
+    case ColorMode::single:
+      break;
+  }
+  return false;
+}
+
+// The mesh without triangles that have a corner which is not finite.
+TriangleMesh finite_part(const TriangleMesh& mesh) {
+  std::vector<std::size_t> kept;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Triangle& triangle = mesh.triangles[t];
+    if (std::all_of(triangle.begin(), triangle.end(),
+                    [&mesh](std::uint32_t corner) { return mesh.vertices[corner].allFinite(); }))
+      kept.push_back(t);
+  }
+  if (kept.size() == mesh.triangles.size()) return mesh;
+  TriangleMesh result = mesh;
+  for (std::size_t k = 0; k < kept.size(); ++k) {
+    result.triangles[k] = mesh.triangles[kept[k]];
+    for (std::size_t f = 0; f < mesh.face_fields.size(); ++f)
+      result.face_fields[f].values[k] = mesh.face_fields[f].values[kept[k]];
+  }
+  result.triangles.resize(kept.size());
+  for (ScalarField& field : result.face_fields) field.values.resize(kept.size());
+  return result;
+}
+
+// Positions, normals and colours of the vertices that a triangle uses.
+void keep_used_vertices(const TriangleMesh& mesh, const std::vector<Color>& colors,
+                        PreparedLayer& result) {
+  constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> place(mesh.vertices.size(), unused);
+  for (Triangle triangle : mesh.triangles) {
+    for (std::uint32_t& corner : triangle) {
+      if (place[corner] == unused) {
+        place[corner] = static_cast<std::uint32_t>(result.positions.size());
+        result.positions.push_back(mesh.vertices[corner]);
+        result.normals.push_back(mesh.vertex_normals[corner]);
+        result.colors.push_back(colors[corner]);
+      }
+      corner = place[corner];
+    }
+    result.triangles.push_back(triangle);
+  }
+}
+
+void give_each_triangle_its_corners(const TriangleMesh& mesh, const std::vector<Color>& face_colors,
+                                    PreparedLayer& result) {
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const auto first = static_cast<std::uint32_t>(3 * t);
+    for (const std::uint32_t corner : mesh.triangles[t]) {
+      result.positions.push_back(mesh.vertices[corner]);
+      result.normals.push_back(mesh.vertex_normals[corner]);
+      result.colors.push_back(face_colors[t]);
+    }
+    result.triangles.push_back({first, first + 1, first + 2});
+  }
+}
+
+PreparedLayer prepare_mesh(const TriangleMesh& input, const SceneLayer& layer,
+                           const Pose& terrain_from_scene) {
+  input.check();
+  TriangleMesh mesh = finite_part(input);
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex = terrain_from_scene * vertex;
+  if (mesh.vertex_normals.empty()) {
+    mesh.vertex_normals = estimate_vertex_normals(mesh);
+  } else {
+    const Eigen::Matrix3f rotation = terrain_from_scene.linear().cast<float>();
+    for (Eigen::Vector3f& normal : mesh.vertex_normals) {
+      normal = (rotation * normal).normalized().eval();
+      if (!normal.allFinite()) normal.setZero();
+    }
+  }
+
+  PreparedLayer result;
+  result.is_mesh = true;
+  result.shaded = layer.shading != Shading::none;
+  if (colored_by_face(mesh, layer.coloring)) {
+    std::vector<Eigen::Vector3d> centers;
+    for (const Triangle& triangle : mesh.triangles)
+      centers.push_back(
+          (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
+          3.0);
+    ColoredPoints colored = color_points({centers, {}, mesh.face_fields}, layer.coloring);
+    give_each_triangle_its_corners(mesh, colored.colors, result);
+    result.legend = std::move(colored.legend);
+  } else {
+    ColoredPoints colored =
+        color_points({mesh.vertices, mesh.vertex_colors, mesh.vertex_fields}, layer.coloring);
+    keep_used_vertices(mesh, colored.colors, result);
+    result.legend = std::move(colored.legend);
+  }
+  return result;
+}
+
+Color darkened(const Color& color, double share) {
+  Color result{};
+  for (std::size_t c = 0; c < 3; ++c)
+    result[c] = static_cast<std::uint8_t>(std::lround(share * color[c]));
+  return result;
+}
+
+// Lambert's law with some ambient light, from the upper left behind the camera; both sides of a
+// surface are lit. A point without a normal keeps its colour.
+double shade_of(const Eigen::Vector3f& normal, const SceneCamera& camera) {
+  const Eigen::Vector3d n = normal.cast<double>();
+  if (n.isZero()) return 1.0;
+  static const double scale = 1.0 / std::sqrt(0.5 * 0.5 + 0.7 * 0.7 + 1.0);
+  const Eigen::Vector3d light = scale * (-0.5 * camera.right + 0.7 * camera.up - camera.forward);
+  const double toward_camera = n.dot(camera.forward) > 0.0 ? -1.0 : 1.0;
+  return 0.3 + 0.7 * std::max(0.0, toward_camera * n.dot(light));
+}
+
+class TriangleBuilder {
+ public:
+  TriangleBuilder(const Eigen::Vector3d& origin, ColoredTriangles& target)
+      : origin_(origin), target_(target) {}
+
+  // The parallelogram around `center` with the half edges a and b.
+  void add_quad(const Eigen::Vector3d& center, const Eigen::Vector3d& a, const Eigen::Vector3d& b,
+                const Color& color) {
+    const auto first = static_cast<std::uint32_t>(target_.vertices.size());
+    const Eigen::Vector3d middle = center - origin_;
+    for (const Eigen::Vector3d& corner : {Eigen::Vector3d(-a - b), Eigen::Vector3d(a - b),
+                                          Eigen::Vector3d(a + b), Eigen::Vector3d(b - a)}) {
+      target_.vertices.emplace_back((middle + corner).cast<float>());
+      target_.colors.push_back(color);
+    }
+    target_.triangles.push_back({first, first + 1, first + 2});
+    target_.triangles.push_back({first, first + 2, first + 3});
+  }
+
+  // The sides of the cube around `center` that the camera sees.
+  void add_cube(const Eigen::Vector3d& center, double half, const Color& color, bool shaded,
+                const SceneCamera& camera) {
+    // Seen along an axis a cube shows one side only, in its exact colour.
+    constexpr std::array<double, 3> side_shades{0.70, 0.84, 1.0};
+    const Eigen::Vector3d toward =
+        camera.perspective ? (camera.position - center).eval() : (-camera.forward).eval();
+    const double least = camera.perspective ? half : 1e-9;
+    const bool single_side = (toward.array().abs() > least).count() == 1;
+    for (Eigen::Index axis = 0; axis < 3; ++axis) {
+      if (!(std::abs(toward[axis]) > least)) continue;
+      const Eigen::Vector3d out = std::copysign(half, toward[axis]) * Eigen::Vector3d::Unit(axis);
+      const double shade = single_side ? 1.0
+                           : axis == 2 && out.z() < 0.0
+                               ? 0.6
+                               : side_shades[static_cast<std::size_t>(axis)];
+      add_quad(center + out, half * Eigen::Vector3d::Unit((axis + 1) % 3),
+               half * Eigen::Vector3d::Unit((axis + 2) % 3),
+               shaded ? darkened(color, shade) : color);
+    }
+  }
+
+ private:
+  const Eigen::Vector3d origin_;
+  ColoredTriangles& target_;
+};
+
+ColoredTriangles mesh_triangles(const PreparedLayer& layer, const SceneCamera& camera,
+                                const Eigen::Vector3d& origin) {
+  ColoredTriangles result;
+  result.triangles = layer.triangles;
+  result.colors = layer.colors;
+  for (std::size_t i = 0; i < layer.positions.size(); ++i) {
+    result.vertices.emplace_back((layer.positions[i] - origin).cast<float>());
+    if (layer.shaded)
+      result.colors[i] = darkened(layer.colors[i], shade_of(layer.normals[i], camera));
+  }
+  return result;
+}
+
+}  // namespace
+
+PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene) {
+  if (const auto* cloud = std::get_if<PointCloud>(&layer.shape))
+    return prepare_cloud(*cloud, layer, terrain_from_scene);
+  return prepare_mesh(std::get<TriangleMesh>(layer.shape), layer, terrain_from_scene);
+}
+
+PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {
+  if (positions.size() < 2) return {};
+  const std::vector<Eigen::Vector3d> offsets = nearest_offsets(positions);
+  if (offsets.empty()) return {};
+  std::vector<double> distances;
+  for (const Eigen::Vector3d& offset : offsets) distances.push_back(offset.norm());
+  // On a lattice some points at least have a neighbour straight beside them.
+  const double pitch = quantile_of(distances, 0.1);
+  const auto on_lattice = [pitch](const Eigen::Vector3d& offset) {
+    const Eigen::Array3d steps = offset.array() / pitch;
+    return ((steps - steps.round()).abs() < 0.02).all();
+  };
+  const auto regular = std::count_if(offsets.begin(), offsets.end(), on_lattice);
+  if (regular * 20 >= static_cast<std::ptrdiff_t>(19 * offsets.size()))
+    return {.distance_m = pitch, .lattice = true};
+  return {.distance_m = quantile_of(distances, 0.5), .lattice = false};
+}
+
+ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
+                              const Eigen::Vector3d& origin) {
+  if (layer.is_mesh) return mesh_triangles(layer, camera, origin);
+  ColoredTriangles result;
+  result.vertices.reserve(4 * layer.positions.size());
+  result.colors.reserve(4 * layer.positions.size());
+  TriangleBuilder builder(origin, result);
+  for (std::size_t i = 0; i < layer.positions.size(); ++i) {
+    const Eigen::Vector3d& center = layer.positions[i];
+    const double depth = camera.depth_of(center);
+    if (!(depth > 0.0)) continue;
+    const double half =
+        0.5 * std::max(layer.point_size_m, least_width_px / camera.pixels_per_m(depth));
+    if (layer.cubes) {
+      builder.add_cube(center, half, layer.colors[i], layer.shaded, camera);
+      continue;
+    }
+    const bool shaded = layer.shaded && !layer.normals.empty();
+    const Color color =
+        shaded ? darkened(layer.colors[i], shade_of(layer.normals[i], camera)) : layer.colors[i];
+    builder.add_quad(center, half * camera.right, half * camera.up, color);
+  }
+  return result;
+}
+
+}  // namespace libmap

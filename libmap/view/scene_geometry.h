@@ -1,0 +1,49 @@
+// From the layers of a scene to coloured triangles, as they are drawn.
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "libmap/core/pose.h"
+#include "libmap/core/triangle_mesh.h"
+#include "libmap/view/color_map.h"
+#include "libmap/view/scene_camera.h"
+#include "libmap/view/scene_view.h"
+
+namespace libmap {
+
+// A layer in the terrain frame, coloured, with nothing in it that cannot be drawn.
+struct PreparedLayer {
+  std::vector<Eigen::Vector3d> positions;  // all finite
+  std::vector<Color> colors;               // one a position
+  std::vector<Eigen::Vector3f> normals;    // empty, or unit length (or zero) one a position
+  std::vector<Triangle> triangles;         // of a mesh
+  bool is_mesh = false;
+  bool cubes = false;
+  bool shaded = false;        // by the normals; for cubes: by the side
+  double point_size_m = 0.0;  // 0 for a mesh
+  Legend legend;
+};
+
+// Throws Error: arrays of a wrong length, and what color_points throws.
+PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene);
+
+// How far apart the points lie, in metres (0 if no two are apart): on a lattice along the axes its
+// pitch, else the median distance to the nearest other point.
+struct PointSpacing {
+  double distance_m = 0.0;
+  bool lattice = false;
+};
+PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);
+
+struct ColoredTriangles {
+  std::vector<Eigen::Vector3f> vertices;  // metres from the `origin` that was given
+  std::vector<Color> colors;              // one a vertex
+  std::vector<Triangle> triangles;
+};
+
+// Squares or the visible sides of cubes for a cloud, at least 1.3 pixels wide; a mesh as it is.
+ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
+                              const Eigen::Vector3d& origin);
+
+}  // namespace libmap

@@ -1,0 +1,356 @@
+#include "libmap/view/scene_page.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+
+#include "libmap/core/text.h"
+#include "libmap/view/charts.h"
+#include "libmap/view/label_layout.h"
+
+namespace libmap {
+namespace {
+
+constexpr Color ink{25, 28, 32};
+constexpr Color paper{255, 255, 255};
+constexpr Color frame_color{90, 96, 104};
+constexpr int least_font_px = 10;
+constexpr double row_height = 1.55;       // of the legend, in font sizes, as all below
+constexpr double title_row_height = 1.9;  // a legend's title
+constexpr double bar_height = 13.0;       // the scalar bar
+constexpr double bar_width = 1.3;
+constexpr double swatch = 1.05;
+constexpr double legend_gap = 1.2;  // between two legends
+constexpr int most_ticks = 6;
+
+std::string fixed_text(double value, int decimals) {
+  std::array<char, 64> buffer{};
+  const auto [end, status] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
+                                           std::chars_format::fixed, decimals);
+  return status == std::errc{} ? std::string(buffer.data(), end) : to_text(value);
+}
+
+// Where no round number lies between the ends, the ends.
+std::vector<double> ticks_of(const Legend& legend) {
+  std::vector<double> ticks = round_ticks(legend.min, legend.max, most_ticks);
+  if (ticks.size() < 2) ticks = {legend.min, legend.max};
+  return ticks;
+}
+
+// Texts that stand beside the swatches or the bar.
+std::vector<std::string> texts_of(const Legend& legend) {
+  std::vector<std::string> texts;
+  if (legend.continuous) texts = tick_texts(ticks_of(legend));
+  for (const LegendEntry& entry : legend.entries) texts.push_back(entry.text);
+  return texts;
+}
+
+Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px) {
+  const TextStyle style{.size_px = font_px};
+  const TextStyle title_style{.size_px = font_px, .bold = true};
+  double width = 0.0;
+  double height = 0.0;
+  for (const Legend& legend : legends) {
+    if (height > 0.0) height += legend_gap * font_px;
+    height += title_row_height * font_px;
+    width = std::max(width, text_size(legend.title, title_style).x());
+    for (const std::string& text : texts_of(legend))
+      width = std::max(width, (bar_width + 0.6) * font_px + text_size(text, style).x());
+    if (legend.continuous) height += (bar_height + 0.9) * font_px;
+    height += row_height * font_px * static_cast<double>(legend.entries.size());
+  }
+  return {width, height};
+}
+
+// Sets the legend's column if there is a font size at which it fits.
+void plan_legend(const SceneViewOptions& options, const std::vector<Legend>& legends,
+                 double title_height, ScenePage& page) {
+  if (!options.legend || legends.empty()) return;
+  const double available = options.height - title_height - 0.8 * page.font_px;
+  for (int font = page.font_px; font >= std::min(8, page.font_px); --font) {
+    const Eigen::Vector2d size = legends_size(legends, font);
+    const double column = std::ceil(size.x() + 1.8 * font);
+    if (column > 0.42 * options.width || size.y() > available) continue;
+    page.legend_font_px = font;
+    page.legend =
+        PixelRect{options.width - column, title_height, column, options.height - title_height};
+    return;
+  }
+}
+
+struct Bands {
+  bool title;
+  bool legend;
+  bool axes;
+  bool scale_bar;
+};
+
+ScenePage plan_with(const SceneViewOptions& options, const std::vector<Legend>& legends,
+                    const Bands& bands) {
+  ScenePage page;
+  page.font_px = std::clamp(std::min(options.width, options.height) / 48, least_font_px, 160);
+  const double f = page.font_px;
+  const double title_height = bands.title ? std::round(2.4 * f) : 0.0;
+  const double bottom_height = bands.axes        ? std::round(4.8 * f)
+                               : bands.scale_bar ? std::round(2.4 * f)
+                                                 : 0.0;
+  if (bands.legend) plan_legend(options, legends, title_height, page);
+  const double right = page.legend ? page.legend->left : options.width;
+  page.plot = {0.0, title_height, right, options.height - title_height - bottom_height};
+  if (bands.title) page.title = PixelRect{0.0, 0.0, double(options.width), title_height};
+  const double axes_width = bands.axes ? std::round(5.2 * f) : 0.0;
+  if (bands.axes) page.axes = PixelRect{0.0, page.plot.bottom(), axes_width, bottom_height};
+  if (bands.scale_bar)
+    page.scale_bar = PixelRect{axes_width, page.plot.bottom(), right - axes_width, bottom_height};
+  return page;
+}
+
+bool roomy(const SceneViewOptions& options, const ScenePage& page) {
+  return page.plot.width >= 0.5 * options.width && page.plot.height >= 0.55 * options.height &&
+         (!page.axes || page.axes->right() <= page.plot.right());
+}
+
+void draw_scalar_bar(const Legend& legend, double left, double top, int font, Overlay& overlay) {
+  const double height = bar_height * font;
+  const PixelRect bar{left, top, bar_width * font, height};
+  const double hair = std::max(1.0, font / 14.0);
+  overlay.rectangle({bar.left - hair, bar.top - hair, bar.width + 2 * hair, bar.height + 2 * hair},
+                    frame_color);
+  constexpr int strips = 128;
+  for (int strip = 0; strip < strips; ++strip) {
+    const double share = static_cast<double>(strip) / strips;
+    // Each reaches up to the next ones, so that no seam shows.
+    overlay.rectangle({bar.left, bar.top, bar.width, height * (1.0 - share)},
+                      viridis((strip + 0.5) / strips));
+  }
+  const std::vector<double> ticks = ticks_of(legend);
+  const std::vector<std::string> texts = tick_texts(ticks);
+  for (std::size_t i = 0; i < ticks.size(); ++i) {
+    const double y = bar.bottom() - height * (ticks[i] - legend.min) / (legend.max - legend.min);
+    overlay.rectangle({bar.right(), y - hair / 2.0, 0.3 * font, hair}, frame_color);
+    overlay.text({bar.right() + 0.5 * font, y}, texts[i], {.size_px = font});
+  }
+}
+
+void draw_arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width,
+                const Color& color, Overlay& overlay) {
+  const Eigen::Vector2d along = (to - from).normalized();
+  const Eigen::Vector2d across(-along.y(), along.x());
+  const Eigen::Vector2d neck = to - 2.6 * width * along;
+  overlay.line(from, neck, width, color);
+  overlay.polygon({to, neck + 1.7 * width * across, neck - 1.7 * width * across}, color);
+}
+
+Color verdict_color(Verdict verdict) {
+  switch (verdict) {
+    case Verdict::positive:
+      return {0, 140, 50};
+    case Verdict::negative:
+      return {205, 20, 20};
+    case Verdict::none:
+      break;
+  }
+  return {40, 44, 52};
+}
+
+}  // namespace
+
+ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& legends) {
+  Bands bands{!options.title.empty(), options.legend, options.axes, options.scale_bar};
+  ScenePage page = plan_with(options, legends, bands);
+  for (bool* band : {&bands.legend, &bands.axes, &bands.scale_bar, &bands.title}) {
+    if (roomy(options, page)) return page;
+    *band = false;
+    page = plan_with(options, legends, bands);
+  }
+  return page;
+}
+
+std::vector<std::string> tick_texts(const std::vector<double>& ticks) {
+  std::vector<std::string> texts;
+  const double step = ticks.size() > 1 ? std::abs(ticks[1] - ticks[0]) : 1.0;
+  const auto is_round = [](double value) { return std::abs(value - std::round(value)) < 1e-6; };
+  int decimals = 0;
+  while (decimals < 6 && !is_round(step * std::pow(10.0, decimals))) ++decimals;
+  for (const double tick : ticks)
+    texts.push_back(step < 1e-6 || std::abs(tick) >= 1e7 ? to_text(static_cast<float>(tick))
+                                                         : fixed_text(tick, decimals));
+  return texts;
+}
+
+double round_length_m(double longest_m) {
+  const double decade = std::pow(10.0, std::floor(std::log10(longest_m) + 1e-9));
+  for (const double factor : {5.0, 2.0})
+    if (factor * decade <= longest_m * (1.0 + 1e-9)) return factor * decade;
+  return decade;
+}
+
+std::string length_text(double length_m) {
+  struct Unit {
+    double m;
+    const char* name;
+  };
+  constexpr std::array<Unit, 4> units{
+      {{1000.0, " km"}, {1.0, " m"}, {0.01, " cm"}, {0.001, " mm"}}};
+  for (const Unit& unit : units)
+    if (length_m >= unit.m * (1.0 - 1e-9))
+      return to_text(static_cast<float>(length_m / unit.m)) + unit.name;
+  return to_text(static_cast<float>(length_m * 1000.0)) + " mm";
+}
+
+void draw_title(const ScenePage& page, const std::string& title, Overlay& overlay) {
+  if (!page.title) return;
+  TextStyle style{.size_px = static_cast<int>(1.3 * page.font_px), .bold = true};
+  const double room = page.title->width - 1.6 * page.font_px;
+  while (style.size_px > least_font_px && text_size(title, style).x() > room) --style.size_px;
+  overlay.text({0.8 * page.font_px, page.title->height / 2.0}, shortened_text(title, style, room),
+               style);
+}
+
+void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Overlay& overlay) {
+  if (!page.legend) return;
+  const int font = page.legend_font_px;
+  const double left = std::round(page.legend->left + 0.9 * font);
+  const double hair = std::max(1.0, font / 14.0);
+  double y = page.legend->top + 0.4 * font;
+  for (const Legend& legend : legends) {
+    overlay.text({left, y + title_row_height * font / 2.0}, legend.title,
+                 {.size_px = font, .bold = true});
+    y += title_row_height * font;
+    if (legend.continuous) {
+      draw_scalar_bar(legend, left, y + 0.3 * font, font, overlay);
+      y += (bar_height + 0.9) * font;
+    }
+    for (const LegendEntry& entry : legend.entries) {
+      const double side = std::round(swatch * font);
+      const PixelRect box{left, std::round(y + (row_height * font - side) / 2.0),
+                          std::round(bar_width * font), side};
+      overlay.rectangle(
+          {box.left - hair, box.top - hair, box.width + 2 * hair, box.height + 2 * hair},
+          frame_color);
+      overlay.rectangle(box, entry.color);
+      overlay.text({box.right() + 0.5 * font, y + row_height * font / 2.0}, entry.text,
+                   {.size_px = font});
+      y += row_height * font;
+    }
+    y += legend_gap * font;
+  }
+}
+
+void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overlay) {
+  if (!page.axes) return;
+  const double f = page.font_px;
+  const double length = 2.3 * f;
+  const std::array<const char*, 3> names{"x", "y", "z"};
+  const std::array<Color, 3> colors{{{200, 30, 30}, {20, 130, 40}, {40, 80, 210}}};
+  std::array<Eigen::Vector2d, 3> tips;
+  Eigen::Vector2d low = Eigen::Vector2d::Zero();
+  Eigen::Vector2d high = Eigen::Vector2d::Zero();
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto k = static_cast<std::size_t>(axis);
+    tips[k] = length * Eigen::Vector2d(camera.right[axis], -camera.up[axis]);
+    low = low.cwiseMin(tips[k]);
+    high = high.cwiseMax(tips[k]);
+  }
+  const Eigen::Vector2d middle(page.axes->left + page.axes->width / 2.0,
+                               page.axes->top + page.axes->height / 2.0);
+  const Eigen::Vector2d origin = middle - (low + high) / 2.0;
+  // Away from the viewer first: the nearer covers the farther.
+  std::array<std::size_t, 3> order{0, 1, 2};
+  std::sort(order.begin(), order.end(), [&camera](std::size_t a, std::size_t b) {
+    return camera.forward[static_cast<Eigen::Index>(a)] >
+           camera.forward[static_cast<Eigen::Index>(b)];
+  });
+  const double width = std::max(1.5, 0.14 * f);
+  for (const std::size_t k : order) {
+    TextStyle style{
+        .size_px = page.font_px, .bold = true, .color = colors[k], .align = TextAlign::center};
+    if (tips[k].norm() > 0.15 * length) {
+      draw_arrow(origin, origin + tips[k], width, colors[k], overlay);
+      overlay.text(origin + tips[k] + 0.6 * f * tips[k].normalized(), names[k], style);
+      continue;
+    }
+    // Along the view: a ring with a dot toward the viewer, without away from it.
+    overlay.disc(origin, 0.38 * f, colors[k]);
+    overlay.disc(origin, 0.38 * f - std::max(1.0, 0.1 * f), paper);
+    if (camera.forward[static_cast<Eigen::Index>(k)] < 0.0)
+      overlay.disc(origin, 0.14 * f, colors[k]);
+    const Eigen::Vector2d free_side = -(low + high) / 2.0;
+    overlay.text(
+        origin + 0.85 * f *
+                     (free_side.norm() > 0.0 ? free_side.normalized() : Eigen::Vector2d(0.0, 1.0)),
+        names[k], style);
+  }
+}
+
+void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
+                    const Eigen::Vector3d& reference, Overlay& overlay) {
+  if (!page.scale_bar) return;
+  const double depth = camera.depth_of(reference);
+  if (!(depth > 0.0)) return;
+  const double f = page.font_px;
+  const TextStyle style{.size_px = page.font_px};
+  const PixelRect& band = *page.scale_bar;
+  const double pixels_per_m = camera.pixels_per_m(depth);
+  const double longest_px = std::min(0.3 * page.plot.width, 0.5 * (band.width - 1.6 * f));
+  if (longest_px < 2.0 * f) return;
+  const double length_m = round_length_m(longest_px / pixels_per_m);
+  const double length_px = length_m * pixels_per_m;
+  const double left = band.left + 0.8 * f;
+  const double y = std::round(band.top + band.height / 2.0);
+  const double thickness = std::max(2.0, std::round(0.16 * f));
+  const double tick = 0.45 * f;
+  overlay.rectangle({left, y - thickness / 2.0, length_px, thickness}, ink);
+  for (const double x : {left, left + length_px - thickness})
+    overlay.rectangle({x, y - tick, thickness, 2.0 * tick}, ink);
+  std::string text = length_text(length_m);
+  const double room = band.width - length_px - 2.2 * f;
+  if (camera.perspective && text_size(text + " at the centre", style).x() <= room)
+    text += " at the centre";
+  if (text_size(text, style).x() <= room)
+    overlay.text({left + length_px + 0.6 * f, y}, text, style);
+}
+
+void draw_markers(const ScenePage& page, const SceneCamera& camera,
+                  const std::vector<Marker>& markers, Overlay& overlay) {
+  const double f = page.font_px;
+  const double radius = std::max(3.0, 0.32 * f);
+  const double border = std::max(1.0, std::round(0.1 * f));
+  const TextStyle style{.size_px = std::max(least_font_px, static_cast<int>(0.85 * f)),
+                        .align = TextAlign::center};
+  std::vector<const Marker*> visible;
+  std::vector<LabelRequest> requests;
+  for (const Marker& marker : markers) {
+    if (!marker.position.allFinite() || !(camera.depth_of(marker.position) > 0.0)) continue;
+    const Eigen::Vector2d pixel = camera.pixel_of(marker.position);
+    if (!page.plot.contains(pixel)) continue;
+    visible.push_back(&marker);
+    const Eigen::Vector2d size = text_size(marker.label, style);
+    requests.push_back({pixel, marker.label.empty() ? 0.0 : size.x() + 0.6 * f + 2.0 * border,
+                        marker.label.empty() ? 0.0 : 1.3 * style.size_px + 2.0 * border});
+  }
+  const std::vector<PixelRect> boxes = place_labels(requests, radius + border, page.plot);
+
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    if (visible[i]->label.empty()) continue;
+    const PixelRect& box = boxes[i];
+    const Eigen::Vector2d middle(box.left + box.width / 2.0, box.top + box.height / 2.0);
+    overlay.line(requests[i].anchor, middle, border, ink);
+  }
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    const Color color = verdict_color(visible[i]->verdict);
+    overlay.disc(requests[i].anchor, radius + border, paper);
+    overlay.disc(requests[i].anchor, radius, color);
+    if (visible[i]->label.empty()) continue;
+    const PixelRect& box = boxes[i];
+    overlay.rectangle(box, color);
+    overlay.rectangle(
+        {box.left + border, box.top + border, box.width - 2.0 * border, box.height - 2.0 * border},
+        paper);
+    overlay.text({box.left + box.width / 2.0, box.top + box.height / 2.0}, visible[i]->label,
+                 style);
+  }
+}
+
+}  // namespace libmap

@@ -1,0 +1,48 @@
+// The page around a scene: title, legends, axes and scale bar, and where the scene itself goes.
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libmap/view/color_map.h"
+#include "libmap/view/overlay.h"
+#include "libmap/view/scene_camera.h"
+#include "libmap/view/scene_view.h"
+
+namespace libmap {
+
+struct ScenePage {
+  PixelRect plot;  // whole pixels
+  std::optional<PixelRect> title;
+  std::optional<PixelRect> legend;
+  std::optional<PixelRect> axes;
+  std::optional<PixelRect> scale_bar;
+  int font_px = 12;
+  int legend_font_px = 12;
+};
+
+// Leaves out, in this order, legend, axes, scale bar and title where they would leave the scene
+// less than half of the width or 0.55 of the height.
+ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& legends);
+
+// Round numbers in a row as texts with the same number of decimals.
+std::vector<std::string> tick_texts(const std::vector<double>& ticks);
+
+// The longest length of 1, 2 or 5 times a power of ten metres that is at most `longest_m`.
+double round_length_m(double longest_m);
+// "50 m", "2 cm", "5 mm".
+std::string length_text(double length_m);
+
+void draw_title(const ScenePage& page, const std::string& title, Overlay& overlay);
+void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Overlay& overlay);
+void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overlay);
+// In perspective the bar is true at `reference`, and says so.
+void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
+                    const Eigen::Vector3d& reference, Overlay& overlay);
+// Markers in the terrain frame.
+void draw_markers(const ScenePage& page, const SceneCamera& camera,
+                  const std::vector<Marker>& markers, Overlay& overlay);
+
+}  // namespace libmap

@@ -1,0 +1,83 @@
+// Offscreen pictures of clouds, meshes and graspability maps.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/pose.h"
+#include "libmap/core/triangle_mesh.h"
+#include "libmap/view/color_map.h"
+#include "libmap/view/image_io.h"
+#include "libmap/view/scene_camera.h"
+
+namespace libmap {
+
+// automatic: cubes where the points lie on a lattice, else squares.
+// cube:      axis-aligned in the terrain frame.
+// square:    facing the camera.
+enum class PointShape { automatic, cube, square };
+std::vector<std::pair<std::string, PointShape>> point_shape_names();
+
+// automatic: meshes, the sides of cubes, and clouds of one colour (by their normals) are shaded;
+//            all else has exactly the colours of the legend.
+// none:      exact colours everywhere.
+// full:      squares of a cloud with normals are shaded too.
+enum class Shading { automatic, none, full };
+std::vector<std::pair<std::string, Shading>> shading_names();
+
+// One cloud or mesh. Points that are not finite are left out, as are triangles with such corners.
+struct SceneLayer {
+  std::variant<PointCloud, TriangleMesh> shape{};
+  Coloring coloring{};
+  PointShape point_shape = PointShape::automatic;
+  Shading shading = Shading::automatic;
+  double point_size_m = 0.0;  // side of a cube or square; 0: from the spacing of the points
+};
+
+// What is known of a marked place: green, red, or dark before there is a verdict.
+enum class Verdict { none, positive, negative };
+
+// A labelled point, drawn over everything. One that the view does not contain is left out.
+struct Marker {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // scene frame, metres
+  std::string label{};                                 // may be empty
+  Verdict verdict = Verdict::none;
+};
+
+struct Scene {
+  std::vector<SceneLayer> layers;  // all in the scene's frame, metres
+  std::vector<Marker> markers;
+  // Views, axes, heights, the zero plane and cubes refer to the terrain frame.
+  Pose terrain_from_scene = Pose::Identity();
+};
+
+struct SceneViewOptions {
+  int width = 1600;   // pixels, 1 to 16384
+  int height = 1200;  // pixels, 1 to 16384
+  Viewpoint view = Viewpoint::top;
+  CameraPlacement camera;  // of Viewpoint::camera, in the scene's frame
+  std::string title;
+  bool axes = true;
+  bool scale_bar = true;
+  bool legend = true;
+  std::string background = "#8f9aa8";  // behind the scene: "#rrggbb" or a name
+  // On the page around the scene lie title, legend, axes and scale bar; parts for which a small
+  // picture has no room are left out.
+};
+
+// The picture of `scene`; the same scene and options give the same bytes on the same machine.
+// Starts a VirtualDisplay of its own if no display answers: hold one around several calls to start
+// only one. Calls from several threads are run one after the other.
+// Throws Error: no point to draw, a size or colour or camera that cannot be, a layer whose arrays
+// do not fit each other, and what color_points throws; (failed) if no picture can be drawn here.
+Image render_scene(const Scene& scene, const SceneViewOptions& options);
+
+// The part of the picture that shows the scene, and the camera that does: where a point falls is
+// camera.pixel_of(terrain_from_scene * point). Needs no display.
+SceneCamera camera_of(const Scene& scene, const SceneViewOptions& options);
+
+}  // namespace libmap

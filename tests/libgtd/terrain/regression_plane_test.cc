@@ -1,0 +1,399 @@
+#include "libgtd/terrain/regression_plane.h"
+
+#include <gmock/gmock.h>
+#include <pcl/filters/voxel_grid.h>
+#include <pcl/point_types.h>
+
+#include <Eigen/Dense>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/parallel.h"
+#include "tests/support/reference_data.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using Eigen::Matrix3d;
+using Eigen::Vector3d;
+using graspmap_test::error_of;
+using graspmap_test::uniform;
+using libgtd::fit_regression_plane;
+using libgtd::PlaneMethod;
+using libgtd::RegressionPlane;
+using libgtd::RegressionPlaneOptions;
+using libgtd::UpSource;
+using libmap::PointCloud;
+using testing::HasSubstr;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+// Ground with bumps on it; its normal is nearly z, and its heights are skewed upwards.
+PointCloud bumpy_ground(std::size_t count) {
+  PointCloud cloud;
+  for (std::size_t i = 0; i < count; ++i) {
+    const double x = uniform(-2, 2), y = uniform(-1, 1);
+    const double bump = 0.3 * std::exp(-20 * ((x - 0.5) * (x - 0.5) + y * y));
+    cloud.positions.emplace_back(x + 1.0, y + 0.4, 0.1 * x + bump + uniform(-0.01, 0.01) + 0.2);
+  }
+  return cloud;
+}
+
+PointCloud moved(const PointCloud& cloud, const Matrix3d& rotation, const Vector3d& shift) {
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.linear() = rotation;
+  pose.translation() = shift;
+  PointCloud result = libmap::transform_cloud(cloud, pose);
+  result.viewpoint = cloud.viewpoint;
+  return result;
+}
+
+Matrix3d rotation_about(const Vector3d& axis, double degrees) {
+  return Eigen::AngleAxisd(degrees * std::numbers::pi / 180, axis.normalized()).matrix();
+}
+
+Matrix3d axes_of(const RegressionPlane& plane) {
+  return plane.terrain_from_input.linear().transpose();
+}
+
+RegressionPlaneOptions upwards(const Vector3d& up, PlaneMethod method = PlaneMethod::corrected) {
+  return {.method = method, .up = up};
+}
+
+TEST(RegressionPlane, AgreesWithSingularValueDecomposition) {
+  const PointCloud cloud = moved(bumpy_ground(20000), rotation_about({1, 2, 0.5}, 35), {3, -1, 2});
+  const RegressionPlane plane = fit_regression_plane(cloud, upwards({0, 0, 1}));
+
+  Eigen::MatrixXd points(3, cloud.size());
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    points.col(static_cast<Eigen::Index>(i)) = cloud.positions[i];
+  const Vector3d mean = points.rowwise().mean();
+  points.colwise() -= mean;
+  const Eigen::JacobiSVD<Eigen::MatrixXd> svd(points, Eigen::ComputeThinU);
+  EXPECT_LT((plane.centroid - mean).norm(), 1e-12);
+  EXPECT_NEAR(std::abs(svd.matrixU().col(2).dot(axes_of(plane).col(2))), 1, 1e-13);
+  EXPECT_NEAR(plane.rmse_m, svd.singularValues()[2] / std::sqrt(20000.0), 1e-12);
+}
+
+TEST(RegressionPlane, FrameIsARotationWithTheCentroidAtItsOrigin) {
+  const PointCloud cloud = moved(bumpy_ground(500), rotation_about({1, 1, 0}, 50), {1, 2, 3});
+  for (const PlaneMethod method : {PlaneMethod::thesis, PlaneMethod::corrected}) {
+    const RegressionPlane plane = fit_regression_plane(cloud, upwards({0, 0, 1}, method));
+    const Matrix3d axes = axes_of(plane);
+    EXPECT_LT((axes.transpose() * axes - Matrix3d::Identity()).norm(), 1e-12);
+    EXPECT_NEAR(axes.determinant(), 1, 1e-12);
+    EXPECT_LT((plane.terrain_from_input * plane.centroid).norm(), 1e-12);
+    EXPECT_EQ(plane.points, 500u);
+    EXPECT_EQ(plane.skipped, 0u);
+  }
+}
+
+TEST(RegressionPlane, ThesisHeadingIsEquation2_17) {
+  const PointCloud cloud = bumpy_ground(500);
+  const RegressionPlane plane =
+      fit_regression_plane(cloud, upwards({0, 0, 1}, PlaneMethod::thesis));
+  const Vector3d n = axes_of(plane).col(2);
+  const Vector3d y = plane.centroid.cross(n).normalized();
+  EXPECT_LT((axes_of(plane).col(1) + y).norm(), 1e-12);
+  EXPECT_LT((axes_of(plane).col(0) - n.cross(y)).norm(), 1e-12);
+}
+
+TEST(RegressionPlane, CorrectedHeadingIsTheInputsXAxis) {
+  const PointCloud cloud = moved(bumpy_ground(500), rotation_about({1, 1, 0}, 40), {1, 2, 3});
+  const Matrix3d axes = axes_of(fit_regression_plane(cloud, upwards({0, 0, 1})));
+  const Vector3d n = axes.col(2);
+  const Vector3d projected = (Vector3d::UnitX() - n.x() * n).normalized();
+  EXPECT_LT((axes.col(0) - projected).norm(), 1e-12);
+}
+
+TEST(RegressionPlane, CorrectedHeadingOnAWallAcrossXIsTheInputsYAxis) {
+  PointCloud wall;
+  for (int i = 0; i < 100; ++i) wall.positions.emplace_back(2, uniform(-1, 1), uniform(-1, 1));
+  const Matrix3d axes = axes_of(fit_regression_plane(wall, upwards({-1, 0, 0})));
+  EXPECT_LT((axes.col(2) + Vector3d::UnitX()).norm(), 1e-12);
+  EXPECT_LT((axes.col(1) - Vector3d::UnitY()).norm(), 1e-12);
+  EXPECT_NEAR(axes.determinant(), 1, 1e-12);
+}
+
+TEST(RegressionPlane, TurningTheCloudTurnsTheThesisFrameWithIt) {
+  const PointCloud cloud = bumpy_ground(500);
+  const Matrix3d turn = rotation_about({0, 0, 1}, 90);
+  const PointCloud turned = moved(cloud, turn, Vector3d::Zero());
+  const auto options = upwards({0, 0, 1}, PlaneMethod::thesis);
+  const RegressionPlane a = fit_regression_plane(cloud, options);
+  const RegressionPlane b = fit_regression_plane(turned, options);
+  EXPECT_LT((axes_of(b) - turn * axes_of(a)).norm(), 1e-12);
+}
+
+TEST(RegressionPlane, TurningTheCloudTurnsItsImageInTheCorrectedFrame) {
+  PointCloud level;  // symmetric, so that its normal is z
+  for (int i = 0; i < 200; ++i) {
+    const Vector3d p(uniform(-2, 2), uniform(-1, 1), uniform(-0.1, 0.1));
+    for (const double sx : {-1, 1})
+      for (const double sy : {-1, 1}) level.positions.emplace_back(sx * p.x(), sy * p.y(), p.z());
+  }
+  const Matrix3d turn = rotation_about({0, 0, 1}, 90);
+  const PointCloud turned = moved(level, turn, Vector3d::Zero());
+  const RegressionPlane a = fit_regression_plane(level);
+  const RegressionPlane b = fit_regression_plane(turned);
+  EXPECT_LT((axes_of(a) - axes_of(b)).norm(), 1e-12);
+  const Vector3d before = a.terrain_from_input * level.positions[7];
+  EXPECT_LT((turn * before - b.terrain_from_input * turned.positions[7]).norm(), 1e-12);
+}
+
+TEST(RegressionPlane, AFarOriginDoesNoHarm) {
+  const PointCloud near = bumpy_ground(3000);
+  const PointCloud far = moved(near, Matrix3d::Identity(), {1e6, -2e6, 5e5});
+  const RegressionPlane a = fit_regression_plane(near);
+  const RegressionPlane b = fit_regression_plane(far);
+  EXPECT_LT((axes_of(a) - axes_of(b)).norm(), 1e-8);
+  EXPECT_NEAR(a.rmse_m, b.rmse_m, 1e-9);
+  const auto at_near = libgtd::transform_to_terrain(near, a, PlaneMethod::corrected);
+  const auto at_far = libgtd::transform_to_terrain(far, b, PlaneMethod::corrected);
+  for (std::size_t i = 0; i < near.size(); ++i)
+    ASSERT_LT((at_near.positions[i] - at_far.positions[i]).norm(), 1e-7);
+}
+
+TEST(RegressionPlane, TinyAndHugeClouds) {
+  for (const double scale : {1e-9, 1e9, 1e120}) {
+    PointCloud cloud = bumpy_ground(100);
+    const Matrix3d axes = axes_of(fit_regression_plane(cloud));
+    for (Vector3d& p : cloud.positions) p *= scale;
+    EXPECT_LT((axes_of(fit_regression_plane(cloud)) - axes).norm(), 1e-9) << scale;
+  }
+}
+
+TEST(RegressionPlane, SameBitsWithAnyNumberOfThreads) {
+  const PointCloud cloud = bumpy_ground(50000);
+  const RegressionPlane a = fit_regression_plane(cloud);
+  for (const unsigned threads : {1u, 2u, 3u}) {
+    const libmap::ThreadLimit limit(threads);
+    const RegressionPlane b = fit_regression_plane(cloud);
+    EXPECT_EQ(a.terrain_from_input.matrix(), b.terrain_from_input.matrix());
+    EXPECT_EQ(a.rmse_m, b.rmse_m);
+  }
+}
+
+TEST(RegressionPlaneUp, DirectionWinsOverAllElse) {
+  PointCloud cloud = bumpy_ground(300);
+  cloud.normals.assign(300, Eigen::Vector3f(0, 0, 1));
+  cloud.viewpoint.translation() = Vector3d(0, 0, 5);
+  const RegressionPlane plane = fit_regression_plane(cloud, upwards({0, 0, -0.001}));
+  EXPECT_EQ(plane.up_source, UpSource::direction);
+  EXPECT_LT(axes_of(plane)(2, 2), 0);
+  EXPECT_LT(plane.relief_skewness, 0);
+}
+
+TEST(RegressionPlaneUp, ThenTheViewpoint) {
+  PointCloud cloud = bumpy_ground(300);
+  cloud.normals.assign(300, Eigen::Vector3f(0, 0, 1));
+  cloud.viewpoint.translation() = Vector3d(0, 0, -5);
+  const RegressionPlane plane = fit_regression_plane(cloud);
+  EXPECT_EQ(plane.up_source, UpSource::viewpoint);
+  EXPECT_LT(axes_of(plane)(2, 2), 0);
+}
+
+TEST(RegressionPlaneUp, ThenTheMajorityOfTheNormals) {
+  PointCloud cloud = bumpy_ground(300);
+  cloud.normals.assign(300, Eigen::Vector3f(0, 0, -0.4F));
+  for (std::size_t i = 0; i < 100; ++i) cloud.normals[i] = Eigen::Vector3f(0, 0, 1);
+  const RegressionPlane plane = fit_regression_plane(cloud);
+  EXPECT_EQ(plane.up_source, UpSource::normals);
+  EXPECT_LT(axes_of(plane)(2, 2), 0);
+}
+
+TEST(RegressionPlaneUp, ZeroNormalsSayNothing) {
+  PointCloud cloud = bumpy_ground(300);
+  cloud.normals.assign(300, Eigen::Vector3f::Zero());
+  cloud.normals[5] = Eigen::Vector3f::Constant(std::numeric_limits<float>::quiet_NaN());
+  const RegressionPlane plane = fit_regression_plane(cloud);
+  EXPECT_EQ(plane.up_source, UpSource::frame_z);
+  EXPECT_GT(axes_of(plane)(2, 2), 0);
+  EXPECT_GT(plane.relief_skewness, 0);
+}
+
+TEST(RegressionPlaneUp, OnAWallTheCameraAtTheOrigin) {
+  const PointCloud wall = moved(bumpy_ground(300), rotation_about({0, 1, 0}, 84), {4, 0, 1});
+  const RegressionPlane plane = fit_regression_plane(wall);
+  EXPECT_EQ(plane.up_source, UpSource::camera_origin);
+  EXPECT_LT(plane.centroid.dot(axes_of(plane).col(2)), 0);  // eq. 2-16
+}
+
+TEST(RegressionPlaneUp, TheReliefWhereNothingElseIsKnown) {
+  PointCloud wall;  // through the origin, bumps toward -x
+  for (int i = 0; i < 40; ++i)
+    for (int j = -20; j < 20; ++j)
+      wall.positions.emplace_back(i % 10 == 0 ? -0.09 : 0.01, 0.1 * i - 1.95, 0.1 * j + 0.05);
+  const RegressionPlane plane = fit_regression_plane(wall);
+  EXPECT_EQ(plane.up_source, UpSource::relief);
+  EXPECT_LT(axes_of(plane)(0, 2), 0);
+  EXPECT_GT(plane.relief_skewness, 0);
+}
+
+TEST(RegressionPlaneUp, NamesOfTheSources) {
+  EXPECT_EQ(libgtd::to_text(UpSource::direction), "direction");
+  EXPECT_EQ(libgtd::to_text(UpSource::camera_origin), "camera_origin");
+}
+
+TEST(RegressionPlaneErrors, TooFewPoints) {
+  PointCloud cloud;
+  EXPECT_THAT(error_of([&] { fit_regression_plane(cloud); }).what(), HasSubstr("too few"));
+  cloud.positions = {{0, 0, 0}, {1, 0, 0}, {0, nan, 0}};
+  EXPECT_THAT(error_of([&] { fit_regression_plane(cloud); }).what(), HasSubstr("2"));
+}
+
+TEST(RegressionPlaneErrors, AllInOnePlace) {
+  for (const Vector3d& place : {Vector3d(0, 0, 0), Vector3d(0.1, 0.7, 1e6)}) {
+    PointCloud cloud;
+    cloud.positions.assign(1000, place);
+    EXPECT_THAT(error_of([&] { fit_regression_plane(cloud); }).what(), HasSubstr("one place"));
+  }
+}
+
+TEST(RegressionPlaneErrors, AllOnALine) {
+  for (const Vector3d& offset : {Vector3d(0, 0, 0), Vector3d(1e3, 2e3, -1e3)}) {
+    PointCloud cloud;
+    for (int i = 0; i < 100; ++i) {
+      const Vector3d p = Vector3d(1, 2, 3) * uniform(0, 1);
+      cloud.positions.push_back(p.cast<float>().cast<double>() + offset);
+    }
+    EXPECT_THAT(error_of([&] { fit_regression_plane(cloud); }).what(), HasSubstr("on a line"));
+  }
+}
+
+TEST(RegressionPlaneErrors, UpWithoutLengthOrInThePlane) {
+  PointCloud square;
+  square.positions = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}};
+  for (const Vector3d& up : {Vector3d(0, 0, 0), Vector3d(1, 0, 0), Vector3d(nan, 0, 1)})
+    EXPECT_EQ(error_of([&] { fit_regression_plane(square, upwards(up)); }).context().field, "up");
+}
+
+TEST(RegressionPlaneErrors, ThesisWithTheCentroidOnTheNormal) {
+  PointCloud square;
+  square.positions = {{-1, -1, 2}, {1, -1, 2}, {-1, 1, 2}, {1, 1, 2}};
+  const RegressionPlaneOptions thesis{.method = PlaneMethod::thesis};
+  EXPECT_THAT(error_of([&] { fit_regression_plane(square, thesis); }).what(),
+              HasSubstr("eq. 2-17"));
+  for (Vector3d& p : square.positions) p.z() = 0;
+  EXPECT_THAT(error_of([&] { fit_regression_plane(square, thesis); }).what(),
+              HasSubstr("eq. 2-17"));
+  EXPECT_NO_THROW(fit_regression_plane(square));
+}
+
+TEST(RegressionPlane, PointsThatAreNotFiniteAreSkipped) {
+  PointCloud cloud = bumpy_ground(300);
+  const RegressionPlane clean = fit_regression_plane(cloud);
+  cloud.positions.emplace(cloud.positions.begin(), nan, 0, 0);
+  cloud.positions.emplace_back(0, std::numeric_limits<double>::infinity(), 0);
+  const RegressionPlane plane = fit_regression_plane(cloud);
+  EXPECT_EQ(plane.skipped, 2u);
+  EXPECT_LT((plane.terrain_from_input.matrix() - clean.terrain_from_input.matrix()).norm(), 1e-12);
+}
+
+TEST(RegressionPlane, NormalsAndViewpointMoveAlong) {
+  PointCloud cloud = moved(bumpy_ground(300), rotation_about({1, 0, 0}, 30), {0, 0, 1});
+  cloud.normals.assign(300, rotation_about({1, 0, 0}, 30).col(2).cast<float>());
+  cloud.viewpoint.translation() = Vector3d(0, -3, 5);
+  const RegressionPlane plane = fit_regression_plane(cloud);
+  for (const PlaneMethod method : {PlaneMethod::thesis, PlaneMethod::corrected}) {
+    const PointCloud terrain = libgtd::transform_to_terrain(cloud, plane, method);
+    EXPECT_GT(terrain.viewpoint.translation().z(), 0);
+    EXPECT_GT(terrain.normals[0].z(), 0.9F);
+    for (std::size_t i = 0; i < cloud.size(); ++i)
+      ASSERT_LT((terrain.positions[i] - plane.terrain_from_input * cloud.positions[i]).norm(),
+                method == PlaneMethod::thesis ? 1e-6 : 1e-12);
+  }
+}
+
+struct ReferenceCase {
+  const char* cloud;
+  const char* frame;
+  float leaf_m;
+};
+
+class RegressionPlaneReference : public testing::TestWithParam<ReferenceCase> {
+ protected:
+  // The author's program thins the cloud before it fits the plane.
+  static PointCloud thinned(const ReferenceCase& set) {
+    const auto path = graspmap_test::data_folder() / "clouds" / (std::string(set.cloud) + ".pcd");
+    pcl::PointCloud<pcl::PointXYZ>::Ptr dense(new pcl::PointCloud<pcl::PointXYZ>);
+    for (const Vector3d& p : libmap::read_cloud(path).cloud.positions)
+      dense->emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                          static_cast<float>(p.z()));
+    pcl::VoxelGrid<pcl::PointXYZ> grid;
+    grid.setInputCloud(dense);
+    grid.setLeafSize(set.leaf_m, set.leaf_m, set.leaf_m);
+    pcl::PointCloud<pcl::PointXYZ> thin;
+    grid.filter(thin);
+    PointCloud cloud;
+    for (const pcl::PointXYZ& p : thin) cloud.positions.emplace_back(p.x, p.y, p.z);
+    return cloud;
+  }
+  static std::filesystem::path reference(const ReferenceCase& set, const char* what) {
+    return graspmap_test::reference_folder() / "gtd" / (std::string(set.frame) + what);
+  }
+};
+
+TEST_P(RegressionPlaneReference, ThesisFrame) {
+  GRASPMAP_REQUIRE_DATA();
+  GRASPMAP_REQUIRE_REFERENCE();
+  const auto frame = graspmap_test::read_frame(reference(GetParam(), ".frame.txt"));
+  const PointCloud cloud = thinned(GetParam());
+  ASSERT_EQ(cloud.size(), static_cast<std::size_t>(frame.downsampled));
+  const RegressionPlane plane =
+      fit_regression_plane(cloud, upwards(frame.rotation.col(2), PlaneMethod::thesis));
+  EXPECT_LT((plane.centroid - frame.centroid).norm(), 5e-6);
+  EXPECT_LT((axes_of(plane) - frame.rotation).cwiseAbs().maxCoeff(), 1e-4);
+  EXPECT_GT(plane.relief_skewness, 0);
+
+  const auto expected =
+      graspmap_test::read_points_f32_gz(reference(GetParam(), ".transformed.f32.gz"));
+  const PointCloud terrain = libgtd::transform_to_terrain(cloud, plane, PlaneMethod::thesis);
+  ASSERT_EQ(terrain.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    ASSERT_LT((terrain.positions[i] - expected[i].cast<double>()).norm(), 2e-4) << i;
+}
+
+TEST_P(RegressionPlaneReference, TransformWithTheGivenFrameToTheBit) {
+  GRASPMAP_REQUIRE_DATA();
+  GRASPMAP_REQUIRE_REFERENCE();
+  const auto frame = graspmap_test::read_frame(reference(GetParam(), ".frame.txt"));
+  RegressionPlane plane;
+  plane.centroid = frame.centroid;
+  plane.terrain_from_input.linear() = frame.rotation.transpose();
+  plane.terrain_from_input.translation() = -(frame.rotation.transpose() * frame.centroid);
+  const PointCloud terrain =
+      libgtd::transform_to_terrain(thinned(GetParam()), plane, PlaneMethod::thesis);
+  const auto expected =
+      graspmap_test::read_points_f32_gz(reference(GetParam(), ".transformed.f32.gz"));
+  ASSERT_EQ(terrain.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i)
+    ASSERT_EQ(terrain.positions[i], expected[i].cast<double>()) << i;
+}
+
+TEST_P(RegressionPlaneReference, CorrectedFindsTheSideOfTheRelief) {
+  GRASPMAP_REQUIRE_DATA();
+  GRASPMAP_REQUIRE_REFERENCE();
+  const auto path =
+      graspmap_test::data_folder() / "clouds" / (std::string(GetParam().cloud) + ".pcd");
+  const auto frame = graspmap_test::read_frame(reference(GetParam(), ".frame.txt"));
+  const RegressionPlane plane = fit_regression_plane(libmap::read_cloud(path).cloud);
+  EXPECT_GT(axes_of(plane).col(2).dot(frame.rotation.col(2)), 0.99);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sets, RegressionPlaneReference,
+    testing::Values(ReferenceCase{"artificial_rocks", "artificial_rocks.thesis", 0.01F},
+                    ReferenceCase{"leaning_bouldering_holds", "leaning_holds_scare.thesis", 0.01F},
+                    ReferenceCase{"leaning_bouldering_holds", "leaning_holds_hubrobo.thesis",
+                                  0.001F},
+                    ReferenceCase{"scanned_cloud_primitive", "primitive_shapes.thesis", 0.005F}),
+    [](const auto& set) {
+      const std::string name = set.param.frame;
+      return name.substr(0, name.find('.'));
+    });
+
+}  // namespace

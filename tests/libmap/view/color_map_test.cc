@@ -1,0 +1,170 @@
+#include "libmap/view/color_map.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/test_support.h"
+
+namespace libmap {
+namespace {
+
+using graspmap_test::error_of;
+using ::testing::HasSubstr;
+
+constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
+
+PointCloud row_of_points(std::size_t count) {
+  PointCloud cloud;
+  for (std::size_t i = 0; i < count; ++i)
+    cloud.positions.emplace_back(double(i), 0.0, 0.01 * double(i));
+  return cloud;
+}
+
+ColoredPoints color(const PointCloud& cloud, const Coloring& coloring) {
+  return color_points({cloud.positions, cloud.colors, cloud.fields}, coloring);
+}
+
+TEST(ScoreColor, ClassesBeginAtTheirBounds) {
+  const Legend legend = score_legend();
+  ASSERT_EQ(legend.entries.size(), 7U);
+  const double bounds[] = {0.9, 0.8, 0.7, 0.6, 0.5, 0.4};
+  for (std::size_t k = 0; k < 6; ++k) {
+    EXPECT_EQ(score_color(bounds[k]), legend.entries[k].color) << bounds[k];
+    EXPECT_EQ(score_color(static_cast<double>(static_cast<float>(bounds[k]))),
+              legend.entries[k].color)
+        << "single precision " << bounds[k];
+    EXPECT_EQ(score_color(bounds[k] - 1e-4), legend.entries[k + 1].color) << bounds[k];
+  }
+  EXPECT_EQ(score_color(1.0), legend.entries[0].color);
+  EXPECT_EQ(score_color(-0.7), legend.entries[6].color);
+  EXPECT_EQ(score_color(nan_value), no_value_color);
+}
+
+TEST(ScoreColor, NoTwoClassesLookTheSame) {
+  const Legend legend = score_legend();
+  for (std::size_t a = 0; a < legend.entries.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b) {
+      int distance = 0;
+      for (std::size_t c = 0; c < 3; ++c)
+        distance += std::abs(int(legend.entries[a].color[c]) - int(legend.entries[b].color[c]));
+      EXPECT_GT(distance, 60) << legend.entries[a].text << " and " << legend.entries[b].text;
+    }
+}
+
+TEST(Viridis, EndsAreThePublishedOnesAndLightnessGrows) {
+  EXPECT_EQ(viridis(0.0), (Color{68, 1, 84}));
+  EXPECT_EQ(viridis(1.0), (Color{253, 231, 37}));
+  // Entry 128 of matplotlib's 256.
+  EXPECT_EQ(viridis(128.0 / 255.0), (Color{33, 145, 140}));
+  EXPECT_EQ(viridis(-3.0), viridis(0.0));
+  EXPECT_EQ(viridis(7.0), viridis(1.0));
+  EXPECT_EQ(viridis(nan_value), no_value_color);
+  double former = -1.0;
+  for (int k = 0; k <= 50; ++k) {
+    const Color c = viridis(k / 50.0);
+    const double luminance = 0.2126 * c[0] + 0.7152 * c[1] + 0.0722 * c[2];
+    EXPECT_GT(luminance, former) << k;
+    former = luminance;
+  }
+}
+
+TEST(ColorPoints, BelowThePlaneIsWhiteAndOnItIsNot) {
+  PointCloud cloud = row_of_points(4);  // z = 0, 0.01, 0.02, 0.03
+  cloud.add_field("score", ScalarType::float32).values = {0.95, 0.95, 0.95, nan_value};
+  Coloring coloring;
+  coloring.zero_plane_m = 0.01;
+  const ColoredPoints result = color(cloud, coloring);
+  EXPECT_EQ(result.mode, ColorMode::score);
+  EXPECT_EQ(result.colors[0], below_plane_color);
+  EXPECT_EQ(result.colors[1], score_color(0.95));
+  EXPECT_EQ(result.colors[3], no_value_color);
+  ASSERT_EQ(result.legend.entries.size(), 9U);
+  EXPECT_EQ(result.legend.entries[7].text, "no value");
+  EXPECT_EQ(result.legend.entries[8].text, "below zero plane");
+}
+
+TEST(ColorPoints, FlagsGraspableBeforeConvex) {
+  PointCloud cloud = row_of_points(4);
+  cloud.add_field("convex", ScalarType::uint8).values = {1, 1, 0, 0};
+  cloud.add_field("graspable", ScalarType::uint8).values = {0, 1, 1, 0};
+  Coloring coloring;
+  coloring.mode = ColorMode::flags;
+  EXPECT_EQ(color(cloud, coloring).colors,
+            (std::vector<Color>{convex_color, intersection_color, intersection_color, rest_color}));
+}
+
+TEST(ColorPoints, RangeGivenOrFromThePercentiles) {
+  PointCloud cloud = row_of_points(101);
+  cloud.add_field("curvature", ScalarType::float64);
+  for (std::size_t i = 0; i <= 100; ++i) cloud.fields[0].values[i] = double(i);
+  cloud.fields[0].values[100] = 1e9;  // an outlier must not use up the colours
+  Coloring coloring;
+  coloring.mode = ColorMode::field;
+  coloring.field = "curvature";
+  const ColoredPoints free_range = color(cloud, coloring);
+  EXPECT_TRUE(free_range.legend.continuous);
+  EXPECT_DOUBLE_EQ(free_range.legend.min, 2.0);
+  EXPECT_DOUBLE_EQ(free_range.legend.max, 98.0);
+  EXPECT_EQ(free_range.colors[0], viridis(0.0));
+  EXPECT_EQ(free_range.colors[50], viridis(0.5));
+  coloring.range_min = -10.0;
+  coloring.range_max = 90.0;
+  const ColoredPoints fixed = color(cloud, coloring);
+  EXPECT_EQ(fixed.colors[40], viridis(0.5));
+  EXPECT_EQ(fixed.colors[100], viridis(1.0));
+}
+
+TEST(ColorPoints, ConstantAndMissingValues) {
+  PointCloud cloud = row_of_points(3);
+  cloud.add_field("f", ScalarType::float64).values = {2.5, 2.5, nan_value};
+  Coloring coloring;
+  coloring.mode = ColorMode::field;
+  coloring.field = "f";
+  const ColoredPoints result = color(cloud, coloring);
+  EXPECT_FALSE(result.legend.continuous);
+  EXPECT_EQ(result.legend.entries.front().text, "2.5");
+  EXPECT_EQ(result.colors, (std::vector<Color>{viridis(0.5), viridis(0.5), no_value_color}));
+}
+
+TEST(ColorPoints, AutomaticTakesWhatTheDataHave) {
+  PointCloud cloud = row_of_points(3);
+  EXPECT_EQ(color(cloud, {}).mode, ColorMode::height);
+  cloud.colors.assign(3, Color{9, 9, 9});
+  EXPECT_EQ(color(cloud, {}).mode, ColorMode::height) << "one grey says nothing";
+  cloud.colors[1] = {1, 2, 3};
+  EXPECT_EQ(color(cloud, {}).mode, ColorMode::own);
+  EXPECT_EQ(color(cloud, {}).colors, cloud.colors);
+  cloud.add_field("score", ScalarType::float32);
+  EXPECT_EQ(color(cloud, {}).mode, ColorMode::score);
+}
+
+TEST(ColorPoints, ErrorsNameWhatWasMeant) {
+  PointCloud cloud = row_of_points(3);
+  cloud.add_field("curvature", ScalarType::float64);
+  Coloring coloring;
+  coloring.mode = ColorMode::field;
+  coloring.field = "curvatur";
+  EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("'curvature'"));
+  coloring.field = "curvature";
+  coloring.range_min = 1.0;
+  EXPECT_EQ(error_of([&] { color(cloud, coloring); }).context().field, "range_max");
+  coloring.mode = ColorMode::own;
+  EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("no colours"));
+  coloring.mode = ColorMode::flags;
+  EXPECT_EQ(error_of([&] { color(cloud, coloring); }).context().value, "convex");
+  coloring.mode = ColorMode::single;
+  coloring.color = "gren";
+  EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("green"));
+}
+
+TEST(ParseColor, HexAndNames) {
+  EXPECT_EQ(parse_color("#0aFf10", "c"), (Color{10, 255, 16}));
+  EXPECT_EQ(parse_color("white", "c"), (Color{255, 255, 255}));
+  for (const char* wrong : {"", "#12345", "#1234567", "#12345g", "#-12345", "# 12345"})
+    EXPECT_EQ(error_of([&] { parse_color(wrong, "c"); }).context().field, "c") << wrong;
+}
+
+}  // namespace
+}  // namespace libmap

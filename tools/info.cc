@@ -1,0 +1,148 @@
+// graspmap info: what a cloud, a mesh or a map holds.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iostream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/mesh_io.h"
+#include "tools/command_line.h"
+
+namespace {
+
+using graspmap_tools::Run;
+using Json = nlohmann::ordered_json;
+
+struct InfoOptions {
+  std::string file;
+  bool json = false;
+};
+
+Json range_of(const std::vector<double>& values) {
+  double low = HUGE_VAL;
+  double high = -HUGE_VAL;
+  std::size_t finite = 0;
+  for (const double value : values) {
+    if (!std::isfinite(value)) continue;
+    low = std::min(low, value);
+    high = std::max(high, value);
+    ++finite;
+  }
+  if (finite == 0) return nullptr;
+  return Json::array({low, high});
+}
+
+Json bounds_json(const std::vector<Eigen::Vector3d>& positions) {
+  if (positions.empty()) return nullptr;
+  const libmap::Bounds3d bounds = libmap::bounds_of(positions);
+  const auto numbers = [](const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); };
+  return {{"min", numbers(bounds.min)}, {"max", numbers(bounds.max)}};
+}
+
+Json fields_json(const std::vector<libmap::ScalarField>& fields) {
+  Json list = Json::array();
+  for (const libmap::ScalarField& field : fields)
+    list.push_back({{"name", field.name},
+                    {"type", libmap::to_text(field.type)},
+                    {"range", range_of(field.values)}});
+  return list;
+}
+
+Json file_json(const libmap::GeometryFileInfo& info) {
+  return {{"format", info.format},
+          {"encoding", libmap::to_text(info.encoding)},
+          {"bytes", info.bytes},
+          {"skipped", info.skipped}};
+}
+
+Json cloud_json(const std::string& path) {
+  const libmap::CloudReadResult read = libmap::read_cloud(path);
+  const bool is_map =
+      read.cloud.find_field("score") != nullptr && read.cloud.find_field("ssv") != nullptr;
+  return {{"kind", is_map ? "graspability map" : "cloud"},
+          {"file", file_json(read.info)},
+          {"points", read.cloud.size()},
+          {"dropped_points", read.dropped_points},
+          {"normals", read.cloud.has_normals()},
+          {"colors", read.cloud.has_colors()},
+          {"bounds_m", bounds_json(read.cloud.positions)},
+          {"fields", fields_json(read.cloud.fields)}};
+}
+
+Json mesh_json(const std::string& path) {
+  const libmap::MeshReadResult read = libmap::read_mesh(path);
+  const libmap::TriangleMesh& mesh = read.mesh;
+  return {{"kind", "mesh"},
+          {"file", file_json(read.info)},
+          {"vertices", mesh.vertices.size()},
+          {"triangles", mesh.triangles.size()},
+          {"area_m2", libmap::surface_area(mesh)},
+          {"normals", !mesh.vertex_normals.empty()},
+          {"colors", !mesh.vertex_colors.empty()},
+          {"bounds_m", bounds_json(mesh.vertices)},
+          {"fields", fields_json(mesh.vertex_fields)},
+          {"face_fields", fields_json(mesh.face_fields)}};
+}
+
+std::string plain(const Json& value) {
+  if (value.is_null()) return "none";
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
+  if (value.is_number_float()) return libmap::to_text(static_cast<float>(value.get<double>()));
+  if (!value.is_array()) return value.dump();
+  std::string text;
+  for (const Json& one : value) text += (text.empty() ? "" : " ") + plain(one);
+  return text.empty() ? "none" : text;
+}
+
+void print_plainly(const Json& json, const std::string& indent) {
+  for (const auto& [name, value] : json.items()) {
+    const bool list_of_objects = value.is_array() && !value.empty() && value.front().is_object();
+    if (value.is_object()) {
+      std::cout << indent << name << ":\n";
+      print_plainly(value, indent + "  ");
+    } else if (list_of_objects) {
+      std::cout << indent << name << ":\n";
+      for (const Json& one : value)
+        std::cout << indent << "  "
+                  << fmt::format("{:<12} {:<8} {}", plain(one.at("name")), plain(one.at("type")),
+                                 plain(one.at("range")))
+                  << "\n";
+    } else {
+      std::cout << indent << fmt::format("{}: {}", name, plain(value)) << "\n";
+    }
+  }
+}
+
+void info(const InfoOptions& options) {
+  Json json = {{"path", options.file}};
+  json.update(libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options.file)
+                                                                        : cloud_json(options.file));
+  if (const auto manifest = libmap::read_manifest_of(options.file)) {
+    json["made_by"] = "graspmap " + manifest->command + " " + manifest->version;
+    json["frame"] = manifest->frame;
+    Json results = Json::object();
+    for (const auto& [name, value] : manifest->results)
+      results[name] = std::visit([](const auto& held) { return Json(held); }, value);
+    json["results"] = results;
+  }
+  if (options.json)
+    std::cout << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+  else
+    print_plainly(json, "");
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  InfoOptions options;
+  graspmap_tools::Command command("info", "What a cloud, a mesh or a graspability map holds.");
+  command.input("FILE", options.file, "cloud, mesh or map");
+  command.flag("--json", options.json, "as JSON");
+  return command.run(argc, argv, [&](Run&) { info(options); });
+}

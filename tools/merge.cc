@@ -1,0 +1,108 @@
+// graspmap merge: the tiles of a map into one map.
+#include <fmt/format.h>
+
+#include <string>
+#include <vector>
+
+#include "libgtd/score/graspability_map.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "tools/command_line.h"
+
+namespace {
+
+using graspmap_tools::Run;
+
+struct MergeOptions {
+  std::vector<std::string> tiles;
+  std::string output;
+};
+
+libmap::Manifest manifest_of(const std::string& tile) {
+  const auto manifest = libmap::read_manifest_of(tile);
+  if (!manifest)
+    throw libmap::Error("no manifest beside it: it is not a tile that `graspmap score` wrote",
+                        {.file = tile});
+  return *manifest;
+}
+
+// What all shares of one map have in common.
+void require_same_map(const libmap::Manifest& first, const libmap::Manifest& other,
+                      const std::string& first_name, const std::string& name) {
+  for (const auto& [key, value] : first.parameters) {
+    if (key == "tile") continue;
+    const libmap::ManifestValue* found = other.find_parameter(key);
+    if (found == nullptr || *found != value)
+      throw libmap::Error("differs from that of " + first_name, {.file = name, .field = key});
+  }
+  const bool same_input = !first.inputs.empty() && !other.inputs.empty() &&
+                          first.inputs.front().sha256 == other.inputs.front().sha256;
+  if (!same_input) throw libmap::Error("was scored from another terrain", {.file = name});
+}
+
+// The shares K/N of the parts are 1 to N, each once.
+void require_all_shares(const std::vector<libmap::Manifest>& manifests,
+                        const std::vector<std::string>& names) {
+  std::vector<std::string> shares;
+  std::string count;
+  for (std::size_t n = 0; n < manifests.size(); ++n) {
+    const libmap::ManifestValue* value = manifests[n].find_parameter("tile");
+    const std::string share = value != nullptr && std::holds_alternative<std::string>(*value)
+                                  ? std::get<std::string>(*value)
+                                  : std::string();
+    const std::string of = share.substr(std::min(share.find('/') + 1, share.size()));
+    if (share.empty() || (n > 0 && of != count))
+      throw libmap::Error("is not a share of the same tiles",
+                          {.file = names[n], .field = "tile", .value = share});
+    count = of;
+    for (const std::string& seen : shares)
+      if (seen == share)
+        throw libmap::Error("two files hold this share",
+                            {.file = names[n], .field = "tile", .value = share});
+    shares.push_back(share);
+  }
+  if (std::to_string(shares.size()) != count)
+    throw libmap::Error(fmt::format("{} of {} shares are given", shares.size(), count),
+                        {.field = "tile"});
+}
+
+void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
+  for (const auto& parameter : part.parameters)
+    if (parameter.first != "tile") whole.parameters.push_back(parameter);
+  whole.frame = part.frame;
+  whole.transforms = part.transforms;
+  for (const char* name : {"lattice_origin_m", "plane_rmse_m", "up_source", "input_points",
+                           "occupied_voxels", "mask_side_voxels", "mask_layers"})
+    if (const libmap::ManifestValue* value = part.find_result(name))
+      whole.results.emplace_back(name, *value);
+}
+
+void merge(const MergeOptions& options, Run& run) {
+  run.claim_output(options.output);
+  std::vector<libmap::Manifest> manifests;
+  for (const std::string& tile : options.tiles) {
+    manifests.push_back(manifest_of(tile));
+    require_same_map(manifests.front(), manifests.back(), options.tiles.front(), tile);
+  }
+  require_all_shares(manifests, options.tiles);
+  std::vector<libmap::PointCloud> parts;
+  for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
+  if (run.dry_run()) return;
+  const libmap::PointCloud whole = libgtd::merge_map_clouds(parts);
+  copy_common_facts(manifests.front(), run.manifest());
+  for (const std::string& tile : options.tiles) run.manifest().add_input(tile);
+  run.manifest().results.emplace_back("scored_voxels", static_cast<std::int64_t>(whole.size()));
+  run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  MergeOptions options;
+  graspmap_tools::Command command("merge", "The shares of a map's tiles into one map.");
+  command.inputs("TILE", options.tiles, "maps that `graspmap score --tile K/N` wrote, all N");
+  command.output(options.output, "the whole map, the same bytes as without --tile");
+  return command.run(argc, argv, [&](Run& run) { merge(options, run); });
+}

@@ -1,0 +1,156 @@
+// graspmap score: graspability map of a terrain, tile by tile.
+#include <fmt/format.h>
+
+#include <string>
+
+#include "libgtd/detect.h"
+#include "libgtd/gripper/gripper_io.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "tools/command_line.h"
+
+namespace {
+
+using graspmap_tools::Run;
+
+struct ScoreOptions {
+  std::string terrain;
+  std::string output;
+  std::string tile = "1/1";
+  std::string up = "auto";
+  libgtd::MapFrame frame = libgtd::MapFrame::terrain;
+  libgtd::DetectionOptions detection;
+};
+
+void bind(libmap::ParameterTable& table, ScoreOptions& options) {
+  bind(table, options.detection.scenario);
+  table.add("plane", options.detection.plane, libgtd::plane_source_names(),
+            "fit: regression plane; none: the cloud is already in the terrain frame");
+  table.add("up", options.up,
+            "which side of the plane is outside: auto, or a direction X,Y,Z in the cloud's frame");
+  table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
+}
+
+libgtd::TileShare parse_share(const std::string& text) {
+  const std::size_t slash = text.find('/');
+  const auto number = libmap::parse_integer(text.substr(0, slash));
+  const auto count =
+      slash == std::string::npos ? std::nullopt : libmap::parse_integer(text.substr(slash + 1));
+  if (!number || !count || *count < 1 || *number < 1 || *number > *count || *count > 1000000)
+    throw libmap::Error("no such share of the tiles",
+                        {.field = "--tile", .value = text, .bound = "K/N with 1 <= K <= N"});
+  return {static_cast<int>(*number), static_cast<int>(*count)};
+}
+
+std::optional<Eigen::Vector3d> parse_up(const std::string& text) {
+  if (text == "auto") return std::nullopt;
+  Eigen::Vector3d up;
+  std::string_view rest = text;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) {
+    const std::size_t comma = rest.find(',');
+    const auto value = libmap::parse_double(rest.substr(0, comma));
+    if (!value || (comma == std::string_view::npos) != (axis == 2))
+      throw libmap::Error("not a direction",
+                          {.field = "--up", .value = text, .bound = "auto or X,Y,Z"});
+    up[axis] = *value;
+    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
+  }
+  return up;
+}
+
+void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& result,
+                 const ScoreOptions& options) {
+  const auto count = [&](const char* name, std::size_t value) {
+    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  const Eigen::Vector3d& origin = result.map.lattice.origin_m;
+  manifest.frame = options.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
+  manifest.transforms.emplace_back("terrain_from_input", result.map.terrain_from_input);
+  manifest.results.emplace_back("lattice_origin_m",
+                                std::vector<double>{origin.x(), origin.y(), origin.z()});
+  count("input_points", result.points);
+  if (result.plane) {
+    manifest.results.emplace_back("plane_rmse_m", result.plane->rmse_m);
+    manifest.results.emplace_back("up_source", std::string(to_text(result.plane->up_source)));
+  }
+  if (result.thinned_points > 0) count("thinned_points", result.thinned_points);
+  if (options.detection.scenario.interpolation) {
+    count("interpolated_points", result.interpolated_points);
+    manifest.results.emplace_back("interpolation_grid_m", result.grid_spacing_m);
+  }
+  count("occupied_voxels", result.occupied_voxels);
+  count("mask_side_voxels", static_cast<std::size_t>(result.mask.side));
+  count("mask_layers", static_cast<std::size_t>(result.mask.layers));
+  count("tiles", result.tiles);
+  count("scored_voxels", result.map.voxels.size());
+  count("edge_voxels", result.edge_voxels);
+  count("curvature_points", result.curvature_points);
+  count("convex_points", result.convex_points);
+  count("graspable_voxels", result.graspable_voxels);
+  manifest.timings_s.insert(manifest.timings_s.end(), result.timings_s.begin(),
+                            result.timings_s.end());
+}
+
+void say_result(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
+  if (result.plane && options.detection.up == std::nullopt)
+    run.say(fmt::format("up from the {}", to_text(result.plane->up_source)));
+  for (const auto& [name, seconds] : result.timings_s)
+    run.detail(fmt::format("{}: {:.3f} s", name, seconds));
+  run.say(fmt::format("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable",
+                      result.points, result.occupied_voxels, result.map.voxels.size(), result.tiles,
+                      result.graspable_voxels));
+  if (result.map.voxels.empty() && options.detection.share.count == 1)
+    run.warn("the terrain is smaller than the gripper mask: nothing was scored");
+}
+
+void score(ScoreOptions& options, Run& run) {
+  libgtd::Scenario& scenario = options.detection.scenario;
+  options.detection.share = parse_share(options.tile);
+  options.detection.up = parse_up(options.up);
+  scenario.check();
+  const auto gripper_file = graspmap_tools::find_data_file("grippers", scenario.gripper);
+  options.detection.gripper = libgtd::read_gripper(gripper_file, scenario.gripper_overrides);
+  run.claim_output(options.output);
+  const libmap::CloudReadResult read =
+      run.timed("read", [&] { return libmap::read_cloud(options.terrain); });
+  if (read.dropped_points > 0)
+    run.warn(fmt::format("{}: {} points without a position were dropped", options.terrain,
+                         read.dropped_points));
+  if (read.cloud.empty()) throw libmap::Error("the cloud has no points", {.file = options.terrain});
+  if (run.dry_run()) {
+    libgtd::make_gripper_mask(options.detection.gripper,
+                              {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
+    return;
+  }
+  libgtd::DetectionResult result;
+  try {
+    result = libgtd::detect(read.cloud, options.detection, run.progress());
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.terrain);
+  }
+  libmap::Manifest& manifest = run.manifest();
+  manifest.parameters.emplace_back("tile", options.tile);
+  manifest.add_input(options.terrain);
+  manifest.add_input(gripper_file);
+  add_results(manifest, result, options);
+  say_result(result, options, run);
+  const libmap::PointCloud cloud = libgtd::to_cloud(result.map, options.frame);
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ScoreOptions options;
+  graspmap_tools::Command command("score", "Graspability map of a terrain, tile by tile.");
+  command.input("TERRAIN", options.terrain, "cloud of the terrain (.pcd, .ply, .vtp, .csv)");
+  command.output(options.output, "graspability map (.pcd, .ply, .vtp, .csv)");
+  command.option("--tile", "K/N", options.tile,
+                 "score share K of N of the tiles alone; `graspmap merge` joins the shares");
+  bind(command.parameters(), options);
+  command.config_resolver(
+      [](const std::string& name) { return graspmap_tools::find_data_file("scenarios", name); });
+  return command.run(argc, argv, [&](Run& run) { score(options, run); });
+}
