@@ -270,19 +270,6 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   }
 }
 
-namespace {
-
-// In the build folder the data stand in the source tree; installed, beside the program.
-fs::path toolkit_data_folder() {
-  std::error_code code;
-  const fs::path program = fs::read_symlink("/proc/self/exe", code);
-  const fs::path installed = program.parent_path() / "../../share/graspmap";
-  if (!code && fs::is_directory(installed)) return installed.lexically_normal();
-  return GRASPMAP_SOURCE_DATA;
-}
-
-}  // namespace
-
 fs::path find_data_file(const std::string& kind, const std::string& name) {
   if (name.find('/') != std::string::npos || name.ends_with(".yaml")) {
     libmap::require_readable_file(name);

@@ -71,7 +71,7 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
 
 // The manifest of a converted map still says in which frame it is.
 void keep_frame(const ConvertOptions& options, Run& run) {
-  run.manifest().add_input(options.input);
+  run.add_input(options.input);
   if (const auto source = libmap::read_manifest_of(options.input)) {
     run.manifest().frame = source->frame;
     run.manifest().transforms = source->transforms;

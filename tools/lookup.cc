@@ -5,12 +5,12 @@
 #include <string>
 
 #include "libgtd/evaluate/lookup.h"
-#include "libgtd/score/graspability_map.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "tools/command_line.h"
+#include "tools/map_frame.h"
 
 namespace {
 
@@ -20,41 +20,9 @@ struct LookupCommandOptions {
   std::string map;
   std::string points;
   std::string output;
-  libgtd::MapFrame points_frame = libgtd::MapFrame::input;
+  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
   libgtd::LookupOptions lookup;
 };
-
-std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
-  const std::size_t columns[] = {table.column("x"), table.column("y"), table.column("z")};
-  std::vector<Eigen::Vector3d> positions;
-  for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    Eigen::Vector3d& position = positions.emplace_back();
-    for (Eigen::Index axis = 0; axis < 3; ++axis)
-      position[axis] = table.number(row, columns[static_cast<std::size_t>(axis)]);
-    if (!position.allFinite())
-      throw libmap::Error("x, y and z must be finite",
-                          {.file = table.file, .field = "row " + std::to_string(row + 1)});
-  }
-  return positions;
-}
-
-// From the frame of the points to that of the map's points.
-libmap::Pose map_from_points(const LookupCommandOptions& options, Run& run) {
-  const auto manifest = libmap::read_manifest_of(options.map);
-  if (!manifest) {
-    run.warn(options.map + ": no manifest beside it: the points are taken in the map's own frame");
-    return libmap::Pose::Identity();
-  }
-  const bool map_in_terrain = manifest->frame != "input";
-  const bool points_in_terrain = options.points_frame == libgtd::MapFrame::terrain;
-  const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
-  if (map_in_terrain == points_in_terrain) return libmap::Pose::Identity();
-  if (terrain_from_input == nullptr)
-    throw libmap::Error(
-        "does not say how the map's frame lies in the input's",
-        {.file = libmap::manifest_path(options.map).string(), .field = "terrain_from_input"});
-  return map_in_terrain ? *terrain_from_input : terrain_from_input->inverse();
-}
 
 // Appends a column; one that the points already have (a verdict named "graspable") keeps its name.
 void add_column(libmap::Table& table, const std::string& name) {
@@ -81,9 +49,10 @@ libmap::Table answer_table(libmap::Table table, const libmap::PointCloud& map,
 void lookup(const LookupCommandOptions& options, Run& run) {
   run.claim_output(options.output);
   const libmap::Table table = libmap::read_csv(options.points);
-  std::vector<Eigen::Vector3d> positions = positions_of(table);
+  std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
-  const libmap::Pose transform = map_from_points(options, run);
+  const libmap::Pose transform =
+      graspmap_tools::map_from_points(options.map, options.points_frame, run);
   for (Eigen::Vector3d& position : positions) position = transform * position;
   if (map.empty()) throw libmap::Error("the map has no points", {.file = options.map});
   if (run.dry_run()) return;
@@ -91,8 +60,8 @@ void lookup(const LookupCommandOptions& options, Run& run) {
       run.timed("look-up", [&] { return libgtd::look_up(map, positions, options.lookup); });
   std::int64_t found = 0;
   for (const libgtd::LookupAnswer& answer : answers) found += answer.found ? 1 : 0;
-  run.manifest().add_input(options.map);
-  run.manifest().add_input(options.points);
+  run.add_input(options.map);
+  run.add_input(options.points);
   run.manifest().results.emplace_back("points", static_cast<std::int64_t>(answers.size()));
   run.manifest().results.emplace_back("found", found);
   run.say(fmt::format("{} of {} points lie on the map", found, answers.size()));
@@ -110,7 +79,8 @@ int main(int argc, char** argv) {
   command.input("POINTS", options.points, "CSV with the columns x, y, z in metres, and any others");
   command.output(options.output, "CSV: the points, each with the map's values there");
   bind(command.parameters(), options.lookup);
-  command.parameters().add("points_frame", options.points_frame, libgtd::map_frame_names(),
+  command.parameters().add("points_frame", options.points_frame,
+                           graspmap_tools::point_frame_names(),
                            "frame of the points: of the cloud that was scored, or the terrain's");
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

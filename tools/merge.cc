@@ -90,7 +90,7 @@ void merge(const MergeOptions& options, Run& run) {
   if (run.dry_run()) return;
   const libmap::PointCloud whole = libgtd::merge_map_clouds(parts);
   copy_common_facts(manifests.front(), run.manifest());
-  for (const std::string& tile : options.tiles) run.manifest().add_input(tile);
+  for (const std::string& tile : options.tiles) run.add_input(tile);
   run.manifest().results.emplace_back("scored_voxels", static_cast<std::int64_t>(whole.size()));
   run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
   run.write_output(options.output,

@@ -29,11 +29,26 @@ bool written_by_this_toolkit(const fs::path& output) {
 
 }  // namespace
 
+fs::path toolkit_data_folder() {
+  // Installed, beside the program; in the build folder, in the source tree.
+  std::error_code code;
+  const fs::path program = fs::read_symlink("/proc/self/exe", code);
+  const fs::path installed = (program.parent_path() / "../../share/graspmap").lexically_normal();
+  if (!code && fs::is_directory(installed)) return installed;
+  return GRASPMAP_SOURCE_DATA;
+}
+
 Run::Run(std::string command, RunOptions options, libmap::Progress& progress)
     : command_(std::move(command)), options_(options), progress_(progress) {
   manifest_.command = command_;
   manifest_.version = GRASPMAP_VERSION;
   manifest_.threads = options_.threads;
+}
+
+void Run::add_input(const fs::path& path) {
+  manifest_.add_input(path);
+  const fs::path place = path.lexically_relative(toolkit_data_folder());
+  if (!place.empty() && *place.begin() != "..") manifest_.inputs.back().path = place.string();
 }
 
 void Run::say(const std::string& text) { spdlog::info("{}", text); }

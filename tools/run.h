@@ -12,6 +12,9 @@
 
 namespace graspmap_tools {
 
+// Where the toolkit's own data lie: grippers, scenarios, scenes.
+std::filesystem::path toolkit_data_folder();
+
 struct RunOptions {
   bool dry_run = false;
   bool force = false;
@@ -29,6 +32,10 @@ class Run {
   bool dry_run() const { return options_.dry_run; }
   libmap::Progress& progress() { return progress_; }
   libmap::Manifest& manifest() { return manifest_; }
+
+  // Hashes an input into the manifest; the toolkit's own data by its place among them, so that the
+  // manifest does not depend on where the toolkit lies.
+  void add_input(const std::filesystem::path& path);
 
   // To stderr: unless --quiet; always; with --verbose only.
   void say(const std::string& text);

@@ -9,6 +9,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "tools/command_line.h"
+#include "tools/map_frame.h"
 
 namespace {
 
@@ -45,18 +46,7 @@ libgtd::TileShare parse_share(const std::string& text) {
 
 std::optional<Eigen::Vector3d> parse_up(const std::string& text) {
   if (text == "auto") return std::nullopt;
-  Eigen::Vector3d up;
-  std::string_view rest = text;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const std::size_t comma = rest.find(',');
-    const auto value = libmap::parse_double(rest.substr(0, comma));
-    if (!value || (comma == std::string_view::npos) != (axis == 2))
-      throw libmap::Error("not a direction",
-                          {.field = "--up", .value = text, .bound = "auto or X,Y,Z"});
-    up[axis] = *value;
-    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
-  }
-  return up;
+  return graspmap_tools::parse_vector(text, "--up");
 }
 
 void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& result,
@@ -131,8 +121,8 @@ void score(ScoreOptions& options, Run& run) {
   }
   libmap::Manifest& manifest = run.manifest();
   manifest.parameters.emplace_back("tile", options.tile);
-  manifest.add_input(options.terrain);
-  manifest.add_input(gripper_file);
+  run.add_input(options.terrain);
+  run.add_input(gripper_file);
   add_results(manifest, result, options);
   say_result(result, options, run);
   const libmap::PointCloud cloud = libgtd::to_cloud(result.map, options.frame);

@@ -35,7 +35,7 @@ std::optional<bool> parse_label(std::string_view text);
 
 // All columns that hold numbers and empty cells alone, at least one number, and are neither the
 // label, nor an identity (id, point, hold, i, j, k), nor a position or distance (x, y, z, or a
-// name that ends with a unit of length such as "_m").
+// name that ends with a unit of length such as "_m"), nor a look-up's flags found and edge.
 std::vector<std::string> default_score_columns(const libmap::Table& table,
                                                std::string_view label_column);
 

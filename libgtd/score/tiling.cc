@@ -91,8 +91,8 @@ ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds) {
 }
 
 std::vector<ScoredVoxel> score_tile(const VoxelGrid& grid, const GripperMask& mask,
-                                    const TileBounds& tile, const ScoringOptions& options) {
-  const std::vector<std::size_t> pivots = pivots_in(grid, mask, tile);
+                                    const TileBounds& tile, const std::vector<std::size_t>& pivots,
+                                    const ScoringOptions& options) {
   const std::vector<VoxelCounts> counts = match_voxels(grid, mask, tile, pivots);
   // The other methods do not score the border at all.
   const bool flag_edges = mask.method == Method::corrected;
@@ -158,11 +158,18 @@ std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& m
 std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& mask,
                                      const std::vector<TileBounds>& tiles,
                                      const ScoringOptions& options, libmap::Progress& progress) {
+  std::vector<std::vector<std::size_t>> pivots(tiles.size());
+  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) pivots[t] = pivots_in(grid, mask, tiles[t]);
+  });
+  // All of them before the first window is made: the last tile may be the one that does not fit.
+  for (std::size_t t = 0; t < tiles.size(); ++t)
+    require_window_room(grid, mask, tiles[t], pivots[t]);
   std::vector<std::vector<ScoredVoxel>> parts(tiles.size());
   progress.begin("voxel matching", tiles.size());
   libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
-      parts[t] = score_tile(grid, mask, tiles[t], options);
+      parts[t] = score_tile(grid, mask, tiles[t], pivots[t], options);
       progress.advance(1);
     }
   });

@@ -13,6 +13,7 @@ namespace {
 
 // The voxels around a tile as rows of bits along j; the rows of one (i) lie side by side in k.
 struct BitWindow {
+  TileBounds columns;
   Voxel low;  // of the first bit
   std::size_t rows_per_i = 0;
   std::size_t words_per_row = 0;
@@ -20,6 +21,10 @@ struct BitWindow {
 
   std::size_t row_of(int i, int k) const {
     return static_cast<std::size_t>(i - low.i) * rows_per_i + static_cast<std::size_t>(k - low.k);
+  }
+  double words() const {
+    return static_cast<double>(columns.i_end - columns.i_begin) * static_cast<double>(rows_per_i) *
+           static_cast<double>(words_per_row);
   }
   void set(const Voxel& voxel) {
     const auto bit = static_cast<std::size_t>(voxel.j - low.j);
@@ -48,30 +53,30 @@ KRange k_range(const VoxelGrid& grid, const std::vector<std::size_t>& pivots) {
   return range;
 }
 
-BitWindow make_window(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
-                      const KRange& pivots_k) {
+// The frame of a tile's window, its bits not yet allocated.
+BitWindow frame_window(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
+                       const std::vector<std::size_t>& pivots) {
   const TileBounds columns = with_halo(tile, mask);
+  const KRange pivots_k = k_range(grid, pivots);
   const int k_low = pivots_k.min - mask.pivot_z;
   const int k_high = pivots_k.max + mask.layers - mask.pivot_z - 1;
   BitWindow window;
+  window.columns = columns;
   window.low = {columns.i_begin, columns.j_begin, k_low};
   window.rows_per_i = static_cast<std::size_t>(k_high - k_low) + 1;
-  const auto width = static_cast<std::size_t>(columns.j_end - columns.j_begin);
   // A spare word at the end: count_bits reads one word beyond a row's last bit.
-  window.words_per_row = width / 64 + 2;
-  const double words = static_cast<double>(columns.i_end - columns.i_begin) *
-                       static_cast<double>(window.rows_per_i) *
-                       static_cast<double>(window.words_per_row);
-  if (words * 8.0 > max_window_bytes)
-    throw libmap::Error(
-        "too small: the window of one tile would take " +
-            libmap::to_text(static_cast<float>(words * 8.0 / 0x1p30)) +
-            " GiB at a bit a voxel, more than " + libmap::to_text(max_window_bytes / 0x1p30),
-        {.field = "voxel_size_m", .value = libmap::to_text(grid.lattice.voxel_size_m)});
-  window.bits.assign(static_cast<std::size_t>(words), 0);
-  visit_columns(grid, columns, [&](std::size_t at) {
+  window.words_per_row = static_cast<std::size_t>(columns.j_end - columns.j_begin) / 64 + 2;
+  return window;
+}
+
+BitWindow make_window(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
+                      const std::vector<std::size_t>& pivots) {
+  BitWindow window = frame_window(grid, mask, tile, pivots);
+  window.bits.assign(static_cast<std::size_t>(window.words()), 0);
+  const int k_end = window.low.k + static_cast<int>(window.rows_per_i);
+  visit_columns(grid, window.columns, [&](std::size_t at) {
     const Voxel& voxel = grid.voxels[at];
-    if (voxel.k >= k_low && voxel.k <= k_high) window.set(voxel);
+    if (voxel.k >= window.low.k && voxel.k < k_end) window.set(voxel);
   });
   return window;
 }
@@ -114,11 +119,25 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
   return pivots;
 }
 
+void require_window_room(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
+                         const std::vector<std::size_t>& pivots) {
+  if (pivots.empty()) return;
+  const double bytes = 8.0 * frame_window(grid, mask, tile, pivots).words();
+  if (bytes > max_window_bytes)
+    throw libmap::Error(
+        "too small for this cloud and gripper: the window of one tile would take " +
+            libmap::to_text(static_cast<float>(bytes / 0x1p30)) +
+            " GiB at a bit a voxel, more than " + libmap::to_text(max_window_bytes / 0x1p30) +
+            " GiB",
+        {.field = "voxel_size_m", .value = libmap::to_text(grid.lattice.voxel_size_m)});
+}
+
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
                                       const TileBounds& tile,
                                       const std::vector<std::size_t>& pivots) {
   if (pivots.empty()) return {};
-  const BitWindow window = make_window(grid, mask, tile, k_range(grid, pivots));
+  require_window_room(grid, mask, tile, pivots);
+  const BitWindow window = make_window(grid, mask, tile, pivots);
   const std::vector<MaskRow> rows = make_rows(mask, window.rows_per_i);
   std::vector<VoxelCounts> counts;
   counts.reserve(pivots.size());

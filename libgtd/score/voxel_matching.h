@@ -26,10 +26,16 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
 
 // Counts of each pivot of one tile, by population counts over rows of bits. Only the voxels of the
 // tile and of a halo of half a mask are read, and the counts of a pivot do not depend on the tile
-// that it is counted in. Throws Error if the window would take more than max_window_bytes.
+// that it is counted in. Throws what require_window_room throws.
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
                                       const TileBounds& tile,
                                       const std::vector<std::size_t>& pivots);
+
+// Throws Error naming voxel_size_m if the bits of that window would take more than
+// max_window_bytes; it says how much they would take.
+void require_window_room(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
+                         const std::vector<std::size_t>& pivots);
+inline constexpr double max_window_bytes = 1024.0 * 1024.0 * 1024.0;
 
 // The same by the plain triple loop of listing A.6, over a dense array of the whole box, one
 // thread: the oracle of the tests and the baseline of the benchmarks.

@@ -60,7 +60,4 @@ VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
 std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
                                                double leaf_m);
 
-// The largest number of bytes that the box of one tile may take as one bit a voxel.
-inline constexpr double max_window_bytes = 4.0 * 1024.0 * 1024.0 * 1024.0;
-
 }  // namespace libgtd

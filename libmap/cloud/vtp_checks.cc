@@ -122,7 +122,7 @@ std::uint64_t word_at(const std::string& bytes, std::uint64_t index, const Block
 
 // A block of `data`: its length, or how many pieces of which sizes are compressed in it.
 void require_sane_block(std::string_view data, bool base64, const BlockLayout& layout,
-                        std::uint64_t number_bytes) {
+                        std::uint64_t number_bytes, bool may_be_empty) {
   const auto head = [&](std::uint64_t words) {
     const std::uint64_t size = words * layout.word_bytes;
     return base64 ? base64_prefix(data, size) : std::string(data.substr(0, size));
@@ -136,7 +136,7 @@ void require_sane_block(std::string_view data, bool base64, const BlockLayout& l
   const std::string sizes = head(3);
   // An array without data may have a header of one word.
   const std::uint64_t pieces = word_at(sizes, 0, layout);
-  if (pieces == 0) return;
+  if (pieces == 0) return require_block(may_be_empty);
   const std::uint64_t piece = word_at(sizes, 1, layout);
   const std::uint64_t last = word_at(sizes, 2, layout);
   const std::uint64_t most = room * max_ratio;
@@ -185,6 +185,32 @@ BlockLayout layout_of(const XmlTag& tag) {
   return layout;
 }
 
+// Which arrays hold data: those of a part of the file that is not empty.
+class Parts {
+ public:
+  void enter(const XmlTag& tag) {
+    if (tag.name == "Piece") piece_ = tag;
+    constexpr std::array<std::string_view, 8> parts = {
+        "FieldData", "PointData", "CellData", "Points", "Verts", "Lines", "Strips", "Polys"};
+    if (std::find(parts.begin(), parts.end(), tag.name) != parts.end()) part_ = tag.name;
+  }
+  bool is_empty(const XmlTag& array) const {
+    if (part_ == "FieldData") return array.attribute("NumberOfTuples") == "0";
+    if (part_ == "Points" || part_ == "PointData") return is_zero("NumberOfPoints");
+    if (part_ == "CellData")
+      return is_zero("NumberOfVerts") && is_zero("NumberOfLines") && is_zero("NumberOfStrips") &&
+             is_zero("NumberOfPolys");
+    return is_zero("NumberOf" + std::string(part_));
+  }
+
+ private:
+  bool is_zero(std::string_view count) const {
+    return parse_integer(piece_.attribute(count)).value_or(0) == 0;
+  }
+  XmlTag piece_;
+  std::string_view part_;
+};
+
 // The appended data behind their underscore; empty if there are none.
 std::string_view appended_data(std::string_view bytes, bool& base64) {
   const std::size_t open = bytes.find("<AppendedData");
@@ -209,22 +235,25 @@ void require_sane_vtp(std::string_view bytes) {
   const std::string_view appended = appended_data(bytes, base64);
   const double max_count = static_cast<double>(bytes.size()) * static_cast<double>(max_ratio);
   BlockLayout layout;
+  Parts parts;
   std::size_t at = 0;
   while (const std::optional<XmlTag> tag = next_tag(xml, at)) {
     const std::uint64_t number_bytes = require_sane_tag(*tag, max_count);
     if (tag->name == "VTKFile") layout = layout_of(*tag);
+    parts.enter(*tag);
     if (tag->name != "DataArray" || tag->attribute("format") == "ascii") continue;
     if (tag->attribute("format") == "appended") {
       const std::optional<std::int64_t> offset = parse_integer(tag->attribute("offset"));
       require_sane(offset && *offset >= 0 && static_cast<std::uint64_t>(*offset) < appended.size(),
                    *tag, "offset");
       require_sane_block(appended.substr(static_cast<std::size_t>(*offset)), base64, layout,
-                         number_bytes);
+                         number_bytes, parts.is_empty(*tag));
     } else {
       const std::size_t begin = xml.find_first_not_of(" \t\r\n", std::min(at + 1, xml.size()));
       const std::string_view data = xml.substr(std::min(begin, xml.size()));
-      if (!data.starts_with('<'))
-        require_sane_block(data.substr(0, data.find('<')), true, layout, number_bytes);
+      if (!data.starts_with('<') || !parts.is_empty(*tag))
+        require_sane_block(data.substr(0, data.find('<')), true, layout, number_bytes,
+                           parts.is_empty(*tag));
     }
   }
 }

@@ -40,6 +40,9 @@ fs::path folder_of(const fs::path& path) {
 OutputFile::OutputFile(fs::path final_path) : final_path_(std::move(final_path)) {
   if (final_path_.filename().empty() || fs::is_directory(final_path_))
     throw Error("is a folder, not a file", {.file = final_path_.string()});
+  // A device or a pipe would be replaced by a file of its name.
+  if (fs::exists(final_path_) && !fs::is_regular_file(final_path_))
+    throw Error("is not a regular file", {.file = final_path_.string()});
   const fs::path folder = folder_of(final_path_);
   if (!fs::is_directory(folder))
     throw Error("no such folder: " + folder.string(), {.file = final_path_.string()});

@@ -14,7 +14,8 @@ namespace libmap {
 // that wants to write the same output gets an Error.
 class OutputFile {
  public:
-  // Throws Error if the folder does not exist or cannot be written to, or the path is a folder.
+  // Throws Error if the folder does not exist or cannot be written to, or the path is a folder or
+  // anything else that is no regular file.
   explicit OutputFile(std::filesystem::path final_path);
   ~OutputFile();
   OutputFile(OutputFile&&) noexcept;

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
 
@@ -44,11 +45,20 @@ Json to_json_value(const ManifestValue& value) {
   return std::visit([](const auto& held) { return Json(held); }, value);
 }
 
+// JSON has no NaN and no infinity: they are written as null.
+double from_json_number(const Json& json) {
+  return json.is_null() ? std::numeric_limits<double>::quiet_NaN() : json.get<double>();
+}
+
 ManifestValue from_json_value(const Json& json) {
   if (json.is_boolean()) return json.get<bool>();
   if (json.is_number_integer()) return json.get<std::int64_t>();
-  if (json.is_number()) return json.get<double>();
-  if (json.is_array()) return json.get<std::vector<double>>();
+  if (json.is_number() || json.is_null()) return from_json_number(json);
+  if (json.is_array()) {
+    std::vector<double> numbers;
+    for (const Json& number : json) numbers.push_back(from_json_number(number));
+    return numbers;
+  }
   return json.get<std::string>();
 }
 

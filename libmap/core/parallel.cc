@@ -18,7 +18,7 @@ void parallel_for(std::size_t count, std::size_t grain,
   tbb::parallel_for(tbb::blocked_range<std::size_t>(0, chunks, 1),
                     [&](const tbb::blocked_range<std::size_t>& range) {
                       for (std::size_t c = range.begin(); c != range.end(); ++c)
-                        body(c * grain, std::min(count, (c + 1) * grain));
+                        body(c * grain, c * grain + std::min(grain, count - c * grain));
                     });
 }
 

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <type_traits>
 #include <utility>
 #include <vector>
 
@@ -19,13 +20,14 @@ void parallel_for(std::size_t count, std::size_t grain,
 template <typename T, typename Chunk, typename Join>
 T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk& chunk,
                   const Join& join) {
+  static_assert(!std::is_same_v<T, bool>, "threads cannot write to one std::vector<bool>");
   if (grain == 0) grain = 1;
-  const std::size_t chunks = (count + grain - 1) / grain;
+  const std::size_t chunks = count == 0 ? 0 : (count - 1) / grain + 1;
   std::vector<T> parts(chunks, identity);
   parallel_for(chunks, 1, [&](std::size_t first, std::size_t last) {
     for (std::size_t c = first; c < last; ++c) {
       const std::size_t begin = c * grain;
-      parts[c] = chunk(begin, begin + grain < count ? begin + grain : count);
+      parts[c] = chunk(begin, grain < count - begin ? begin + grain : count);
     }
   });
   T result = std::move(identity);

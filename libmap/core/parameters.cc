@@ -151,7 +151,13 @@ std::vector<std::pair<std::string, std::string>> ParameterTable::values() const 
 void ParameterTable::set(std::string_view key, std::string_view value) const {
   const Parameter* parameter = find(key);
   if (Overrides* texts = overrides_of(key); parameter == nullptr && texts != nullptr) {
-    texts->emplace_back(key.substr(key.find('.') + 1), value);
+    const std::string name(key.substr(key.find('.') + 1));
+    for (auto& [known, text] : *texts) {
+      if (known != name) continue;
+      text = value;
+      return;
+    }
+    texts->emplace_back(name, value);
     return;
   }
   if (parameter == nullptr)
@@ -172,8 +178,10 @@ std::string flag_of(std::string_view key) {
 
 void set_from_yaml(const ParameterTable& table, const std::string& text, const std::string& file) {
   try {
-    const YAML::Node root = YAML::Load(text);
-    if (root.IsNull()) return;
+    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
+    if (documents.size() > 1) throw Error("holds more than one YAML document");
+    if (documents.empty() || documents.front().IsNull()) return;
+    const YAML::Node root = documents.front();
     if (!root.IsMap()) throw Error("not a map of keys and values");
     std::set<std::string> seen;
     for (const auto& entry : root) {

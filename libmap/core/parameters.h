@@ -53,7 +53,7 @@ class ParameterTable {
            std::string description);
 
   // Keys "PREFIX.KEY" are collected as text, for a second table that is filled from a file first
-  // ("gripper.opening_angle_deg"); who applies them checks their names.
+  // ("gripper.opening_angle_deg"), the last text of each key; who applies them checks their names.
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }

@@ -126,6 +126,8 @@ std::string to_csv(const Table& table) {
       if (i > 0) text += ',';
       text += quoted_cell(cells[i]);
     }
+    // An empty line would be passed over.
+    if (cells.size() == 1 && cells.front().empty()) text += "\"\"";
     text += '\n';
   };
   add_line(table.columns);

@@ -32,6 +32,11 @@ std::size_t edit_distance(std::string_view a, std::string_view b) {
   return row.back();
 }
 
+// std::from_chars knows no '+'. What follows it may not be a second sign.
+std::string_view without_plus(std::string_view text) {
+  return text.size() > 1 && text[0] == '+' && text[1] != '-' ? text.substr(1) : text;
+}
+
 std::string lower_case(std::string_view text) {
   std::string lower(text);
   // Not std::tolower: it follows the locale.
@@ -55,7 +60,7 @@ std::string_view trim(std::string_view text) {
 
 std::optional<double> parse_double(std::string_view text) {
   text = trim(text);
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  text = without_plus(text);
   // YAML writes .nan and .inf.
   const std::string lower = lower_case(text);
   if (lower == ".nan") return std::numeric_limits<double>::quiet_NaN();
@@ -69,7 +74,7 @@ std::optional<double> parse_double(std::string_view text) {
 
 std::optional<std::int64_t> parse_integer(std::string_view text) {
   text = trim(text);
-  if (!text.empty() && text.front() == '+') text.remove_prefix(1);
+  text = without_plus(text);
   std::int64_t value = 0;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;

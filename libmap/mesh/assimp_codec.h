@@ -1,4 +1,4 @@
-// OBJ, OFF, STL and GLB through assimp, in memory.
+// OBJ, STL and GLB through assimp, in memory.
 #pragma once
 
 #include <string>
@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// `format` is "obj", "off", "stl" or "glb". Equal corners become one vertex. Throws Error (without
+// `format` is "obj", "stl" or "glb". Equal corners become one vertex. Throws Error (without
 // the file's name) with assimp's own reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
 

@@ -58,7 +58,7 @@ TriangleMesh mesh_of_columns(GeometryColumns& content) {
   return mesh;
 }
 
-// What assimp does not tell.
+// What the formats without fields have.
 GeometryFileInfo info_of(const TriangleMesh& mesh, const std::string& format,
                          const std::string& bytes) {
   GeometryFileInfo info;
@@ -69,8 +69,8 @@ GeometryFileInfo info_of(const TriangleMesh& mesh, const std::string& format,
   info.bytes = bytes.size();
   info.points = mesh.vertices.size();
   info.faces = mesh.triangles.size();
-  for (const char* const axis : {"x", "y", "z"})
-    info.fields.push_back({axis, ScalarType::float32, 1});
+  const ScalarType type = format == "off" ? ScalarType::float64 : ScalarType::float32;
+  for (const char* const axis : {"x", "y", "z"}) info.fields.push_back({axis, type, 1});
   return info;
 }
 
@@ -81,7 +81,7 @@ MeshReadResult decode(const std::string& format, const std::shared_ptr<const std
     return {std::move(mesh), std::move(content.info)};
   }
   const std::string name = format.substr(1);
-  TriangleMesh mesh = decode_by_assimp(*bytes, name);
+  TriangleMesh mesh = name == "off" ? read_off(*bytes) : decode_by_assimp(*bytes, name);
   GeometryFileInfo info = info_of(mesh, name, *bytes);
   return {std::move(mesh), std::move(info)};
 }

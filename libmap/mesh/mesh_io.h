@@ -4,7 +4,7 @@
 //   .ply   ply_codec       ply_codec       doubles, normals, colours, vertex and face fields
 //   .vtp   VTK             VTK             doubles, normals, colours, vertex and face fields
 //   .obj   assimp          mesh_text       doubles written, float32 read; normals, colours
-//   .off   assimp          mesh_text       doubles written, float32 read; geometry alone
+//   .off   mesh_text       mesh_text       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
 //   .glb   assimp          assimp          float32; normals, colours
 //
@@ -12,7 +12,7 @@
 // coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp: they write float64
 // where float32 would move some coordinate by more than 1e-5 m.
 //
-// The formats that assimp reads store corners, not vertices: corners equal in every number are made
+// assimp yields corners, not vertices: corners equal in every number are made
 // one vertex again, in the order of their first use, and vertices of no triangle are lost. GLB has
 // y up by its standard, this project z: writing and reading turn it about x.
 #pragma once

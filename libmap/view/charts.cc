@@ -171,7 +171,7 @@ std::string legend_text(const std::string& name) { return " " + name; }
 
 void add_line(vtkChartXY* chart, std::vector<double> x_px, std::vector<double> y_px,
               const ChartCurve& look, const Color& color) {
-  if (x_px.size() == 1) {  // VTK refuses a line of one point, and with it the marker
+  if (x_px.size() == 1) {  // VTK complains of a line with one point
     x_px.push_back(x_px[0]);
     y_px.push_back(y_px[0]);
   }

@@ -13,10 +13,13 @@ namespace {
 constexpr std::size_t spacing_samples = 2000;
 constexpr double least_width_px = 1.3;
 // Poisson-disk samples leave gaps of up to twice their spacing.
-constexpr double square_per_spacing = 1.6;
+constexpr double square_per_spacing = 1.8;
 // Neighbouring cubes overlap by a hair, so that rounding opens no gap between them.
 constexpr double cube_per_spacing = 1.005;
 constexpr double lone_point_size_m = 0.01;
+// A filler closes gaps of one missing cell, and lies behind neighbours two steps further away.
+constexpr double filler_per_spacing = 2.6;
+constexpr double filler_depth_per_size = 2.75;
 
 struct KdTreeSource {
   const std::vector<Eigen::Vector3d>& points;
@@ -40,26 +43,32 @@ double quantile_of(std::vector<double> values, double share) {
   return values[static_cast<std::size_t>(rank)];
 }
 
-// Offsets to the nearest point that stands elsewhere, of points spread over the cloud.
-std::vector<Eigen::Vector3d> nearest_offsets(const std::vector<Eigen::Vector3d>& positions) {
+// What surrounds some points spread over a cloud.
+struct Neighborhoods {
+  std::vector<Eigen::Vector3d> nearest;  // offsets to the nearest point that stands elsewhere
+  std::vector<double> eighth_m;  // distances to the eighth of these; infinite if there are fewer
+};
+
+Neighborhoods look_around(const std::vector<Eigen::Vector3d>& positions) {
   const KdTreeSource source{positions};
   KdTree tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(16));
   tree.buildIndex();
-  std::vector<Eigen::Vector3d> offsets;
+  Neighborhoods result;
   const std::size_t step = std::max<std::size_t>(1, positions.size() / spacing_samples);
   for (std::size_t i = 0; i < positions.size(); i += step) {
-    // Several points may stand in one place.
-    std::array<std::uint32_t, 8> neighbors{};
-    std::array<double, 8> squared{};
+    std::array<std::uint32_t, 12> neighbors{};
+    std::array<double, 12> squared{};
     const std::size_t found =
         tree.knnSearch(positions[i].data(), neighbors.size(), neighbors.data(), squared.data());
-    for (std::size_t k = 0; k < found; ++k) {
-      if (!(squared[k] > 0.0)) continue;
-      offsets.push_back(positions[neighbors[k]] - positions[i]);
-      break;
-    }
+    // Several points may stand in one place.
+    std::size_t first = 0;
+    while (first < found && !(squared[first] > 0.0)) ++first;
+    if (first == found) continue;
+    result.nearest.push_back(positions[neighbors[first]] - positions[i]);
+    result.eighth_m.push_back(first + 7 < found ? std::sqrt(squared[first + 7])
+                                                : std::numeric_limits<double>::infinity());
   }
-  return offsets;
+  return result;
 }
 
 PreparedLayer prepare_cloud(const PointCloud& cloud, const SceneLayer& layer,
@@ -82,6 +91,7 @@ PreparedLayer prepare_cloud(const PointCloud& cloud, const SceneLayer& layer,
     result.point_size_m =
         spacing.distance_m * (result.cubes ? cube_per_spacing : square_per_spacing);
     if (!(result.point_size_m > 0.0)) result.point_size_m = lone_point_size_m;
+    if (spacing.gaps) result.filler_size_m = spacing.distance_m * filler_per_spacing;
   }
   result.positions = std::move(in_terrain.positions);
   result.colors = std::move(colored.colors);
@@ -276,6 +286,14 @@ class TriangleBuilder {
   ColoredTriangles& target_;
 };
 
+// How far behind its point a filler lies, metres.
+double filler_depth_m(const PreparedLayer& layer, const SceneCamera& camera) {
+  const double usual = filler_depth_per_size * layer.point_size_m;
+  if (camera.perspective || camera.forward.z() > -0.999) return usual;
+  const Bounds3d bounds = bounds_of(layer.positions);
+  return bounds.max.z() - bounds.min.z() + usual;
+}
+
 ColoredTriangles mesh_triangles(const PreparedLayer& layer, const SceneCamera& camera,
                                 const Eigen::Vector3d& origin) {
   ColoredTriangles result;
@@ -299,20 +317,23 @@ PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_sc
 
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {
   if (positions.size() < 2) return {};
-  const std::vector<Eigen::Vector3d> offsets = nearest_offsets(positions);
-  if (offsets.empty()) return {};
+  const Neighborhoods around = look_around(positions);
+  if (around.nearest.empty()) return {};
   std::vector<double> distances;
-  for (const Eigen::Vector3d& offset : offsets) distances.push_back(offset.norm());
+  for (const Eigen::Vector3d& offset : around.nearest) distances.push_back(offset.norm());
   // On a lattice some points at least have a neighbour straight beside them.
   const double pitch = quantile_of(distances, 0.1);
   const auto on_lattice = [pitch](const Eigen::Vector3d& offset) {
     const Eigen::Array3d steps = offset.array() / pitch;
     return ((steps - steps.round()).abs() < 0.02).all();
   };
-  const auto regular = std::count_if(offsets.begin(), offsets.end(), on_lattice);
-  if (regular * 20 >= static_cast<std::ptrdiff_t>(19 * offsets.size()))
-    return {.distance_m = pitch, .lattice = true};
-  return {.distance_m = quantile_of(distances, 0.5), .lattice = false};
+  const auto count = static_cast<std::ptrdiff_t>(distances.size());
+  if (std::count_if(around.nearest.begin(), around.nearest.end(), on_lattice) * 20 < 19 * count)
+    return {.distance_m = quantile_of(distances, 0.5), .lattice = false, .gaps = true};
+  // The eight cells around one of a closed surface touch it, at their corners at least.
+  const auto enclosed = [pitch](double eighth_m) { return eighth_m < 1.8 * pitch; };
+  const auto closed = std::count_if(around.eighth_m.begin(), around.eighth_m.end(), enclosed);
+  return {.distance_m = pitch, .lattice = true, .gaps = closed * 100 < 85 * count};
 }
 
 ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
@@ -322,20 +343,27 @@ ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& cam
   result.vertices.reserve(4 * layer.positions.size());
   result.colors.reserve(4 * layer.positions.size());
   TriangleBuilder builder(origin, result);
+  const bool shaded = layer.shaded && !layer.cubes && !layer.normals.empty();
+  const double filler_depth = filler_depth_m(layer, camera);
   for (std::size_t i = 0; i < layer.positions.size(); ++i) {
     const Eigen::Vector3d& center = layer.positions[i];
     const double depth = camera.depth_of(center);
     if (!(depth > 0.0)) continue;
     const double half =
         0.5 * std::max(layer.point_size_m, least_width_px / camera.pixels_per_m(depth));
-    if (layer.cubes) {
-      builder.add_cube(center, half, layer.colors[i], layer.shaded, camera);
-      continue;
-    }
-    const bool shaded = layer.shaded && !layer.normals.empty();
     const Color color =
         shaded ? darkened(layer.colors[i], shade_of(layer.normals[i], camera)) : layer.colors[i];
-    builder.add_quad(center, half * camera.right, half * camera.up, color);
+    if (layer.cubes)
+      builder.add_cube(center, half, color, layer.shaded, camera);
+    else
+      builder.add_quad(center, half * camera.right, half * camera.up, color);
+    if (layer.filler_size_m > 2.0 * half) {
+      const Eigen::Vector3d away =
+          camera.perspective ? (center - camera.position).normalized().eval() : camera.forward;
+      const double filler = layer.filler_size_m / 2.0;
+      builder.add_quad(center + filler_depth * away, filler * camera.right, filler * camera.up,
+                       color);
+    }
   }
   return result;
 }

@@ -20,19 +20,21 @@ struct PreparedLayer {
   std::vector<Triangle> triangles;         // of a mesh
   bool is_mesh = false;
   bool cubes = false;
-  bool shaded = false;        // by the normals; for cubes: by the side
-  double point_size_m = 0.0;  // 0 for a mesh
+  bool shaded = false;         // by the normals; for cubes: by the side
+  double point_size_m = 0.0;   // 0 for a mesh
+  double filler_size_m = 0.0;  // of the squares that close gaps; 0: none
   Legend legend;
 };
 
 // Throws Error: arrays of a wrong length, and what color_points throws.
 PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene);
 
-// How far apart the points lie, in metres (0 if no two are apart): on a lattice along the axes its
-// pitch, else the median distance to the nearest other point.
 struct PointSpacing {
+  // Metres, 0 if no two points are apart: on a lattice along the axes its pitch, else the median
+  // distance to the nearest other point.
   double distance_m = 0.0;
   bool lattice = false;
+  bool gaps = false;  // cells of a surface on the lattice are empty; always where there is none
 };
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);
 
@@ -42,7 +44,10 @@ struct ColoredTriangles {
   std::vector<Triangle> triangles;
 };
 
-// Squares or the visible sides of cubes for a cloud, at least 1.3 pixels wide; a mesh as it is.
+// Squares or the visible sides of cubes for a cloud, at least 1.3 pixels wide; a mesh as it is. The
+// fillers are larger squares behind the points, seen from the camera: what is seen through a gap is
+// the colour of a point beside it. From above they lie below the whole layer, so that every column
+// shows its highest point; in other views they cover only what is far behind.
 ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
                               const Eigen::Vector3d& origin);
 

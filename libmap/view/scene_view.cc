@@ -193,7 +193,8 @@ void aim(const Setup& setup, vtkCamera& target) {
       farthest = std::max(farthest, depth);
     }
   }
-  farthest += 3.0 * setup.radius_m + 0.01 * std::abs(farthest) + 1e-6;
+  // Fillers may lie as far behind the last point as that behind the first.
+  farthest += farthest - nearest + 8.0 * setup.radius_m + 0.01 * std::abs(farthest) + 1e-6;
   nearest = std::max(nearest - 3.0 * setup.radius_m - 0.01 * farthest, 1e-3 * farthest);
   const double distance = std::max(camera.depth_of(setup.center), nearest);
   const Eigen::Vector3d focal_point = position + distance * camera.forward;

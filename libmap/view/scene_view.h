@@ -35,7 +35,7 @@ struct SceneLayer {
   Coloring coloring{};
   PointShape point_shape = PointShape::automatic;
   Shading shading = Shading::automatic;
-  double point_size_m = 0.0;  // side of a cube or square; 0: from the spacing of the points
+  double point_size_m = 0.0;  // side of a cube or square; 0: from the spacing, gaps closed
 };
 
 // What is known of a marked place: green, red, or dark before there is a verdict.
@@ -64,7 +64,7 @@ struct SceneViewOptions {
   bool axes = true;
   bool scale_bar = true;
   bool legend = true;
-  std::string background = "#8f9aa8";  // behind the scene: "#rrggbb" or a name
+  std::string background = "#5f6b7a";  // behind the scene: "#rrggbb" or a name
   // On the page around the scene lie title, legend, axes and scale bar; parts for which a small
   // picture has no room are left out.
 };

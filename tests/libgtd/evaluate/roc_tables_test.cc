@@ -46,7 +46,7 @@ TEST(RocTables, LabelsInAnyUsualWriting) {
 
 TEST(RocTables, DefaultColumnsAreTheNumbersThatAreNeitherIdentityNorPlace) {
   const Table table = parse_csv(
-      "id,hold,i,x,y,z,distance_m,name,graspable,empty,score,mixed,ssv\n"
+      "found,hold,i,x,y,z,distance_m,name,graspable,empty,score,mixed,ssv\n"
       "1,1,1,1,1,1,1,a,1,,0.5,1,20\n2,2,2,2,2,2,2,b,0,,,b,30\n",
       "t.csv");
   EXPECT_THAT(libgtd::default_score_columns(table, "graspable"), ElementsAre("score", "ssv"));

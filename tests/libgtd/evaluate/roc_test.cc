@@ -293,6 +293,10 @@ TEST(Roc, WilsonIntervals) {
   EXPECT_NEAR((Rate{0, 10}.wilson_95()->high), z2 / (10 + z2), 1e-15);
   EXPECT_EQ((Rate{10, 10}.wilson_95()->high), 1.0);
   EXPECT_NEAR((Rate{10, 10}.wilson_95()->low), 10 / (10 + z2), 1e-15);
+  for (std::size_t total = 1; total <= 500; ++total) {
+    EXPECT_EQ((Rate{0, total}.wilson_95()->low), 0.0) << total;
+    EXPECT_EQ((Rate{total, total}.wilson_95()->high), 1.0) << total;
+  }
   EXPECT_FALSE((Rate{0, 0}.wilson_95().has_value()));
 }
 

@@ -1,6 +1,7 @@
 #include <pcl/features/normal_3d.h>
 #include <pcl/features/principal_curvatures.h>
 #include <pcl/point_types.h>
+#include <pcl/search/kdtree.h>
 
 #include <cmath>
 
@@ -11,7 +12,7 @@ namespace {
 
 using graspmap_test::uniform;
 
-// The calls of the author's program, on one thread.
+// PCL's usual calls, with its usual search tree: neighbours come sorted by distance.
 TEST(PclCurvature, ThesisIsPclsOwnPipelineToTheBit) {
   libmap::PointCloud cloud;
   pcl::PointCloud<pcl::PointXYZ>::Ptr points(new pcl::PointCloud<pcl::PointXYZ>);
@@ -21,14 +22,17 @@ TEST(PclCurvature, ThesisIsPclsOwnPipelineToTheBit) {
     const Eigen::Vector3f p = cloud.positions.back().cast<float>();
     points->emplace_back(p.x(), p.y(), p.z());
   }
+  const pcl::search::KdTree<pcl::PointXYZ>::Ptr search(new pcl::search::KdTree<pcl::PointXYZ>);
   pcl::NormalEstimation<pcl::PointXYZ, pcl::Normal> normal_estimation;
   normal_estimation.setInputCloud(points);
+  normal_estimation.setSearchMethod(search);
   normal_estimation.setRadiusSearch(0.09);
   pcl::PointCloud<pcl::Normal>::Ptr normals(new pcl::PointCloud<pcl::Normal>);
   normal_estimation.compute(*normals);
   pcl::PrincipalCurvaturesEstimation<pcl::PointXYZ, pcl::Normal> estimation;
   estimation.setInputCloud(points);
   estimation.setInputNormals(normals);
+  estimation.setSearchMethod(search);
   estimation.setRadiusSearch(0.09);
   pcl::PointCloud<pcl::PrincipalCurvatures> expected;
   estimation.compute(expected);

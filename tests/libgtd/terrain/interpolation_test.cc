@@ -188,6 +188,15 @@ TEST(Interpolation, PitchOfTheProgramTakesTheBoundingBoxAndNoFiveThirds) {
   EXPECT_EQ(result.grid_spacing_m, 1 / 22.3607);  // sqrt(500), four digits
 }
 
+TEST(Interpolation, GridOfTheProgramEndsBeforeTheLargestCoordinate) {
+  PointCloud square;  // 4 points on 16 m^2: a pitch of 2 m
+  square.positions = {{0, 0, 1}, {4, 0, 1}, {0, 4, 1}, {4, 4, 1}};
+  const InterpolationResult result = interpolate(square, method(InterpolationMethod::thesis));
+  EXPECT_EQ(result.grid_spacing_m, 2);
+  EXPECT_THAT(result.cloud.positions, testing::ElementsAre(Vector3d(0, 0, 1), Vector3d(0, 2, 1),
+                                                           Vector3d(2, 0, 1), Vector3d(2, 2, 1)));
+}
+
 TEST(Interpolation, HeightZeroIsDroppedByTheThesisAlone) {
   const PointCloud flat = random_cloud(200, [](double, double) { return 0.0; });
   const InterpolationResult thesis = interpolate(flat, method(InterpolationMethod::thesis));

@@ -157,6 +157,18 @@ TEST(RegressionPlane, AFarOriginDoesNoHarm) {
     ASSERT_LT((at_near.positions[i] - at_far.positions[i]).norm(), 1e-7);
 }
 
+TEST(RegressionPlane, TheCentroidIsRightToTheLastBits) {
+  PointCloud cloud;
+  for (int i = 0; i < 50000; ++i) {
+    const Vector3d d(uniform(-1, 1), uniform(-1, 1), 0);
+    cloud.positions.push_back(Vector3d(1e9 + 0.3, 0.3, 0) + d);
+    cloud.positions.push_back(Vector3d(1e9 + 0.3, 0.3, 0) - d);
+  }
+  const RegressionPlane plane = fit_regression_plane(cloud);
+  EXPECT_NEAR(plane.centroid.x(), 1e9 + 0.3, 2.5e-7);  // two steps of a double there
+  EXPECT_NEAR(plane.centroid.y(), 0.3, 1e-14);
+}
+
 TEST(RegressionPlane, TinyAndHugeClouds) {
   for (const double scale : {1e-9, 1e9, 1e120}) {
     PointCloud cloud = bumpy_ground(100);

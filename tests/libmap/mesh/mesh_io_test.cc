@@ -45,7 +45,7 @@ const Format formats[] = {
     {".vtp", FileEncoding::binary, false, "vtp_binary", true, true, true, true},
     {".vtp", FileEncoding::binary_compressed, false, "vtp_compressed", true, true, true, true},
     {".obj", FileEncoding::ascii, false, "obj", true, true, false, false},
-    {".off", FileEncoding::ascii, false, "off", false, false, false, false},
+    {".off", FileEncoding::ascii, false, "off", false, false, false, true},
     {".stl", FileEncoding::binary, false, "stl_binary", false, false, false, false},
     {".stl", FileEncoding::ascii, false, "stl_ascii", false, false, false, false},
     {".glb", FileEncoding::binary, false, "glb", true, true, false, false}};
@@ -206,7 +206,7 @@ TEST_P(MeshFormat, SameBytesTwiceAndUnderAnyLocale) {
 TEST_P(MeshFormat, DamageIsAnErrorAndNeverACrash) {
   const std::string bytes = read_text(write_sample(GetParam(), sheet(3)));
   graspmap_test::expect_no_crash(
-      bytes, [&](const std::string& damaged) { read_as(GetParam().extension, damaged); }, 400);
+      bytes, [&](const std::string& damaged) { read_as(GetParam().extension, damaged); }, 250);
 }
 
 TEST_P(MeshFormat, FilesThatAreNone) {
@@ -282,6 +282,22 @@ TEST(MeshFiles, ObjWithQuadsAndGroups) {
   EXPECT_EQ(read.mesh.triangles.size(), 3U);
   EXPECT_EQ(read.mesh.vertices.size(), 7U);
   EXPECT_NEAR(surface_area(read.mesh), 1.5, 1e-12);
+}
+
+TEST(MeshFiles, OffOfOtherPrograms) {
+  const MeshReadResult read =
+      read_as(".off",
+              "COFF 5 2 0 # counts\n# vertices\n0 0 0 255 0 0 255\n1 0 0 0 0 0 0\n1 1 0 0 0 0 0\n\n"
+              "0 1 0 1 1 1 1\n.5 2 1e-3 9 9 9 9\n4 0 1 2 3  10 20 30\n3 3 2 4\n");
+  EXPECT_EQ(read.mesh.triangles, (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}, {3, 2, 4}}));
+  EXPECT_EQ(read.mesh.vertices[4], Eigen::Vector3d(0.5, 2, 1e-3));
+  for (const char* const text :
+       {"OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 3\n", "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1\n",
+        "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1 0\n2 0 1\n", "OFF\n3 1 0\n0 0 0\n1 0\n0 1 0\n3 0 1 2\n",
+        "OFF\n3 1 0\n0 0 0\n1 0 0\n0 nan 0\n3 0 1 2\n",
+        "OFF\n3 2 0\n0 0 0\n1 0 0\n0 1 0\n3 0 1 2\n", "OFF\n4000000000 1 0\n0 0 0\n",
+        "OFF\n3 4000000000 0\n0 0 0\n", "OFF\n", "OFF BINARY\n"})
+    error_as(".off", text);
 }
 
 TEST(MeshFiles, NoTriangleIsAnError) {

@@ -23,6 +23,11 @@ TEST(PointSpacing, KnowsALattice) {
   const PointSpacing spacing = estimate_spacing(lattice(30, 0.01));
   EXPECT_TRUE(spacing.lattice);
   EXPECT_NEAR(spacing.distance_m, 0.01, 1e-12);
+  EXPECT_FALSE(spacing.gaps);
+  std::vector<Eigen::Vector3d> holes = lattice(30, 0.01);
+  std::erase_if(holes, [](const Eigen::Vector3d&) { return uniform(0, 1) < 0.35; });
+  EXPECT_TRUE(estimate_spacing(holes).lattice);
+  EXPECT_TRUE(estimate_spacing(holes).gaps);
   std::vector<Eigen::Vector3d> random;
   for (int i = 0; i < 2000; ++i) random.emplace_back(uniform(0, 1), uniform(0, 1), 0.0);
   EXPECT_FALSE(estimate_spacing(random).lattice);

@@ -19,7 +19,7 @@ using graspmap_test::error_of;
 using graspmap_test::uniform;
 using ::testing::HasSubstr;
 
-constexpr Color background{143, 154, 168};
+constexpr Color background{95, 107, 122};
 constexpr Color red{255, 0, 0};
 constexpr Color green{0, 255, 0};
 constexpr Color blue{0, 0, 255};
@@ -173,6 +173,36 @@ TEST_F(SceneViewTest, ALatticeIsDrawnWithoutGaps) {
   for (int y = static_cast<int>(low.y()); y < static_cast<int>(high.y()); ++y)
     for (int x = static_cast<int>(low.x()); x < static_cast<int>(high.x()); ++x)
       ASSERT_EQ(image.at(x, y), red) << x << ", " << y;
+}
+
+// A map of a sparse cloud has empty cells: they take a neighbour's colour, and cover no neighbour.
+TEST_F(SceneViewTest, EmptyCellsOfAMapAreClosed) {
+  Scene scene;
+  PointCloud cloud;
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 60; ++j)
+      if ((3 * i + 5 * j) % 7 > 1) {
+        const bool high = (i / 8 + j / 8) % 2 == 0;  // by a cliff
+        cloud.positions.emplace_back(0.01 * i, 0.01 * j, high ? 0.2 : 0.0);
+        cloud.colors.push_back(high ? red : green);
+      }
+  SceneLayer layer;
+  layer.shape = cloud;
+  layer.coloring.mode = ColorMode::own;
+  scene.layers.push_back(layer);
+  const SceneViewOptions options = bare(600, 600);
+  const Image image = render_scene(scene, options);
+  const SceneCamera camera = camera_of(scene, options);
+  for (std::size_t i = 0; i < cloud.size(); ++i)
+    for (const double offset : {-0.0035, 0.0035})
+      EXPECT_EQ(color_at(image, camera.pixel_of(cloud.positions[i] +
+                                                Eigen::Vector3d(offset, offset, 0.0))),
+                cloud.colors[i]);
+  const Eigen::Vector2d low = camera.pixel_of({0.02, 0.57, 0});
+  const Eigen::Vector2d high = camera.pixel_of({0.57, 0.02, 0});
+  for (int y = static_cast<int>(low.y()); y < static_cast<int>(high.y()); ++y)
+    for (int x = static_cast<int>(low.x()); x < static_cast<int>(high.x()); ++x)
+      ASSERT_NE(image.at(x, y), background) << x << ", " << y;
 }
 
 TEST_F(SceneViewTest, AMeshIsFilledAndShadedUnlessToldNotTo) {

@@ -1,0 +1,141 @@
+#include "libgtd/detect.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/libgtd/score/score_test_support.h"
+
+namespace libgtd {
+namespace {
+
+using graspmap_test::bumpy_cloud;
+using graspmap_test::error_of;
+using graspmap_test::gripper_named;
+using libmap::PointCloud;
+
+DetectionOptions options_for(Method method) {
+  DetectionOptions options;
+  options.scenario.method = method;
+  options.gripper = gripper_named("scar-e");
+  return options;
+}
+
+class Detection : public testing::TestWithParam<Method> {};
+
+INSTANTIATE_TEST_SUITE_P(All, Detection,
+                         testing::Values(Method::thesis, Method::envelope, Method::climblab,
+                                         Method::corrected),
+                         [](const auto& given) { return name_of(given.param); });
+
+TEST_P(Detection, SharesYieldTheVoxelsOfTheWholeMap) {
+  const PointCloud cloud = bumpy_cloud(0.8, 0.009);
+  DetectionOptions options = options_for(GetParam());
+  options.scenario.tile_size_m = 0.25;
+  const auto whole = detect(cloud, options);
+  ASSERT_GT(whole.map.voxels.size(), 1000U);
+  std::size_t at = 0;
+  std::vector<PointCloud> parts;
+  for (int number = 1; number <= 3; ++number) {
+    options.share = {number, 3};
+    const auto part = detect(cloud, options);
+    at += part.map.voxels.size();
+    parts.push_back(to_cloud(part.map, MapFrame::terrain));
+  }
+  EXPECT_EQ(at, whole.map.voxels.size());
+  const PointCloud merged = merge_map_clouds(parts);
+  const PointCloud expected = to_cloud(whole.map, MapFrame::terrain);
+  EXPECT_EQ(merged.positions, expected.positions);
+  EXPECT_EQ(merged.colors, expected.colors);
+  EXPECT_EQ(merged.fields, expected.fields);
+}
+
+TEST_P(Detection, TileSizeChangesNothing) {
+  const PointCloud cloud = bumpy_cloud(0.7, 0.009);
+  DetectionOptions options = options_for(GetParam());
+  options.scenario.interpolation = true;
+  const auto fields_with = [&](double tile_size_m) {
+    options.scenario.tile_size_m = tile_size_m;
+    return to_cloud(detect(cloud, options).map, MapFrame::input).fields;
+  };
+  const auto expected = fields_with(10.0);
+  EXPECT_EQ(fields_with(0.05), expected);
+  EXPECT_EQ(fields_with(0.31), expected);
+}
+
+TEST_P(Detection, MapReturnsIntoTheInputFrame) {
+  const libmap::Pose tilted = libmap::make_pose_from_rpy({0.3, 0.2, 1.5}, {20.0, -10.0, 40.0});
+  const PointCloud cloud = libmap::transform_cloud(bumpy_cloud(0.6, 0.01), tilted);
+  DetectionOptions options = options_for(GetParam());
+  options.up = tilted.linear().col(2);
+  const auto result = detect(cloud, options);
+  const PointCloud map = to_cloud(result.map, MapFrame::input);
+  ASSERT_FALSE(map.empty());
+  // Each voxel's centre lies within a voxel's diagonal of a point of the cloud; the thinning of
+  // `thesis` and its second lattice move it by another voxel.
+  const bool thins = GetParam() == Method::thesis || GetParam() == Method::envelope;
+  const double reach = thins ? 0.03 : 0.00867;
+  for (std::size_t n = 0; n < map.size(); n += 7) {
+    double nearest = 1.0;
+    for (const Eigen::Vector3d& point : cloud.positions)
+      nearest = std::min(nearest, (point - map.positions[n]).norm());
+    EXPECT_LE(nearest, reach);
+  }
+}
+
+TEST(DetectionErrors, NameTheField) {
+  const PointCloud cloud = bumpy_cloud(0.4, 0.01);
+  DetectionOptions options = options_for(Method::corrected);
+  error_of([&] { detect(PointCloud(), options); });
+  options.scenario.voxel_size_m = 10.0;
+  EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "voxel_size_m");
+  options.scenario.voxel_size_m = 0.0;
+  EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "voxel_size_m");
+  options = options_for(Method::corrected);
+  options.scenario.tile_size_m = -1.0;
+  EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "tile_size_m");
+  options = options_for(Method::corrected);
+  options.gripper.closing_angle_deg = options.gripper.opening_angle_deg;
+  EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "closing_angle_deg");
+}
+
+TEST(DetectionErrors, WindowThatDoesNotFitIntoMemorySaysHowMuch) {
+  PointCloud cloud = bumpy_cloud(0.4, 0.01);
+  cloud.positions.emplace_back(0.0, 0.0, 900.0);
+  DetectionOptions options = options_for(Method::corrected);
+  options.plane = PlaneSource::none;
+  options.scenario.voxel_size_m = 0.0004;
+  const libmap::Error error = error_of([&] { detect(cloud, options); });
+  EXPECT_EQ(error.context().field, "voxel_size_m");
+  EXPECT_NE(std::string(error.what()).find("GiB"), std::string::npos) << error.what();
+}
+
+TEST(Detection, OnePointInItsFrameIsOneVoxel) {
+  PointCloud cloud;
+  cloud.positions = {{0.3, 0.2, 0.1}};
+  DetectionOptions options = options_for(Method::corrected);
+  options.plane = PlaneSource::none;
+  const auto result = detect(cloud, options);
+  ASSERT_EQ(result.map.voxels.size(), 1U);
+  EXPECT_EQ(result.map.voxels[0].counts.ssv, 1U);
+  EXPECT_TRUE(result.map.voxels[0].edge);
+}
+
+TEST(Detection, WhatLiesBelowTheZeroPlaneIsScoredButNoTarget) {
+  DetectionOptions options = options_for(Method::corrected);
+  options.plane = PlaneSource::none;
+  options.scenario.curvature_radius_m = 0.0;
+  options.scenario.graspability_threshold = 0.0;
+  options.scenario.zero_plane_m = 0.01;
+  const auto result = detect(bumpy_cloud(0.5, 0.008), options);
+  std::size_t below = 0;
+  for (const MapVoxel& one : result.map.voxels) {
+    const bool is_below = result.map.lattice.center_of(one.voxel).z() < 0.01;
+    EXPECT_EQ(one.graspable, !is_below);
+    below += is_below && one.score > 0.0 ? 1 : 0;
+  }
+  EXPECT_GT(below, 100U);
+}
+
+}  // namespace
+}  // namespace libgtd

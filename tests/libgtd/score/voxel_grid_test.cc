@@ -1,0 +1,92 @@
+#include "libgtd/terrain/voxel_grid.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "tests/libgtd/score/score_test_support.h"
+
+namespace {
+
+using graspmap_test::uniform;
+using libgtd::Voxel;
+using libgtd::VoxelGrid;
+using libgtd::VoxelLattice;
+
+TEST(VoxelLattice, CentersComeBackToTheirVoxel) {
+  for (int round = 0; round < 1000; ++round) {
+    const VoxelLattice lattice{{uniform(-5, 5), uniform(-5, 5), uniform(-5, 5)},
+                               uniform(0.0005, 0.3)};
+    const Voxel voxel{static_cast<int>(uniform(-3000, 3000)),
+                      static_cast<int>(uniform(-3000, 3000)),
+                      static_cast<int>(uniform(-3000, 3000))};
+    EXPECT_EQ(lattice.voxel_of(lattice.center_of(voxel)), voxel);
+  }
+}
+
+TEST(VoxelLattice, PointsLieWithinHalfAVoxelOfTheirCenter) {
+  for (int round = 0; round < 1000; ++round) {
+    const VoxelLattice lattice{{0, 0, 0}, 0.01};
+    const Eigen::Vector3d point(uniform(-9, 9), uniform(-9, 9), uniform(-9, 9));
+    const Eigen::Vector3d off = point - lattice.center_of(lattice.voxel_of(point));
+    EXPECT_LE(off.cwiseAbs().maxCoeff(), 0.005 + 1e-12);
+  }
+}
+
+TEST(FloorDivide, RoundsDown) {
+  for (int dividend = -20; dividend <= 20; ++dividend)
+    for (const int divisor : {1, 3, 7})
+      EXPECT_EQ(libgtd::floor_divide(dividend, divisor),
+                static_cast<int>(std::floor(static_cast<double>(dividend) / divisor)));
+}
+
+// Fault 5 of the author's program: two lattices that are not aligned lose voxels.
+TEST(Voxelize, KeepsEveryPointsVoxelWhateverElseIsThere) {
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 3000; ++n)
+    points.emplace_back(uniform(-1, 1), uniform(-1, 1), uniform(-0.2, 0.2));
+  const VoxelGrid whole = libgtd::voxelize(points, 0.01);
+  const VoxelGrid half = libgtd::voxelize({points.begin(), points.begin() + 1500}, 0.01);
+  for (const Voxel& voxel : half.voxels)
+    EXPECT_TRUE(std::binary_search(whole.voxels.begin(), whole.voxels.end(), voxel));
+  for (const Eigen::Vector3d& point : points)
+    EXPECT_TRUE(std::binary_search(whole.voxels.begin(), whole.voxels.end(),
+                                   whole.lattice.voxel_of(point)));
+}
+
+TEST(Voxelize, DoesNotDependOnTheOrderOfPoints) {
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 2000; ++n)
+    points.emplace_back(uniform(-0.3, 0.3), uniform(-0.3, 0.3), uniform(-0.1, 0.1));
+  const auto voxels = libgtd::voxelize(points, 0.02).voxels;
+  std::shuffle(points.begin(), points.end(), graspmap_test::random_engine());
+  EXPECT_EQ(libgtd::voxelize(points, 0.02).voxels, voxels);
+}
+
+TEST(Voxelize, BadSizesAreErrorsThatSayHowMuchMemory) {
+  const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {3, 3, 0.7}};
+  for (const double size : {0.0, -0.01, std::numeric_limits<double>::quiet_NaN(),
+                            std::numeric_limits<double>::infinity()}) {
+    const libmap::Error error = graspmap_test::error_of([&] { libgtd::voxelize(points, size); });
+    EXPECT_EQ(error.context().field, "voxel_size_m");
+  }
+  const libmap::Error error = graspmap_test::error_of([&] { libgtd::voxelize(points, 1e-9); });
+  EXPECT_NE(std::string(error.what()).find("GiB"), std::string::npos) << error.what();
+}
+
+TEST(Thinning, AveragesThePointsOfACell) {
+  const std::vector<Eigen::Vector3f> points = {
+      {0.001F, 0.001F, 0.001F}, {0.003F, 0.005F, 0.001F}, {0.015F, 0.001F, 0.001F}};
+  const auto centroids = libgtd::thin_to_centroids(points, 0.01);
+  ASSERT_EQ(centroids.size(), 2U);
+  EXPECT_FLOAT_EQ(centroids[0].x(), 0.002F);
+  EXPECT_FLOAT_EQ(centroids[0].y(), 0.003F);
+  EXPECT_EQ(centroids[1], points[2]);
+}
+
+TEST(Voxelize, OfNothingIsNothing) {
+  EXPECT_TRUE(libgtd::voxelize({}, 0.01).voxels.empty());
+  EXPECT_TRUE(libgtd::voxelize_thesis({}, 0.01).voxels.empty());
+}
+
+}  // namespace

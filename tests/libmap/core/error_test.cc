@@ -1,0 +1,50 @@
+#include "libmap/core/error.h"
+
+#include <gtest/gtest.h>
+
+#include <type_traits>
+
+namespace {
+
+using libmap::Error;
+using libmap::ErrorKind;
+
+TEST(ErrorTest, SaysFileFieldValueReasonAndBound) {
+  const Error error("out of range",
+                    {.file = "a.yaml", .field = "size_m", .value = "0", .bound = "> 0"});
+  EXPECT_STREQ(error.what(), "a.yaml: size_m is 0: out of range (must be > 0)");
+  EXPECT_EQ(error.reason(), "out of range");
+  EXPECT_EQ(error.context().file, "a.yaml");
+  EXPECT_EQ(error.context().field, "size_m");
+  EXPECT_EQ(error.context().value, "0");
+  EXPECT_EQ(error.context().bound, "> 0");
+  EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+}
+
+TEST(ErrorTest, LeavesOutWhatIsEmpty) {
+  EXPECT_STREQ(Error("broken").what(), "broken");
+  EXPECT_STREQ(Error("no such file", {.file = "a.pcd"}).what(), "a.pcd: no such file");
+  EXPECT_STREQ(Error("missing", {.field = "name"}).what(), "name: missing");
+  EXPECT_STREQ(Error("unknown", {.value = "x"}).what(), "'x': unknown");
+  EXPECT_STREQ(Error("too large", {.bound = "< 3"}).what(), "too large (must be < 3)");
+}
+
+TEST(ErrorTest, IsAStandardException) {
+  static_assert(std::is_base_of_v<std::runtime_error, Error>);
+  try {
+    throw Error("full", {}, ErrorKind::failed);
+  } catch (const std::exception& caught) {
+    EXPECT_STREQ(caught.what(), "full");
+  }
+}
+
+TEST(ErrorTest, InFileNamesAFileOnce) {
+  const Error error("missing", {.field = "x"}, ErrorKind::failed);
+  const Error named = error.in_file("points.csv");
+  EXPECT_STREQ(named.what(), "points.csv: x: missing");
+  EXPECT_EQ(named.kind(), ErrorKind::failed);
+  EXPECT_STREQ(named.in_file("other.csv").what(), "points.csv: x: missing");
+  EXPECT_STREQ(error.what(), "x: missing") << "the original stays as it was";
+}
+
+}  // namespace

@@ -1,0 +1,156 @@
+#include "libmap/core/parameters.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/support/test_support.h"
+
+namespace {
+
+using graspmap_test::error_of;
+using libmap::ParameterTable;
+using libmap::Range;
+
+enum class Shape { round, square };
+
+struct Options {
+  double size_m = 0.01;
+  double height_m = -1.5;
+  int layers = 1;
+  std::uint64_t seed = 3;
+  bool fill = false;
+  std::string name = "default";
+  Shape shape = Shape::square;
+  std::vector<std::pair<std::string, std::string>> overrides;
+
+  void bind(ParameterTable& table) {
+    table.add("size_m", size_m, libmap::positive, "edge, m");
+    table.add("height_m", height_m, libmap::any_number, "height, m");
+    table.add("layers", layers, {0, 10}, "layers");
+    table.add("seed", seed, libmap::any_number, "seed");
+    table.add("fill", fill, "fill gaps");
+    table.add("name", name, "a name");
+    table.add("shape", shape, {{"round", Shape::round}, {"square", Shape::square}}, "the shape");
+    table.add_overrides("gripper", overrides);
+  }
+};
+
+class ParametersTest : public testing::Test {
+ protected:
+  ParametersTest() { options.bind(table); }
+  std::string message(const std::string& key, const std::string& value) {
+    return error_of([&] { table.set(key, value); }).what();
+  }
+  Options options;
+  ParameterTable table;
+};
+
+TEST_F(ParametersTest, GetsAndSetsTheFields) {
+  EXPECT_EQ(table.find("size_m")->get(), "0.01");
+  EXPECT_EQ(table.find("shape")->get(), "square");
+  EXPECT_EQ(table.find("fill")->get(), "false");
+  table.set("size_m", "0.25");
+  table.set("height_m", " -3e-2 ");
+  table.set("layers", "10");
+  table.set("seed", "9000000000000000000");
+  table.set("fill", "yes");
+  table.set("name", " a: b # c ");
+  table.set("shape", "round");
+  EXPECT_EQ(options.size_m, 0.25);
+  EXPECT_EQ(options.height_m, -0.03);
+  EXPECT_EQ(options.layers, 10);
+  EXPECT_EQ(options.seed, 9000000000000000000U);
+  EXPECT_TRUE(options.fill);
+  EXPECT_EQ(options.name, " a: b # c ");
+  EXPECT_EQ(options.shape, Shape::round);
+}
+
+TEST_F(ParametersTest, ErrorsNameKeyValueAndBound) {
+  EXPECT_EQ(message("size_m", "0"), "size_m is 0: out of range (must be > 0)");
+  EXPECT_EQ(message("size_m", "-1"), "size_m is -1: out of range (must be > 0)");
+  EXPECT_EQ(message("size_m", "wide"), "size_m is wide: not a number (must be > 0)");
+  EXPECT_EQ(message("size_m", "0,01"), "size_m is 0,01: not a number (must be > 0)");
+  EXPECT_EQ(message("height_m", "nan"), "height_m is nan: out of range (must be a finite number)");
+  EXPECT_EQ(message("height_m", "inf"), "height_m is inf: out of range (must be a finite number)");
+  EXPECT_EQ(message("layers", "11"), "layers is 11: out of range (must be >= 0 and <= 10)");
+  EXPECT_EQ(message("layers", "1.5"),
+            "layers is 1.5: not a whole number (must be >= 0 and <= 10)");
+  EXPECT_EQ(message("seed", "-1"), "seed is -1: out of range (must be >= 0)");
+  EXPECT_EQ(message("fill", "maybe"), "fill is maybe: not a switch (must be true or false)");
+  EXPECT_EQ(message("shape", "rond"),
+            "shape is rond: unknown name (did you mean 'round'?) (must be one of round square)");
+  EXPECT_EQ(message("sise_m", "1"), "sise_m: unknown key (did you mean 'size_m'?)");
+  EXPECT_EQ(options.size_m, 0.01) << "a refused value changes nothing";
+  EXPECT_EQ(options.layers, 1);
+  EXPECT_EQ(options.shape, Shape::square);
+}
+
+TEST(ParameterRange, IntegerThatDoesNotFitIsRefused) {
+  int field = 1;
+  ParameterTable table;
+  table.add("n", field, libmap::any_number, "");
+  for (const char* text : {"2147483648", "-2147483649", "9223372036854775807"})
+    error_of([&] { table.set("n", text); });
+  EXPECT_EQ(field, 1);
+  table.set("n", "-2147483648");
+  EXPECT_EQ(field, -2147483647 - 1);
+}
+
+TEST(ParameterRange, OpenEndsExcludeTheirValue) {
+  double field = 0.5;
+  ParameterTable table;
+  table.add("open", field, Range{0, 90, true, true}, "");
+  table.add("closed", field, libmap::zero_to_one, "");
+  error_of([&] { table.set("open", "0"); });
+  error_of([&] { table.set("open", "90"); });
+  table.set("open", "89.9");
+  table.set("closed", "0");
+  table.set("closed", "1");
+  error_of([&] { table.set("closed", "1.0000001"); });
+}
+
+TEST(ParameterRange, Descriptions) {
+  EXPECT_EQ(libmap::describe(libmap::positive), "> 0");
+  EXPECT_EQ(libmap::describe(libmap::not_negative), ">= 0");
+  EXPECT_EQ(libmap::describe(libmap::zero_to_one), ">= 0 and <= 1");
+  EXPECT_EQ(libmap::describe(libmap::any_number), "a finite number");
+  EXPECT_EQ(libmap::describe({0, 90, true, true}), "> 0 and < 90");
+}
+
+TEST_F(ParametersTest, KeysStandInTheirOrder) {
+  EXPECT_EQ(table.keys(), (std::vector<std::string>{"size_m", "height_m", "layers", "seed", "fill",
+                                                    "name", "shape"}));
+  EXPECT_EQ(table.find("shape")->choices, (std::vector<std::string>{"round", "square"}));
+  EXPECT_EQ(table.find("none"), nullptr);
+}
+
+TEST_F(ParametersTest, OverridesAreKeptAsText) {
+  EXPECT_TRUE(table.knows("gripper.angle_deg"));
+  EXPECT_FALSE(table.knows("gripper."));
+  EXPECT_FALSE(table.knows("gripper"));
+  EXPECT_FALSE(table.knows("griper.angle_deg"));
+  table.set("gripper.angle_deg", "80");
+  ASSERT_EQ(options.overrides.size(), 1U);
+  EXPECT_EQ(options.overrides[0], (std::pair<std::string, std::string>{"angle_deg", "80"}));
+  EXPECT_EQ(table.values().back(),
+            (std::pair<std::string, std::string>{"gripper.angle_deg", "80"}));
+}
+
+TEST_F(ParametersTest, TheLastOverrideOfAKeyHolds) {
+  table.set("gripper.angle_deg", "70");
+  table.set("gripper.name", "x");
+  table.set("gripper.angle_deg", "80");
+  EXPECT_EQ(options.overrides, (std::vector<std::pair<std::string, std::string>>{
+                                   {"angle_deg", "80"}, {"name", "x"}}));
+}
+
+TEST(ParameterFlags, UnitsAreLeftOut) {
+  EXPECT_EQ(libmap::flag_of("voxel_size_m"), "--voxel-size");
+  EXPECT_EQ(libmap::flag_of("palm_diameter_mm"), "--palm-diameter");
+  EXPECT_EQ(libmap::flag_of("opening_angle_deg"), "--opening-angle");
+  EXPECT_EQ(libmap::flag_of("width_px"), "--width");
+  EXPECT_EQ(libmap::flag_of("delay_s"), "--delay");
+  EXPECT_EQ(libmap::flag_of("extra_void_layers"), "--extra-void-layers");
+  EXPECT_EQ(libmap::flag_of("max"), "--max");
+}
+
+}  // namespace

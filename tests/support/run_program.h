@@ -1,0 +1,27 @@
+// Programs of this project run as a user runs them: as processes of their own.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+namespace graspmap_test {
+
+struct ProgramResult {
+  int exit_code = -1;  // 128 + the signal's number if a signal ended it
+  std::string standard_output;
+  std::string standard_error;
+};
+
+struct ProgramSurroundings {
+  std::filesystem::path folder{};                       // to run in; empty: this process's own
+  std::map<std::string, std::string> environment = {};  // added to this process's own
+};
+
+// Runs words[0] with the other words as its arguments, nothing on its standard input, and waits for
+// its end. Throws std::runtime_error if it cannot be started.
+ProgramResult run_program(const std::vector<std::string>& words,
+                          const ProgramSurroundings& surroundings = {});
+
+}  // namespace graspmap_test
