@@ -3,6 +3,7 @@
 
 #include <cmath>
 #include <string>
+#include <utility>
 
 #include "libgtd/evaluate/lookup.h"
 #include "libmap/cloud/cloud_io.h"
@@ -25,8 +26,9 @@ struct LookupCommandOptions {
 };
 
 // Appends a column; one that the points already have (a verdict named "graspable") keeps its name.
-void add_column(libmap::Table& table, const std::string& name) {
-  table.columns.push_back(table.find_column(name) ? "map_" + name : name);
+void add_column(libmap::Table& table, std::string name) {
+  while (table.find_column(name)) name = "map_" + name;
+  table.columns.push_back(std::move(name));
 }
 
 libmap::Table answer_table(libmap::Table table, const libmap::PointCloud& map,

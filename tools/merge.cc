@@ -1,6 +1,8 @@
 // graspmap merge: the tiles of a map into one map.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -26,18 +28,30 @@ libmap::Manifest manifest_of(const std::string& tile) {
   return *manifest;
 }
 
+// The first parameter of `one` that `other` does not have with the same value.
+std::optional<std::string> differing_parameter(const libmap::Manifest& one,
+                                               const libmap::Manifest& other) {
+  for (const auto& [key, value] : one.parameters) {
+    if (key == "tile") continue;
+    const libmap::ManifestValue* found = other.find_parameter(key);
+    if (found == nullptr || *found != value) return key;
+  }
+  return std::nullopt;
+}
+
 // What all shares of one map have in common.
 void require_same_map(const libmap::Manifest& first, const libmap::Manifest& other,
                       const std::string& first_name, const std::string& name) {
-  for (const auto& [key, value] : first.parameters) {
-    if (key == "tile") continue;
-    const libmap::ManifestValue* found = other.find_parameter(key);
-    if (found == nullptr || *found != value)
-      throw libmap::Error("differs from that of " + first_name, {.file = name, .field = key});
-  }
-  const bool same_input = !first.inputs.empty() && !other.inputs.empty() &&
-                          first.inputs.front().sha256 == other.inputs.front().sha256;
-  if (!same_input) throw libmap::Error("was scored from another terrain", {.file = name});
+  std::optional<std::string> key = differing_parameter(first, other);
+  if (!key) key = differing_parameter(other, first);  // one that only the other has
+  if (key) throw libmap::Error("differs from that of " + first_name, {.file = name, .field = *key});
+  // The terrain and the gripper file.
+  const auto same = [](const libmap::ManifestInput& a, const libmap::ManifestInput& b) {
+    return a.sha256 == b.sha256;
+  };
+  if (first.inputs.empty() || !std::equal(first.inputs.begin(), first.inputs.end(),
+                                          other.inputs.begin(), other.inputs.end(), same))
+    throw libmap::Error("was scored from other inputs than " + first_name, {.file = name});
 }
 
 // The shares K/N of the parts are 1 to N, each once.
@@ -78,6 +92,7 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
 }
 
 void merge(const MergeOptions& options, Run& run) {
+  libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   std::vector<libmap::Manifest> manifests;
   for (const std::string& tile : options.tiles) {

@@ -67,6 +67,10 @@ void Run::claim_output(const fs::path& path) {
   if (fs::exists(path) && !options_.force && !written_by_this_toolkit(path))
     throw libmap::Error("exists and was not written by graspmap: --force overwrites it",
                         {.file = path.string()});
+  const fs::path manifest = libmap::manifest_path(path);
+  if (fs::exists(manifest) && !options_.force && !written_by_this_toolkit(path))
+    throw libmap::Error("exists and is no manifest of graspmap: --force overwrites it",
+                        {.file = manifest.string()});
   // Made and dropped at once: a folder that is missing or read-only is found before the work.
   if (!options_.dry_run) const libmap::OutputFile probe(path);
 }
@@ -77,7 +81,15 @@ void Run::write_manifest(const fs::path& output) {
 
 void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
   libmap::OutputFile output(path);
-  timed("write", [&] { writer(output.temporary_path()); });
+  try {
+    timed("write", [&] { writer(output.temporary_path()); });
+  } catch (const libmap::Error& error) {
+    if (error.context().file != output.temporary_path().string()) throw;
+    // The user knows the output by its own name.
+    libmap::ErrorContext context = error.context();
+    context.file = path.string();
+    throw libmap::Error(error.reason(), context, error.kind());
+  }
   // The manifest goes first: an output without one would not be recognised as ours, and `make`
   // judges by the output, which is then still the old one.
   write_manifest(path);

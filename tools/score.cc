@@ -101,18 +101,21 @@ void score(ScoreOptions& options, Run& run) {
   scenario.check();
   const auto gripper_file = graspmap_tools::find_data_file("grippers", scenario.gripper);
   options.detection.gripper = libgtd::read_gripper(gripper_file, scenario.gripper_overrides);
+  // Before any work: a voxel size that does not suit the gripper shows here.
+  libgtd::make_gripper_mask(options.detection.gripper,
+                            {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
+  libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const libmap::CloudReadResult read =
       run.timed("read", [&] { return libmap::read_cloud(options.terrain); });
+  if (read.cloud.empty() && read.dropped_points > 0)
+    throw libmap::Error(fmt::format("none of its {} points has a position", read.dropped_points),
+                        {.file = options.terrain});
+  if (read.cloud.empty()) throw libmap::Error("the cloud has no points", {.file = options.terrain});
   if (read.dropped_points > 0)
     run.warn(fmt::format("{}: {} points without a position were dropped", options.terrain,
                          read.dropped_points));
-  if (read.cloud.empty()) throw libmap::Error("the cloud has no points", {.file = options.terrain});
-  if (run.dry_run()) {
-    libgtd::make_gripper_mask(options.detection.gripper,
-                              {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
-    return;
-  }
+  if (run.dry_run()) return;
   libgtd::DetectionResult result;
   try {
     result = libgtd::detect(read.cloud, options.detection, run.progress());

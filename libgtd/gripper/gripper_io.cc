@@ -1,5 +1,7 @@
 #include "libgtd/gripper/gripper_io.h"
 
+#include <algorithm>
+
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 
@@ -8,9 +10,10 @@ namespace libgtd {
 namespace {
 
 // A measure that a file left out is still 0 and would be reported as a bad value: say what it is.
-void require_all_keys(const libmap::ParameterTable& table, const std::string& yaml) {
+void require_all_keys(const libmap::ParameterTable& table, const std::vector<std::string>& given) {
   for (const std::string& key : table.keys())
-    if (yaml.find(key + ":") == std::string::npos) throw libmap::Error("missing", {.field = key});
+    if (std::find(given.begin(), given.end(), key) == given.end())
+      throw libmap::Error("missing", {.field = key});
 }
 
 }  // namespace
@@ -21,8 +24,7 @@ Gripper parse_gripper(const std::string& yaml, const std::string& file,
   libmap::ParameterTable table;
   bind(table, gripper);
   try {
-    libmap::set_from_yaml(table, yaml, file);
-    require_all_keys(table, yaml);
+    require_all_keys(table, libmap::set_from_yaml(table, yaml, file));
     for (const auto& [key, value] : overrides) table.set(key, value);
     gripper.check();
   } catch (const libmap::Error& error) {

@@ -37,6 +37,8 @@ void append(PointCloud& whole, const PointCloud& part) {
     const ScalarField* other = part.find_field(field.name);
     if (other == nullptr || part.fields.size() != whole.fields.size())
       throw libmap::Error("the parts have different fields", {.field = field.name});
+    // Text files do not say their types: a part of whole numbers alone is read as int32.
+    if (field.type != other->type) field.type = ScalarType::float64;
     add(field.values, other->values);
   }
   if (whole.has_colors() != part.has_colors() && !whole.empty() && !part.empty())

@@ -34,12 +34,6 @@ Error unknown_format(const std::filesystem::path& path) {
                 .bound = ".pcd, .ply, .vtp or .csv"});
 }
 
-void require_known_format(const std::filesystem::path& path) {
-  const std::string format = format_of(path);
-  if (format != ".pcd" && format != ".ply" && format != ".vtp" && format != ".csv")
-    throw unknown_format(path);
-}
-
 GeometryColumns decode(const std::string& format, const std::shared_ptr<const std::string>& bytes) {
   if (format == ".pcd") return decode_pcd(bytes);
   if (format == ".ply") return decode_ply(bytes);
@@ -57,6 +51,12 @@ std::string read_head(const std::filesystem::path& path) {
 }
 
 }  // namespace
+
+void require_cloud_format(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  if (format != ".pcd" && format != ".ply" && format != ".vtp" && format != ".csv")
+    throw unknown_format(path);
+}
 
 std::string format_of(const std::filesystem::path& path) {
   std::string extension = path.extension().string();
@@ -93,7 +93,7 @@ void write_geometry_file(const std::filesystem::path& path,
 }
 
 CloudReadResult read_cloud(const std::filesystem::path& path) {
-  require_known_format(path);
+  require_cloud_format(path);
   const auto bytes = read_geometry_bytes(path);
   try {
     GeometryColumns content = decode(format_of(path), bytes);
@@ -108,7 +108,7 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
 }
 
 CloudFileInfo read_cloud_info(const std::filesystem::path& path) {
-  require_known_format(path);
+  require_cloud_format(path);
   require_readable_file(path);
   const std::string format = format_of(path);
   try {
@@ -123,7 +123,7 @@ CloudFileInfo read_cloud_info(const std::filesystem::path& path) {
 
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
                  const CloudWriteOptions& options) {
-  require_known_format(path);
+  require_cloud_format(path);
   const std::string format = format_of(path);
   const NormalNames names = format == ".pcd" ? NormalNames::long_names : NormalNames::short_names;
   write_geometry_file(path, [&](std::ostream& out) {

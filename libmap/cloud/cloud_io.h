@@ -53,6 +53,9 @@ CloudFileInfo read_cloud_info(const std::filesystem::path& path);
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
                  const CloudWriteOptions& options = {});
 
+// Throws Error unless the extension is that of a format of clouds.
+void require_cloud_format(const std::filesystem::path& path);
+
 // The extension in lower case, e.g. ".ply".
 std::string format_of(const std::filesystem::path& path);
 

@@ -31,6 +31,29 @@ void sync_path(const fs::path& path, int flags) {
   if (result != 0) throw failed(path, "cannot be synced", code);
 }
 
+bool is_still_named(int descriptor, const fs::path& path) {
+  struct stat held {};
+  struct stat named {};
+  return fstat(descriptor, &held) == 0 && stat(path.c_str(), &named) == 0 &&
+         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+}
+
+// Opens and locks the temporary of `final_path`.
+int lock_temporary(const fs::path& temporary, const fs::path& final_path) {
+  for (;;) {
+    const int lock = open(temporary.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
+    if (lock < 0) throw failed(final_path, "cannot be written", errno);
+    if (flock(lock, LOCK_EX | LOCK_NB) != 0) {
+      close(lock);
+      throw Error("another process is writing it", {.file = final_path.string()},
+                  ErrorKind::failed);
+    }
+    // Between opening and locking, another process may have put this very file in place.
+    if (is_still_named(lock, temporary)) return lock;
+    close(lock);
+  }
+}
+
 fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
@@ -49,12 +72,7 @@ OutputFile::OutputFile(fs::path final_path) : final_path_(std::move(final_path))
   // The extension stays at the end: writers choose the format by it.
   temporary_path_ =
       folder / ("." + final_path_.stem().string() + ".partial" + final_path_.extension().string());
-  lock_ = open(temporary_path_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-  if (lock_ < 0) throw failed(final_path_, "cannot be written", errno);
-  if (flock(lock_, LOCK_EX | LOCK_NB) != 0) {
-    close(std::exchange(lock_, -1));
-    throw Error("another process is writing it", {.file = final_path_.string()}, ErrorKind::failed);
-  }
+  lock_ = lock_temporary(temporary_path_, final_path_);
 }
 
 OutputFile::~OutputFile() {

@@ -176,11 +176,12 @@ std::string flag_of(std::string_view key) {
   return flag;
 }
 
-void set_from_yaml(const ParameterTable& table, const std::string& text, const std::string& file) {
+std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
+                                       const std::string& file) {
   try {
     const std::vector<YAML::Node> documents = YAML::LoadAll(text);
     if (documents.size() > 1) throw Error("holds more than one YAML document");
-    if (documents.empty() || documents.front().IsNull()) return;
+    if (documents.empty() || documents.front().IsNull()) return {};
     const YAML::Node root = documents.front();
     if (!root.IsMap()) throw Error("not a map of keys and values");
     std::set<std::string> seen;
@@ -193,6 +194,7 @@ void set_from_yaml(const ParameterTable& table, const std::string& text, const s
     }
     for (const auto& entry : root)
       table.set(entry.first.as<std::string>(), entry.second.as<std::string>());
+    return {seen.begin(), seen.end()};
   } catch (const Error& error) {
     throw error.in_file(file);
   } catch (const YAML::Exception& error) {

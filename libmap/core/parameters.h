@@ -82,8 +82,9 @@ std::string flag_of(std::string_view key);
 
 // A flat YAML map of scalars, `text` (named `file` in errors), into the table. A key that is not
 // in the table, stands twice or holds no scalar is an Error; nothing is set halfway: all keys are
-// known before the first is set.
-void set_from_yaml(const ParameterTable& table, const std::string& text, const std::string& file);
+// known before the first is set. Returns the keys that the text holds.
+std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
+                                       const std::string& file);
 
 // The table as YAML that set_from_yaml reads back, each line followed by its description.
 std::string to_yaml(const ParameterTable& table);

@@ -17,8 +17,8 @@ constexpr double square_per_spacing = 1.8;
 // Neighbouring cubes overlap by a hair, so that rounding opens no gap between them.
 constexpr double cube_per_spacing = 1.005;
 constexpr double lone_point_size_m = 0.01;
-// A filler closes gaps of one missing cell, and lies behind neighbours two steps further away.
-constexpr double filler_per_spacing = 2.6;
+// A filler closes gaps of two missing cells, and lies behind neighbours two steps further away.
+constexpr double filler_per_spacing = 3.0;
 constexpr double filler_depth_per_size = 2.75;
 
 struct KdTreeSource {

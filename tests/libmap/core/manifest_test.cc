@@ -108,8 +108,8 @@ TEST(ManifestTest, ParametersKeepTheirTypes) {
   Manifest manifest;
   manifest.add_parameters(table);
   const std::vector<std::pair<std::string, ManifestValue>> wanted = {
-      {"size_m", 0.5},  {"layers", std::int64_t{2}},       {"seed", std::int64_t{7}},
-      {"fill", true},   {"name", std::string("12")},       {"gripper.angle_deg", std::string("80")}};
+      {"size_m", 0.5}, {"layers", std::int64_t{2}}, {"seed", std::int64_t{7}},
+      {"fill", true},  {"name", std::string("12")}, {"gripper.angle_deg", std::string("80")}};
   EXPECT_EQ(manifest.parameters, wanted);
 }
 
@@ -159,8 +159,7 @@ TEST(ManifestTest, BrokenJsonNamesTheFile) {
 
 TEST(ManifestTest, NumbersThatAreNotFiniteStayReadable) {
   Manifest manifest = sample();
-  manifest.results = {{"auc", std::nan("")},
-                      {"origin_m", std::vector<double>{1, std::nan(""), 2}}};
+  manifest.results = {{"auc", std::nan("")}, {"origin_m", std::vector<double>{1, std::nan(""), 2}}};
   const auto read = libmap::read_manifest_of(written(libmap::to_json(manifest)));
   ASSERT_TRUE(read);
   EXPECT_TRUE(std::isnan(std::get<double>(*read->find_result("auc"))));

@@ -90,9 +90,7 @@ TEST(ParallelTest, ReductionJoinsFromLeftToRight) {
   }
 }
 
-TEST(ParallelTest, ReductionOfNothingIsTheIdentity) {
-  EXPECT_EQ(sum_in_chunks({}, 0, 10), 0.0);
-}
+TEST(ParallelTest, ReductionOfNothingIsTheIdentity) { EXPECT_EQ(sum_in_chunks({}, 0, 10), 0.0); }
 
 TEST(ParallelTest, HugeGrainIsOneChunk) {
   const std::vector<double> values = {1, 2, 3};
@@ -118,9 +116,8 @@ TEST(ParallelTest, ExceptionsPass) {
 TEST(ParallelTest, LoopsMayBeNested) {
   std::atomic<int> items = 0;
   parallel_for(20, 1, [&](std::size_t, std::size_t) {
-    parallel_for(30, 7, [&](std::size_t begin, std::size_t end) {
-      items += static_cast<int>(end - begin);
-    });
+    parallel_for(
+        30, 7, [&](std::size_t begin, std::size_t end) { items += static_cast<int>(end - begin); });
   });
   EXPECT_EQ(items, 600);
 }

@@ -72,8 +72,7 @@ TEST_F(ParametersTest, ErrorsNameKeyValueAndBound) {
   EXPECT_EQ(message("height_m", "nan"), "height_m is nan: out of range (must be a finite number)");
   EXPECT_EQ(message("height_m", "inf"), "height_m is inf: out of range (must be a finite number)");
   EXPECT_EQ(message("layers", "11"), "layers is 11: out of range (must be >= 0 and <= 10)");
-  EXPECT_EQ(message("layers", "1.5"),
-            "layers is 1.5: not a whole number (must be >= 0 and <= 10)");
+  EXPECT_EQ(message("layers", "1.5"), "layers is 1.5: not a whole number (must be >= 0 and <= 10)");
   EXPECT_EQ(message("seed", "-1"), "seed is -1: out of range (must be >= 0)");
   EXPECT_EQ(message("fill", "maybe"), "fill is maybe: not a switch (must be true or false)");
   EXPECT_EQ(message("shape", "rond"),
@@ -139,8 +138,8 @@ TEST_F(ParametersTest, TheLastOverrideOfAKeyHolds) {
   table.set("gripper.angle_deg", "70");
   table.set("gripper.name", "x");
   table.set("gripper.angle_deg", "80");
-  EXPECT_EQ(options.overrides, (std::vector<std::pair<std::string, std::string>>{
-                                   {"angle_deg", "80"}, {"name", "x"}}));
+  EXPECT_EQ(options.overrides,
+            (std::vector<std::pair<std::string, std::string>>{{"angle_deg", "80"}, {"name", "x"}}));
 }
 
 TEST(ParameterFlags, UnitsAreLeftOut) {

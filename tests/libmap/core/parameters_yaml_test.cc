@@ -40,8 +40,9 @@ class ParametersYaml : public testing::Test {
 };
 
 TEST_F(ParametersYaml, ReadsAFlatMap) {
-  read("# a scenario\nsize_m: 0.5   # m\nlayers: -3\nfill: yes\n'name': \"a: b\"\n"
-       "shape: round\ngripper.angle_deg: 80\n");
+  read(
+      "# a scenario\nsize_m: 0.5   # m\nlayers: -3\nfill: yes\n'name': \"a: b\"\n"
+      "shape: round\ngripper.angle_deg: 80\n");
   EXPECT_EQ(options.size_m, 0.5);
   EXPECT_EQ(options.layers, -3);
   EXPECT_TRUE(options.fill);
@@ -68,8 +69,7 @@ TEST_F(ParametersYaml, KeyThatStandsTwice) {
 
 TEST_F(ParametersYaml, ValueThatIsNoScalar) {
   for (const char* value : {"[1, 2]", "{a: 1}", "", "~", "\n  - 1"})
-    EXPECT_EQ(message("layers: " + std::string(value) + "\n"),
-              "s.yaml: layers: not a single value")
+    EXPECT_EQ(message("layers: " + std::string(value) + "\n"), "s.yaml: layers: not a single value")
         << value;
 }
 

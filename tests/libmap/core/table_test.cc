@@ -26,16 +26,16 @@ TEST(TableTest, PlainTable) {
 TEST(TableTest, QuotesAsInRfc4180) {
   const Table table = parse_csv(
       "a,b\n\"1,5\",\"say \"\"hi\"\"\"\n\"two\nlines\",\"\"\n\"\"\"\",\"#no comment\"\n", "");
-  EXPECT_EQ(table.rows,
-            (Rows{{"1,5", "say \"hi\""}, {"two\nlines", ""}, {"\"", "#no comment"}}));
+  EXPECT_EQ(table.rows, (Rows{{"1,5", "say \"hi\""}, {"two\nlines", ""}, {"\"", "#no comment"}}));
 }
 
 TEST(TableTest, ByteOrderMarkAndLineEndings) {
   const Rows rows = {{"1", "2"}, {"3", "4"}};
-  for (const std::string& text : std::initializer_list<std::string>
-       {"a,b\n1,2\n3,4\n", "a,b\r\n1,2\r\n3,4\r\n", "\xEF\xBB\xBF"
-                                                     "a,b\n1,2\n3,4",
-        "a,b\r\n1,2\n3,4\r\n", "a , b\n1,2\n\n\r\n3,4\n\n"}) {
+  for (const std::string& text :
+       std::initializer_list<std::string>{"a,b\n1,2\n3,4\n", "a,b\r\n1,2\r\n3,4\r\n",
+                                          "\xEF\xBB\xBF"
+                                          "a,b\n1,2\n3,4",
+                                          "a,b\r\n1,2\n3,4\r\n", "a , b\n1,2\n\n\r\n3,4\n\n"}) {
     const Table table = parse_csv(text, "");
     EXPECT_EQ(table.columns, (Cells{"a", "b"})) << text;
     EXPECT_EQ(table.rows, rows) << text;

@@ -41,9 +41,9 @@ TEST(TextTest, EveryDoubleReadsBackAsItself) {
     ASSERT_TRUE(read) << to_text(value);
     ASSERT_EQ(std::bit_cast<std::uint64_t>(*read), std::bit_cast<std::uint64_t>(value));
   }
-  for (const double value : {std::numeric_limits<double>::denorm_min(), 5e-324, 2.2250738585072e-308,
-                             std::numeric_limits<double>::max(),
-                             std::numeric_limits<double>::lowest()})
+  for (const double value :
+       {std::numeric_limits<double>::denorm_min(), 5e-324, 2.2250738585072e-308,
+        std::numeric_limits<double>::max(), std::numeric_limits<double>::lowest()})
     EXPECT_EQ(parse_double(to_text(value)), value);
 }
 
@@ -73,8 +73,9 @@ TEST(TextTest, ParsesNumbers) {
 }
 
 TEST(TextTest, RefusesWhatIsNotWhollyANumber) {
-  for (const char* text : {"", " ", "+", "-", ".", "e5", "1,5", "1.5m", "1 2", "0x10", "1e", "--1",
-                           "+-1", "-+1", "++1", "+ 1", "1e999", "1_000", "\xD9\xA1", "one", "1.2.3"})
+  for (const char* text :
+       {"",    " ",   "+",   "-",   ".",   "e5",    "1,5",   "1.5m",     "1 2", "0x10", "1e",
+        "--1", "+-1", "-+1", "++1", "+ 1", "1e999", "1_000", "\xD9\xA1", "one", "1.2.3"})
     EXPECT_FALSE(parse_double(text)) << text;
   EXPECT_FALSE(parse_double(std::string_view("1\0", 2))) << "a NUL behind the number";
 }

@@ -1,0 +1,38 @@
+# The embedded example: the thesis's scenario 1 (primitive shapes on a plane), simulated exactly,
+# scored with the thesis's program's method and with the corrected one, looked up at 12 places and
+# evaluated against their expected graspability. Needs no data.
+#
+#   make -f pipelines/primitive_shapes.mk OUT=folder [SHARES=4] -j2
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+OUT ?= demo
+SHARES ?= 4
+SPACING ?= 0.0068
+points := $(here)../data/field_test/primitive_shapes.csv
+ifeq ($(wildcard $(points)),)
+  points := $(here)../field_test/primitive_shapes.csv
+endif
+methods := thesis corrected
+
+.DELETE_ON_ERROR:
+.PHONY: all $(methods)
+all: $(OUT)/scene.png $(methods)
+
+$(OUT):
+	@mkdir -p $@
+
+# About as many points as the thesis's scan of this scene.
+$(OUT)/terrain.pcd: | $(OUT)
+	@$(GRASPMAP) simulate scene --spacing $(SPACING) -o $@
+
+$(OUT)/scene.ply: | $(OUT)
+	@$(GRASPMAP) simulate scene --mesh -o $@
+
+$(OUT)/scene.png: $(OUT)/scene.ply
+	@$(GRASPMAP) render $< -o $@ --view oblique --color single --title 'primitive shapes' --quiet
+
+$(methods): $(OUT)/terrain.pcd
+	@$(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(points) \
+	  SCENARIO=primitive_shapes_prescan METHOD=$@ OUT=$(OUT)/$@ SHARES=$(SHARES) \
+	  GRASPMAP=$(GRASPMAP) TITLE='primitive shapes, $@'

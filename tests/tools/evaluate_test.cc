@@ -1,0 +1,102 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "libmap/core/table.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_text;
+using Words = std::vector<std::string>;
+
+const Words files = {"rates.csv", "roc.csv", "roc.png", "roc.svg", "summary.json", "summary.md"};
+
+Words names_in(const std::string& folder) {
+  Words names;
+  for (const auto& entry : std::filesystem::directory_iterator(scratch(folder)))
+    names.push_back(entry.path().filename().string());
+  std::sort(names.begin(), names.end());
+  return names;
+}
+
+void write_table() {
+  write_text(scratch("t.csv"),
+             "id,graspable,good,bad\n1,1,0.9,0.1\n2,yes,0.8,0.2\n3,0,0.3,0.8\n4,no,0.2,0.9\n");
+}
+
+TEST(Evaluate, PerfectAndReversedScores) {
+  write_table();
+  ASSERT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "out"})));
+  EXPECT_EQ(names_in("out"), files);
+  const nlohmann::json results = graspmap_test::json_of("out.json").at("results");
+  EXPECT_EQ(results.at("rows"), 4);
+  EXPECT_EQ(results.at("good.auc_trapezoid"), 1.0);
+  EXPECT_EQ(results.at("bad.auc_trapezoid"), 0.0);
+  EXPECT_FALSE(results.contains("id.auc_trapezoid"));
+  EXPECT_TRUE(content("out/roc.png").starts_with("\x89PNG"));
+  EXPECT_NE(content("out/roc.svg").find("<svg"), std::string::npos);
+  EXPECT_FALSE(libmap::read_csv(scratch("out/roc.csv")).rows.empty());
+  EXPECT_TRUE(nlohmann::json::parse(content("out/summary.json")).is_object());
+}
+
+TEST(Evaluate, SameSeedSameBytes) {
+  write_table();
+  ASSERT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "one", "--threads", "1"})));
+  ASSERT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "two", "--threads", "2"})));
+  for (const std::string& name : files)
+    EXPECT_EQ(content("one/" + name), content("two/" + name)) << name;
+}
+
+TEST(Evaluate, ForeignFolderIsKept) {
+  write_table();
+  std::filesystem::create_directory(scratch("mine"));
+  write_text(scratch("mine/roc.csv"), "precious");
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "mine"}), {"mine", "--force"}));
+  EXPECT_EQ(content("mine/roc.csv"), "precious");
+  EXPECT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "mine", "--force"})));
+  EXPECT_NE(content("mine/roc.csv"), "precious");
+}
+
+TEST(Evaluate, BadInputLeavesNothing) {
+  write_table();
+  write_text(scratch("text.csv"), "graspable,score\n1,high\n0,0.2\n");
+  write_text(scratch("label.csv"), "graspable,score\nperhaps,0.5\n0,0.2\n");
+  const Words before = graspmap_test::names_in_scratch();
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "none.csv", "-o", "out"}), {"none.csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "out", "--label", "graspabel"}),
+                        {"t.csv", "graspabel", "did you mean 'graspable'"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"evaluate", "t.csv", "-o", "out", "--score", "gud"}), {"t.csv", "gud"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "text.csv", "-o", "out", "--score", "score"}),
+                        {"text.csv", "high"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"evaluate", "label.csv", "-o", "out"}), {"label.csv", "perhaps"}));
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "t.csv"}), {"t.csv: is a file"}));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), before);
+}
+
+TEST(Evaluate, DryRunWritesNothing) {
+  write_table();
+  EXPECT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "out", "--dry-run"})));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), Words{"t.csv"});
+}
+
+TEST(Evaluate, PublishedFieldTest) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string table =
+      (graspmap_test::data_folder() / "thesis" / "field_test_scenario4.csv").string();
+  ASSERT_TRUE(succeeded(graspmap({"evaluate", table, "-o", "out", "--score", "prescan"})));
+  const nlohmann::json manifest = graspmap_test::json_of("out.json");
+  EXPECT_EQ(manifest.at("results").at("prescan.locations"), 30);
+  EXPECT_GT(manifest.at("results").at("prescan.auc_upper_sum"),
+            manifest.at("results").at("prescan.auc_trapezoid"))
+      << "the published area is the upper sum";
+}
+
+}  // namespace

@@ -1,0 +1,206 @@
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/table.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::graspmap;
+using graspmap_test::ProgramResult;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_text;
+using libmap::Table;
+using Words = std::vector<std::string>;
+
+// Three voxels of 1 cm along x.
+void write_small_map() {
+  write_text(scratch("map.csv"),
+             "x,y,z,score,ssv,graspable\n"
+             "0.005,0.005,0.005,0.5,200,0\n"
+             "0.015,0.005,0.005,0.9,210,1\n"
+             "0.025,0.005,0.005,0.25,220,0\n");
+}
+
+Table looked_up(const Words& more) {
+  Words words = {"lookup", "map.csv", "points.csv", "-o", "answers.csv"};
+  words.insert(words.end(), more.begin(), more.end());
+  const ProgramResult result = graspmap(words);
+  EXPECT_TRUE(succeeded(result));
+  return result.exit_code == 0 ? libmap::read_csv(scratch("answers.csv")) : Table{};
+}
+
+std::string cell(const Table& table, std::size_t row, const std::string& column) {
+  return table.rows.at(row).at(table.column(column));
+}
+
+TEST(Lookup, EveryPointIsAnswered) {
+  write_small_map();
+  write_text(scratch("points.csv"),
+             "name,x,y,z\n"
+             "on,0.015,0.005,0.005\n"
+             "beside,0.025,0.005,0.035\n"
+             "\"far, off\",1,2,3\n"
+             "farther,-1e6,0,0\n");
+  const Table answers = looked_up({});
+  ASSERT_EQ(answers.rows.size(), 4U);
+  EXPECT_EQ(cell(answers, 0, "name"), "on");
+  EXPECT_EQ(cell(answers, 0, "found"), "1");
+  EXPECT_EQ(answers.number(0, answers.column("distance_m")), 0);
+  EXPECT_EQ(cell(answers, 0, "score"), "0.9");
+  EXPECT_EQ(cell(answers, 0, "ssv"), "210");
+  EXPECT_EQ(cell(answers, 0, "graspable"), "1");
+  EXPECT_EQ(cell(answers, 1, "found"), "1");
+  EXPECT_NEAR(answers.number(1, answers.column("distance_m")), 0.03, 1e-7);
+  EXPECT_EQ(cell(answers, 1, "score"), "0.25");
+  EXPECT_EQ(cell(answers, 2, "name"), "far, off");
+  for (const std::size_t row : {2U, 3U}) {
+    EXPECT_EQ(cell(answers, row, "found"), "0");
+    EXPECT_EQ(cell(answers, row, "score"), "");
+    EXPECT_EQ(cell(answers, row, "graspable"), "");
+    EXPECT_GT(answers.number(row, answers.column("distance_m")), 3);
+  }
+  const nlohmann::json manifest = graspmap_test::json_of("answers.csv.json");
+  EXPECT_EQ(manifest.at("results").at("points"), 4);
+  EXPECT_EQ(manifest.at("results").at("found"), 2);
+  EXPECT_EQ(manifest.at("inputs").size(), 2U);
+}
+
+TEST(Lookup, MaxDistanceIsABound) {
+  write_small_map();
+  write_text(scratch("points.csv"), "x,y,z\n0.025,0.005,0.035\n");
+  EXPECT_EQ(cell(looked_up({"--max-distance", "0.031"}), 0, "found"), "1");
+  EXPECT_EQ(cell(looked_up({"--max-distance", "0.029"}), 0, "found"), "0");
+}
+
+TEST(Lookup, MaximumAndMeanWithinTheRadius) {
+  write_small_map();
+  write_text(scratch("points.csv"), "x,y,z\n0.0251,0.005,0.005\n0.5,0.005,0.005\n");
+  const Table best = looked_up({"--mode", "maximum", "--radius", "0.012"});
+  EXPECT_EQ(cell(best, 0, "score"), "0.9");
+  EXPECT_EQ(cell(best, 0, "ssv"), "210");
+  EXPECT_EQ(cell(best, 1, "found"), "0");
+  const Table mean = looked_up({"--mode", "mean", "--radius", "0.012"});
+  EXPECT_NEAR(mean.number(0, mean.column("score")), 0.575, 1e-6);
+  EXPECT_NEAR(mean.number(0, mean.column("ssv")), 215, 1e-4);
+  EXPECT_EQ(cell(mean, 1, "score"), "");
+}
+
+TEST(Lookup, ColumnsOfThePointsKeepTheirNames) {
+  write_small_map();
+  write_text(scratch("points.csv"), "id,graspable,x,y,z\n7,yes,0.015,0.005,0.005\n");
+  const Table answers = looked_up({});
+  EXPECT_EQ(cell(answers, 0, "graspable"), "yes") << "the verdict of the field test";
+  EXPECT_EQ(cell(answers, 0, "map_graspable"), "1");
+  EXPECT_EQ(cell(answers, 0, "id"), "7");
+}
+
+TEST(Lookup, AnswersCanBeLookedUpAgainAndAgain) {
+  write_small_map();
+  write_text(scratch("points.csv"), "x,y,z,score\n0.015,0.005,0.005,0.1\n");
+  for (int round = 0; round < 3; ++round) {
+    const Table answers = looked_up({});
+    EXPECT_EQ(cell(answers, 0, "score"), "0.1");
+    const std::set<std::string> names(answers.columns.begin(), answers.columns.end());
+    EXPECT_EQ(names.size(), answers.columns.size()) << "a column stands twice";
+    std::filesystem::copy_file(scratch("answers.csv"), scratch("points.csv"),
+                               std::filesystem::copy_options::overwrite_existing);
+  }
+}
+
+TEST(Lookup, FramesOfMapAndPointsMeet) {
+  const libmap::PointCloud terrain = libmap::transform_cloud(
+      graspmap_test::bumpy_terrain(), libmap::make_pose_from_rpy({4, -7, 2}, {12, -20, 35}));
+  libmap::write_cloud(scratch("tilted.pcd"), terrain);
+  for (const std::string frame : {"terrain", "input"}) {
+    ASSERT_TRUE(succeeded(graspmap({"score", "tilted.pcd", "--curvature-radius", "0", "--up",
+                                    "0,0,1", "--frame", frame, "-o", frame + ".csv"})));
+  }
+  const Table scores = libmap::read_csv(scratch("terrain.csv"));
+  for (const std::string map : {"terrain.csv", "input.csv"})
+    for (const std::string points : {"terrain", "input"}) {
+      ASSERT_TRUE(succeeded(graspmap(
+          {"lookup", map, points + ".csv", "--points-frame", points, "-o", "answers.csv"})));
+      const Table answers = libmap::read_csv(scratch("answers.csv"));
+      ASSERT_EQ(answers.rows.size(), scores.rows.size());
+      std::size_t wrong = 0;
+      for (std::size_t row = 0; row < scores.rows.size(); ++row) {
+        wrong += answers.number(row, answers.column("distance_m")) > 1e-5 ? 1 : 0;
+        wrong += cell(answers, row, "map_score") != cell(scores, row, "score") ? 1 : 0;
+        wrong += cell(answers, row, "map_i") != cell(scores, row, "i") ? 1 : 0;
+      }
+      EXPECT_EQ(wrong, 0U) << map << " looked up at points in the frame " << points;
+    }
+}
+
+TEST(Lookup, ConvertedMapStillKnowsItsFrame) {
+  libmap::write_cloud(scratch("shifted.pcd"),
+                      libmap::transform_cloud(graspmap_test::bumpy_terrain(),
+                                              libmap::make_pose_from_rpy({40, 0, 0}, {0, 0, 0})));
+  ASSERT_TRUE(
+      succeeded(graspmap({"score", "shifted.pcd", "--curvature-radius", "0", "-o", "scored.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scored.pcd", "map.csv"})));
+  write_text(scratch("points.csv"), "x,y,z\n40,0,0\n0,0,0\n");
+  const Table answers = looked_up({});
+  EXPECT_EQ(cell(answers, 0, "found"), "1");
+  EXPECT_EQ(cell(answers, 1, "found"), "0");
+}
+
+class LookupBadInput : public testing::Test {
+ protected:
+  LookupBadInput() { write_small_map(); }
+  static ProgramResult lookup(const std::string& points) {
+    write_text(scratch("points.csv"), points);
+    const ProgramResult result = graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv"});
+    EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
+    EXPECT_FALSE(std::filesystem::exists(scratch("out.csv.json")));
+    return result;
+  }
+};
+
+TEST_F(LookupBadInput, MissingColumn) {
+  EXPECT_TRUE(bad_input(lookup("x,y,hight\n1,2,3\n"), {"points.csv", "column 'z'"}));
+  EXPECT_TRUE(bad_input(lookup("X,Y,Z\n1,2,3\n"), {"points.csv", "column 'x'"}));
+  EXPECT_TRUE(bad_input(lookup(""), {"points.csv"}));
+}
+
+TEST_F(LookupBadInput, TextInANumber) {
+  EXPECT_TRUE(
+      bad_input(lookup("x,y,z\n1,2,3\n4,five,6\n"), {"points.csv", "row 2", "column 'y'", "five"}));
+  EXPECT_TRUE(bad_input(lookup("x,y,z\n1,,3\n"), {"points.csv", "row 1", "column 'y'"}));
+  EXPECT_TRUE(bad_input(lookup("x,y,z\n1,nan,3\n"), {"points.csv", "row 1"}));
+  EXPECT_TRUE(bad_input(lookup("x,y,z\n1,inf,3\n"), {"points.csv", "row 1"}));
+}
+
+TEST_F(LookupBadInput, BrokenTable) {
+  EXPECT_TRUE(bad_input(lookup("x,y,z\n1,2\n"), {"points.csv", "line 2"}));
+  EXPECT_TRUE(bad_input(lookup("x,y,z\n1,\"2,3\n"), {"points.csv", "quote"}));
+  EXPECT_TRUE(bad_input(lookup(std::string("x,y,z\n1,\0002,3\n", 13)), {"points.csv"}));
+}
+
+TEST_F(LookupBadInput, MapsThatCannotBe) {
+  write_text(scratch("points.csv"), "x,y,z\n1,2,3\n");
+  write_text(scratch("empty.csv"), "x,y,z,score\n");
+  EXPECT_TRUE(bad_input(graspmap({"lookup", "none.pcd", "points.csv", "-o", "out.csv"}),
+                        {"none.pcd: no such file"}));
+  EXPECT_TRUE(bad_input(graspmap({"lookup", "map.csv", "none.csv", "-o", "out.csv"}),
+                        {"none.csv: no such file"}));
+  EXPECT_TRUE(bad_input(graspmap({"lookup", "empty.csv", "points.csv", "-o", "out.csv"}),
+                        {"empty.csv", "no points"}));
+  write_text(scratch("map.csv.json"), "{broken");
+  EXPECT_TRUE(
+      bad_input(graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv"}), {"map.csv.json"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
+}
+
+TEST(Lookup, NoPointsHaveNoAnswers) {
+  write_small_map();
+  write_text(scratch("points.csv"), "x,y,z\n");
+  EXPECT_TRUE(looked_up({}).rows.empty());
+}
+
+}  // namespace

@@ -1,0 +1,229 @@
+// What `graspmap score` cannot use: exit code 3, one line that names it, no output.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "libmap/cloud/cloud_io.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::graspmap;
+using graspmap_test::ProgramResult;
+using graspmap_test::read_text;
+using graspmap_test::scratch;
+using graspmap_test::write_text;
+using Words = std::vector<std::string>;
+
+class ScoreBadInput : public testing::Test {
+ protected:
+  // Runs `graspmap score WORDS... -o out.pcd`; nothing new may be left beside the inputs.
+  ProgramResult score(Words words) {
+    words.insert(words.begin(), "score");
+    words.insert(words.end(), {"-o", "out.pcd"});
+    const Words before = graspmap_test::names_in_scratch();
+    const ProgramResult result = graspmap(words);
+    EXPECT_EQ(graspmap_test::names_in_scratch(), before) << "something was left";
+    return result;
+  }
+
+  std::string gripper_with(const std::string& from, const std::string& to) {
+    std::string text =
+        read_text(graspmap_test::source_folder() / "data" / "grippers" / "scar-e.yaml");
+    const std::size_t at = text.find(from);
+    EXPECT_NE(at, std::string::npos) << from;
+    text.replace(at, from.size(), to);
+    write_text(scratch("gripper.yaml"), text);
+    return "gripper.yaml";
+  }
+
+  static std::string cloud_of(const std::vector<Eigen::Vector3d>& positions) {
+    libmap::PointCloud cloud;
+    cloud.positions = positions;
+    libmap::write_cloud(scratch("cloud.pcd"), cloud);
+    return "cloud.pcd";
+  }
+};
+
+TEST_F(ScoreBadInput, NoSuchFile) {
+  EXPECT_TRUE(bad_input(score({"none.pcd"}), {"none.pcd: no such file"}));
+}
+
+TEST_F(ScoreBadInput, EmptyFileAndFolder) {
+  write_text(scratch("empty.pcd"), "");
+  EXPECT_TRUE(bad_input(score({"empty.pcd"}), {"empty.pcd: is empty"}));
+  std::filesystem::create_directory(scratch("folder.pcd"));
+  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {"folder.pcd: is a folder"}));
+}
+
+TEST_F(ScoreBadInput, EmptyCloud) {
+  EXPECT_TRUE(bad_input(score({cloud_of({})}), {"cloud.pcd", "no points"}));
+  write_text(scratch("empty.csv"), "x,y,z\n");
+  EXPECT_TRUE(bad_input(score({"empty.csv"}), {"empty.csv", "no points"}));
+}
+
+TEST_F(ScoreBadInput, OnePointTwoPointsOnePlace) {
+  for (const char* method : {"thesis", "corrected"}) {
+    EXPECT_TRUE(bad_input(score({cloud_of({{1, 2, 3}}), "--method", method}), {"cloud.pcd", "1"}));
+    EXPECT_TRUE(
+        bad_input(score({cloud_of({{1, 2, 3}, {2, 2, 3}}), "--method", method}), {"cloud.pcd"}));
+    EXPECT_TRUE(bad_input(
+        score({cloud_of(std::vector<Eigen::Vector3d>(50, {1, 2, 3})), "--method", method}),
+        {"cloud.pcd"}));
+  }
+}
+
+TEST_F(ScoreBadInput, AllPointsOnALine) {
+  std::vector<Eigen::Vector3d> line;
+  for (int n = 0; n < 500; ++n) line.emplace_back(n * 0.01, n * 0.02, n * -0.005);
+  for (const char* method : {"thesis", "envelope", "climblab", "corrected"})
+    EXPECT_TRUE(bad_input(score({cloud_of(line), "--method", method}), {"cloud.pcd", "on a line"}));
+}
+
+TEST_F(ScoreBadInput, AllNaN) {
+  const double nan = std::nan("");
+  cloud_of(std::vector<Eigen::Vector3d>(7, {nan, nan, nan}));
+  EXPECT_TRUE(bad_input(score({"cloud.pcd"}), {"cloud.pcd", "none of its 7 points"}));
+}
+
+TEST_F(ScoreBadInput, HeaderPromisesMoreThanFollows) {
+  graspmap_test::write_terrain();
+  const std::string whole = read_text(scratch("terrain.pcd"));
+  write_text(scratch("cut.pcd"), whole.substr(0, whole.size() / 2));
+  EXPECT_TRUE(bad_input(score({"cut.pcd"}), {"cut.pcd", "14400"}));
+  write_text(scratch("ascii.pcd"),
+             "VERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH 100\n"
+             "HEIGHT 1\nPOINTS 100\nDATA ascii\n1 2 3\n4 5 6\n");
+  EXPECT_TRUE(bad_input(score({"ascii.pcd"}), {"ascii.pcd", "100"}));
+}
+
+TEST_F(ScoreBadInput, CloudWithoutZ) {
+  write_text(scratch("flat.csv"), "x,y\n1,2\n");
+  EXPECT_TRUE(bad_input(score({"flat.csv"}), {"flat.csv", "z"}));
+}
+
+TEST_F(ScoreBadInput, Grippers) {
+  graspmap_test::write_terrain();
+  const auto with_gripper = [&](const std::string& from, const std::string& to) {
+    return score({"terrain.pcd", "--gripper", "./" + gripper_with(from, to)});
+  };
+  EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "finger_length_mm: -40"),
+                        {"gripper.yaml", "finger_length_mm is -40", "> 0"}));
+  EXPECT_TRUE(bad_input(with_gripper("closing_angle_deg: 10", "closing_angle_deg: 86"),
+                        {"gripper.yaml", "closing_angle_deg is 86", "85"}));
+  EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "finger_lenght_mm: 40"),
+                        {"gripper.yaml", "finger_lenght_mm", "did you mean 'finger_length_mm'"}));
+  EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "# finger_length_mm: 40"),
+                        {"gripper.yaml", "finger_length_mm", "missing"}));
+  EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 90"),
+                        {"gripper.yaml", "opening_angle_deg is 90", "< 90"}));
+  EXPECT_TRUE(bad_input(with_gripper("name: SCAR-E", "name: SCAR-E\nname: other"),
+                        {"gripper.yaml", "name", "stands twice"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", "scare"}),
+                        {"gripper is scare", "did you mean 'scar-e'"}));
+  EXPECT_TRUE(
+      bad_input(score({"terrain.pcd", "--gripper", "none.yaml"}), {"none.yaml: no such file"}));
+}
+
+TEST_F(ScoreBadInput, GripperKeysWithSpacesBeforeTheColonAreThere) {
+  graspmap_test::write_terrain();
+  gripper_with("finger_length_mm: 40", "\"finger_length_mm\" : 40");
+  EXPECT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "--gripper", "gripper.yaml",
+                                  "--curvature-radius", "0", "-o", "out.pcd"})));
+}
+
+TEST_F(ScoreBadInput, MisspeltGripperKeyOnTheCommandLine) {
+  graspmap_test::write_terrain();
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "gripper.opening_angel_deg=80"}),
+                        {"opening_angel_deg", "did you mean 'opening_angle_deg'"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "griper.opening_angle_deg=80"}),
+                        {"griper.opening_angle_deg", "unknown key"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "gripper.opening_angle_deg=wide"}),
+                        {"opening_angle_deg is wide"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--set", "method"}), {"--set is method", "="}));
+}
+
+TEST_F(ScoreBadInput, VoxelSizes) {
+  graspmap_test::write_terrain();
+  const auto with_size = [&](const char* method, const char* size) {
+    return score({"terrain.pcd", "--method", method, "--voxel-size", size});
+  };
+  for (const char* method : {"thesis", "envelope", "climblab", "corrected"}) {
+    EXPECT_TRUE(bad_input(with_size(method, "0"), {"--voxel-size is 0", "> 0"}));
+    EXPECT_TRUE(bad_input(with_size(method, "-0.01"), {"--voxel-size is -0.01", "> 0"}));
+    EXPECT_TRUE(bad_input(with_size(method, "nan"), {"--voxel-size is nan"}));
+    EXPECT_TRUE(bad_input(with_size(method, "10"),
+                          {"error: voxel_size_m is 10", "mask would have", "voxels a side"}));
+    // A mask of 0.27 x 0.27 x 0.09 m holds some 6e15 voxels of that size.
+    EXPECT_TRUE(bad_input(with_size(method, "1e-6"),
+                          {"error: voxel_size_m is 1e-06", "voxels, more than 2^31"}));
+    EXPECT_TRUE(bad_input(with_size(method, "1e-300"), {"error: voxel_size_m is 1e-300"}));
+  }
+}
+
+TEST_F(ScoreBadInput, CloudTooWideForTheVoxelSize) {
+  // Two patches 1e8 m apart.
+  std::vector<Eigen::Vector3d> positions;
+  for (const double offset : {0.0, 1e8})
+    for (int n = 0; n < 9; ++n) positions.emplace_back(offset + n % 3, n / 3, 0.1 * (n % 2));
+  for (const char* method : {"thesis", "corrected"}) {
+    cloud_of(positions);
+    EXPECT_TRUE(bad_input(
+        score({"cloud.pcd", "--plane", "none", "--voxel-size", "0.01", "--method", method}),
+        {"cloud.pcd", "voxel_size_m is 0.01", "GiB"}));
+  }
+}
+
+TEST_F(ScoreBadInput, Scenarios) {
+  graspmap_test::write_terrain();
+  const auto with_scenario = [&](const std::string& yaml) {
+    write_text(scratch("scenario.yaml"), yaml);
+    return score({"terrain.pcd", "--config", "scenario.yaml"});
+  };
+  EXPECT_TRUE(bad_input(with_scenario("voxel_sise_m: 0.01\n"),
+                        {"scenario.yaml", "voxel_sise_m", "did you mean 'voxel_size_m'"}));
+  EXPECT_TRUE(
+      bad_input(with_scenario("voxel_size_m: 0\n"), {"scenario.yaml", "voxel_size_m is 0", "> 0"}));
+  EXPECT_TRUE(bad_input(with_scenario("method: thesiss\n"),
+                        {"scenario.yaml", "method is thesiss", "did you mean 'thesis'"}));
+  EXPECT_TRUE(bad_input(with_scenario("method: [thesis]\n"), {"scenario.yaml", "method"}));
+  EXPECT_TRUE(bad_input(with_scenario("method: thesis\nmethod: corrected\n"),
+                        {"scenario.yaml", "method", "stands twice"}));
+  EXPECT_TRUE(bad_input(with_scenario("a: b: c\n"), {"scenario.yaml", "line 1"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "none.yaml"}), {"none.yaml"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "artificial_rocks_prescam"}),
+                        {"did you mean 'artificial_rocks_prescan'"}));
+}
+
+TEST_F(ScoreBadInput, FlagsOutOfTheirBounds) {
+  graspmap_test::write_terrain();
+  for (const char* share : {"3/2", "0/2", "-1/2", "1", "1/", "/2", "a/b", "1/2/3", "1/0", ""})
+    EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile", share}), {"--tile", "K/N"})) << share;
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0"}), {"--up"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--up", "0,0,0"}), {}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--threads", "-1"}), {"--threads is -1"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--progress", "fancy"}), {"--progress is fancy"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--graspability-threshold", "1.5"}),
+                        {"--graspability-threshold is 1.5", "<= 1"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--solid-voxel-threshold", "0"}),
+                        {"--solid-voxel-threshold is 0"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile-size", "1e-9"}), {"tile_size_m is 1e-09"}));
+}
+
+TEST_F(ScoreBadInput, OutputsThatCannotBe) {
+  graspmap_test::write_terrain();
+  const auto to = [](const std::string& output) {
+    const Words before = graspmap_test::names_in_scratch();
+    const ProgramResult result = graspmap({"score", "terrain.pcd", "-o", output});
+    EXPECT_EQ(graspmap_test::names_in_scratch(), before);
+    return result;
+  };
+  EXPECT_TRUE(bad_input(to("none/out.pcd"), {"none/out.pcd", "no such folder"}));
+  EXPECT_TRUE(bad_input(to("out.xyz"), {"out.xyz", ".pcd"}));
+  EXPECT_TRUE(bad_input(to("out"), {"out", "extension"}));
+  std::filesystem::create_directory(scratch("folder.pcd"));
+  EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: is a folder"}));
+}
+
+}  // namespace

@@ -1,0 +1,166 @@
+// Shares of a map, scored in processes of their own and merged, are the map, byte for byte; neither
+// threads nor tiles change a byte of it.
+#include <gtest/gtest.h>
+
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::ProgramResult;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using Words = std::vector<std::string>;
+
+ProgramResult score_to(const std::string& output, Words more) {
+  Words words = {"score",       "terrain.pcd", "-o",           output,
+                 "--tile-size", "0.15",        "--zero-plane", "-0.01"};
+  words.insert(words.end(), more.begin(), more.end());
+  return graspmap(words);
+}
+
+struct Case {
+  const char* method;
+  const char* format;
+};
+
+void PrintTo(const Case& given, std::ostream* out) { *out << given.method << given.format; }
+
+class ScoreShares : public testing::TestWithParam<Case> {
+ protected:
+  ScoreShares() { graspmap_test::write_terrain(); }
+  std::string file(const std::string& stem) const { return stem + GetParam().format; }
+  ProgramResult score(const std::string& stem, Words more) const {
+    more.insert(more.end(), {"--method", GetParam().method});
+    return score_to(file(stem), more);
+  }
+};
+
+TEST_P(ScoreShares, MergedAreTheWholeMap) {
+  ASSERT_TRUE(succeeded(score("whole", {})));
+  for (const char* number : {"1", "2", "3"})
+    ASSERT_TRUE(
+        succeeded(score("part" + std::string(number), {"--tile", std::string(number) + "/3"})));
+  EXPECT_NE(content(file("part1")), content(file("whole")));
+  // In any order.
+  ASSERT_TRUE(succeeded(
+      graspmap({"merge", file("part3"), file("part1"), file("part2"), "-o", file("merged")})));
+  EXPECT_EQ(content(file("merged")), content(file("whole")));
+}
+
+TEST_P(ScoreShares, MoreSharesThanTilesAreTheWholeMap) {
+  ASSERT_TRUE(succeeded(score("whole", {"--tile-size", "0.4"})));
+  Words merge = {"merge", "-o", file("merged")};
+  for (int number = 1; number <= 11; ++number) {
+    const std::string part = "part" + std::to_string(number);
+    ASSERT_TRUE(
+        succeeded(score(part, {"--tile-size", "0.4", "--tile", std::to_string(number) + "/11"})));
+    merge.push_back(file(part));
+  }
+  ASSERT_TRUE(succeeded(graspmap(merge)));
+  EXPECT_EQ(content(file("merged")), content(file("whole")));
+}
+
+TEST_P(ScoreShares, ThreadsAndTilesChangeNothing) {
+  ASSERT_TRUE(succeeded(score("first", {"--threads", "1"})));
+  const std::string map = content(file("first"));
+  for (const Words& flags :
+       {Words{"--threads", "2"}, Words{"--threads", "8"}, Words{"--tile-size", "0.05"},
+        Words{"--tile-size", "0.37"}, Words{"--tile-size", "5"}}) {
+    ASSERT_TRUE(succeeded(score("other", flags)));
+    EXPECT_EQ(content(file("other")), map) << flags[0] << " " << flags[1];
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, ScoreShares,
+                         testing::Values(Case{"thesis", ".pcd"}, Case{"thesis", ".csv"},
+                                         Case{"envelope", ".pcd"}, Case{"envelope", ".csv"},
+                                         Case{"climblab", ".pcd"}, Case{"climblab", ".csv"},
+                                         Case{"corrected", ".pcd"}, Case{"corrected", ".csv"}),
+                         [](const auto& one) {
+                           return std::string(one.param.method) + "_" +
+                                  std::string(one.param.format).substr(1);
+                         });
+
+class Merge : public testing::Test {
+ protected:
+  Merge() {
+    graspmap_test::write_terrain();
+    EXPECT_TRUE(succeeded(share("a.pcd", "1/2", {})));
+    EXPECT_TRUE(succeeded(share("b.pcd", "2/2", {})));
+  }
+  // Convexity is not judged: quick.
+  static ProgramResult share(const std::string& output, const std::string& tile, Words more) {
+    more.insert(more.end(), {"--tile", tile, "--curvature-radius", "0"});
+    return score_to(output, more);
+  }
+  static ProgramResult merge(Words parts) {
+    parts.insert(parts.begin(), "merge");
+    parts.insert(parts.end(), {"-o", "merged.pcd"});
+    const ProgramResult result = graspmap(parts);
+    EXPECT_EQ(std::filesystem::exists(scratch("merged.pcd")), result.exit_code == 0);
+    EXPECT_EQ(std::filesystem::exists(scratch("merged.pcd.json")), result.exit_code == 0);
+    return result;
+  }
+};
+
+TEST_F(Merge, KeepsWhatTheSharesHaveInCommon) {
+  ASSERT_TRUE(succeeded(merge({"a.pcd", "b.pcd"})));
+  const nlohmann::json part = graspmap_test::json_of("a.pcd.json");
+  const nlohmann::json whole = graspmap_test::json_of("merged.pcd.json");
+  EXPECT_EQ(whole.at("command"), "merge");
+  EXPECT_EQ(whole.at("frame"), part.at("frame"));
+  EXPECT_EQ(whole.at("transforms"), part.at("transforms"));
+  EXPECT_EQ(whole.at("parameters").at("method"), "corrected");
+  EXPECT_FALSE(whole.at("parameters").contains("tile"));
+  EXPECT_EQ(whole.at("inputs").size(), 2U);
+  EXPECT_EQ(whole.at("results").at("scored_voxels"),
+            part.at("results").at("scored_voxels").get<int>() +
+                graspmap_test::json_of("b.pcd.json").at("results").at("scored_voxels").get<int>());
+}
+
+TEST_F(Merge, MissingShare) {
+  EXPECT_TRUE(bad_input(merge({"a.pcd"}), {"1 of 2 shares"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "none.pcd"}), {"none.pcd"}));
+}
+
+TEST_F(Merge, ShareTwice) {
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "a.pcd"}), {"a.pcd", "two files hold this share"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd", "b.pcd"}), {"b.pcd"}));
+}
+
+TEST_F(Merge, SharesOfDifferentScenarios) {
+  ASSERT_TRUE(succeeded(share("other.pcd", "2/2", {"--extra-void-layers", "2"})));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "other.pcd"}), {"other.pcd", "extra_void_layers"}));
+  ASSERT_TRUE(succeeded(share("other.pcd", "2/2", {"--set", "gripper.opening_angle_deg=80"})));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "other.pcd"}), {"gripper.opening_angle_deg"}));
+  ASSERT_TRUE(succeeded(share("first.pcd", "1/2", {"--set", "gripper.opening_angle_deg=80"})));
+  EXPECT_TRUE(bad_input(merge({"first.pcd", "b.pcd"}), {"gripper.opening_angle_deg"}));
+  ASSERT_TRUE(succeeded(share("third.pcd", "3/3", {})));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "third.pcd"}), {"third.pcd", "3/3"}));
+}
+
+TEST_F(Merge, SharesOfDifferentInputs) {
+  const std::string gripper =
+      graspmap_test::read_text(graspmap_test::source_folder() / "data/grippers/scar-e.yaml");
+  graspmap_test::write_text(scratch("g.yaml"), gripper);
+  ASSERT_TRUE(succeeded(share("c.pcd", "1/2", {"--gripper", "g.yaml"})));
+  graspmap_test::write_text(scratch("g.yaml"), gripper + "# changed\n");
+  ASSERT_TRUE(succeeded(share("d.pcd", "2/2", {"--gripper", "g.yaml"})));
+  EXPECT_TRUE(bad_input(merge({"c.pcd", "d.pcd"}), {"d.pcd", "other inputs"}));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "terrain.pcd", "t2.pcd", "--encoding", "ascii"})));
+  std::filesystem::rename(scratch("t2.pcd"), scratch("terrain.pcd"));
+  ASSERT_TRUE(succeeded(share("e.pcd", "2/2", {})));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "e.pcd"}), {"e.pcd", "other inputs"}));
+}
+
+TEST_F(Merge, CloudsThatAreNoShares) {
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "terrain.pcd"}), {"terrain.pcd", "no manifest"}));
+  graspmap_test::write_text(scratch("b.pcd.json"), "{");
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {"b.pcd.json"}));
+  EXPECT_TRUE(bad_input(graspmap({"merge", "a.pcd", "-o", "merged.xyz"}), {"merged.xyz"}));
+}
+
+}  // namespace
