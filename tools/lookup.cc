@@ -53,10 +53,10 @@ void lookup(const LookupCommandOptions& options, Run& run) {
   const libmap::Table table = libmap::read_csv(options.points);
   std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
+  if (map.empty()) throw libmap::Error("the map has no points", {.file = options.map});
   const libmap::Pose transform =
       graspmap_tools::map_from_points(options.map, options.points_frame, run);
   for (Eigen::Vector3d& position : positions) position = transform * position;
-  if (map.empty()) throw libmap::Error("the map has no points", {.file = options.map});
   if (run.dry_run()) return;
   const std::vector<libgtd::LookupAnswer> answers =
       run.timed("look-up", [&] { return libgtd::look_up(map, positions, options.lookup); });

@@ -76,7 +76,7 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
                                                    table.columns[column] + "'",
                                           .value = "'" + cell + "'",
                                           .bound = "1, 0 or empty"});
-  return *verdict ? libmap::Verdict::positive : libmap::Verdict::negative;
+  return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
 }
 
 std::vector<libmap::Marker> read_markers(const RenderOptions& options,

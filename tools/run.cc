@@ -27,6 +27,14 @@ bool written_by_this_toolkit(const fs::path& output) {
   }
 }
 
+// A file of the user's own that happens to stand where the manifest will.
+void require_no_foreign_manifest(const fs::path& output) {
+  const fs::path manifest = libmap::manifest_path(output);
+  if (fs::exists(manifest) && !written_by_this_toolkit(output))
+    throw libmap::Error("exists and is no manifest of graspmap: --force overwrites it",
+                        {.file = manifest.string()});
+}
+
 }  // namespace
 
 fs::path toolkit_data_folder() {
@@ -67,10 +75,7 @@ void Run::claim_output(const fs::path& path) {
   if (fs::exists(path) && !options_.force && !written_by_this_toolkit(path))
     throw libmap::Error("exists and was not written by graspmap: --force overwrites it",
                         {.file = path.string()});
-  const fs::path manifest = libmap::manifest_path(path);
-  if (fs::exists(manifest) && !options_.force && !written_by_this_toolkit(path))
-    throw libmap::Error("exists and is no manifest of graspmap: --force overwrites it",
-                        {.file = manifest.string()});
+  if (!options_.force) require_no_foreign_manifest(path);
   // Made and dropped at once: a folder that is missing or read-only is found before the work.
   if (!options_.dry_run) const libmap::OutputFile probe(path);
 }
@@ -104,6 +109,7 @@ void Run::claim_output_folder(const fs::path& given) {
       !written_by_this_toolkit(folder))
     throw libmap::Error("is not empty and was not written by graspmap: --force writes into it",
                         {.file = folder.string()});
+  if (!options_.force) require_no_foreign_manifest(folder);
 }
 
 void Run::begin_output_folder(const fs::path& given) {

@@ -256,6 +256,7 @@ void check_options(const InterpolationOptions& options) {
   };
   check("max_edge_m", options.max_edge_m);
   check("grid_spacing_m", options.grid_spacing_m);
+  check("max_grid_spacing_m", options.max_grid_spacing_m);
   check("area_cell_m", options.area_cell_m);
 }
 
@@ -290,9 +291,10 @@ HeightGrid make_grid(const std::vector<Vector3d>& points, const InterpolationOpt
   }
   result.area_m2 = occupied_area(points, box, options.area_cell_m);
   const double density = static_cast<double>(points.size()) / result.area_m2;
-  const double spacing = result.grid_spacing_m = options.grid_spacing_m > 0
-                                                     ? options.grid_spacing_m
-                                                     : 1 / std::sqrt(density * 5 / 3);  // eq. 3-5
+  double spacing = options.grid_spacing_m > 0 ? options.grid_spacing_m
+                                              : 1 / std::sqrt(density * 5 / 3);  // eq. 3-5
+  if (options.max_grid_spacing_m > 0) spacing = std::min(spacing, options.max_grid_spacing_m);
+  result.grid_spacing_m = spacing;
   check_grid(box, spacing, options.max_nodes);
   return {lattice(box.min_x, box.max_x, spacing), lattice(box.min_y, box.max_y, spacing), spacing};
 }

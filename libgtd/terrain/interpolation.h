@@ -20,6 +20,9 @@ struct InterpolationOptions {
   double max_edge_m = 0;
   // Pitch of the grid with `corrected`; 0 takes it from eq. 3-5. Tiles that shall agree share one.
   double grid_spacing_m = 0;
+  // Upper bound of the pitch that eq. 3-5 gives, 0 for none: nodes farther apart than the voxels
+  // that they shall fill leave rows of them empty. Corrected only.
+  double max_grid_spacing_m = 0;
   // Side of the square cells whose number measures the area A of eq. 3-5 with `corrected`; 0 takes
   // 4 times the mean spacing of as many points in the bounding box, whose area bounds A then.
   double area_cell_m = 0;

@@ -221,8 +221,10 @@ std::string_view appended_data(std::string_view bytes, bool& base64) {
   if (encoding != "raw" && encoding != "base64")
     throw Error("the appended data have no known encoding");
   base64 = encoding == "base64";
-  const std::size_t begin = bytes.find('_', close);
-  return begin == std::string_view::npos ? std::string_view() : bytes.substr(begin + 1);
+  const std::size_t begin = bytes.find_first_not_of(" \t\r\n", close + 1);
+  if (begin == std::string_view::npos || bytes[begin] != '_')
+    throw Error("the appended data do not begin with '_'");
+  return bytes.substr(begin + 1);
 }
 
 }  // namespace

@@ -61,7 +61,9 @@ PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_sour
   for (Eigen::Vector3d& point : moved.positions) point = target_from_source * point;
   const Eigen::Matrix3f rotation = target_from_source.linear().cast<float>();
   for (Eigen::Vector3f& normal : moved.normals) normal = rotation * normal;
-  moved.viewpoint = target_from_source * cloud.viewpoint;
+  // The identity says that the viewpoint is not known, and a move does not make it known.
+  if (!cloud.viewpoint.matrix().isIdentity(0.0))
+    moved.viewpoint = target_from_source * cloud.viewpoint;
   return moved;
 }
 

@@ -34,7 +34,8 @@ struct PointCloud {
   std::vector<Eigen::Vector3f> normals;
   std::vector<Color> colors;
   std::vector<ScalarField> fields;
-  Pose viewpoint = Pose::Identity();  // cloud_from_sensor, as PCD's VIEWPOINT
+  // cloud_from_sensor, as PCD's VIEWPOINT; the identity where it is not known.
+  Pose viewpoint = Pose::Identity();
 
   std::size_t size() const { return positions.size(); }
   bool empty() const { return positions.empty(); }
@@ -55,7 +56,8 @@ struct PointCloud {
 // The points of `cloud` at `indices`, in that order, with all that belongs to them.
 PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>& indices);
 
-// The cloud moved: positions and viewpoint by `target_from_source`, normals by its rotation.
+// The cloud moved: positions and a known viewpoint by `target_from_source`, normals by its
+// rotation.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
 struct Bounds3d {

@@ -11,17 +11,18 @@ namespace libmap {
 struct ScoreClass {
   double min_score = 0.0;  // of 0..1
   Color color{};
+  const char* text = "";
 };
 
 // From the best to the worst: dark green, green, yellow-green, yellow, light orange, orange, red.
 inline constexpr std::array<ScoreClass, 7> score_classes{{
-    {0.9, {0, 100, 0}},
-    {0.8, {50, 180, 50}},
-    {0.7, {173, 223, 47}},
-    {0.6, {255, 235, 0}},
-    {0.5, {255, 195, 100}},
-    {0.4, {255, 130, 0}},
-    {-std::numeric_limits<double>::infinity(), {215, 25, 28}},
+    {0.9, {0, 100, 0}, "0.9 and above"},
+    {0.8, {34, 170, 34}, "0.8 to 0.9"},
+    {0.7, {154, 205, 50}, "0.7 to 0.8"},
+    {0.6, {255, 235, 0}, "0.6 to 0.7"},
+    {0.5, {255, 200, 110}, "0.5 to 0.6"},
+    {0.4, {255, 140, 0}, "0.4 to 0.5"},
+    {-std::numeric_limits<double>::infinity(), {214, 24, 24}, "below 0.4"},
 }};
 inline constexpr Color below_plane_color{255, 255, 255};
 inline constexpr Color no_value_color{128, 128, 128};

@@ -11,23 +11,6 @@
 namespace libmap {
 namespace {
 
-struct ScoreClass {
-  double from;
-  Color color;
-  const char* text;
-};
-constexpr std::array<ScoreClass, 7> score_classes{{
-    {0.9, {0, 100, 0}, "0.9 and above"},
-    {0.8, {34, 170, 34}, "0.8 to 0.9"},
-    {0.7, {154, 205, 50}, "0.7 to 0.8"},
-    {0.6, {255, 235, 0}, "0.6 to 0.7"},
-    {0.5, {255, 200, 110}, "0.5 to 0.6"},
-    {0.4, {255, 140, 0}, "0.4 to 0.5"},
-    {-std::numeric_limits<double>::infinity(), {214, 24, 24}, "below 0.4"},
-}};
-// Single precision rounds 0.9 to 0.89999998.
-constexpr double score_tolerance = 1e-6;
-
 // Every 15th of matplotlib's 256 entries; between them the map is linear to within a byte.
 constexpr std::array<std::array<double, 3>, 18> viridis_points{{
     {0.267004, 0.004874, 0.329415},
@@ -236,13 +219,6 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
       break;
   }
   return result;
-}
-
-Color score_color(double score) {
-  if (std::isnan(score)) return no_value_color;
-  for (const ScoreClass& entry : score_classes)
-    if (score >= entry.from - score_tolerance) return entry.color;
-  return score_classes.back().color;
 }
 
 Legend score_legend() {

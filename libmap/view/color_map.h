@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/score_color.h"
 
 namespace libmap {
 
@@ -69,10 +70,7 @@ struct ColoredPoints {
 // colours asked of data without any, a colour that is none.
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring);
 
-// The class of a graspability score in 0..1: >= 0.9 dark green, >= 0.8 green, >= 0.7 yellow-green,
-// >= 0.6 yellow, >= 0.5 light orange, >= 0.4 orange, else red. A bound is met from 1e-6 below it,
-// so that a score that was stored in single precision keeps its class. NaN is grey.
-Color score_color(double score);
+// The classes of core/score_color.h.
 Legend score_legend();
 
 // viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is grey.
@@ -82,8 +80,6 @@ Color viridis(double t);
 // Throws Error naming `field`.
 Color parse_color(std::string_view text, const std::string& field);
 
-inline constexpr Color below_plane_color{255, 255, 255};
-inline constexpr Color no_value_color{128, 128, 128};
 inline constexpr Color convex_color{40, 90, 220};
 inline constexpr Color intersection_color{0, 100, 0};
 inline constexpr Color rest_color{211, 211, 211};

@@ -144,9 +144,9 @@ void draw_arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double w
 
 Color verdict_color(Verdict verdict) {
   switch (verdict) {
-    case Verdict::positive:
+    case Verdict::pass:
       return {0, 140, 50};
-    case Verdict::negative:
+    case Verdict::fail:
       return {205, 20, 20};
     case Verdict::none:
       break;

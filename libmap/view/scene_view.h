@@ -39,7 +39,7 @@ struct SceneLayer {
 };
 
 // What is known of a marked place: green, red, or dark before there is a verdict.
-enum class Verdict { none, positive, negative };
+enum class Verdict { none, pass, fail };
 
 // A labelled point, drawn over everything. One that the view does not contain is left out.
 struct Marker {

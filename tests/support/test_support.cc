@@ -29,6 +29,9 @@ class ScratchCleaner : public testing::EmptyTestEventListener {
   fs::path folder;
   void OnTestEnd(const testing::TestInfo& info) override {
     if (!folder.empty() && info.result()->Passed()) fs::remove_all(folder);
+    // The folder of this process, if this was the last in it.
+    std::error_code not_empty;
+    if (!folder.empty()) fs::remove(folder.parent_path(), not_empty);
     folder.clear();
   }
 };

@@ -61,6 +61,9 @@ TEST(Evaluate, ForeignFolderIsKept) {
   EXPECT_EQ(content("mine/roc.csv"), "precious");
   EXPECT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "mine", "--force"})));
   EXPECT_NE(content("mine/roc.csv"), "precious");
+  write_text(scratch("other.json"), "{\"mine\": 1}");
+  EXPECT_TRUE(bad_input(graspmap({"evaluate", "t.csv", "-o", "other"}), {"other.json", "--force"}));
+  EXPECT_EQ(content("other.json"), "{\"mine\": 1}");
 }
 
 TEST(Evaluate, BadInputLeavesNothing) {

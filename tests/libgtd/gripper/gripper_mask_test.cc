@@ -34,10 +34,9 @@ TEST_P(ReferenceMask, EveryVoxelAgrees) {
   const MaskCase& given = GetParam();
   Gripper gripper = gripper_named(given.gripper);
   gripper.opening_angle_deg = given.opening_angle_deg;
-  const GripperMask mask =
-      libgtd::make_gripper_mask(gripper, {given.method, given.voxel_size_m, given.extra_void_layers});
-  const auto reference =
-      graspmap_test::read_mask(graspmap_test::reference_folder() / given.file);
+  const GripperMask mask = libgtd::make_gripper_mask(
+      gripper, {given.method, given.voxel_size_m, given.extra_void_layers});
+  const auto reference = graspmap_test::read_mask(graspmap_test::reference_folder() / given.file);
   ASSERT_EQ(reference.dims, (std::array<int, 3>{mask.side, mask.side, mask.layers}));
   int differences = 0;
   for (int z = 0; z < mask.layers; ++z)
@@ -49,17 +48,18 @@ TEST_P(ReferenceMask, EveryVoxelAgrees) {
   EXPECT_EQ(differences, 0);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    All, ReferenceMask,
-    testing::Values(
-        MaskCase{"gtd/mask.thesis.scar-e.10mm.txt", "scar-e", 85, Method::thesis, 0.01, 1, false},
-        MaskCase{"gtd/mask.thesis.scar-e.5mm.txt", "scar-e", 85, Method::thesis, 0.005, 5, false},
-        MaskCase{"gtd/mask.thesis.hubrobo.1mm.txt", "hubrobo", 75, Method::thesis, 0.001, 3, false},
-        MaskCase{"gtd/mask.envelope.scar-e.10mm.txt", "scar-e", 80, Method::envelope, 0.01, 1,
-                 false},
-        MaskCase{"gtd/mask.envelope.hubrobo.1mm.txt", "hubrobo", 75, Method::envelope, 0.001, 3,
-                 false},
-        MaskCase{"climblab/mask.hubrobo.1mm.txt", "hubrobo", 75, Method::climblab, 0.001, 0,
-                 true}));
+INSTANTIATE_TEST_SUITE_P(All, ReferenceMask,
+                         testing::Values(MaskCase{"gtd/mask.thesis.scar-e.10mm.txt", "scar-e", 85,
+                                                  Method::thesis, 0.01, 1, false},
+                                         MaskCase{"gtd/mask.thesis.scar-e.5mm.txt", "scar-e", 85,
+                                                  Method::thesis, 0.005, 5, false},
+                                         MaskCase{"gtd/mask.thesis.hubrobo.1mm.txt", "hubrobo", 75,
+                                                  Method::thesis, 0.001, 3, false},
+                                         MaskCase{"gtd/mask.envelope.scar-e.10mm.txt", "scar-e", 80,
+                                                  Method::envelope, 0.01, 1, false},
+                                         MaskCase{"gtd/mask.envelope.hubrobo.1mm.txt", "hubrobo",
+                                                  75, Method::envelope, 0.001, 3, false},
+                                         MaskCase{"climblab/mask.hubrobo.1mm.txt", "hubrobo", 75,
+                                                  Method::climblab, 0.001, 0, true}));
 
 }  // namespace

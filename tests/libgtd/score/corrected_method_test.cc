@@ -1,7 +1,11 @@
 // One test for each fault of the author's program that method `corrected` must not have.
 #include <gtest/gtest.h>
 
+#include <array>
+#include <cmath>
 #include <map>
+#include <set>
+#include <utility>
 
 #include "libgtd/detect.h"
 #include "libgtd/score/scoring.h"
@@ -210,6 +214,21 @@ TEST(Corrected, InterpolationIsAsFineAsItsEquation) {
   const double area = 0.6 * 0.6;
   const double spacing = 1.0 / std::sqrt(static_cast<double>(cloud.size()) / area * 5.0 / 3.0);
   EXPECT_NEAR(result.grid_spacing_m, spacing, 0.15 * spacing);
+}
+
+// A grid coarser than the voxels would leave rows of voxels empty.
+TEST(Corrected, InterpolationFillsEveryVoxelColumn) {
+  DetectionOptions options = corrected_options();
+  options.plane = PlaneSource::none;
+  options.scenario.interpolation = true;
+  PointCloud sparse = bumpy_cloud(0.6, 0.05);
+  const auto result = detect(sparse, options);
+  EXPECT_LE(result.grid_spacing_m, 0.009);
+  std::set<std::pair<int, int>> columns;
+  for (const MapVoxel& one : result.map.voxels) columns.insert({one.voxel.i, one.voxel.j});
+  for (int i = result.grid_min.i + 1; i < result.grid_max.i; ++i)
+    for (int j = result.grid_min.j + 1; j < result.grid_max.j; ++j)
+      EXPECT_TRUE(columns.contains({i, j})) << i << " " << j;
 }
 
 // Fault 13: curvature without a sign, and convex areas cut in half toward the origin.

@@ -228,6 +228,21 @@ TEST(Bump, bends_a_tilted_ground_along_the_grounds_normal) {
   }
 }
 
+TEST(Profile, a_share_of_the_area_lies_before_the_point_that_marks_it) {
+  for (const ProfileSegment& segment :
+       {ProfileSegment::line({0.0, 0.3}, {0.2, 0.0}), ProfileSegment::line({0.2, 0.0}, {0.0, 0.0}),
+        ProfileSegment::line({0.2, 0.3}, {0.2, 0.0}), ProfileSegment::arc(0.1, 0.2, 0.0, pi),
+        ProfileSegment::arc(0.1, 0.2, 0.5 * pi, pi)}) {
+    for (int i = 0; i < 50; ++i) {
+      const double t0 = uniform(0.0, 0.7);
+      const double t1 = uniform(t0 + 0.01, 1.0);
+      const double share = uniform(0.0, 1.0);
+      const double t = segment.t_of_area_share(t0, t1, share);
+      EXPECT_NEAR(segment.area_between(t0, t), share * segment.area_between(t0, t1), 1e-14);
+    }
+  }
+}
+
 TEST(SignedDistance, is_the_closed_form_of_each_solid) {
   const auto distance = [](ShapeGeometry geometry, double x, double y, double z) {
     return signed_distance(scene_of({{std::move(geometry), {}, {}}}), {x, y, z});

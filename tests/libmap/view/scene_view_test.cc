@@ -230,8 +230,8 @@ TEST_F(SceneViewTest, MarkersLieOverTheTerrainAndTakeTheirVerdictsColour) {
   Scene scene;
   scene.layers.push_back(
       colored_points({{-1, -1, 9}, {1, 1, 9}, {0, 0, 9}}, {blue, blue, blue}, 1.2));
-  scene.markers = {{{0, 0, 0}, "P1", Verdict::positive},
-                   {{-0.5, 0.5, 0}, "P2", Verdict::negative},
+  scene.markers = {{{0, 0, 0}, "P1", Verdict::pass},
+                   {{-0.5, 0.5, 0}, "P2", Verdict::fail},
                    {{0.5, -0.5, 0}, "", Verdict::none}};
   SceneViewOptions options = bare(600, 600);
   const Image image = render_scene(scene, options);

@@ -1,0 +1,34 @@
+#!/bin/sh
+# The embedded example, on a coarser cloud: all results appear, tiles of any share give the map that
+# one process gives, a second run does nothing, and a run that lost files makes them again.
+. "$(dirname "$0")/check.sh"
+out=$scratch/demo
+
+run() {
+  make --no-print-directory -f "$source/pipelines/primitive_shapes.mk" OUT="$out" SPACING=0.02 \
+    SHARES=3 GRASPMAP="$graspmap" "$@"
+}
+
+run -j2
+for method in thesis corrected; do
+  folder=$out/$method
+  require_files "$folder/map.pcd" "$folder/map.vtp" "$folder/map.pcd.json" "$folder/top.png" \
+    "$folder/oblique.png" "$folder/curvature.png" "$folder/roc.png" \
+    "$folder/evaluation/summary.md" "$folder/evaluation/roc.svg"
+  # A header and 12 places, each answered.
+  [ "$(wc -l <"$folder/lookup.csv")" -eq 13 ] || fail "$folder/lookup.csv has not 12 places"
+  "$graspmap" score "$out/terrain.pcd" --config primitive_shapes_prescan --method "$method" \
+    -o "$scratch/whole.pcd" --quiet
+  cmp "$scratch/whole.pcd" "$folder/map.pcd" || fail "the $method map depends on its shares"
+done
+
+before=$(listing "$out")
+run -j2
+[ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
+
+map=$(sha256sum <"$out/thesis/map.pcd")
+rm "$out/thesis/tiles/2-of-3.pcd" "$out/thesis/top.png"
+run
+[ "$map" = "$(sha256sum <"$out/thesis/map.pcd")" ] || fail "the map made again differs"
+require_files "$out/thesis/top.png"
+echo "passed"

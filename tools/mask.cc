@@ -1,0 +1,104 @@
+// graspmap mask: a gripper's mask as text, cloud or picture.
+#include <fmt/format.h>
+
+#include <string>
+
+#include "libgtd/gripper/gripper_io.h"
+#include "libgtd/gripper/gripper_mask.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/file_output.h"
+#include "libmap/view/scene_view.h"
+#include "tools/command_line.h"
+
+namespace {
+
+using graspmap_tools::Run;
+using libgtd::GripperMask;
+
+struct MaskOptions {
+  std::string output;
+  std::string gripper = "scar-e";
+  std::vector<std::pair<std::string, std::string>> overrides;
+  libgtd::GripperMaskOptions mask;
+  libmap::Viewpoint view = libmap::Viewpoint::oblique;
+};
+
+void bind(libmap::ParameterTable& table, MaskOptions& options) {
+  table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
+  table.add_overrides("gripper", options.overrides);
+  table.add("method", options.mask.method, libgtd::method_names(), "whose design");
+  table.add("voxel_size_m", options.mask.voxel_size_m, libmap::positive, "edge of a voxel, m");
+  table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
+            "void layers on top (H_add), voxels");
+  table.add("view", options.view, libmap::viewpoint_names(), "from where a picture is taken");
+}
+
+// A point at the centre of each solid voxel, the pivot in the origin, with the fields layer (from
+// the lowest, 0) and counted.
+libmap::PointCloud to_cloud(const GripperMask& mask) {
+  libmap::PointCloud cloud;
+  std::vector<double> layers;
+  std::vector<double> counted;
+  for (int x = 0; x < mask.side; ++x)
+    for (int y = 0; y < mask.side; ++y)
+      for (int z = 0; z < mask.layers; ++z) {
+        if (!mask.is_solid(x, y, z)) continue;
+        cloud.positions.push_back(mask.voxel_size_m * Eigen::Vector3d(x - mask.pivot_xy,
+                                                                      y - mask.pivot_xy,
+                                                                      z - mask.pivot_z));
+        layers.push_back(z);
+        counted.push_back(mask.is_counted(x, y, z) ? 1.0 : 0.0);
+      }
+  cloud.add_field("layer", libmap::ScalarType::uint16).values = layers;
+  cloud.add_field("counted", libmap::ScalarType::uint8).values = counted;
+  return cloud;
+}
+
+std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
+  libmap::SceneLayer layer;
+  layer.shape = to_cloud(mask);
+  layer.coloring.mode = libmap::ColorMode::field;
+  layer.coloring.field = "layer";
+  layer.point_shape = libmap::PointShape::cube;
+  layer.point_size_m = mask.voxel_size_m;
+  libmap::SceneViewOptions view;
+  view.view = options.view;
+  view.title = fmt::format("{} mask, {}, {} mm", options.gripper, name_of(mask.method),
+                           libmap::to_text(static_cast<float>(mask.voxel_size_m * 1000.0)));
+  libmap::Scene scene;
+  scene.layers.push_back(layer);
+  return libmap::to_png(libmap::render_scene(scene, view));
+}
+
+void mask(const MaskOptions& options, Run& run) {
+  run.claim_output(options.output);
+  const auto file = graspmap_tools::find_data_file("grippers", options.gripper);
+  const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
+  const GripperMask made = libgtd::make_gripper_mask(gripper, options.mask);
+  if (run.dry_run()) return;
+  run.add_input(file);
+  run.manifest().frame = "mask";
+  run.manifest().results.emplace_back("side_voxels", static_cast<std::int64_t>(made.side));
+  run.manifest().results.emplace_back("layers", static_cast<std::int64_t>(made.layers));
+  run.say(fmt::format("{} x {} x {} voxels", made.side, made.side, made.layers));
+  const std::string extension = std::filesystem::path(options.output).extension().string();
+  run.write_output(options.output, [&](const auto& temporary) {
+    if (extension == ".txt")
+      libmap::write_text(temporary, to_text(made));
+    else if (extension == ".png")
+      libmap::write_text(temporary, to_picture(made, options));
+    else
+      libmap::write_cloud(temporary, to_cloud(made));
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  MaskOptions options;
+  graspmap_tools::Command command("mask", "A gripper's mask as text, cloud or picture.");
+  command.output(options.output,
+                 "layers as text (.txt), solid voxels as a cloud (.vtp .pcd .ply .csv), or .png");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { mask(options, run); });
+}
