@@ -69,10 +69,13 @@ std::vector<Eigen::Vector3d> surface_points(const PointCloud& terrain, const Sce
                                             DetectionResult& result) {
   if (!scenario.interpolation) return terrain.positions;
   return timed(result, "interpolation", [&] {
-    InterpolationResult filled = interpolate(
-        terrain, {.method = follows_thesis(scenario.method) ? InterpolationMethod::thesis
-                                                            : InterpolationMethod::corrected,
-                  .max_edge_m = scenario.interpolation_max_edge_m});
+    InterpolationOptions options;
+    options.method = follows_thesis(scenario.method) ? InterpolationMethod::thesis
+                                                     : InterpolationMethod::corrected;
+    options.max_edge_m = scenario.interpolation_max_edge_m;
+    // A node in each voxel: below its edge, so that rounding leaves none out.
+    options.max_grid_spacing_m = 0.9 * scenario.voxel_size_m;
+    InterpolationResult filled = interpolate(terrain, options);
     result.grid_spacing_m = filled.grid_spacing_m;
     result.interpolated_points = filled.cloud.size();
     // The author's program goes on with the grid alone; measured points are worth keeping.

@@ -85,6 +85,9 @@ void Run::write_manifest(const fs::path& output) {
 }
 
 void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
+  for (const libmap::ManifestInput& input : manifest_.inputs)
+    if (fs::exists(path) && fs::exists(input.path) && fs::equivalent(path, input.path))
+      throw libmap::Error("is the input: the output needs another name", {.file = path.string()});
   libmap::OutputFile output(path);
   try {
     timed("write", [&] { writer(output.temporary_path()); });

@@ -226,9 +226,9 @@ void require_cells(vtkCellArray* cells, vtkIdType points, const std::string& wha
 }
 
 vtkSmartPointer<vtkPolyData> read_poly_data(const std::string& bytes) {
-  require_sane_vtp(bytes);
   try {
     const VtkMessages messages;
+    require_sane_vtp(bytes);
     vtkNew<vtkXMLPolyDataReader> reader;
     reader->ReadFromInputStringOn();
     reader->SetInputString(bytes);

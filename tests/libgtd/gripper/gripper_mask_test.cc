@@ -27,6 +27,8 @@ struct MaskCase {
   bool top_first;  // ClimbLab's file begins with the top layer
 };
 
+void PrintTo(const MaskCase& given, std::ostream* out) { *out << given.file; }
+
 class ReferenceMask : public testing::TestWithParam<MaskCase> {};
 
 TEST_P(ReferenceMask, EveryVoxelAgrees) {

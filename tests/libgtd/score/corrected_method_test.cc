@@ -223,7 +223,7 @@ TEST(Corrected, InterpolationFillsEveryVoxelColumn) {
   options.scenario.interpolation = true;
   PointCloud sparse = bumpy_cloud(0.6, 0.05);
   const auto result = detect(sparse, options);
-  EXPECT_LE(result.grid_spacing_m, 0.009);
+  EXPECT_LE(result.grid_spacing_m, 0.01);
   std::set<std::pair<int, int>> columns;
   for (const MapVoxel& one : result.map.voxels) columns.insert({one.voxel.i, one.voxel.j});
   for (int i = result.grid_min.i + 1; i < result.grid_max.i; ++i)

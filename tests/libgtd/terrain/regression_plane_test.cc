@@ -326,6 +326,8 @@ struct ReferenceCase {
   float leaf_m;
 };
 
+void PrintTo(const ReferenceCase& set, std::ostream* out) { *out << set.frame; }
+
 class RegressionPlaneReference : public testing::TestWithParam<ReferenceCase> {
  protected:
   // The author's program thins the cloud before it fits the plane.
