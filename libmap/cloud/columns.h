@@ -2,6 +2,7 @@
 // memory that somebody else keeps, so that neither reading nor writing copies a cloud.
 #pragma once
 
+#include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
@@ -10,7 +11,7 @@
 #include <optional>
 #include <string>
 #include <string_view>
-#include <type_traits>
+#include <utility>
 #include <vector>
 
 #include "libmap/cloud/geometry_file.h"

@@ -54,14 +54,18 @@ std::optional<XmlTag> next_tag(std::string_view xml, std::size_t& at) {
   }
 }
 
+// A piece of the file for an error's single line.
+std::string quotable(std::string_view text) {
+  return std::string(text.substr(0, std::min<std::size_t>(text.find_first_of("\r\n"), 40)));
+}
+
 void require_sane(bool sane, const XmlTag& tag, std::string_view attribute) {
   if (sane) return;
-  throw Error(
-      "nothing that this file can hold",
-      {.file = {},
-       .field = std::string(tag.name.substr(0, 40)) + " " + std::string(attribute.substr(0, 40)),
-       .value = "'" + std::string(tag.attribute(attribute).substr(0, 40)) + "'",
-       .bound = {}});
+  throw Error("nothing that this file can hold",
+              {.file = {},
+               .field = quotable(tag.name) + " " + quotable(attribute),
+               .value = "'" + quotable(tag.attribute(attribute)) + "'",
+               .bound = {}});
 }
 
 struct NumberType {

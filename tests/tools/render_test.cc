@@ -1,0 +1,73 @@
+#include <gtest/gtest.h>
+
+#include "libmap/cloud/cloud_io.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::wrong_usage;
+
+// Width and height from the header of a PNG file (RFC 2083, 4.1.1), big-endian.
+std::pair<unsigned, unsigned> png_size(const std::string& bytes) {
+  EXPECT_EQ(bytes.substr(1, 3), "PNG");
+  const auto number = [&](std::size_t at) {
+    unsigned value = 0;
+    for (std::size_t n = at; n < at + 4; ++n)
+      value = value * 256 + static_cast<unsigned char>(bytes[n]);
+    return value;
+  };
+  return {number(16), number(20)};
+}
+
+TEST(Render, CloudWithMarkedPoints) {
+  graspmap_test::write_terrain();
+  graspmap_test::write_text(scratch("points.csv"),
+                            "id,x,y,z,graspable\nA,0,0,0,1\nB,0.1,0.1,0,0\nC,-0.1,0,0,\n");
+  const std::vector<std::string> words = {"render",    "terrain.pcd", "--points", "points.csv",
+                                          "--verdict", "graspable",   "--width",  "320",
+                                          "--height",  "240",         "-o"};
+  for (const char* name : {"a.png", "b.png"}) {
+    std::vector<std::string> call = words;
+    call.emplace_back(name);
+    ASSERT_TRUE(succeeded(graspmap(call)));
+  }
+  EXPECT_EQ(png_size(content("a.png")), (std::pair{320U, 240U}));
+  EXPECT_EQ(content("a.png"), content("b.png"));
+}
+
+TEST(Render, NeedsNoDisplay) {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(succeeded(
+      graspmap({"render", "terrain.pcd", "-o", "a.png", "--width", "64", "--height", "64"},
+               {{"DISPLAY", ""}})));
+  EXPECT_EQ(png_size(content("a.png")), (std::pair{64U, 64U}));
+}
+
+TEST(Render, BadInputIsOneLine) {
+  graspmap_test::write_terrain();
+  libmap::write_cloud(scratch("empty.pcd"), {});
+  graspmap_test::write_text(scratch("points.csv"), "id,x,y,z,graspable\nA,0,0,0,maybe\n");
+  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "a.png"}), {"none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "empty.pcd", "-o", "a.png"}), {"empty.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.jpg"}), {"a.jpg", ".png"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--width", "0"}),
+                        {"--width", "16384"}));
+  EXPECT_TRUE(bad_input(
+      graspmap({"render", "terrain.pcd", "-o", "a.png", "--color", "field", "--field", "scroe"}),
+      {"scroe"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--view", "tpo"}),
+                        {"--view", "tpo", "top"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--points", "points.csv",
+                                  "--verdict", "graspable"}),
+                        {"points.csv", "maybe"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"render", "terrain.pcd", "-o", "a.png", "--wdith", "3"}),
+                          {"--wdith", "--width"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("a.png")));
+}
+
+}  // namespace
