@@ -18,6 +18,17 @@ float distance(double center, int x, int y) {
   return static_cast<float>(std::hypot(center - x, center - y));
 }
 
+// A byte each for `solid` and `counted`.
+constexpr double max_mask_voxels = 0x1p28;
+
+libmap::Error too_small(double voxel_size_m, double mask_voxels) {
+  const double gigabytes = 2.0 * mask_voxels / 0x1p30;
+  return libmap::Error("too small for this gripper: its mask alone would take " +
+                           libmap::to_text(static_cast<float>(gigabytes)) + " GiB, more than " +
+                           libmap::to_text(2.0 * max_mask_voxels / 0x1p30) + " GiB",
+                       {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
+}
+
 void allocate(GripperMask& mask) {
   const double voxels = static_cast<double>(mask.side) * mask.side * mask.layers;
   if (mask.side < 3 || mask.solid_layers < 2)
@@ -25,10 +36,7 @@ void allocate(GripperMask& mask) {
                             std::to_string(mask.side) + " voxels a side and " +
                             std::to_string(mask.solid_layers) + " layers",
                         {.field = "voxel_size_m", .value = libmap::to_text(mask.voxel_size_m)});
-  if (voxels > 0x1p31)
-    throw libmap::Error(
-        "the gripper mask would have " + libmap::to_text(voxels) + " voxels, more than 2^31",
-        {.field = "voxel_size_m", .value = libmap::to_text(mask.voxel_size_m)});
+  if (voxels > max_mask_voxels) throw too_small(mask.voxel_size_m, voxels);
   mask.solid.assign(static_cast<std::size_t>(voxels), 0);
   mask.counted.assign(static_cast<std::size_t>(voxels), 1);
 }
@@ -166,9 +174,6 @@ GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& opt
   const double slack = 1e-9;
   const double rings = std::floor(half / voxel_mm + slack);
   const double depth_layers = std::ceil(gripper.closing_height_mm / voxel_mm - slack);
-  if (!(rings < 0x1p20 && depth_layers < 0x1p20))
-    throw libmap::Error("the gripper mask would be more than 2^21 voxels wide",
-                        {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
   GripperMask mask =
       empty_mask(options, 2 * static_cast<int>(rings) + 1, static_cast<int>(depth_layers));
   mask.pivot_z = mask.solid_layers - 1;
@@ -216,10 +221,14 @@ GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& 
     throw libmap::Error("out of range", {.field = "extra_void_layers",
                                          .value = std::to_string(options.extra_void_layers),
                                          .bound = ">= 0 and <= 10000"});
-  // Below this the measures in voxels would not fit their integers.
-  if (options.voxel_size_m < 1e-7)
-    throw libmap::Error("the gripper mask would be more than 2^21 voxels wide",
-                        {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
+  // Before the measures in voxels, which might not fit their integers.
+  const double half_m = (gripper.finger_joint_diameter_mm / 2.0 + gripper.finger_length_mm +
+                         gripper.spine_length_mm) /
+                        1000.0;
+  const double side = 2.0 * half_m / options.voxel_size_m;
+  const double layers = gripper.closing_height_mm / 1000.0 / options.voxel_size_m;
+  if (side * side * layers > 4.0 * max_mask_voxels)
+    throw too_small(options.voxel_size_m, side * side * layers);
   switch (options.method) {
     case Method::thesis:
       return make_thesis(gripper, options);

@@ -51,7 +51,8 @@ struct GripperMask {
 };
 
 // Throws Error if the gripper breaks a bound, or if the voxel size gives a mask without a layer or
-// without a ring around its centre, or one of more than 2^31 voxels (it says how many).
+// without a ring around its centre, or one of more than 2^28 voxels (it says how much memory
+// it would take).
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
 // The mask as text, layer by layer from the lowest: "z 0", then `side` lines (x) of `side`

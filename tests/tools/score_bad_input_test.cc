@@ -157,7 +157,7 @@ TEST_F(ScoreBadInput, VoxelSizes) {
                           {"error: voxel_size_m is 10", "mask would have", "voxels a side"}));
     // A mask of 0.27 x 0.27 x 0.09 m holds some 6e15 voxels of that size.
     EXPECT_TRUE(bad_input(with_size(method, "1e-6"),
-                          {"error: voxel_size_m is 1e-06", "voxels, more than 2^31"}));
+                          {"error: voxel_size_m is 1e-06", "its mask alone would take", "GiB"}));
     EXPECT_TRUE(bad_input(with_size(method, "1e-300"), {"error: voxel_size_m is 1e-300"}));
   }
 }
