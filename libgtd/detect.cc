@@ -49,7 +49,11 @@ PointCloud thinned(const PointCloud& cloud, double leaf_m) {
 // The terrain in the terrain frame.
 PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& options,
                            DetectionResult& result) {
-  if (options.plane == PlaneSource::none) return input;
+  if (options.plane == PlaneSource::none) {
+    // No use is made of it, but points in one place or on a line are no terrain in any frame.
+    fit_regression_plane(input);
+    return input;
+  }
   const bool thesis = follows_thesis(options.scenario.method);
   PointCloud cloud = input;
   if (thesis) {
@@ -100,7 +104,7 @@ std::vector<std::size_t> points_near_tiles(const PointCloud& terrain, const Voxe
                                            const std::vector<TileBounds>& tiles, double margin_m) {
   std::vector<std::size_t> near;
   for (std::size_t n = 0; n < terrain.size(); ++n) {
-    const Eigen::Vector3d cell = (terrain.positions[n] - lattice.origin_m) / lattice.voxel_size_m;
+    const Eigen::Vector3d cell = lattice.cell_of(terrain.positions[n]);
     const double margin = margin_m / lattice.voxel_size_m + 1.0;
     for (const TileBounds& tile : tiles)
       if (cell.x() >= tile.i_begin - margin && cell.x() <= tile.i_end + margin &&

@@ -5,7 +5,8 @@
 #
 # POINTS (columns x, y, z; first column: name) may be left out; if it has a column `graspable` (1 or
 # 0), the map is evaluated against it. SCENARIO is a name of data/scenarios or a file. METHOD, if
-# set, replaces the scenario's method. A second run does nothing; a run that was stopped goes on.
+# set, replaces the scenario's method. A second run does nothing; a run that was stopped goes on;
+# other variables or changed files make again what depends on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -13,28 +14,41 @@ SCENARIO ?= artificial_rocks_prescan
 SHARES ?= 8
 METHOD ?=
 SCORE ?=
-TITLE ?= $(basename $(notdir $(SITE)))
+export TITLE ?= $(basename $(notdir $(SITE)))
 
-ifeq ($(strip $(SITE)),)
+# make splits names at spaces; better an error than half a name.
+one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+$(foreach name,SITE POINTS OUT SCENARIO,$(call one_word,$(name)))
+ifeq ($(SITE),)
   $(error SITE is not set: the cloud of the terrain, e.g. SITE=cloud.pcd)
 endif
-ifeq ($(strip $(OUT)),)
+ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
+ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
+  $(error SHARES is '$(SHARES)': it must be a whole number >= 1)
+endif
+ifneq ($(POINTS)$(wildcard $(POINTS)),$(POINTS)$(POINTS))
+  $(error POINTS is '$(POINTS)': no such file)
+endif
+
+# The scenario's file and its gripper's: named ones lie in data/ (beside this folder, installed too).
+data := $(firstword $(wildcard $(here)../data) $(here)..)
+scenario_file := $(firstword $(wildcard $(SCENARIO) $(data)/scenarios/$(SCENARIO).yaml))
+gripper := $(if $(scenario_file),$(shell sed -n 's/^gripper: *\([^ \#]*\).*/\1/p' $(scenario_file)))
+gripper_file := $(firstword $(wildcard $(gripper) $(data)/grippers/$(gripper).yaml))
 
 score_flags := --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
 tiles := $(foreach k,$(shell seq $(SHARES)),$(OUT)/tiles/$(k)-of-$(SHARES).pcd)
-pictures := $(OUT)/top.png $(OUT)/oblique.png $(OUT)/curvature.png
-results := $(OUT)/map.pcd $(OUT)/map.vtp $(pictures)
+results := $(OUT)/map.pcd $(OUT)/map.vtp $(OUT)/top.png $(OUT)/oblique.png $(OUT)/curvature.png
 markers :=
-ifneq ($(strip $(POINTS)),)
+ifneq ($(POINTS),)
   results += $(OUT)/lookup.csv
-  header := $(shell grep -v '^ *\#' '$(POINTS)' | head -n 1 | tr -d '\r' | tr ',' ' ')
-  ifneq ($(filter graspable,$(header)),)
+  markers := --points $(POINTS)
+  columns := $(shell grep -v '^ *\#' '$(POINTS)' | head -n 1 | tr -d '\r' | tr ',' ' ')
+  ifneq ($(filter graspable,$(columns)),)
     results += $(OUT)/roc.png
-    markers := --points $(POINTS) --verdict graspable
-  else
-    markers := --points $(POINTS)
+    markers += --verdict graspable
   endif
 endif
 
@@ -46,12 +60,15 @@ all: $(results)
 $(OUT) $(OUT)/tiles:
 	@mkdir -p $@
 
-# Other parameters make other tiles: the file changes only if they do.
-$(OUT)/parameters: FORCE | $(OUT)
-	@echo '$(score_flags)' | cmp -s - $@ || echo '$(score_flags)' > $@
+# Stamps of the variables that a result depends on: written anew only if they change.
+export scored_with := $(SITE) $(score_flags)
+export shown_with := $(POINTS) $(TITLE)
+$(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
+	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
 # make runs the shares side by side: each process takes one thread.
-$(OUT)/tiles/%-of-$(SHARES).pcd: $(SITE) $(OUT)/parameters $(wildcard $(SCENARIO)) | $(OUT)/tiles
+$(OUT)/tiles/%-of-$(SHARES).pcd: $(SITE) $(OUT)/scored_with $(scenario_file) $(gripper_file) \
+    | $(OUT)/tiles
 	@$(GRASPMAP) score $(SITE) -o $@ $(score_flags) --tile $*/$(SHARES) --threads 1 --quiet
 
 $(OUT)/map.pcd: $(tiles)
@@ -60,20 +77,19 @@ $(OUT)/map.pcd: $(tiles)
 $(OUT)/map.vtp: $(OUT)/map.pcd
 	@$(GRASPMAP) convert $< $@ --quiet
 
-$(OUT)/lookup.csv: $(OUT)/map.pcd $(POINTS)
+$(OUT)/lookup.csv: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
 	@$(GRASPMAP) lookup $< $(POINTS) -o $@
 
-# The chart is the last file of the evaluation's folder that is put in place.
 $(OUT)/roc.png: $(OUT)/lookup.csv
 	@$(GRASPMAP) evaluate $< -o $(OUT)/evaluation --label graspable --score score --quiet \
-	  --title '$(TITLE)'
+	  --title "$$TITLE"
 	@cp $(OUT)/evaluation/roc.png $@
 
-$(OUT)/top.png: $(OUT)/map.pcd $(POINTS)
-	@$(GRASPMAP) render $< -o $@ --view top --color score $(markers) --title '$(TITLE)' --quiet
+$(OUT)/top.png: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
+	@$(GRASPMAP) render $< -o $@ --view top --color score $(markers) --title "$$TITLE" --quiet
 
-$(OUT)/oblique.png: $(OUT)/map.pcd
-	@$(GRASPMAP) render $< -o $@ --view oblique --color score --title '$(TITLE)' --quiet
+$(OUT)/oblique.png: $(OUT)/map.pcd $(OUT)/shown_with
+	@$(GRASPMAP) render $< -o $@ --view oblique --color score --title "$$TITLE" --quiet
 
-$(OUT)/curvature.png: $(OUT)/map.pcd
-	@$(GRASPMAP) render $< -o $@ --view top --color flags --title '$(TITLE): convex areas' --quiet
+$(OUT)/curvature.png: $(OUT)/map.pcd $(OUT)/shown_with
+	@$(GRASPMAP) render $< -o $@ --view top --color flags --title "$$TITLE: convex areas" --quiet

@@ -6,6 +6,7 @@
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <iostream>
+#include <optional>
 #include <thread>
 
 #include "libmap/core/error.h"
@@ -78,10 +79,14 @@ struct Command::Parts {
   std::vector<std::string> overrides;                            // --set
   std::vector<std::pair<std::string, std::string>> flag_values;  // key, text
 
+  fs::path config_file() const {
+    return config_resolver ? config_resolver(config) : fs::path(config);
+  }
   void add_common_options();
   void add_parameter_flags();
   void apply_parameters();
-  int usage_error(const CLI::ParseError& error);
+  std::optional<std::string> unknown_flag(int argc, char** argv) const;
+  int usage_error(const std::string& message) const;
 };
 
 Command::Command(std::string name, std::string summary)
@@ -182,7 +187,7 @@ void Command::Parts::add_parameter_flags() {
 
 void Command::Parts::apply_parameters() {
   if (!config.empty()) {
-    const fs::path path = config_resolver ? config_resolver(config) : fs::path(config);
+    const fs::path path = config_file();
     libmap::set_from_yaml(table, libmap::read_whole_file(path, 1U << 24U), path.string());
   }
   for (const auto& [key, text] : flag_values) {
@@ -202,21 +207,24 @@ void Command::Parts::apply_parameters() {
   }
 }
 
-int Command::Parts::usage_error(const CLI::ParseError& error) {
-  std::string message = error.what();
-  if (dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr) {
-    std::vector<std::string> flags;
-    for (const CLI::Option* option : app.get_options())
-      for (const std::string& flag : option->get_lnames()) flags.push_back("--" + flag);
-    for (const std::string& word : app.remaining()) {
-      message = word.starts_with("-") ? "unknown flag " + word + libmap::did_you_mean(word, flags)
-                                      : "one argument too many: " + word;
-      break;
-    }
+// Long flags that the command does not have, wherever they stand: CLI11 would first ask for
+// arguments that are missing.
+std::optional<std::string> Command::Parts::unknown_flag(int argc, char** argv) const {
+  std::vector<std::string> flags;
+  for (const CLI::Option* option : app.get_options())
+    for (const std::string& flag : option->get_lnames()) flags.push_back("--" + flag);
+  for (int n = 1; n < argc; ++n) {
+    const std::string word = argv[n];
+    if (word == "--") break;
+    const std::string flag = word.substr(0, word.find('='));
+    if (flag.starts_with("--") && std::find(flags.begin(), flags.end(), flag) == flags.end())
+      return "unknown flag " + flag + libmap::did_you_mean(flag, flags);
   }
-  report(name, message, exit_usage);
-  std::cerr << "graspmap " << name << " --help shows what it takes\n";
-  return exit_usage;
+  return std::nullopt;
+}
+
+int Command::Parts::usage_error(const std::string& message) const {
+  return report(name, message + "; graspmap " + name + " --help shows what it takes", exit_usage);
 }
 
 int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
@@ -230,13 +238,14 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   };
   if (!parts.table.parameters().empty() && asks_for_config())
     for (CLI::Option* option : parts.app.get_options()) option->required(false);
+  if (const auto message = parts.unknown_flag(argc, argv)) return parts.usage_error(*message);
   try {
     parts.app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
     std::cout << parts.app.help();
     return 0;
   } catch (const CLI::ParseError& error) {
-    return parts.usage_error(error);
+    return parts.usage_error(error.what());
   }
   try {
     parts.apply_parameters();
@@ -257,6 +266,7 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
         make_progress(parts.run_options.quiet ? "none" : parts.progress);
     Run run(parts.name, parts.run_options, *progress);
     run.manifest().add_parameters(parts.table);
+    if (!parts.config.empty()) run.add_input(parts.config_file());
     body(run);
     progress->end();
     return 0;

@@ -46,7 +46,6 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
   if (holds_meshes_alone(options.output))
     throw libmap::Error("a cloud has no faces: this format holds meshes alone",
                         {.file = options.output});
-  if (run.dry_run()) return;
   run.manifest().results.emplace_back("points", static_cast<std::int64_t>(read.cloud.size()));
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_cloud(temporary, read.cloud, {options.encoding, options.big_endian});
@@ -57,7 +56,6 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   const bool to_cloud = holds_clouds_alone(options.output);
   if (to_cloud) run.say("the output holds the mesh's vertices alone");
-  if (run.dry_run()) return;
   run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
   run.manifest().results.emplace_back("triangles",
                                       static_cast<std::int64_t>(mesh.triangles.size()));
@@ -80,7 +78,7 @@ void keep_frame(const ConvertOptions& options, Run& run) {
 
 void convert(const ConvertOptions& options, Run& run) {
   libmap::format_of(options.output);
-  run.claim_output(options.output);
+  run.claim_output(options.output, {options.input});
   const libmap::FileKind kind = libmap::file_kind(options.input);
   keep_frame(options, run);
   if (kind == libmap::FileKind::mesh)

@@ -95,39 +95,36 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
   }
 }
 
-void write_text_in(Run& run, const fs::path& folder, const std::string& name,
-                   const std::string& text) {
-  run.write_file_in(folder, name,
-                    [&](const fs::path& temporary) { libmap::write_whole_file(temporary, text); });
-}
-
 void write_results(const EvaluateOptions& options, const TableEvaluation& evaluation, Run& run) {
-  const fs::path folder = options.folder;
   const libmap::Chart chart = chart_of(evaluation, options.title);
   const libmap::VirtualDisplay display;
   const libmap::Image picture =
       run.timed("draw", [&] { return libmap::draw_chart(chart, libmap::roc_chart_size); });
-  run.begin_output_folder(folder);
-  write_text_in(run, folder, "roc.csv", libmap::to_csv(libgtd::roc_table(evaluation)));
-  write_text_in(run, folder, "rates.csv", libmap::to_csv(libgtd::rates_table(evaluation)));
-  write_text_in(run, folder, "summary.json", libgtd::to_json(evaluation));
-  write_text_in(run, folder, "summary.md", libgtd::to_markdown(evaluation, options.title));
-  run.write_file_in(folder, "roc.png",
-                    [&](const fs::path& temporary) { libmap::write_png(temporary, picture); });
-  run.write_file_in(folder, "roc.svg", [&](const fs::path& temporary) {
-    libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
-  });
+  const auto text = [](std::string content) {
+    return [content = std::move(content)](const fs::path& temporary) {
+      libmap::write_text(temporary, content);
+    };
+  };
+  run.write_output_folder(options.folder,
+                          {{"roc.csv", text(libmap::to_csv(libgtd::roc_table(evaluation)))},
+                           {"rates.csv", text(libmap::to_csv(libgtd::rates_table(evaluation)))},
+                           {"summary.json", text(libgtd::to_json(evaluation))},
+                           {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
+                           {"roc.svg",
+                            [&](const fs::path& temporary) {
+                              libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
+                            }},
+                           {"roc.png", text(libmap::to_png(picture))}});
 }
 
 void evaluate(EvaluateOptions& options, Run& run) {
   run.claim_output_folder(options.folder);
   options.evaluation.score_columns = split_names(options.scores);
   const libmap::Table table = libmap::read_csv(options.table);
-  run.manifest().add_input(options.table);
+  run.add_input(options.table);
   const TableEvaluation evaluation =
       run.timed("evaluate", [&] { return libgtd::evaluate_table(table, options.evaluation); });
   note_results(evaluation, run);
-  if (run.dry_run()) return;
   write_results(options, evaluation, run);
 }
 

@@ -49,7 +49,9 @@ libmap::Table answer_table(libmap::Table table, const libmap::PointCloud& map,
 }
 
 void lookup(const LookupCommandOptions& options, Run& run) {
-  run.claim_output(options.output);
+  if (libmap::format_of(options.output) != ".csv")
+    throw libmap::Error("look-ups are written as .csv", {.file = options.output});
+  run.claim_output(options.output, {options.map, options.points});
   const libmap::Table table = libmap::read_csv(options.points);
   std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
@@ -57,7 +59,6 @@ void lookup(const LookupCommandOptions& options, Run& run) {
   const libmap::Pose transform =
       graspmap_tools::map_from_points(options.map, options.points_frame, run);
   for (Eigen::Vector3d& position : positions) position = transform * position;
-  if (run.dry_run()) return;
   const std::vector<libgtd::LookupAnswer> answers =
       run.timed("look-up", [&] { return libgtd::look_up(map, positions, options.lookup); });
   std::int64_t found = 0;

@@ -33,27 +33,6 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("view", options.view, libmap::viewpoint_names(), "from where a picture is taken");
 }
 
-// A point at the centre of each solid voxel, the pivot in the origin, with the fields layer (from
-// the lowest, 0) and counted.
-libmap::PointCloud to_cloud(const GripperMask& mask) {
-  libmap::PointCloud cloud;
-  std::vector<double> layers;
-  std::vector<double> counted;
-  for (int x = 0; x < mask.side; ++x)
-    for (int y = 0; y < mask.side; ++y)
-      for (int z = 0; z < mask.layers; ++z) {
-        if (!mask.is_solid(x, y, z)) continue;
-        cloud.positions.push_back(mask.voxel_size_m * Eigen::Vector3d(x - mask.pivot_xy,
-                                                                      y - mask.pivot_xy,
-                                                                      z - mask.pivot_z));
-        layers.push_back(z);
-        counted.push_back(mask.is_counted(x, y, z) ? 1.0 : 0.0);
-      }
-  cloud.add_field("layer", libmap::ScalarType::uint16).values = layers;
-  cloud.add_field("counted", libmap::ScalarType::uint8).values = counted;
-  return cloud;
-}
-
 std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
   libmap::SceneLayer layer;
   layer.shape = to_cloud(mask);
@@ -71,17 +50,17 @@ std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
 }
 
 void mask(const MaskOptions& options, Run& run) {
+  const std::string extension = std::filesystem::path(options.output).extension().string();
+  if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const auto file = graspmap_tools::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
   const GripperMask made = libgtd::make_gripper_mask(gripper, options.mask);
-  if (run.dry_run()) return;
   run.add_input(file);
   run.manifest().frame = "mask";
   run.manifest().results.emplace_back("side_voxels", static_cast<std::int64_t>(made.side));
   run.manifest().results.emplace_back("layers", static_cast<std::int64_t>(made.layers));
   run.say(fmt::format("{} x {} x {} voxels", made.side, made.side, made.layers));
-  const std::string extension = std::filesystem::path(options.output).extension().string();
   run.write_output(options.output, [&](const auto& temporary) {
     if (extension == ".txt")
       libmap::write_text(temporary, to_text(made));

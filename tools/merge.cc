@@ -91,9 +91,15 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
       whole.results.emplace_back(name, *value);
 }
 
+// Points whose flag is set.
+std::int64_t count_of(const libmap::PointCloud& map, const char* flag) {
+  const libmap::ScalarField* field = map.find_field(flag);
+  return field == nullptr ? 0 : std::count(field->values.begin(), field->values.end(), 1.0);
+}
+
 void merge(const MergeOptions& options, Run& run) {
   libmap::require_cloud_format(options.output);
-  run.claim_output(options.output);
+  run.claim_output(options.output, options.tiles);
   std::vector<libmap::Manifest> manifests;
   for (const std::string& tile : options.tiles) {
     manifests.push_back(manifest_of(tile));
@@ -102,11 +108,14 @@ void merge(const MergeOptions& options, Run& run) {
   require_all_shares(manifests, options.tiles);
   std::vector<libmap::PointCloud> parts;
   for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
-  if (run.dry_run()) return;
   const libmap::PointCloud whole = libgtd::merge_map_clouds(parts);
   copy_common_facts(manifests.front(), run.manifest());
+  // The terrain and the gripper that the parts were made from, then the parts.
+  run.manifest().inputs = manifests.front().inputs;
   for (const std::string& tile : options.tiles) run.add_input(tile);
   run.manifest().results.emplace_back("scored_voxels", static_cast<std::int64_t>(whole.size()));
+  run.manifest().results.emplace_back("edge_voxels", count_of(whole, "edge"));
+  run.manifest().results.emplace_back("graspable_voxels", count_of(whole, "graspable"));
   run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });

@@ -81,7 +81,6 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
 
 std::vector<libmap::Marker> read_markers(const RenderOptions& options,
                                          const libmap::Pose& scene_from_points) {
-  if (options.points.empty()) return {};
   const libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
   const std::size_t label = options.label == "auto" ? 0 : table.column(options.label);
@@ -131,15 +130,16 @@ libmap::Scene read_scene(const RenderOptions& options, Run& run) {
   if (manifest && manifest->frame == "input")
     if (const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input"))
       scene.terrain_from_scene = *terrain_from_input;
-  scene.markers = read_markers(
-      options, graspmap_tools::map_from_points(options.file, options.points_frame, run));
+  if (!options.points.empty())
+    scene.markers = read_markers(
+        options, graspmap_tools::map_from_points(options.file, options.points_frame, run));
   return scene;
 }
 
 void render(RenderOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".png")
     throw libmap::Error("pictures are written as .png", {.file = options.output});
-  run.claim_output(options.output);
+  run.claim_output(options.output, {options.file, options.points});
   if (options.view.view == libmap::Viewpoint::camera) {
     options.view.camera.position =
         graspmap_tools::parse_vector(options.camera_position, "--camera-position");
@@ -150,7 +150,6 @@ void render(RenderOptions& options, Run& run) {
   libmap::Image image;
   try {
     scene = run.timed("read", [&] { return read_scene(options, run); });
-    if (run.dry_run()) return;
     image = run.timed("render", [&] { return libmap::render_scene(scene, options.view); });
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.file) : error;

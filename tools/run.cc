@@ -69,7 +69,10 @@ Run::Timing::~Timing() {
   spdlog::debug("{}: {:.3f} s", name_, taken.count());
 }
 
-void Run::claim_output(const fs::path& path) {
+void Run::claim_output(const fs::path& path, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs)
+    if (fs::exists(path) && fs::exists(input) && fs::equivalent(path, input))
+      throw libmap::Error("is the input: the output needs another name", {.file = path.string()});
   if (fs::is_directory(path))
     throw libmap::Error("is a folder, not a file", {.file = path.string()});
   if (fs::exists(path) && !options_.force && !written_by_this_toolkit(path))
@@ -77,7 +80,7 @@ void Run::claim_output(const fs::path& path) {
                         {.file = path.string()});
   if (!options_.force) require_no_foreign_manifest(path);
   // Made and dropped at once: a folder that is missing or read-only is found before the work.
-  if (!options_.dry_run) const libmap::OutputFile probe(path);
+  const libmap::OutputFile probe(path);
 }
 
 void Run::write_manifest(const fs::path& output) {
@@ -85,9 +88,7 @@ void Run::write_manifest(const fs::path& output) {
 }
 
 void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
-  for (const libmap::ManifestInput& input : manifest_.inputs)
-    if (fs::exists(path) && fs::exists(input.path) && fs::equivalent(path, input.path))
-      throw libmap::Error("is the input: the output needs another name", {.file = path.string()});
+  if (options_.dry_run) return;
   libmap::OutputFile output(path);
   try {
     timed("write", [&] { writer(output.temporary_path()); });
@@ -115,21 +116,22 @@ void Run::claim_output_folder(const fs::path& given) {
   if (!options_.force) require_no_foreign_manifest(folder);
 }
 
-void Run::begin_output_folder(const fs::path& given) {
+void Run::write_output_folder(const fs::path& given,
+                              const std::vector<std::pair<std::string, Writer>>& files) {
+  if (options_.dry_run) return;
   const fs::path folder = without_trailing_slash(given);
   std::error_code code;
   fs::create_directories(folder, code);
   if (code)
     throw libmap::Error("cannot be made: " + code.message(), {.file = folder.string()},
                         libmap::ErrorKind::failed);
+  std::vector<libmap::OutputFile> outputs;
+  for (const auto& [name, writer] : files) {
+    outputs.emplace_back(folder / name);
+    writer(outputs.back().temporary_path());
+  }
   write_manifest(folder);
-}
-
-void Run::write_file_in(const fs::path& folder, const std::string& name,
-                        const std::function<void(const fs::path&)>& writer) {
-  libmap::OutputFile output(without_trailing_slash(folder) / name);
-  writer(output.temporary_path());
-  output.commit();
+  for (libmap::OutputFile& output : outputs) output.commit();
 }
 
 }  // namespace graspmap_tools

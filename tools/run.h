@@ -6,6 +6,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "libmap/core/manifest.h"
 #include "libmap/core/progress.h"
@@ -28,8 +29,6 @@ class Run {
   Run(std::string command, RunOptions options, libmap::Progress& progress);
 
   const RunOptions& options() const { return options_; }
-  // True with --dry-run: the command returns once everything is checked.
-  bool dry_run() const { return options_.dry_run; }
   libmap::Progress& progress() { return progress_; }
   libmap::Manifest& manifest() { return manifest_; }
 
@@ -49,20 +48,21 @@ class Run {
     return step();
   }
 
-  // Throws Error if `path` exists and this toolkit did not write it, unless --force, or if it
-  // cannot be written. Call it before the work.
-  void claim_output(const std::filesystem::path& path);
+  // Throws Error if `path` is one of the inputs, if it exists and this toolkit did not write it,
+  // unless --force, or if it cannot be written. Call it before the work.
+  void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
-  // writer(temporary) writes the file; it is put in place whole, with its manifest beside it.
+  // writer(temporary) writes the file; it is put in place whole, with its manifest beside it. With
+  // --dry-run nothing is written.
   void write_output(const std::filesystem::path& path,
                     const std::function<void(const std::filesystem::path& temporary)>& writer);
 
-  // A folder of outputs: made if it is missing; its manifest FOLDER.json stands beside it, written
-  // first. The files in it are then written with write_file_in.
+  // A folder of outputs, made if it is missing. All files are written before the first is put in
+  // place; the manifest FOLDER.json stands beside the folder. With --dry-run nothing is written.
+  using Writer = std::function<void(const std::filesystem::path& temporary)>;
   void claim_output_folder(const std::filesystem::path& folder);
-  void begin_output_folder(const std::filesystem::path& folder);
-  void write_file_in(const std::filesystem::path& folder, const std::string& name,
-                     const std::function<void(const std::filesystem::path& temporary)>& writer);
+  void write_output_folder(const std::filesystem::path& folder,
+                           const std::vector<std::pair<std::string, Writer>>& files);
 
  private:
   class Timing {

@@ -105,7 +105,7 @@ void score(ScoreOptions& options, Run& run) {
   libgtd::make_gripper_mask(options.detection.gripper,
                             {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
   libmap::require_cloud_format(options.output);
-  run.claim_output(options.output);
+  run.claim_output(options.output, {options.terrain});
   const libmap::CloudReadResult read =
       run.timed("read", [&] { return libmap::read_cloud(options.terrain); });
   if (read.cloud.empty() && read.dropped_points > 0)
@@ -115,7 +115,6 @@ void score(ScoreOptions& options, Run& run) {
   if (read.dropped_points > 0)
     run.warn(fmt::format("{}: {} points without a position were dropped", options.terrain,
                          read.dropped_points));
-  if (run.dry_run()) return;
   libgtd::DetectionResult result;
   try {
     result = libgtd::detect(read.cloud, options.detection, run.progress());

@@ -66,10 +66,13 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
 }
 
 void simulate(const SimulateOptions& options, Run& run) {
+  if (options.mesh)
+    libmap::require_mesh_format(options.output);
+  else
+    libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const auto file = graspmap_tools::find_data_file("scenes", options.scene);
   const libmap::PrimitiveScene scene = libmap::load_scene(file);
-  if (run.dry_run()) return;
   run.add_input(file);
   run.manifest().frame = "scene";
   if (options.mesh)

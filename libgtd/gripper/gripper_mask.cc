@@ -257,4 +257,22 @@ std::string to_text(const GripperMask& mask) {
   return text;
 }
 
+libmap::PointCloud to_cloud(const GripperMask& mask) {
+  libmap::PointCloud cloud;
+  std::vector<double> layers;
+  std::vector<double> counted;
+  for (int x = 0; x < mask.side; ++x)
+    for (int y = 0; y < mask.side; ++y)
+      for (int z = 0; z < mask.layers; ++z) {
+        if (!mask.is_solid(x, y, z)) continue;
+        const Eigen::Vector3d offset(x - mask.pivot_xy, y - mask.pivot_xy, z - mask.pivot_z);
+        cloud.positions.push_back(mask.voxel_size_m * offset);
+        layers.push_back(z);
+        counted.push_back(mask.is_counted(x, y, z) ? 1.0 : 0.0);
+      }
+  cloud.add_field("layer", libmap::ScalarType::uint16).values = layers;
+  cloud.add_field("counted", libmap::ScalarType::uint8).values = counted;
+  return cloud;
+}
+
 }  // namespace libgtd

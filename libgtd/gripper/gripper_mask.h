@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libgtd/gripper/gripper.h"
+#include "libmap/core/point_cloud.h"
 
 namespace libgtd {
 
@@ -58,5 +59,9 @@ GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& 
 // The mask as text, layer by layer from the lowest: "z 0", then `side` lines (x) of `side`
 // characters (y), '1' for solid.
 std::string to_text(const GripperMask& mask);
+
+// A point at the centre of each solid voxel, metres, the pivot in the origin, z toward the palm;
+// fields `layer` (0 is the lowest) and `counted`.
+libmap::PointCloud to_cloud(const GripperMask& mask);
 
 }  // namespace libgtd

@@ -11,8 +11,9 @@
 
 namespace libgtd {
 
-// The tiles that cover the grid's box, in rows along j; borders are whole multiples of
-// `tile_voxels` on the lattice, whatever the cloud. Throws Error for more than 2^24 tiles.
+// The tiles that cover the grid's box, in rows along j; borders within the box
+// are whole multiples of `tile_voxels` on the lattice, whatever the cloud. Throws Error for more
+// than 2^24 tiles.
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
 
 // Share `number` of `count`, from 1 on: a run of neighbouring tiles; all shares together are all

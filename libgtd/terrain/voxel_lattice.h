@@ -21,8 +21,12 @@ struct VoxelLattice {
   Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
   double voxel_size_m = 0.01;
 
+  // In voxels from the lattice's origin, not cut to whole ones.
+  Eigen::Vector3d cell_of(const Eigen::Vector3d& point_in_terrain) const {
+    return (point_in_terrain - origin_m) / voxel_size_m;
+  }
   Voxel voxel_of(const Eigen::Vector3d& point_in_terrain) const {
-    const Eigen::Vector3d cell = (point_in_terrain - origin_m) / voxel_size_m;
+    const Eigen::Vector3d cell = cell_of(point_in_terrain);
     return {static_cast<int>(std::floor(cell.x())), static_cast<int>(std::floor(cell.y())),
             static_cast<int>(std::floor(cell.z()))};
   }

@@ -102,6 +102,10 @@ std::optional<std::string> nearest_name(std::string_view name,
       nearest = candidate;
     }
   }
+  // A name that was broken off is meant as its whole.
+  if (!nearest && wanted.size() >= 3)
+    for (const std::string& candidate : candidates)
+      if (lower_case(candidate).starts_with(wanted)) return candidate;
   return nearest;
 }
 

@@ -22,8 +22,8 @@ std::optional<bool> parse_bool(std::string_view text);
 
 std::string_view trim(std::string_view text);
 
-// The candidate with the smallest Levenshtein distance to `name`, or nothing if none is near
-// (more than half of the name would have to change).
+// The candidate with the smallest Levenshtein distance to `name`, or the first that begins with
+// it; nothing if none is near (more than half of the name would have to change).
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates);
 

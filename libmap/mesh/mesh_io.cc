@@ -26,17 +26,6 @@ bool is_mesh_format(const std::string& format) {
   return std::find(mesh_formats.begin(), mesh_formats.end(), format) != mesh_formats.end();
 }
 
-void require_known_format(const std::filesystem::path& path) {
-  const std::string format = format_of(path);
-  if (is_mesh_format(format)) return;
-  throw Error(
-      "not a mesh format" + did_you_mean(format, {mesh_formats.begin(), mesh_formats.end()}),
-      {.file = path.string(),
-       .field = "extension",
-       .value = format.empty() ? "missing" : format,
-       .bound = ".ply, .obj, .stl, .off, .glb or .vtp"});
-}
-
 // A field of polygons as one of triangles.
 ScalarField field_of_triangles(const ScalarField& field, const std::vector<std::uint32_t>& faces) {
   ScalarField spread{field.name, field.type, {}};
@@ -123,8 +112,19 @@ void encode(const std::string& format, const TriangleMesh& mesh, const MeshWrite
 
 }  // namespace
 
+void require_mesh_format(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  if (is_mesh_format(format)) return;
+  throw Error(
+      "not a mesh format" + did_you_mean(format, {mesh_formats.begin(), mesh_formats.end()}),
+      {.file = path.string(),
+       .field = "extension",
+       .value = format.empty() ? "missing" : format,
+       .bound = ".ply, .obj, .stl, .off, .glb or .vtp"});
+}
+
 MeshReadResult read_mesh(const std::filesystem::path& path) {
-  require_known_format(path);
+  require_mesh_format(path);
   const auto bytes = read_geometry_bytes(path);
   try {
     MeshReadResult result = decode(format_of(path), bytes);
@@ -137,7 +137,7 @@ MeshReadResult read_mesh(const std::filesystem::path& path) {
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshWriteOptions& options) {
-  require_known_format(path);
+  require_mesh_format(path);
   mesh.check();
   write_geometry_file(path,
                       [&](std::ostream& out) { encode(format_of(path), mesh, options, out); });

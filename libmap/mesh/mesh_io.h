@@ -50,6 +50,9 @@ MeshReadResult read_mesh(const std::filesystem::path& path);
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshWriteOptions& options = {});
 
+// Throws Error unless the extension is one that meshes are read from and written to.
+void require_mesh_format(const std::filesystem::path& path);
+
 // Whether the file holds a mesh (it has faces) or a cloud: by its extension, and for .ply and .vtp
 // by its content. Throws Error: an extension of neither, or a file that cannot be read.
 FileKind file_kind(const std::filesystem::path& path);

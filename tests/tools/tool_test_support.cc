@@ -56,8 +56,7 @@ testing::AssertionResult bad_input(const ProgramResult& result,
 
 testing::AssertionResult wrong_usage(const ProgramResult& result,
                                      const std::vector<std::string>& parts) {
-  const bool of_a_command = result.standard_error.starts_with("graspmap ");
-  return failed_with(result, 2, of_a_command ? 2 : 1, parts);
+  return failed_with(result, 2, 1, parts);
 }
 
 fs::path scratch(const std::string& name) { return scratch_folder() / name; }

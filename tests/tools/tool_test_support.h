@@ -27,7 +27,7 @@ testing::AssertionResult succeeded(const ProgramResult& result);
 testing::AssertionResult bad_input(const ProgramResult& result,
                                    const std::vector<std::string>& parts);
 
-// The same of exit code 2: wrong usage. A second line points to --help.
+// The same of exit code 2: wrong usage.
 testing::AssertionResult wrong_usage(const ProgramResult& result,
                                      const std::vector<std::string>& parts);
 

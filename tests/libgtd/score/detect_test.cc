@@ -110,15 +110,16 @@ TEST(DetectionErrors, WindowThatDoesNotFitIntoMemorySaysHowMuch) {
   EXPECT_NE(std::string(error.what()).find("GiB"), std::string::npos) << error.what();
 }
 
-TEST(Detection, OnePointInItsFrameIsOneVoxel) {
-  PointCloud cloud;
-  cloud.positions = {{0.3, 0.2, 0.1}};
-  DetectionOptions options = options_for(Method::corrected);
-  options.plane = PlaneSource::none;
-  const auto result = detect(cloud, options);
-  ASSERT_EQ(result.map.voxels.size(), 1U);
-  EXPECT_EQ(result.map.voxels[0].counts.ssv, 1U);
-  EXPECT_TRUE(result.map.voxels[0].edge);
+TEST(DetectionErrors, PointsInOnePlaceOrOnALineAreNoTerrain) {
+  for (const PlaneSource plane : {PlaneSource::fit, PlaneSource::none}) {
+    DetectionOptions options = options_for(Method::corrected);
+    options.plane = plane;
+    PointCloud cloud;
+    cloud.positions = {{0.3, 0.2, 0.1}};
+    error_of([&] { detect(cloud, options); });
+    for (int n = 0; n < 50; ++n) cloud.positions.emplace_back(0.3 + 0.01 * n, 0.2, 0.1);
+    error_of([&] { detect(cloud, options); });
+  }
 }
 
 TEST(Detection, WhatLiesBelowTheZeroPlaneIsScoredButNoTarget) {
