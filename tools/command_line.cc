@@ -245,7 +245,11 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
     std::cout << parts.app.help();
     return 0;
   } catch (const CLI::ParseError& error) {
-    return parts.usage_error(error.what());
+    // CLI11's own text does not fit this case.
+    const std::vector<std::string> surplus = parts.app.remaining();
+    const bool too_many = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
+    return parts.usage_error(
+        too_many && !surplus.empty() ? "one argument too many: " + surplus.front() : error.what());
   }
   try {
     parts.apply_parameters();

@@ -79,15 +79,15 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
   return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
 }
 
-std::vector<libmap::Marker> read_markers(const RenderOptions& options,
-                                         const libmap::Pose& scene_from_points) {
+// In the frame in which they are listed.
+std::vector<libmap::Marker> read_markers(const RenderOptions& options) {
   const libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
   const std::size_t label = options.label == "auto" ? 0 : table.column(options.label);
   std::vector<libmap::Marker> markers;
   for (std::size_t row = 0; row < positions.size(); ++row) {
     libmap::Marker& marker = markers.emplace_back();
-    marker.position = scene_from_points * positions[row];
+    marker.position = positions[row];
     marker.label = table.rows[row][label];
     if (!options.verdict.empty())
       marker.verdict = verdict_of(table, row, table.column(options.verdict));
@@ -130,9 +130,13 @@ libmap::Scene read_scene(const RenderOptions& options, Run& run) {
   if (manifest && manifest->frame == "input")
     if (const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input"))
       scene.terrain_from_scene = *terrain_from_input;
-  if (!options.points.empty())
-    scene.markers = read_markers(
-        options, graspmap_tools::map_from_points(options.file, options.points_frame, run));
+  if (!options.points.empty()) {
+    scene.markers = read_markers(options);
+    const libmap::Pose scene_from_points =
+        graspmap_tools::map_from_points(options.file, options.points_frame, run);
+    for (libmap::Marker& marker : scene.markers)
+      marker.position = scene_from_points * marker.position;
+  }
   return scene;
 }
 

@@ -31,4 +31,25 @@ rm "$out/thesis/tiles/2-of-3.pcd" "$out/thesis/top.png"
 run
 [ "$map" = "$(sha256sum <"$out/thesis/map.pcd")" ] || fail "the map made again differs"
 require_files "$out/thesis/top.png"
+
+# Another terrain, gripper or title is seen, even an older file.
+cp "$source/data/grippers/scar-e.yaml" "$scratch/mine.yaml"
+printf 'gripper: %s\nvoxel_size_m: 0.02\n' "$scratch/mine.yaml" >"$scratch/scenario.yaml"
+"$graspmap" simulate scene --spacing 0.02 --seed 2 -o "$scratch/other.pcd" --quiet
+touch -d '2001-01-01' "$scratch/other.pcd"
+site() {
+  make --no-print-directory -f "$source/pipelines/site.mk" OUT="$scratch/site" SHARES=2 \
+    GRASPMAP="$graspmap" SCENARIO="$scratch/scenario.yaml" "$@"
+}
+site SITE="$out/terrain.pcd"
+first=$(sha256sum <"$scratch/site/map.pcd")
+site SITE="$scratch/other.pcd" TITLE="Bob's site"
+second=$(sha256sum <"$scratch/site/map.pcd")
+[ "$first" != "$second" ] || fail "another terrain was not seen"
+sleep 1
+sed -i 's/^palm_diameter_mm: 71/palm_diameter_mm: 90/' "$scratch/mine.yaml"
+site SITE="$scratch/other.pcd" TITLE="Bob's site"
+[ "$second" != "$(sha256sum <"$scratch/site/map.pcd")" ] || fail "another gripper was not seen"
+if site SITE="no such.pcd" 2>"$scratch/errors"; then fail "a name with a space was taken"; fi
+grep -q 'holds a space' "$scratch/errors" || fail "no clear error for a name with a space"
 echo "passed"

@@ -163,10 +163,12 @@ TEST_F(ScoreBadInput, VoxelSizes) {
 }
 
 TEST_F(ScoreBadInput, CloudTooWideForTheVoxelSize) {
-  // Two patches 1e8 m apart.
+  // Three patches 1e8 m apart.
   std::vector<Eigen::Vector3d> positions;
-  for (const double offset : {0.0, 1e8})
-    for (int n = 0; n < 9; ++n) positions.emplace_back(offset + n % 3, n / 3, 0.1 * (n % 2));
+  for (const Eigen::Vector3d& patch :
+       {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(1e8, 0, 0), Eigen::Vector3d(0, 1e8, 0)})
+    for (int n = 0; n < 9; ++n)
+      positions.push_back(patch + Eigen::Vector3d(n % 3, n / 3, 0.1 * (n % 2)));
   for (const char* method : {"thesis", "corrected"}) {
     cloud_of(positions);
     EXPECT_TRUE(bad_input(

@@ -119,7 +119,10 @@ TEST_F(Merge, KeepsWhatTheSharesHaveInCommon) {
   EXPECT_EQ(whole.at("transforms"), part.at("transforms"));
   EXPECT_EQ(whole.at("parameters").at("method"), "corrected");
   EXPECT_FALSE(whole.at("parameters").contains("tile"));
-  EXPECT_EQ(whole.at("inputs").size(), 2U);
+  // The terrain and the gripper behind the parts, then the two parts.
+  ASSERT_EQ(whole.at("inputs").size(), 4U);
+  EXPECT_EQ(whole.at("inputs").at(0), part.at("inputs").at(0));
+  EXPECT_EQ(whole.at("inputs").at(3).at("path"), "b.pcd");
   EXPECT_EQ(whole.at("results").at("scored_voxels"),
             part.at("results").at("scored_voxels").get<int>() +
                 graspmap_test::json_of("b.pcd.json").at("results").at("scored_voxels").get<int>());
