@@ -131,13 +131,14 @@ GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& opti
     return (s <= m.Hcl && d <= Rg) || (ring_top < s && s < m.H && Rui < d && d <= Ruo) ||
            (s == m.H && m.RB < d && d <= Ruo);
   });
+  const int center = mask.side / 2;
   const double Rc = std::round(m.in_voxels(gripper.palm_diameter_mm) / 2.0);
   for (int z = 0; z < mask.layers; ++z) {
     const double reach =
         std::round(Rc + std::sqrt(2.0 * (mask.layers - 1) / cos_closed * z - 1.0 * z * z));
     for (int x = 0; x < mask.side; ++x)
       for (int y = 0; y < mask.side; ++y)
-        mask.counted[mask.index(x, y, z)] = distance(mask.side / 2, x, y) <= reach ? 1 : 0;
+        mask.counted[mask.index(x, y, z)] = distance(center, x, y) <= reach ? 1 : 0;
   }
   return mask;
 }
@@ -153,8 +154,9 @@ GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   const double ROS = std::round(m.in_voxels(gripper.opening_spine_radius_mm));
   const double DOS = std::round(m.in_voxels(gripper.opening_spine_depth_mm));
   const double DS = std::round(m.in_voxels(gripper.spine_depth_mm));
+  const int center = mask.side / 2;
   fill(mask, [&](int x, int y, int s) {
-    const float d = distance(mask.side / 2, x, y);
+    const float d = distance(center, x, y);
     const double depth = s - 1;
     const double Rg = m.RT + (m.half - m.RT) * depth / (m.Hcl - 1.0);
     const double outer = m.half - std::round(m.half - (ROS + DS)) * depth / (DOS - 1.0);
