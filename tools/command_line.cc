@@ -107,20 +107,6 @@ void Command::inputs(const std::string& name, std::vector<std::string>& paths,
   parts_->app.add_option(name, paths, description)->required()->type_name("");
 }
 
-void Command::verb(std::string& word, const std::vector<std::string>& words,
-                   const std::string& description) {
-  const auto check = [words](const std::string& given) {
-    if (std::find(words.begin(), words.end(), given) != words.end()) return std::string();
-    return "unknown word '" + given + "'" + libmap::did_you_mean(given, words);
-  };
-  std::string names;
-  for (const std::string& known : words) names += (names.empty() ? "" : "|") + known;
-  parts_->app.add_option("WHAT", word, description + ": " + names)
-      ->required()
-      ->type_name("")
-      ->check(CLI::Validator(check, "", "WHAT"));
-}
-
 void Command::output(std::string& path, const std::string& description, bool required) {
   parts_->output_option = parts_->app.add_option("-o,--output", path, description)
                               ->type_name("OUTPUT")

@@ -34,9 +34,6 @@ class Command {
   void optional_input(const std::string& name, std::string& path, const std::string& description);
   void inputs(const std::string& name, std::vector<std::string>& paths,
               const std::string& description);
-  // The first positional argument as one of a few words, for commands such as `simulate scene`.
-  void verb(std::string& word, const std::vector<std::string>& words,
-            const std::string& description);
   // -o, --output.
   void output(std::string& path, const std::string& description, bool required = true);
   // Flags and options that are no parameters of a stage, such as --json or --tile.

@@ -1,93 +1,51 @@
-// graspmap simulate: scenes of primitive shapes with their closed-form truth.
-#include <fmt/format.h>
+// graspmap simulate WHAT: terrains and recordings whose truth is known.
+#include "tools/simulate_commands.h"
 
+#include <iostream>
 #include <string>
+#include <vector>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/mesh/mesh_io.h"
-#include "libmap/simulate/primitive_scene_io.h"
-#include "libmap/simulate/scene_mesh.h"
-#include "libmap/simulate/scene_sampling.h"
-#include "tools/command_line.h"
+#include "libmap/core/text.h"
 
 namespace {
 
-using graspmap_tools::Run;
-
-struct SimulateOptions {
-  std::string what;
-  std::string output;
-  std::string scene = "primitive_shapes";
-  bool mesh = false;
-  libmap::SceneSamplingOptions sampling;
-  libmap::SceneMeshOptions meshing;
+struct Entry {
+  const char* name;
+  const char* summary;
+  int (*run)(int argc, char** argv);
 };
 
-void bind(libmap::ParameterTable& table, SimulateOptions& options) {
-  using libmap::not_negative;
-  using libmap::positive;
-  table.add("scene", options.scene, "scene of the toolkit, or a scene file");
-  table.add("mesh", options.mesh, "the surface as a mesh, not as a cloud");
-  table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance of the samples, m");
-  table.add("count", options.sampling.count, not_negative,
-            "number of samples (2 %) in place of a spacing; 0: by spacing");
-  table.add("jitter", options.sampling.jitter, libmap::zero_to_one,
-            "how far samples leave their grid: 0 regular, 1 a whole cell");
-  table.add("noise_m", options.sampling.noise_m, not_negative,
-            "standard deviation of the noise along the normal, m");
-  table.add("seed", options.sampling.seed, not_negative, "of jitter and noise");
-  table.add("edge_length_m", options.meshing.edge_length_m, positive,
-            "longest edge of the mesh, m");
-  table.add("chord_error_m", options.meshing.chord_error_m, positive,
-            "largest distance of the mesh from a round shape, m");
-}
+constexpr Entry entries[] = {
+    {"scene", "a scene of primitive shapes as cloud or mesh", graspmap_tools::simulate_scene},
+};
 
-void write_samples(const libmap::PrimitiveScene& scene, const SimulateOptions& options, Run& run) {
-  const libmap::SceneSamples samples =
-      run.timed("sampling", [&] { return libmap::sample_scene(scene, options.sampling); });
-  run.manifest().results.emplace_back("points", static_cast<std::int64_t>(samples.cloud.size()));
-  run.manifest().results.emplace_back("spacing_m", samples.spacing_m);
-  run.say(fmt::format("{} points, {} m apart", samples.cloud.size(),
-                      libmap::to_text(static_cast<float>(samples.spacing_m))));
-  run.write_output(options.output,
-                   [&](const auto& temporary) { libmap::write_cloud(temporary, samples.cloud); });
-}
-
-void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& options, Run& run) {
-  const libmap::TriangleMesh mesh =
-      run.timed("meshing", [&] { return libmap::scene_mesh(scene, options.meshing); });
-  run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
-  run.manifest().results.emplace_back("triangles",
-                                      static_cast<std::int64_t>(mesh.triangles.size()));
-  run.say(fmt::format("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size()));
-  run.write_output(options.output,
-                   [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); });
-}
-
-void simulate(const SimulateOptions& options, Run& run) {
-  if (options.mesh)
-    libmap::require_mesh_format(options.output);
-  else
-    libmap::require_cloud_format(options.output);
-  run.claim_output(options.output);
-  const auto file = graspmap_tools::find_data_file("scenes", options.scene);
-  const libmap::PrimitiveScene scene = libmap::load_scene(file);
-  run.add_input(file);
-  run.manifest().frame = "scene";
-  if (options.mesh)
-    write_surface(scene, options, run);
-  else
-    write_samples(scene, options, run);
+void print_help() {
+  std::cout << "Terrains and recordings whose truth is known.\n\n"
+               "Usage: graspmap simulate WHAT ... -o OUTPUT [options]\n\nWHAT:\n";
+  for (const Entry& entry : entries) {
+    std::string name = entry.name;
+    name.resize(12, ' ');
+    std::cout << "  " << name << entry.summary << "\n";
+  }
+  std::cout << "\ngraspmap simulate WHAT --help shows each option with its unit and default.\n";
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  SimulateOptions options;
-  graspmap_tools::Command command("simulate", "Terrains that are known exactly.");
-  command.verb(options.what, {"scene"}, "what to simulate");
-  command.output(options.output, "cloud with true normals and curvatures, or mesh");
-  bind(command.parameters(), options);
-  return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
+  const std::string what = argc > 1 ? argv[1] : "";
+  if (what == "--help" || what == "-h") {
+    print_help();
+    return 0;
+  }
+  std::vector<std::string> names;
+  for (const Entry& entry : entries) {
+    if (what == entry.name) return entry.run(argc - 1, argv + 1);
+    names.emplace_back(entry.name);
+  }
+  std::cerr << "graspmap simulate: error: "
+            << (what.empty() ? "nothing named to simulate"
+                             : "unknown " + what + libmap::did_you_mean(what, names))
+            << "; graspmap simulate --help lists what there is\n";
+  return 2;
 }

@@ -1,0 +1,78 @@
+#include "libmap/core/pose_graph.h"
+
+#include <algorithm>
+
+namespace libmap {
+
+std::string to_text(LinkType type) {
+  switch (type) {
+    case LinkType::neighbor:
+      return "neighbor";
+    case LinkType::global_closure:
+      return "global closure";
+    case LinkType::local_space_closure:
+      return "local space closure";
+    case LinkType::local_time_closure:
+      return "local time closure";
+    case LinkType::user_closure:
+      return "user closure";
+    case LinkType::virtual_closure:
+      return "virtual closure";
+    case LinkType::neighbor_merged:
+      return "neighbor merged";
+    case LinkType::pose_prior:
+      return "pose prior";
+    case LinkType::landmark:
+      return "landmark";
+    case LinkType::gravity:
+      return "gravity";
+  }
+  return "type " + std::to_string(static_cast<int>(type));
+}
+
+std::string to_text(PoseSource source) {
+  switch (source) {
+    case PoseSource::odometry:
+      return "odometry";
+    case PoseSource::stored:
+      return "stored";
+    case PoseSource::ground_truth:
+      return "ground-truth";
+  }
+  return {};
+}
+
+const GraphNode* PoseGraph::find_node(int id) const {
+  const auto place =
+      std::lower_bound(nodes.begin(), nodes.end(), id,
+                       [](const GraphNode& node, int value) { return node.id < value; });
+  return place != nodes.end() && place->id == id ? &*place : nullptr;
+}
+
+Trajectory trajectory_of(const PoseGraph& graph, PoseSource source) {
+  constexpr int invalid_weight = -9;
+  Trajectory trajectory;
+  for (const GraphNode& node : graph.nodes) {
+    if (node.weight == invalid_weight) continue;
+    std::optional<Pose> pose;
+    if (source == PoseSource::odometry) pose = node.odometry_from_base;
+    if (source == PoseSource::ground_truth) pose = node.truth_from_base;
+    if (source == PoseSource::stored) {
+      const auto place = graph.optimized_map_from_base.find(node.id);
+      if (place != graph.optimized_map_from_base.end()) pose = place->second;
+    }
+    if (pose) trajectory.push_back({node.id, node.stamp_s, *pose});
+  }
+  return trajectory;
+}
+
+double path_length(const Trajectory& trajectory) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < trajectory.size(); ++i)
+    length += (trajectory[i].world_from_base.translation() -
+               trajectory[i - 1].world_from_base.translation())
+                  .norm();
+  return length;
+}
+
+}  // namespace libmap

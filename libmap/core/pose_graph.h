@@ -1,0 +1,93 @@
+// Poses of a scan and what binds them together.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libmap/core/pose.h"
+
+namespace libmap {
+
+// Numbers as RTAB-Map stores them.
+enum class LinkType {
+  neighbor = 0,
+  global_closure = 1,
+  local_space_closure = 2,
+  local_time_closure = 3,
+  user_closure = 4,
+  virtual_closure = 5,
+  neighbor_merged = 6,
+  pose_prior = 7,  // from = to
+  landmark = 8,    // to < 0
+  gravity = 9      // from = to
+};
+// "neighbor", "global closure", ...; "type N" for a number that is not known.
+std::string to_text(LinkType type);
+
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+// pose_to = pose_from * from_from_to.
+struct PoseLink {
+  int from = 0;
+  int to = 0;
+  LinkType type = LinkType::neighbor;
+  Pose from_from_to = Pose::Identity();
+  // Inverse covariance in the order x y z roll pitch yaw, m and rad.
+  Matrix6d information = Matrix6d::Identity();
+};
+
+struct GpsFix {
+  double stamp_s = 0.0;
+  double longitude_deg = 0.0;
+  double latitude_deg = 0.0;
+  double altitude_m = 0.0;
+  double error_m = 0.0;
+  double bearing_deg = 0.0;  // clockwise from north
+};
+
+// One place at which the scan was recorded.
+struct GraphNode {
+  int id = 0;       // > 0
+  int session = 0;  // odometry does not connect different sessions
+  int weight = 0;   // >= 0 normal, -1 intermediate, -9 invalid
+  double stamp_s = 0.0;
+  std::string label{};
+  std::optional<Pose> odometry_from_base{};
+  std::optional<Pose> truth_from_base{};            // ground truth, in a frame of its own
+  std::optional<std::array<double, 6>> velocity{};  // m/s and rad/s: x y z roll pitch yaw
+  std::optional<GpsFix> gps{};
+};
+
+struct PoseGraph {
+  std::vector<GraphNode> nodes;                 // by ascending id
+  std::vector<PoseLink> links;                  // each once, whatever its direction
+  std::map<int, Pose> optimized_map_from_base;  // as stored with the scan; may be empty
+
+  // nullptr if there is no such node.
+  const GraphNode* find_node(int id) const;
+};
+
+// One pose of a trajectory. `node` is 0 where only the time is known.
+struct TrajectoryPose {
+  int node = 0;
+  double stamp_s = 0.0;
+  Pose world_from_base = Pose::Identity();
+};
+using Trajectory = std::vector<TrajectoryPose>;
+
+// Which of a scan's own poses: by odometry, optimised as stored, or ground truth.
+enum class PoseSource { odometry, stored, ground_truth };
+std::string to_text(PoseSource source);  // "odometry", "stored", "ground-truth"
+
+// The poses of that source, by ascending node; nodes that have none, and invalid nodes, are left
+// out.
+Trajectory trajectory_of(const PoseGraph& graph, PoseSource source);
+
+// Sum of the distances between consecutive poses, m.
+double path_length(const Trajectory& trajectory);
+
+}  // namespace libmap

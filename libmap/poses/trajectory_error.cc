@@ -1,0 +1,1 @@
+#include "libmap/poses/trajectory_error.h"

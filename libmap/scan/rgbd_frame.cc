@@ -1,0 +1,55 @@
+#include "libmap/scan/rgbd_frame.h"
+
+#include <string>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+
+namespace {
+
+// Width of one of `count` pictures side by side.
+int part_width(int node, const std::string& what, int width, std::size_t count) {
+  const int cameras = static_cast<int>(count);
+  if (width % cameras != 0)
+    throw Error("images of several cameras cannot be told apart",
+                {.file = {},
+                 .field = "node " + std::to_string(node) + ": " + what + " width",
+                 .value = std::to_string(width),
+                 .bound = "a multiple of " + std::to_string(cameras)});
+  return width / cameras;
+}
+
+}  // namespace
+
+std::vector<CameraView> camera_views(const RgbdFrame& frame) {
+  std::vector<CameraView> views;
+  if (frame.cameras.empty()) return views;
+  const std::size_t count = frame.cameras.size();
+  const int color_width = part_width(frame.node, "colour image", frame.color.width, count);
+  const int depth_width = part_width(frame.node, "depth image", frame.depth.width, count);
+  for (std::size_t i = 0; i < count; ++i) {
+    CameraView view;
+    view.color_camera = frame.cameras[i];
+    const int place = static_cast<int>(i);
+    if (!frame.color.empty()) {
+      view.color =
+          count == 1 ? frame.color : crop_columns(frame.color, place * color_width, color_width);
+      if (view.color.width != view.color_camera.width ||
+          view.color.height != view.color_camera.height)
+        view.color_camera = scale_camera(view.color_camera, view.color.width, view.color.height);
+    }
+    view.depth_camera = view.color_camera;
+    if (!frame.depth.empty()) {
+      view.depth =
+          count == 1 ? frame.depth : crop_columns(frame.depth, place * depth_width, depth_width);
+      if (view.depth.width != view.depth_camera.width ||
+          view.depth.height != view.depth_camera.height)
+        view.depth_camera = scale_camera(view.depth_camera, view.depth.width, view.depth.height);
+    }
+    views.push_back(std::move(view));
+  }
+  return views;
+}
+
+}  // namespace libmap

@@ -1,0 +1,45 @@
+// What one node of a scan has recorded.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+
+namespace libmap {
+
+// A rectified pair: the right camera lies `baseline_m` along the left one's x axis.
+struct StereoCamera {
+  Camera left;
+  Camera right;
+  double baseline_m = 0.0;
+  Pose right_from_left = Pose::Identity();
+};
+
+// Colour and depth of one or several cameras; several stand side by side in one image, each with
+// the same share of its width, in the order of `cameras`. Depth is registered to the colour camera,
+// and may have another size than colour.
+struct RgbdFrame {
+  int node = 0;
+  double stamp_s = 0.0;
+  std::vector<Camera>
+      cameras;       // of the colour images; of the depth images where there is no colour
+  ColorImage color;  // empty if not stored or not asked for
+  DepthImage depth;
+  GrayImage right;  // of a stereo pair
+  std::vector<StereoCamera> stereo;
+};
+
+// One camera's part of a frame.
+struct CameraView {
+  Camera color_camera;
+  Camera depth_camera;  // color_camera at the size of `depth`
+  ColorImage color;
+  DepthImage depth;
+};
+
+// The frame cut into its cameras. Throws Error naming the node if the image does not fit them.
+std::vector<CameraView> camera_views(const RgbdFrame& frame);
+
+}  // namespace libmap

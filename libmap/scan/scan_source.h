@@ -1,0 +1,37 @@
+// A scan as all later stages see it, whatever file it comes from: poses and links at once, frames
+// one by one.
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "libmap/core/pose_graph.h"
+#include "libmap/scan/rgbd_frame.h"
+
+namespace libmap {
+
+// Which images of a frame to decode. Cameras are always read.
+struct FrameParts {
+  bool color = true;
+  bool depth = true;
+};
+
+class ScanSource {
+ public:
+  virtual ~ScanSource() = default;
+
+  // As the user named it.
+  virtual const std::filesystem::path& path() const = 0;
+  // Read when the scan was opened.
+  virtual const PoseGraph& graph() const = 0;
+  // May be called from several threads at once. Images that are not stored are left empty. Throws
+  // Error naming the file, the node and the part that is broken.
+  virtual RgbdFrame read_frame(int node, FrameParts parts = {}) const = 0;
+};
+
+// An RTAB-Map database, or a folder in the layout of the TUM RGB-D benchmark. Throws Error if the
+// path is neither.
+std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path);
+
+}  // namespace libmap

@@ -1,0 +1,92 @@
+// graspmap simulate scene: scenes of primitive shapes with their closed-form truth.
+#include <fmt/format.h>
+
+#include <string>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/simulate/primitive_scene_io.h"
+#include "libmap/simulate/scene_mesh.h"
+#include "libmap/simulate/scene_sampling.h"
+#include "tools/command_line.h"
+#include "tools/simulate_commands.h"
+
+namespace {
+
+using graspmap_tools::Run;
+
+struct SimulateOptions {
+  std::string output;
+  std::string scene = "primitive_shapes";
+  bool mesh = false;
+  libmap::SceneSamplingOptions sampling;
+  libmap::SceneMeshOptions meshing;
+};
+
+void bind(libmap::ParameterTable& table, SimulateOptions& options) {
+  using libmap::not_negative;
+  using libmap::positive;
+  table.add("scene", options.scene, "scene of the toolkit, or a scene file");
+  table.add("mesh", options.mesh, "the surface as a mesh, not as a cloud");
+  table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance of the samples, m");
+  table.add("count", options.sampling.count, not_negative,
+            "number of samples (2 %) in place of a spacing; 0: by spacing");
+  table.add("jitter", options.sampling.jitter, libmap::zero_to_one,
+            "how far samples leave their grid: 0 regular, 1 a whole cell");
+  table.add("noise_m", options.sampling.noise_m, not_negative,
+            "standard deviation of the noise along the normal, m");
+  table.add("seed", options.sampling.seed, not_negative, "of jitter and noise");
+  table.add("edge_length_m", options.meshing.edge_length_m, positive,
+            "longest edge of the mesh, m");
+  table.add("chord_error_m", options.meshing.chord_error_m, positive,
+            "largest distance of the mesh from a round shape, m");
+}
+
+void write_samples(const libmap::PrimitiveScene& scene, const SimulateOptions& options, Run& run) {
+  const libmap::SceneSamples samples =
+      run.timed("sampling", [&] { return libmap::sample_scene(scene, options.sampling); });
+  run.manifest().results.emplace_back("points", static_cast<std::int64_t>(samples.cloud.size()));
+  run.manifest().results.emplace_back("spacing_m", samples.spacing_m);
+  run.say(fmt::format("{} points, {} m apart", samples.cloud.size(),
+                      libmap::to_text(static_cast<float>(samples.spacing_m))));
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_cloud(temporary, samples.cloud); });
+}
+
+void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& options, Run& run) {
+  const libmap::TriangleMesh mesh =
+      run.timed("meshing", [&] { return libmap::scene_mesh(scene, options.meshing); });
+  run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
+  run.manifest().results.emplace_back("triangles",
+                                      static_cast<std::int64_t>(mesh.triangles.size()));
+  run.say(fmt::format("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size()));
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); });
+}
+
+void simulate(const SimulateOptions& options, Run& run) {
+  if (options.mesh)
+    libmap::require_mesh_format(options.output);
+  else
+    libmap::require_cloud_format(options.output);
+  run.claim_output(options.output);
+  const auto file = graspmap_tools::find_data_file("scenes", options.scene);
+  const libmap::PrimitiveScene scene = libmap::load_scene(file);
+  run.add_input(file);
+  run.manifest().frame = "scene";
+  if (options.mesh)
+    write_surface(scene, options, run);
+  else
+    write_samples(scene, options, run);
+}
+
+}  // namespace
+
+int graspmap_tools::simulate_scene(int argc, char** argv) {
+  SimulateOptions options;
+  Command command("simulate scene", "Terrains of primitive shapes that are known exactly.");
+  command.output(options.output, "cloud with true normals and curvatures, or mesh");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
+}
