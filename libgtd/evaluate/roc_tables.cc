@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <nlohmann/json.hpp>
 
 #include "libmap/core/error.h"
@@ -20,14 +19,6 @@ std::string number_text(std::size_t value) {
 
 std::string text_or_empty(std::optional<double> value) {
   return value ? libmap::to_text(*value) : std::string();
-}
-
-// With so many decimals, '.' under every locale.
-std::string fixed_text(double value, int decimals) {
-  std::array<char, 64> buffer;
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
-                                 std::chars_format::fixed, decimals);
-  return std::string(buffer.data(), end.ptr);
 }
 
 struct NamedRate {
@@ -150,8 +141,8 @@ std::string markdown_cell(const std::string& text) {
 
 std::string interval_text(const std::optional<Interval>& interval, int decimals) {
   if (!interval) return "";
-  return " (" + fixed_text(interval->low, decimals) + " to " +
-         fixed_text(interval->high, decimals) + ")";
+  return " (" + to_fixed_text(interval->low, decimals) + " to " +
+         to_fixed_text(interval->high, decimals) + ")";
 }
 
 std::string areas_markdown(const TableEvaluation& evaluation) {
@@ -164,9 +155,9 @@ std::string areas_markdown(const TableEvaluation& evaluation) {
     text += "| " + markdown_cell(column.name) + " | " + number_text(counts.size()) + " | " +
             number_text(counts.positives()) + " | " + number_text(result.left_out_unscored) + " | ";
     if (result.area) {
-      text += fixed_text(result.area->trapezoid, 3) +
+      text += to_fixed_text(result.area->trapezoid, 3) +
               interval_text(result.area->trapezoid_bootstrap_95, 3) + " | " +
-              fixed_text(result.area->upper_sum, 3) +
+              to_fixed_text(result.area->upper_sum, 3) +
               (result.area->upper_sum_width < 1.0 ? " (incomplete, see below) |\n" : " |\n");
     } else {
       text += "not defined | not defined |\n";
@@ -187,7 +178,7 @@ std::string rates_markdown(const TableEvaluation& evaluation) {
     for (const NamedRate& named : named_rates(column.result.at_rate_cutoff.counts)) {
       const std::optional<double> value = named.rate.value();
       text += " " +
-              (value ? fixed_text(*value, 4) + interval_text(named.rate.wilson_95(), 2)
+              (value ? to_fixed_text(*value, 4) + interval_text(named.rate.wilson_95(), 2)
                      : std::string("not defined")) +
               " |";
     }
@@ -208,7 +199,7 @@ std::string notes_markdown(const TableEvaluation& evaluation) {
       text += "- " + markdown_cell(column.name) +
               ": some locations that are not graspable score below the first cutoff or reach the "
               "last one; the upper sum covers only " +
-              fixed_text(result.area->upper_sum_width, 3) +
+              to_fixed_text(result.area->upper_sum_width, 3) +
               " of the false positive rate and can lie below the trapezoid.\n";
   }
   return text.empty() ? text : text + "\n";

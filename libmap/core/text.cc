@@ -58,6 +58,15 @@ std::string_view trim(std::string_view text) {
   return text;
 }
 
+std::string to_fixed_text(double value, int decimals) {
+  // 309 digits of the largest double, a sign, a point and the decimals.
+  std::string text(312 + static_cast<std::size_t>(std::max(decimals, 0)), ' ');
+  const auto end = std::to_chars(text.data(), text.data() + text.size(), value,
+                                 std::chars_format::fixed, decimals);
+  text.resize(static_cast<std::size_t>(end.ptr - text.data()));
+  return text;
+}
+
 std::optional<double> parse_double(std::string_view text) {
   text = trim(text);
   text = without_plus(text);

@@ -13,6 +13,8 @@ namespace libmap {
 std::string to_text(double value);
 std::string to_text(float value);
 std::string to_text(std::int64_t value);
+// With that many digits after the point, however large the number.
+std::string to_fixed_text(double value, int decimals);
 
 // The whole of `text` (spaces around it allowed) as a number, or nothing.
 std::optional<double> parse_double(std::string_view text);

@@ -51,13 +51,6 @@ struct Margins {
 };
 constexpr Margins margins;
 
-std::string fixed_text(double value, int decimals) {
-  std::array<char, 400> buffer;
-  const auto end = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
-                                 std::chars_format::fixed, decimals);
-  return std::string(buffer.data(), end.ptr);
-}
-
 // Plain digits for numbers of everyday size, powers of ten for others.
 std::string tick_text(double value, double largest) {
   if (largest >= 1e7 || largest < 1e-3) return to_text(value);
@@ -432,7 +425,7 @@ Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title) {
   for (const RocCurve& curve : curves) {
     ChartCurve drawn;
     drawn.name = curve.name;
-    if (curve.area) drawn.name += ", AUC " + fixed_text(*curve.area, 3) + " (trapezoid)";
+    if (curve.area) drawn.name += ", AUC " + to_fixed_text(*curve.area, 3) + " (trapezoid)";
     drawn.x = curve.false_positive_rates;
     drawn.y = curve.true_positive_rates;
     drawn.markers = curve.false_positive_rates.size() <= 50;

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include "libmap/core/text.h"
@@ -23,13 +22,6 @@ constexpr double bar_width = 1.3;
 constexpr double swatch = 1.05;
 constexpr double legend_gap = 1.2;  // between two legends
 constexpr int most_ticks = 6;
-
-std::string fixed_text(double value, int decimals) {
-  std::array<char, 64> buffer{};
-  const auto [end, status] = std::to_chars(buffer.data(), buffer.data() + buffer.size(), value,
-                                           std::chars_format::fixed, decimals);
-  return status == std::errc{} ? std::string(buffer.data(), end) : to_text(value);
-}
 
 // Where no round number lies between the ends, the ends.
 std::vector<double> ticks_of(const Legend& legend) {
@@ -175,7 +167,7 @@ std::vector<std::string> tick_texts(const std::vector<double>& ticks) {
   while (decimals < 6 && !is_round(step * std::pow(10.0, decimals))) ++decimals;
   for (const double tick : ticks)
     texts.push_back(step < 1e-6 || std::abs(tick) >= 1e7 ? to_text(static_cast<float>(tick))
-                                                         : fixed_text(tick, decimals));
+                                                         : to_fixed_text(tick, decimals));
   return texts;
 }
 

@@ -31,6 +31,15 @@ TEST(TextTest, NumbersTakeTheShortestText) {
   EXPECT_EQ(to_text(std::numeric_limits<double>::quiet_NaN()), "nan");
 }
 
+TEST(TextTest, FixedDigitsAtAnySize) {
+  using libmap::to_fixed_text;
+  EXPECT_EQ(to_fixed_text(0.125, 2), "0.12");
+  EXPECT_EQ(to_fixed_text(-2.0, 0), "-2");
+  EXPECT_EQ(to_fixed_text(0.7449, 3), "0.745");
+  EXPECT_EQ(to_fixed_text(std::numeric_limits<double>::max(), 3).size(), 309u + 4u);
+  EXPECT_EQ(to_fixed_text(std::numeric_limits<double>::quiet_NaN(), 3), "nan");
+}
+
 TEST(TextTest, EveryDoubleReadsBackAsItself) {
   int tried = 0;
   while (tried < 20000) {
