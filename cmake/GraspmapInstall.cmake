@@ -12,7 +12,7 @@ install(TARGETS ${graspmap_libraries} EXPORT graspmap_targets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY data/grippers data/scenarios data/scenes data/field_test
+install(DIRECTORY data/grippers data/rigs data/scenarios data/scenes data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 

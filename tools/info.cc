@@ -1,9 +1,10 @@
-// graspmap info: what a cloud, a mesh or a map holds.
+// graspmap info: what a scan, a cloud, a mesh or a map holds.
 #include <fmt/format.h>
 
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 
 #include "libmap/cloud/cloud_io.h"
@@ -12,6 +13,7 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "tools/command_line.h"
+#include "tools/info_scan.h"
 
 namespace {
 
@@ -21,6 +23,7 @@ using Json = nlohmann::ordered_json;
 struct InfoOptions {
   std::string file;
   bool json = false;
+  bool verify = false;
 };
 
 Json range_of(const std::vector<double>& values) {
@@ -93,36 +96,77 @@ std::string plain(const Json& value) {
   if (value.is_null()) return "none";
   if (value.is_string()) return value.get<std::string>();
   if (value.is_boolean()) return value.get<bool>() ? "yes" : "no";
-  if (value.is_number_float()) return libmap::to_text(static_cast<float>(value.get<double>()));
+  if (value.is_number_float()) {
+    // Stamps need more digits than a float has.
+    const auto number = value.get<double>();
+    return std::abs(number) < 1e6 ? libmap::to_text(static_cast<float>(number))
+                                  : libmap::to_fixed_text(number, 3);
+  }
   if (!value.is_array()) return value.dump();
   std::string text;
   for (const Json& one : value) text += (text.empty() ? "" : " ") + plain(one);
   return text.empty() ? "none" : text;
 }
 
+// One object of a list in one line.
+std::string line_of(const Json& object) {
+  if (object.contains("type") && object.contains("range"))
+    return fmt::format("{:<12} {:<8} {}", plain(object.at("name")), plain(object.at("type")),
+                       plain(object.at("range")));
+  std::string line;
+  for (const auto& [name, value] : object.items())
+    line += fmt::format("{}{} {}", line.empty() ? "" : ", ", name, plain(value));
+  return line;
+}
+
+bool is_list_of(const Json& value, bool (Json::*kind)() const noexcept) {
+  return value.is_array() && !value.empty() && (value.front().*kind)();
+}
+
 void print_plainly(const Json& json, const std::string& indent) {
   for (const auto& [name, value] : json.items()) {
-    const bool list_of_objects = value.is_array() && !value.empty() && value.front().is_object();
     if (value.is_object()) {
       std::cout << indent << name << ":\n";
       print_plainly(value, indent + "  ");
-    } else if (list_of_objects) {
+    } else if (is_list_of(value, &Json::is_object) || is_list_of(value, &Json::is_string)) {
       std::cout << indent << name << ":\n";
       for (const Json& one : value)
-        std::cout << indent << "  "
-                  << fmt::format("{:<12} {:<8} {}", plain(one.at("name")), plain(one.at("type")),
-                                 plain(one.at("range")))
-                  << "\n";
+        std::cout << indent << "  " << (one.is_object() ? line_of(one) : plain(one)) << "\n";
     } else {
       std::cout << indent << fmt::format("{}: {}", name, plain(value)) << "\n";
     }
   }
 }
 
-void info(const InfoOptions& options) {
+Json content_json(const InfoOptions& options, Run& run, std::vector<libmap::ScanFault>& faults) {
+  if (graspmap_tools::may_be_scan(options.file)) {
+    graspmap_tools::ScanInfo scan =
+        graspmap_tools::scan_info(options.file, options.verify, run.progress());
+    faults = std::move(scan.faults);
+    return std::move(scan.json);
+  }
+  if (options.verify)
+    throw libmap::Error("only scans are verified", {.file = options.file, .field = "--verify"});
+  return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options.file)
+                                                                   : cloud_json(options.file);
+}
+
+// Of a scan that was verified: what is broken, in one line; the list stands on stdout.
+void require_sound(const std::string& file, const std::vector<libmap::ScanFault>& faults) {
+  if (faults.empty()) return;
+  std::set<int> nodes;
+  for (const libmap::ScanFault& fault : faults)
+    if (fault.node > 0) nodes.insert(fault.node);
+  throw libmap::Error(fmt::format("{} {} broken, in {} {}", faults.size(),
+                                  faults.size() == 1 ? "part is" : "parts are", nodes.size(),
+                                  nodes.size() == 1 ? "node" : "nodes"),
+                      {.file = file});
+}
+
+void info(const InfoOptions& options, Run& run) {
   Json json = {{"path", options.file}};
-  json.update(libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options.file)
-                                                                        : cloud_json(options.file));
+  std::vector<libmap::ScanFault> faults;
+  json.update(content_json(options, run, faults));
   if (const auto manifest = libmap::read_manifest_of(options.file)) {
     json["made_by"] = "graspmap " + manifest->command + " " + manifest->version;
     json["frame"] = manifest->frame;
@@ -135,14 +179,17 @@ void info(const InfoOptions& options) {
     std::cout << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   else
     print_plainly(json, "");
+  require_sound(options.file, faults);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   InfoOptions options;
-  graspmap_tools::Command command("info", "What a cloud, a mesh or a graspability map holds.");
-  command.input("FILE", options.file, "cloud, mesh or map");
+  graspmap_tools::Command command("info",
+                                  "What a scan, a cloud, a mesh or a graspability map holds.");
+  command.input("FILE", options.file, "scan, cloud, mesh or map");
   command.flag("--json", options.json, "as JSON");
-  return command.run(argc, argv, [&](Run&) { info(options); });
+  command.flag("--verify", options.verify, "decode all that a scan stores and list what is broken");
+  return command.run(argc, argv, [&](Run& run) { info(options, run); });
 }

@@ -21,12 +21,17 @@ struct CommandEntry {
 
 constexpr CommandEntry commands[] = {
     {"simulate", "scenes of primitive shapes with their closed-form truth"},
+    {"calibrate", "a camera's intrinsics and distortion by pictures of a chessboard"},
+    {"extract", "colour, depth, calibrations, poses and links of a scan as plain files"},
+    {"fuse", "the depth images of a scan -> one oriented, coloured cloud"},
+    {"panorama", "depth images of a camera rig -> one cloud in the robot's frame"},
     {"score", "graspability map of a terrain, tile by tile"},
     {"merge", "tiles of a map into one map"},
     {"lookup", "the map's values at listed locations"},
     {"evaluate", "ROC, AUC and accuracy of looked-up scores against a field test"},
     {"render", "a picture of a cloud, a mesh or a map"},
     {"mask", "a gripper's mask as text, cloud or picture data"},
+    {"compare", "how far a cloud lies from a true surface, and how much of it the cloud covers"},
     {"info", "what a cloud, a mesh or a map holds"},
     {"convert", "any format to any other"},
 };

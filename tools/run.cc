@@ -7,6 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/folder_output.h"
 
 namespace graspmap_tools {
 
@@ -33,6 +34,12 @@ void require_no_foreign_manifest(const fs::path& output) {
   if (fs::exists(manifest) && !written_by_this_toolkit(output))
     throw libmap::Error("exists and is no manifest of graspmap: --force overwrites it",
                         {.file = manifest.string()});
+}
+
+void require_other_than_inputs(const fs::path& output, const std::vector<std::string>& inputs) {
+  for (const std::string& input : inputs)
+    if (fs::exists(output) && fs::exists(input) && fs::equivalent(output, input))
+      throw libmap::Error("is the input: the output needs another name", {.file = output.string()});
 }
 
 }  // namespace
@@ -70,9 +77,7 @@ Run::Timing::~Timing() {
 }
 
 void Run::claim_output(const fs::path& path, const std::vector<std::string>& inputs) {
-  for (const std::string& input : inputs)
-    if (fs::exists(path) && fs::exists(input) && fs::equivalent(path, input))
-      throw libmap::Error("is the input: the output needs another name", {.file = path.string()});
+  require_other_than_inputs(path, inputs);
   if (fs::is_directory(path))
     throw libmap::Error("is a folder, not a file", {.file = path.string()});
   if (fs::exists(path) && !options_.force && !written_by_this_toolkit(path))
@@ -132,6 +137,24 @@ void Run::write_output_folder(const fs::path& given,
   }
   write_manifest(folder);
   for (libmap::OutputFile& output : outputs) output.commit();
+}
+
+void Run::claim_output_tree(const fs::path& given, const std::vector<std::string>& names,
+                            const std::vector<std::string>& inputs) {
+  require_other_than_inputs(given, inputs);
+  claim_output_folder(given);
+  // Made and dropped at once: what cannot be written or replaced is found before the work.
+  const libmap::OutputFolder probe(given, names);
+}
+
+void Run::write_output_tree(const fs::path& given, const std::vector<std::string>& names,
+                            const Writer& writer) {
+  if (options_.dry_run) return writer({});
+  const fs::path folder = without_trailing_slash(given);
+  libmap::OutputFolder output(folder, names);
+  timed("write", [&] { writer(output.temporary_path()); });
+  write_manifest(folder);
+  output.commit();
 }
 
 }  // namespace graspmap_tools

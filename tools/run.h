@@ -64,6 +64,15 @@ class Run {
   void write_output_folder(const std::filesystem::path& folder,
                            const std::vector<std::pair<std::string, Writer>>& files);
 
+  // A folder of any number of files: writer(temporary) fills a folder beside it, which then takes
+  // the place of `folder` as a whole. An earlier one that holds anything but `names`, or is one of
+  // the inputs, is an Error, with --force too. With --dry-run the writer gets no folder (an empty
+  // path) and nothing is written.
+  void claim_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,
+                         const std::vector<std::string>& inputs = {});
+  void write_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,
+                         const Writer& writer);
+
  private:
   class Timing {
    public:

@@ -16,7 +16,12 @@ struct Entry {
 };
 
 constexpr Entry entries[] = {
+    {"cameras", "what the depth cameras of a robot see on a mesh",
+     graspmap_tools::simulate_cameras},
+    {"scan", "a scan of a mesh as a scan database", graspmap_tools::simulate_scan},
     {"scene", "a scene of primitive shapes as cloud or mesh", graspmap_tools::simulate_scene},
+    {"site", "rocks, slopes or a climbing wall: true mesh and field points",
+     graspmap_tools::simulate_site},
 };
 
 void print_help() {

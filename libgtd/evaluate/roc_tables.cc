@@ -12,6 +12,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 using libmap::Table;
+using libmap::to_fixed_text;
 
 std::string number_text(std::size_t value) {
   return libmap::to_text(static_cast<std::int64_t>(value));

@@ -85,6 +85,8 @@ Pose optical_to_body_rotation() {
 }
 
 bool Camera::is_distorted() const {
+  // Without terms too, an equidistant lens is no pinhole.
+  if (distortion_model == DistortionModel::equidistant) return true;
   return distortion_model != DistortionModel::none &&
          std::any_of(distortion.begin(), distortion.end(), [](double term) { return term != 0.0; });
 }

@@ -1,16 +1,21 @@
-// Rays against a triangle mesh (Embree), in single precision about the mesh's centre.
+// Rays against a triangle mesh (Embree). Triangles are found in single precision about the mesh's
+// centre, watertight along shared edges; where a ray meets them is then computed in double
+// precision.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
 
 struct RayHit {
+  static constexpr std::uint32_t no_triangle = 0xffffffff;
+
   double distance = 0.0;  // in lengths of the ray's direction
   std::uint32_t triangle = 0;
   double u = 0.0;  // barycentric: (1 - u - v) * a + u * b + v * c
@@ -19,18 +24,25 @@ struct RayHit {
 
 class RayCaster {
  public:
-  // Throws Error if the mesh has no triangle. The mesh may go away afterwards.
+  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
+  // The mesh may go away afterwards.
   explicit RayCaster(const TriangleMesh& mesh);
   ~RayCaster();
   RayCaster(RayCaster&&) noexcept;
   RayCaster& operator=(RayCaster&&) noexcept;
 
-  // The nearest triangle along origin + distance * direction, distance between `near` and `far`,
-  // from either side. May be called from several threads at once.
+  // The nearest triangle along origin + distance * direction, distance between `near` and `far`
+  // (0 <= near <= far), from either side. Nothing where the direction is zero or not finite. May be
+  // called from several threads at once.
   std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double near = 0.0, double far = 1e30) const;
   bool is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                   double near = 0.0, double far = 1e30) const;
+
+  // The same for many rays from one place, quickest where neighbours in `directions` point nearly
+  // the same way; `hits` is as long. RayHit::no_triangle marks a ray that meets nothing.
+  void cast_bundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
+                   std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;
 
  private:
   struct Scene;

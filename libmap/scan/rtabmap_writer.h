@@ -7,37 +7,43 @@
 #include <string>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/scan/depth_codec.h"
+#include "libmap/scan/image_codec.h"
 #include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
 
-enum class DepthEncoding { rvl, png16, float_png };
-enum class ColorEncoding { jpeg, png };
-
 struct RtabmapWriterOptions {
-  DepthEncoding depth = DepthEncoding::rvl;  // rvl and png16: whole millimetres up to 65.534 m
-  ColorEncoding color = ColorEncoding::jpeg;
-  int jpeg_quality = 95;                            // RTAB-Map's default
+  DepthFormat depth = DepthFormat::rvl;   // rvl and png16: whole millimetres up to 65.534 m
+  ImageFormat color = ImageFormat::jpeg;  // of the right image of a stereo pair too
+  int jpeg_quality = 95;                  // RTAB-Map's default
   std::map<std::string, std::string> parameters{};  // into Info.parameters
 };
 
+// The same calls in the same order give the same bytes: where RTAB-Map writes the present time, the
+// stamps of the nodes stand.
 class RtabmapWriter {
  public:
-  // Makes a new file at `path`, which callers give as an OutputFile's temporary path. Throws Error.
+  // Makes a new file at `path`, which callers give as an OutputFile's temporary path; what stood
+  // there is lost. Throws Error.
   explicit RtabmapWriter(const std::filesystem::path& path,
                          const RtabmapWriterOptions& options = {});
   ~RtabmapWriter();
   RtabmapWriter(const RtabmapWriter&) = delete;
   RtabmapWriter& operator=(const RtabmapWriter&) = delete;
 
-  // One node with its images, in any order of ids. Throws Error if the id is taken.
+  // One node with its images, in any order of ids; poses are kept as float32. Throws Error if the
+  // id or the label is taken, an id is not above 0, a camera is no camera, or the frame is another
+  // node's.
   void add_node(const GraphNode& node, const RgbdFrame& frame);
   // Stored in both directions, the inverse with the same information matrix, as RTAB-Map does;
-  // priors, gravity and landmarks in one.
+  // priors, gravity and landmarks in one. The nodes may come later. Throws Error for a link that
+  // is there already, in either direction, and for numbers that are not finite.
   void add_link(const PoseLink& link);
   void set_optimized_poses(const std::map<int, Pose>& map_from_base);
-  // Writes what is left and closes the file: no journal is left beside it. A writer that goes away
-  // without it leaves a file that is no whole scan.
+  // Writes what is left and closes the file: no journal is left beside it. Throws Error if a link
+  // or an optimised pose names a node that is not there. A writer that goes away without it leaves
+  // a file that is no whole scan.
   void finish();
 
  private:
@@ -45,7 +51,11 @@ class RtabmapWriter {
   std::unique_ptr<Parts> parts_;
 };
 
-// `source` copied to `target` with other optimised poses; everything else stays as it is.
+// `source` copied to `target`, whatever stood there, with other optimised poses (Admin.opt_ids,
+// opt_poses); everything else stays as it is, row for row. Where the last localisation stood at an
+// optimised pose it moves with its node, else it is dropped. A map, cloud or mesh that RTAB-Map
+// stored with the earlier poses stays as well. `source` may be open elsewhere. Throws Error: no
+// database of RTAB-Map 0.13 or later, a pose of a node that is not there.
 void copy_with_optimized_poses(const std::filesystem::path& source,
                                const std::filesystem::path& target,
                                const std::map<int, Pose>& map_from_base);

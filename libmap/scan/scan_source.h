@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <vector>
 
 #include "libmap/core/pose_graph.h"
 #include "libmap/scan/rgbd_frame.h"
@@ -25,6 +26,11 @@ class ScanSource {
   virtual const std::filesystem::path& path() const = 0;
   // Read when the scan was opened.
   virtual const PoseGraph& graph() const = 0;
+  // What was left out when it was opened, and why.
+  virtual const std::vector<std::string>& warnings() const {
+    static const std::vector<std::string> none;
+    return none;
+  }
   // May be called from several threads at once. Images that are not stored are left empty. Throws
   // Error naming the file, the node and the part that is broken.
   virtual RgbdFrame read_frame(int node, FrameParts parts = {}) const = 0;

@@ -82,6 +82,13 @@ TEST(CameraTest, DistortionFollowsTheFormulas) {
   EXPECT_NEAR(bent.y(), fisheye.fy * y * td / r + fisheye.cy, 1e-10);
 }
 
+// Without terms the radius in the image is the angle, not its tangent.
+TEST(CameraTest, AnIdealFisheyeIsNoPinhole) {
+  const Camera fisheye = distorted(DistortionModel::equidistant, {0, 0, 0, 0});
+  const Vector2d pixel = libmap::distort_to_pixel(fisheye, Vector2d(std::tan(0.8), 0.0));
+  EXPECT_NEAR(pixel.x(), fisheye.cx + fisheye.fx * 0.8, 1e-9);
+}
+
 TEST(CameraTest, EveryPixelsRayComesBackToItsPixel) {
   for (const Camera& camera : lenses()) {
     for (int trial = 0; trial < 2000; ++trial) {

@@ -1,0 +1,68 @@
+// One oriented, coloured cloud from all depth images of a scan.
+//
+// Two passes over the frames. The first fits a plane to the pixels around each pixel
+// (depth_planes) and averages places and normals in a hashed voxel grid (surface_voxels): a coarse
+// surface, one element a voxel. The second moves each element along its normal to the weighted mean
+// of what all frames measured within a disc around it (surface_refinement). Both average where the
+// rays meet the surface, not where noise has put the measurements: that is what makes the means
+// free of bias. Memory grows with the occupied voxels alone.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/cloud/depth_planes.h"
+#include "libmap/cloud/surface_points.h"
+#include "libmap/core/parameters.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/pose_graph.h"
+#include "libmap/core/progress.h"
+#include "libmap/scan/scan_source.h"
+
+namespace libmap {
+
+struct DepthFusionOptions {
+  double voxel_size_m = 0.01;  // > 0
+  DepthPlaneOptions planes{};
+  double disc_radius_voxels = 1.5;  // > 0: measurements this near along the surface are averaged
+  // >= 0: by which a whole frame may lie wrong along a normal. It keeps the frame nearest to a
+  // place from speaking for it alone.
+  double pose_error_m = 0.0;
+  int min_views = 1;  // distinct frames that must have measured a point
+  // A point is dropped that more views see through than see, each counted by its cosine (Merrell et
+  // al. 2007); larger keeps more.
+  double max_seen_through = 0.3;
+  // Points one voxel beyond the edge of what was measured, unless views see through them.
+  bool extend_edges = true;
+  bool color = true;
+  bool stereo = false;  // compute the depth of stereo pairs (stereo_depth)
+  bool strict = false;  // a frame that cannot be used is an Error
+};
+void bind(ParameterTable& table, DepthFusionOptions& options);
+
+struct DepthFusionResult {
+  // World frame; unit normals towards the cameras; colours if any frame has them. Fields: `views`,
+  // distinct frames; `expected_error` of the position along the normal, m, one standard deviation:
+  // from the noise, from how far frames disagree, and from how far the two passes do, as they do
+  // where the surface bends within a disc.
+  PointCloud cloud;
+  DepthPixelCounts pixels;
+  std::size_t frames = 0;                            // used
+  std::vector<std::pair<int, std::string>> skipped;  // node and what it lacks
+  std::size_t occupied_voxels = 0;
+  std::size_t elements = 0;  // of the surface, before points were made of them
+  SurfacePointCounts points;
+  std::vector<std::pair<std::string, double>> timings_s;
+};
+
+// The frames of `world_from_base` that have depth, by ascending node. The same bytes for any number
+// of threads. Frames without depth, with a pose that is not finite or that cannot be decoded are
+// skipped and listed. Throws Error: options out of their ranges, no frame that can be used, poses
+// that lie too far apart for the voxel size (2^20 voxels).
+DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
+                             const DepthFusionOptions& options = {},
+                             Progress& progress = no_progress());
+
+}  // namespace libmap

@@ -1,0 +1,19 @@
+// How far a depth camera's measurements scatter.
+#pragma once
+
+namespace libmap {
+
+// Of the form of Nguyen, Izadi and Lovell 2012 ("Modeling Kinect sensor noise for improved 3D
+// reconstruction and tracking"): an axial part that grows with the range, and a lateral part that
+// counts the more the more obliquely a surface is seen. The axial defaults are those of a
+// time-of-flight camera as the project's scans describe it (2 mm + 0.5 % of the range); half a
+// pixel is what a pixel's own footprint leaves open.
+struct DepthNoise {
+  double axial_m = 0.002;         // > 0: standard deviation at range 0
+  double axial_of_range = 0.005;  // >= 0: what each metre of range adds, m/m
+  double lateral_px = 0.8;        // >= 0
+
+  double axial_at(double z_m) const { return axial_m + axial_of_range * z_m; }
+};
+
+}  // namespace libmap

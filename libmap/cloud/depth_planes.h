@@ -1,0 +1,59 @@
+// The surface through each pixel of a depth image: a plane fitted to the pixels around it.
+//
+// The inverse depth of a plane is affine in the image coordinates of a pinhole camera, and noise of
+// the depth does not move a measurement to another pixel: averaged there, a slanted surface keeps
+// its place.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "libmap/cloud/depth_noise.h"
+#include "libmap/cloud/depth_projection.h"
+#include "libmap/core/image.h"
+
+namespace libmap {
+
+struct DepthPlaneOptions {
+  double min_depth_m = 0.1;
+  double max_depth_m = 4.0;
+  DepthNoise noise{};
+  int radius_px = 2;                // 1 to 7: of the disc of pixels that a plane is fitted to
+  int min_pairs = 6;                // of opposite pixels that must agree with the one between them
+  double max_incidence_deg = 85.0;  // between line of sight and normal: more is grazing
+};
+
+// What became of each pixel.
+struct DepthPixelCounts {
+  std::size_t pixels = 0;
+  std::size_t unmeasured = 0;  // no depth
+  std::size_t out_of_range = 0;
+  std::size_t without_ray = 0;  // outside what the lens distortion can undo
+  std::size_t flying = 0;       // no surface around them explains them
+  std::size_t grazing = 0;
+  std::size_t used = 0;
+
+  DepthPixelCounts& operator+=(const DepthPixelCounts& more);
+};
+
+// Each used pixel's plane, by row and column; support 0 elsewhere.
+struct DepthPlanes {
+  int width = 0;
+  int height = 0;
+  std::vector<float> depth_m;            // z of the plane on the pixel's ray
+  std::vector<Eigen::Vector3f> normals;  // optical frame, towards the camera
+  std::vector<float> cos_incidence;
+  std::vector<std::uint8_t> support;  // pixels that the plane was fitted to
+  DepthPixelCounts counts;
+};
+
+// For each pixel those pairs of opposite neighbours whose mean agrees with it within the noise:
+// their mean inverse depth and its least-squares slopes. A pixel with too few such pairs, at the
+// edge of a surface, takes the plane next to it that predicts its depth within the noise; if there
+// is none, it is flying. Throws Error if image and rays differ in size.
+DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
+                             const DepthPlaneOptions& options = {});
+
+}  // namespace libmap

@@ -1,0 +1,78 @@
+#include "libmap/cloud/depth_projection.h"
+
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+
+namespace {
+
+bool same_lens(const Camera& a, const Camera& b) {
+  return a.width == b.width && a.height == b.height && a.fx == b.fx && a.fy == b.fy &&
+         a.cx == b.cx && a.cy == b.cy && a.distortion_model == b.distortion_model &&
+         a.distortion == b.distortion;
+}
+
+std::string size_text(int width, int height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
+
+}  // namespace
+
+PixelRays pixel_rays(const Camera& camera) {
+  const std::vector<Eigen::Vector2d> table = ray_table(camera);
+  PixelRays rays;
+  rays.width = camera.width;
+  rays.height = camera.height;
+  rays.x.assign(table.size() + 4, 0.0F);
+  rays.y.assign(table.size() + 4, 0.0F);
+  rays.min.setConstant(std::numeric_limits<double>::infinity());
+  rays.max = -rays.min;
+  for (std::size_t n = 0; n < table.size(); ++n) {
+    if (!table[n].allFinite()) {
+      rays.blind.push_back(n);
+      continue;
+    }
+    rays.x[n] = static_cast<float>(table[n].x());
+    rays.y[n] = static_cast<float>(table[n].y());
+    rays.min = rays.min.cwiseMin(table[n]);
+    rays.max = rays.max.cwiseMax(table[n]);
+  }
+  return rays;
+}
+
+std::shared_ptr<const PixelRays> PixelRayCache::rays_of(const Camera& camera) {
+  const std::lock_guard lock(mutex_);
+  for (const auto& [lens, rays] : known_)
+    if (same_lens(lens, camera)) return rays;
+  known_.emplace_back(camera, std::make_shared<const PixelRays>(pixel_rays(camera)));
+  return known_.back().second;
+}
+
+void require_size_of(const Camera& camera, int width, int height) {
+  if (width == camera.width && height == camera.height) return;
+  throw Error("a depth image is not of its camera's size",
+              {.file = {},
+               .field = "depth image",
+               .value = size_text(width, height),
+               .bound = size_text(camera.width, camera.height)});
+}
+
+std::vector<Eigen::Vector3d> back_project(const DepthImage& depth, const Camera& camera,
+                                          double min_depth_m, double max_depth_m) {
+  require_size_of(camera, depth.width, depth.height);
+  const std::vector<Eigen::Vector2d> rays = ray_table(camera);
+  std::vector<Eigen::Vector3d> points;
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    const auto z = static_cast<double>(depth.pixels[n]);
+    // Not true either where z is not a number.
+    if (!(z > 0.0 && z >= min_depth_m && z <= max_depth_m) || !rays[n].allFinite()) continue;
+    points.emplace_back(rays[n].x() * z, rays[n].y() * z, z);
+  }
+  return points;
+}
+
+}  // namespace libmap

@@ -1,0 +1,49 @@
+// Depth images as points: the rays of a camera's pixels, and what they meet.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <mutex>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+
+namespace libmap {
+
+// x/z and y/z of each pixel's ray in single precision, row by row, lens distortion undone. Four
+// entries more than pixels, so that four may be read at once anywhere.
+struct PixelRays {
+  int width = 0;
+  int height = 0;
+  std::vector<float> x;
+  std::vector<float> y;
+  std::vector<std::size_t> blind;  // pixels without a ray; x and y are 0 there
+  // Of all rays.
+  Eigen::Vector2d min = Eigen::Vector2d::Zero();
+  Eigen::Vector2d max = Eigen::Vector2d::Zero();
+};
+PixelRays pixel_rays(const Camera& camera);
+
+// The rays of each lens once. May be used from several threads.
+class PixelRayCache {
+ public:
+  std::shared_ptr<const PixelRays> rays_of(const Camera& camera);
+
+ private:
+  std::mutex mutex_;
+  std::vector<std::pair<Camera, std::shared_ptr<const PixelRays>>> known_;
+};
+
+// Every measurement with min_depth_m <= z <= max_depth_m as a point of the camera's optical frame:
+// x = z (u - cx) / fx, y = z (v - cy) / fy where the lens does not distort; by row and column.
+// Throws Error if the image is not of the camera's size.
+std::vector<Eigen::Vector3d> back_project(const DepthImage& depth, const Camera& camera,
+                                          double min_depth_m, double max_depth_m);
+
+// Throws Error if an image of that size does not belong to the camera.
+void require_size_of(const Camera& camera, int width, int height);
+
+}  // namespace libmap

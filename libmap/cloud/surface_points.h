@@ -1,0 +1,33 @@
+// Refined elements of a surface as a cloud: one point a voxel, without those that views contradict.
+#pragma once
+
+#include <cstddef>
+
+#include "libmap/cloud/surface_refinement.h"
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+struct SurfacePointOptions {
+  double voxel_size_m = 0.01;     // > 0
+  int min_views = 1;              // frames that must have measured a point
+  double max_seen_through = 0.3;  // views that see through a point for each that sees it
+};
+
+struct SurfacePointCounts {
+  std::size_t unconfirmed = 0;      // dropped: measured by too few frames
+  std::size_t seen_through = 0;     // dropped: views see through them
+  std::size_t bent_away = 0;        // dropped: beyond an edge where the surface does not go on
+  std::size_t merged = 0;           // with another one of the same voxel, or an echo of one
+  std::size_t extended_points = 0;  // of the cloud: beyond the edges
+};
+
+struct SurfacePoints {
+  // With normals, colours if the surface has them, and the fields `views` and `expected_error`.
+  PointCloud cloud;
+  SurfacePointCounts counts;
+};
+SurfacePoints make_surface_points(const RefinedSurface& surface,
+                                  const SurfacePointOptions& options);
+
+}  // namespace libmap

@@ -1,0 +1,78 @@
+// Elements of a surface moved along their normals to where all views of their place together put
+// it.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "libmap/cloud/depth_noise.h"
+#include "libmap/cloud/depth_projection.h"
+#include "libmap/cloud/surface_voxels.h"
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+#include "libmap/core/pose.h"
+#include "libmap/scan/rgbd_frame.h"
+
+namespace libmap {
+
+struct SurfaceRefinementOptions {
+  double disc_radius_m = 0.015;  // > 0: measurements this near along the surface are averaged
+  double search_m = 0.01;        // >= 0: by which an element may be wrong before it is refined
+  double min_depth_m = 0.1;
+  double max_depth_m = 4.0;
+  double max_incidence_deg = 85.0;
+  DepthNoise noise{};
+  double pose_error_m = 0.0;  // >= 0: standard deviation of a whole frame along the normal
+};
+
+// One camera of one frame, made ready.
+struct RefinementView {
+  std::uint32_t frame = 0;  // ascending; views of one frame count as one
+  Camera depth_camera;
+  Camera color_camera;
+  std::vector<float> depth_m;  // 0 where there is no ray; four more than pixels
+  ColorImage color;            // may be empty
+  std::shared_ptr<const PixelRays> rays;
+  Pose camera_from_grid = Pose::Identity();
+};
+RefinementView make_refinement_view(CameraView view, std::shared_ptr<const PixelRays> rays,
+                                    const Pose& camera_from_grid, std::uint32_t frame);
+
+struct RefinedElement {
+  float shift_m = 0.0F;  // along the normal
+  float expected_error_m = 0.0F;
+  std::uint32_t frames = 0;   // that measured it
+  float seen = 0.0F;          // views on whose central pixel it lies, by their cosine
+  float seen_through = 0.0F;  // views that see beyond it there
+  Color color{};
+};
+
+struct RefinedSurface {
+  std::vector<SurfaceElement> elements;
+  std::vector<RefinedElement> refined;  // one an element
+  bool has_color = false;
+};
+
+class SurfaceRefinement {
+ public:
+  // Elements in metres.
+  SurfaceRefinement(std::vector<SurfaceElement> elements, const SurfaceRefinementOptions& options);
+  ~SurfaceRefinement();
+
+  // Gathers what the views measured of every element. The result does not depend on how views are
+  // grouped into calls nor on the number of threads, but on their order by rounding.
+  void add(std::span<const RefinementView> views);
+
+  // What was found of each element. Ends the refinement.
+  RefinedSurface finish() &&;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+}  // namespace libmap

@@ -1,0 +1,285 @@
+#include "libmap/cloud/surface_voxels.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "libmap/core/parallel.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
+
+std::uint64_t axis_bits(int cell) {
+  return static_cast<std::uint64_t>(cell + voxel_cell_limit) & axis_mask;
+}
+
+// The finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+std::uint64_t scramble(std::uint64_t key) {
+  key = (key ^ (key >> 30U)) * 0xbf58476d1ce4e5b9U;
+  key = (key ^ (key >> 27U)) * 0x94d049bb133111ebU;
+  return key ^ (key >> 31U);
+}
+
+// Two zeros before each bit of a 21-bit number.
+std::uint64_t spread_bits(std::uint64_t bits) {
+  bits &= axis_mask;
+  bits = (bits | bits << 32U) & 0x1f00000000ffffU;
+  bits = (bits | bits << 16U) & 0x1f0000ff0000ffU;
+  bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
+  bits = (bits | bits << 4U) & 0x10c30c30c30c30c3U;
+  return (bits | bits << 2U) & 0x1249249249249249U;
+}
+
+// Along a Z-order curve (Morton 1966), so that what is near in space is near in the list; the side
+// last.
+std::uint64_t curve_place(std::uint64_t key) {
+  return spread_bits(key >> 43U) << 3U | spread_bits(key >> 22U) << 2U |
+         spread_bits(key >> 1U) << 1U | (key & 1U);
+}
+
+}  // namespace
+
+std::uint64_t pack(const VoxelPlace& place) {
+  return axis_bits(place.cell.x()) << 43U | axis_bits(place.cell.y()) << 22U |
+         axis_bits(place.cell.z()) << 1U | static_cast<std::uint64_t>(place.side);
+}
+
+VoxelPlace unpack(std::uint64_t key) {
+  const auto cell = [](std::uint64_t bits) {
+    return static_cast<int>(bits & axis_mask) - voxel_cell_limit;
+  };
+  return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
+}
+
+VoxelIndex::VoxelIndex() : slots_(1U << 10U, none) {}
+
+std::size_t VoxelIndex::slot_of(std::uint64_t key) const {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t slot = static_cast<std::size_t>(scramble(key)) & mask;
+  while (slots_[slot] != none && keys_[slots_[slot]] != key) slot = (slot + 1) & mask;
+  return slot;
+}
+
+std::uint32_t VoxelIndex::find(std::uint64_t key) const { return slots_[slot_of(key)]; }
+
+std::uint32_t VoxelIndex::find_or_add(std::uint64_t key) {
+  if (last_ < keys_.size() && keys_[last_] == key) return last_;
+  const std::size_t slot = slot_of(key);
+  if (slots_[slot] != none) return last_ = slots_[slot];
+  const auto number = static_cast<std::uint32_t>(keys_.size());
+  last_ = number;
+  slots_[slot] = number;
+  keys_.push_back(key);
+  if (2 * keys_.size() > slots_.size()) grow();
+  return number;
+}
+
+void VoxelIndex::grow() {
+  slots_.assign(2 * slots_.size(), none);
+  for (std::size_t n = 0; n < keys_.size(); ++n)
+    slots_[slot_of(keys_[n])] = static_cast<std::uint32_t>(n);
+}
+
+SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelPlace& place, const Eigen::Vector3f& normal) {
+  std::uint32_t number = index_.find_or_add(pack({place.cell, 0}));
+  if (number < sums_.size() && sums_[number].normal.dot(normal) < 0.0F)
+    number = index_.find_or_add(pack({place.cell, 1}));
+  if (number == sums_.size()) sums_.emplace_back();
+  return sums_[number];
+}
+
+void SurfaceVoxels::add(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float weight) {
+  const Eigen::Array3f floor = place.array().floor();
+  if (!((floor.abs() < static_cast<float>(voxel_cell_limit - 2)).all())) return;
+  Sum& sum = side_of({floor.cast<int>().matrix(), 0}, normal);
+  sum.weight += weight;
+  sum.offset += weight * (place.array() - floor - 0.5F).matrix();
+  sum.normal += weight * normal;
+  sum.frames = 1;
+}
+
+void SurfaceVoxels::merge_frame(const SurfaceVoxels& frame) {
+  for (std::size_t n = 0; n < frame.sums_.size(); ++n) {
+    const Sum& more = frame.sums_[n];
+    Sum& sum = side_of(unpack(frame.index_.keys()[n]), more.normal);
+    sum.weight += more.weight;
+    sum.offset += more.offset;
+    sum.normal += more.normal;
+    ++sum.frames;
+  }
+}
+
+namespace {
+
+// The surface of one voxel, seen along its column.
+struct Piece {
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+  int axis = 2;                   // of the column
+  float height = 0.0F;            // along it, on its centre line
+  bool speaks = false;            // for its column
+  std::array<bool, 4> is_edge{};  // by neighbour
+};
+
+class ElementMaker {
+ public:
+  ElementMaker(const SurfaceVoxels& voxels, bool extend) : voxels_(voxels), pieces_(voxels.size()) {
+    each_piece([&](std::size_t n) { pieces_[n] = piece_of(n); });
+    each_piece([&](std::size_t n) {
+      pieces_[n].speaks = speaks_for_column(n);
+      for (std::size_t step = 0; extend && pieces_[n].speaks && step < 4; ++step)
+        pieces_[n].is_edge[step] = is_empty(neighbour(n, step), pieces_[n]);
+    });
+  }
+
+  std::vector<SurfaceElement> run() {
+    for (std::size_t n = 0; n < pieces_.size(); ++n) {
+      const Piece& piece = pieces_[n];
+      if (!piece.speaks) continue;
+      const VoxelPlace place = unpack(key_of(n));
+      found_.emplace_back(curve_place(key_of(n)),
+                          element(place.cell, piece.axis, piece.height, piece.normal, false));
+      for (std::size_t step = 0; step < 4; ++step)
+        if (piece.is_edge[step]) expect(neighbour(n, step), piece, voxels_.sums()[n].weight);
+    }
+    for (std::size_t n = 0; n < beside_.size(); ++n) {
+      const Beside& one = beside_[n];
+      const VoxelPlace place = unpack(beside_index_.keys()[n]);
+      found_.emplace_back(
+          curve_place(beside_index_.keys()[n]),
+          element(place.cell, one.axis, one.height / one.weight, one.normal.normalized(), true));
+    }
+    return in_order();
+  }
+
+ private:
+  // Sums of what the neighbours of an empty voxel expect in it.
+  struct Beside {
+    int axis = 2;
+    float weight = 0.0F;
+    float height = 0.0F;
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+  };
+
+  std::uint64_t key_of(std::size_t n) const { return voxels_.index().keys()[n]; }
+
+  Piece piece_of(std::size_t n) const {
+    const SurfaceVoxels::Sum& sum = voxels_.sums()[n];
+    const Eigen::Vector3f offset = sum.offset / sum.weight;
+    Piece piece;
+    const float length = sum.normal.norm();
+    piece.normal = length > 0.0F ? Eigen::Vector3f(sum.normal / length) : Eigen::Vector3f::UnitZ();
+    piece.normal.cwiseAbs().maxCoeff(&piece.axis);
+    const int cell = unpack(key_of(n)).cell[piece.axis];
+    // The plane through the mean meets the column's centre line.
+    const float along = piece.normal.dot(offset) / piece.normal[piece.axis];
+    piece.height = static_cast<float>(cell) + 0.5F + along;
+    return piece;
+  }
+
+  // The number of the piece that another voxel of the column has on the same side.
+  std::optional<std::size_t> piece_at(Eigen::Vector3i cell, int axis, int height,
+                                      const Eigen::Vector3f& normal) const {
+    cell[axis] = height;
+    for (int side = 0; side < 2; ++side) {
+      const std::uint32_t n = voxels_.index().find(pack({cell, side}));
+      if (n != VoxelIndex::none && pieces_[n].normal.dot(normal) > 0.0F) return n;
+    }
+    return std::nullopt;
+  }
+
+  bool speaks_for_column(std::size_t n) const {
+    const Piece& piece = pieces_[n];
+    const VoxelPlace place = unpack(key_of(n));
+    const int height = static_cast<int>(std::floor(piece.height));
+    if (height == place.cell[piece.axis]) return true;
+    const auto other = piece_at(place.cell, piece.axis, height, piece.normal);
+    if (!other) return true;
+    const float own = voxels_.sums()[n].weight;
+    const float others = voxels_.sums()[*other].weight;
+    return own > others || (own == others && key_of(n) < key_of(*other));
+  }
+
+  // Where a piece goes on in the column beside it.
+  struct Neighbour {
+    VoxelPlace place;
+    float height = 0.0F;
+  };
+
+  template <typename Use>
+  void each_piece(const Use& use) {
+    parallel_for(pieces_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) use(n);
+    });
+  }
+
+  Neighbour neighbour(std::size_t n, std::size_t step) const {
+    const Piece& piece = pieces_[n];
+    const int lateral = (piece.axis + 1 + static_cast<int>(step) / 2) % 3;
+    const int direction = step % 2 == 0 ? 1 : -1;
+    const float slope = -piece.normal[lateral] / piece.normal[piece.axis];
+    Neighbour there{unpack(key_of(n)), piece.height + slope * static_cast<float>(direction)};
+    there.place.cell[lateral] += direction;
+    there.place.cell[piece.axis] = static_cast<int>(std::floor(there.height));
+    return there;
+  }
+
+  bool is_empty(const Neighbour& there, const Piece& piece) const {
+    const int cell = there.place.cell[piece.axis];
+    for (const int height : {cell, cell - 1, cell + 1})
+      if (piece_at(there.place.cell, piece.axis, height, piece.normal)) return false;
+    return true;
+  }
+
+  void expect(const Neighbour& there, const Piece& piece, float weight) {
+    const std::uint32_t n = beside_index_.find_or_add(pack(there.place));
+    if (n == beside_.size()) beside_.push_back({.axis = piece.axis});
+    // Columns along another axis have their middle elsewhere.
+    if (beside_[n].axis != piece.axis) return;
+    beside_[n].weight += weight;
+    beside_[n].height += weight * there.height;
+    beside_[n].normal += weight * piece.normal;
+  }
+
+  std::vector<SurfaceElement> in_order() const {
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order;
+    order.reserve(found_.size());
+    for (const auto& [place, element] : found_)
+      order.emplace_back(place, static_cast<std::uint32_t>(order.size()));
+    // A place is taken twice at most, and then by one that was measured and, found later, one that
+    // was not.
+    std::sort(order.begin(), order.end());
+    std::vector<SurfaceElement> elements;
+    elements.reserve(order.size());
+    for (const auto& [place, number] : order) elements.push_back(found_[number].second);
+    return elements;
+  }
+
+  static SurfaceElement element(const Eigen::Vector3i& cell, int axis, float height,
+                                const Eigen::Vector3f& normal, bool extended) {
+    SurfaceElement made;
+    made.position = cell.cast<float>().array() + 0.5F;
+    made.position[axis] = height;
+    made.normal = normal;
+    made.extended = extended;
+    return made;
+  }
+
+  const SurfaceVoxels& voxels_;
+  std::vector<Piece> pieces_;
+  VoxelIndex beside_index_;
+  std::vector<Beside> beside_;
+  std::vector<std::pair<std::uint64_t, SurfaceElement>> found_;
+};
+
+}  // namespace
+
+std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend) {
+  return ElementMaker(voxels, extend).run();
+}
+
+}  // namespace libmap

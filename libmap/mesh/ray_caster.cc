@@ -1,0 +1,248 @@
+#include "libmap/mesh/ray_caster.h"
+
+#include <embree3/rtcore.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <string>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr double largest_float = std::numeric_limits<float>::max();
+constexpr std::size_t packet_size = 8;
+
+struct DeviceRelease {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct SceneRelease {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+using Device = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
+using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
+
+void require_success(RTCDevice device) {
+  if (const RTCError code = rtcGetDeviceError(device); code != RTC_ERROR_NONE)
+    throw Error(
+        "Embree cannot build the scene (error " + std::to_string(static_cast<int>(code)) + ")", {},
+        ErrorKind::failed);
+}
+
+// A ray as Embree sees it: of unit length, about the mesh's centre, and begun just outside the
+// mesh's box, where single precision is finest.
+struct LocalRay {
+  Eigen::Vector3f origin;
+  Eigen::Vector3f direction;
+  float near = 0.0F;
+  float far = -1.0F;     // less than near: the ray meets nothing
+  double length = 1.0;   // of the direction as given
+  double skipped = 0.0;  // unit lengths from the given origin to `origin`
+};
+
+}  // namespace
+
+struct RayCaster::Scene {
+  Device device;
+  SceneHandle scene;
+  Eigen::Vector3d centre;
+  Eigen::AlignedBox3d box;                // about the centre, a little larger than the mesh
+  std::vector<Eigen::Vector3d> vertices;  // about the centre
+  std::vector<Triangle> triangles;
+
+  explicit Scene(const TriangleMesh& mesh);
+  LocalRay localize(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double near,
+                    double far) const;
+  RayHit refine(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                const LocalRay& ray, float found, unsigned triangle, float u, float v) const;
+};
+
+RayCaster::Scene::Scene(const TriangleMesh& mesh) {
+  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  mesh.check();
+  Eigen::AlignedBox3d bounds;
+  for (const Eigen::Vector3d& vertex : mesh.vertices) {
+    if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
+    bounds.extend(vertex);
+  }
+  centre = bounds.center();
+  const Eigen::Vector3d half =
+      0.5 * bounds.sizes() + Eigen::Vector3d::Constant(1e-3 * bounds.diagonal().norm() + 1e-6);
+  box = Eigen::AlignedBox3d(-half, half);
+  triangles = mesh.triangles;
+  vertices.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices.push_back(vertex - centre);
+
+  device.reset(rtcNewDevice(nullptr));
+  if (!device) throw Error("Embree cannot start", {}, ErrorKind::failed);
+  scene.reset(rtcNewScene(device.get()));
+  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
+  const RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
+  auto* indices = static_cast<unsigned*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              3 * sizeof(unsigned), triangles.size()));
+  require_success(device.get());
+  for (const Eigen::Vector3d& vertex : vertices)
+    for (int axis = 0; axis < 3; ++axis) *corners++ = static_cast<float>(vertex[axis]);
+  for (const Triangle& triangle : triangles)
+    for (const std::uint32_t index : triangle) *indices++ = index;
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene.get(), geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene.get());
+  require_success(device.get());
+}
+
+LocalRay RayCaster::Scene::localize(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                    double near, double far) const {
+  LocalRay ray;
+  ray.length = direction.stableNorm();
+  if (!(ray.length > 0.0) || !std::isfinite(ray.length) || !origin.allFinite()) return ray;
+  const Eigen::Vector3d unit = direction / ray.length;
+  const Eigen::Vector3d start = origin - centre;
+  double enter = 0.0;
+  double leave = largest_float;
+  for (int axis = 0; axis < 3; ++axis) {
+    if (unit[axis] == 0.0) {
+      if (start[axis] < box.min()[axis] || start[axis] > box.max()[axis]) return ray;
+      continue;
+    }
+    const double a = (box.min()[axis] - start[axis]) / unit[axis];
+    const double b = (box.max()[axis] - start[axis]) / unit[axis];
+    enter = std::max(enter, std::min(a, b));
+    leave = std::min(leave, std::max(a, b));
+  }
+  if (enter > leave) return ray;
+  ray.skipped = enter;
+  ray.origin = (start + enter * unit).cast<float>();
+  ray.direction = unit.cast<float>();
+  ray.near = static_cast<float>(std::clamp(near * ray.length - enter, 0.0, largest_float));
+  ray.far = static_cast<float>(std::clamp(far * ray.length - enter, -1.0, largest_float));
+  return ray;
+}
+
+RayHit RayCaster::Scene::refine(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                                const LocalRay& ray, float found, unsigned triangle, float u,
+                                float v) const {
+  RayHit hit;
+  hit.triangle = triangle;
+  const double unit_distance = ray.skipped + static_cast<double>(found);
+  hit.distance = unit_distance / ray.length;
+  hit.u = static_cast<double>(u);
+  hit.v = static_cast<double>(v);
+  const Eigen::Vector3d& a = vertices[triangles[triangle][0]];
+  const Eigen::Vector3d ab = vertices[triangles[triangle][1]] - a;
+  const Eigen::Vector3d ac = vertices[triangles[triangle][2]] - a;
+  const Eigen::Vector3d normal = ab.cross(ac);
+  const Eigen::Vector3d start = origin - centre;
+  const double exact = normal.dot(a - start) / normal.dot(direction);
+  // Where a ray grazes its triangle the plane says less about the hit than Embree does.
+  if (!(std::abs(exact - hit.distance) * ray.length <= 1e-5 * (1e-3 + std::abs(unit_distance))))
+    return hit;
+  hit.distance = exact;
+  const Eigen::Vector3d arm = start + exact * direction - a;
+  const double square = normal.squaredNorm();
+  hit.u = std::clamp(arm.cross(ac).dot(normal) / square, 0.0, 1.0);
+  hit.v = std::clamp(ab.cross(arm).dot(normal) / square, 0.0, 1.0 - hit.u);
+  return hit;
+}
+
+RayCaster::RayCaster(const TriangleMesh& mesh) : scene_(std::make_unique<Scene>(mesh)) {}
+RayCaster::~RayCaster() = default;
+RayCaster::RayCaster(RayCaster&&) noexcept = default;
+RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
+
+namespace {
+
+RTCRay embree_ray(const LocalRay& local) {
+  RTCRay ray{};
+  ray.org_x = local.origin.x();
+  ray.org_y = local.origin.y();
+  ray.org_z = local.origin.z();
+  ray.dir_x = local.direction.x();
+  ray.dir_y = local.direction.y();
+  ray.dir_z = local.direction.z();
+  ray.tnear = local.near;
+  ray.tfar = local.far;
+  ray.mask = ~0U;
+  return ray;
+}
+
+}  // namespace
+
+std::optional<RayHit> RayCaster::cast(const Eigen::Vector3d& origin,
+                                      const Eigen::Vector3d& direction, double near,
+                                      double far) const {
+  const LocalRay local = scene_->localize(origin, direction, near, far);
+  if (local.far < local.near) return std::nullopt;
+  RTCRayHit ray{};
+  ray.ray = embree_ray(local);
+  ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcIntersect1(scene_->scene.get(), &context, &ray);
+  if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
+  return scene_->refine(origin, direction, local, ray.ray.tfar, ray.hit.primID, ray.hit.u,
+                        ray.hit.v);
+}
+
+bool RayCaster::is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+                           double near, double far) const {
+  const LocalRay local = scene_->localize(origin, direction, near, far);
+  if (local.far < local.near) return false;
+  RTCRay ray = embree_ray(local);
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  rtcOccluded1(scene_->scene.get(), &context, &ray);
+  return ray.tfar < 0.0F;  // Embree's mark of a blocked ray
+}
+
+void RayCaster::cast_bundle(const Eigen::Vector3d& origin,
+                            std::span<const Eigen::Vector3d> directions, std::span<RayHit> hits,
+                            double near, double far) const {
+  if (hits.size() != directions.size())
+    throw Error("a bundle of " + std::to_string(directions.size()) + " rays wants as many hits");
+  RTCIntersectContext context;
+  rtcInitIntersectContext(&context);
+  context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+  std::array<LocalRay, packet_size> local;
+  for (std::size_t first = 0; first < directions.size(); first += packet_size) {
+    const std::size_t count = std::min(packet_size, directions.size() - first);
+    RTCRayHit8 packet{};
+    alignas(32) std::array<int, packet_size> valid{};
+    for (std::size_t i = 0; i < count; ++i) {
+      LocalRay& ray = local[i];
+      ray = scene_->localize(origin, directions[first + i], near, far);
+      packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
+      if (ray.far < ray.near) continue;
+      valid[i] = -1;
+      packet.ray.org_x[i] = ray.origin.x();
+      packet.ray.org_y[i] = ray.origin.y();
+      packet.ray.org_z[i] = ray.origin.z();
+      packet.ray.dir_x[i] = ray.direction.x();
+      packet.ray.dir_y[i] = ray.direction.y();
+      packet.ray.dir_z[i] = ray.direction.z();
+      packet.ray.tnear[i] = ray.near;
+      packet.ray.tfar[i] = ray.far;
+      packet.ray.mask[i] = ~0U;
+    }
+    rtcIntersect8(valid.data(), scene_->scene.get(), &context, &packet);
+    for (std::size_t i = 0; i < count; ++i) {
+      RayHit& hit = hits[first + i];
+      if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
+        hit = RayHit{.triangle = RayHit::no_triangle};
+        continue;
+      }
+      hit = scene_->refine(origin, directions[first + i], local[i], packet.ray.tfar[i],
+                           packet.hit.primID[i], packet.hit.u[i], packet.hit.v[i]);
+    }
+  }
+}
+
+}  // namespace libmap

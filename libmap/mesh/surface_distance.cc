@@ -1,0 +1,298 @@
+#include "libmap/mesh/surface_distance.h"
+
+#include <embree3/rtcore.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nanoflann.hpp>
+#include <random>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/mesh/ray_caster.h"
+
+namespace libmap {
+
+namespace {
+
+struct DeviceRelease {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct SceneRelease {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+
+void require_success(RTCDevice device) {
+  if (const RTCError code = rtcGetDeviceError(device); code != RTC_ERROR_NONE)
+    throw Error(
+        "Embree cannot build the scene (error " + std::to_string(static_cast<int>(code)) + ")", {},
+        ErrorKind::failed);
+}
+
+}  // namespace
+
+struct SurfaceDistance::Scene {
+  std::unique_ptr<RTCDeviceTy, DeviceRelease> device;
+  std::unique_ptr<RTCSceneTy, SceneRelease> scene;
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double extent = 0.0;
+  std::vector<Eigen::Vector3d> vertices;  // about the centre
+  std::vector<Triangle> triangles;
+
+  explicit Scene(const TriangleMesh& mesh);
+  Eigen::Vector3d nearest_on(std::uint32_t triangle, const Eigen::Vector3d& point) const {
+    const Triangle& corners = triangles[triangle];
+    return nearest_on_triangle(point, vertices[corners[0]], vertices[corners[1]],
+                               vertices[corners[2]]);
+  }
+};
+
+SurfaceDistance::Scene::Scene(const TriangleMesh& mesh) : triangles(mesh.triangles) {
+  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  mesh.check();
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
+  const Bounds3d bounds = bounds_of(mesh.vertices);
+  centre = 0.5 * (bounds.min + bounds.max);
+  extent = (bounds.max - bounds.min).norm();
+  vertices.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices.push_back(vertex - centre);
+
+  device.reset(rtcNewDevice(nullptr));
+  if (!device) throw Error("Embree cannot start", {}, ErrorKind::failed);
+  scene.reset(rtcNewScene(device.get()));
+  const RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
+  auto* indices = static_cast<unsigned*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              3 * sizeof(unsigned), triangles.size()));
+  require_success(device.get());
+  for (const Eigen::Vector3d& vertex : vertices)
+    for (int axis = 0; axis < 3; ++axis) *corners++ = static_cast<float>(vertex[axis]);
+  for (const Triangle& triangle : triangles)
+    for (const std::uint32_t index : triangle) *indices++ = index;
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene.get(), geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene.get());
+  require_success(device.get());
+}
+
+SurfaceDistance::SurfaceDistance(const TriangleMesh& mesh)
+    : scene_(std::make_unique<Scene>(mesh)) {}
+SurfaceDistance::~SurfaceDistance() = default;
+SurfaceDistance::SurfaceDistance(SurfaceDistance&&) noexcept = default;
+SurfaceDistance& SurfaceDistance::operator=(SurfaceDistance&&) noexcept = default;
+
+SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
+  struct Search {
+    const Scene& scene;
+    Eigen::Vector3d point;
+    double slack;  // by which single precision may misplace a triangle
+    Eigen::Vector3d best;
+    std::uint32_t triangle;
+    double distance;
+  };
+  const Eigen::Vector3d local = point - scene_->centre;
+  Search search{
+      *scene_, local, 1e-6 * (scene_->extent + local.norm()), scene_->nearest_on(0, local), 0, 0.0};
+  search.distance = (search.best - local).norm();
+  RTCPointQuery query{};
+  query.x = static_cast<float>(local.x());
+  query.y = static_cast<float>(local.y());
+  query.z = static_cast<float>(local.z());
+  query.radius = static_cast<float>(search.distance + search.slack);
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  const auto visit = [](RTCPointQueryFunctionArguments* arguments) {
+    Search& found = *static_cast<Search*>(arguments->userPtr);
+    const Eigen::Vector3d at = found.scene.nearest_on(arguments->primID, found.point);
+    const double distance = (at - found.point).norm();
+    // Among equals the first triangle, however the tree is walked.
+    if (distance > found.distance ||
+        (distance == found.distance && arguments->primID >= found.triangle))
+      return false;
+    found.best = at;
+    found.triangle = arguments->primID;
+    found.distance = distance;
+    arguments->query->radius = static_cast<float>(distance + found.slack);
+    return true;
+  };
+  rtcPointQuery(scene_->scene.get(), &query, &context, visit, &search);
+  return {search.best + scene_->centre, search.triangle, search.distance};
+}
+
+Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                                    const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  const Eigen::Vector3d ab = b - a;
+  const Eigen::Vector3d ac = c - a;
+  const Eigen::Vector3d ap = point - a;
+  const double d1 = ab.dot(ap);
+  const double d2 = ac.dot(ap);
+  if (d1 <= 0.0 && d2 <= 0.0) return a;
+  const Eigen::Vector3d bp = point - b;
+  const double d3 = ab.dot(bp);
+  const double d4 = ac.dot(bp);
+  if (d3 >= 0.0 && d4 <= d3) return b;
+  const Eigen::Vector3d cp = point - c;
+  const double d5 = ab.dot(cp);
+  const double d6 = ac.dot(cp);
+  if (d6 >= 0.0 && d5 <= d6) return c;
+  const double of_c = d1 * d4 - d3 * d2;
+  if (of_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return d1 == d3 ? a : a + d1 / (d1 - d3) * ab;
+  const double of_b = d5 * d2 - d1 * d6;
+  if (of_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return d2 == d6 ? a : a + d2 / (d2 - d6) * ac;
+  const double of_a = d3 * d6 - d5 * d4;
+  const double along = d4 - d3;
+  const double back = d5 - d6;
+  if (of_a <= 0.0 && along >= 0.0 && back >= 0.0)
+    return along + back == 0.0 ? b : b + along / (along + back) * (c - b);
+  const double scale = 1.0 / (of_a + of_b + of_c);
+  return a + of_b * scale * ab + of_c * scale * ac;
+}
+
+std::vector<double> distances_to_surface(const std::vector<Eigen::Vector3d>& points,
+                                         const TriangleMesh& mesh) {
+  const SurfaceDistance surface(mesh);
+  std::vector<double> distances(points.size());
+  parallel_for(points.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) distances[n] = surface.nearest(points[n]).distance_m;
+  });
+  return distances;
+}
+
+DistanceStatistics distance_statistics(std::vector<double> distances_m) {
+  DistanceStatistics statistics;
+  statistics.count = distances_m.size();
+  if (distances_m.empty()) return statistics;
+  std::sort(distances_m.begin(), distances_m.end());
+  double sum = 0.0;
+  double squares = 0.0;
+  for (const double distance : distances_m) {
+    sum += distance;
+    squares += distance * distance;
+  }
+  const std::size_t n = distances_m.size();
+  statistics.mean_m = sum / static_cast<double>(n);
+  statistics.rmse_m = std::sqrt(squares / static_cast<double>(n));
+  statistics.median_m = 0.5 * (distances_m[(n - 1) / 2] + distances_m[n / 2]);
+  statistics.p95_m =
+      distances_m[static_cast<std::size_t>(std::ceil(0.95 * static_cast<double>(n))) - 1];
+  statistics.max_m = distances_m.back();
+  return statistics;
+}
+
+std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,
+                                         std::uint64_t seed) {
+  std::vector<double> area_before;
+  double area = 0.0;
+  for (const Triangle& triangle : mesh.triangles) {
+    area_before.push_back(area);
+    area += 0.5 * area_normal(mesh, triangle).norm();
+  }
+  if (!(area > 0.0) || !std::isfinite(area)) throw Error("the mesh has no area");
+  const double wanted = std::ceil(per_m2 * area);
+  if (!(wanted >= 0.0 && wanted < 2147483648.0))
+    throw Error("too many samples of the surface", {.file = {},
+                                                    .field = "samples",
+                                                    .value = std::to_string(wanted),
+                                                    .bound = ">= 0 and < 2147483648"});
+  const auto count = static_cast<std::size_t>(wanted);
+  std::mt19937_64 engine(seed);
+  // Not a distribution of the standard library: those differ between libraries.
+  const auto uniform = [&] { return static_cast<double>(engine() >> 11U) * 0x1p-53; };
+  std::vector<SurfacePoint> samples(count);
+  for (std::size_t n = 0; n < count; ++n) {
+    // One in each of `count` strata of equal area.
+    const double at = (static_cast<double>(n) + uniform()) / static_cast<double>(count) * area;
+    const auto above = std::upper_bound(area_before.begin(), area_before.end(), at);
+    const auto number = static_cast<std::size_t>(above - area_before.begin()) - 1;
+    const Triangle& corners = mesh.triangles[number];
+    const double root = std::sqrt(uniform());
+    const double share = uniform();
+    samples[n].position = (1.0 - root) * mesh.vertices[corners[0]] +
+                          root * (1.0 - share) * mesh.vertices[corners[1]] +
+                          root * share * mesh.vertices[corners[2]];
+    samples[n].triangle = static_cast<std::uint32_t>(number);
+  }
+  return samples;
+}
+
+namespace {
+
+// nanoflann's view of a list of points.
+struct PointList {
+  const std::vector<Eigen::Vector3d>& points;
+  std::size_t kdtree_get_point_count() const { return points.size(); }
+  double kdtree_get_pt(std::size_t n, std::size_t axis) const {
+    return points[n][static_cast<Eigen::Index>(axis)];
+  }
+  template <typename Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointList>,
+                                                 PointList, 3, std::size_t>;
+
+}  // namespace
+
+std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
+                          const std::vector<Eigen::Vector3d>& points, double radius_m) {
+  std::vector<char> flags(samples.size(), 0);
+  if (!points.empty()) {
+    const PointList list{points};
+    const Tree tree(3, list, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+    parallel_for(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) {
+        std::size_t nearest = 0;
+        double square = std::numeric_limits<double>::infinity();
+        tree.knnSearch(samples[n].data(), 1, &nearest, &square);
+        flags[n] = square <= radius_m * radius_m ? 1 : 0;
+      }
+    });
+  }
+  return {flags.begin(), flags.end()};
+}
+
+double share_of(const std::vector<bool>& flags) {
+  if (flags.empty()) return 0.0;
+  return static_cast<double>(std::count(flags.begin(), flags.end(), true)) /
+         static_cast<double>(flags.size());
+}
+
+namespace {
+
+// Of the way to a sample: what is met nearer is before it.
+constexpr double sight_margin = 2e-3;
+
+bool sees(const ViewingCamera& viewing, const RayCaster& caster, const Eigen::Vector3d& sample,
+          double max_depth_m) {
+  const Eigen::Vector3d in_camera = viewing.mesh_from_camera.inverse() * sample;
+  if (in_camera.z() > max_depth_m) return false;
+  const auto pixel = project_point(viewing.camera, in_camera);
+  if (!pixel || !(pixel->x() >= -0.5 && pixel->y() >= -0.5) ||
+      !(pixel->x() <= viewing.camera.width - 0.5 && pixel->y() <= viewing.camera.height - 0.5))
+    return false;
+  const Eigen::Vector3d eye = viewing.mesh_from_camera.translation();
+  return !caster.is_blocked(eye, sample - eye, 0.0, 1.0 - sight_margin);
+}
+
+}  // namespace
+
+std::vector<int> count_views(const TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& samples,
+                             const std::vector<ViewingCamera>& cameras, double max_depth_m) {
+  const RayCaster caster(mesh);
+  std::vector<int> views(samples.size(), 0);
+  parallel_for(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      for (const ViewingCamera& camera : cameras)
+        views[n] += sees(camera, caster, samples[n], max_depth_m) ? 1 : 0;
+  });
+  return views;
+}
+
+}  // namespace libmap

@@ -1,0 +1,47 @@
+// Camera calibrations as YAML, in the layout that OpenCV's FileStorage, RTAB-Map and ROS share:
+//
+//   %YAML:1.0
+//   ---
+//   camera_name: infrared
+//   image_width: 512
+//   image_height: 424
+//   camera_matrix: !!opencv-matrix
+//     rows: 3
+//     cols: 3
+//     dt: d
+//     data: [365, 0, 256, 0, 365, 212, 0, 0, 1]
+//   distortion_model: plumb_bob
+//   distortion_coefficients: !!opencv-matrix
+//     {rows: 1, cols: 5, dt: d, data: [...]}
+//   local_transform: !!opencv-matrix          # base_from_camera, 3 x 4; may be missing
+//     {rows: 3, cols: 4, dt: d, data: [...]}
+//
+// distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
+// order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without it the number
+// of terms decides, and `fisheye_model: 1` of OpenCV's own calibration sample. A camera whose terms
+// are all zero is read as undistorted. Keys of other meaning are passed over, as these files carry
+// many (projection_matrix, avg_reprojection_error, ...).
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "libmap/core/camera.h"
+
+namespace libmap {
+
+struct CameraFile {
+  std::string name{};  // may be empty
+  Camera camera{};
+};
+
+// Throws Error naming `file`, the key, its value and its bound: no YAML, a key that is missing, a
+// matrix of another size, skew, a transform that is no rotation, terms that are no known model's.
+CameraFile parse_camera(const std::string& text, const std::string& file);
+CameraFile read_camera(const std::filesystem::path& path);
+
+// Text that parse_camera reads back as the same numbers, and cv::FileStorage and RTAB-Map as well.
+// `comment` stands at its head, line by line.
+std::string to_yaml(const CameraFile& camera, const std::string& comment = {});
+
+}  // namespace libmap

@@ -1,0 +1,46 @@
+// Depth images as RTAB-Map stores them: RVL (Wilson 2017, "Fast lossless depth image compression"),
+// 16-bit PNG, both in whole millimetres, or the bytes of float32 metres as the four channels of a
+// PNG.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "libmap/core/image.h"
+
+namespace libmap {
+
+using MillimetreImage = Image<std::uint16_t>;  // 0 and 65535: nothing was measured
+
+enum class DepthFormat { rvl, png16, float_png };
+std::string to_text(DepthFormat format);  // "RVL", "16-bit PNG", "float PNG"
+
+struct DepthInfo {
+  DepthFormat format = DepthFormat::rvl;
+  int width = 0;
+  int height = 0;
+};
+
+// From the header alone: `bytes` may end after it. Nothing if it is another kind of image, such as
+// the right one of a stereo pair. Throws Error if it is no image.
+std::optional<DepthInfo> read_depth_info(std::string_view bytes);
+
+// In metres; 0 where nothing was measured: 0 and 65535 mm; NaN, infinity and values <= 0 of floats.
+// Sizes are checked before memory is taken, and every read is bounded. Throws Error.
+DepthImage decode_depth(std::string_view bytes);
+
+// RVL with RTAB-Map's header: "DEPTHRVL", columns, rows.
+MillimetreImage decode_rvl(std::string_view bytes);
+std::string encode_rvl(const MillimetreImage& image);
+
+// Floats keep their bits.
+DepthImage decode_float_png(std::string_view bytes);
+std::string encode_float_png(const DepthImage& image);
+
+// Nearest millimetre; 0 for what is not finite, not above 0 or beyond 65.534 m.
+MillimetreImage to_millimetres(const DepthImage& image);
+DepthImage to_metres(const MillimetreImage& image);
+
+}  // namespace libmap

@@ -1,0 +1,432 @@
+#include "libmap/scan/frame_folder.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <initializer_list>
+#include <limits>
+#include <optional>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/table.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/camera_io.h"
+#include "libmap/scan/depth_codec.h"
+#include "libmap/scan/frame_folder_files.h"
+#include "libmap/scan/image_codec.h"
+#include "libmap/scan/stamp_pairing.h"
+#include "libmap/scan/text_lines.h"
+#include "libmap/scan/trajectory_text.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+namespace files = frame_folder_files;
+
+namespace {
+
+constexpr std::uint16_t no_measurement = 65535;
+constexpr double millimetre_m = 0.001;
+
+std::string cell_of(const Table& table, std::size_t row, const char* column) {
+  const std::optional<std::size_t> index = table.find_column(column);
+  return index ? std::string(trim(table.rows[row][*index])) : std::string();
+}
+
+std::string field_of(std::size_t row, const char* column) {
+  return "row " + std::to_string(row + 1) + ", column " + column;
+}
+
+int integer_in(const Table& table, std::size_t row, const char* column, int missing) {
+  const std::string cell = cell_of(table, row, column);
+  if (cell.empty()) return missing;
+  const std::optional<std::int64_t> value = parse_integer(cell);
+  if (!value || std::abs(*value) > std::numeric_limits<int>::max())
+    throw Error("not a whole number",
+                {.file = table.file, .field = field_of(row, column), .value = cell});
+  return static_cast<int>(*value);
+}
+
+// Numbers with spaces between them.
+std::vector<double> numbers_in(const Table& table, std::size_t row, const char* column) {
+  const std::string cell = cell_of(table, row, column);
+  std::vector<double> numbers;
+  for (const TextLine& line : split_lines(cell)) {
+    for (const std::string_view word : line.words) {
+      const std::optional<double> value = parse_double(word);
+      if (!value || !std::isfinite(*value))
+        throw Error("not a number",
+                    {.file = table.file, .field = field_of(row, column), .value = cell});
+      numbers.push_back(*value);
+    }
+  }
+  return numbers;
+}
+
+std::optional<std::array<double, 6>> six_in(const Table& table, std::size_t row,
+                                            const char* column) {
+  const std::vector<double> numbers = numbers_in(table, row, column);
+  if (numbers.empty()) return std::nullopt;
+  if (numbers.size() != 6)
+    throw Error(
+        "not six numbers",
+        {.file = table.file, .field = field_of(row, column), .value = cell_of(table, row, column)});
+  std::array<double, 6> six{};
+  std::copy(numbers.begin(), numbers.end(), six.begin());
+  return six;
+}
+
+GraphNode node_in(const Table& table, std::size_t row) {
+  GraphNode node;
+  node.id = integer_in(table, row, "node", 0);
+  if (node.id <= 0)
+    throw Error("no number of a node", {.file = table.file,
+                                        .field = field_of(row, "node"),
+                                        .value = cell_of(table, row, "node"),
+                                        .bound = "> 0"});
+  node.session = integer_in(table, row, "session", 0);
+  node.weight = integer_in(table, row, "weight", 0);
+  node.stamp_s = table.optional_number(row, table.column("stamp_s")).value_or(0.0);
+  node.label = cell_of(table, row, "label");
+  node.velocity = six_in(table, row, "velocity");
+  if (const auto gps = six_in(table, row, "gps")) {
+    const auto& [stamp, longitude, latitude, altitude, error, bearing] = *gps;
+    node.gps = GpsFix{stamp, longitude, latitude, altitude, error, bearing};
+  }
+  return node;
+}
+
+std::vector<std::string> split_names(const std::string& cell) {
+  std::vector<std::string> names;
+  for (const TextLine& line : split_lines(cell))
+    for (const std::string_view word : line.words) names.emplace_back(word);
+  return names;
+}
+
+// "depth" or "color", by the first image that is there: depth has one channel of 16 bits.
+bool is_depth_image(const fs::path& file) {
+  const std::optional<ImageInfo> info = read_image_info(read_whole_file(file));
+  return info && info->channels == 1 && info->bits == 16;
+}
+
+// Spherical interpolation of the rotation, linear of the position.
+Pose between(const Pose& a, const Pose& b, double share) {
+  return make_pose((1.0 - share) * a.translation() + share * b.translation(),
+                   Eigen::Quaterniond(a.linear()).slerp(share, Eigen::Quaterniond(b.linear())));
+}
+
+// `trajectory` by ascending stamp.
+std::optional<Pose> pose_at(const Trajectory& trajectory, double stamp_s, double tolerance_s) {
+  const auto after = std::lower_bound(
+      trajectory.begin(), trajectory.end(), stamp_s,
+      [](const TrajectoryPose& pose, double value) { return pose.stamp_s < value; });
+  const bool has_after = after != trajectory.end() && after->stamp_s - stamp_s <= tolerance_s;
+  const bool has_before =
+      after != trajectory.begin() && stamp_s - (after - 1)->stamp_s <= tolerance_s;
+  if (has_after && (after->stamp_s == stamp_s || !has_before)) return after->world_from_base;
+  if (!has_before) return std::nullopt;
+  const TrajectoryPose& before = *(after - 1);
+  if (!has_after) return before.world_from_base;
+  const double share = (stamp_s - before.stamp_s) / (after->stamp_s - before.stamp_s);
+  return between(before.world_from_base, after->world_from_base, share);
+}
+
+DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
+  const MillimetreImage units = decode_gray16(bytes);
+  if (depth_unit_m == millimetre_m) return to_metres(units);
+  DepthImage depth(units.width, units.height);
+  std::transform(units.pixels.begin(), units.pixels.end(), depth.pixels.begin(),
+                 [&](std::uint16_t value) {
+                   return value == no_measurement ? 0.0F : static_cast<float>(value * depth_unit_m);
+                 });
+  return depth;
+}
+
+std::string count_of(std::size_t count, const std::string& what) {
+  return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
+}
+
+}  // namespace
+
+// Images and when they were taken.
+struct FrameFolder::Listing {
+  std::vector<double> stamps;
+  std::vector<std::string> names;
+
+  void add(const TextLine& line, std::size_t first, const std::string& file) {
+    if (line.words.size() < first + 2)
+      throw Error("no stamp and file", {.file = file,
+                                        .field = name_of(line),
+                                        .value = std::to_string(line.words.size()) + " columns",
+                                        .bound = ">= " + std::to_string(first + 2)});
+    stamps.push_back(numbers_of(line, first, 1, file).front());
+    names.emplace_back(line.words[first + 1]);
+  }
+
+  static Listing read(const fs::path& path) {
+    Listing listing;
+    const std::string text = read_whole_file(path);
+    for (const TextLine& line : split_lines(text))
+      if (!is_comment(line)) listing.add(line, 0, path.string());
+    return listing;
+  }
+};
+
+const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names() {
+  static const std::vector<std::pair<std::string, PoseFrame>> names = {
+      {"camera", PoseFrame::camera}, {"base", PoseFrame::base}};
+  return names;
+}
+
+void bind(ParameterTable& table, FrameFolderOptions& options) {
+  table.add("depth_unit_m", options.depth_unit_m, positive,
+            "metres a unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimetres");
+  table.add("calibration", options.calibration, "the camera's intrinsics");
+  table.add("pose_frame", options.pose_frame, pose_frame_names(),
+            "whose poses the files hold: the camera's optical frame, or the base");
+  table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
+            "greatest difference in time of what belongs together");
+}
+
+FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& defaults)
+    : path_(path), options_(defaults) {
+  if (!fs::is_directory(path)) throw Error("no such folder", {.file = path.string()});
+  if (fs::exists(path / files::options)) {
+    ParameterTable table;
+    bind(table, options_);
+    const fs::path file = path / files::options;
+    set_from_yaml(table, read_whole_file(file), file.string());
+  }
+  if (fs::exists(path / files::nodes))
+    read_nodes();
+  else
+    read_images();
+  read_poses();
+  read_links();
+}
+
+std::size_t FrameFolder::add_camera(const std::string& name) {
+  const auto known = camera_of_name_.find(name);
+  if (known != camera_of_name_.end()) return known->second;
+  const fs::path file = path_ / name;
+  if (!fs::exists(file))
+    throw Error(
+        "no such file: the scan needs its camera's intrinsics, as `graspmap calibrate` "
+        "writes them; the key calibration of scan.yaml names another file",
+        {.file = file.string()});
+  cameras_.push_back(read_camera(file).camera);
+  camera_of_name_.emplace(name, cameras_.size() - 1);
+  return cameras_.size() - 1;
+}
+
+void FrameFolder::read_nodes() {
+  const Table table = read_csv(path_ / files::nodes);
+  table.column("node");
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    GraphNode node = node_in(table, row);
+    Files of_node;
+    of_node.color = cell_of(table, row, "color");
+    of_node.depth = cell_of(table, row, "depth");
+    of_node.right = cell_of(table, row, "right");
+    of_node.baselines_m = numbers_in(table, row, "baseline_m");
+    for (const std::string& name : split_names(cell_of(table, row, "calibration")))
+      of_node.cameras.push_back(add_camera(name));
+    if (!of_node.baselines_m.empty() && of_node.cameras.size() != 2 * of_node.baselines_m.size())
+      throw Error("each stereo pair has two cameras",
+                  {.file = table.file,
+                   .field = field_of(row, "calibration"),
+                   .value = cell_of(table, row, "calibration")});
+    if (!files_.emplace(node.id, std::move(of_node)).second)
+      throw Error(
+          "stands twice",
+          {.file = table.file, .field = field_of(row, "node"), .value = std::to_string(node.id)});
+    graph_.nodes.push_back(std::move(node));
+  }
+  std::sort(graph_.nodes.begin(), graph_.nodes.end(),
+            [](const GraphNode& a, const GraphNode& b) { return a.id < b.id; });
+}
+
+void FrameFolder::read_images() {
+  const fs::path associations = path_ / files::associations;
+  const fs::path depth_list = path_ / files::depth_list;
+  Listing first;
+  Listing second;
+  if (fs::exists(associations)) {
+    const std::string text = read_whole_file(associations);
+    for (const TextLine& line : split_lines(text)) {
+      if (is_comment(line)) continue;
+      first.add(line, 0, associations.string());
+      second.add(line, 2, associations.string());
+    }
+    // Both orders are in use.
+    bool depth_first = false;
+    for (std::size_t i = 0; i < first.names.size(); ++i) {
+      if (!fs::is_regular_file(path_ / first.names[i])) continue;
+      depth_first = is_depth_image(path_ / first.names[i]);
+      break;
+    }
+    add_images(depth_first ? second : first, depth_first ? first : second);
+  } else if (fs::exists(depth_list)) {
+    if (fs::exists(path_ / files::color_list)) first = Listing::read(path_ / files::color_list);
+    add_images(first, Listing::read(depth_list));
+  } else {
+    throw Error("is no scan: a folder of frames holds " + std::string(files::associations) +
+                    ", or " + files::color_list + " and " + files::depth_list,
+                {.file = path_.string()});
+  }
+}
+
+void FrameFolder::add_images(const Listing& color, const Listing& depth) {
+  if (depth.names.empty()) throw Error("lists no depth image", {.file = path_.string()});
+  std::vector<std::string> color_of_depth(depth.names.size());
+  const auto pairs = pair_by_stamp(color.stamps, depth.stamps, options_.pairing_tolerance_s);
+  for (const auto& [i, j] : pairs) color_of_depth[j] = color.names[i];
+  std::vector<std::size_t> order;
+  for (std::size_t j = 0; j < depth.names.size(); ++j)
+    if (color.names.empty() || !color_of_depth[j].empty()) order.push_back(j);
+  const std::string tolerance = to_text(options_.pairing_tolerance_s) + " s";
+  if (order.empty())
+    throw Error("no colour image lies within " + tolerance + " of a depth image",
+                {.file = path_.string()});
+  if (order.size() < depth.names.size())
+    warnings_.push_back(count_of(depth.names.size() - order.size(), "depth image") +
+                        " without a colour image within " + tolerance);
+  if (pairs.size() < color.names.size())
+    warnings_.push_back(count_of(color.names.size() - pairs.size(), "colour image") +
+                        " without a depth image within " + tolerance);
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return depth.stamps[a] < depth.stamps[b]; });
+  const std::size_t camera = add_camera(options_.calibration);
+  for (const std::size_t j : order) {
+    GraphNode node;
+    node.id = static_cast<int>(graph_.nodes.size()) + 1;
+    node.stamp_s = depth.stamps[j];
+    graph_.nodes.push_back(node);
+    Files of_node;
+    of_node.color = color_of_depth[j];
+    of_node.depth = depth.names[j];
+    of_node.cameras = {camera};
+    files_.emplace(node.id, std::move(of_node));
+  }
+}
+
+Pose FrameFolder::to_base_pose(const GraphNode& node, const Pose& pose) const {
+  if (options_.pose_frame == PoseFrame::base) return pose;
+  const Files& of_node = files_.at(node.id);
+  if (of_node.cameras.empty()) return pose * optical_to_body_rotation().inverse();
+  return pose * cameras_[of_node.cameras.front()].base_from_camera.inverse();
+}
+
+void FrameFolder::read_poses() {
+  const auto read = [&](std::initializer_list<const char*> names,
+                        const std::function<void(GraphNode&, const Pose&)>& use) {
+    for (const char* name : names) {
+      const fs::path file = path_ / name;
+      if (!fs::exists(file)) continue;
+      Trajectory trajectory = parse_tum(read_whole_file(file), file.string());
+      std::stable_sort(trajectory.begin(), trajectory.end(),
+                       [](const auto& a, const auto& b) { return a.stamp_s < b.stamp_s; });
+      const bool have_nodes = std::all_of(trajectory.begin(), trajectory.end(),
+                                          [](const auto& pose) { return pose.node > 0; });
+      std::map<int, const Pose*> pose_of_node;
+      for (const TrajectoryPose& pose : trajectory)
+        pose_of_node.emplace(pose.node, &pose.world_from_base);
+      std::size_t found = 0;
+      for (GraphNode& node : graph_.nodes) {
+        std::optional<Pose> pose;
+        if (!have_nodes)
+          pose = pose_at(trajectory, node.stamp_s, options_.pairing_tolerance_s);
+        else if (const auto place = pose_of_node.find(node.id); place != pose_of_node.end())
+          pose = *place->second;
+        if (!pose) continue;
+        use(node, to_base_pose(node, *pose));
+        ++found;
+      }
+      if (found == 0) warnings_.push_back(std::string(name) + ": no pose belongs to a node");
+      return;
+    }
+  };
+  read({files::odometry, files::plain_odometry},
+       [](GraphNode& node, const Pose& pose) { node.odometry_from_base = pose; });
+  read({files::truth, files::plain_truth},
+       [](GraphNode& node, const Pose& pose) { node.truth_from_base = pose; });
+  read({files::stored}, [this](GraphNode& node, const Pose& pose) {
+    graph_.optimized_map_from_base.emplace(node.id, pose);
+  });
+}
+
+void FrameFolder::read_links() {
+  const fs::path file = path_ / files::links;
+  if (!fs::exists(file)) return;
+  if (options_.pose_frame != PoseFrame::base) {
+    warnings_.push_back(std::string(files::links) +
+                        ": not read: links are between bases, the folder's poses of cameras");
+    return;
+  }
+  std::size_t dangling = 0;
+  for (PoseLink& link : parse_g2o(read_whole_file(file), file.string()).links) {
+    const bool is_landmark = link.to < 0;
+    if (graph_.find_node(link.from) == nullptr ||
+        (!is_landmark && graph_.find_node(link.to) == nullptr))
+      ++dangling;
+    else
+      graph_.links.push_back(std::move(link));
+  }
+  if (dangling > 0)
+    warnings_.push_back(std::string(files::links) + ": " + count_of(dangling, "link") +
+                        " of nodes that are not there");
+}
+
+RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
+  const auto place = files_.find(node);
+  if (place == files_.end())
+    throw Error("no such node",
+                {.file = path_.string(), .field = "node", .value = std::to_string(node)});
+  const Files& of_node = place->second;
+  RgbdFrame frame;
+  frame.node = node;
+  frame.stamp_s = graph_.find_node(node)->stamp_s;
+  const auto read = [&](const std::string& name, const char* part, const auto& decode) {
+    if (name.empty()) return;
+    const std::string field = "node " + std::to_string(node) + ": " + part;
+    const fs::path file = path_ / name;
+    try {
+      decode(read_whole_file(file));
+    } catch (const Error& error) {
+      ErrorContext context = error.context();
+      context.file = file.string();
+      context.field = context.field.empty() ? field : field + ": " + context.field;
+      throw Error(error.reason(), context, error.kind());
+    }
+  };
+  if (parts.color)
+    read(of_node.color, "colour",
+         [&](const std::string& bytes) { frame.color = decode_color(bytes); });
+  if (parts.depth) {
+    read(of_node.depth, "depth",
+         [&](const std::string& bytes) { frame.depth = read_depth(bytes, options_.depth_unit_m); });
+    read(of_node.right, "right",
+         [&](const std::string& bytes) { frame.right = decode_gray(bytes); });
+  }
+  for (std::size_t i = 0; i < of_node.baselines_m.size(); ++i) {
+    StereoCamera stereo{.left = cameras_[of_node.cameras[2 * i]],
+                        .right = cameras_[of_node.cameras[2 * i + 1]],
+                        .baseline_m = of_node.baselines_m[i]};
+    stereo.right_from_left.translation().x() = -stereo.baseline_m;
+    frame.cameras.push_back(stereo.left);
+    frame.stereo.push_back(std::move(stereo));
+  }
+  if (frame.stereo.empty())
+    for (const std::size_t camera : of_node.cameras) frame.cameras.push_back(cameras_[camera]);
+  return frame;
+}
+
+std::unique_ptr<ScanSource> open_frame_folder(const fs::path& path,
+                                              const FrameFolderOptions& defaults) {
+  return std::make_unique<FrameFolder>(path, defaults);
+}
+
+}  // namespace libmap

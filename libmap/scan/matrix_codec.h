@@ -1,0 +1,56 @@
+// Matrices and texts as RTAB-Map compresses them: a zlib stream, then rows, columns and OpenCV's
+// type as int32, little-endian.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <cstring>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace libmap {
+
+// OpenCV's depth numbers.
+enum class MatrixElement {
+  uint8 = 0,
+  int8 = 1,
+  uint16 = 2,
+  int16 = 3,
+  int32 = 4,
+  float32 = 5,
+  float64 = 6
+};
+std::size_t bytes_of(MatrixElement element);
+
+struct StoredMatrix {
+  int rows = 0;
+  int columns = 0;
+  int channels = 1;
+  MatrixElement element = MatrixElement::uint8;
+  std::string bytes;  // rows * columns * channels elements, row by row, little-endian
+
+  // All elements, in the order of `bytes`; T must have the size of `element`.
+  template <typename T>
+  std::vector<T> values() const {
+    std::vector<T> list(bytes.size() / sizeof(T));
+    if (!list.empty()) std::memcpy(list.data(), bytes.data(), list.size() * sizeof(T));
+    return list;
+  }
+
+  bool operator==(const StoredMatrix&) const = default;
+};
+
+// Sizes and type from a blob's end, without its bytes. Throws Error if they are none.
+StoredMatrix read_matrix_header(std::string_view blob);
+
+// Sizes are checked before memory is taken: at most 2^30 bytes, and no more than the stream can
+// hold. Throws Error for a broken stream or one of another length than its sizes say.
+StoredMatrix decode_matrix(std::string_view blob);
+std::string encode_matrix(const StoredMatrix& matrix);
+
+// A text as a matrix of one row of int8 that ends with NUL.
+std::string decode_compressed_text(std::string_view blob);
+std::string encode_compressed_text(std::string_view text);
+
+}  // namespace libmap

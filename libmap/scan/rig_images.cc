@@ -1,0 +1,175 @@
+#include "libmap/scan/rig_images.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/table.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/image_codec.h"
+
+namespace libmap {
+
+namespace {
+
+namespace fs = std::filesystem;
+using State = RigMoment::Camera::State;
+
+// File names have whole microseconds.
+constexpr double stamp_rounding_s = 1e-6;
+constexpr std::uint16_t saturated = 65535;
+
+double stamp_of(const std::string& text, const std::string& file, const std::string& field) {
+  const std::optional<double> stamp = parse_double(text);
+  if (!stamp || !std::isfinite(*stamp))
+    throw Error("is no time stamp",
+                {.file = file, .field = field, .value = text, .bound = "a number of seconds"});
+  return *stamp;
+}
+
+bool is_png(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension == ".png";
+}
+
+void append_folder(const fs::path& folder, std::size_t camera, std::vector<RigImage>& images) {
+  std::error_code code;
+  fs::directory_iterator entries(folder, code);
+  if (code) throw Error("cannot be read: " + code.message(), {.file = folder.string()});
+  for (const fs::directory_entry& entry : entries) {
+    const fs::path& file = entry.path();
+    // Hidden files are other programs' own.
+    if (!is_png(file) || file.filename().string().starts_with(".")) continue;
+    images.push_back({camera, stamp_of(file.stem().string(), file.string(), "name"), file});
+  }
+}
+
+std::vector<RigImage> images_of_table(const fs::path& folder, const CameraRig& rig) {
+  const Table table = read_csv(folder / rig_images_file_name);
+  const std::size_t camera_column = table.column("camera");
+  const std::size_t stamp_column = table.column("stamp_s");
+  const std::size_t file_column = table.column("file");
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) names.push_back(camera.name);
+  std::vector<RigImage> images;
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    const std::string& name = table.rows[row][camera_column];
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      throw Error("the rig has no such camera" + did_you_mean(name, names),
+                  {.file = table.file, .field = "camera", .value = name});
+    stamp_of(table.rows[row][stamp_column], table.file, "stamp_s");
+    images.push_back({static_cast<std::size_t>(found - names.begin()),
+                      table.number(row, stamp_column), folder / table.rows[row][file_column]});
+  }
+  return images;
+}
+
+}  // namespace
+
+std::string rig_image_name(const std::string& camera, double stamp_s) {
+  return camera + "/" + to_fixed_text(stamp_s, 6) + ".png";
+}
+
+std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& rig) {
+  if (!fs::is_directory(folder))
+    throw Error(fs::exists(folder) ? "is no folder" : "no such folder", {.file = folder.string()});
+  std::vector<RigImage> images;
+  if (fs::exists(folder / rig_images_file_name)) {
+    images = images_of_table(folder, rig);
+  } else {
+    for (std::size_t n = 0; n < rig.cameras.size(); ++n)
+      if (fs::is_directory(folder / rig.cameras[n].name))
+        append_folder(folder / rig.cameras[n].name, n, images);
+  }
+  if (images.empty())
+    throw Error("holds no image of any of the rig's cameras", {.file = folder.string()});
+  std::sort(images.begin(), images.end(), [](const RigImage& a, const RigImage& b) {
+    if (a.camera != b.camera) return a.camera < b.camera;
+    if (a.stamp_s != b.stamp_s) return a.stamp_s < b.stamp_s;
+    return a.file.native() < b.file.native();
+  });
+  return images;
+}
+
+DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera) {
+  Image<std::uint16_t> units;
+  try {
+    units = decode_gray16(read_whole_file(image.file));
+  } catch (const Error& error) {
+    throw error.in_file(image.file.string());
+  }
+  const Camera& calibrated = camera.camera;
+  const auto size = [](int width, int height) {
+    return std::to_string(width) + " x " + std::to_string(height);
+  };
+  if (units.width != calibrated.width || units.height != calibrated.height)
+    throw Error("does not fit the calibration of " + camera.name,
+                {.file = image.file.string(),
+                 .field = "image size",
+                 .value = size(units.width, units.height),
+                 .bound = size(calibrated.width, calibrated.height)});
+  DepthImage depth(units.width, units.height);
+  for (std::size_t n = 0; n < units.pixels.size(); ++n) {
+    if (units.pixels[n] == saturated) continue;
+    depth.pixels[n] = static_cast<float>(units.pixels[n] * camera.depth_scale_m);
+  }
+  return depth;
+}
+
+std::size_t RigMoment::seen() const {
+  return static_cast<std::size_t>(std::count_if(
+      cameras.begin(), cameras.end(), [](const Camera& c) { return c.state == State::seen; }));
+}
+
+RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_count,
+                        double stamp_s, double tolerance_s) {
+  RigMoment moment;
+  moment.stamp_s = stamp_s;
+  moment.cameras.resize(camera_count);
+  for (std::size_t n = 0; n < images.size(); ++n) {
+    RigMoment::Camera& camera = moment.cameras.at(images[n].camera);
+    const double offset = images[n].stamp_s - stamp_s;
+    const bool nearer = std::abs(offset) < std::abs(camera.offset_s) ||
+                        (std::abs(offset) == std::abs(camera.offset_s) && offset < camera.offset_s);
+    if (camera.state != State::missing && !nearer) continue;
+    camera.state = std::abs(offset) <= tolerance_s + stamp_rounding_s ? State::seen : State::late;
+    camera.image = n;
+    camera.offset_s = offset;
+  }
+  return moment;
+}
+
+RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t camera_count,
+                             double tolerance_s) {
+  if (images.empty()) throw Error("there are no images to choose a moment from");
+  const auto sum_of_offsets = [](const RigMoment& moment) {
+    double sum = 0.0;
+    for (const RigMoment::Camera& camera : moment.cameras)
+      if (camera.state == State::seen) sum += std::abs(camera.offset_s);
+    return sum;
+  };
+  std::vector<double> stamps;
+  for (const RigImage& image : images) stamps.push_back(image.stamp_s);
+  std::sort(stamps.begin(), stamps.end());
+  stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
+  RigMoment best;
+  double best_sum = 0.0;
+  for (const double stamp : stamps) {
+    RigMoment moment = rig_moment_at(images, camera_count, stamp, tolerance_s);
+    const double sum = sum_of_offsets(moment);
+    const bool better = best.cameras.empty() || moment.seen() > best.seen() ||
+                        (moment.seen() == best.seen() && sum < best_sum);
+    if (!better) continue;
+    best = std::move(moment);
+    best_sum = sum;
+  }
+  return best;
+}
+
+}  // namespace libmap

@@ -1,0 +1,316 @@
+#include "libmap/scan/rtabmap_graph.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstring>
+#include <functional>
+#include <limits>
+#include <map>
+#include <tuple>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/sqlite_file.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t pose_bytes = 48;
+// RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
+constexpr std::size_t absent_bytes = 4;
+constexpr std::size_t max_warnings = 100;
+// Of the nine numbers from the nearest rotation: float32 of old versions is off by 1e-4.
+constexpr double max_rotation_error = 0.05;
+
+template <typename T, std::size_t N>
+std::array<T, N> numbers_of(std::string_view bytes, const char* what) {
+  std::array<T, N> numbers{};
+  if (bytes.size() != sizeof numbers)
+    throw Error(std::string(what) + " of another length",
+                {.value = std::to_string(bytes.size()) + " bytes",
+                 .bound = std::to_string(sizeof numbers)});
+  std::memcpy(numbers.data(), bytes.data(), sizeof numbers);
+  return numbers;
+}
+
+class Warnings {
+ public:
+  explicit Warnings(std::vector<std::string>& list) : list_(list) {}
+  ~Warnings() {
+    if (count_ > max_warnings)
+      list_.push_back("... and " + std::to_string(count_ - max_warnings) + " more");
+  }
+  Warnings(const Warnings&) = delete;
+  Warnings& operator=(const Warnings&) = delete;
+
+  void add(const std::string& text) {
+    if (++count_ <= max_warnings) list_.push_back(text);
+  }
+
+  // The value, or nothing and a warning.
+  template <typename Make>
+  auto attempt(const std::string& what, const Make& make) -> decltype(make()) {
+    try {
+      return make();
+    } catch (const Error& error) {
+      add(what + ": " + error.what());
+      return std::nullopt;
+    }
+  }
+
+ private:
+  std::vector<std::string>& list_;
+  std::size_t count_ = 0;
+};
+
+std::optional<int> as_id(std::int64_t number) {
+  if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
+    return std::nullopt;
+  return static_cast<int>(number);
+}
+
+std::string node_text(std::int64_t id) { return "node " + std::to_string(id); }
+
+// ------------------------------------------------------------------------------------------ nodes
+
+std::optional<Pose> pose_in(const SqliteRow& row, int column, const std::string& what,
+                            Warnings& warnings) {
+  const std::string bytes = row.bytes(column);
+  if (bytes.size() <= absent_bytes) return std::nullopt;
+  return warnings.attempt(what, [&] { return decode_pose(bytes); });
+}
+
+// Columns: id map_id weight stamp label pose ground_truth_pose velocity gps.
+GraphNode node_in(const SqliteRow& row, int id, Warnings& warnings) {
+  const std::string what = node_text(id);
+  GraphNode node{.id = id,
+                 .session = as_id(row.integer(1)).value_or(0),
+                 .weight = as_id(row.integer(2)).value_or(0)};
+  node.stamp_s = row.is_null(3) ? 0.0 : row.real(3);
+  if (!std::isfinite(node.stamp_s)) node.stamp_s = 0.0;
+  node.label = row.bytes(4);
+  node.odometry_from_base = pose_in(row, 5, what + ": pose", warnings);
+  node.truth_from_base = pose_in(row, 6, what + ": ground_truth_pose", warnings);
+  if (const std::string bytes = row.bytes(7); bytes.size() > absent_bytes)
+    node.velocity = warnings.attempt(what + ": velocity", [&] { return decode_velocity(bytes); });
+  if (const std::string bytes = row.bytes(8); bytes.size() > absent_bytes)
+    node.gps = warnings.attempt(what + ": gps", [&] { return decode_gps(bytes); });
+  return node;
+}
+
+void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph& graph,
+                Warnings& warnings) {
+  std::string list = "id";
+  for (const char* name :
+       {"map_id", "weight", "stamp", "label", "pose", "ground_truth_pose", "velocity", "gps"})
+    list += ", " + columns.or_null("Node", name);
+  file.each_row("SELECT " + list + " FROM Node ORDER BY id", {}, [&](const SqliteRow& row) {
+    const std::optional<int> id = as_id(row.integer(0));
+    if (!id || *id <= 0) {
+      warnings.add(node_text(row.integer(0)) + ": is left out: ids begin at 1");
+    } else if (!graph.nodes.empty() && graph.nodes.back().id == *id) {
+      warnings.add(node_text(*id) + ": is there more than once; the first is taken");
+    } else {
+      graph.nodes.push_back(node_in(row, *id, warnings));
+    }
+  });
+}
+
+// ------------------------------------------------------------------------------------------ links
+
+Matrix6d information_of(double rotation_variance, double translation_variance) {
+  if (!(rotation_variance > 0) || !(translation_variance > 0) ||
+      !std::isfinite(rotation_variance) || !std::isfinite(translation_variance))
+    throw Error("variance that is not above 0");
+  Matrix6d information = Matrix6d::Zero();
+  information.diagonal() << Eigen::Vector3d::Constant(1 / translation_variance),
+      Eigen::Vector3d::Constant(1 / rotation_variance);
+  return information;
+}
+
+bool may_link_to_itself(LinkType type) {
+  return type == LinkType::pose_prior || type == LinkType::gravity;
+}
+
+enum class InformationForm { matrix, two_variances, one_variance, none };
+
+class LinkReader {
+ public:
+  LinkReader(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph& graph,
+             Warnings& warnings)
+      : file_(file), columns_(columns), graph_(graph), warnings_(warnings) {}
+
+  void read() {
+    form_ = form();
+    std::string list = "from_id, to_id, type, transform";
+    if (form_ == InformationForm::matrix) list += ", information_matrix";
+    if (form_ == InformationForm::two_variances) list += ", rot_variance, trans_variance";
+    if (form_ == InformationForm::one_variance) list += ", variance";
+    file_.each_row("SELECT " + list + " FROM Link ORDER BY from_id, to_id, type, rowid", {},
+                   [&](const SqliteRow& row) { take(row); });
+    for (const auto& [key, link] : links_) graph_.links.push_back(link);
+  }
+
+ private:
+  InformationForm form() const {
+    if (columns_.has("Link", "information_matrix")) return InformationForm::matrix;
+    if (columns_.has("Link", "rot_variance")) return InformationForm::two_variances;
+    if (columns_.has("Link", "variance")) return InformationForm::one_variance;
+    return InformationForm::none;
+  }
+
+  void take(const SqliteRow& row) {
+    const std::string what =
+        "link " + std::to_string(row.integer(0)) + " -> " + std::to_string(row.integer(1));
+    try {
+      if (const std::optional<PoseLink> link = link_in(row)) keep(*link);
+    } catch (const Error& error) {
+      warnings_.add(what + ": is left out: " + error.what());
+    }
+  }
+
+  // Nothing for a null transform, which RTAB-Map stores where odometry was lost.
+  std::optional<PoseLink> link_in(const SqliteRow& row) const {
+    const std::optional<int> from = as_id(row.integer(0));
+    const std::optional<int> to = as_id(row.integer(1));
+    const std::optional<int> type = as_id(row.integer(2));
+    if (!from || !to || !type) throw Error("its numbers are no ids");
+    PoseLink link{.from = *from, .to = *to, .type = static_cast<LinkType>(*type)};
+    // Before 0.7.4 types were neighbor, loop closure and child.
+    if (form_ == InformationForm::none && *type != 0) link.type = LinkType::global_closure;
+    check_ends(link);
+    const std::optional<Pose> pose = decode_pose(row.bytes(3));
+    if (!pose) return std::nullopt;
+    link.from_from_to = *pose;
+    if (form_ == InformationForm::matrix) link.information = decode_information(row.bytes(4));
+    if (form_ == InformationForm::two_variances)
+      link.information = information_of(row.real(4), row.real(5));
+    if (form_ == InformationForm::one_variance)
+      link.information = information_of(row.real(4), row.real(4));
+    return link;
+  }
+
+  void check_ends(const PoseLink& link) const {
+    if (graph_.find_node(link.from) == nullptr) throw Error(node_text(link.from) + " is not there");
+    if (link.type != LinkType::landmark && graph_.find_node(link.to) == nullptr)
+      throw Error(node_text(link.to) + " is not there");
+    if (link.from == link.to && !may_link_to_itself(link.type))
+      throw Error("a " + to_text(link.type) + " link to itself");
+  }
+
+  // Rows come by ascending `from`: the direction from the lower node comes first.
+  void keep(const PoseLink& link) {
+    const auto [low, high] = std::minmax(link.from, link.to);
+    links_.try_emplace({low, high, static_cast<int>(link.type)}, link);
+  }
+
+  const SqliteFile& file_;
+  const RtabmapColumns& columns_;
+  PoseGraph& graph_;
+  Warnings& warnings_;
+  InformationForm form_ = InformationForm::none;
+  std::map<std::tuple<int, int, int>, PoseLink> links_;
+};
+
+// ---------------------------------------------------------------------------------- optimised
+// poses
+
+std::map<int, Pose> decode_optimized_poses(const std::string& ids_blob,
+                                           const std::string& poses_blob, Warnings& warnings) {
+  const StoredMatrix ids = decode_matrix(ids_blob);
+  const StoredMatrix poses = decode_matrix(poses_blob);
+  if (ids.element != MatrixElement::int32 || poses.element != MatrixElement::float32)
+    throw Error("matrices of other types than int32 and float32");
+  const auto list = ids.values<std::int32_t>();
+  if (poses.bytes.size() != list.size() * pose_bytes)
+    throw Error("other numbers of ids and poses",
+                {.value = std::to_string(list.size()) + " and " +
+                          std::to_string(poses.bytes.size() / pose_bytes)});
+  std::map<int, Pose> map_from_base;
+  for (std::size_t i = 0; i < list.size(); ++i) {
+    const auto pose = warnings.attempt(node_text(list[i]) + ": Admin.opt_poses", [&] {
+      return decode_pose(std::string_view(poses.bytes).substr(i * pose_bytes, pose_bytes));
+    });
+    if (pose) map_from_base.emplace(list[i], *pose);
+  }
+  return map_from_base;
+}
+
+void read_optimized_poses(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph& graph,
+                          Warnings& warnings) {
+  if (!columns.has("Admin", "opt_ids") || !columns.has("Admin", "opt_poses")) return;
+  std::string ids;
+  std::string poses;
+  file.each_row("SELECT opt_ids, opt_poses FROM Admin LIMIT 1", {}, [&](const SqliteRow& row) {
+    ids = row.bytes(0);
+    poses = row.bytes(1);
+  });
+  if (ids.size() <= absent_bytes || poses.size() <= absent_bytes) return;
+  try {
+    graph.optimized_map_from_base = decode_optimized_poses(ids, poses, warnings);
+  } catch (const Error& error) {
+    warnings.add(std::string("Admin.opt_poses: ") + error.what());
+  }
+  // Landmarks, and nodes that were deleted since.
+  std::erase_if(graph.optimized_map_from_base,
+                [&](const auto& entry) { return graph.find_node(entry.first) == nullptr; });
+}
+
+}  // namespace
+
+std::optional<Pose> decode_pose(std::string_view bytes) {
+  const auto numbers = numbers_of<float, 12>(bytes, "pose");
+  if (std::all_of(numbers.begin(), numbers.end(), [](float number) { return number == 0; }))
+    return std::nullopt;
+  using RowMajor = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
+  const Eigen::Matrix<double, 3, 4> stored =
+      Eigen::Map<const RowMajor>(numbers.data()).cast<double>();
+  if (!stored.allFinite()) throw Error("pose that is not finite");
+  Pose pose = Pose::Identity();
+  pose.linear() = nearest_rotation(stored.leftCols<3>());
+  pose.translation() = stored.col(3);
+  if ((pose.linear() - stored.leftCols<3>()).norm() > max_rotation_error)
+    throw Error("pose whose matrix is no rotation");
+  return pose;
+}
+
+Matrix6d decode_information(std::string_view bytes) {
+  const auto numbers = numbers_of<double, 36>(bytes, "information matrix");
+  using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+  const Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
+  if (!information.allFinite()) throw Error("information matrix that is not finite");
+  return information;
+}
+
+std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes) {
+  const auto numbers = numbers_of<float, 6>(bytes, "velocity");
+  std::array<double, 6> velocity{};
+  std::copy(numbers.begin(), numbers.end(), velocity.begin());
+  const bool is_known =
+      std::any_of(velocity.begin(), velocity.end(), [](double v) { return v != 0; }) &&
+      std::all_of(velocity.begin(), velocity.end(), [](double v) { return std::isfinite(v); });
+  return is_known ? std::optional(velocity) : std::nullopt;
+}
+
+std::optional<GpsFix> decode_gps(std::string_view bytes) {
+  const auto numbers = numbers_of<double, 6>(bytes, "gps");
+  if (std::all_of(numbers.begin(), numbers.end(), [](double number) { return number == 0; }))
+    return std::nullopt;
+  if (!std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); }))
+    throw Error("gps that is not finite");
+  return GpsFix{numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]};
+}
+
+RtabmapGraph read_rtabmap_graph(const SqliteFile& file, const RtabmapColumns& columns) {
+  RtabmapGraph result;
+  Warnings warnings(result.warnings);
+  read_nodes(file, columns, result.graph, warnings);
+  if (columns.has_table("Link")) LinkReader(file, columns, result.graph, warnings).read();
+  read_optimized_poses(file, columns, result.graph, warnings);
+  return result;
+}
+
+}  // namespace libmap

@@ -1,0 +1,122 @@
+#include <SQLiteCpp/SQLiteCpp.h>
+
+#include <optional>
+#include <set>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_blobs.h"
+#include "libmap/scan/rtabmap_writer.h"
+#include "libmap/scan/sqlite_file.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+std::set<std::string> columns_of(SQLite::Database& database, const std::string& table) {
+  std::set<std::string> columns;
+  SQLite::Statement statement(database, "PRAGMA table_info(" + table + ")");
+  while (statement.executeStep()) columns.insert(statement.getColumn(1).getString());
+  return columns;
+}
+
+std::string blob_of(SQLite::Column column) {
+  const char* bytes = static_cast<const char*>(column.getBlob());
+  return bytes == nullptr ? std::string()
+                          : std::string(bytes, static_cast<std::size_t>(column.getBytes()));
+}
+
+// The node at whose optimised pose the last localisation stands.
+std::optional<int> node_of_localization(SQLite::Database& database) {
+  SQLite::Statement row(database, "SELECT opt_ids, opt_poses, opt_last_localization FROM Admin");
+  if (!row.executeStep()) return std::nullopt;
+  const std::string localization = blob_of(row.getColumn(2));
+  if (localization.size() != null_pose_blob().size()) return std::nullopt;
+  try {
+    const std::vector<int> ids = decode_matrix(blob_of(row.getColumn(0))).values<int>();
+    const std::string poses = decode_matrix(blob_of(row.getColumn(1))).bytes;
+    // From the back: RTAB-Map localises at the last node.
+    for (std::size_t i = ids.size(); i-- > 0;)
+      if (poses.compare(i * localization.size(), localization.size(), localization) == 0)
+        return ids[i];
+  } catch (const Error&) {
+    // Broken poses are replaced all the same.
+  } catch (const std::out_of_range&) {
+  }
+  return std::nullopt;
+}
+
+void require_nodes(SQLite::Database& database, const std::map<int, Pose>& poses,
+                   const std::string& source) {
+  std::set<int> nodes;
+  SQLite::Statement statement(database, "SELECT id FROM Node");
+  while (statement.executeStep()) nodes.insert(statement.getColumn(0).getInt());
+  for (const auto& [id, pose] : poses) {
+    if (id > 0 && nodes.count(id) == 0)
+      throw Error("the scan has no such node",
+                  {.file = source, .field = "optimised pose of node", .value = std::to_string(id)});
+    if (!pose.matrix().allFinite())
+      throw Error("is not finite", {.field = "optimised pose of node " + std::to_string(id)});
+  }
+}
+
+void require_columns(SQLite::Database& database, const std::string& source) {
+  const std::set<std::string> columns = columns_of(database, "Admin");
+  if (columns.empty() || columns_of(database, "Node").count("id") == 0)
+    throw Error("is no RTAB-Map database", {.file = source});
+  if (columns.count("opt_ids") == 0 || columns.count("opt_poses") == 0)
+    throw Error("has no place for optimised poses: it was made by RTAB-Map before 0.13",
+                {.file = source});
+  SQLite::Statement rows(database, "SELECT COUNT(*) FROM Admin");
+  rows.executeStep();
+  if (rows.getColumn(0).getInt() != 1)
+    throw Error("is no RTAB-Map database", {.file = source,
+                                            .field = "rows of table Admin",
+                                            .value = rows.getColumn(0).getString(),
+                                            .bound = "1"});
+}
+
+void update_poses(SQLite::Database& database, const std::map<int, Pose>& map_from_base) {
+  const OptimizedPoseBlobs blobs = to_blobs(map_from_base);
+  const bool localizes = columns_of(database, "Admin").count("opt_last_localization") > 0;
+  std::string localization;
+  if (localizes) {
+    const std::optional<int> node = node_of_localization(database);
+    const auto place = node ? map_from_base.find(*node) : map_from_base.end();
+    if (place != map_from_base.end()) localization = to_blob(place->second);
+  }
+  SQLite::Statement update(database, std::string("UPDATE Admin SET opt_ids = ?, opt_poses = ?") +
+                                         (localizes ? ", opt_last_localization = ?" : ""));
+  const auto bind = [&](int index, const std::string& blob) {
+    if (!map_from_base.empty() && !blob.empty())
+      update.bindNoCopy(index, blob.data(), static_cast<int>(blob.size()));
+  };
+  bind(1, blobs.ids);
+  bind(2, blobs.poses);
+  if (localizes) bind(3, localization);
+  update.exec();
+}
+
+}  // namespace
+
+void copy_with_optimized_poses(const fs::path& source, const fs::path& target,
+                               const std::map<int, Pose>& map_from_base) {
+  SqliteFile(source).copy_to(target);
+  try {
+    SQLite::Database copy(target.string(), SQLite::OPEN_READWRITE);
+    copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = MEMORY;");
+    require_columns(copy, source.string());
+    require_nodes(copy, map_from_base, source.string());
+    update_poses(copy, map_from_base);
+  } catch (const SQLite::Exception& error) {
+    throw Error(std::string("cannot be updated: ") + error.what(), {.file = source.string()},
+                ErrorKind::failed);
+  }
+}
+
+}  // namespace libmap

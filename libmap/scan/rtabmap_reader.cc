@@ -1,0 +1,477 @@
+#include "libmap/scan/rtabmap_reader.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_graph.h"
+#include "libmap/scan/sqlite_file.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+// RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
+constexpr std::size_t absent_bytes = 4;
+// Enough for the frame header of a JPEG that cameras make.
+constexpr std::size_t header_bytes = 4096;
+
+bool is_absent(const std::string& blob) { return blob.size() <= absent_bytes; }
+
+std::string or_empty(std::string blob) { return is_absent(blob) ? std::string() : std::move(blob); }
+
+// Where images and calibration stand: in Data, or before 0.10 in Image and Depth.
+struct ImageColumns {
+  std::string from;
+  std::string id;
+  std::string image;
+  std::string depth;
+  std::string calibration;
+  std::string focal_length_x = "NULL";  // before 0.10
+  std::string focal_length_y = "NULL";
+  std::string center_x = "NULL";
+  std::string center_y = "NULL";
+  std::string local_transform = "NULL";
+  std::string scan = "NULL";
+  std::string user_data = "NULL";
+};
+
+ImageColumns image_columns(const RtabmapColumns& columns) {
+  if (columns.has_table("Data"))
+    return {.from = "Data",
+            .id = "id",
+            .image = columns.or_null("Data", "image"),
+            .depth = columns.or_null("Data", "depth"),
+            .calibration = columns.or_null("Data", "calibration"),
+            .scan = columns.or_null("Data", "scan"),
+            .user_data = columns.or_null("Data", "user_data")};
+  const bool has_depth = columns.has_table("Depth");
+  const auto depth_column = [&](const char* name) {
+    return columns.has("Depth", name) ? std::string("Depth.") + name : std::string("NULL");
+  };
+  return {.from = has_depth ? "Image LEFT OUTER JOIN Depth ON Image.id = Depth.id" : "Image",
+          .id = "Image.id",
+          .image = "Image.data",
+          .depth = depth_column("data"),
+          .calibration = "NULL",
+          .focal_length_x = depth_column("fx"),
+          .focal_length_y = depth_column("fy"),
+          .center_x = depth_column("cx"),
+          .center_y = depth_column("cy"),
+          .local_transform = depth_column("local_transform"),
+          .scan = depth_column("data2d")};
+}
+
+std::string calibration_list(const ImageColumns& of) {
+  return of.calibration + ", " + of.focal_length_x + ", " + of.focal_length_y + ", " + of.center_x +
+         ", " + of.center_y + ", " + of.local_transform;
+}
+
+// Columns `first`...: calibration fx fy cx cy local_transform; the last five before 0.10. A second
+// focal length below 1 is the baseline of a stereo pair (DBDriverSqlite3.cpp).
+std::string calibration_in(const SqliteRow& row, int first) {
+  if (!row.is_null(first)) return or_empty(row.bytes(first));
+  if (row.is_null(first + 1)) return {};
+  std::vector<float> numbers;
+  for (int i = 1; i <= 4; ++i) numbers.push_back(static_cast<float>(row.real(first + i)));
+  if (numbers[1] < 1) numbers = {numbers[0], numbers[0], numbers[2], numbers[3], numbers[1]};
+  std::string local = row.bytes(first + 5);
+  if (local.size() != 48) local = std::string(48, '\0');
+  std::string bytes(numbers.size() * sizeof(float), '\0');
+  std::memcpy(bytes.data(), numbers.data(), bytes.size());
+  return bytes + local;
+}
+
+std::string version_of(const SqliteFile& file, const RtabmapColumns& columns) {
+  std::string version;
+  if (columns.has("Admin", "version"))
+    file.each_row("SELECT version FROM Admin LIMIT 1", {},
+                  [&](const SqliteRow& row) { version = row.bytes(0); });
+  return version;
+}
+
+void require_scan(const fs::path& path, const RtabmapColumns& columns) {
+  const auto refuse = [&](const std::string& why) {
+    throw Error("is an SQLite file but no scan of RTAB-Map: " + why, {.file = path.string()});
+  };
+  if (!columns.has_table("Node")) refuse("it has no table Node");
+  if (!columns.has("Node", "id")) refuse("its table Node has no column id");
+  if (columns.has_table("Link"))
+    for (const char* column : {"from_id", "to_id", "type", "transform"})
+      if (!columns.has("Link", column))
+        refuse(std::string("its table Link has no column ") + column);
+  for (const char* table : {"Data", "Image", "Depth"})
+    if (columns.has_table(table) && !columns.has(table, "id"))
+      refuse(std::string("its table ") + table + " has no column id");
+}
+
+std::string joined(const std::string& place, const std::string& field) {
+  return place.empty() || field.empty() ? place + field : place + ": " + field;
+}
+
+// `step` with its Errors naming `part`.
+template <typename Step>
+void decode_part(const char* part, const Step& step) {
+  try {
+    step();
+  } catch (const Error& error) {
+    ErrorContext context = error.context();
+    context.field = joined(part, context.field);
+    throw Error(error.reason(), std::move(context), error.kind());
+  }
+}
+
+}  // namespace
+
+RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts) {
+  RgbdFrame frame;
+  // Of the image that the cameras belong to.
+  int width = 0;
+  int height = 0;
+  if (!blobs.image.empty())
+    decode_part("image", [&] {
+      const std::optional<ImageInfo> info = read_image_info(blobs.image);
+      if (!info) throw Error("image ends in its header");
+      width = info->width;
+      height = info->height;
+      if (parts.color) frame.color = decode_color(blobs.image);
+    });
+  if (!blobs.depth.empty())
+    decode_part("depth", [&] {
+      const std::optional<DepthInfo> info = read_depth_info(blobs.depth);
+      if (info && parts.depth) frame.depth = decode_depth(blobs.depth);
+      if (!info && parts.depth) frame.right = decode_gray(blobs.depth);
+      if (info && width == 0) {
+        width = info->width;
+        height = info->height;
+      }
+    });
+  if (!blobs.calibration.empty())
+    decode_part("calibration", [&] {
+      const Calibration calibration = decode_calibration(blobs.calibration);
+      frame.cameras = cameras_of(calibration, width, height);
+      frame.stereo = stereo_cameras_of(calibration, width, height);
+    });
+  return frame;
+}
+
+RtabmapDatabase::RtabmapDatabase(const fs::path& path)
+    : path_(path), file_(std::make_unique<SqliteFile>(path)), columns_(*file_) {
+  require_scan(path, columns_);
+  version_ = version_of(*file_, columns_);
+  RtabmapGraph read = read_rtabmap_graph(*file_, columns_);
+  graph_ = std::move(read.graph);
+  warnings_ = std::move(read.warnings);
+  if (!columns_.has_table("Data") && !columns_.has_table("Image"))
+    warnings_.push_back("it has no table Data: there are no images");
+  for (const std::string& name : columns_.unknown())
+    warnings_.push_back(name + " is not known and is not read");
+}
+
+RtabmapDatabase::~RtabmapDatabase() = default;
+
+Error RtabmapDatabase::in_part(const Error& error, int node, const std::string& part) const {
+  if (!error.context().file.empty()) return error;
+  ErrorContext context = error.context();
+  context.file = path_.string();
+  context.field = joined(joined("node " + std::to_string(node), part), context.field);
+  return Error(error.reason(), std::move(context), error.kind());
+}
+
+void RtabmapDatabase::require_node(int node) const {
+  if (graph_.find_node(node) == nullptr)
+    throw Error("there is no such node",
+                {.file = path_.string(), .field = "node", .value = std::to_string(node)});
+}
+
+FrameBlobs RtabmapDatabase::read_blobs(int node, FrameParts parts) const {
+  require_node(node);
+  FrameBlobs blobs;
+  if (!columns_.has_table("Data") && !columns_.has_table("Image")) return blobs;
+  const ImageColumns of = image_columns(columns_);
+  // Where an image is not asked for, its header still says the size of cameras that store none.
+  const auto part = [&](const std::string& column, bool is_wanted) {
+    return is_wanted ? column : "substr(" + column + ", 1, " + std::to_string(header_bytes) + ")";
+  };
+  const std::string query = "SELECT " + part(of.image, parts.color) + ", " +
+                            part(of.depth, parts.depth) + ", " + calibration_list(of) + " FROM " +
+                            of.from + " WHERE " + of.id + " = ? LIMIT 1";
+  file_->each_row(query, {node}, [&](const SqliteRow& row) {
+    blobs.image = or_empty(row.bytes(0));
+    blobs.depth = or_empty(row.bytes(1));
+    blobs.calibration = calibration_in(row, 2);
+  });
+  return blobs;
+}
+
+RgbdFrame RtabmapDatabase::read_frame(int node, FrameParts parts) const {
+  FrameBlobs blobs = read_blobs(node, parts);
+  try {
+    // A header longer than the bytes that were read.
+    if (!parts.color && !blobs.image.empty() && !read_image_info(blobs.image))
+      blobs.image = read_blobs(node).image;
+    RgbdFrame frame = decode_frame(blobs, parts);
+    frame.node = node;
+    frame.stamp_s = graph_.find_node(node)->stamp_s;
+    return frame;
+  } catch (const Error& error) {
+    throw in_part(error, node, {});
+  }
+}
+
+Calibration RtabmapDatabase::calibration(int node) const {
+  const std::string bytes = read_blobs(node, {.color = false, .depth = false}).calibration;
+  if (bytes.empty()) return {};
+  try {
+    return decode_calibration(bytes);
+  } catch (const Error& error) {
+    throw in_part(error, node, "calibration");
+  }
+}
+
+std::optional<LaserScan> RtabmapDatabase::laser_scan(int node) const {
+  require_node(node);
+  if (!columns_.has_table("Data") && !columns_.has_table("Image")) return std::nullopt;
+  const ImageColumns of = image_columns(columns_);
+  std::string scan;
+  std::string info;
+  file_->each_row("SELECT " + of.scan + ", " + columns_.or_null("Data", "scan_info") + " FROM " +
+                      of.from + " WHERE " + of.id + " = ? LIMIT 1",
+                  {node}, [&](const SqliteRow& row) {
+                    scan = or_empty(row.bytes(0));
+                    info = or_empty(row.bytes(1));
+                  });
+  if (scan.empty()) return std::nullopt;
+  try {
+    return decode_laser_scan(scan, info);
+  } catch (const Error& error) {
+    throw in_part(error, node, "scan");
+  }
+}
+
+std::map<std::string, std::string> RtabmapDatabase::parameters() const {
+  // In 0.11.8 to 0.11.10 they stand in Statistics.
+  const std::string table = columns_.has("Info", "parameters") ? "Info" : "Statistics";
+  std::map<std::string, std::string> parameters;
+  if (!columns_.has(table, "parameters")) return parameters;
+  std::string text;
+  const std::string order = columns_.has(table, "time_enter") ? "time_enter DESC, " : "";
+  file_->each_row("SELECT parameters FROM " + table + " WHERE parameters IS NOT NULL ORDER BY " +
+                      order + "rowid DESC LIMIT 1",
+                  {}, [&](const SqliteRow& row) { text = row.bytes(0); });
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t end = std::min(text.find(';', at), text.size());
+    const std::string entry = text.substr(at, end - at);
+    const std::size_t colon = entry.find(':');
+    if (colon != std::string::npos && colon > 0)
+      parameters[entry.substr(0, colon)] = entry.substr(colon + 1);
+    at = end + 1;
+  }
+  return parameters;
+}
+
+namespace {
+
+std::size_t count_rows(const SqliteFile& file, const std::string& table) {
+  std::size_t count = 0;
+  file.each_row("SELECT count(*) FROM " + table, {}, [&](const SqliteRow& row) {
+    count = static_cast<std::size_t>(std::max<std::int64_t>(row.integer(0), 0));
+  });
+  return count;
+}
+
+std::string feature_table(const RtabmapColumns& columns) {
+  for (const char* table : {"Feature", "Map_Node_Word"})
+    if (columns.has_table(table)) return table;
+  return {};
+}
+
+float float_in(const SqliteRow& row, int column) { return static_cast<float>(row.real(column)); }
+
+int int_in(const SqliteRow& row, int column) {
+  return static_cast<int>(std::clamp<std::int64_t>(
+      row.integer(column), std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
+}
+
+// Columns: word_id pos_x pos_y size dir response octave depth_x depth_y depth_z descriptor_size
+// descriptor.
+StoredFeature feature_in(const SqliteRow& row) {
+  StoredFeature feature{.word = int_in(row, 0),
+                        .x = float_in(row, 1),
+                        .y = float_in(row, 2),
+                        .size = int_in(row, 3),
+                        .angle_deg = float_in(row, 4),
+                        .response = float_in(row, 5),
+                        .octave = int_in(row, 6)};
+  const Eigen::Vector3f point(float_in(row, 7), float_in(row, 8), float_in(row, 9));
+  if (point.allFinite()) feature.point_in_base = point;
+  const std::string descriptor = row.bytes(11);
+  const auto size = static_cast<std::size_t>(std::max(int_in(row, 10), 0));
+  if (size == 0 || descriptor.empty()) return feature;
+  if (descriptor.size() == size) {
+    feature.binary_descriptor.assign(descriptor.begin(), descriptor.end());
+  } else if (descriptor.size() == sizeof(float) * size) {
+    feature.float_descriptor.resize(size);
+    std::memcpy(feature.float_descriptor.data(), descriptor.data(), descriptor.size());
+  } else {
+    throw Error("descriptor of another length than it says",
+                {.value = std::to_string(descriptor.size()) + " bytes",
+                 .bound = std::to_string(size) + " or " + std::to_string(sizeof(float) * size)});
+  }
+  return feature;
+}
+
+}  // namespace
+
+std::size_t RtabmapDatabase::word_count() const {
+  return columns_.has_table("Word") ? count_rows(*file_, "Word") : 0;
+}
+
+std::size_t RtabmapDatabase::feature_count() const {
+  const std::string table = feature_table(columns_);
+  return table.empty() ? 0 : count_rows(*file_, table);
+}
+
+std::vector<StoredFeature> RtabmapDatabase::features(int node) const {
+  require_node(node);
+  std::vector<StoredFeature> features;
+  const std::string table = feature_table(columns_);
+  if (!columns_.has(table, "node_id")) return features;
+  std::string list;
+  for (const char* name : {"word_id", "pos_x", "pos_y", "size", "dir", "response", "octave",
+                           "depth_x", "depth_y", "depth_z", "descriptor_size", "descriptor"})
+    list += (list.empty() ? "" : ", ") + columns_.or_null(table, name);
+  try {
+    file_->each_row("SELECT " + list + " FROM " + table + " WHERE node_id = ? ORDER BY rowid",
+                    {node}, [&](const SqliteRow& row) { features.push_back(feature_in(row)); });
+  } catch (const Error& error) {
+    throw in_part(error, node, "features");
+  }
+  return features;
+}
+
+namespace {
+
+template <typename Read>
+void attempt(NodeContent& content, const char* part, const Read& read) {
+  try {
+    read();
+  } catch (const Error& error) {
+    content.faults.push_back(std::string(part) + ": " + error.what());
+  }
+}
+
+void read_headers(NodeContent& content, const std::string& image, const std::string& depth,
+                  const std::string& calibration) {
+  if (!image.empty()) attempt(content, "image", [&] { content.color = read_image_info(image); });
+  if (!depth.empty())
+    attempt(content, "depth", [&] {
+      content.depth = read_depth_info(depth);
+      if (!content.depth) content.right = read_image_info(depth);
+    });
+  if (!calibration.empty())
+    attempt(content, "calibration", [&] { content.calibration = decode_calibration(calibration); });
+}
+
+}  // namespace
+
+void RtabmapDatabase::each_content(const std::function<void(const NodeContent&)>& use) const {
+  if (!columns_.has_table("Data") && !columns_.has_table("Image")) return;
+  const ImageColumns of = image_columns(columns_);
+  const auto begin_of = [](const std::string& column) {
+    return "substr(" + column + ", 1, " + std::to_string(header_bytes) + "), length(" + column +
+           ")";
+  };
+  file_->each_row("SELECT " + of.id + ", " + begin_of(of.image) + ", " + begin_of(of.depth) +
+                      ", length(" + of.scan + "), length(" + of.user_data + "), " +
+                      calibration_list(of) + " FROM " + of.from + " ORDER BY " + of.id,
+                  {}, [&](const SqliteRow& row) {
+                    NodeContent content{.node = int_in(row, 0)};
+                    if (graph_.find_node(content.node) == nullptr) return;
+                    const auto bytes_in = [&](int column) {
+                      const std::int64_t size = row.integer(column);
+                      return size > static_cast<std::int64_t>(absent_bytes)
+                                 ? static_cast<std::size_t>(size)
+                                 : 0;
+                    };
+                    content.color_bytes = bytes_in(2);
+                    content.depth_bytes = bytes_in(4);
+                    content.laser_scan_bytes = bytes_in(5);
+                    content.user_data_bytes = bytes_in(6);
+                    read_headers(content, or_empty(row.bytes(1)), or_empty(row.bytes(3)),
+                                 calibration_in(row, 7));
+                    use(content);
+                  });
+}
+
+namespace {
+
+// Materials one after the other: the number of polygons, then their indices.
+std::size_t count_polygons(const std::string& blob, std::int64_t corners) {
+  const auto numbers = decode_matrix(blob).values<std::int32_t>();
+  std::size_t count = 0;
+  for (std::size_t at = 0; at < numbers.size();) {
+    if (numbers[at] < 0 || corners < 1) throw Error("mesh of no valid size");
+    const auto polygons = static_cast<std::size_t>(numbers[at]);
+    const std::size_t left = numbers.size() - at - 1;
+    if (polygons > left / static_cast<std::size_t>(corners))
+      throw Error("mesh ends before its last polygon");
+    count += polygons;
+    at += 1 + polygons * static_cast<std::size_t>(corners);
+  }
+  return count;
+}
+
+}  // namespace
+
+StoredMap RtabmapDatabase::stored_map() const {
+  StoredMap map;
+  if (!columns_.has_table("Admin")) return map;
+  std::string list;
+  for (const char* name :
+       {"opt_map", "opt_map_resolution", "opt_cloud", "opt_polygons", "opt_polygons_size",
+        "opt_tex_materials", "preview_image", "opt_last_localization"})
+    list += (list.empty() ? "" : ", ") + columns_.or_null("Admin", name);
+  std::string field;
+  const auto read = [&](const SqliteRow& row) {
+    const auto blob = [&](int column, const char* name) {
+      field = name;
+      return or_empty(row.bytes(column));
+    };
+    if (const std::string grid = blob(0, "opt_map"); !grid.empty()) {
+      const StoredMatrix size = read_matrix_header(grid);
+      map.grid_width = size.columns;
+      map.grid_height = size.rows;
+      map.grid_resolution_m = row.is_null(1) ? 0.0 : row.real(1);
+    }
+    if (const std::string cloud = blob(2, "opt_cloud"); !cloud.empty()) {
+      const StoredMatrix size = read_matrix_header(cloud);
+      map.cloud_points =
+          static_cast<std::size_t>(size.rows) * static_cast<std::size_t>(size.columns);
+    }
+    if (const std::string mesh = blob(3, "opt_polygons"); !mesh.empty())
+      map.polygons = count_polygons(mesh, row.integer(4));
+    if (const std::string texture = blob(5, "opt_tex_materials"); !texture.empty())
+      map.texture = read_image_info(texture);
+    if (const std::string preview = blob(6, "preview_image"); !preview.empty())
+      map.preview = read_image_info(preview);
+    if (const std::string pose = blob(7, "opt_last_localization"); !pose.empty())
+      map.last_localization_map_from_base = decode_pose(pose);
+  };
+  try {
+    file_->each_row("SELECT " + list + " FROM Admin LIMIT 1", {}, read);
+  } catch (const Error& error) {
+    throw error.context().file.empty()
+        ? Error("Admin." + field + ": " + error.what(), {.file = path_.string()})
+        : error;
+  }
+  return map;
+}
+
+}  // namespace libmap

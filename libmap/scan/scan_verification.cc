@@ -1,0 +1,296 @@
+#include "libmap/scan/scan_verification.h"
+
+#include <algorithm>
+#include <array>
+#include <functional>
+#include <mutex>
+#include <tuple>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_graph.h"
+#include "libmap/scan/rtabmap_reader.h"
+#include "libmap/scan/sqlite_file.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t absent_bytes = 4;
+
+void check_pose(const std::string& blob) { decode_pose(blob); }
+void check_velocity(const std::string& blob) { decode_velocity(blob); }
+void check_gps(const std::string& blob) { decode_gps(blob); }
+void check_information(const std::string& blob) { decode_information(blob); }
+void check_matrix(const std::string& blob) { decode_matrix(blob); }
+void check_image(const std::string& blob) { decode_color(blob); }
+
+void check_depth(const std::string& blob) {
+  if (read_depth_info(blob))
+    decode_depth(blob);
+  else
+    decode_gray(blob);
+}
+
+// Three float64 for each sensor.
+void check_sensors(const std::string& blob) {
+  if (blob.size() % 24 != 0)
+    throw Error("env_sensors of another length",
+                {.value = std::to_string(blob.size()) + " bytes", .bound = "a multiple of 24"});
+}
+
+struct BlobColumn {
+  const char* table;
+  const char* node;  // column of the node's id, or nullptr
+  const char* column;
+  void (*check)(const std::string&);
+};
+
+// All but those of Data, and those whose length another column says.
+constexpr std::array<BlobColumn, 21> blob_columns{{
+    {"Node", "id", "pose", check_pose},
+    {"Node", "id", "ground_truth_pose", check_pose},
+    {"Node", "id", "velocity", check_velocity},
+    {"Node", "id", "gps", check_gps},
+    {"Node", "id", "env_sensors", check_sensors},
+    {"Link", "from_id", "transform", check_pose},
+    {"Link", "from_id", "information_matrix", check_information},
+    {"Link", "from_id", "user_data", check_matrix},
+    {"GlobalDescriptor", "node_id", "info", check_matrix},
+    {"GlobalDescriptor", "node_id", "data", check_matrix},
+    {"Tag", "node_id", "transform", check_pose},
+    {"Statistics", "id", "wm_state", check_matrix},
+    {"Admin", nullptr, "opt_ids", check_matrix},
+    {"Admin", nullptr, "opt_poses", check_matrix},
+    {"Admin", nullptr, "opt_last_localization", check_pose},
+    {"Admin", nullptr, "opt_map", check_matrix},
+    {"Admin", nullptr, "opt_cloud", check_matrix},
+    {"Admin", nullptr, "opt_polygons", check_matrix},
+    {"Admin", nullptr, "opt_tex_coords", check_matrix},
+    {"Admin", nullptr, "opt_tex_materials", check_image},
+    {"Admin", nullptr, "preview_image", check_image},
+}};
+
+// Collects from several threads.
+class Findings {
+ public:
+  explicit Findings(ScanVerificationResult& result) : result_(result) {}
+
+  void add(int node, std::string part, const Error& error) {
+    const std::lock_guard lock(mutex_);
+    result_.faults.push_back({node, std::move(part), error.what()});
+  }
+
+  void count(const std::string& blob) {
+    const std::lock_guard lock(mutex_);
+    ++result_.blobs;
+    result_.bytes += blob.size();
+  }
+
+  // One blob; whether it is sound.
+  template <typename Check>
+  bool check(int node, const std::string& part, const std::string& blob, const Check& use) {
+    if (blob.size() <= absent_bytes) return true;
+    count(blob);
+    return attempt(node, part, [&] { use(blob); });
+  }
+
+  template <typename Step>
+  bool attempt(int node, const std::string& part, const Step& step) {
+    try {
+      step();
+      return true;
+    } catch (const Error& error) {
+      add(node, part, error);
+      return false;
+    }
+  }
+
+ private:
+  ScanVerificationResult& result_;
+  std::mutex mutex_;
+};
+
+int node_in(const SqliteRow& row, int column) {
+  const std::int64_t id = row.integer(column);
+  return id > 0 && id <= 0x7fffffff ? static_cast<int>(id) : 0;
+}
+
+std::string part_of(const char* table, const char* column) {
+  return std::string(table) + "." + column;
+}
+
+class DatabaseVerification {
+ public:
+  DatabaseVerification(const RtabmapDatabase& scan, ScanVerificationResult& result,
+                       Progress& progress)
+      : scan_(scan), result_(result), findings_(result), progress_(progress) {}
+
+  void run() {
+    findings_.attempt(0, "file", [&] { check_structure(); });
+    for (const BlobColumn& column : blob_columns)
+      findings_.attempt(0, column.table, [&] { check_column(column); });
+    findings_.attempt(0, "Statistics.data", [&] { check_statistics(); });
+    for (const char* table : {"Word", "Feature", "Map_Node_Word"})
+      findings_.attempt(0, table, [&] { check_descriptors(table); });
+    findings_.attempt(0, "Admin", [&] { scan_.stored_map(); });
+    check_frames();
+  }
+
+ private:
+  void check_structure() {
+    scan_.file().each_row("PRAGMA quick_check(20)", {}, [&](const SqliteRow& row) {
+      if (row.bytes(0) != "ok") findings_.add(0, "file", Error(row.bytes(0)));
+    });
+  }
+
+  void check_column(const BlobColumn& of) {
+    if (!scan_.columns().has(of.table, of.column)) return;
+    if (of.node != nullptr && !scan_.columns().has(of.table, of.node)) return;
+    const std::string node = of.node == nullptr ? "0" : of.node;
+    scan_.file().each_row(
+        "SELECT " + node + ", " + of.column + " FROM " + of.table, {}, [&](const SqliteRow& row) {
+          findings_.check(node_in(row, 0), part_of(of.table, of.column), row.bytes(1), of.check);
+        });
+  }
+
+  // Plain text before 0.15.
+  void check_statistics() {
+    if (!scan_.columns().has("Statistics", "data")) return;
+    scan_.file().each_row("SELECT id, data FROM Statistics", {}, [&](const SqliteRow& row) {
+      if (row.is_text(1)) return;
+      findings_.check(node_in(row, 0), "Statistics.data", row.bytes(1),
+                      [](const std::string& blob) { decode_compressed_text(blob); });
+    });
+  }
+
+  // descriptor_size bytes or as many float32.
+  void check_descriptors(const char* table) {
+    const RtabmapColumns& columns = scan_.columns();
+    if (!columns.has(table, "descriptor") || !columns.has(table, "descriptor_size")) return;
+    const std::string node = columns.has(table, "node_id") ? "node_id" : "0";
+    const auto check = [&](const SqliteRow& row) {
+      const std::int64_t size = row.integer(1);
+      const std::int64_t bytes = row.integer(2);
+      if (bytes <= 0) return;
+      ++result_.blobs;
+      result_.bytes += static_cast<std::uint64_t>(bytes);
+      if (size > 0 && (bytes == size || bytes == 4 * size)) return;
+      findings_.add(node_in(row, 0), part_of(table, "descriptor"),
+                    Error("another length than it says",
+                          {.value = std::to_string(bytes) + " bytes",
+                           .bound = std::to_string(size) + " or " + std::to_string(4 * size)}));
+    };
+    scan_.file().each_row("SELECT " + node + ", descriptor_size, length(descriptor) FROM " + table,
+                          {}, check);
+  }
+
+  void check_frames() {
+    const std::string table = scan_.columns().has_table("Data") ? "Data" : "Image";
+    if (!scan_.columns().has_table(table)) return;
+    std::vector<std::int64_t> ids;
+    findings_.attempt(0, table, [&] {
+      scan_.file().each_row("SELECT id FROM " + table + " ORDER BY id", {},
+                            [&](const SqliteRow& row) { ids.push_back(row.integer(0)); });
+    });
+    progress_.begin("verify", ids.size());
+    parallel_for(ids.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const int node = ids[i] > 0 && ids[i] <= 0x7fffffff ? static_cast<int>(ids[i]) : 0;
+        findings_.attempt(node, table, [&] {
+          if (table == "Data") check_data(node, ids[i]);
+          if (scan_.graph().find_node(node) != nullptr) check_frame(node);
+        });
+        progress_.advance(1);
+      }
+    });
+    progress_.end();
+    result_.nodes = ids.size();
+  }
+
+  // The blobs of Data that belong to no frame.
+  void check_data(int node, std::int64_t id) {
+    static constexpr std::array<const char*, 5> matrices{
+        "depth_confidence", "ground_cells", "obstacle_cells", "empty_cells", "user_data"};
+    const RtabmapColumns& columns = scan_.columns();
+    std::string list =
+        columns.or_null("Data", "scan") + ", " + columns.or_null("Data", "scan_info");
+    for (const char* column : matrices) list += ", " + columns.or_null("Data", column);
+    std::vector<std::string> blobs;
+    scan_.file().each_row("SELECT " + list + " FROM Data WHERE id = ?", {id},
+                          [&](const SqliteRow& row) {
+                            for (int i = 0; i < 7; ++i) blobs.push_back(row.bytes(i));
+                          });
+    if (blobs.size() < 7) return;
+    findings_.check(node, "Data.scan", blobs[0], [&](const std::string& scan) {
+      decode_laser_scan(scan, blobs[1].size() <= absent_bytes ? std::string() : blobs[1]);
+    });
+    for (std::size_t i = 0; i < matrices.size(); ++i)
+      findings_.check(node, part_of("Data", matrices[i]), blobs[2 + i], check_matrix);
+  }
+
+  void check_frame(int node) {
+    const FrameBlobs blobs = scan_.read_blobs(node);
+    for (const std::string* blob : {&blobs.image, &blobs.depth, &blobs.calibration})
+      if (!blob->empty()) findings_.count(*blob);
+    try {
+      camera_views(decode_frame(blobs));
+    } catch (const Error& error) {
+      list_faults(node, blobs, error);
+    }
+  }
+
+  // Each part by itself, so that one that is broken does not hide another.
+  void list_faults(int node, const FrameBlobs& blobs, const Error& first) {
+    bool is_listed = false;
+    const auto check = [&](const char* part, const std::string& blob, auto use) {
+      if (!blob.empty()) is_listed |= !findings_.attempt(node, part, [&] { use(blob); });
+    };
+    check("Data.image", blobs.image, check_image);
+    check("Data.depth", blobs.depth, check_depth);
+    check("Data.calibration", blobs.calibration, decode_calibration);
+    if (!is_listed) findings_.add(node, "Data", first);
+  }
+
+  const RtabmapDatabase& scan_;
+  ScanVerificationResult& result_;
+  Findings findings_;
+  Progress& progress_;
+};
+
+void verify_frames(const ScanSource& scan, ScanVerificationResult& result, Progress& progress) {
+  Findings findings(result);
+  const std::vector<GraphNode>& nodes = scan.graph().nodes;
+  progress.begin("verify", nodes.size());
+  parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      findings.attempt(nodes[i].id, "frame", [&] { camera_views(scan.read_frame(nodes[i].id)); });
+      progress.advance(1);
+    }
+  });
+  progress.end();
+  result.nodes = nodes.size();
+}
+
+}  // namespace
+
+std::string to_text(const ScanFault& fault) {
+  const std::string place = fault.node > 0 ? "node " + std::to_string(fault.node) + ": " : "";
+  return place + fault.part + ": " + fault.reason;
+}
+
+ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress) {
+  ScanVerificationResult result;
+  if (const auto* database = dynamic_cast<const RtabmapDatabase*>(&scan))
+    DatabaseVerification(*database, result, progress).run();
+  else
+    verify_frames(scan, result, progress);
+  std::sort(result.faults.begin(), result.faults.end(), [](const auto& a, const auto& b) {
+    return std::tie(a.node, a.part, a.reason) < std::tie(b.node, b.part, b.reason);
+  });
+  return result;
+}
+
+}  // namespace libmap

@@ -1,0 +1,34 @@
+// Everything that a scan stores, decoded to find what is broken.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "libmap/core/progress.h"
+#include "libmap/scan/scan_source.h"
+
+namespace libmap {
+
+struct ScanFault {
+  int node = 0;        // 0: of the whole file
+  std::string part{};  // table and column, e.g. "Data.depth"
+  std::string reason{};
+};
+// "node 17: Data.depth: REASON".
+std::string to_text(const ScanFault& fault);
+
+struct ScanVerificationResult {
+  std::size_t nodes = 0;            // whose frames were decoded
+  std::size_t blobs = 0;            // decoded, of a database; NULLs are not counted
+  std::uint64_t bytes = 0;          // in them
+  std::vector<ScanFault> faults{};  // by node, then by part
+};
+
+// In parallel, one node's images a thread in memory. Of a database every blob of every table, and
+// SQLite's own check of the file; of any other scan every frame. A fault is no Error; Error means
+// that the file cannot be read any further.
+ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress = no_progress());
+
+}  // namespace libmap

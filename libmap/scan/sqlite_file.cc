@@ -1,0 +1,191 @@
+#include "libmap/scan/sqlite_file.h"
+
+#include <SQLiteCpp/Backup.h>
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <sqlite3.h>
+
+#include <fstream>
+#include <limits>
+#include <mutex>
+#include <string_view>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int busy_timeout_ms = 10000;
+constexpr std::string_view signature("SQLite format 3\0", 16);
+// Offsets in the header (sqlite.org/fileformat2.html, 1.3).
+constexpr std::size_t read_version_at = 19;
+constexpr char wal_version = 2;
+
+SQLite::Column column_of(const void* statement, int column) {
+  return static_cast<const SQLite::Statement*>(statement)->getColumn(column);
+}
+
+std::string read_header(const fs::path& path) {
+  std::string header(100, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(header.data(), static_cast<std::streamsize>(header.size()));
+  header.resize(static_cast<std::size_t>(file.gcount()));
+  return header;
+}
+
+fs::path beside(const fs::path& path, const char* suffix) { return fs::path(path).concat(suffix); }
+
+// As a URI's path (RFC 3986), absolute: "//" at its beginning would name a host.
+std::string uri_of(const fs::path& path) {
+  static constexpr std::string_view hex = "0123456789ABCDEF";
+  std::string uri = "file:";
+  for (const char c : fs::absolute(path).string()) {
+    const bool is_plain = (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') ||
+                          (c >= '0' && c <= '9') ||
+                          std::string_view("/-_.~").find(c) != std::string_view::npos;
+    if (is_plain) {
+      uri += c;
+    } else {
+      const auto byte = static_cast<unsigned char>(c);
+      uri += {'%', hex[byte >> 4], hex[byte & 15]};
+    }
+  }
+  return uri;
+}
+
+struct OpenMode {
+  std::string uri;
+  const char* file_system = nullptr;  // SQLite's name of it; nullptr: the usual one
+  bool exclusive = false;
+};
+
+OpenMode open_mode(const fs::path& path, std::string_view header) {
+  const std::string uri = uri_of(path);
+  if (header[read_version_at] != wal_version) return {.uri = uri + "?mode=ro"};
+  const bool has_wal = fs::exists(beside(path, "-wal"));
+  const bool has_index = fs::exists(beside(path, "-shm"));
+  if (has_wal && has_index) return {.uri = uri + "?mode=ro"};
+  if (!has_wal) return {.uri = uri + "?immutable=1"};
+  // In exclusive mode SQLite keeps the index of the -wal in memory; the lock for it cannot be had
+  // on a file that is open for reading, and is not needed where no other program is.
+  return {.uri = uri + "?mode=ro", .file_system = "unix-none", .exclusive = true};
+}
+
+Error read_error(const fs::path& path, const SQLite::Exception& error) {
+  std::string reason = std::string("cannot be read as SQLite: ") + error.what();
+  if (error.getErrorCode() == SQLITE_BUSY)
+    reason = "another program has locked it; " + std::to_string(busy_timeout_ms / 1000) +
+             " s were waited";
+  const int code = error.getExtendedErrorCode();
+  if (code == SQLITE_READONLY_ROLLBACK || code == SQLITE_READONLY_RECOVERY)
+    reason =
+        "an interrupted write left its journal beside the file; roll it back by opening it once "
+        "with a program that may write, e.g. `sqlite3 FILE .tables`";
+  return Error(reason, {.file = path.string()});
+}
+
+}  // namespace
+
+struct SqliteFile::Connection {
+  explicit Connection(const OpenMode& mode)
+      : database(mode.uri, SQLite::OPEN_READONLY | SQLite::OPEN_URI, busy_timeout_ms,
+                 mode.file_system == nullptr ? "" : mode.file_system) {
+    // What a schema from elsewhere may do when it is queried.
+    database.exec(
+        "PRAGMA trusted_schema = OFF; PRAGMA query_only = ON; PRAGMA temp_store = MEMORY");
+    if (mode.exclusive) database.exec("PRAGMA locking_mode = EXCLUSIVE");
+  }
+
+  SQLite::Database database;
+  std::mutex mutex;
+};
+
+bool SqliteRow::is_null(int column) const { return column_of(statement_, column).isNull(); }
+
+std::int64_t SqliteRow::integer(int column) const {
+  return column_of(statement_, column).getInt64();
+}
+
+double SqliteRow::real(int column) const {
+  const SQLite::Column held = column_of(statement_, column);
+  return held.isNull() ? std::numeric_limits<double>::quiet_NaN() : held.getDouble();
+}
+
+std::string SqliteRow::bytes(int column) const {
+  const SQLite::Column held = column_of(statement_, column);
+  const void* data = held.getBlob();
+  return data == nullptr ? std::string()
+                         : std::string(static_cast<const char*>(data),
+                                       static_cast<std::size_t>(held.getBytes()));
+}
+
+bool SqliteRow::is_text(int column) const { return column_of(statement_, column).isText(); }
+
+SqliteFile::SqliteFile(const fs::path& path) : path_(path) {
+  require_readable_file(path);
+  const std::string header = read_header(path);
+  if (header.empty()) throw Error("is empty: 0 bytes", {.file = path.string()});
+  if (!header.starts_with(signature)) throw Error("is not an SQLite file", {.file = path.string()});
+  if (header.size() < 100)
+    throw Error("is an SQLite file that ends in its header", {.file = path.string()});
+  try {
+    connection_ = std::make_unique<Connection>(open_mode(path, header));
+    connection_->database.execAndGet("SELECT count(*) FROM sqlite_master");
+  } catch (const SQLite::Exception& error) {
+    throw read_error(path, error);
+  }
+}
+
+SqliteFile::~SqliteFile() = default;
+
+void SqliteFile::each_row(const std::string& query, const std::vector<std::int64_t>& arguments,
+                          const std::function<void(const SqliteRow&)>& use) const {
+  const std::lock_guard lock(connection_->mutex);
+  try {
+    SQLite::Statement statement(connection_->database, query);
+    for (std::size_t i = 0; i < arguments.size(); ++i)
+      statement.bind(static_cast<int>(i) + 1, static_cast<std::int64_t>(arguments[i]));
+    while (statement.executeStep()) use(SqliteRow(&statement));
+  } catch (const SQLite::Exception& error) {
+    throw read_error(path_, error);
+  }
+}
+
+void SqliteFile::copy_to(const fs::path& target) const {
+  const std::lock_guard lock(connection_->mutex);
+  write_text(target, {});
+  try {
+    SQLite::Database copy(target.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    if (SQLite::Backup(copy, connection_->database).executeStep() != SQLITE_DONE)
+      throw Error("another program keeps writing to it", {.file = path_.string()},
+                  ErrorKind::failed);
+    // The copy of a file in WAL mode would call for a -wal of its own.
+    copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = DELETE;");
+  } catch (const SQLite::Exception& error) {
+    throw Error("cannot be copied to " + target.string() + ": " + error.what(),
+                {.file = path_.string()}, ErrorKind::failed);
+  }
+}
+
+std::set<std::string> SqliteFile::tables() const {
+  std::set<std::string> names;
+  each_row("SELECT name FROM sqlite_master WHERE type = 'table' AND name NOT LIKE 'sqlite_%'", {},
+           [&](const SqliteRow& row) { names.insert(row.bytes(0)); });
+  return names;
+}
+
+std::set<std::string> SqliteFile::columns(const std::string& table) const {
+  std::set<std::string> names;
+  std::string quoted;
+  for (const char c : table) quoted += c == '"' ? "\"\"" : std::string(1, c);
+  each_row("PRAGMA table_info(\"" + quoted + "\")", {},
+           [&](const SqliteRow& row) { names.insert(row.bytes(1)); });
+  return names;
+}
+
+bool is_sqlite_file(const fs::path& path) { return read_header(path).starts_with(signature); }
+
+}  // namespace libmap

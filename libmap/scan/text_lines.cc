@@ -1,0 +1,82 @@
+#include "libmap/scan/text_lines.h"
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+namespace {
+
+std::vector<std::string_view> split_words(std::string_view text) {
+  constexpr std::string_view separators = " \t\r,;";
+  std::vector<std::string_view> words;
+  for (std::size_t begin = text.find_first_not_of(separators); begin != std::string_view::npos;) {
+    const std::size_t end = text.find_first_of(separators, begin);
+    words.push_back(text.substr(begin, end - begin));
+    begin = text.find_first_not_of(separators, end);
+  }
+  return words;
+}
+
+void require_word(const TextLine& line, std::size_t word, const std::string& file) {
+  if (word >= line.words.size())
+    throw Error("ends too early", {.file = file,
+                                   .field = name_of(line),
+                                   .value = std::to_string(line.words.size()) + " columns",
+                                   .bound = ">= " + std::to_string(word + 1)});
+}
+
+}  // namespace
+
+std::vector<TextLine> split_lines(std::string_view text) {
+  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
+  if (text.substr(0, byte_order_mark.size()) == byte_order_mark)
+    text.remove_prefix(byte_order_mark.size());
+  std::vector<TextLine> lines;
+  for (std::size_t number = 1; !text.empty(); ++number) {
+    const std::size_t end = text.find('\n');
+    TextLine line{.number = number, .text = text.substr(0, end)};
+    line.words = split_words(line.text);
+    if (!line.words.empty()) lines.push_back(std::move(line));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+  }
+  return lines;
+}
+
+std::string name_of(const TextLine& line) { return "line " + std::to_string(line.number); }
+
+std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::size_t count,
+                               const std::string& file) {
+  if (count == 0) return {};
+  require_word(line, first + count - 1, file);
+  std::vector<double> numbers;
+  for (std::size_t i = first; i < first + count; ++i) {
+    const std::optional<double> value = parse_double(line.words[i]);
+    if (!value || !std::isfinite(*value))
+      throw Error("not a number", {.file = file,
+                                   .field = name_of(line),
+                                   .value = std::string(line.words[i]),
+                                   .bound = "a finite number"});
+    numbers.push_back(*value);
+  }
+  return numbers;
+}
+
+int integer_of(const TextLine& line, std::size_t word, const std::string& file) {
+  require_word(line, word, file);
+  const std::optional<std::int64_t> value = parse_integer(line.words[word]);
+  if (!value || *value < std::numeric_limits<int>::min() ||
+      *value > std::numeric_limits<int>::max())
+    throw Error("not a whole number", {.file = file,
+                                       .field = name_of(line),
+                                       .value = std::string(line.words[word]),
+                                       .bound = "of 32 bits"});
+  return static_cast<int>(*value);
+}
+
+}  // namespace libmap

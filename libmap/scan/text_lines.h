@@ -1,0 +1,30 @@
+// Text formats of one record a line.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace libmap {
+
+struct TextLine {
+  std::size_t number = 0;  // from 1
+  std::string_view text{};
+  std::vector<std::string_view> words{};  // between spaces, tabs and commas
+};
+
+// The lines that hold a word, those that begin with '#' too; without a byte order mark.
+std::vector<TextLine> split_lines(std::string_view text);
+
+inline bool is_comment(const TextLine& line) { return line.words.front().front() == '#'; }
+
+// "line 12".
+std::string name_of(const TextLine& line);
+
+// Words `first` to `first + count - 1` as finite numbers. Throws Error naming file and line.
+std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::size_t count,
+                               const std::string& file);
+int integer_of(const TextLine& line, std::size_t word, const std::string& file);
+
+}  // namespace libmap

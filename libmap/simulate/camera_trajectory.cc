@@ -1,0 +1,242 @@
+#include "libmap/simulate/camera_trajectory.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/simulate/random_stream.h"
+
+namespace libmap {
+
+namespace {
+
+using std::numbers::pi;
+
+constexpr double first_stamp_s = 1.7e9;
+constexpr double pace_step = 1e-3;  // of a loop, for its length
+
+// A smooth random function of time with mean 0 and standard deviation 1 over long times: waves of a
+// band of frequencies with random phases.
+class Wander {
+ public:
+  Wander(std::uint64_t seed, std::uint64_t key, double low_hz, double high_hz) {
+    RandomStream random(seed, key);
+    for (Wave& wave : waves_) {
+      wave.rate = 2 * pi * random.uniform(low_hz, high_hz);
+      wave.phase = random.uniform(0.0, 2 * pi);
+    }
+  }
+  double at(double time_s) const {
+    double sum = 0.0;
+    for (const Wave& wave : waves_) sum += std::sin(wave.rate * time_s + wave.phase);
+    return sum * std::sqrt(2.0 / static_cast<double>(waves_.size()));
+  }
+
+ private:
+  struct Wave {
+    double rate = 0.0;
+    double phase = 0.0;
+  };
+  std::array<Wave, 6> waves_;
+};
+
+using Wander3 = std::array<Wander, 3>;
+Wander3 wander3(std::uint64_t seed, std::uint64_t key, double low_hz, double high_hz) {
+  return {Wander(seed, key, low_hz, high_hz), Wander(seed, key + 1, low_hz, high_hz),
+          Wander(seed, key + 2, low_hz, high_hz)};
+}
+Eigen::Vector3d at(const Wander3& wander, double time_s) {
+  return {wander[0].at(time_s), wander[1].at(time_s), wander[2].at(time_s)};
+}
+
+// Where zeros of the options are replaced.
+struct Way {
+  Eigen::Vector3d centre;  // on the ground
+  Eigen::Vector3d target;
+  double radius = 0.0, last_radius = 0.0;
+  double height = 0.0, last_height = 0.0;
+  double start_deg = 0.0, sweep_deg = 0.0;
+};
+
+// The level direction in which a wall faces; nothing for ground and for closed surfaces.
+std::optional<Eigen::Vector2d> facing_of_wall(const TriangleMesh& mesh) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Triangle& triangle : mesh.triangles) sum += 0.5 * area_normal(mesh, triangle);
+  const bool closed = sum.norm() <= 0.3 * surface_area(mesh);
+  if (closed || std::abs(sum.z()) > 0.7 * sum.norm()) return std::nullopt;
+  return Eigen::Vector2d(sum.head<2>().normalized());
+}
+
+Way way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& options) {
+  const Bounds3d bounds = bounds_of(mesh.vertices);
+  const Eigen::Vector3d size = bounds.max - bounds.min;
+  const std::optional<Eigen::Vector2d> facing = facing_of_wall(mesh);
+  const auto or_fitted = [](double given, double fitted) { return given != 0 ? given : fitted; };
+  Way way;
+  way.centre = 0.5 * (bounds.min + bounds.max);
+  const double half_side =
+      0.5 * (facing ? std::max(size.x(), size.y()) : size.head<2>().minCoeff());
+  way.radius = or_fitted(options.radius_m, std::clamp(4.0 / 3.0 * half_side, 0.8, 2.0));
+  way.last_radius = or_fitted(options.last_radius_m, 0.7 * way.radius);
+  way.height = or_fitted(options.height_m, 0.6 * way.radius);
+  way.last_height = or_fitted(options.last_height_m, 0.8 * way.radius);
+  if (facing) {
+    way.target = options.target.value_or(way.centre);
+    way.centre.z() = bounds.min.z();
+    way.sweep_deg = or_fitted(options.sweep_deg, 120.0);
+    way.start_deg =
+        options.start_deg + std::atan2(facing->y(), facing->x()) * 180.0 / pi - 0.5 * way.sweep_deg;
+  } else {
+    way.centre.z() = surrounding_ground_height(mesh);
+    way.target = options.target.value_or(way.centre);
+    way.sweep_deg = or_fitted(options.sweep_deg, 360.0);
+    way.start_deg = options.start_deg;
+  }
+  return way;
+}
+
+// 0 on the first loop, 1 on the last; turns smoothly into the next within +-15 % of a loop.
+double loop_share(double loop, int loops) {
+  if (loops < 2) return 0.0;
+  const double nearest_end = std::clamp(std::round(loop), 1.0, loops - 1.0);
+  const double t = std::clamp((loop - nearest_end) / 0.3 + 0.5, 0.0, 1.0);
+  return (nearest_end - 1.0 + t * t * (3.0 - 2.0 * t)) / (loops - 1.0);
+}
+
+// The way without the hand's unrest; `loop` counts loops from the start.
+Eigen::Vector3d position_on(const Way& way, const CameraTrajectoryOptions& options, double loop) {
+  const double share = loop_share(loop, options.loops);
+  const double radius = way.radius + share * (way.last_radius - way.radius);
+  const double height = way.height + share * (way.last_height - way.height);
+  double turns = loop;
+  if (std::abs(way.sweep_deg) < 360.0) {
+    const double phase = std::fmod(loop, 2.0);
+    turns = phase <= 1.0 ? phase : 2.0 - phase;
+  }
+  const double angle = (way.start_deg + turns * way.sweep_deg) * pi / 180.0;
+  return way.centre + Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), height);
+}
+
+// Body axes with x toward the target and y level.
+Eigen::Matrix3d look_at(const Eigen::Vector3d& position, const Eigen::Vector3d& target) {
+  Eigen::Vector3d forward = target - position;
+  if (forward.norm() < 1e-9) forward = -Eigen::Vector3d::UnitZ();
+  forward.normalize();
+  Eigen::Vector3d left = Eigen::Vector3d::UnitZ().cross(forward);
+  if (left.norm() < 1e-9) left = Eigen::Vector3d::UnitY();
+  left.normalize();
+  Eigen::Matrix3d axes;
+  axes << forward, left, forward.cross(left);
+  return axes;
+}
+
+// Places of the frames on the way, the same length of way apart.
+std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& options) {
+  const auto steps = static_cast<std::size_t>(std::lround(options.loops / pace_step));
+  std::vector<double> lengths{0.0};
+  Eigen::Vector3d last = position_on(way, options, 0.0);
+  for (std::size_t i = 1; i <= steps; ++i) {
+    const Eigen::Vector3d here = position_on(way, options, pace_step * static_cast<double>(i));
+    lengths.push_back(lengths.back() + (here - last).norm());
+    last = here;
+  }
+  // The last frame stands one step before the end, where a closed loop begins again.
+  const double step_m = lengths.back() / options.frames;
+  std::vector<double> loops;
+  std::size_t i = 0;
+  for (int n = 0; n < options.frames; ++n) {
+    const double wanted = n * step_m;
+    while (i + 2 < lengths.size() && lengths[i + 1] < wanted) ++i;
+    const double span = lengths[i + 1] - lengths[i];
+    const double part = span > 0 ? std::clamp((wanted - lengths[i]) / span, 0.0, 1.0) : 0.0;
+    loops.push_back(pace_step * (static_cast<double>(i) + part));
+  }
+  return loops;
+}
+
+}  // namespace
+
+void CameraTrajectoryOptions::check() const {
+  const auto refuse = [](const char* field, double value, const char* bound) {
+    throw Error("no way to carry a camera",
+                {.file = {}, .field = field, .value = to_text(value), .bound = bound});
+  };
+  if (frames < 1 || frames > 1000000) refuse("frames", frames, ">= 1 and <= 1000000");
+  if (loops < 1 || loops > 1000) refuse("loops", loops, ">= 1 and <= 1000");
+  if (!(frame_interval_s > 0)) refuse("frame_interval_s", frame_interval_s, "> 0");
+  if (target && !target->allFinite()) refuse("target", target->sum(), "finite");
+}
+
+void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
+  table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
+  table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
+  table.add("radius_m", options.radius_m, not_negative,
+            "distance from the site's centre on the first loop, m; 0: fitted to the mesh");
+  table.add("last_radius_m", options.last_radius_m, not_negative,
+            "the same on the last loop, m; 0: 0.7 times the first");
+  table.add("height_m", options.height_m, not_negative,
+            "height above the ground on the first loop, m; 0: 0.6 times its radius");
+  table.add("last_height_m", options.last_height_m, not_negative,
+            "the same on the last loop, m; 0: 0.8 times the first radius");
+  table.add(
+      "start_deg", options.start_deg, any_number,
+      "where the first loop begins, counter-clockwise from x; of a wall: from where it begins by "
+      "itself");
+  table.add(
+      "sweep_deg", options.sweep_deg, {-360.0, 360.0},
+      "of each loop, degrees; less than a full circle: every other loop goes back; 0: 360 around "
+      "ground, 120 before a wall");
+  table.add("gaze_deg", options.gaze_deg, {0.0, 45.0},
+            "how far the look wanders from the target, degrees");
+  table.add("sway_m", options.sway_m, not_negative,
+            "standard deviation of the hand about its way in each axis, m");
+  table.add("tremor_deg", options.tremor_deg, not_negative,
+            "standard deviation of the hand's turns about each axis, degrees");
+  table.add("frame_interval_s", options.frame_interval_s, positive, "between two poses, s");
+}
+
+double surrounding_ground_height(const TriangleMesh& mesh) {
+  if (mesh.vertices.empty()) throw Error("the mesh has no vertices");
+  const Bounds3d bounds = bounds_of(mesh.vertices);
+  const Eigen::Vector3d inset = 0.1 * (bounds.max - bounds.min);
+  std::vector<double> heights;
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    if (vertex.x() <= bounds.min.x() + inset.x() || vertex.x() >= bounds.max.x() - inset.x() ||
+        vertex.y() <= bounds.min.y() + inset.y() || vertex.y() >= bounds.max.y() - inset.y())
+      heights.push_back(vertex.z());
+  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
+  std::nth_element(heights.begin(), middle, heights.end());
+  return *middle;
+}
+
+Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
+                        std::uint64_t seed) {
+  options.check();
+  const Way way = way_of(mesh, options);
+  const std::vector<double> loops = paced_loops(way, options);
+  // A hand sways with the steps of a walk; a look wanders in some ten seconds.
+  const Wander3 sway = wander3(seed, 0, 0.4, 2.0);
+  const Wander3 turn = wander3(seed, 3, 0.4, 2.0);
+  const Wander3 gaze = wander3(seed, 6, 0.04, 0.15);
+  const double gaze_m = way.radius * std::tan(options.gaze_deg * pi / 180.0);
+  Trajectory trajectory;
+  for (std::size_t n = 0; n < loops.size(); ++n) {
+    const double time_s = static_cast<double>(n) * options.frame_interval_s;
+    const Eigen::Vector3d position =
+        position_on(way, options, loops[n]) + options.sway_m * at(sway, time_s);
+    // The look wanders over the ground more than up and down.
+    const Eigen::Vector3d target =
+        way.target + gaze_m * Eigen::Vector3d(1.0, 1.0, 0.3).cwiseProduct(at(gaze, time_s));
+    Pose pose = make_pose_from_rpy(position, Eigen::Vector3d::Zero());
+    pose.linear() = look_at(position, target) *
+                    make_pose_from_rpy({0, 0, 0}, options.tremor_deg * at(turn, time_s)).linear();
+    trajectory.push_back({static_cast<int>(n) + 1, first_stamp_s + time_s, pose});
+  }
+  return trajectory;
+}
+
+}  // namespace libmap

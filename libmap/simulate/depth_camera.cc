@@ -1,0 +1,387 @@
+#include "libmap/simulate/depth_camera.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <limits>
+#include <numbers>
+#include <span>
+#include <string>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/mesh/ray_caster.h"
+#include "libmap/simulate/random_stream.h"
+#include "libmap/simulate/rock_texture.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t rows_a_task = 8;
+constexpr double radians = std::numbers::pi / 180.0;
+// The band before the largest angle in which ever more measurements are lost.
+constexpr double grazing_band_deg = 10.0;
+
+// Most of the light comes from all over the sky, the rest from one side.
+constexpr float sky_light = 0.7F;
+constexpr float side_light = 0.4F;
+const Eigen::Vector3f& toward_light() {
+  static const Eigen::Vector3f direction = Eigen::Vector3f(0.4F, -0.5F, 0.75F).normalized();
+  return direction;
+}
+// What stands behind the mesh: a plain wall.
+const Eigen::Vector3f background(0.62F, 0.64F, 0.66F);
+
+std::vector<Eigen::Vector2d> lattice_rays(const Camera& camera, int width, int height,
+                                          double shift) {
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Eigen::Vector2d> rays;
+  rays.reserve(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      rays.push_back(pixel_to_ray(camera, Eigen::Vector2d(x + shift, y + shift))
+                         .value_or(Eigen::Vector2d(nan, nan)));
+  return rays;
+}
+
+}  // namespace
+
+PixelRays make_pixel_rays(const Camera& camera) {
+  camera.check();
+  return {camera.width, camera.height, ray_table(camera),
+          lattice_rays(camera, camera.width + 1, camera.height + 1, -0.5)};
+}
+
+struct VisibleSurface::Parts {
+  RayCaster caster;
+  TriangleMesh mesh;  // with vertex normals
+  std::uint64_t texture_seed = 1;
+
+  struct Seen {
+    float depth = 0.0F;
+    float incidence_cos = 0.0F;
+    Eigen::Vector3f color = background;
+  };
+  using Sink = std::function<void(std::size_t column, const Seen& seen)>;
+  void view_row(std::span<const Eigen::Vector2d> rays, const Pose& world_from_camera,
+                bool with_color, const Sink& sink) const;
+  Eigen::Vector3f albedo(const RayHit& hit, const Eigen::Vector3d& point) const;
+  Seen look(const RayHit& hit, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
+            bool with_color) const;
+};
+
+Eigen::Vector3f VisibleSurface::Parts::albedo(const RayHit& hit,
+                                              const Eigen::Vector3d& point) const {
+  const auto to_vector = [](const Color& color) -> Eigen::Vector3f {
+    return Eigen::Vector3f(color[0], color[1], color[2]) / 255.0F;
+  };
+  if (mesh.vertex_colors.empty()) return to_vector(rock_color(point, texture_seed));
+  const Triangle& t = mesh.triangles[hit.triangle];
+  return static_cast<float>(1.0 - hit.u - hit.v) * to_vector(mesh.vertex_colors[t[0]]) +
+         static_cast<float>(hit.u) * to_vector(mesh.vertex_colors[t[1]]) +
+         static_cast<float>(hit.v) * to_vector(mesh.vertex_colors[t[2]]);
+}
+
+VisibleSurface::Parts::Seen VisibleSurface::Parts::look(const RayHit& hit,
+                                                        const Eigen::Vector3d& origin,
+                                                        const Eigen::Vector3d& direction,
+                                                        bool with_color) const {
+  Seen seen;
+  seen.depth = static_cast<float>(hit.distance);
+  const Triangle& t = mesh.triangles[hit.triangle];
+  const Eigen::Vector3d flat = area_normal(mesh, t).normalized();
+  const double cosine = flat.dot(direction) / direction.norm();
+  seen.incidence_cos = static_cast<float>(std::min(1.0, std::abs(cosine)));
+  if (!with_color) return seen;
+  Eigen::Vector3f normal = (static_cast<float>(1.0 - hit.u - hit.v) * mesh.vertex_normals[t[0]] +
+                            static_cast<float>(hit.u) * mesh.vertex_normals[t[1]] +
+                            static_cast<float>(hit.v) * mesh.vertex_normals[t[2]])
+                               .normalized();
+  if (!normal.allFinite()) normal = flat.cast<float>();
+  // Meshes that are not closed are seen from behind as well.
+  if (cosine > 0) normal = -normal;
+  const float light = sky_light * (0.75F + 0.25F * normal.z()) +
+                      side_light * std::max(0.0F, normal.dot(toward_light()));
+  seen.color = (light * albedo(hit, origin + hit.distance * direction)).cwiseMin(1.0F);
+  return seen;
+}
+
+void VisibleSurface::Parts::view_row(std::span<const Eigen::Vector2d> rays,
+                                     const Pose& world_from_camera, bool with_color,
+                                     const Sink& sink) const {
+  std::vector<Eigen::Vector3d> directions;
+  directions.reserve(rays.size());
+  for (const Eigen::Vector2d& ray : rays)
+    directions.emplace_back(world_from_camera.linear() * Eigen::Vector3d(ray.x(), ray.y(), 1.0));
+  std::vector<RayHit> hits(rays.size());
+  const Eigen::Vector3d origin = world_from_camera.translation();
+  caster.cast_bundle(origin, directions, hits);
+  for (std::size_t i = 0; i < hits.size(); ++i)
+    sink(i, hits[i].triangle == RayHit::no_triangle
+                ? Seen{}
+                : look(hits[i], origin, directions[i], with_color));
+}
+
+const std::vector<std::pair<std::string, TextureSource>>& texture_source_names() {
+  static const std::vector<std::pair<std::string, TextureSource>> names = {
+      {"auto", TextureSource::automatic},
+      {"mesh", TextureSource::mesh},
+      {"rock", TextureSource::rock}};
+  return names;
+}
+
+VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
+                               std::uint64_t texture_seed)
+    : parts_(new Parts{RayCaster(mesh), mesh, texture_seed}) {
+  std::vector<Color>& colors = parts_->mesh.vertex_colors;
+  if (texture == TextureSource::mesh && colors.empty())
+    throw Error("the mesh has no colours of its own");
+  const bool plain = std::all_of(colors.begin(), colors.end(),
+                                 [&](const Color& color) { return color == colors.front(); });
+  if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))
+    colors.clear();
+  parts_->mesh.vertex_normals = estimate_vertex_normals(mesh);
+  parts_->mesh.vertex_fields.clear();
+  parts_->mesh.face_fields.clear();
+}
+VisibleSurface::~VisibleSurface() = default;
+VisibleSurface::VisibleSurface(VisibleSurface&&) noexcept = default;
+VisibleSurface& VisibleSurface::operator=(VisibleSurface&&) noexcept = default;
+
+SurfaceView VisibleSurface::view(const PixelRays& rays, const Pose& world_from_camera,
+                                 bool with_color) const {
+  const int w = rays.width;
+  const int h = rays.height;
+  SurfaceView view{DepthImage(w, h), DepthImage(w + 1, h + 1), Image<float>(w, h), {}};
+  Image<Eigen::Vector3f> corner_color;
+  if (with_color) {
+    view.color = Image<Eigen::Vector3f>(w, h, background);
+    corner_color = Image<Eigen::Vector3f>(w + 1, h + 1, background);
+  }
+  const auto row_of = [](const std::vector<Eigen::Vector2d>& all, std::size_t row, int width) {
+    const auto count = static_cast<std::size_t>(width);
+    return std::span<const Eigen::Vector2d>(all).subspan(row * count, count);
+  };
+  parallel_for(static_cast<std::size_t>(h) + 1, rows_a_task,
+               [&](std::size_t begin, std::size_t end) {
+                 for (std::size_t y = begin; y < end; ++y) {
+                   const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
+                   parts_->view_row(row_of(rays.corners, y, w + 1), world_from_camera, with_color,
+                                    [&](std::size_t x, const Parts::Seen& seen) {
+                                      view.corner_depth.pixels[corner_start + x] = seen.depth;
+                                      if (with_color)
+                                        corner_color.pixels[corner_start + x] = seen.color;
+                                    });
+                   if (y == static_cast<std::size_t>(h)) continue;
+                   const std::size_t start = y * static_cast<std::size_t>(w);
+                   parts_->view_row(row_of(rays.centres, y, w), world_from_camera, with_color,
+                                    [&](std::size_t x, const Parts::Seen& seen) {
+                                      view.depth.pixels[start + x] = seen.depth;
+                                      view.incidence_cos.pixels[start + x] = seen.incidence_cos;
+                                      if (with_color) view.color.pixels[start + x] = seen.color;
+                                    });
+                 }
+               });
+  for (int y = 0; with_color && y < h; ++y)
+    for (int x = 0; x < w; ++x)
+      view.color.at(x, y) = 0.5F * view.color.at(x, y) +
+                            0.125F * (corner_color.at(x, y) + corner_color.at(x + 1, y) +
+                                      corner_color.at(x, y + 1) + corner_color.at(x + 1, y + 1));
+  return view;
+}
+
+void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
+  table.add("noise_m", options.noise_m, not_negative,
+            "standard deviation of the depth noise along the ray at range 0, m");
+  table.add("noise_of_range", options.noise_of_range, not_negative,
+            "what that deviation grows by, m a m of range");
+  table.add("depth_offset_m", options.depth_offset_m, any_number, "added to every range, m");
+  table.add("max_incidence_deg", options.max_incidence_deg, {0.0, 90.0},
+            "surfaces seen flatter give nothing, degrees from the normal; 90: none is too flat");
+  table.add("edge_gap_m", options.edge_gap_m, positive,
+            "a larger jump of depth within one pixel is an edge, m");
+  table.add("flying_pixels", options.flying_pixels, zero_to_one,
+            "share of the edge pixels that lie between front and back");
+  table.add("edge_dropouts", options.edge_dropouts, zero_to_one,
+            "share of the edge pixels that give nothing");
+}
+
+void bind(ParameterTable& table, DepthSensorOptions& options) {
+  bind_noise(table, options);
+  table.add("depth_step_m", options.depth_step_m, not_negative,
+            "depths are multiples of it, m; 0: not rounded");
+  table.add("near_m", options.near_m, not_negative, "smallest depth that is measured, m");
+  table.add("far_m", options.far_m, positive, "largest depth that is measured, m");
+}
+
+void bind(ParameterTable& table, PhotoOptions& options) {
+  table.add("vignetting", options.vignetting, zero_to_one,
+            "how much darker the picture's corners are");
+  table.add("color_noise", options.color_noise, not_negative,
+            "standard deviation of the colours, of 255");
+}
+
+DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {
+  return {.noise_m = 0.0,
+          .noise_of_range = 0.0,
+          .depth_offset_m = 0.0,
+          .depth_step_m = 0.0,
+          .near_m = near_m,
+          .far_m = far_m,
+          .max_incidence_deg = 90.0,
+          .edge_gap_m = 0.05,
+          .flying_pixels = 0.0,
+          .edge_dropouts = 0.0};
+}
+
+void DepthSensorOptions::check() const {
+  if (!(far_m > near_m))
+    throw Error(
+        "nothing lies between near_m and far_m",
+        {.file = {}, .field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
+  if (!(flying_pixels + edge_dropouts <= 1.0))
+    throw Error("more edge pixels than there are", {.file = {},
+                                                    .field = "flying_pixels + edge_dropouts",
+                                                    .value = to_text(flying_pixels + edge_dropouts),
+                                                    .bound = "<= 1"});
+}
+
+namespace {
+
+struct PixelDepths {
+  double centre = 0.0;
+  std::array<double, 4> corners{};  // opposite ones follow each other
+};
+
+PixelDepths depths_of(const SurfaceView& view, int x, int y) {
+  const auto corner = [&](int i, int j) {
+    return static_cast<double>(view.corner_depth.at(x + i, y + j));
+  };
+  return {static_cast<double>(view.depth.at(x, y)),
+          {corner(0, 0), corner(1, 1), corner(1, 0), corner(0, 1)}};
+}
+
+// Whether depth jumps within the pixel. On a plane inverse depth is linear in the image: however
+// flat it is seen, the harmonic mean of opposite corners is the centre's depth. A jump by g leaves
+// the centre at least g / 2 from one of the two means.
+bool is_edge(const PixelDepths& depths, double gap) {
+  for (std::size_t k = 0; k < 4; k += 2) {
+    const double a = depths.corners[k];
+    const double b = depths.corners[k + 1];
+    if (a <= 0 || b <= 0) return true;
+    if (std::abs(depths.centre - 2 * a * b / (a + b)) > gap / 2) return true;
+  }
+  return false;
+}
+
+// The share of surfaces seen at this angle that gives nothing.
+double grazing_loss(double incidence_cos, double max_incidence_deg) {
+  if (max_incidence_deg >= 90.0) return 0.0;
+  const double angle = std::acos(std::clamp(incidence_cos, 0.0, 1.0)) / radians;
+  return std::clamp((angle - max_incidence_deg) / grazing_band_deg + 1.0, 0.0, 1.0);
+}
+
+enum class PixelKind { nothing, plain, edge, flying };
+
+// What the sensor says of one pixel, 0 if nothing.
+std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double incidence_cos,
+                                           double range_of_depth, const DepthSensorOptions& options,
+                                           RandomStream random) {
+  if (depths.centre <= 0 || !std::isfinite(range_of_depth)) return {0.0, PixelKind::nothing};
+  const double fate = random.uniform();
+  const double grazing_fate = random.uniform();
+  const double blend = random.uniform();
+  double depth = depths.centre;
+  PixelKind kind = PixelKind::plain;
+  if (is_edge(depths, options.edge_gap_m)) {
+    kind = PixelKind::edge;
+    if (fate < options.edge_dropouts) return {0.0, kind};
+    if (fate < options.edge_dropouts + options.flying_pixels) {
+      double front = depth;
+      double back = depth;
+      for (const double corner : depths.corners) {
+        if (corner <= 0) continue;
+        front = std::min(front, corner);
+        back = std::max(back, corner);
+      }
+      depth = front + blend * (back - front);
+      if (back > front) kind = PixelKind::flying;
+    }
+  }
+  if (grazing_fate < grazing_loss(incidence_cos, options.max_incidence_deg)) return {0.0, kind};
+  const double range = depth * range_of_depth;
+  const double deviation = options.noise_m + options.noise_of_range * range;
+  const double measured_range = range + options.depth_offset_m + deviation * random.normal();
+  double measured = measured_range / range_of_depth;
+  if (options.depth_step_m > 0)
+    measured = std::round(measured / options.depth_step_m) * options.depth_step_m;
+  if (!(measured > 0 && measured >= options.near_m && measured <= options.far_m))
+    return {0.0, kind};
+  return {measured, kind};
+}
+
+}  // namespace
+
+DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
+                               const DepthSensorOptions& options, std::uint64_t seed) {
+  options.check();
+  DepthMeasurement result{.depth = DepthImage(view.depth.width, view.depth.height)};
+  struct Counts {
+    std::size_t measured = 0, edges = 0, flying = 0;
+  };
+  const Counts counts = parallel_reduce(
+      static_cast<std::size_t>(view.depth.height), rows_a_task, Counts{},
+      [&](std::size_t begin, std::size_t end) {
+        Counts part;
+        for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
+          for (int x = 0; x < view.depth.width; ++x) {
+            const std::size_t index = view.depth.index(x, y);
+            const auto [depth, kind] = measure_pixel(
+                depths_of(view, x, y), static_cast<double>(view.incidence_cos.pixels[index]),
+                rays.centres[index].homogeneous().norm(), options, RandomStream(seed, index));
+            result.depth.pixels[index] = static_cast<float>(depth);
+            part.measured += depth > 0;
+            part.edges += kind == PixelKind::edge || kind == PixelKind::flying;
+            part.flying += kind == PixelKind::flying && depth > 0;
+          }
+        return part;
+      },
+      [](const Counts& a, const Counts& b) {
+        return Counts{a.measured + b.measured, a.edges + b.edges, a.flying + b.flying};
+      });
+  result.measured = counts.measured;
+  result.edges = counts.edges;
+  result.flying = counts.flying;
+  return result;
+}
+
+ColorImage take_photo(const SurfaceView& view, const PhotoOptions& options, std::uint64_t seed) {
+  const int w = view.color.width;
+  const int h = view.color.height;
+  ColorImage photo(w, h);
+  const Eigen::Vector2d middle(0.5 * (w - 1), 0.5 * (h - 1));
+  const double largest = std::max(middle.squaredNorm(), 1e-9);
+  parallel_for(static_cast<std::size_t>(h), rows_a_task, [&](std::size_t begin, std::size_t end) {
+    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
+      for (int x = 0; x < w; ++x) {
+        const std::size_t index = photo.index(x, y);
+        RandomStream random(seed, index);
+        const double radius2 = (Eigen::Vector2d(x, y) - middle).squaredNorm() / largest;
+        const double scale = 255.0 * (1.0 - options.vignetting * radius2);
+        for (std::size_t c = 0; c < 3; ++c) {
+          double value =
+              scale * static_cast<double>(view.color.pixels[index][static_cast<Eigen::Index>(c)]);
+          if (options.color_noise > 0) value += options.color_noise * random.normal();
+          photo.pixels[index][c] =
+              static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
+        }
+      }
+  });
+  return photo;
+}
+
+}  // namespace libmap

@@ -1,0 +1,107 @@
+// A time-of-flight depth camera with a registered colour camera, looking at a triangle mesh.
+//
+// First what an ideal camera sees, then what the sensor makes of it. Every pixel has random numbers
+// of its own: the same seed gives the same image at any thread count.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+#include "libmap/core/parameters.h"
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+// x/z, y/z of the rays through a camera's pixels and their corners; NaN where there is no ray.
+struct PixelRays {
+  int width = 0;
+  int height = 0;
+  std::vector<Eigen::Vector2d> centres;  // width * height
+  std::vector<Eigen::Vector2d> corners;  // (width + 1) * (height + 1); (0, 0) is at pixel -0.5 -0.5
+};
+PixelRays make_pixel_rays(const Camera& camera);
+
+// One view without noise. Depths are 0 where there is no surface.
+struct SurfaceView {
+  DepthImage depth;              // at the pixels' centres
+  DepthImage corner_depth;       // at their corners, as PixelRays::corners
+  Image<float> incidence_cos;    // of the angle between ray and normal at the centre
+  Image<Eigen::Vector3f> color;  // 0 to 1: half the centre's, an eighth of each corner's
+};
+
+// Where colours come from: the mesh's vertices, or rock_color(); automatic: the vertices, unless
+// they have no colours or all the same.
+enum class TextureSource { automatic, mesh, rock };
+const std::vector<std::pair<std::string, TextureSource>>& texture_source_names();
+
+// A mesh ready to be looked at. Light comes from the sky and a little more from one side.
+class VisibleSurface {
+ public:
+  // Throws Error as RayCaster does, and where the mesh's own colours are asked for and there are
+  // none. The mesh may go away afterwards.
+  explicit VisibleSurface(const TriangleMesh& mesh,
+                          TextureSource texture = TextureSource::automatic,
+                          std::uint64_t texture_seed = 1);
+  ~VisibleSurface();
+  VisibleSurface(VisibleSurface&&) noexcept;
+  VisibleSurface& operator=(VisibleSurface&&) noexcept;
+
+  // Rows in parallel. May be called from several threads at once. Without `with_color` the view's
+  // colour is empty.
+  SurfaceView view(const PixelRays& rays, const Pose& world_from_camera,
+                   bool with_color = true) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+// Defaults: the Kinect v2's limits (0.5 to 4.5 m, whole millimetres) and the noise of the scans
+// that this toolkit is tested on, 2 mm and 0.5 % of range.
+struct DepthSensorOptions {
+  double noise_m = 0.002;         // standard deviation along the ray at range 0 ...
+  double noise_of_range = 0.005;  // ... and what it grows by, m a m of range
+  double depth_offset_m = 0.0;    // added to every range
+  double depth_step_m = 0.001;    // depths are multiples of it; 0: not rounded
+  double near_m = 0.5;            // of the measured depth
+  double far_m = 4.5;
+  double max_incidence_deg = 80.0;  // surfaces seen flatter give nothing; 90: all give something
+  double edge_gap_m = 0.05;         // a larger jump of depth within one pixel is an edge
+  double flying_pixels = 0.35;      // share of the edge pixels that lie between front and back
+  double edge_dropouts = 0.35;      // share of the edge pixels that give nothing
+
+  void check() const;
+};
+void bind(ParameterTable& table, DepthSensorOptions& options);
+// All but step and limits.
+void bind_noise(ParameterTable& table, DepthSensorOptions& options);
+// No noise, no losses, no rounding.
+DepthSensorOptions ideal_depth_sensor(double near_m, double far_m);
+
+struct DepthMeasurement {
+  DepthImage depth;
+  std::size_t measured = 0;  // pixels with a depth
+  std::size_t edges = 0;     // pixels that see a jump of depth
+  std::size_t flying = 0;    // of these, measured between front and back
+};
+
+// Grazing measurements are lost more and more over the last 10 degrees before max_incidence_deg.
+DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
+                               const DepthSensorOptions& options, std::uint64_t seed);
+
+struct PhotoOptions {
+  double vignetting = 0.25;  // how much darker the image's corners are, 0 to 1
+  double color_noise = 2.0;  // standard deviation, of 255
+};
+void bind(ParameterTable& table, PhotoOptions& options);
+
+ColorImage take_photo(const SurfaceView& view, const PhotoOptions& options, std::uint64_t seed);
+
+}  // namespace libmap

@@ -1,0 +1,294 @@
+#include "libmap/simulate/field_points.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <optional>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr double hard_slope_deg = 60.0;
+// Shares of the normals' spread (eigenvalues of their mean outer product, which add up to 1).
+constexpr double arc_share = 0.05;  // an edge of 26 degrees
+constexpr double tip_share = 0.04;
+constexpr double hollow_share = 0.06;  // of the radius: mean depth below the neighbours' planes
+
+// The mesh with what the search asks of it.
+class Surface {
+ public:
+  explicit Surface(const TriangleMesh& mesh) : mesh_(mesh), first_(mesh.vertices.size() + 1, 0) {
+    for (const Triangle& triangle : mesh.triangles) {
+      normals_.push_back(0.5 * area_normal(mesh, triangle));
+      centres_.push_back(
+          (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
+          3.0);
+      for (const std::uint32_t vertex : triangle) ++first_[vertex + 1];
+    }
+    for (std::size_t n = 1; n < first_.size(); ++n) first_[n] += first_[n - 1];
+    around_.resize(3 * mesh.triangles.size());
+    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
+    for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n)
+      for (const std::uint32_t vertex : mesh.triangles[n]) around_[next[vertex]++] = n;
+  }
+
+  template <typename Visit>
+  void for_triangles_at(std::uint32_t vertex, const Visit& visit) const {
+    for (std::uint32_t n = first_[vertex]; n < first_[vertex + 1]; ++n) visit(around_[n]);
+  }
+
+  // Triangles that are reached over the surface without leaving a ball around the vertex.
+  std::vector<std::uint32_t> within(std::uint32_t vertex, double radius_m) const {
+    std::vector<std::uint32_t> found;
+    std::vector<std::uint32_t> open = {vertex};
+    std::vector<std::uint32_t> seen = {vertex};
+    while (!open.empty()) {
+      const std::uint32_t at = open.back();
+      open.pop_back();
+      for_triangles_at(at, [&](std::uint32_t triangle) {
+        found.push_back(triangle);
+        for (const std::uint32_t next : mesh_.triangles[triangle]) {
+          if ((mesh_.vertices[next] - mesh_.vertices[vertex]).norm() > radius_m) continue;
+          if (std::find(seen.begin(), seen.end(), next) != seen.end()) continue;
+          seen.push_back(next);
+          open.push_back(next);
+        }
+      });
+    }
+    std::sort(found.begin(), found.end());
+    found.erase(std::unique(found.begin(), found.end()), found.end());
+    return found;
+  }
+
+  const Eigen::Vector3d& area_vector(std::uint32_t triangle) const { return normals_[triangle]; }
+  const Eigen::Vector3d& centre(std::uint32_t triangle) const { return centres_[triangle]; }
+
+ private:
+  const TriangleMesh& mesh_;
+  std::vector<Eigen::Vector3d> normals_;  // their length is the area
+  std::vector<Eigen::Vector3d> centres_;
+  std::vector<std::uint32_t> first_;
+  std::vector<std::uint32_t> around_;
+};
+
+// Kind and mean normal of the surroundings.
+void look_around(const Surface& surface, const TriangleMesh& mesh, std::uint32_t vertex,
+                 double radius_m, FieldPoint& point) {
+  Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double area = 0.0;
+  double hollow = 0.0;
+  for (const std::uint32_t triangle : surface.within(vertex, radius_m)) {
+    const Eigen::Vector3d& vector = surface.area_vector(triangle);
+    const double own = vector.norm();
+    if (own <= 0.0) continue;
+    spread += vector * vector.transpose() / own;
+    sum += vector;
+    area += own;
+    hollow += std::max(0.0, (mesh.vertices[vertex] - surface.centre(triangle)).dot(vector)) -
+              0.5 * std::max(0.0, (surface.centre(triangle) - mesh.vertices[vertex]).dot(vector));
+  }
+  if (area <= 0.0) return;
+  point.normal = sum.normalized();
+  const Eigen::Vector3d shares =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread / area).eigenvalues();
+  if (hollow / area > hollow_share * radius_m)
+    point.kind = PlaceKind::irregular;
+  else if (shares[0] > tip_share)
+    point.kind = PlaceKind::corner;
+  else if (shares[1] > arc_share)
+    point.kind = PlaceKind::edge;
+  else
+    point.kind = PlaceKind::flat;
+}
+
+const ScalarField& rock_field(const TriangleMesh& mesh) {
+  for (const ScalarField& field : mesh.face_fields)
+    if (field.name == "rock") return field;
+  throw Error("the mesh does not say which triangles are which rock's", {.field = "rock"});
+}
+
+// The rock of each vertex whose triangles are all that rock's, else 0.
+std::vector<int> vertex_rocks(const TriangleMesh& mesh) {
+  const ScalarField& field = rock_field(mesh);
+  constexpr int unseen = -1;
+  std::vector<int> rocks(mesh.vertices.size(), unseen);
+  for (std::size_t n = 0; n < mesh.triangles.size(); ++n) {
+    const int rock = static_cast<int>(field.values[n]);
+    for (const std::uint32_t vertex : mesh.triangles[n])
+      rocks[vertex] = rocks[vertex] == unseen || rocks[vertex] == rock ? rock : 0;
+  }
+  return rocks;
+}
+
+struct Candidate {
+  std::uint32_t vertex = 0;
+  FieldPoint point;
+};
+
+// One vertex of the rocks in each cell of half the radius: the first.
+std::vector<Candidate> candidates_of(const RockSite& site, const TriangleMesh& mesh) {
+  const FieldPointOptions& options = site.field_points;
+  const GroundRelief relief(site);
+  const Pose ground_from_site = site.site_from_ground().inverse();
+  const std::vector<int> rocks = vertex_rocks(mesh);
+  std::map<std::array<std::int64_t, 3>, std::uint32_t> cells;
+  for (std::uint32_t vertex = 0; vertex < mesh.vertices.size(); ++vertex) {
+    if (rocks[vertex] <= 0) continue;
+    const Eigen::Vector3d cell = mesh.vertices[vertex] / (0.5 * options.radius_m);
+    cells.emplace(std::array<std::int64_t, 3>{static_cast<std::int64_t>(std::floor(cell.x())),
+                                              static_cast<std::int64_t>(std::floor(cell.y())),
+                                              static_cast<std::int64_t>(std::floor(cell.z()))},
+                  vertex);
+  }
+  std::vector<Candidate> candidates;
+  for (const auto& [cell, vertex] : cells) {
+    const Eigen::Vector3d local = ground_from_site * mesh.vertices[vertex];
+    Candidate candidate;
+    candidate.vertex = vertex;
+    candidate.point.position = mesh.vertices[vertex];
+    candidate.point.rock = rocks[vertex] - 1;
+    candidate.point.height_m = local.z() - relief.height(local.x(), local.y());
+    if (candidate.point.height_m >= options.min_height_m) candidates.push_back(candidate);
+  }
+  const Surface surface(mesh);
+  parallel_for(candidates.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      FieldPoint& point = candidates[n].point;
+      look_around(surface, mesh, candidates[n].vertex, options.radius_m, point);
+      const double up = (ground_from_site.linear() * point.normal).z();
+      point.slope_deg = std::acos(std::clamp(up, -1.0, 1.0)) * 180.0 / M_PI;
+      point.is_hard = point.slope_deg > hard_slope_deg;
+    }
+  });
+  return candidates;
+}
+
+class Chooser {
+ public:
+  Chooser(const RockSite& site, std::vector<Candidate> candidates)
+      : candidates_(std::move(candidates)),
+        distances_(candidates_.size(), std::numeric_limits<double>::infinity()),
+        by_rock_(site.rocks.size(), 0),
+        spacing_m_(site.field_points.radius_m) {}
+
+  // Nothing is left: false.
+  bool choose_next() {
+    const std::optional<int> rock = least_used_rock();
+    if (!rock) return false;
+    const auto is_open = [&](std::size_t n) {
+      return candidates_[n].point.rock == *rock && distances_[n] >= spacing_m_;
+    };
+    // The kind that is rarest so far on the rock, then on the site; then easy or hard.
+    std::optional<std::size_t> best;
+    for (std::size_t n = 0; n < candidates_.size(); ++n)
+      if (is_open(n) && (!best || is_better(n, *best))) best = n;
+    take(*best);
+    return true;
+  }
+
+  std::vector<FieldPoint> chosen() && { return std::move(chosen_); }
+
+ private:
+  std::optional<int> least_used_rock() const {
+    std::optional<int> rock;
+    for (std::size_t n = 0; n < candidates_.size(); ++n) {
+      if (distances_[n] < spacing_m_) continue;
+      const int own = candidates_[n].point.rock;
+      if (!rock || uses(own) < uses(*rock) || (uses(own) == uses(*rock) && own < *rock)) rock = own;
+    }
+    return rock;
+  }
+
+  int uses(int rock) const { return by_rock_[static_cast<std::size_t>(rock)]; }
+  int uses(const FieldPoint& point) const { return by_kind_[static_cast<std::size_t>(point.kind)]; }
+  int uses_on_rock(const FieldPoint& point) const {
+    return static_cast<int>(
+        std::count_if(chosen_.begin(), chosen_.end(), [&](const FieldPoint& other) {
+          return other.rock == point.rock && other.kind == point.kind;
+        }));
+  }
+
+  bool is_better(std::size_t a, std::size_t b) const {
+    const FieldPoint& first = candidates_[a].point;
+    const FieldPoint& second = candidates_[b].point;
+    const int on_rock = uses_on_rock(first) - uses_on_rock(second);
+    if (on_rock != 0) return on_rock < 0;
+    if (uses(first) != uses(second)) return uses(first) < uses(second);
+    if (first.kind != second.kind) return first.kind < second.kind;
+    const int first_difficulty = by_difficulty_[first.is_hard ? 1 : 0];
+    const int second_difficulty = by_difficulty_[second.is_hard ? 1 : 0];
+    if (first_difficulty != second_difficulty) return first_difficulty < second_difficulty;
+    if (distances_[a] != distances_[b]) return distances_[a] > distances_[b];
+    return first.height_m > second.height_m;
+  }
+
+  void take(std::size_t index) {
+    const FieldPoint& point = candidates_[index].point;
+    ++by_rock_[static_cast<std::size_t>(point.rock)];
+    ++by_kind_[static_cast<std::size_t>(point.kind)];
+    ++by_difficulty_[point.is_hard ? 1 : 0];
+    for (std::size_t n = 0; n < candidates_.size(); ++n)
+      distances_[n] =
+          std::min(distances_[n], (candidates_[n].point.position - point.position).norm());
+    chosen_.push_back(point);
+  }
+
+  std::vector<Candidate> candidates_;
+  std::vector<double> distances_;  // to the nearest chosen point
+  std::vector<int> by_rock_;
+  std::array<int, 4> by_kind_{};
+  std::array<int, 2> by_difficulty_{};
+  double spacing_m_;
+  std::vector<FieldPoint> chosen_;
+};
+
+}  // namespace
+
+const std::string& place_kind_name(PlaceKind kind) {
+  static const std::array<std::string, 4> names = {"flat", "edge", "corner", "irregular"};
+  return names[static_cast<std::size_t>(kind)];
+}
+
+std::vector<FieldPoint> choose_field_points(const RockSite& site, const TriangleMesh& mesh) {
+  Chooser chooser(site, candidates_of(site, mesh));
+  for (int n = 0; n < site.field_points.count; ++n) {
+    if (!chooser.choose_next())
+      throw Error("the rocks have too few places high enough",
+                  {.file = {},
+                   .field = "field_points.count",
+                   .value = std::to_string(site.field_points.count),
+                   .bound = "at most " + std::to_string(n) + " here"});
+  }
+  return std::move(chooser).chosen();
+}
+
+Table field_point_table(const RockSite& site, const std::vector<FieldPoint>& points) {
+  Table table;
+  table.columns = {"place", "x", "y", "z", "kind", "difficulty", "rock", "height_m", "slope_deg"};
+  const std::size_t digits = std::max<std::size_t>(2, std::to_string(points.size()).size());
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const FieldPoint& point = points[n];
+    std::string number = std::to_string(n + 1);
+    number.insert(0, digits - std::min(digits, number.size()), '0');
+    const SiteRock& rock = site.rocks[static_cast<std::size_t>(point.rock)];
+    table.rows.push_back({"P" + number, to_fixed_text(point.position.x(), 4),
+                          to_fixed_text(point.position.y(), 4),
+                          to_fixed_text(point.position.z(), 4), place_kind_name(point.kind),
+                          point.is_hard ? "hard" : "easy",
+                          rock.name.empty() ? std::to_string(point.rock + 1) : rock.name,
+                          to_fixed_text(point.height_m, 3), to_fixed_text(point.slope_deg, 0)});
+  }
+  return table;
+}
+
+}  // namespace libmap

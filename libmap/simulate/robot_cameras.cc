@@ -1,0 +1,73 @@
+#include "libmap/simulate/robot_cameras.h"
+
+#include <cmath>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/ray_caster.h"
+#include "libmap/simulate/random_stream.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::uint64_t stamp_key = 1;
+constexpr std::uint64_t camera_key = 1000;
+
+Image<std::uint16_t> to_units(const DepthImage& depth, double depth_scale_m) {
+  Image<std::uint16_t> units(depth.width, depth.height);
+  for (std::size_t i = 0; i < units.pixels.size(); ++i) {
+    const double value = std::round(static_cast<double>(depth.pixels[i]) / depth_scale_m);
+    // 65535 is what sensors write where they are saturated.
+    units.pixels[i] = value < 65535.0 ? static_cast<std::uint16_t>(value) : std::uint16_t{0};
+  }
+  return units;
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, RobotCamerasOptions& options) {
+  bind_noise(table, options.sensor);
+  table.add("stamp_s", options.stamp_s, not_negative, "time of the images, s");
+  table.add("stamp_spread_s", options.stamp_spread_s, not_negative,
+            "how far apart the cameras' stamps lie at most, s");
+  table.add("seed", options.seed, not_negative, "of noise and stamps");
+}
+
+std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
+                                                     const Pose& world_from_robot,
+                                                     const RobotCamerasOptions& options) {
+  rig.check();
+  const VisibleSurface surface(mesh);
+  RandomStream stamps(options.seed, stamp_key);
+  std::vector<RobotCameraImage> images;
+  for (std::size_t i = 0; i < rig.cameras.size(); ++i) {
+    const RigCamera& camera = rig.cameras[i];
+    DepthSensorOptions sensor = options.sensor;
+    sensor.depth_step_m = 0.0;
+    sensor.near_m = camera.near_m;
+    sensor.far_m = camera.far_m;
+    const PixelRays rays = make_pixel_rays(camera.camera);
+    const SurfaceView view =
+        surface.view(rays, world_from_robot * camera.camera.base_from_camera, false);
+    RobotCameraImage image;
+    image.measurement = measure_depth(view, rays, sensor, mix_bits(options.seed, camera_key + i));
+    image.depth = to_units(image.measurement.depth, camera.depth_scale_m);
+    image.stamp_s = options.stamp_s + options.stamp_spread_s * stamps.uniform();
+    images.push_back(std::move(image));
+  }
+  return images;
+}
+
+double ground_height(const TriangleMesh& mesh, double x_m, double y_m) {
+  const RayCaster caster(mesh);
+  const double above = bounds_of(mesh.vertices).max.z() + 1.0;
+  const auto hit = caster.cast({x_m, y_m, above}, {0.0, 0.0, -1.0});
+  if (!hit)
+    throw Error("the mesh has no ground beneath the robot",
+                {.file = {}, .field = "x, y", .value = to_text(x_m) + ", " + to_text(y_m)});
+  return above - hit->distance;
+}
+
+}  // namespace libmap

@@ -1,0 +1,269 @@
+#include "libmap/simulate/rock_site.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/simulate/random_stream.h"
+#include "libmap/simulate/scene_geometry.h"
+#include "libmap/simulate/solid_noise.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr Range rock_size_range{0.01, 10.0};
+constexpr Range ground_size_range{0.1, 100.0};
+
+// To a whole number of 1/steps.
+double rounded(double value, double steps) { return std::round(value * steps) / steps; }
+
+// A rectangle on the ground.
+struct Footprint {
+  Eigen::Vector2d centre;
+  Eigen::Vector2d axis_x;
+  Eigen::Vector2d axis_y;
+  Eigen::Vector2d half;
+
+  double reach(const Eigen::Vector2d& direction) const {
+    return std::abs(axis_x.dot(direction)) * half.x() + std::abs(axis_y.dot(direction)) * half.y();
+  }
+  // Separating axes: whether the two are at least `gap` apart along one of them.
+  bool is_apart(const Footprint& other, double gap) const {
+    const std::array<Eigen::Vector2d, 4> axes = {axis_x, axis_y, other.axis_x, other.axis_y};
+    return std::any_of(axes.begin(), axes.end(), [&](const Eigen::Vector2d& axis) {
+      return std::abs(axis.dot(other.centre - centre)) >= reach(axis) + other.reach(axis) + gap;
+    });
+  }
+};
+
+Footprint footprint_of(const SiteRock& rock) {
+  const double yaw = rock.yaw_deg * M_PI / 180.0;
+  return {{rock.x_m, rock.y_m},
+          {std::cos(yaw), std::sin(yaw)},
+          {-std::sin(yaw), std::cos(yaw)},
+          {0.5 * rock.width_m, 0.5 * rock.depth_m}};
+}
+
+Footprint square(double size) {
+  return {Eigen::Vector2d::Zero(), Eigen::Vector2d::UnitX(), Eigen::Vector2d::UnitY(),
+          Eigen::Vector2d::Constant(0.5 * size)};
+}
+
+bool is_within(const Footprint& footprint, double half_x, double half_y) {
+  return std::abs(footprint.centre.x()) + footprint.reach(Eigen::Vector2d::UnitX()) <= half_x &&
+         std::abs(footprint.centre.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
+}
+
+void check_table(const ParameterTable& table, const std::string& place) {
+  // A table's setters know the bounds: set each parameter of a copy to what it is.
+  try {
+    for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  } catch (const Error& error) {
+    ErrorContext context = error.context();
+    context.field = place + "." + context.field;
+    throw Error(error.reason(), context);
+  }
+}
+
+std::string rock_place(std::size_t n, const SiteRock& rock) {
+  return "rocks[" + std::to_string(n) + "]" + (rock.name.empty() ? "" : " (" + rock.name + ")");
+}
+
+}  // namespace
+
+const std::vector<std::pair<std::string, RockShape>>& rock_shape_names() {
+  static const std::vector<std::pair<std::string, RockShape>> names = {
+      {"block", RockShape::block}, {"dome", RockShape::dome},     {"cobble", RockShape::cobble},
+      {"jug", RockShape::jug},     {"sloper", RockShape::sloper}, {"crimp", RockShape::crimp},
+      {"pinch", RockShape::pinch}};
+  return names;
+}
+
+const std::vector<std::pair<std::string, GroundTexture>>& ground_texture_names() {
+  static const std::vector<std::pair<std::string, GroundTexture>> names = {
+      {"soil", GroundTexture::soil},
+      {"rock", GroundTexture::rock},
+      {"panel", GroundTexture::panel}};
+  return names;
+}
+
+bool is_hold(RockShape shape) {
+  return shape == RockShape::jug || shape == RockShape::sloper || shape == RockShape::crimp ||
+         shape == RockShape::pinch;
+}
+
+ParameterTable rock_parameters(SiteRock& rock) {
+  ParameterTable table;
+  table.add("name", rock.name, "free text");
+  table.add("shape", rock.shape, rock_shape_names(), "its kind");
+  table.add("x_m", rock.x_m, Range{-100.0, 100.0}, "place on the ground");
+  table.add("y_m", rock.y_m, Range{-100.0, 100.0}, "place on the ground");
+  table.add("height_m", rock.height_m, rock_size_range, "top over the ground");
+  table.add("width_m", rock.width_m, rock_size_range, "size along its own x");
+  table.add("depth_m", rock.depth_m, rock_size_range, "size along its own y");
+  table.add("yaw_deg", rock.yaw_deg, Range{-360.0, 360.0}, "turn about z");
+  table.add("sides", rock.sides, Range{4.0, 12.0}, "walls of a block");
+  table.add("ledges", rock.ledges, Range{0.0, 3.0}, "lower blocks grown together with it");
+  table.add("overhang_deg", rock.overhang_deg, Range{0.0, 35.0},
+            "how far a third of the walls lean outward");
+  table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0}, "depth of a wedge cut into the top");
+  table.add("roughness", rock.roughness, Range{0.0, 1.5}, "of the surface");
+  table.add("seed", rock.seed, not_negative, "of its form and colours");
+  return table;
+}
+
+ParameterTable ground_parameters(SiteGround& ground) {
+  ParameterTable table;
+  table.add("size_x_m", ground.size_x_m, ground_size_range, "length along x");
+  table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y");
+  table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0}, "height of the random relief");
+  table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0}, "0: level, 90: an upright wall");
+  table.add("texture", ground.texture, ground_texture_names(), "colours");
+  return table;
+}
+
+ParameterTable layout_parameters(SiteLayout& layout) {
+  ParameterTable table;
+  table.add("site_size_m", layout.site_size_m, ground_size_range, "square in which rocks stand");
+  table.add("free_square_m", layout.free_square_m, Range{0.0, 100.0}, "square without rocks");
+  table.add("gap_m", layout.gap_m, Range{0.0, 10.0}, "least distance of two rocks");
+  return table;
+}
+
+ParameterTable field_point_parameters(FieldPointOptions& options) {
+  ParameterTable table;
+  table.add("count", options.count, Range{1.0, 10'000.0}, "number of places");
+  table.add("min_height_m", options.min_height_m, not_negative, "least height above the ground");
+  table.add("radius_m", options.radius_m, Range{0.005, 1.0},
+            "of the surroundings that are looked at");
+  return table;
+}
+
+void RockSite::check() const {
+  RockSite copy = *this;
+  check_table(ground_parameters(copy.ground), "ground");
+  check_table(layout_parameters(copy.layout), "layout");
+  check_table(field_point_parameters(copy.field_points), "field_points");
+  for (std::size_t n = 0; n < rocks.size(); ++n) {
+    check_table(rock_parameters(copy.rocks[n]), rock_place(n, rocks[n]));
+    // The outline of the ground stays whole.
+    constexpr double margin_m = 0.05;
+    if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,
+                   0.5 * ground.size_y_m - margin_m))
+      throw Error("reaches over the edge of the ground",
+                  {.file = {},
+                   .field = rock_place(n, rocks[n]) + ".x_m, y_m",
+                   .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
+                   .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
+                            to_text(ground.size_y_m) + " m"});
+  }
+}
+
+Pose RockSite::site_from_ground() const {
+  const double tilt = ground.tilt_deg * M_PI / 180.0;
+  return make_pose_from_rpy({0.0, 0.0, 0.5 * ground.size_y_m * std::sin(tilt)},
+                            {ground.tilt_deg, 0.0, 0.0});
+}
+
+SiteRock draw_rock(RockShape shape, double height_m, std::uint64_t seed) {
+  RandomStream draw(seed, 1);
+  SiteRock rock;
+  rock.shape = shape;
+  rock.height_m = height_m;
+  rock.seed = seed;
+  // High rocks are slender, low ones flat.
+  double width = height_m * std::clamp(1.75 - 1.25 * height_m, 0.85, 1.5) * draw.uniform(0.9, 1.1);
+  double depth = width * draw.uniform(0.75, 1.0);
+  if (shape == RockShape::cobble) width = height_m * draw.uniform(1.35, 1.7);
+  if (shape == RockShape::cobble) depth = width * draw.uniform(0.7, 0.95);
+  if (shape == RockShape::dome) width = height_m * draw.uniform(1.8, 2.6);
+  if (shape == RockShape::dome) depth = width * draw.uniform(0.75, 1.0);
+  if (shape == RockShape::sloper) width = height_m * draw.uniform(2.2, 3.4);
+  if (shape == RockShape::sloper) depth = width * draw.uniform(0.65, 1.0);
+  if (shape == RockShape::jug) width = height_m * draw.uniform(1.8, 2.6);
+  if (shape == RockShape::jug) depth = height_m * draw.uniform(1.2, 1.6);
+  if (shape == RockShape::crimp) width = height_m * draw.uniform(2.5, 4.0);
+  if (shape == RockShape::crimp) depth = height_m * draw.uniform(1.0, 1.4);
+  if (shape == RockShape::pinch) width = height_m * draw.uniform(0.8, 1.1);
+  if (shape == RockShape::pinch) depth = height_m * draw.uniform(1.8, 2.6);
+  rock.width_m = std::max(0.02, rounded(width, 200.0));
+  rock.depth_m = std::max(0.02, rounded(depth, 200.0));
+  rock.yaw_deg = std::floor(draw.uniform(0.0, 360.0));
+  rock.sides = 5 + static_cast<int>(draw.uniform(0.0, 4.0));
+  rock.ledges = draw.uniform() < 0.4 ? 1 + static_cast<int>(draw.uniform(0.0, 2.0)) : 0;
+  rock.overhang_deg = draw.uniform() < 0.4 ? std::floor(draw.uniform(8.0, 20.0)) : 0.0;
+  rock.cleft_m = draw.uniform() < 0.3 ? rounded(draw.uniform(0.25, 0.5) * height_m, 100.0) : 0.0;
+  rock.roughness = 1.0;
+  return rock;
+}
+
+void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
+  std::vector<Footprint> taken;
+  if (site.layout.free_square_m > 0.0) taken.push_back(square(site.layout.free_square_m));
+  for (std::size_t n = 0; n < site.rocks.size(); ++n)
+    if (std::none_of(rocks.begin(), rocks.end(), [n](const auto& one) { return one.rock == n; }))
+      taken.push_back(footprint_of(site.rocks[n]));
+  const auto area = [&](const RockToPlace& one) {
+    return site.rocks[one.rock].width_m * site.rocks[one.rock].depth_m;
+  };
+  std::stable_sort(rocks.begin(), rocks.end(),
+                   [&](const auto& a, const auto& b) { return area(a) > area(b); });
+  RandomStream draw(site.seed, 2);
+  const double half = 0.5 * site.layout.site_size_m;
+  for (const RockToPlace& one : rocks) {
+    SiteRock& rock = site.rocks[one.rock];
+    const double turn = is_hold(rock.shape) ? 25.0 : 180.0;
+    bool is_placed = false;
+    for (int attempt = 0; attempt < 20'000 && !is_placed; ++attempt) {
+      rock.x_m = rounded(draw.uniform(-half, half), 100.0);
+      rock.y_m = rounded(draw.uniform(-half, half), 100.0);
+      const double yaw = std::round(draw.uniform(-turn, turn));
+      if (!one.keeps_yaw) rock.yaw_deg = yaw;
+      const Footprint footprint = footprint_of(rock);
+      is_placed = is_within(footprint, half, half) &&
+                  std::all_of(taken.begin(), taken.end(), [&](const Footprint& other) {
+                    return footprint.is_apart(other, site.layout.gap_m);
+                  });
+    }
+    if (!is_placed)
+      throw Error("no room is left for it between the free square and the site's edge",
+                  {.file = {},
+                   .field = rock_place(one.rock, rock),
+                   .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m",
+                   .bound = {}});
+    taken.push_back(footprint_of(rock));
+  }
+}
+
+struct GroundRelief::Parts {
+  std::optional<SceneGeometry> bumps;
+  double unevenness_m = 0.0;
+  std::uint64_t seed = 0;
+};
+
+GroundRelief::GroundRelief(const RockSite& site) : parts_(std::make_unique<Parts>()) {
+  parts_->unevenness_m = site.ground.unevenness_m;
+  parts_->seed = mix_bits(site.seed, 3);
+  if (site.bumps.empty()) return;
+  PrimitiveScene scene;
+  scene.shapes.push_back({Plane{site.ground.size_x_m, site.ground.size_y_m}, {}, "ground"});
+  scene.shapes.insert(scene.shapes.end(), site.bumps.begin(), site.bumps.end());
+  parts_->bumps.emplace(scene);
+}
+
+GroundRelief::~GroundRelief() = default;
+
+double GroundRelief::height(double x_m, double y_m) const {
+  const Eigen::Vector3d at(x_m, y_m, 0.37);
+  const double relief = 0.6 * gradient_noise(at / 0.8, parts_->seed) +
+                        0.25 * gradient_noise(at / 0.25, parts_->seed + 1) +
+                        0.15 * gradient_noise(at / 0.07, parts_->seed + 2);
+  const double bumps = parts_->bumps ? parts_->bumps->ground_height(x_m, y_m).value : 0.0;
+  return bumps + parts_->unevenness_m * relief;
+}
+
+}  // namespace libmap

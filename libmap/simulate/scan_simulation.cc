@@ -1,0 +1,177 @@
+#include "libmap/simulate/scan_simulation.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/simulate/random_stream.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr double degrees = 180.0 / std::numbers::pi;
+// Frames that are drawn at the same time.
+constexpr std::size_t batch = 8;
+
+// Keys of the random numbers; frames take those from `frame_key` on, four each.
+constexpr std::uint64_t trajectory_key = 1;
+constexpr std::uint64_t odometry_key = 2;
+constexpr std::uint64_t closure_key = 3;
+constexpr std::uint64_t frame_key = 1000;
+
+double turn_of(const Pose& motion) { return Eigen::AngleAxisd(motion.linear()).angle(); }
+
+// A link whose error is drawn from the covariance that it states.
+PoseLink noisy_link(int from, int to, LinkType type, const Pose& true_motion, double error_m,
+                    double error_deg, RandomStream random) {
+  PoseLink link{.from = from, .to = to, .type = type};
+  Eigen::Vector3d shift;
+  Eigen::Vector3d turn_deg;
+  for (Eigen::Index axis = 0; axis < 3; ++axis) shift[axis] = error_m * random.normal();
+  for (Eigen::Index axis = 0; axis < 3; ++axis) turn_deg[axis] = error_deg * random.normal();
+  link.from_from_to = true_motion * make_pose_from_rpy(shift, turn_deg);
+  const double error_rad = error_deg / degrees;
+  link.information.setZero();
+  link.information.diagonal().head<3>().setConstant(1.0 / (error_m * error_m));
+  link.information.diagonal().tail<3>().setConstant(1.0 / (error_rad * error_rad));
+  return link;
+}
+
+// The nodes before `last` that are near in place and view, nearest first.
+std::vector<std::size_t> closures_of(const Trajectory& truth, std::size_t last,
+                                     const LoopClosureOptions& options) {
+  const Pose& here = truth[last].world_from_base;
+  std::vector<std::pair<double, std::size_t>> found;
+  for (std::size_t i = 0; i + static_cast<std::size_t>(options.node_gap) <= last; ++i) {
+    const Pose motion = truth[i].world_from_base.inverse() * here;
+    const double distance = motion.translation().norm();
+    if (distance <= options.distance_m && turn_of(motion) * degrees <= options.angle_deg)
+      found.emplace_back(distance, i);
+  }
+  std::sort(found.begin(), found.end());
+  if (found.size() > static_cast<std::size_t>(options.closures_a_node))
+    found.resize(static_cast<std::size_t>(options.closures_a_node));
+  std::vector<std::size_t> nodes;
+  for (const auto& [distance, node] : found) nodes.push_back(node);
+  return nodes;
+}
+
+void add_closures(PoseGraph& graph, const Trajectory& truth, const LoopClosureOptions& options,
+                  std::uint64_t seed) {
+  for (std::size_t last = 0; last < truth.size(); ++last)
+    for (const std::size_t first : closures_of(truth, last, options))
+      graph.links.push_back(
+          noisy_link(truth[first].node, truth[last].node, LinkType::global_closure,
+                     truth[first].world_from_base.inverse() * truth[last].world_from_base,
+                     options.shift_error_m, options.turn_error_deg,
+                     RandomStream(mix_bits(seed, closure_key), first * truth.size() + last)));
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, OdometryOptions& options) {
+  table.add("odometry_error_of_distance", options.error_of_distance, not_negative,
+            "standard deviation of a motion in each axis, m a m of way");
+  table.add("odometry_error_of_turn", options.error_of_turn, not_negative,
+            "standard deviation of a motion about each axis, degrees a degree of turn");
+  table.add("odometry_turn_of_distance_deg", options.turn_of_distance_deg, not_negative,
+            "and degrees a m of way");
+}
+
+void bind(ParameterTable& table, LoopClosureOptions& options) {
+  table.add("closures", options.closures, "add loop closures between places that are near");
+  table.add("closure_distance_m", options.distance_m, not_negative,
+            "between the two places at most, m");
+  table.add("closure_angle_deg", options.angle_deg, {0.0, 180.0},
+            "between the two views at most, degrees");
+  table.add("closure_node_gap", options.node_gap, {2.0, 1e6}, "nodes between the two at least");
+  table.add("closures_a_node", options.closures_a_node, {1.0, 1e6},
+            "to earlier nodes at most, the nearest first");
+  table.add("closure_shift_error_m", options.shift_error_m, positive,
+            "standard deviation of a closure in each axis, m");
+  table.add("closure_turn_error_deg", options.turn_error_deg, positive,
+            "standard deviation of a closure about each axis, degrees");
+}
+
+PoseGraph simulate_odometry(const Trajectory& truth, const OdometryOptions& odometry,
+                            const LoopClosureOptions& closures, std::uint64_t seed) {
+  PoseGraph graph;
+  Pose odometry_from_base = Pose::Identity();
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    if (i > 0) {
+      const Pose motion = truth[i - 1].world_from_base.inverse() * truth[i].world_from_base;
+      const double way_m = motion.translation().norm();
+      const double error_m = std::max(least_odometry_error_m, odometry.error_of_distance * way_m);
+      const double error_deg =
+          std::max(least_odometry_error_deg, odometry.error_of_turn * turn_of(motion) * degrees +
+                                                 odometry.turn_of_distance_deg * way_m);
+      graph.links.push_back(noisy_link(truth[i - 1].node, truth[i].node, LinkType::neighbor, motion,
+                                       error_m, error_deg,
+                                       RandomStream(mix_bits(seed, odometry_key), i)));
+      odometry_from_base = odometry_from_base * graph.links.back().from_from_to;
+    }
+    GraphNode node{.id = truth[i].node, .stamp_s = truth[i].stamp_s};
+    node.odometry_from_base = odometry_from_base;
+    node.truth_from_base = truth[i].world_from_base;
+    graph.nodes.push_back(node);
+  }
+  if (closures.closures) add_closures(graph, truth, closures, seed);
+  return graph;
+}
+
+Camera kinect_v2_camera() {
+  return {.width = 512, .height = 424, .fx = 365.0, .fy = 365.0, .cx = 256.0, .cy = 212.0};
+}
+
+ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
+                                   const FrameSink& sink, Progress& progress) {
+  options.depth.check();
+  const PixelRays rays = make_pixel_rays(options.camera);
+  const VisibleSurface surface(mesh, options.texture, options.seed);
+  const Trajectory truth =
+      carry_camera(mesh, options.trajectory, mix_bits(options.seed, trajectory_key));
+  ScanSimulationResult result;
+  result.graph = simulate_odometry(truth, options.odometry, options.closures, options.seed);
+  result.path_length_m = path_length(truth);
+  progress.begin("frames", truth.size());
+  for (std::size_t first = 0; first < truth.size(); first += batch) {
+    const std::size_t count = std::min(batch, truth.size() - first);
+    std::array<RgbdFrame, batch> frames;
+    std::array<DepthMeasurement, batch> measured;
+    parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const TrajectoryPose& pose = truth[first + i];
+        const auto key = frame_key + 4 * static_cast<std::uint64_t>(first + i);
+        const SurfaceView view =
+            surface.view(rays, pose.world_from_base * options.camera.base_from_camera);
+        measured[i] = measure_depth(view, rays, options.depth, mix_bits(options.seed, key));
+        frames[i].node = pose.node;
+        frames[i].stamp_s = pose.stamp_s;
+        frames[i].cameras = {options.camera};
+        frames[i].color = take_photo(view, options.photo, mix_bits(options.seed, key + 1));
+        frames[i].depth = std::move(measured[i].depth);
+      }
+    });
+    for (std::size_t i = 0; i < count; ++i) {
+      result.pixels += frames[i].depth.pixels.size();
+      result.measured_pixels += measured[i].measured;
+      result.edge_pixels += measured[i].edges;
+      result.flying_pixels += measured[i].flying;
+      result.empty_frames += measured[i].measured == 0;
+      sink(result.graph.nodes[first + i], frames[i]);
+      progress.advance(1);
+    }
+  }
+  progress.end();
+  if (result.measured_pixels == 0)
+    throw Error("no frame sees any of the mesh within the depth camera's range");
+  return result;
+}
+
+}  // namespace libmap

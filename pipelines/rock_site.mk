@@ -1,0 +1,46 @@
+# The thesis's scenario 4 without leaving the desk: a simulated site of rocks, its scan by a Kinect
+# v2 carried round it by hand, the cloud of that scan and its distance to the true mesh, and the map.
+# Needs no data.
+#
+#   make -f pipelines/rock_site.mk OUT=folder [SEED=1] [FRAMES=60] [SITE=rocks] [EDGE=0.008] -j2
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+OUT ?= rock_site
+SEED ?= 1
+FRAMES ?= 60
+SITE ?= rocks
+EDGE ?= 0.008
+POSES ?= odometry
+SCENARIO ?= artificial_rocks_prescan
+METHOD ?= corrected
+SHARES ?= 4
+
+site_flags := --site $(SITE) --seed $(SEED) --edge-length $(EDGE)
+scan_flags := --seed $(SEED) --frames $(FRAMES)
+
+.DELETE_ON_ERROR:
+.PHONY: all map FORCE
+all: $(OUT)/site.png map
+
+$(OUT):
+	@mkdir -p $@
+
+# A stamp of the variables that site and scan depend on: written anew only if they change.
+export simulated_with := $(site_flags) $(scan_flags)
+$(OUT)/simulated_with: FORCE | $(OUT)
+	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
+
+$(OUT)/site/mesh.ply $(OUT)/site/field_points.csv &: $(OUT)/simulated_with
+	@$(GRASPMAP) simulate site $(site_flags) -o $(OUT)/site
+
+$(OUT)/site.png: $(OUT)/site/mesh.ply
+	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title 'simulated site' --quiet
+
+$(OUT)/scan.db: $(OUT)/site/mesh.ply
+	@$(GRASPMAP) simulate scan $< $(scan_flags) -o $@
+
+map: $(OUT)/scan.db $(OUT)/site/field_points.csv
+	@$(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$< OUT=$(OUT)/scan POSES=$(POSES) \
+	  TRUTH=$(OUT)/site/mesh.ply POINTS=$(OUT)/site/field_points.csv SCENARIO=$(SCENARIO) \
+	  METHOD=$(METHOD) SHARES=$(SHARES) GRASPMAP=$(GRASPMAP) TITLE='simulated scan'

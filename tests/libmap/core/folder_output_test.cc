@@ -1,0 +1,117 @@
+#include "libmap/core/folder_output.h"
+
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "tests/support/test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using libmap::OutputFolder;
+
+const std::vector<std::string> names = {"a.txt", "b"};
+
+std::vector<std::string> names_in(const fs::path& folder) {
+  std::vector<std::string> found;
+  for (const auto& entry : fs::directory_iterator(folder))
+    found.push_back(entry.path().filename().string());
+  std::sort(found.begin(), found.end());
+  return found;
+}
+
+void fill(const OutputFolder& output, const std::string& text) {
+  graspmap_test::write_text(output.temporary_path() / "a.txt", text);
+  fs::create_directory(output.temporary_path() / "b");
+  graspmap_test::write_text(output.temporary_path() / "b/c.txt", text);
+}
+
+class OutputFolderTest : public testing::Test {
+ protected:
+  fs::path scratch_ = graspmap_test::scratch_folder();
+  fs::path folder_ = scratch_ / "out";
+};
+
+TEST_F(OutputFolderTest, AppearsOnCommit) {
+  OutputFolder output(folder_, names);
+  fill(output, "one");
+  EXPECT_FALSE(fs::exists(folder_));
+  output.commit();
+  EXPECT_EQ(names_in(scratch_), std::vector<std::string>{"out"});
+  EXPECT_EQ(graspmap_test::read_text(folder_ / "b/c.txt"), "one");
+}
+
+TEST_F(OutputFolderTest, LeavesNothingWithoutCommit) {
+  {
+    const OutputFolder output(folder_, names);
+    fill(output, "one");
+  }
+  EXPECT_EQ(names_in(scratch_), std::vector<std::string>{});
+}
+
+TEST_F(OutputFolderTest, ReplacesTheEarlierOneAsAWhole) {
+  fs::create_directories(folder_ / "b");
+  graspmap_test::write_text(folder_ / "b/old.txt", "old");
+  {
+    const OutputFolder dropped(folder_, names);
+    fill(dropped, "one");
+  }
+  EXPECT_EQ(names_in(folder_ / "b"), std::vector<std::string>{"old.txt"});
+  OutputFolder output(folder_.string() + "/", names);
+  fill(output, "two");
+  EXPECT_EQ(names_in(folder_ / "b"), std::vector<std::string>{"old.txt"});
+  output.commit();
+  EXPECT_EQ(names_in(scratch_), std::vector<std::string>{"out"});
+  EXPECT_EQ(names_in(folder_ / "b"), std::vector<std::string>{"c.txt"});
+}
+
+TEST_F(OutputFolderTest, KeepsForeignContent) {
+  fs::create_directory(folder_);
+  graspmap_test::write_text(folder_ / "thesis.tex", "mine");
+  const libmap::Error error = graspmap_test::error_of([&] { OutputFolder(folder_, names); });
+  EXPECT_NE(std::string(error.what()).find("thesis.tex"), std::string::npos);
+  EXPECT_EQ(names_in(folder_), std::vector<std::string>{"thesis.tex"});
+  EXPECT_EQ(names_in(scratch_), std::vector<std::string>{"out"});
+}
+
+TEST_F(OutputFolderTest, RefusesPathsOfNoUse) {
+  graspmap_test::write_text(scratch_ / "file", "");
+  fs::create_directory_symlink(scratch_, scratch_ / "link");
+  for (const char* name : {"file", "link", "missing/out", ".", ".."}) {
+    SCOPED_TRACE(name);
+    EXPECT_THROW(OutputFolder(scratch_ / name, names), libmap::Error);
+  }
+}
+
+TEST_F(OutputFolderTest, TakesOverWhatAKilledRunLeft) {
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    const OutputFolder output(folder_, names);
+    fill(output, "killed");
+    _exit(0);
+  }
+  waitpid(child, nullptr, 0);
+  ASSERT_FALSE(fs::exists(folder_));
+  ASSERT_EQ(names_in(scratch_).size(), 1U);
+  OutputFolder output(folder_, names);
+  EXPECT_EQ(names_in(output.temporary_path()), std::vector<std::string>{});
+  output.commit();
+  EXPECT_EQ(names_in(scratch_), std::vector<std::string>{"out"});
+}
+
+TEST_F(OutputFolderTest, BelongsToOneAtATime) {
+  OutputFolder output(folder_, names);
+  const libmap::Error error = graspmap_test::error_of([&] { OutputFolder(folder_, names); });
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+  output.commit();
+  EXPECT_NO_THROW(OutputFolder(folder_, names));
+}
+
+}  // namespace

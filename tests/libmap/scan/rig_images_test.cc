@@ -1,0 +1,152 @@
+#include "libmap/scan/rig_images.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "libmap/scan/image_codec.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_test::error_of;
+using graspmap_test::scratch_folder;
+using graspmap_test::write_text;
+using libmap::fullest_rig_moment;
+using libmap::RigImage;
+using libmap::RigMoment;
+using State = libmap::RigMoment::Camera::State;
+using testing::HasSubstr;
+
+libmap::CameraRig rig_of(const std::vector<std::string>& names) {
+  libmap::CameraRig rig;
+  for (const std::string& name : names) {
+    libmap::RigCamera camera;
+    camera.name = name;
+    camera.camera.width = 4;
+    camera.camera.height = 3;
+    camera.camera.fx = camera.camera.fy = 4;
+    rig.cameras.push_back(camera);
+  }
+  return rig;
+}
+
+void touch(const fs::path& path) {
+  fs::create_directories(path.parent_path());
+  write_text(path, "");
+}
+
+TEST(RigImages, FoldersByCameraThenStamp) {
+  const fs::path folder = scratch_folder() / "run";
+  touch(folder / libmap::rig_image_name("right", 100.25));
+  touch(folder / "left" / "20.5.png");
+  touch(folder / "left" / "3.PNG");
+  touch(folder / "left" / "notes.txt");
+  touch(folder / "left" / ".hidden.png");
+  touch(folder / "stranger" / "1.png");
+  const auto images = list_rig_images(folder, rig_of({"right", "left", "absent"}));
+  ASSERT_EQ(images.size(), 3U);
+  EXPECT_EQ(images[0].camera, 0U);
+  EXPECT_EQ(images[0].stamp_s, 100.25);
+  EXPECT_EQ(images[0].file, folder / "right" / "100.250000.png");
+  EXPECT_EQ(images[1].stamp_s, 3.0);
+  EXPECT_EQ(images[2].stamp_s, 20.5);
+}
+
+TEST(RigImages, TableStandsAboveFolders) {
+  const fs::path folder = scratch_folder() / "run";
+  touch(folder / "left" / "1.png");
+  write_text(folder / "images.csv",
+             "file,camera,stamp_s\npictures/b.png,left,2.5\n/data/a.png,left,1e1\n");
+  const auto images = list_rig_images(folder, rig_of({"left"}));
+  ASSERT_EQ(images.size(), 2U);
+  EXPECT_EQ(images[0].file, folder / "pictures/b.png");
+  EXPECT_EQ(images[1].file, "/data/a.png");
+  EXPECT_EQ(images[1].stamp_s, 10.0);
+  write_text(folder / "images.csv", "file,camera,stamp_s\nb.png,lfet,2.5\n");
+  EXPECT_THAT(error_of([&] { list_rig_images(folder, rig_of({"left"})); }).what(),
+              HasSubstr("did you mean 'left'"));
+  write_text(folder / "images.csv", "file,camera,stamp_s\nb.png,left,nan\n");
+  EXPECT_THAT(error_of([&] { list_rig_images(folder, rig_of({"left"})); }).what(),
+              HasSubstr("stamp_s is nan"));
+}
+
+TEST(RigImages, BadFoldersAreNamed) {
+  const auto said = [](const fs::path& folder) {
+    return std::string(error_of([&] { list_rig_images(folder, rig_of({"left"})); }).what());
+  };
+  EXPECT_THAT(said(scratch_folder() / "none"), HasSubstr("no such folder"));
+  touch(scratch_folder() / "file");
+  EXPECT_THAT(said(scratch_folder() / "file"), HasSubstr("is no folder"));
+  fs::create_directories(scratch_folder() / "empty" / "left");
+  EXPECT_THAT(said(scratch_folder() / "empty"), HasSubstr("no image"));
+  touch(scratch_folder() / "odd" / "left" / "first.png");
+  EXPECT_THAT(said(scratch_folder() / "odd"), HasSubstr("name is first"));
+}
+
+std::vector<RigImage> images_at(const std::vector<std::vector<double>>& stamps) {
+  std::vector<RigImage> images;
+  for (std::size_t camera = 0; camera < stamps.size(); ++camera)
+    for (const double stamp : stamps[camera]) images.push_back({camera, stamp, {}});
+  return images;
+}
+
+TEST(RigMoments, SeenLateAndMissing) {
+  const auto images = images_at({{1.0, 2.0}, {1.95, 2.04}, {2.0201}, {}, {0.5}});
+  const RigMoment moment = rig_moment_at(images, 5, 2.0, 0.02);
+  ASSERT_EQ(moment.cameras.size(), 5U);
+  EXPECT_EQ(moment.seen(), 1U);
+  EXPECT_EQ(moment.cameras[0].state, State::seen);
+  EXPECT_EQ(moment.cameras[0].image, 1U);
+  EXPECT_EQ(moment.cameras[1].state, State::late);
+  EXPECT_NEAR(moment.cameras[1].offset_s, 0.04, 1e-12);
+  EXPECT_EQ(moment.cameras[2].state, State::late);
+  EXPECT_EQ(moment.cameras[3].state, State::missing);
+  EXPECT_NEAR(moment.cameras[4].offset_s, -1.5, 1e-12);
+  EXPECT_EQ(rig_moment_at(images, 5, 2.0, 0.05).seen(), 3U);
+}
+
+TEST(RigMoments, ToleranceHoldsItsBound) {
+  // 0.1 + 0.02 - 0.1 is a little more than 0.02 in binary.
+  EXPECT_EQ(rig_moment_at(images_at({{0.12}}), 1, 0.1, 0.02).seen(), 1U);
+  EXPECT_EQ(rig_moment_at(images_at({{0.12001}}), 1, 0.1, 0.02).seen(), 0U);
+}
+
+TEST(RigMoments, FullestThenTightestThenEarliest) {
+  // Three cameras at 2, three more closely at 3 and 4; two at 1.
+  const auto images =
+      images_at({{1.0, 2.00, 3.000, 4.000}, {1.0, 2.01, 3.001, 4.001}, {2.01, 3.001, 4.001}});
+  const RigMoment moment = fullest_rig_moment(images, 3, 0.02);
+  EXPECT_EQ(moment.seen(), 3U);
+  EXPECT_EQ(moment.stamp_s, 3.001);
+  // An oracle: no stamp of an image does better.
+  for (const RigImage& image : images)
+    EXPECT_LE(rig_moment_at(images, 3, image.stamp_s, 0.02).seen(), 3U);
+  EXPECT_THROW(fullest_rig_moment({}, 3, 0.02), libmap::Error);
+}
+
+TEST(RigDepth, UnitsBecomeMetres) {
+  libmap::Image<std::uint16_t> units(4, 3);
+  units.at(1, 2) = 4000;
+  units.at(2, 0) = 65535;
+  units.at(3, 0) = 65534;
+  const fs::path file = scratch_folder() / "1.png";
+  write_text(file, libmap::encode_png(units));
+  libmap::RigCamera camera = rig_of({"front"}).cameras[0];
+  camera.depth_scale_m = 0.00025;
+  const libmap::DepthImage depth = read_rig_depth({0, 1.0, file}, camera);
+  EXPECT_FLOAT_EQ(depth.at(1, 2), 1.0F);
+  EXPECT_EQ(depth.at(2, 0), 0.0F);
+  EXPECT_FLOAT_EQ(depth.at(3, 0), 16.3835F);
+  camera.camera.width = 5;
+  EXPECT_THAT(error_of([&] {
+                read_rig_depth({0, 1.0, file}, camera);
+              }).what(),
+              testing::AllOf(HasSubstr("1.png"), HasSubstr("4 x 3"), HasSubstr("front")));
+  write_text(file, libmap::encode_png(libmap::GrayImage(4, 3)));
+  EXPECT_THAT(error_of([&] { read_rig_depth({0, 1.0, file}, camera); }).what(), HasSubstr("1.png"));
+  write_text(file, "");
+  EXPECT_THAT(error_of([&] { read_rig_depth({0, 1.0, file}, camera); }).what(), HasSubstr("1.png"));
+}
+
+}  // namespace

@@ -1,0 +1,516 @@
+#include "libmap/scan/rtabmap_reader.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <cmath>
+
+#include "libmap/core/parallel.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/scan_verification.h"
+#include "tests/libmap/scan/sample_database.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using namespace graspmap_test;
+using libmap::LinkType;
+using libmap::PoseLink;
+using libmap::RgbdFrame;
+using libmap::RtabmapDatabase;
+namespace fs = std::filesystem;
+
+fs::path sample_file(SchemaVersion version = {}) {
+  const fs::path file = scratch_folder() / (version.text() + ".db");
+  write_sample(file, version);
+  return file;
+}
+
+const PoseLink* find_link(const libmap::PoseGraph& graph, int from, int to, LinkType type) {
+  for (const PoseLink& link : graph.links)
+    if (link.from == from && link.to == to && link.type == type) return &link;
+  return nullptr;
+}
+
+void expect_same_pose(const std::optional<libmap::Pose>& actual, const libmap::Pose& expected) {
+  ASSERT_TRUE(actual);
+  EXPECT_TRUE(actual->isApprox(expected, 1e-6)) << actual->matrix() << "\n" << expected.matrix();
+  EXPECT_LT((actual->linear().transpose() * actual->linear() - Eigen::Matrix3d::Identity()).norm(),
+            1e-14);
+}
+
+// ---------------------------------------------------------------------------------------- schemas
+
+class EverySchema : public testing::TestWithParam<SchemaVersion> {};
+
+TEST_P(EverySchema, NodesAndPoses) {
+  const SchemaVersion version = GetParam();
+  const RtabmapDatabase scan(sample_file(version));
+  EXPECT_EQ(scan.version(), version.text());
+  EXPECT_TRUE(scan.warnings().empty()) << scan.warnings().front();
+  const libmap::PoseGraph& graph = scan.graph();
+  ASSERT_EQ(graph.nodes.size(), 3U);
+  for (int id = 1; id <= 3; ++id) {
+    const libmap::GraphNode& node = graph.nodes.at(static_cast<std::size_t>(id - 1));
+    EXPECT_EQ(node.id, id);
+    EXPECT_EQ(node.weight, id - 1);
+    EXPECT_EQ(node.stamp_s, 100.25 + id);
+    EXPECT_EQ(node.label, id == 1 ? "start" : "");
+    expect_same_pose(node.odometry_from_base, sample_pose(id));
+    EXPECT_EQ(node.truth_from_base.has_value(), version >= (SchemaVersion{11, 1}));
+    if (node.truth_from_base) expect_same_pose(node.truth_from_base, sample_truth(id));
+    EXPECT_EQ(node.velocity.has_value(), version >= (SchemaVersion{13, 0}));
+    EXPECT_EQ(node.gps.has_value(), version >= (SchemaVersion{14, 0}));
+    if (node.velocity) {
+      EXPECT_EQ(node.velocity->at(5), 0.25);
+    }
+    if (node.gps) {
+      EXPECT_EQ(node.gps->latitude_deg, 48.25);
+    }
+  }
+  EXPECT_EQ(graph.optimized_map_from_base.size(), version >= (SchemaVersion{13, 0}) ? 3U : 0U);
+  for (const auto& [id, pose] : graph.optimized_map_from_base)
+    expect_same_pose(pose, sample_optimized(id));
+}
+
+TEST_P(EverySchema, LinksOnceEach) {
+  const SchemaVersion version = GetParam();
+  const RtabmapDatabase scan(sample_file(version));
+  const libmap::PoseGraph& graph = scan.graph();
+  EXPECT_EQ(graph.links.size(), version >= (SchemaVersion{18, 3}) ? 5U : 3U);
+  const PoseLink* neighbor = find_link(graph, 1, 2, LinkType::neighbor);
+  ASSERT_NE(neighbor, nullptr);
+  expect_same_pose(neighbor->from_from_to, sample_pose(1).inverse() * sample_pose(2));
+  EXPECT_NEAR(neighbor->information(0, 0), 100, 1e-9);
+  EXPECT_NEAR(neighbor->information(5, 5), version >= (SchemaVersion{13, 0}) ? 100 : 25, 1e-9);
+  EXPECT_EQ(neighbor->information(0, 5), 0);
+  ASSERT_NE(find_link(graph, 1, 3, LinkType::global_closure), nullptr);
+  if (version < SchemaVersion{18, 3}) return;
+  EXPECT_NE(find_link(graph, 1, 1, LinkType::gravity), nullptr);
+  EXPECT_NE(find_link(graph, 2, -1, LinkType::landmark), nullptr);
+}
+
+TEST_P(EverySchema, Frames) {
+  const RtabmapDatabase scan(sample_file(GetParam()));
+  for (int id = 1; id <= 3; ++id) {
+    const RgbdFrame frame = scan.read_frame(id);
+    EXPECT_EQ(frame.node, id);
+    EXPECT_EQ(frame.stamp_s, 100.25 + id);
+    EXPECT_EQ(frame.color, sample_color(id));
+    EXPECT_EQ(frame.depth, libmap::to_metres(sample_depth(id)));
+    ASSERT_EQ(frame.cameras.size(), 1U);
+    const libmap::Camera& camera = frame.cameras[0];
+    EXPECT_EQ(camera.width, 32);
+    EXPECT_EQ(camera.height, 24);
+    EXPECT_EQ(camera.fx, 30);
+    EXPECT_EQ(camera.fy, 31);
+    EXPECT_EQ(camera.cx, 15.5);
+    EXPECT_EQ(camera.cy, 11.5);
+    EXPECT_EQ(camera.base_from_camera.translation(), Eigen::Vector3d(0.5, 0.25, 0.125));
+  }
+}
+
+TEST_P(EverySchema, EverythingElse) {
+  const SchemaVersion version = GetParam();
+  const RtabmapDatabase scan(sample_file(version));
+  EXPECT_EQ(scan.word_count(), 2U);
+  EXPECT_EQ(scan.feature_count(), 2U);
+  const auto features = scan.features(1);
+  ASSERT_EQ(features.size(), 2U);
+  EXPECT_EQ(features[0].word, 1);
+  EXPECT_EQ(features[0].x, 3.5F);
+  EXPECT_EQ(features[0].octave, version >= (SchemaVersion{12, 0}) ? 2 : 0);
+  EXPECT_EQ(features[0].point_in_base, Eigen::Vector3f(1.5F, 2, 0.25F));
+  EXPECT_FALSE(features[1].point_in_base);
+  if (version >= SchemaVersion{11, 2}) {
+    EXPECT_EQ(features[0].binary_descriptor, std::vector<std::uint8_t>(32, 0x5a));
+    EXPECT_EQ(features[1].float_descriptor, (std::vector<float>{1, 2, 3}));
+  }
+  const auto laser = scan.laser_scan(2);
+  ASSERT_TRUE(laser);
+  EXPECT_EQ(laser->points.positions.at(1), Eigen::Vector3d(4, 5, 6));
+  EXPECT_FALSE(scan.laser_scan(1));
+  const auto parameters = scan.parameters();
+  if (version >= SchemaVersion{11, 8}) {
+    EXPECT_EQ(parameters.size(), 3U);
+    EXPECT_EQ(parameters.at("Kp/Max"), "500");
+    EXPECT_EQ(parameters.at("Path/Url"), "http://x");
+    EXPECT_EQ(parameters.at("Empty"), "");
+  }
+  EXPECT_TRUE(libmap::verify_scan(scan).faults.empty())
+      << to_text(libmap::verify_scan(scan).faults.front());
+}
+
+std::string name_of(const testing::TestParamInfo<SchemaVersion>& info) {
+  return "v0_" + std::to_string(info.param.minor) + "_" + std::to_string(info.param.patch);
+}
+INSTANTIATE_TEST_SUITE_P(RtabmapReader, EverySchema, testing::ValuesIn(schema_versions()), name_of);
+
+TEST(RtabmapReader, SchemasAreToldApartByTheirColumns) {
+  const auto recognised = [](SchemaVersion version) {
+    const fs::path file = sample_file(version);
+    execute(file, "UPDATE Admin SET version = '9.99.9'");
+    const RtabmapDatabase scan(file);
+    EXPECT_EQ(scan.version(), "9.99.9");
+    return scan.recognised_version();
+  };
+  for (const SchemaVersion version : {SchemaVersion{10, 0},
+                                      {10, 7},
+                                      {11, 1},
+                                      {11, 10},
+                                      {13, 0},
+                                      {14, 0},
+                                      {16, 0},
+                                      {17, 0},
+                                      {18, 0},
+                                      {20, 0},
+                                      {22, 0},
+                                      {23, 0}})
+    EXPECT_EQ(recognised(version), version.text());
+}
+
+TEST(RtabmapReader, WhatComesAfterTodayIsNamed) {
+  const fs::path file = sample_file();
+  execute(file, "ALTER TABLE Data ADD COLUMN hologram BLOB");
+  execute(file, "CREATE TABLE Smell (id INTEGER)");
+  execute(file, "CREATE TABLE \"odd \"\"name(\" (id INTEGER)");
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.warnings(),
+            (std::vector<std::string>{"Data.hologram is not known and is not read",
+                                      "Smell is not known and is not read",
+                                      "odd \"name( is not known and is not read"}));
+  EXPECT_EQ(scan.read_frame(1).color, sample_color(1));
+}
+
+TEST(RtabmapReader, ImagesInTablesOfTheirOwn) {
+  const fs::path file = scratch_folder() / "old.db";
+  execute(file,
+          "CREATE TABLE Node (id INTEGER PRIMARY KEY, map_id INTEGER, weight INTEGER, pose BLOB)");
+  execute(file, "CREATE TABLE Image (id INTEGER PRIMARY KEY, data BLOB)");
+  execute(file,
+          "CREATE TABLE Depth (id INTEGER PRIMARY KEY, data BLOB, fx FLOAT, fy FLOAT, cx FLOAT, cy "
+          "FLOAT, local_transform BLOB, data2d BLOB)");
+  execute(file,
+          "CREATE TABLE Link (from_id INTEGER, to_id INTEGER, type INTEGER, variance FLOAT, "
+          "transform BLOB)");
+  for (int id = 1; id <= 3; ++id) {
+    const std::string key = std::to_string(id);
+    execute(file, "INSERT INTO Node VALUES (" + key + ", 0, 0, ?)", {pose_bytes(sample_pose(id))});
+    execute(file, "INSERT INTO Image VALUES (" + key + ", ?)", {encode_png(sample_color(id))});
+  }
+  execute(file, "INSERT INTO Depth VALUES (1, ?, 30, 31, 15.5, 11.5, ?, NULL)",
+          {encode_png(sample_depth(1)), pose_bytes(libmap::optical_to_body_rotation())});
+  execute(
+      file, "INSERT INTO Depth VALUES (2, ?, 30, 0.125, 15.5, 11.5, ?, NULL)",
+      {encode_png(libmap::GrayImage(32, 24, 9)), pose_bytes(libmap::optical_to_body_rotation())});
+  execute(file, "INSERT INTO Link VALUES (1, 2, 0, 0.25, ?)", {pose_bytes(sample_pose(1))});
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.recognised_version(), "before 0.10.0");
+  EXPECT_EQ(scan.graph().links.at(0).information(3, 3), 4);
+  EXPECT_EQ(scan.read_frame(1).depth, libmap::to_metres(sample_depth(1)));
+  EXPECT_EQ(scan.read_frame(1).cameras.at(0).fy, 31);
+  EXPECT_EQ(scan.read_frame(1).cameras.at(0).width, 32);
+  // A second focal length below 1 is a baseline.
+  EXPECT_EQ(scan.read_frame(2).stereo.at(0).baseline_m, 0.125);
+  EXPECT_EQ(scan.read_frame(2).right.at(0, 0), 9);
+  EXPECT_TRUE(scan.read_frame(3).cameras.empty());
+  EXPECT_TRUE(libmap::verify_scan(scan).faults.empty());
+}
+
+// ------------------------------------------------------------------------------------------ graph
+
+TEST(RtabmapReader, ALinkOfWhichOneDirectionIsStoredKeepsIt) {
+  const fs::path file = sample_file();
+  execute(file, "DELETE FROM Link WHERE from_id = 1 AND to_id = 2");
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.graph().links.size(), 5U);
+  const PoseLink* link = find_link(scan.graph(), 2, 1, LinkType::neighbor);
+  ASSERT_NE(link, nullptr);
+  expect_same_pose(link->from_from_to, sample_pose(2).inverse() * sample_pose(1));
+}
+
+TEST(RtabmapReader, LinksOfOtherTypesBetweenTheSameNodesAreKept) {
+  const fs::path file = sample_file();
+  execute(file,
+          "INSERT INTO Link SELECT from_id, to_id, 4, information_matrix, transform, NULL "
+          "FROM Link WHERE type = 0");
+  EXPECT_EQ(RtabmapDatabase(file).graph().links.size(), 7U);
+}
+
+TEST(RtabmapReader, LinksThatCannotBeUsedAreNamed) {
+  const fs::path file = sample_file();
+  execute(file, "DELETE FROM Link");
+  const std::string identity = pose_bytes(libmap::Pose::Identity());
+  const std::string good = bytes_of(std::vector<double>(36, 1.0));
+  std::vector<float> nan_pose(12, NAN);
+  const auto insert = [&](const std::string& ends, const std::string& pose,
+                          const std::string& information) {
+    execute(file,
+            "INSERT INTO Link (from_id, to_id, type, transform, information_matrix) VALUES (" +
+                ends + ", ?, ?)",
+            {pose, information});
+  };
+  insert("1, 2, 0", identity, good);
+  insert("1, 77, 0", identity, good);
+  insert("88, 2, 0", identity, good);
+  insert("2, 2, 0", identity, good);
+  insert("2, 3, 1", bytes_of(nan_pose), good);
+  insert("2, 3, 2", identity.substr(1), good);
+  insert("2, 3, 3", identity, good.substr(8));
+  insert("2, 3, 4", identity, bytes_of(std::vector<double>(36, INFINITY)));
+  insert("2, 3, 5", std::string(48, '\0'), good);  // null: odometry was lost
+  insert("2, 3, 12", identity, good);              // a type to come
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.graph().links.size(), 2U);
+  ASSERT_EQ(scan.warnings().size(), 7U);
+  EXPECT_EQ(scan.warnings()[0], "link 1 -> 77: is left out: node 77 is not there");
+  EXPECT_NE(scan.warnings()[2].find("not finite"), std::string::npos);
+}
+
+TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
+  const fs::path file = sample_file();
+  execute(file, "INSERT INTO Node (id, map_id) VALUES (-4, 0)");
+  execute(file, "INSERT INTO Node (id, map_id) VALUES (99999999999, 0)");
+  execute(file, "UPDATE Node SET pose = ? WHERE id = 1", {bytes_of(std::vector<float>(12, NAN))});
+  execute(file, "UPDATE Node SET pose = ? WHERE id = 2", {std::string(48, '\0')});
+  execute(file, "UPDATE Node SET pose = ? WHERE id = 3", {bytes_of(std::vector<float>(12, 3.0F))});
+  execute(file, "UPDATE Node SET stamp = NULL, weight = NULL WHERE id = 3");
+  const RtabmapDatabase scan(file);
+  ASSERT_EQ(scan.graph().nodes.size(), 3U);
+  for (const libmap::GraphNode& node : scan.graph().nodes)
+    EXPECT_FALSE(node.odometry_from_base) << node.id;
+  EXPECT_EQ(scan.warnings().size(), 4U);  // a null pose is none
+}
+
+TEST(RtabmapReader, NodesThatAreThereTwice) {
+  const fs::path file = scratch_folder() / "a.db";
+  execute(file, "CREATE TABLE Node (id INTEGER, map_id INTEGER, weight INTEGER, stamp FLOAT)");
+  execute(file, "INSERT INTO Node VALUES (3, 0, 5, 1), (3, 0, 6, 2), (1, 0, 7, 3)");
+  const RtabmapDatabase scan(file);
+  ASSERT_EQ(scan.graph().nodes.size(), 2U);
+  EXPECT_EQ(scan.graph().nodes[0].id, 1);
+  EXPECT_EQ(scan.graph().nodes[1].weight, 5);
+  EXPECT_NE(scan.warnings()[0].find("more than once"), std::string::npos);
+}
+
+TEST(RtabmapReader, WarningsAreBounded) {
+  const fs::path file = sample_file();
+  execute(file,
+          "WITH RECURSIVE n(i) AS (SELECT 10 UNION ALL SELECT i + 1 FROM n WHERE i < 500) INSERT "
+          "INTO Link SELECT i, 1, 0, zeroblob(288), zeroblob(48), NULL FROM n");
+  const RtabmapDatabase scan(file);
+  ASSERT_EQ(scan.warnings().size(), 101U);
+  EXPECT_EQ(scan.warnings().back(), "... and 391 more");
+}
+
+TEST(RtabmapReader, RotationsAreMadeProper) {
+  const fs::path file = sample_file();
+  std::vector<float> numbers{1.001F, 0, 0, 5, 0, 0.999F, 0.001F, 6, 0, 0, 1, 7};
+  execute(file, "UPDATE Node SET pose = ? WHERE id = 1", {bytes_of(numbers)});
+  const RtabmapDatabase scan(file);
+  const libmap::Pose pose = *scan.graph().nodes[0].odometry_from_base;
+  EXPECT_LT((pose.linear() * pose.linear().transpose() - Eigen::Matrix3d::Identity()).norm(),
+            1e-14);
+  EXPECT_EQ(pose.translation(), Eigen::Vector3d(5, 6, 7));
+}
+
+TEST(RtabmapReader, BrokenOptimisedPosesAreLeftOut) {
+  const fs::path file = sample_file();
+  execute(file, "UPDATE Admin SET opt_poses = substr(opt_poses, 1, 20)");
+  const RtabmapDatabase scan(file);
+  EXPECT_TRUE(scan.graph().optimized_map_from_base.empty());
+  ASSERT_EQ(scan.warnings().size(), 1U);
+  EXPECT_TRUE(scan.warnings()[0].starts_with("Admin.opt_poses: "));
+  execute(file, "UPDATE Admin SET opt_poses = NULL");
+  EXPECT_TRUE(RtabmapDatabase(file).warnings().empty());
+}
+
+// ----------------------------------------------------------------------------------------- frames
+
+TEST(RtabmapReader, PartsThatAreNotAskedForAreLeftOut) {
+  const RtabmapDatabase scan(sample_file());
+  const RgbdFrame depth = scan.read_frame(1, {.color = false});
+  EXPECT_TRUE(depth.color.empty());
+  EXPECT_EQ(depth.depth, libmap::to_metres(sample_depth(1)));
+  const RgbdFrame none = scan.read_frame(1, {.color = false, .depth = false});
+  EXPECT_TRUE(none.depth.empty());
+  EXPECT_EQ(none.cameras.at(0).width, 32);
+}
+
+// The size of a camera that stores none stands in the image's header, however long that is.
+TEST(RtabmapReader, SizesFromAnImageWithALongHeader) {
+  const fs::path file = sample_file({10, 7});
+  std::string jpeg = libmap::encode_jpeg(sample_color(1));
+  std::string comment("\xff\xfe\x27\x12", 4);
+  comment += std::string(0x2712 - 2, 'x');
+  jpeg.insert(2, comment);
+  execute(file, "UPDATE Data SET image = ?, depth = NULL WHERE id = 1", {jpeg});
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.read_frame(1, {.color = false, .depth = false}).cameras.at(0).width, 32);
+}
+
+TEST(RtabmapReader, AbsentPartsAreNoError) {
+  const fs::path file = sample_file();
+  execute(file, "UPDATE Data SET image = NULL, depth = x'00000000' WHERE id = 1");
+  execute(file, "UPDATE Data SET calibration = NULL WHERE id = 2");
+  execute(file, "DELETE FROM Data WHERE id = 3");
+  const RtabmapDatabase scan(file);
+  EXPECT_TRUE(scan.read_frame(1).color.empty());
+  EXPECT_TRUE(scan.read_frame(1).depth.empty());
+  EXPECT_EQ(scan.read_frame(1).cameras.size(), 1U);
+  EXPECT_TRUE(scan.read_frame(2).cameras.empty());
+  EXPECT_TRUE(scan.read_frame(3).color.empty());
+  EXPECT_TRUE(scan.calibration(3).empty());
+  EXPECT_EQ(error_of([&] { scan.read_frame(4); }).context().value, "4");
+}
+
+TEST(RtabmapReader, DepthOfAnotherSizeThanColour) {
+  const fs::path file = sample_file();
+  libmap::MillimetreImage half(16, 12, 1500);
+  execute(file, "UPDATE Data SET depth = ? WHERE id = 1", {encode_rvl(half)});
+  const RtabmapDatabase scan(file);
+  const auto views = camera_views(scan.read_frame(1));
+  ASSERT_EQ(views.size(), 1U);
+  EXPECT_EQ(views[0].depth_camera.width, 16);
+  EXPECT_EQ(views[0].depth_camera.fx, 15);
+  EXPECT_EQ(views[0].depth_camera.cx, 7.5);  // of 32 columns with the centre at 15.5
+  EXPECT_EQ(views[0].color_camera.fx, 30);
+}
+
+TEST(RtabmapReader, StereoPairs) {
+  const fs::path file = sample_file({11, 2});
+  const std::string calibration =
+      bytes_of(std::vector<float>{30, 31, 15.5F, 11.5F, 0.25F, 32, 24}) +
+      pose_bytes(libmap::optical_to_body_rotation());
+  execute(file, "UPDATE Data SET calibration = ?, depth = ? WHERE id = 1",
+          {calibration, libmap::encode_jpeg(libmap::GrayImage(32, 24, 80))});
+  const RtabmapDatabase scan(file);
+  const RgbdFrame frame = scan.read_frame(1);
+  ASSERT_EQ(frame.stereo.size(), 1U);
+  EXPECT_EQ(frame.stereo[0].baseline_m, 0.25);
+  EXPECT_EQ(frame.cameras.size(), 1U);
+  EXPECT_TRUE(frame.depth.empty());
+  EXPECT_NEAR(frame.right.at(16, 12), 80, 1);
+}
+
+TEST(RtabmapReader, BrokenPartsNameTheirNode) {
+  const fs::path file = sample_file();
+  execute(file, "UPDATE Data SET image = substr(image, 1, 100) WHERE id = 1");
+  execute(file, "UPDATE Data SET depth = substr(depth, 1, 100) WHERE id = 2");
+  execute(file, "UPDATE Data SET calibration = substr(calibration, 1, 100) WHERE id = 3");
+  const RtabmapDatabase scan(file);
+  EXPECT_TRUE(std::string(error_of([&] { scan.read_frame(1); }).what())
+                  .starts_with(file.string() + ": node 1: image: "));
+  EXPECT_EQ(std::string(error_of([&] { scan.read_frame(2); }).what()),
+            file.string() + ": node 2: depth: RVL ends after 100 bytes, before its last pixel");
+  EXPECT_EQ(error_of([&] { scan.read_frame(3); }).context().field, "node 3: calibration");
+  EXPECT_EQ(error_of([&] { scan.calibration(3); }).context().field, "node 3: calibration");
+  EXPECT_NO_THROW(scan.read_frame(1, {.color = false}));
+}
+
+TEST(RtabmapReader, ContentIsReadFromHeaders) {
+  const fs::path file = sample_file();
+  execute(file, "UPDATE Data SET depth = ? WHERE id = 3",
+          {libmap::encode_png(libmap::GrayImage(20, 10))});
+  execute(file, "UPDATE Data SET image = x'0102030405060708' WHERE id = 2");
+  std::vector<libmap::NodeContent> list;
+  RtabmapDatabase(file).each_content(
+      [&](const libmap::NodeContent& content) { list.push_back(content); });
+  ASSERT_EQ(list.size(), 3U);
+  EXPECT_EQ(list[0].color->width, 32);
+  EXPECT_EQ(list[0].color_bytes, encode_png(sample_color(1)).size());
+  EXPECT_EQ(list[0].depth->format, libmap::DepthFormat::rvl);
+  EXPECT_EQ(list[0].calibration.cameras.size(), 1U);
+  EXPECT_EQ(list[1].faults.size(), 1U);
+  EXPECT_GT(list[1].user_data_bytes, 0U);
+  EXPECT_GT(list[1].laser_scan_bytes, 0U);
+  EXPECT_EQ(list[2].right->width, 20);
+}
+
+TEST(RtabmapReader, ManyThreadsReadTheSame) {
+  const RtabmapDatabase scan(sample_file());
+  std::atomic<int> wrong = 0;
+  libmap::parallel_for(200, 1, [&](std::size_t begin, std::size_t) {
+    const int node = static_cast<int>(begin % 3) + 1;
+    if (scan.read_frame(node).color != sample_color(node)) ++wrong;
+  });
+  EXPECT_EQ(wrong, 0);
+}
+
+TEST(RtabmapReader, StoredMap) {
+  const fs::path file = sample_file();
+  using libmap::MatrixElement;
+  const auto compressed = [](int rows, int columns, int channels, MatrixElement element,
+                             const std::string& bytes) {
+    return encode_matrix(libmap::StoredMatrix{rows, columns, channels, element, bytes});
+  };
+  execute(file,
+          "UPDATE Admin SET opt_map = ?, opt_cloud = ?, opt_polygons = ?, preview_image = ?, "
+          "opt_polygons_size = 3, opt_map_resolution = 0.05",
+          {compressed(4, 6, 1, MatrixElement::int8, std::string(24, '\1')),
+           compressed(1, 9, 4, MatrixElement::float32, std::string(144, '\0')),
+           compressed(1, 11, 1, MatrixElement::int32,
+                      bytes_of(std::vector<std::int32_t>{2, 0, 1, 2, 2, 3, 0, 1, 4, 5, 6})),
+           libmap::encode_jpeg(sample_color(1))});
+  const libmap::StoredMap map = RtabmapDatabase(file).stored_map();
+  EXPECT_EQ(map.grid_width, 6);
+  EXPECT_EQ(map.grid_height, 4);
+  EXPECT_EQ(map.grid_resolution_m, 0.05);
+  EXPECT_EQ(map.cloud_points, 9U);
+  EXPECT_EQ(map.polygons, 3U);
+  EXPECT_EQ(map.preview->width, 32);
+}
+
+// -------------------------------------------------------------------------------------- real files
+
+struct RealFile {
+  const char* name;
+  std::size_t nodes;
+  std::size_t links;
+  std::size_t optimized;
+  const char* schema;
+};
+
+TEST(RtabmapReader, RealDatabases) {
+  GRASPMAP_REQUIRE_DATA();
+  // Links: half of the rows, since both directions are stored; site_killed.db has one.
+  const std::vector<RealFile> files{
+      {"site_full.db", 40, 48, 40, "0.23.0"},    {"site_drift.db", 40, 43, 40, "0.23.0"},
+      {"site_killed.db", 29, 33, 0, "0.23.0"},   {"site_v0160.db", 40, 47, 0, "0.16.0"},
+      {"site_tiny_v0180.db", 6, 5, 6, "0.18.0"}, {"site_tiny_v0160.db", 6, 5, 0, "0.16.0"}};
+  for (const RealFile& file : files) {
+    SCOPED_TRACE(file.name);
+    const RtabmapDatabase scan(data_folder() / "scans" / file.name);
+    EXPECT_EQ(scan.graph().nodes.size(), file.nodes);
+    EXPECT_EQ(scan.graph().links.size(), file.links);
+    EXPECT_EQ(scan.graph().optimized_map_from_base.size(), file.optimized);
+    EXPECT_EQ(scan.recognised_version(), file.schema);
+    EXPECT_TRUE(scan.warnings().empty());
+    EXPECT_EQ(scan.parameters().size(), 612U);
+    const RgbdFrame frame = scan.read_frame(1);
+    EXPECT_FALSE(frame.color.empty());
+    EXPECT_EQ(frame.cameras.at(0).width, frame.color.width);
+    // The camera is 512 x 424, fx 365; images of half or quarter size were scaled.
+    EXPECT_NEAR(frame.cameras.at(0).fx, 365.0 * frame.color.width / 512, 1e-6);
+    const auto measured = std::count_if(frame.depth.pixels.begin(), frame.depth.pixels.end(),
+                                        [](float depth) { return depth > 0.3F && depth < 10; });
+    EXPECT_GT(measured, static_cast<std::ptrdiff_t>(frame.depth.pixels.size() / 2));
+  }
+}
+
+// RTAB-Map's own encoder and ours write the same bytes.
+TEST(RtabmapReader, RealRvlAndCalibrationsKeepTheirBytes) {
+  GRASPMAP_REQUIRE_DATA();
+  for (const char* name : {"site_tiny_q.db", "site_tiny_v0160.db", "site_killed.db"}) {
+    const RtabmapDatabase scan(data_folder() / "scans" / name);
+    for (const libmap::GraphNode& node : scan.graph().nodes) {
+      const libmap::FrameBlobs blobs = scan.read_blobs(node.id);
+      if (blobs.depth.empty() || blobs.calibration.empty()) continue;
+      EXPECT_EQ(encode_rvl(libmap::decode_rvl(blobs.depth)), blobs.depth) << name << node.id;
+      EXPECT_EQ(encode_calibration(libmap::decode_calibration(blobs.calibration)),
+                blobs.calibration);
+    }
+  }
+}
+
+}  // namespace

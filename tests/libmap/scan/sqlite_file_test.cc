@@ -1,0 +1,201 @@
+#include "libmap/scan/sqlite_file.h"
+
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gtest/gtest.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <map>
+#include <set>
+
+#include "libmap/scan/rtabmap_reader.h"
+#include "libmap/scan/scan_source.h"
+#include "tests/libmap/scan/sample_database.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using namespace graspmap_test;
+using libmap::RtabmapDatabase;
+namespace fs = std::filesystem;
+
+// Names and bytes of all files in the folder.
+std::map<std::string, std::string> files_in(const fs::path& folder) {
+  std::map<std::string, std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder))
+    files[entry.path().filename()] = entry.is_regular_file() ? read_text(entry.path()) : "";
+  return files;
+}
+
+std::set<std::string> names_in(const fs::path& folder) {
+  std::set<std::string> names;
+  for (const auto& [name, bytes] : files_in(folder)) names.insert(name);
+  return names;
+}
+
+void expect_sample(const RtabmapDatabase& scan, std::size_t nodes = 3) {
+  EXPECT_EQ(scan.graph().nodes.size(), nodes);
+  EXPECT_EQ(scan.read_frame(2).color, sample_color(2));
+}
+
+TEST(SqliteFile, LeavesNothingBeside) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  const auto before = files_in(folder);
+  {
+    const RtabmapDatabase scan(folder / "a.db");
+    expect_sample(scan);
+    EXPECT_EQ(files_in(folder), before);
+  }
+  EXPECT_EQ(files_in(folder), before);
+}
+
+TEST(SqliteFile, WalModeThatNobodyHasOpen) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  execute(folder / "a.db", "PRAGMA journal_mode = WAL");
+  const auto before = files_in(folder);
+  ASSERT_EQ(before.size(), 1U);
+  {
+    const RtabmapDatabase scan(folder / "a.db");
+    expect_sample(scan);
+    EXPECT_EQ(files_in(folder), before);
+  }
+  EXPECT_EQ(files_in(folder), before);
+}
+
+TEST(SqliteFile, WalModeThatAnotherProgramWritesTo) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  SQLite::Database writer((folder / "a.db").string(), SQLite::OPEN_READWRITE);
+  writer.exec("PRAGMA journal_mode = WAL");
+  writer.exec("INSERT INTO Node (id, map_id) VALUES (7, 0)");
+  writer.exec("BEGIN IMMEDIATE; INSERT INTO Node (id, map_id) VALUES (8, 0)");
+  const auto names = names_in(folder);
+  {
+    const RtabmapDatabase scan(folder / "a.db");
+    expect_sample(scan, 4);  // what is committed, and no more
+  }
+  EXPECT_EQ(names_in(folder), names);
+  writer.exec("COMMIT");
+  expect_sample(RtabmapDatabase(folder / "a.db"), 5);
+}
+
+// The program died: its -wal holds what the file does not.
+TEST(SqliteFile, WalThatWasLeftBehind) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  const fs::path left = folder / "left";
+  fs::create_directory(left);
+  {
+    SQLite::Database writer((folder / "a.db").string(), SQLite::OPEN_READWRITE);
+    writer.exec("PRAGMA journal_mode = WAL");
+    writer.exec("INSERT INTO Node (id, map_id) VALUES (7, 0)");
+    fs::copy(folder / "a.db", left / "a.db");
+    fs::copy(folder / "a.db-wal", left / "a.db-wal");
+  }
+  const auto before = files_in(left);
+  {
+    const RtabmapDatabase scan(left / "a.db");
+    expect_sample(scan, 4);
+    EXPECT_EQ(files_in(left), before);
+  }
+  EXPECT_EQ(files_in(left), before);
+}
+
+TEST(SqliteFile, RollbackModeWithAWriterInItsTransaction) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  SQLite::Database writer((folder / "a.db").string(), SQLite::OPEN_READWRITE);
+  writer.exec("BEGIN IMMEDIATE; INSERT INTO Node (id, map_id) VALUES (7, 0)");
+  const RtabmapDatabase scan(folder / "a.db");
+  expect_sample(scan);
+  // Reading does not keep the writer from its commit.
+  writer.exec("COMMIT");
+  expect_sample(RtabmapDatabase(folder / "a.db"), 4);
+}
+
+TEST(SqliteFile, JournalOfAnInterruptedWrite) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  // A process that dies in the middle of writing its pages.
+  const pid_t child = fork();
+  ASSERT_GE(child, 0);
+  if (child == 0) {
+    SQLite::Database writer((folder / "a.db").string(), SQLite::OPEN_READWRITE);
+    writer.exec("PRAGMA cache_size = 1; PRAGMA cache_spill = 1; BEGIN EXCLUSIVE");
+    writer.exec("UPDATE Data SET image = randomblob(200000)");
+    _exit(0);
+  }
+  int status = 0;
+  waitpid(child, &status, 0);
+  ASSERT_TRUE(fs::exists(folder / "a.db-journal"));
+  const auto before = files_in(folder);
+  const libmap::Error error = error_of([&] { RtabmapDatabase(folder / "a.db"); });
+  EXPECT_NE(error.reason().find("interrupted write"), std::string::npos) << error.what();
+  EXPECT_EQ(files_in(folder), before);
+}
+
+TEST(SqliteFile, FolderThatCannotBeWrittenTo) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  write_sample(folder / "wal.db");
+  execute(folder / "wal.db", "PRAGMA journal_mode = WAL");
+  fs::permissions(folder / "a.db", fs::perms::owner_read);
+  fs::permissions(folder / "wal.db", fs::perms::owner_read);
+  fs::permissions(folder, fs::perms::owner_read | fs::perms::owner_exec);
+  expect_sample(RtabmapDatabase(folder / "a.db"));
+  expect_sample(RtabmapDatabase(folder / "wal.db"));
+  fs::permissions(folder, fs::perms::owner_all);
+  EXPECT_EQ(files_in(folder).size(), 2U);
+}
+
+TEST(SqliteFile, NamesThatAUriWouldReadOtherwise) {
+  const fs::path file = scratch_folder() / "50% a?mode=rw#b &c ü.db";
+  write_sample(file);
+  expect_sample(RtabmapDatabase(file));
+}
+
+TEST(OpenScan, WhatIsNoScan) {
+  const fs::path folder = scratch_folder();
+  const auto reason = [&](const std::string& name) {
+    const libmap::Error error = error_of([&] { libmap::open_scan(folder / name); });
+    EXPECT_EQ(error.context().file, folder / name);
+    EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
+    return error.reason();
+  };
+  EXPECT_EQ(reason("none.db"), "no such file");
+  write_text(folder / "empty.db", "");
+  EXPECT_EQ(reason("empty.db"), "is empty: 0 bytes");
+  write_text(folder / "text.db", "this is no database");
+  EXPECT_NE(reason("text.db").find("is no scan"), std::string::npos);
+  write_text(folder / "zeros.db", std::string(8192, '\0'));
+  EXPECT_NE(reason("zeros.db").find("is no scan"), std::string::npos);
+  execute(folder / "other.db", "CREATE TABLE Customers (id INTEGER)");
+  EXPECT_EQ(reason("other.db"), "is an SQLite file but no scan of RTAB-Map: it has no table Node");
+  execute(folder / "nodes.db", "CREATE TABLE Node (name TEXT)");
+  EXPECT_NE(reason("nodes.db").find("no column id"), std::string::npos);
+  execute(folder / "links.db", "CREATE TABLE Node (id INTEGER)");
+  execute(folder / "links.db", "CREATE TABLE Link (a INTEGER)");
+  EXPECT_NE(reason("links.db").find("no column from_id"), std::string::npos);
+  write_sample(folder / "whole.db");
+  const std::string whole = read_text(folder / "whole.db");
+  write_text(folder / "header.db", whole.substr(0, 50));
+  EXPECT_NE(reason("header.db").find("ends in its header"), std::string::npos);
+  write_text(folder / "page.db", whole.substr(0, 4096));
+  reason("page.db");
+  fs::create_directory(folder / "folder");
+  error_of([&] { libmap::open_scan(folder / "folder"); });
+}
+
+TEST(OpenScan, ADatabaseWithoutNodesOrWithoutData) {
+  const fs::path file = scratch_folder() / "a.db";
+  execute(file, "CREATE TABLE Node (id INTEGER)");
+  const auto scan = libmap::open_scan(file);
+  EXPECT_TRUE(scan->graph().nodes.empty());
+  error_of([&] { scan->read_frame(1); });
+  execute(file, "INSERT INTO Node VALUES (1)");
+  EXPECT_TRUE(libmap::open_scan(file)->read_frame(1).color.empty());
+}
+
+}  // namespace

@@ -1,0 +1,263 @@
+#include "libmap/scan/trajectory_text.h"
+
+#include <gtest/gtest.h>
+
+#include <clocale>
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "libmap/core/text.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using libmap::LinkType;
+using libmap::Matrix6d;
+using libmap::Pose;
+using libmap::Trajectory;
+
+double draw() { return graspmap_test::uniform(-1.0, 1.0); }
+
+Pose random_pose() {
+  return libmap::make_pose(Eigen::Vector3d(draw(), draw(), draw()),
+                           Eigen::Quaterniond(draw(), draw(), draw(), draw()));
+}
+
+Matrix6d random_information() {
+  Matrix6d root;
+  for (int i = 0; i < 36; ++i) root(i / 6, i % 6) = draw();
+  return root.transpose() * root * 1e3;
+}
+
+Trajectory random_trajectory() {
+  Trajectory trajectory;
+  for (int i = 0; i < 20; ++i)
+    trajectory.push_back({i + 1, 1700000000.0 + 1.08 * i + 1e-6 * draw(), random_pose()});
+  return trajectory;
+}
+
+void expect_same(const Trajectory& read, const Trajectory& written) {
+  ASSERT_EQ(read.size(), written.size());
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].world_from_base.translation(), written[i].world_from_base.translation());
+    EXPECT_LT((read[i].world_from_base.linear() - written[i].world_from_base.linear()).norm(),
+              1e-14);
+  }
+}
+
+std::string with_line(int number, const std::string& line) {
+  return std::string(static_cast<std::size_t>(number - 1), '\n') + line + "\n";
+}
+
+TEST(TumText, KeepsEveryDigit) {
+  const Trajectory written = random_trajectory();
+  const Trajectory read = libmap::parse_tum(libmap::to_tum(written), "poses.tum");
+  expect_same(read, written);
+  for (std::size_t i = 0; i < read.size(); ++i) {
+    EXPECT_EQ(read[i].stamp_s, written[i].stamp_s);
+    EXPECT_EQ(read[i].node, 0);
+  }
+}
+
+TEST(TumText, HoldsNodesInANinthColumnIfAsked) {
+  const Trajectory written = random_trajectory();
+  const Trajectory read = libmap::parse_tum(libmap::to_tum(written, true), "poses.tum");
+  for (std::size_t i = 0; i < read.size(); ++i) EXPECT_EQ(read[i].node, written[i].node);
+}
+
+TEST(TumText, WritesStampsWithoutExponents) {
+  Trajectory written;
+  for (const double stamp : {0.0, 1e-7, 1700000000.0, 1e22, 0.25, -3.5})
+    written.push_back({0, stamp, Pose::Identity()});
+  const std::string text = libmap::to_tum(written);
+  EXPECT_EQ(text.find('e', text.find('\n')), std::string::npos);
+  const Trajectory read = libmap::parse_tum(text, "poses.tum");
+  for (std::size_t i = 0; i < read.size(); ++i)
+    EXPECT_NEAR(read[i].stamp_s, written[i].stamp_s, 5e-10);
+}
+
+TEST(TumText, ReadsWhatOthersWrite) {
+  // RTAB-Map's format 11, commas, tabs, comments, a byte order mark and lines that end in CRLF.
+  const Trajectory read = libmap::parse_tum(
+      "\xEF\xBB\xBF#timestamp x y z qx qy qz qw id\r\n"
+      "1305031102.175304 1.5 -2 0.25 0 0 0.7071 0.7071 17\r\n"
+      "\n"
+      "2,1,2,3,0,0,0,-1\n"
+      "  # a comment\n"
+      "3\t1e0\t2\t+3\t0\t0\t0\t1",
+      "poses.tum");
+  ASSERT_EQ(read.size(), 3U);
+  EXPECT_EQ(read[0].node, 17);
+  EXPECT_EQ(read[0].stamp_s, 1305031102.175304);
+  EXPECT_TRUE(read[0].world_from_base.isApprox(
+      libmap::make_pose_from_rpy({1.5, -2.0, 0.25}, {0.0, 0.0, 90.0}), 1e-12));
+  EXPECT_TRUE(read[1].world_from_base.linear().isIdentity(1e-14));
+  EXPECT_EQ(read[2].world_from_base.translation(), Eigen::Vector3d(1.0, 2.0, 3.0));
+}
+
+TEST(TumText, NamesTheLineThatIsNoPose) {
+  const std::vector<std::string> lines = {"1 2 3",
+                                          "1 0 0 0 0 0 0 1 5 6",
+                                          "1 0 0 x 0 0 0 1",
+                                          "1 0 0 nan 0 0 0 1",
+                                          "inf 0 0 0 0 0 0 1",
+                                          "1 0 0 0 0 0 0 0",
+                                          "1 0 0 0 0 0 0 2",
+                                          "1 0 0 0 0 0 0 1 1.5",
+                                          "1 0 0 0 0 0 0 1 99999999999"};
+  for (const std::string& line : lines) {
+    SCOPED_TRACE(line);
+    const libmap::Error error =
+        graspmap_test::error_of([&] { libmap::parse_tum(with_line(7, line), "poses.tum"); });
+    EXPECT_EQ(error.context().file, "poses.tum");
+    EXPECT_EQ(error.context().field, "line 7");
+  }
+}
+
+TEST(TumText, DoesNotFollowTheLocale) {
+  const Trajectory written = random_trajectory();
+  const std::string text = libmap::to_tum(written);
+  const char* set = std::setlocale(LC_ALL, "de_DE.UTF-8");
+  if (set == nullptr) GTEST_SKIP() << "no locale with a decimal comma";
+  EXPECT_EQ(libmap::to_tum(written), text);
+  expect_same(libmap::parse_tum(text, "poses.tum"), written);
+  std::setlocale(LC_ALL, "C");
+}
+
+TEST(KittiText, KeepsEveryDigit) {
+  const Trajectory written = random_trajectory();
+  const Trajectory read = libmap::parse_kitti(libmap::to_kitti(written), "poses.kitti");
+  expect_same(read, written);
+}
+
+TEST(KittiText, IsRowByRow) {
+  const Trajectory read = libmap::parse_kitti("0 -1 0 10 1 0 0 20 0 0 1 30\n", "poses.kitti");
+  ASSERT_EQ(read.size(), 1U);
+  EXPECT_EQ(read[0].world_from_base * Eigen::Vector3d::UnitX(), Eigen::Vector3d(10, 21, 30));
+}
+
+TEST(KittiText, NamesTheLineThatIsNoPose) {
+  for (const char* line :
+       {"1 0 0 0 0 1 0 0 0 0 1", "2 0 0 0 0 2 0 0 0 0 2 0", "-1 0 0 0 0 -1 0 0 0 0 -1 0",
+        "0 0 0 0 0 0 0 0 0 0 0 0", "1 0 0 inf 0 1 0 0 0 0 1 0"}) {
+    SCOPED_TRACE(line);
+    const libmap::Error error =
+        graspmap_test::error_of([&] { libmap::parse_kitti(with_line(3, line), "poses.kitti"); });
+    EXPECT_EQ(error.context().field, "line 3");
+  }
+}
+
+std::vector<libmap::PoseLink> links_of_every_type() {
+  std::vector<libmap::PoseLink> links;
+  for (const LinkType type :
+       {LinkType::neighbor, LinkType::neighbor, LinkType::global_closure,
+        LinkType::local_space_closure, LinkType::local_time_closure, LinkType::user_closure,
+        LinkType::neighbor_merged, LinkType::neighbor, LinkType{77}})
+    links.push_back({.from = static_cast<int>(links.size()) + 1,
+                     .to = 20 - static_cast<int>(links.size()),
+                     .type = type,
+                     .from_from_to = random_pose(),
+                     .information = random_information()});
+  links.push_back({4, 4, LinkType::pose_prior, random_pose(), random_information()});
+  links.push_back({4, -2, LinkType::landmark, random_pose(), random_information()});
+  links.push_back({5, 5, LinkType::gravity, random_pose(), random_information()});
+  links.push_back({5, 6, LinkType::neighbor, random_pose(), random_information()});
+  return links;
+}
+
+TEST(G2oText, KeepsPosesAndLinksOfEveryType) {
+  const Trajectory poses = random_trajectory();
+  const std::vector<libmap::PoseLink> links = links_of_every_type();
+  const libmap::PoseGraphText read = libmap::parse_g2o(libmap::to_g2o(poses, links), "links.g2o");
+  expect_same(read.poses, poses);
+  for (std::size_t i = 0; i < poses.size(); ++i) EXPECT_EQ(read.poses[i].node, poses[i].node);
+  ASSERT_EQ(read.links.size(), links.size());
+  for (std::size_t i = 0; i < links.size(); ++i) {
+    SCOPED_TRACE(i);
+    EXPECT_EQ(read.links[i].from, links[i].from);
+    EXPECT_EQ(read.links[i].to, links[i].to);
+    EXPECT_EQ(read.links[i].type, links[i].type);
+    EXPECT_TRUE(read.links[i].from_from_to.isApprox(links[i].from_from_to, 1e-14));
+    // Factors of two change no digit; the two halves may differ by rounding.
+    EXPECT_TRUE(read.links[i].information.isApprox(links[i].information, 1e-14));
+  }
+}
+
+TEST(G2oText, HoldsOtherProgramsFromLinksThatAreNoEdges) {
+  const std::string text = libmap::to_g2o({}, links_of_every_type());
+  std::size_t edges = 0;
+  for (std::size_t at = text.find("\nEDGE"); at != std::string::npos;
+       at = text.find("\nEDGE", at + 1))
+    ++edges;
+  EXPECT_EQ(edges, 10U);
+}
+
+// The cost of a small error is the same in both conventions: e' Omega e with e = (t, angles) here,
+// (t, vector part of the quaternion) there.
+TEST(G2oText, WritesInformationOfHalfAngles) {
+  const Matrix6d information = random_information();
+  const std::string text =
+      libmap::to_g2o({}, {{1, 2, LinkType::neighbor, Pose::Identity(), information}});
+  const std::size_t begin = text.find("EDGE_SE3:QUAT 1 2 0 0 0 0 0 0 1 ");
+  ASSERT_NE(begin, std::string::npos);
+  std::vector<double> numbers;
+  std::string word;
+  for (const char c : text.substr(begin + 32)) {
+    if (c != ' ' && c != '\n') {
+      word += c;
+      continue;
+    }
+    numbers.push_back(libmap::parse_double(word).value());
+    word.clear();
+  }
+  ASSERT_EQ(numbers.size(), 21U);
+  Matrix6d stored;
+  std::size_t next = 0;
+  for (int i = 0; i < 6; ++i)
+    for (int j = i; j < 6; ++j) stored(i, j) = stored(j, i) = numbers[next++];
+
+  const Eigen::Vector3d angles = 1e-5 * Eigen::Vector3d(draw(), draw(), draw());
+  Eigen::Matrix<double, 6, 1> of_angles;
+  of_angles << 1e-5 * Eigen::Vector3d(draw(), draw(), draw()), angles;
+  Eigen::Matrix<double, 6, 1> of_quaternion = of_angles;
+  of_quaternion.tail<3>() =
+      Eigen::Quaterniond(Eigen::AngleAxisd(angles.norm(), angles.normalized())).vec();
+  const double cost = of_angles.dot(information * of_angles);
+  EXPECT_NEAR(of_quaternion.dot(stored * of_quaternion), cost, 1e-8 * cost);
+}
+
+TEST(G2oText, GuessesTheTypesOfForeignEdges) {
+  const std::string rest = " 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  const std::string pose = " 0 0 0 0 0 0 1\n";
+  const libmap::PoseGraphText read = libmap::parse_g2o(
+      "FIX 3\nPARAMS_SE3OFFSET 0 0 0 0 0 0 0 1\nEDGE_SE3:QUAT 3 5" + rest + "EDGE_SE3:QUAT 9 5" +
+          rest + "EDGE_SE3:QUAT 3 9" + rest + "VERTEX_SE3:QUAT 3" + pose + "VERTEX_SE3:QUAT 5" +
+          pose + "VERTEX_SE3:QUAT 9" + pose,
+      "foreign.g2o");
+  ASSERT_EQ(read.links.size(), 3U);
+  EXPECT_EQ(read.poses.size(), 3U);
+  EXPECT_EQ(read.links[0].type, LinkType::neighbor);
+  EXPECT_EQ(read.links[1].type, LinkType::neighbor);
+  EXPECT_EQ(read.links[2].type, LinkType::global_closure);
+  Matrix6d expected = Matrix6d::Identity();
+  expected.bottomRightCorner<3, 3>() /= 4.0;
+  EXPECT_EQ(read.links[0].information, expected);
+}
+
+TEST(G2oText, NamesTheLineThatIsBroken) {
+  for (const char* line :
+       {"VERTEX_SE3:QUAT 1 0 0 0 0 0 0", "VERTEX_SE3:QUAT one 0 0 0 0 0 0 1",
+        "EDGE_SE3:QUAT 1 2 0 0 0 0 0 0 1 1 0 0 0 0 0 1", "EDGE_SE3:QUAT 1", "EDGE_SE2 1 2 0 0 0",
+        "VERTEX_SE3:QUAT 1 0 0 0 0 0 0 0", "# graspmap:type x", "# graspmap:edge 1 2 3"}) {
+    SCOPED_TRACE(line);
+    const libmap::Error error =
+        graspmap_test::error_of([&] { libmap::parse_g2o(with_line(4, line), "links.g2o"); });
+    EXPECT_EQ(error.context().file, "links.g2o");
+    EXPECT_EQ(error.context().field, "line 4");
+  }
+  const std::string vertex = "VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\n";
+  EXPECT_THROW(libmap::parse_g2o(vertex + vertex, "links.g2o"), libmap::Error);
+}
+
+}  // namespace

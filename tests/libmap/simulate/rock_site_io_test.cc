@@ -1,0 +1,126 @@
+// Site files: what is given stands, what is missing is drawn, what is wrong is named.
+#include "libmap/simulate/rock_site_io.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/test_support.h"
+
+namespace libmap {
+namespace {
+
+using graspmap_test::error_of;
+
+RockSite parse(const std::string& text, std::optional<std::uint64_t> seed = std::nullopt) {
+  return parse_site(text, "site.yaml", seed);
+}
+
+TEST(RockSiteIo, KeepsWhatIsGivenAndDrawsTheRest) {
+  const std::string text =
+      "seed: 5\nground: {size_x_m: 5}\nrocks:\n"
+      "  - {name: a, height_m: 0.4, width_m: 0.33, x_m: 1.2, y_m: -1}\n"
+      "  - {height_m: 0.3}\n";
+  const RockSite site = parse(text);
+  EXPECT_EQ(site.seed, 5U);
+  EXPECT_EQ(site.ground.size_x_m, 5.0);
+  EXPECT_EQ(site.ground.size_y_m, SiteGround().size_y_m);
+  EXPECT_EQ(site.rocks[0].name, "a");
+  EXPECT_EQ(site.rocks[0].width_m, 0.33);
+  EXPECT_EQ(site.rocks[0].x_m, 1.2);
+  EXPECT_EQ(site.rocks[0].y_m, -1.0);
+  // Placed clear of the free square.
+  EXPECT_GT(std::max(std::abs(site.rocks[1].x_m), std::abs(site.rocks[1].y_m)), 0.75);
+  // Another seed draws other rocks, and leaves what is given.
+  const RockSite other = parse(text, 6);
+  EXPECT_EQ(other.rocks[0].width_m, 0.33);
+  EXPECT_NE(other.rocks[0].seed, site.rocks[0].seed);
+  EXPECT_NE(other.rocks[1].x_m, site.rocks[1].x_m);
+}
+
+TEST(RockSiteIo, WrittenAndReadIsTheSameSite) {
+  for (const char* name : {"rocks.yaml", "slopes_and_bumps.yaml", "bouldering_wall.yaml"}) {
+    const RockSite site = load_site(graspmap_test::source_folder() / "data/sites" / name, 3);
+    const std::string text = to_yaml(site);
+    const RockSite again = parse(text);
+    EXPECT_EQ(to_yaml(again), text) << name;
+    EXPECT_EQ(again.bumps, site.bumps) << name;
+    ASSERT_EQ(again.rocks.size(), site.rocks.size());
+    for (std::size_t n = 0; n < site.rocks.size(); ++n) {
+      EXPECT_EQ(again.rocks[n].x_m, site.rocks[n].x_m);
+      EXPECT_EQ(again.rocks[n].seed, site.rocks[n].seed);
+      EXPECT_EQ(again.rocks[n].yaw_deg, site.rocks[n].yaw_deg);
+    }
+  }
+}
+
+// Placed rocks keep apart: corners of one rectangle are never inside another.
+TEST(RockSiteIo, PlacedRocksKeepApart) {
+  for (std::uint64_t seed = 1; seed <= 20; ++seed) {
+    const RockSite site = load_site(graspmap_test::source_folder() / "data/sites/rocks.yaml", seed);
+    for (const SiteRock& a : site.rocks) {
+      for (const SiteRock& b : site.rocks) {
+        if (&a == &b) continue;
+        const Eigen::Rotation2Dd turn_a(a.yaw_deg * M_PI / 180.0);
+        const Eigen::Rotation2Dd turn_b(b.yaw_deg * M_PI / 180.0);
+        for (int n = 0; n < 400; ++n) {
+          const Eigen::Vector2d local(a.width_m * ((n % 20) / 19.0 - 0.5),
+                                      a.depth_m * ((n / 20) / 19.0 - 0.5));
+          const Eigen::Vector2d point = Eigen::Vector2d(a.x_m, a.y_m) + turn_a * local;
+          const Eigen::Vector2d in_b = turn_b.inverse() * (point - Eigen::Vector2d(b.x_m, b.y_m));
+          EXPECT_TRUE(std::abs(in_b.x()) > 0.5 * b.width_m || std::abs(in_b.y()) > 0.5 * b.depth_m)
+              << seed;
+          EXPECT_GE(point.cwiseAbs().maxCoeff(), 0.75 - 1e-9) << seed;
+          EXPECT_LE(point.cwiseAbs().maxCoeff(), 1.5 + 1e-9) << seed;
+        }
+      }
+    }
+  }
+}
+
+struct BadCase {
+  const char* text;
+  const char* field;
+  const char* what;
+};
+
+TEST(RockSiteIo, SaysWhatIsWrong) {
+  const BadCase cases[] = {
+      {"rocks: 3", "rocks", "list"},
+      {"rock: []", "rock", "rocks"},
+      {"rocks:\n  - {width_m: 0.3}", "rocks[0].height_m", "missing"},
+      {"rocks:\n  - {height_m: 0.3, x_m: 1}", "rocks[0].y_m", "missing"},
+      {"rocks:\n  - {heigth_m: 0.3}", "heigth_m", "height_m"},
+      {"rocks:\n  - {height_m: -1}", "rocks[0].height_m", ">="},
+      {"rocks:\n  - {height_m: nan}", "rocks[0].height_m", ""},
+      {"rocks:\n  - {height_m: 0.3, shape: bloc}", "rocks[0].shape", "block"},
+      {"rocks:\n  - {height_m: 0.3, sides: 2}", "rocks[0].sides", ">= 4"},
+      {"rocks:\n  - 7", "rocks[0]", "map"},
+      {"rocks:\n  - {height_m: 0.3, x_m: 9, y_m: 0}", "rocks[0]", "edge"},
+      {"rocks:\n  - {height_m: 5, width_m: 4}", "rocks[0]", "room"},
+      {"ground: {size_x_m: 1e9}", "ground.size_x_m", "<="},
+      {"ground: {tilt: 3}", "ground.tilt", "tilt_deg"},
+      {"bumps:\n  - {height_m: 1}", "bumps[0].radius_m", "missing"},
+      {"seed: -1", "seed", ">= 0"},
+      {"seed: 1\nseed: 2", "seed", "twice"},
+      {"rocks: [", "line", "YAML"},
+      {"7", "", "map"},
+  };
+  for (const BadCase& one : cases) {
+    const Error error = error_of([&] { parse(one.text); });
+    EXPECT_EQ(error.context().file, "site.yaml") << one.text;
+    EXPECT_NE(error.context().field.find(one.field), std::string::npos)
+        << one.text << ": " << error.what();
+    EXPECT_NE(std::string(error.what()).find(one.what), std::string::npos)
+        << one.text << ": " << error.what();
+    EXPECT_EQ(error.kind(), ErrorKind::bad_input);
+  }
+}
+
+TEST(RockSiteIo, EmptyIsGroundAlone) {
+  EXPECT_TRUE(parse("{}").rocks.empty());
+  EXPECT_TRUE(parse("rocks:\nbumps:\n").rocks.empty());
+}
+
+}  // namespace
+}  // namespace libmap

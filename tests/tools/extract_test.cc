@@ -1,0 +1,220 @@
+#include <SQLiteCpp/SQLiteCpp.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "libmap/scan/rtabmap_reader.h"
+#include "libmap/scan/rtabmap_writer.h"
+#include "libmap/scan/scan_source.h"
+#include "tests/libmap/scan/example_scan.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::ExampleScan;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+
+ExampleScan write_example(const libmap::RtabmapWriterOptions& options = {}) {
+  const ExampleScan scan = graspmap_test::example_scan();
+  libmap::RtabmapWriter writer(scratch("scan.db"), options);
+  for (const libmap::GraphNode& node : scan.graph.nodes)
+    writer.add_node(node, scan.frames.at(node.id));
+  for (const libmap::PoseLink& link : scan.graph.links) writer.add_link(link);
+  writer.set_optimized_poses(scan.graph.optimized_map_from_base);
+  writer.finish();
+  return scan;
+}
+
+// All files under a folder of the scratch folder, by name.
+std::map<std::string, std::string> files_in(const std::string& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : fs::recursive_directory_iterator(scratch(folder)))
+    if (entry.is_regular_file())
+      files[entry.path().lexically_relative(scratch(folder)).string()] =
+          graspmap_test::read_text(entry.path());
+  return files;
+}
+
+void expect_same_scan(const libmap::ScanSource& actual, const libmap::ScanSource& expected) {
+  graspmap_test::expect_same_graph(actual.graph(), expected.graph(), 1e-14);
+  for (const libmap::GraphNode& node : expected.graph().nodes) {
+    SCOPED_TRACE("node " + std::to_string(node.id));
+    graspmap_test::expect_same_frame(actual.read_frame(node.id), expected.read_frame(node.id));
+  }
+}
+
+TEST(Extract, GivesAFolderThatIsTheSameScan) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  const libmap::RtabmapDatabase database(scratch("scan.db"));
+  expect_same_scan(*libmap::open_scan(scratch("out")), database);
+  EXPECT_EQ(content("out/color/000009.jpg"), database.read_blobs(9).image);
+  EXPECT_EQ(fs::exists(scratch("out/right")), false);
+  const auto manifest = json_of("out.json");
+  EXPECT_EQ(manifest["results"]["depth_images"], 4);
+  EXPECT_EQ(manifest["results"]["ground_truth_poses"], 3);
+  EXPECT_EQ(manifest["results"]["broken_frames"], 0);
+  EXPECT_EQ(manifest["inputs"].size(), 1U);
+}
+
+TEST(Extract, OfAFolderGivesTheSameFolder) {
+  write_example({.color = libmap::ImageFormat::png});
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "one"})));
+  ASSERT_TRUE(succeeded(graspmap({"extract", "one", "-o", "two"})));
+  const auto one = files_in("one");
+  const auto two = files_in("two");
+  ASSERT_EQ(one.size(), two.size());
+  for (const auto& [name, bytes] : one) {
+    SCOPED_TRACE(name);
+    ASSERT_EQ(two.count(name), 1U);
+    // Quaternions go through rotation matrices: their last digit may differ.
+    const bool has_rotations = name.find("poses_") == 0 || name == "links.g2o";
+    EXPECT_TRUE(has_rotations || two.at(name) == bytes);
+  }
+  expect_same_scan(*libmap::open_scan(scratch("two")), *libmap::open_scan(scratch("one")));
+}
+
+TEST(Extract, DoesNotDependOnTheNumberOfThreads) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "one", "--threads", "1"})));
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "two", "--threads", "2"})));
+  EXPECT_TRUE(files_in("one") == files_in("two"));
+}
+
+TEST(Extract, SaysThatFloatsWereRounded) {
+  const ExampleScan scan = write_example({.depth = libmap::DepthFormat::float_png});
+  const auto result = graspmap({"extract", "scan.db", "-o", "out"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("4 depth images of floats were rounded"), std::string::npos);
+  EXPECT_EQ(json_of("out.json")["results"]["depth_images_rounded_from_float"], 4);
+  EXPECT_TRUE(libmap::open_scan(scratch("out"))->read_frame(5).depth == scan.frames.at(5).depth);
+}
+
+TEST(Extract, KeepsMillimetrePngsByteForByte) {
+  write_example({.depth = libmap::DepthFormat::png16});
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  EXPECT_EQ(content("out/depth/000002.png"),
+            libmap::RtabmapDatabase(scratch("scan.db")).read_blobs(2).depth);
+}
+
+TEST(Extract, KeepsBothImagesOfAStereoPair) {
+  libmap::RgbdFrame frame;
+  frame.node = 3;
+  frame.color = graspmap_test::random_color(40, 30);
+  frame.right = libmap::GrayImage(40, 30, 77);
+  libmap::StereoCamera pair;
+  pair.left = graspmap_test::example_camera(40, 30);
+  pair.right = pair.left;
+  pair.baseline_m = 0.125;
+  pair.right_from_left.translation().x() = -0.125;
+  frame.stereo = {pair};
+  libmap::RtabmapWriter writer(scratch("scan.db"));
+  writer.add_node({.id = 3}, frame);
+  writer.finish();
+  const auto result = graspmap({"extract", "scan.db", "-o", "out"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("1 right images"), std::string::npos);
+  const libmap::RtabmapDatabase database(scratch("scan.db"));
+  EXPECT_EQ(content("out/color/000003.jpg"), database.read_blobs(3).image);
+  EXPECT_EQ(content("out/right/000003.jpg"), database.read_blobs(3).depth);
+  const libmap::RgbdFrame read = libmap::open_scan(scratch("out"))->read_frame(3);
+  ASSERT_EQ(read.stereo.size(), 1U);
+  EXPECT_NEAR(read.stereo[0].baseline_m, 0.125, 1e-9);
+  EXPECT_TRUE(read.right == database.read_frame(3).right);
+}
+
+// A depth blob that ends too early and a colour blob that is no image.
+void break_frames() {
+  SQLite::Database database(scratch("scan.db").string(), SQLite::OPEN_READWRITE);
+  database.exec("UPDATE Data SET depth = substr(depth, 1, 40) WHERE id = 2");
+  database.exec("UPDATE Data SET image = X'0102030405060708' WHERE id = 5");
+}
+
+TEST(Extract, LeavesBrokenFramesOutAndNamesThem) {
+  const ExampleScan scan = write_example();
+  break_frames();
+  const auto result = graspmap({"extract", "scan.db", "-o", "out"});
+  ASSERT_TRUE(succeeded(result));
+  for (const char* part : {"node 2: depth", "node 5: image"})
+    EXPECT_NE(result.standard_error.find(part), std::string::npos) << result.standard_error;
+  EXPECT_EQ(json_of("out.json")["results"]["broken_frames"], 2);
+  std::vector<std::string> images;
+  for (const auto& [name, bytes] : files_in("out"))
+    if (name.find("color/") == 0 || name.find("depth/") == 0) images.push_back(name);
+  EXPECT_EQ(images, (std::vector<std::string>{"color/000001.jpg", "color/000009.jpg",
+                                              "depth/000001.png", "depth/000009.png"}));
+  // Their poses and links are sound.
+  graspmap_test::expect_same_graph(libmap::open_scan(scratch("out"))->graph(), scan.graph, 2e-7);
+}
+
+TEST(Extract, EndsAtABrokenFrameIfAskedAndLeavesNothing) {
+  write_example();
+  break_frames();
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "out", "--strict"}),
+                        {"scan.db", "node 2: depth"}));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
+}
+
+TEST(Extract, ReplacesItsFolderAsAWhole) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  const auto before = files_in("out");
+  break_frames();
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "out", "--strict"}), {"node 2"}));
+  EXPECT_TRUE(files_in("out") == before);
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out/"})));
+  EXPECT_EQ(files_in("out").count("color/000002.jpg"), 0U);
+  // Something of the user's own stands in it.
+  graspmap_test::write_text(scratch("out/notes.txt"), "mine");
+  for (const std::string force : {"--quiet", "--force"})
+    EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "out", force}), {"notes.txt"}));
+  EXPECT_EQ(content("out/notes.txt"), "mine");
+}
+
+TEST(Extract, WritesNothingInADryRun) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out", "--dry-run"})));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
+}
+
+TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
+  write_example();
+  graspmap_test::write_text(scratch("empty.db"), "");
+  graspmap_test::write_text(scratch("text.db"), "this is no database\n");
+  fs::create_directory(scratch("folder"));
+  for (const char* name : {"missing.db", "empty.db", "text.db", "folder"})
+    EXPECT_TRUE(bad_input(graspmap({"extract", name, "-o", "out"}), {name}));
+  EXPECT_FALSE(fs::exists(scratch("out")));
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "text.db"}), {"text.db"}));
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  EXPECT_TRUE(bad_input(graspmap({"extract", "out", "-o", "out/"}), {"is the input"}));
+}
+
+TEST(Extract, TakesEveryRealScan) {
+  GRASPMAP_REQUIRE_DATA();
+  for (const char* name : {"site_killed", "site_tiny", "site_tiny_q", "site_tiny_v0160",
+                           "site_tiny_v0180", "site_v0160", "site_drift", "site_full"}) {
+    SCOPED_TRACE(name);
+    const fs::path path = graspmap_test::data_folder() / "scans" / (std::string(name) + ".db");
+    const auto result = graspmap({"extract", path.string(), "-o", name});
+    ASSERT_TRUE(succeeded(result));
+    EXPECT_EQ(result.standard_error.find("warning"), std::string::npos) << result.standard_error;
+    const auto scan = libmap::open_scan(path);
+    const auto read = libmap::open_scan(scratch(name));
+    graspmap_test::expect_same_graph(read->graph(), scan->graph(), 1e-14);
+    const int last = scan->graph().nodes.back().id;
+    graspmap_test::expect_same_frame(read->read_frame(last), scan->read_frame(last), 1e-9);
+  }
+}
+
+}  // namespace

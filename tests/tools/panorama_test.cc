@@ -1,0 +1,151 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/scan/image_codec.h"
+#include "libmap/scan/rig_images.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+
+constexpr int width = 48;
+constexpr int height = 27;
+
+// Six cameras in the middle of a room with walls 1 m away, a prism of six sides.
+libmap::CameraRig rig() {
+  libmap::CameraRig cameras;
+  for (int n = 0; n < 6; ++n) {
+    libmap::RigCamera camera;
+    camera.name = "camera_" + std::to_string(n);
+    camera.camera.width = width;
+    camera.camera.height = height;
+    camera.camera.fx = camera.camera.fy = 25;
+    camera.camera.cx = 23.5;
+    camera.camera.cy = 13;
+    camera.camera.base_from_camera = libmap::make_pose_from_rpy({0, 0, 0}, {0, 0, 60.0 * n}) *
+                                     libmap::make_pose_from_rpy({0.2, 0, 0}, {0, 0, 0}) *
+                                     libmap::optical_to_body_rotation();
+    camera.depth_scale_m = 0.0005;
+    camera.near_m = 0.28;
+    camera.far_m = 1.5;
+    cameras.cameras.push_back(camera);
+  }
+  return cameras;
+}
+
+void write_image(const std::string& camera, double stamp_s, std::uint16_t units = 1600) {
+  const fs::path file = scratch("run") / libmap::rig_image_name(camera, stamp_s);
+  fs::create_directories(file.parent_path());
+  graspmap_test::write_text(file,
+                            libmap::encode_png(libmap::Image<std::uint16_t>(width, height, units)));
+}
+
+void write_run() {
+  for (int n = 0; n < 6; ++n) write_image("camera_" + std::to_string(n), 12.0 + 0.003 * n);
+  graspmap_test::write_text(scratch("run") / "rig.yaml", to_yaml(rig()));
+}
+
+TEST(PanoramaCommand, WallsOfARoom) {
+  write_run();
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "cloud.pcd"})));
+  const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.pcd")).cloud;
+  ASSERT_EQ(cloud.size(), 6U * width * height);
+  const std::vector<double>& camera = cloud.find_field("camera")->values;
+  for (std::size_t n = 0; n < cloud.size(); ++n) {
+    // 1600 units of 0.5 mm from a camera 0.2 m off the centre: 1 m along the wall's normal.
+    const double angle = camera[n] * M_PI / 3;
+    ASSERT_NEAR(cloud.positions[n].dot(Eigen::Vector3d(std::cos(angle), std::sin(angle), 0)), 1.0,
+                1e-6);
+  }
+  const nlohmann::json manifest = json_of("cloud.pcd.json");
+  EXPECT_EQ(manifest.at("frame"), "robot");
+  EXPECT_EQ(manifest.at("results").at("cameras_seen"), 6);
+  EXPECT_EQ(manifest.at("results").at("camera_5.points"), width * height);
+  EXPECT_EQ(manifest.at("inputs").size(), 7U);
+}
+
+TEST(PanoramaCommand, SameBytesForAnyThreads) {
+  write_run();
+  ASSERT_TRUE(
+      succeeded(graspmap({"panorama", "run", "-o", "a.pcd", "--normals", "--threads", "1"})));
+  ASSERT_TRUE(
+      succeeded(graspmap({"panorama", "run", "-o", "b.pcd", "--normals", "--threads", "3"})));
+  EXPECT_EQ(content("a.pcd"), content("b.pcd"));
+}
+
+TEST(PanoramaCommand, LateAndMissingCamerasAreNamed) {
+  write_run();
+  fs::remove_all(scratch("run") / "camera_2");
+  fs::remove_all(scratch("run") / "camera_4");
+  write_image("camera_4", 12.055);
+  const auto result = graspmap({"panorama", "run", "-o", "cloud.pcd"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("camera_2: no image"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("camera_4: its nearest image is"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("ms late"), std::string::npos);
+  EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("camera_2.state"), "missing");
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "cloud.pcd", "--tolerance", "0.06"})));
+  EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("cameras_seen"), 5);
+  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--strict"}),
+                        {"run: camera_2: no image"}));
+  EXPECT_FALSE(fs::exists(scratch("c.pcd")));
+}
+
+TEST(PanoramaCommand, MomentsAreChosen) {
+  write_run();
+  write_image("camera_0", 20.0, 2000);
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "cloud.pcd", "--stamp", "20.01"})));
+  const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.pcd")).cloud;
+  ASSERT_EQ(cloud.size(), static_cast<std::size_t>(width * height));
+  EXPECT_NEAR(cloud.positions[0].x(), 1.2, 1e-6);
+  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--stamp", "15"}),
+                        {"--stamp is 15", "--tolerance"}));
+  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--stamp", "noon"}), {"noon"}));
+}
+
+TEST(PanoramaCommand, OwnRigAndTable) {
+  write_run();
+  fs::rename(scratch("run") / "rig.yaml", scratch("own.yaml"));
+  fs::rename(scratch("run") / "camera_1", scratch("run") / "pictures");
+  graspmap_test::write_text(scratch("run") / "images.csv",
+                            "camera,stamp_s,file\ncamera_1,5,pictures/12.003000.png\n");
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "--rig", "own.yaml", "-o", "cloud.pcd"})));
+  EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("stamp_s"), 5.0);
+  EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("points"), width * height);
+}
+
+TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
+  write_run();
+  const auto run = [](const std::string& folder) {
+    return graspmap({"panorama", folder, "-o", "cloud.pcd"});
+  };
+  EXPECT_TRUE(bad_input(run("none"), {"none: no such folder"}));
+  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"is no folder"}));
+  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "cloud.xyz"}), {"cloud.xyz"}));
+  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--rig", "no.yaml"}),
+                        {"no.yaml: no such file"}));
+  const std::string image = "run/" + libmap::rig_image_name("camera_3", 12.009);
+  const std::string whole = content(image);
+  for (const std::size_t length : {0U, 20U, 60U}) {
+    graspmap_test::write_text(scratch(image), whole.substr(0, length));
+    EXPECT_TRUE(bad_input(run("run"), {image})) << length;
+  }
+  graspmap_test::write_text(scratch(image), libmap::encode_png(libmap::GrayImage(width, height)));
+  EXPECT_TRUE(bad_input(run("run"), {image}));
+  graspmap_test::write_text(scratch(image), libmap::encode_png(libmap::Image<std::uint16_t>(8, 8)));
+  EXPECT_TRUE(bad_input(run("run"), {image, "8 x 8", "48 x 27"}));
+  graspmap_test::write_text(scratch("run") / "rig.yaml", "cameras: []\n");
+  EXPECT_TRUE(bad_input(run("run"), {"run/rig.yaml", "cameras"}));
+  EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
+}
+
+}  // namespace

@@ -1,0 +1,145 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/scan/camera_io.h"
+#include "libmap/scan/scan_source.h"
+#include "tests/libmap/mesh/mesh_samples.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_text;
+using graspmap_test::wrong_usage;
+using libmap::LinkType;
+using libmap::PoseSource;
+
+const Eigen::Vector3d ball_centre(0.2, 0.1, 0.3);
+
+// With colours of its own, which are quicker to draw than rock.
+void write_site() {
+  libmap::TriangleMesh mesh = libmap::join_meshes(
+      graspmap_test::square_mesh(0.0, 1.5), graspmap_test::ball_mesh(60, 120, ball_centre, 0.3));
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
+    mesh.vertex_colors.push_back({static_cast<std::uint8_t>(40 * (i % 6)), 120, 90});
+  libmap::write_mesh(scratch("site.ply"), mesh);
+}
+
+std::vector<std::string> scan(std::vector<std::string> words) {
+  words.insert(words.begin(), {"simulate", "scan", "site.ply"});
+  return words;
+}
+
+TEST(SimulateScanCommand, WritesAScanWhoseTruePosesPutItOnTheMesh) {
+  write_site();
+  ASSERT_TRUE(
+      succeeded(graspmap(scan({"-o", "scan.db", "--frames", "9", "--noise", "0", "--noise-of-range",
+                               "0", "--flying-pixels", "0", "--closures"}))));
+  const auto source = libmap::open_scan(scratch("scan.db"));
+  const libmap::PoseGraph& graph = source->graph();
+  ASSERT_EQ(graph.nodes.size(), 9U);
+  EXPECT_TRUE(graph.optimized_map_from_base.empty());
+  EXPECT_EQ(libmap::trajectory_of(graph, PoseSource::odometry).size(), 9U);
+  EXPECT_EQ(libmap::trajectory_of(graph, PoseSource::ground_truth).size(), 9U);
+  std::size_t neighbors = 0;
+  for (const libmap::PoseLink& link : graph.links) neighbors += link.type == LinkType::neighbor;
+  EXPECT_EQ(neighbors, 8U);
+  std::size_t points = 0;
+  for (const libmap::GraphNode& node : graph.nodes) {
+    if (node.id % 4 != 1) continue;
+    const libmap::RgbdFrame frame = source->read_frame(node.id);
+    ASSERT_EQ(frame.cameras.size(), 1U);
+    const libmap::Camera& camera = frame.cameras[0];
+    EXPECT_EQ(camera.fx, 365.0);
+    EXPECT_EQ(frame.color.width, 512);
+    EXPECT_EQ(frame.depth.height, 424);
+    const auto rays = libmap::ray_table(camera);
+    for (std::size_t p = 0; p < rays.size(); p += 7) {
+      const auto depth = static_cast<double>(frame.depth.pixels[p]);
+      if (depth == 0) continue;
+      ++points;
+      const Eigen::Vector3d point =
+          *node.truth_from_base * (camera.base_from_camera * (depth * rays[p].homogeneous()));
+      // Whole millimetres along rays of up to 1.3 z, and the ball's facets.
+      EXPECT_LT(std::min(std::abs(point.z()), std::abs((point - ball_centre).norm() - 0.3)),
+                0.0015);
+    }
+  }
+  EXPECT_GT(points, 30000U);
+  const auto manifest = json_of("scan.db.json");
+  EXPECT_EQ(manifest["frame"], "mesh");
+  EXPECT_EQ(manifest["results"]["frames"], 9);
+  EXPECT_EQ(manifest["results"]["links"], graph.links.size());
+  EXPECT_EQ(manifest["results"]["flying_pixels"], 0);
+  EXPECT_EQ(manifest["parameters"]["noise_of_range"], 0.0);
+}
+
+TEST(SimulateScanCommand, SeedsDecideTheBytesThreadsDoNot) {
+  write_site();
+  const auto run = [](const std::string& seed, const std::string& threads, const std::string& to) {
+    return succeeded(graspmap(scan({"-o", to, "--frames", "3", "--closure-node-gap", "2", "--seed",
+                                    seed, "--threads", threads, "--closures"})));
+  };
+  ASSERT_TRUE(run("1", "1", "a.db"));
+  ASSERT_TRUE(run("1", "3", "b.db"));
+  ASSERT_TRUE(run("2", "1", "c.db"));
+  EXPECT_EQ(content("a.db"), content("b.db"));
+  EXPECT_NE(content("a.db"), content("c.db"));
+}
+
+TEST(SimulateScanCommand, TakesACameraFileAndAnOffset) {
+  write_site();
+  libmap::CameraFile file;
+  file.camera = {.width = 80, .height = 60, .fx = 70, .fy = 71, .cx = 40, .cy = 29};
+  file.camera.distortion_model = libmap::DistortionModel::radial_tangential;
+  file.camera.distortion = {0.05, -0.02, 0.0, 0.0, 0.0};
+  write_text(scratch("camera.yaml"), libmap::to_yaml(file));
+  const auto run = [](const std::string& offset, const std::string& to) {
+    return succeeded(graspmap(
+        scan({"-o", to, "--frames", "3", "--camera", "camera.yaml", "--depth-offset", offset,
+              "--target", "0.1,0,0.1", "--depth-format", "float", "--depth-step", "0"})));
+  };
+  ASSERT_TRUE(run("0", "plain.db"));
+  ASSERT_TRUE(run("0.018", "offset.db"));
+  const auto plain = libmap::open_scan(scratch("plain.db"))->read_frame(2);
+  const auto offset = libmap::open_scan(scratch("offset.db"))->read_frame(2);
+  ASSERT_EQ(plain.depth.width, 80);
+  EXPECT_EQ(plain.cameras[0].distortion, file.camera.distortion);
+  const auto rays = libmap::ray_table(plain.cameras[0]);
+  std::size_t both = 0;
+  for (std::size_t p = 0; p < rays.size(); ++p) {
+    if (plain.depth.pixels[p] == 0 || offset.depth.pixels[p] == 0) continue;
+    ++both;
+    const auto difference = static_cast<double>(offset.depth.pixels[p] - plain.depth.pixels[p]);
+    EXPECT_NEAR(difference * rays[p].homogeneous().norm(), 0.018, 1e-5);
+  }
+  EXPECT_GT(both, 1000U);
+}
+
+TEST(SimulateScanCommand, BadInputIsOneLineAndLeavesNothing) {
+  write_site();
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "none.ply", "-o", "a.db"}), {"none.ply"}));
+  EXPECT_TRUE(
+      bad_input(graspmap(scan({"-o", "a.db", "--near", "3", "--far", "2"})), {"far_m", "> 3"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.db", "--target", "1,2"})), {"--target"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.db", "--camera", "none.yaml"})), {"none.yaml"}));
+  EXPECT_TRUE(bad_input(
+      graspmap(scan({"-o", "a.db", "--frames", "2", "--radius", "50", "--last-radius", "50"})),
+      {"site.ply", "no frame sees"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "site.ply"})), {"is the input"}));
+  EXPECT_TRUE(
+      bad_input(graspmap(scan({"-o", "a.db", "--flying-pixels", "0.9"})), {"flying_pixels"}));
+  EXPECT_TRUE(wrong_usage(graspmap(scan({"-o", "a.db", "--frmaes", "2"})), {"--frames"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("a.db")));
+  ASSERT_TRUE(succeeded(graspmap(scan({"-o", "a.db", "--dry-run"}))));
+  EXPECT_FALSE(std::filesystem::exists(scratch("a.db")));
+}
+
+}  // namespace

@@ -1,0 +1,340 @@
+// graspmap calibrate: pictures of a chessboard -> intrinsics and lens distortion of the camera.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/table.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/camera_calibration.h"
+#include "libmap/scan/camera_io.h"
+#include "libmap/scan/image_codec.h"
+#include "tools/calibration_charts.h"
+#include "tools/command_line.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+using libmap::CalibratedPicture;
+using libmap::CameraCalibrationResult;
+
+// The thesis calls a calibration good below it.
+constexpr double good_error_px = 0.5;
+// Lens terms are of the order of 1.
+constexpr double good_term_deviation = 1.0;
+// Above it a measurement of 1 m is off by 5 mm for the focal length alone.
+constexpr double good_focal_deviation = 0.005;
+constexpr double good_coverage = 0.6;
+
+struct CalibrateOptions {
+  std::vector<std::string> images;
+  std::string output;
+  std::string board = "8x6";
+  std::string name = "camera";
+  std::string report;
+  libmap::CameraCalibrationOptions calibration;
+};
+
+struct Picture {
+  std::string name;
+  int width = 0;
+  int height = 0;
+  std::optional<std::vector<Eigen::Vector2d>> corners;
+};
+
+void bind(libmap::ParameterTable& table, CalibrateOptions& options) {
+  table.add("board", options.board,
+            "COLUMNSxROWS of inner corners, where four squares meet: 9 x 7 squares are 8x6");
+  bind(table, options.calibration);
+  table.add("name", options.name, "name of the camera in the file");
+}
+
+bool has_image_extension(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension)
+    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
+  return extension == ".png" || extension == ".jpg" || extension == ".jpeg";
+}
+
+// A folder stands for the images in it, by name.
+std::vector<std::string> image_files(const std::vector<std::string>& given) {
+  std::vector<std::string> files;
+  for (const std::string& path : given) {
+    if (!fs::is_directory(path)) {
+      files.push_back(path);
+      continue;
+    }
+    std::vector<std::string> inside;
+    for (const fs::directory_entry& entry : fs::directory_iterator(path))
+      if (entry.is_regular_file() && has_image_extension(entry.path()))
+        inside.push_back(entry.path().string());
+    if (inside.empty()) throw libmap::Error("holds no .png or .jpg image", {.file = path});
+    std::sort(inside.begin(), inside.end());
+    files.insert(files.end(), inside.begin(), inside.end());
+  }
+  return files;
+}
+
+Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
+  try {
+    const std::string bytes = libmap::read_whole_file(file);
+    const auto info = libmap::read_image_info(bytes);
+    const bool is_deep = info && info->bits == 16 && info->channels == 1;
+    const libmap::GrayImage image = is_deep ? libmap::stretch_contrast(libmap::decode_gray16(bytes))
+                                            : libmap::decode_gray(bytes);
+    return {file, image.width, image.height, libmap::find_chessboard(image, board)};
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file);
+  }
+}
+
+std::vector<Picture> read_pictures(const std::vector<std::string>& files,
+                                   const libmap::Chessboard& board, Run& run) {
+  std::vector<Picture> pictures(files.size());
+  run.progress().begin("boards", files.size());
+  libmap::parallel_for(files.size(), 1, [&](std::size_t first, std::size_t last) {
+    for (std::size_t n = first; n < last; ++n) {
+      pictures[n] = read_picture(files[n], board);
+      run.progress().advance(1);
+    }
+  });
+  run.progress().end();
+  const auto size = [](const Picture& picture) {
+    return fmt::format("{} x {}", picture.width, picture.height);
+  };
+  for (const Picture& picture : pictures)
+    if (size(picture) != size(pictures.front()))
+      throw libmap::Error("the images are not of one size",
+                          {.file = picture.name,
+                           .field = "size",
+                           .value = size(picture),
+                           .bound = size(pictures.front()) + " as " + pictures.front().name});
+  return pictures;
+}
+
+std::vector<libmap::BoardPicture> boards_of(const std::vector<Picture>& pictures,
+                                            const CalibrateOptions& options, Run& run) {
+  std::vector<libmap::BoardPicture> boards;
+  for (const Picture& picture : pictures)
+    if (picture.corners) boards.push_back({picture.name, *picture.corners});
+  if (boards.empty())
+    throw libmap::Error("no image shows the whole board",
+                        {.file = {},
+                         .field = "--board",
+                         .value = options.board,
+                         .bound = "the number of inner corners, one less than of squares"});
+  for (const Picture& picture : pictures)
+    if (!picture.corners)
+      run.warn(fmt::format("{}: no board of {} inner corners", picture.name, options.board));
+  return boards;
+}
+
+std::vector<std::string> value_names(const libmap::Camera& camera) {
+  std::vector<std::string> names = {"fx", "fy", "cx", "cy"};
+  if (camera.distortion_model == libmap::DistortionModel::equidistant)
+    names.insert(names.end(), {"k1", "k2", "k3", "k4"});
+  else
+    names.insert(names.end(), {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"});
+  names.resize(4 + camera.distortion.size());
+  return names;
+}
+
+std::vector<double> values_of(const libmap::Camera& camera) {
+  std::vector<double> values = {camera.fx, camera.fy, camera.cx, camera.cy};
+  values.insert(values.end(), camera.distortion.begin(), camera.distortion.end());
+  return values;
+}
+
+// "365.23 +- 0.18", to two digits of the deviation.
+std::string with_deviation(double value, double deviation) {
+  const int decimals =
+      deviation > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 12)
+                    : 6;
+  return libmap::to_fixed_text(value, decimals) + " +- " +
+         libmap::to_fixed_text(deviation, decimals);
+}
+
+std::string summary(const CameraCalibrationResult& result, const CalibrateOptions& options) {
+  std::string text = fmt::format(
+      "{} pictures of a board of {} inner corners, squares of {} mm\n"
+      "reprojection error {:.3f} px (root mean square)\n",
+      result.pictures.size(), options.board, libmap::to_text(options.calibration.board.square_mm),
+      result.rms_px);
+  const std::vector<std::string> names = value_names(result.camera);
+  const std::vector<double> values = values_of(result.camera);
+  for (std::size_t n = 0; n < values.size(); ++n)
+    text += names[n] + " " + with_deviation(values[n], result.deviations[n]) + "\n";
+  return text + "+-: one standard deviation\n";
+}
+
+libmap::Table picture_table(const std::vector<Picture>& pictures,
+                            const CameraCalibrationResult& result) {
+  libmap::Table table;
+  table.columns = {"image", "used", "rms_px", "max_px", "distance_m", "tilt_deg"};
+  for (const Picture& picture : pictures) {
+    const auto found = std::find_if(
+        result.pictures.begin(), result.pictures.end(),
+        [&](const CalibratedPicture& calibrated) { return calibrated.name == picture.name; });
+    const bool is_repeated = std::find(result.repeated.begin(), result.repeated.end(),
+                                       picture.name) != result.repeated.end();
+    if (found == result.pictures.end()) {
+      table.rows.push_back({picture.name,
+                            !picture.corners ? "no board"
+                            : is_repeated    ? "repeated"
+                                             : "rejected",
+                            "", "", "", ""});
+      continue;
+    }
+    table.rows.push_back({picture.name, "yes", libmap::to_text(found->rms_px),
+                          libmap::to_text(found->max_px),
+                          libmap::to_text(found->camera_from_board.translation().norm()),
+                          libmap::to_text(found->tilt_deg)});
+  }
+  return table;
+}
+
+libmap::Table residual_table(const CameraCalibrationResult& result,
+                             const libmap::Chessboard& board) {
+  libmap::Table table;
+  table.columns = {"image", "row", "column", "x_px", "y_px", "residual_x_px", "residual_y_px"};
+  const auto columns = static_cast<std::size_t>(board.columns);
+  for (const CalibratedPicture& picture : result.pictures)
+    for (std::size_t n = 0; n < picture.corners.size(); ++n)
+      table.rows.push_back({picture.name, std::to_string(n / columns), std::to_string(n % columns),
+                            libmap::to_text(picture.corners[n].x()),
+                            libmap::to_text(picture.corners[n].y()),
+                            libmap::to_text(picture.residuals_px[n].x()),
+                            libmap::to_text(picture.residuals_px[n].y())});
+  return table;
+}
+
+void note_results(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
+                  libmap::Manifest& manifest) {
+  const auto count = [&](const std::string& name, std::size_t value) {
+    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  count("images", pictures.size());
+  count("images_without_board",
+        static_cast<std::size_t>(std::count_if(pictures.begin(), pictures.end(),
+                                               [](const Picture& p) { return !p.corners; })));
+  count("images_repeated", result.repeated.size());
+  count("images_rejected", result.rejected.size());
+  count("images_used", result.pictures.size());
+  manifest.results.emplace_back("rms_px", result.rms_px);
+  manifest.results.emplace_back("sigma_px", result.sigma_px);
+  const std::vector<std::string> names = value_names(result.camera);
+  const std::vector<double> values = values_of(result.camera);
+  for (std::size_t n = 0; n < values.size(); ++n) {
+    manifest.results.emplace_back(names[n], values[n]);
+    manifest.results.emplace_back(names[n] + "_deviation", result.deviations[n]);
+  }
+  manifest.results.emplace_back("corners_width_share", result.corners_width_share);
+  manifest.results.emplace_back("corners_height_share", result.corners_height_share);
+}
+
+void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
+  for (const std::string& name : result.repeated)
+    run.warn(name + ": left out: an earlier picture shows the board in the same place");
+  for (const std::string& name : result.rejected)
+    run.warn(name + ": left out for its reprojection error");
+  for (const CalibratedPicture& picture : result.pictures)
+    if (picture.rms_px > good_error_px)
+      run.warn(fmt::format("{}: reprojection error {:.2f} px, above {} px", picture.name,
+                           picture.rms_px, good_error_px));
+  if (result.relative_focal_deviation() > good_focal_deviation)
+    run.warn(
+        fmt::format("the focal length is known to {:.1f} % only: more pictures, tilted by 30 "
+                    "degrees and more about both axes of the board, would tell it",
+                    100 * result.relative_focal_deviation()));
+  const std::vector<std::string> names = value_names(result.camera);
+  for (std::size_t n = 4; n < names.size(); ++n) {
+    if (result.deviations[n] <= good_term_deviation) continue;
+    run.warn(fmt::format("the pictures do not tell the lens's {}, {}: a simpler --lens would do",
+                         names[n],
+                         with_deviation(result.camera.distortion[n - 4], result.deviations[n])));
+    break;
+  }
+  if (std::min(result.corners_width_share, result.corners_height_share) < good_coverage)
+    run.warn(
+        fmt::format("the corners span {:.0f} % of the image's width and {:.0f} % of its height: "
+                    "the distortion beyond is a guess",
+                    100 * result.corners_width_share, 100 * result.corners_height_share));
+}
+
+void write_report(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
+                  const CalibrateOptions& options, Run& run) {
+  std::vector<graspmap_tools::PictureResiduals> residuals;
+  for (const CalibratedPicture& picture : result.pictures)
+    residuals.push_back({picture.name, picture.rms_px, picture.corners, picture.residuals_px});
+  const auto text = [](std::string content) {
+    return [content = std::move(content)](const fs::path& temporary) {
+      libmap::write_text(temporary, content);
+    };
+  };
+  const libmap::Camera& camera = result.camera;
+  run.write_output_folder(
+      options.report,
+      {{"images.csv", text(libmap::to_csv(picture_table(pictures, result)))},
+       {"residuals.csv", text(libmap::to_csv(residual_table(result, options.calibration.board)))},
+       {"residuals.png",
+        text(graspmap_tools::draw_residuals(residuals, camera.width, camera.height))},
+       {"errors.png", text(graspmap_tools::draw_errors(residuals, good_error_px))}});
+}
+
+void calibrate(CalibrateOptions& options, Run& run) {
+  const double square_mm = options.calibration.board.square_mm;
+  options.calibration.board = libmap::parse_chessboard(options.board, "--board");
+  options.calibration.board.square_mm = square_mm;
+  const std::vector<std::string> files = image_files(options.images);
+  run.claim_output(options.output, files);
+  if (!options.report.empty()) run.claim_output_folder(options.report);
+  const std::vector<Picture> pictures = run.timed(
+      "find boards", [&] { return read_pictures(files, options.calibration.board, run); });
+  for (const std::string& file : files) run.add_input(file);
+  const std::vector<libmap::BoardPicture> boards = boards_of(pictures, options, run);
+  const CameraCalibrationResult result = run.timed("calibrate", [&] {
+    return libmap::calibrate_camera(boards, pictures.front().width, pictures.front().height,
+                                    options.calibration);
+  });
+  note_results(pictures, result, run.manifest());
+  warn_of_weaknesses(result, run);
+  const std::string said = summary(result, options);
+  run.say(said.substr(0, said.size() - 1));
+  if (!options.report.empty())
+    run.timed("report", [&] { write_report(pictures, result, options, run); });
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::write_text(temporary, libmap::to_yaml({options.name, result.camera}, said));
+  });
+}
+
+// Boards are sold by millimetres: the flag may carry its unit.
+void drop_unit_of_square(std::vector<std::string>& words) {
+  const std::string with_unit = "--square-mm";
+  for (std::string& word : words)
+    if (word == with_unit || word.starts_with(with_unit + "="))
+      word = "--square" + word.substr(with_unit.size());
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  std::vector<std::string> words(argv, argv + argc);
+  drop_unit_of_square(words);
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  CalibrateOptions options;
+  graspmap_tools::Command command(
+      "calibrate",
+      "Intrinsics and lens distortion of a colour or infrared camera by pictures of a chessboard.");
+  command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
+  command.output(options.output, "the camera (.yaml)");
+  command.option("--report", "DIR", options.report,
+                 "folder of images.csv, residuals.csv, residuals.png and errors.png");
+  bind(command.parameters(), options);
+  return command.run(argc, arguments.data(), [&](Run& run) { calibrate(options, run); });
+}

@@ -1,0 +1,155 @@
+// graspmap extract: a scan as plain files.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/scan/depth_codec.h"
+#include "libmap/scan/frame_folder_writer.h"
+#include "libmap/scan/image_codec.h"
+#include "libmap/scan/rtabmap_reader.h"
+#include "libmap/scan/scan_source.h"
+#include "tools/command_line.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+
+struct ExtractOptions {
+  std::string scan;
+  std::string output;
+  bool strict = false;
+};
+
+struct Counts {
+  std::size_t broken_frames = 0;
+  std::size_t rounded_depth_images = 0;  // of floats
+};
+
+struct NodeImages {
+  libmap::RgbdFrame frame;
+  libmap::StoredImages stored;
+  bool is_rounded = false;
+  std::optional<libmap::Error> error{};
+};
+
+// The image files of a database as they are stored.
+void keep_files(const libmap::RtabmapDatabase& database, NodeImages& images) {
+  libmap::FrameBlobs blobs = database.read_blobs(images.frame.node);
+  images.stored.color = std::move(blobs.image);
+  if (!images.frame.right.empty()) images.stored.right = std::move(blobs.depth);
+  if (images.frame.depth.empty()) return;
+  const auto info = libmap::read_depth_info(blobs.depth);
+  images.is_rounded = info && info->format == libmap::DepthFormat::float_png;
+  if (info && info->format == libmap::DepthFormat::png16)
+    images.stored.depth = std::move(blobs.depth);
+}
+
+NodeImages read_images(const libmap::ScanSource& scan, int node) {
+  NodeImages images;
+  try {
+    // Decoded even where it is copied as it is: what cannot be decoded is not handed on.
+    images.frame = scan.read_frame(node);
+    if (const auto* database = dynamic_cast<const libmap::RtabmapDatabase*>(&scan))
+      keep_files(*database, images);
+    if (!images.frame.depth.empty() && images.stored.depth.empty())
+      images.stored.depth = libmap::encode_png(libmap::to_millimetres(images.frame.depth));
+  } catch (const libmap::Error& error) {
+    images.error = error;
+  }
+  return images;
+}
+
+// Nothing is written without a writer.
+Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter* writer,
+                      const ExtractOptions& options, Run& run) {
+  // So many frames are in memory at a time.
+  constexpr std::size_t batch_size = 8;
+  const std::vector<libmap::GraphNode>& nodes = scan.graph().nodes;
+  Counts counts;
+  run.progress().begin("frames", nodes.size());
+  for (std::size_t first = 0; first < nodes.size(); first += batch_size) {
+    std::vector<NodeImages> batch(std::min(batch_size, nodes.size() - first));
+    libmap::parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) batch[i] = read_images(scan, nodes[first + i].id);
+    });
+    for (const NodeImages& images : batch) {
+      if (images.error && options.strict) throw libmap::Error(*images.error);
+      if (images.error) {
+        run.warn(std::string(images.error->what()) + "; its images are left out");
+        ++counts.broken_frames;
+      } else {
+        if (images.is_rounded) ++counts.rounded_depth_images;
+        if (writer != nullptr) writer->add_frame(images.frame, images.stored);
+      }
+    }
+    run.progress().advance(batch.size());
+  }
+  run.progress().end();
+  return counts;
+}
+
+void add_results(libmap::Manifest& manifest, const libmap::PoseGraph& graph, const Counts& counts,
+                 const libmap::FrameFolderCounts& written) {
+  const auto count = [&](const char* name, std::size_t value) {
+    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  manifest.frame = "base";
+  count("nodes", graph.nodes.size());
+  count("links", graph.links.size());
+  const auto poses = [&](libmap::PoseSource source) {
+    return libmap::trajectory_of(graph, source).size();
+  };
+  count("odometry_poses", poses(libmap::PoseSource::odometry));
+  count("stored_poses", poses(libmap::PoseSource::stored));
+  count("ground_truth_poses", poses(libmap::PoseSource::ground_truth));
+  count("color_images", written.color_images);
+  count("depth_images", written.depth_images);
+  count("right_images", written.right_images);
+  count("calibrations", written.calibrations);
+  count("associations", written.associations);
+  count("broken_frames", counts.broken_frames);
+  count("depth_images_rounded_from_float", counts.rounded_depth_images);
+  manifest.results.emplace_back("depth_unit_m", 0.001);
+}
+
+void extract(const ExtractOptions& options, Run& run) {
+  run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
+  const auto scan = run.timed("open", [&] { return libmap::open_scan(options.scan); });
+  for (const std::string& warning : scan->warnings()) run.warn(options.scan + ": " + warning);
+  if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
+  const auto work = [&](const fs::path& folder) {
+    std::optional<libmap::FrameFolderWriter> writer;
+    if (!run.options().dry_run) writer.emplace(folder);
+    const Counts counts = extract_frames(*scan, writer ? &*writer : nullptr, options, run);
+    if (!writer) return;
+    const libmap::FrameFolderCounts written = writer->finish(scan->graph());
+    add_results(run.manifest(), scan->graph(), counts, written);
+    run.say(fmt::format("{} nodes: {} colour, {} depth images, {} calibrations, {} links",
+                        scan->graph().nodes.size(), written.color_images, written.depth_images,
+                        written.calibrations, scan->graph().links.size()));
+    if (written.right_images > 0)
+      run.say(fmt::format("{} right images of stereo pairs", written.right_images));
+    if (counts.rounded_depth_images > 0)
+      run.say(fmt::format("{} depth images of floats were rounded to millimetres",
+                          counts.rounded_depth_images));
+  };
+  run.write_output_tree(options.output, libmap::frame_folder_names(), work);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ExtractOptions options;
+  graspmap_tools::Command command("extract", "A scan as plain files: images, calibrations, poses.");
+  command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
+  command.output(options.output, "folder, replaced as a whole");
+  command.flag("--strict", options.strict, "end at a frame that is broken");
+  return command.run(argc, argv, [&](Run& run) { extract(options, run); });
+}

@@ -1,0 +1,167 @@
+// graspmap panorama: depth images of a camera rig -> one cloud in the robot's frame.
+#include "libmap/cloud/panorama.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/rig_images.h"
+#include "tools/command_line.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+using libmap::RigMoment;
+using State = libmap::RigMoment::Camera::State;
+
+struct PanoramaCommandOptions {
+  std::string folder;
+  std::string output;
+  std::string rig;
+  std::string stamp = "fullest";
+  double tolerance_s = 0.02;
+  bool strict = false;
+  libmap::PanoramaOptions panorama;
+};
+
+void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
+  table.add("stamp_s", options.stamp,
+            "the moment to show; fullest: the one at which most cameras saw something");
+  table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
+            "images further from the moment are left out");
+  table.add("strict", options.strict, "end with an error if a camera's image is late or missing");
+  bind(table, options.panorama);
+}
+
+std::optional<double> parse_stamp(const std::string& text) {
+  if (text == "fullest") return std::nullopt;
+  const std::optional<double> stamp = libmap::parse_double(text);
+  if (!stamp || !std::isfinite(*stamp))
+    throw libmap::Error("no such moment", {.file = {},
+                                           .field = "--stamp",
+                                           .value = text,
+                                           .bound = "a number of seconds, or fullest"});
+  return stamp;
+}
+
+// One line on a camera that is left out.
+std::string absence(const std::string& name, const RigMoment::Camera& camera) {
+  if (camera.state == State::missing) return name + ": no image";
+  return fmt::format("{}: its nearest image is {:.1f} ms {}", name, std::abs(camera.offset_s) * 1e3,
+                     camera.offset_s > 0 ? "late" : "early");
+}
+
+void report_absent(const libmap::CameraRig& rig, const RigMoment& moment,
+                   const PanoramaCommandOptions& options, Run& run) {
+  if (moment.seen() == 0)
+    throw libmap::Error("no camera saw anything at that moment",
+                        {.file = options.folder,
+                         .field = "--stamp",
+                         .value = libmap::to_text(moment.stamp_s),
+                         .bound = "within --tolerance of an image"});
+  for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
+    if (moment.cameras[n].state == State::seen) continue;
+    const std::string line = absence(rig.cameras[n].name, moment.cameras[n]);
+    if (options.strict) throw libmap::Error(line, {.file = options.folder});
+    run.warn(line);
+  }
+}
+
+void add_results(const libmap::CameraRig& rig, const RigMoment& moment,
+                 const libmap::PanoramaResult& result,
+                 const std::vector<libmap::PanoramaView>& views, libmap::Manifest& manifest) {
+  manifest.frame = "robot";
+  const auto count = [&](const std::string& name, std::size_t value) {
+    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  manifest.results.emplace_back("stamp_s", moment.stamp_s);
+  count("cameras", rig.cameras.size());
+  count("cameras_seen", moment.seen());
+  count("points", result.cloud.size());
+  for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
+    const RigMoment::Camera& camera = moment.cameras[n];
+    const std::string& name = rig.cameras[n].name;
+    const char* state = camera.state == State::seen   ? "seen"
+                        : camera.state == State::late ? "outside the tolerance"
+                                                      : "missing";
+    manifest.results.emplace_back(name + ".state", std::string(state));
+    if (camera.state != State::missing)
+      manifest.results.emplace_back(name + ".offset_s", camera.offset_s);
+  }
+  for (std::size_t n = 0; n < views.size(); ++n) {
+    const libmap::PanoramaCounts& counts = result.views[n];
+    manifest.transforms.emplace_back("robot_from_" + views[n].name,
+                                     views[n].camera.base_from_camera);
+    count(views[n].name + ".points", counts.points);
+    count(views[n].name + ".unmeasured", counts.unmeasured);
+    count(views[n].name + ".too_near", counts.too_near);
+    count(views[n].name + ".too_far", counts.too_far);
+    count(views[n].name + ".flying", counts.flying);
+    count(views[n].name + ".without_ray", counts.without_ray);
+  }
+}
+
+std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
+                                             const std::vector<libmap::RigImage>& images,
+                                             const RigMoment& moment, Run& run) {
+  std::vector<libmap::PanoramaView> views;
+  for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
+    if (moment.cameras[n].state != State::seen) continue;
+    const libmap::RigCamera& camera = rig.cameras[n];
+    const libmap::RigImage& image = images[moment.cameras[n].image];
+    run.add_input(image.file);
+    views.push_back({camera.name, static_cast<int>(n), camera.camera,
+                     libmap::read_rig_depth(image, camera), camera.near_m, camera.far_m});
+  }
+  return views;
+}
+
+void panorama(PanoramaCommandOptions& options, Run& run) {
+  const std::optional<double> stamp = parse_stamp(options.stamp);
+  libmap::require_cloud_format(options.output);
+  run.claim_output(options.output);
+  const fs::path rig_file = options.rig.empty() ? fs::path(options.folder) / libmap::rig_file_name
+                                                : fs::path(options.rig);
+  if (!fs::is_directory(options.folder))
+    throw libmap::Error(fs::exists(options.folder) ? "is no folder" : "no such folder",
+                        {.file = options.folder});
+  const libmap::CameraRig rig = libmap::read_rig(rig_file);
+  run.add_input(rig_file);
+  const std::vector<libmap::RigImage> images = libmap::list_rig_images(options.folder, rig);
+  const std::size_t cameras = rig.cameras.size();
+  const RigMoment moment = stamp
+                               ? libmap::rig_moment_at(images, cameras, *stamp, options.tolerance_s)
+                               : libmap::fullest_rig_moment(images, cameras, options.tolerance_s);
+  report_absent(rig, moment, options, run);
+  const std::vector<libmap::PanoramaView> views =
+      run.timed("read", [&] { return read_views(rig, images, moment, run); });
+  const libmap::PanoramaResult result =
+      run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
+  if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
+  add_results(rig, moment, result, views, run.manifest());
+  run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), moment.seen(),
+                      cameras, libmap::to_text(moment.stamp_s)));
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::write_cloud(temporary, result.cloud);
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  PanoramaCommandOptions options;
+  graspmap_tools::Command command(
+      "panorama", "One cloud in the robot's frame from the depth images of its cameras.");
+  command.input("DIR", options.folder, "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
+  command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
+  command.option("--rig", "FILE", options.rig, "the rig, if it is not DIR/rig.yaml");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { panorama(options, run); });
+}

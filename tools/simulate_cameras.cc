@@ -1,0 +1,146 @@
+// graspmap simulate cameras: what the depth cameras of a robot see from one place.
+#include <fmt/format.h>
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/scan/image_codec.h"
+#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
+#include "libmap/simulate/robot_cameras.h"
+#include "tools/command_line.h"
+#include "tools/simulate_commands.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+
+struct SimulateCamerasOptions {
+  std::string mesh;
+  std::string output;
+  std::string rig = "scar-e";
+  double depth_scale_m = 0.0;
+  // Of the body in the mesh's frame.
+  double x_m = 0.0;
+  double y_m = 0.0;
+  double z_m = 0.25;
+  bool absolute_z = false;
+  double roll_deg = 0.0;
+  double pitch_deg = 0.0;
+  double yaw_deg = 0.0;
+  libmap::RobotCamerasOptions cameras;
+};
+
+void bind(libmap::ParameterTable& table, SimulateCamerasOptions& options) {
+  using libmap::any_number;
+  table.add("rig", options.rig, "robot of the toolkit, or a rig file (.yaml)");
+  table.add("depth_scale_m", options.depth_scale_m, libmap::not_negative,
+            "metres a unit of the images; 0: the rig's own");
+  table.add("x_m", options.x_m, any_number, "place of the robot's body in the mesh's frame, m");
+  table.add("y_m", options.y_m, any_number, "place of the robot's body in the mesh's frame, m");
+  table.add("z_m", options.z_m, any_number, "height of the body above the ground beneath it, m");
+  table.add("absolute_z", options.absolute_z, "z is that of the mesh's frame");
+  table.add("roll_deg", options.roll_deg, any_number, "the body's turn about its x axis, degrees");
+  table.add("pitch_deg", options.pitch_deg, any_number, "about y, degrees; positive: nose down");
+  table.add("yaw_deg", options.yaw_deg, any_number, "about z, degrees");
+  bind(table, options.cameras);
+}
+
+libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
+  const fs::path file = graspmap_tools::find_data_file("rigs", options.rig);
+  libmap::CameraRig rig = libmap::read_rig(file);
+  run.add_input(file);
+  if (options.depth_scale_m > 0)
+    for (libmap::RigCamera& camera : rig.cameras) camera.depth_scale_m = options.depth_scale_m;
+  return rig;
+}
+
+libmap::Pose body_pose(const libmap::TriangleMesh& mesh, const SimulateCamerasOptions& options) {
+  const double ground =
+      options.absolute_z ? 0.0 : libmap::ground_height(mesh, options.x_m, options.y_m);
+  return libmap::make_pose_from_rpy({options.x_m, options.y_m, ground + options.z_m},
+                                    {options.roll_deg, options.pitch_deg, options.yaw_deg});
+}
+
+// One file a camera, whatever its stamp, so that a second run leaves none of the first.
+std::string image_name(const libmap::RigCamera& camera) { return camera.name + ".png"; }
+
+std::string images_table(const libmap::CameraRig& rig,
+                         const std::vector<libmap::RobotCameraImage>& images) {
+  std::string text = "camera,stamp_s,file\n";
+  for (std::size_t i = 0; i < images.size(); ++i)
+    text += fmt::format("{},{},{}\n", rig.cameras[i].name,
+                        libmap::to_fixed_text(images[i].stamp_s, 6), image_name(rig.cameras[i]));
+  return text;
+}
+
+std::vector<std::pair<std::string, Run::Writer>> files_of(
+    const libmap::CameraRig& rig, const std::vector<libmap::RobotCameraImage>& images) {
+  std::vector<std::pair<std::string, Run::Writer>> files;
+  files.emplace_back(libmap::rig_file_name, [&](const fs::path& temporary) {
+    libmap::write_text(temporary, libmap::to_yaml(rig));
+  });
+  files.emplace_back(libmap::rig_images_file_name, [&](const fs::path& temporary) {
+    libmap::write_text(temporary, images_table(rig, images));
+  });
+  for (std::size_t i = 0; i < images.size(); ++i)
+    files.emplace_back(image_name(rig.cameras[i]), [&image = images[i]](const fs::path& temporary) {
+      libmap::write_text(temporary, libmap::encode_png(image.depth));
+    });
+  return files;
+}
+
+void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCameraImage>& images,
+                 Run& run) {
+  std::size_t pixels = 0;
+  std::size_t measured = 0;
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    pixels += images[i].depth.pixels.size();
+    measured += images[i].measurement.measured;
+    if (images[i].measurement.measured == 0)
+      run.warn(fmt::format("{}: nothing within its range", rig.cameras[i].name));
+  }
+  run.manifest().results.emplace_back("cameras", static_cast<std::int64_t>(images.size()));
+  run.manifest().results.emplace_back("pixels", static_cast<std::int64_t>(pixels));
+  run.manifest().results.emplace_back("measured_pixels", static_cast<std::int64_t>(measured));
+  run.say(fmt::format("{} cameras, {:.0f} % of the pixels measured", images.size(),
+                      100.0 * static_cast<double>(measured) / static_cast<double>(pixels)));
+}
+
+void simulate(const SimulateCamerasOptions& options, Run& run) {
+  run.claim_output_folder(options.output);
+  const libmap::CameraRig rig = load_rig(options, run);
+  const libmap::TriangleMesh mesh =
+      run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
+  run.add_input(options.mesh);
+  run.manifest().frame = "robot";
+  try {
+    const libmap::Pose mesh_from_robot = body_pose(mesh, options);
+    run.manifest().transforms.emplace_back("mesh_from_robot", mesh_from_robot);
+    const std::vector<libmap::RobotCameraImage> images = run.timed("cameras", [&] {
+      return libmap::simulate_robot_cameras(mesh, rig, mesh_from_robot, options.cameras);
+    });
+    add_results(rig, images, run);
+    run.write_output_folder(options.output, files_of(rig, images));
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.mesh);
+  }
+}
+
+}  // namespace
+
+int graspmap_tools::simulate_cameras(int argc, char** argv) {
+  SimulateCamerasOptions options;
+  Command command("simulate cameras", "What the depth cameras of a robot see from one place.");
+  command.input("MESH", options.mesh,
+                "where the robot stands (.ply, .obj, .stl, .off, .glb, .vtp)");
+  command.output(options.output, "folder of 16-bit depth images and their rig file");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
+}

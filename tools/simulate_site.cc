@@ -1,0 +1,96 @@
+// graspmap simulate site: test sites with their true mesh and places for a field test.
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/simulate/field_points.h"
+#include "libmap/simulate/rock_site_io.h"
+#include "libmap/simulate/site_mesh.h"
+#include "tools/command_line.h"
+#include "tools/simulate_commands.h"
+
+namespace {
+
+using graspmap_tools::Run;
+
+struct SimulateSiteOptions {
+  std::string output;
+  std::string site = "rocks";
+  std::uint64_t seed = 0;
+  std::uint64_t places = 0;
+  libmap::SiteMeshOptions meshing;
+};
+
+void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
+  using libmap::not_negative;
+  table.add("site", options.site, "site of the toolkit, or a site file");
+  table.add("seed", options.seed, not_negative, "another site of the kind; 0: the site file's own");
+  table.add("edge_length_m", options.meshing.edge_length_m, libmap::positive,
+            "of the mesh, about, m");
+  table.add("closed", options.meshing.closed,
+            "with the sides and base of the ground: a solid's whole surface");
+  table.add("places", options.places, libmap::Range{0.0, 10'000.0},
+            "number of field points; 0: as the site file has it");
+}
+
+libmap::RockSite load(const SimulateSiteOptions& options, const std::filesystem::path& file) {
+  std::optional<std::uint64_t> seed;
+  if (options.seed != 0) seed = options.seed;
+  libmap::RockSite site = libmap::load_site(file, seed);
+  if (options.places != 0) site.field_points.count = static_cast<int>(options.places);
+  if (site.rocks.empty())
+    throw libmap::Error("a site needs at least one rock",
+                        {.file = file.string(), .field = "rocks"});
+  return site;
+}
+
+void simulate(const SimulateSiteOptions& options, Run& run) {
+  const std::string extension = std::filesystem::path(options.output).extension().string();
+  if (extension == ".ply" || extension == ".obj" || extension == ".csv" || extension == ".yaml")
+    throw libmap::Error(
+        "names a file; a site is a folder with mesh.ply, field_points.csv, site.yaml",
+        {.file = options.output});
+  run.claim_output_folder(options.output);
+  const auto file = graspmap_tools::find_data_file("sites", options.site);
+  const libmap::RockSite site = load(options, file);
+  run.add_input(file);
+  run.manifest().frame = "site";
+  const libmap::TriangleMesh mesh =
+      run.timed("meshing", [&] { return libmap::site_mesh(site, options.meshing); });
+  const auto points =
+      run.timed("field points", [&] { return libmap::choose_field_points(site, mesh); });
+  run.manifest().results.emplace_back("rocks", static_cast<std::int64_t>(site.rocks.size()));
+  run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
+  run.manifest().results.emplace_back("triangles",
+                                      static_cast<std::int64_t>(mesh.triangles.size()));
+  run.manifest().results.emplace_back("field_points", static_cast<std::int64_t>(points.size()));
+  run.say(fmt::format("{} rocks, {} triangles, {} field points", site.rocks.size(),
+                      mesh.triangles.size(), points.size()));
+  const std::string table =
+      "# Places chosen by the form of the rocks alone: no field test was made at them.\n" +
+      libmap::to_csv(libmap::field_point_table(site, points));
+  const std::string yaml =
+      "# The site with all that was drawn: graspmap simulate site --site THIS makes it again.\n" +
+      libmap::to_yaml(site);
+  run.write_output_folder(
+      options.output,
+      {{"mesh.ply", [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); }},
+       {"field_points.csv", [&](const auto& temporary) { libmap::write_text(temporary, table); }},
+       {"site.yaml", [&](const auto& temporary) { libmap::write_text(temporary, yaml); }}});
+}
+
+}  // namespace
+
+int graspmap_tools::simulate_site(int argc, char** argv) {
+  SimulateSiteOptions options;
+  Command command("simulate site",
+                  "Test sites of rocks, slopes or climbing holds, with their true surface.");
+  command.output(options.output, "folder: mesh.ply, field_points.csv, site.yaml");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
+}
