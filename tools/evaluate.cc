@@ -98,7 +98,7 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
 void write_results(const EvaluateOptions& options, const TableEvaluation& evaluation, Run& run) {
   const libmap::Chart chart = chart_of(evaluation, options.title);
   const libmap::VirtualDisplay display;
-  const libmap::Image picture =
+  const libmap::ColorImage picture =
       run.timed("draw", [&] { return libmap::draw_chart(chart, libmap::roc_chart_size); });
   const auto text = [](std::string content) {
     return [content = std::move(content)](const fs::path& temporary) {

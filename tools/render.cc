@@ -151,7 +151,7 @@ void render(RenderOptions& options, Run& run) {
         graspmap_tools::parse_vector(options.camera_target, "--camera-target");
   }
   libmap::Scene scene;
-  libmap::Image image;
+  libmap::ColorImage image;
   try {
     scene = run.timed("read", [&] { return read_scene(options, run); });
     image = run.timed("render", [&] { return libmap::render_scene(scene, options.view); });

@@ -313,20 +313,17 @@ std::string description(const Chart& chart) {
   return text;
 }
 
-Image image_of(vtkRenderWindow* window) {
+ColorImage image_of(vtkRenderWindow* window) {
   vtkNew<vtkWindowToImageFilter> filter;
   filter->SetInput(window);
   filter->SetInputBufferTypeToRGB();
   filter->ReadFrontBufferOff();
   filter->Update();
   vtkImageData* pixels = filter->GetOutput();
-  Image image;
-  image.width = pixels->GetDimensions()[0];
-  image.height = pixels->GetDimensions()[1];
+  ColorImage image(pixels->GetDimensions()[0], pixels->GetDimensions()[1]);
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
-  image.rgb.resize(row_bytes * static_cast<std::size_t>(image.height));
   for (int row = 0; row < image.height; ++row)  // VTK's rows begin at the bottom
-    std::memcpy(image.rgb.data() + row_bytes * static_cast<std::size_t>(row),
+    std::memcpy(image.pixels.data() + image.index(0, row),
                 pixels->GetScalarPointer(0, image.height - 1 - row, 0), row_bytes);
   return image;
 }
@@ -400,7 +397,7 @@ void Chart::check() const {
   }
 }
 
-Image draw_chart(const Chart& chart, const ChartSize& size) {
+ColorImage draw_chart(const Chart& chart, const ChartSize& size) {
   return image_of(ChartView(chart, size).render());
 }
 

@@ -59,7 +59,7 @@ struct ChartSize {
   int height_px = 700;
 };
 
-Image draw_chart(const Chart& chart, const ChartSize& size = {});
+ColorImage draw_chart(const Chart& chart, const ChartSize& size = {});
 
 void write_chart_svg(const std::filesystem::path& path, const Chart& chart,
                      const ChartSize& size = {});

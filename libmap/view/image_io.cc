@@ -13,22 +13,22 @@
 namespace libmap {
 namespace {
 
-void check(const Image& image) {
+void check(const ColorImage& image) {
   if (image.width <= 0 || image.height <= 0)
     throw Error("an image without pixels cannot be written");
-  const std::size_t bytes =
-      3 * static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
-  if (image.rgb.size() != bytes)
-    throw Error("the image's bytes do not fit its size",
+  const std::size_t pixels =
+      static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
+  if (image.pixels.size() != pixels)
+    throw Error("the image's pixels do not fit its size",
                 {.file = {},
-                 .field = "rgb",
-                 .value = std::to_string(image.rgb.size()) + " bytes",
-                 .bound = std::to_string(bytes)});
+                 .field = "pixels",
+                 .value = std::to_string(image.pixels.size()),
+                 .bound = std::to_string(pixels)});
 }
 
 }  // namespace
 
-std::string to_png(const Image& image) {
+std::string to_png(const ColorImage& image) {
   check(image);
   vtkNew<vtkImageData> pixels;
   pixels->SetDimensions(image.width, image.height, 1);
@@ -39,7 +39,7 @@ std::string to_png(const Image& image) {
   for (int row = 0; row < image.height; ++row) {
     const auto from = static_cast<std::size_t>(image.height - 1 - row);
     std::memcpy(target + static_cast<std::size_t>(row) * row_bytes,
-                image.rgb.data() + from * row_bytes, row_bytes);
+                image.pixels.data() + from * static_cast<std::size_t>(image.width), row_bytes);
   }
   vtkNew<vtkPNGWriter> writer;
   writer->SetInputData(pixels);
@@ -52,7 +52,7 @@ std::string to_png(const Image& image) {
           static_cast<std::size_t>(bytes->GetNumberOfValues())};
 }
 
-void write_png(const std::filesystem::path& path, const Image& image) {
+void write_png(const std::filesystem::path& path, const ColorImage& image) {
   write_whole_file(path, to_png(image));
 }
 

@@ -220,24 +220,23 @@ Overlay overlay_of(const Setup& setup, const SceneViewOptions& options) {
   return overlay;
 }
 
-Image pixels_of(vtkRenderWindow& window, int width, int height) {
-  Image image{.width = width, .height = height, .rgb = {}};
+ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
+  ColorImage image(width, height);
   vtkNew<vtkUnsignedCharArray> pixels;
   window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels);
   const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
   const std::size_t bytes = row_bytes * static_cast<std::size_t>(height);
   if (static_cast<std::size_t>(pixels->GetNumberOfValues()) != bytes)
     throw Error("the picture could not be read back from OpenGL", {}, ErrorKind::failed);
-  image.rgb.resize(bytes);
   // OpenGL's rows begin at the bottom.
   for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row)
-    std::memcpy(image.rgb.data() + row * row_bytes,
+    std::memcpy(image.pixels.data() + row * static_cast<std::size_t>(width),
                 pixels->GetPointer(0) + (static_cast<std::size_t>(height) - 1 - row) * row_bytes,
                 row_bytes);
   return image;
 }
 
-Image draw(const Setup& setup, const SceneViewOptions& options) {
+ColorImage draw(const Setup& setup, const SceneViewOptions& options) {
   vtkNew<vtkRenderWindow> window;
   window->OffScreenRenderingOn();
   window->ShowWindowOff();
@@ -287,14 +286,14 @@ std::vector<std::pair<std::string, Shading>> shading_names() {
   return {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}};
 }
 
-Image render_scene(const Scene& scene, const SceneViewOptions& options) {
+ColorImage render_scene(const Scene& scene, const SceneViewOptions& options) {
   const Setup setup = set_up(scene, options);
   // VTK's rendering and the environment are for one thread at a time.
   static std::mutex one_at_a_time;
   const std::scoped_lock lock(one_at_a_time);
   const VirtualDisplay display;
   const QuietScope quiet;
-  Image image = draw(setup, options);
+  ColorImage image = draw(setup, options);
   if (!quiet.first_error().empty()) {
     std::string reason = quiet.first_error();
     std::replace(reason.begin(), reason.end(), '\n', ' ');

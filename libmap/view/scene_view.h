@@ -74,7 +74,7 @@ struct SceneViewOptions {
 // only one. Calls from several threads are run one after the other.
 // Throws Error: no point to draw, a size or colour or camera that cannot be, a layer whose arrays
 // do not fit each other, and what color_points throws; (failed) if no picture can be drawn here.
-Image render_scene(const Scene& scene, const SceneViewOptions& options);
+ColorImage render_scene(const Scene& scene, const SceneViewOptions& options);
 
 // The part of the picture that shows the scene, and the camera that does: where a point falls is
 // camera.pixel_of(terrain_from_scene * point). Needs no display.

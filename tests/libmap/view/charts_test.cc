@@ -23,7 +23,7 @@ using libmap::ChartCurve;
 using libmap::ChartHistogram;
 using libmap::ChartSize;
 using libmap::Color;
-using libmap::Image;
+using libmap::ColorImage;
 using testing::HasSubstr;
 
 constexpr double nan_value = std::numeric_limits<double>::quiet_NaN();
@@ -53,7 +53,7 @@ struct Box {
 };
 
 // Where that very color is.
-Box find_color(const Image& image, const Color& color) {
+Box find_color(const ColorImage& image, const Color& color) {
   Box box;
   for (int y = 0; y < image.height; ++y) {
     for (int x = 0; x < image.width; ++x) {
@@ -147,7 +147,7 @@ TEST_F(Charts, LinesLieWhereTheirNumbersSay) {
   Chart chart = unit_chart();
   chart.curves = {curve_of({0.2, 0.6}, {0.25, 0.25}, red), curve_of({0.2, 0.6}, {0.5, 0.5}, green),
                   curve_of({0.4, 0.8}, {0.75, 0.75}, blue)};
-  const Image image = libmap::draw_chart(chart, {800, 600});
+  const ColorImage image = libmap::draw_chart(chart, {800, 600});
   ASSERT_EQ(image.width, 800);
   ASSERT_EQ(image.height, 600);
   EXPECT_EQ(image.at(0, 0), (Color{255, 255, 255}));
@@ -264,10 +264,10 @@ TEST_F(Charts, NumbersDoNotDependOnTheLocale) {
   Chart large;
   large.histograms = {histogram};
   const std::string plain = svg_of(chart).text + svg_of(large, {1500, 1500}).text;
-  const Image image = libmap::draw_chart(chart);
+  const ColorImage image = libmap::draw_chart(chart);
   const std::locale before = std::locale::global(std::locale(std::locale(), new Comma));
   const std::string comma = svg_of(chart).text + svg_of(large, {1500, 1500}).text;
-  const Image comma_image = libmap::draw_chart(chart);
+  const ColorImage comma_image = libmap::draw_chart(chart);
   std::locale::global(before);
   EXPECT_TRUE(comma == plain);
   EXPECT_TRUE(comma_image == image);
@@ -297,7 +297,7 @@ TEST_F(Charts, HistogramBarsStandOnZeroAndTouch) {
     }
   }
   // Filled: the pale blue between the outlines.
-  const Image image = libmap::draw_chart(chart);
+  const ColorImage image = libmap::draw_chart(chart);
   const Color inside =
       image.at(static_cast<int>(outline[1].x) + 20, static_cast<int>(zero - unit * 1.5) + 7);
   EXPECT_LT(inside[0], 200);

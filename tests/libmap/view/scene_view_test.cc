@@ -46,11 +46,11 @@ SceneViewOptions bare(int width, int height, Viewpoint view = Viewpoint::top) {
   return options;
 }
 
-Color color_at(const Image& image, const Eigen::Vector2d& pixel) {
+Color color_at(const ColorImage& image, const Eigen::Vector2d& pixel) {
   return image.at(static_cast<int>(pixel.x()), static_cast<int>(pixel.y()));
 }
 
-std::size_t count(const Image& image, const Color& color) {
+std::size_t count(const ColorImage& image, const Color& color) {
   std::size_t found = 0;
   for (int y = 0; y < image.height; ++y)
     for (int x = 0; x < image.width; ++x) found += image.at(x, y) == color ? 1 : 0;
@@ -72,7 +72,7 @@ TEST_F(SceneViewTest, ASquareIsWhereItShouldBeAndAsLarge) {
       colored_points({{-1, -1, 0}, {1, 1, 0}, {0, 0, 0}}, {blue, green, red}, 0.2));
   scene.layers[0].point_shape = PointShape::square;
   const SceneViewOptions options = bare(440, 440);
-  const Image image = render_scene(scene, options);
+  const ColorImage image = render_scene(scene, options);
   EXPECT_NEAR(camera_of(scene, options).scale_px, 180.0, 1e-9);
   for (int offset = -18 + 1; offset < 18 - 1; ++offset) {
     EXPECT_EQ(image.at(220 + offset, 220), red) << offset;
@@ -104,7 +104,7 @@ TEST_F(SceneViewTest, EveryViewShowsThePointsWhereItsCameraSays) {
     options.title = name;
     options.view = view;
     options.camera.position = {-1, -7, 3};
-    const Image image = render_scene(scene, options);
+    const ColorImage image = render_scene(scene, options);
     const SceneCamera camera = camera_of(scene, options);
     int seen = 0;
     for (std::size_t i = 0; i < positions.size(); ++i)
@@ -119,7 +119,7 @@ TEST_F(SceneViewTest, TopViewShowsTheHighest) {
   scene.layers.push_back(colored_points({{0, 0, 0}, {0, 0, 1}, {0, 0, 0.5}, {1, 0, 0}},
                                         {blue, red, green, blue}, 0.2));
   const SceneViewOptions options = bare(200, 200);
-  const Image image = render_scene(scene, options);
+  const ColorImage image = render_scene(scene, options);
   EXPECT_EQ(color_at(image, camera_of(scene, options).pixel_of({0, 0, 0})), red);
 }
 
@@ -138,7 +138,7 @@ TEST_F(SceneViewTest, ScoresHaveTheColoursOfTheLegendExactly) {
   scene.layers.push_back(layer);
   SceneViewOptions options = bare(400, 300);
   options.legend = true;
-  const Image image = render_scene(scene, options);
+  const ColorImage image = render_scene(scene, options);
   const SceneCamera camera = camera_of(scene, options);
   for (std::size_t i = 0; i < cloud.size(); ++i) {
     const Color expected = i < scores.size() ? score_color(scores[i]) : below_plane_color;
@@ -166,7 +166,7 @@ TEST_F(SceneViewTest, ALatticeIsDrawnWithoutGaps) {
   layer.coloring.mode = ColorMode::own;
   scene.layers.push_back(layer);
   const SceneViewOptions options = bare(437, 391);
-  const Image image = render_scene(scene, options);
+  const ColorImage image = render_scene(scene, options);
   const SceneCamera camera = camera_of(scene, options);
   const Eigen::Vector2d low = camera.pixel_of({0, 0.59, 0});
   const Eigen::Vector2d high = camera.pixel_of({0.59, 0, 0});
@@ -191,7 +191,7 @@ TEST_F(SceneViewTest, EmptyCellsOfAMapAreClosed) {
   layer.coloring.mode = ColorMode::own;
   scene.layers.push_back(layer);
   const SceneViewOptions options = bare(600, 600);
-  const Image image = render_scene(scene, options);
+  const ColorImage image = render_scene(scene, options);
   const SceneCamera camera = camera_of(scene, options);
   for (std::size_t i = 0; i < cloud.size(); ++i)
     for (const double offset : {-0.0035, 0.0035})
@@ -217,7 +217,7 @@ TEST_F(SceneViewTest, AMeshIsFilledAndShadedUnlessToldNotTo) {
   Scene scene;
   scene.layers.push_back(layer);
   const SceneViewOptions options = bare(300, 300);
-  const Image flat = render_scene(scene, options);
+  const ColorImage flat = render_scene(scene, options);
   const SceneCamera camera = camera_of(scene, options);
   for (const double x : {0.05, 0.3, 0.6, 0.95})
     for (const double y : {0.06, 0.31, 0.7, 0.94})
@@ -234,7 +234,7 @@ TEST_F(SceneViewTest, MarkersLieOverTheTerrainAndTakeTheirVerdictsColour) {
                    {{-0.5, 0.5, 0}, "P2", Verdict::fail},
                    {{0.5, -0.5, 0}, "", Verdict::none}};
   SceneViewOptions options = bare(600, 600);
-  const Image image = render_scene(scene, options);
+  const ColorImage image = render_scene(scene, options);
   const SceneCamera camera = camera_of(scene, options);
   EXPECT_EQ(color_at(image, camera.pixel_of({0, 0, 0})), (Color{0, 140, 50}));
   EXPECT_EQ(color_at(image, camera.pixel_of({-0.5, 0.5, 0})), (Color{205, 20, 20}));
@@ -275,8 +275,8 @@ TEST_F(SceneViewTest, AnySizeGivesAPictureWithTheScene) {
     options.width = width;
     options.height = height;
     options.title = "A title that is much too long for a picture of this width, whatever it is";
-    const Image image = render_scene(scene, options);
-    EXPECT_EQ(image.rgb.size(), 3U * static_cast<unsigned>(width) * static_cast<unsigned>(height));
+    const ColorImage image = render_scene(scene, options);
+    EXPECT_EQ(image.pixels.size(), static_cast<unsigned>(width) * static_cast<unsigned>(height));
     if (width > 1) {
       EXPECT_EQ(color_at(image, camera_of(scene, options).pixel_of({1, 1, 0})), score_color(1.0))
           << width << " x " << height;
@@ -320,12 +320,17 @@ TEST_F(SceneViewTest, RefusesSizesAndColoursThatCannotBe) {
 }
 
 TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
-  const Image image{.width = 2, .height = 1, .rgb = {255, 0, 0, 0, 0, 255}};
+  ColorImage image(2, 1);
+  image.pixels = {{255, 0, 0}, {0, 0, 255}};
   EXPECT_EQ(image.at(1, 0), blue);
   const auto path = graspmap_test::scratch_folder() / "two.png";
   write_png(path, image);
   EXPECT_EQ(graspmap_test::read_text(path), to_png(image));
-  error_of([] { to_png({.width = 2, .height = 2, .rgb = {1, 2, 3}}); });
+  error_of([] {
+    libmap::ColorImage broken(2, 2);
+    broken.pixels.pop_back();
+    to_png(broken);
+  });
   error_of([] { to_png({}); });
 }
 

@@ -26,7 +26,7 @@ std::string variable(const char* name) {
   return value != nullptr ? value : "(unset)";
 }
 
-Image small_picture() {
+ColorImage small_picture() {
   Scene scene;
   PointCloud cloud;
   cloud.positions = {{0, 0, 0}, {1, 1, 0}};
@@ -62,7 +62,7 @@ TEST_F(VirtualDisplayTest, ADisplayThatAnswersIsUsed) {
     const VirtualDisplay inner;
     EXPECT_FALSE(inner.started());
     EXPECT_EQ(variable("DISPLAY"), name);
-    EXPECT_EQ(small_picture().rgb.size(), 3U * 64 * 64);
+    EXPECT_EQ(small_picture().pixels.size(), 64U * 64);
   }
   EXPECT_EQ(variable("DISPLAY"), name);
   EXPECT_TRUE(runs(outer.process_id()));
@@ -79,7 +79,7 @@ TEST_F(VirtualDisplayTest, ADeadDisplayIsReplacedAndRestored) {
 }
 
 TEST_F(VirtualDisplayTest, DrawsOneAfterTheOtherWithServersOfTheirOwn) {
-  const Image first = small_picture();
+  const ColorImage first = small_picture();
   EXPECT_EQ(small_picture(), first);
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   // No child is left behind, neither running nor as a zombie.
