@@ -20,7 +20,7 @@ struct CommandEntry {
 };
 
 constexpr CommandEntry commands[] = {
-    {"simulate", "scenes of primitive shapes with their closed-form truth"},
+    {"simulate", "scenes, rock sites, scans and robot cameras whose truth is known"},
     {"calibrate", "a camera's intrinsics and distortion by pictures of a chessboard"},
     {"extract", "colour, depth, calibrations, poses and links of a scan as plain files"},
     {"fuse", "the depth images of a scan -> one oriented, coloured cloud"},
@@ -32,7 +32,7 @@ constexpr CommandEntry commands[] = {
     {"render", "a picture of a cloud, a mesh or a map"},
     {"mask", "a gripper's mask as text, cloud or picture data"},
     {"compare", "how far a cloud lies from a true surface, and how much of it the cloud covers"},
-    {"info", "what a cloud, a mesh or a map holds"},
+    {"info", "what a scan, a cloud, a mesh or a map holds"},
     {"convert", "any format to any other"},
 };
 
