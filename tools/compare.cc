@@ -85,16 +85,15 @@ bool is_inside(const std::optional<libmap::Bounds3d>& box, const Eigen::Vector3d
          ((point.array() >= box->min.array()).all() && (point.array() <= box->max.array()).all());
 }
 
-libmap::PointCloud cloud_in_box(const CompareOptions& options,
-                                const std::optional<libmap::Bounds3d>& box) {
-  const libmap::PointCloud cloud = libmap::transform_cloud(libmap::read_cloud(options.cloud).cloud,
-                                                           mesh_from_cloud(options.transform));
+libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
+                               const std::optional<libmap::Bounds3d>& box,
+                               const std::string& file) {
   std::vector<std::size_t> inside;
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (is_inside(box, cloud.positions[n])) inside.push_back(n);
   if (inside.empty())
     throw libmap::Error(cloud.empty() ? "the cloud has no points" : "no point lies in the box",
-                        {.file = options.cloud});
+                        {.file = file});
   return libmap::select_points(cloud, inside);
 }
 
@@ -104,6 +103,7 @@ struct Comparison {
   double completeness = 0.0;
 };
 
+// Of the surface in the box, by all of the cloud: points just outside cover its border.
 double completeness_of(const libmap::TriangleMesh& mesh, const libmap::PointCloud& cloud,
                        const std::optional<libmap::Bounds3d>& box, const CompareOptions& options,
                        std::size_t& samples) {
@@ -158,14 +158,16 @@ void compare(const CompareOptions& options, Run& run) {
     libmap::require_cloud_format(options.output);
     run.claim_output(options.output, {options.cloud, options.mesh});
   }
-  libmap::PointCloud cloud = cloud_in_box(options, box);
+  const libmap::PointCloud whole = libmap::transform_cloud(libmap::read_cloud(options.cloud).cloud,
+                                                           mesh_from_cloud(options.transform));
+  libmap::PointCloud cloud = part_in_box(whole, box, options.cloud);
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   std::vector<double> distances =
       run.timed("distances", [&] { return libmap::distances_to_surface(cloud.positions, mesh); });
   Comparison comparison;
   comparison.distances = libmap::distance_statistics(distances);
   comparison.completeness = run.timed("completeness", [&] {
-    return completeness_of(mesh, cloud, box, options, comparison.samples);
+    return completeness_of(mesh, whole, box, options, comparison.samples);
   });
   print(comparison, options);
   if (options.output.empty()) return;

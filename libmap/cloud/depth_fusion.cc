@@ -32,7 +32,6 @@ void require(double value, const Range& range, const char* field) {
 }
 
 constexpr Range radius_range{1, 7};
-constexpr Range pairs_range{2, 60};
 constexpr Range incidence_range{0, 89.5, true, false};
 
 void check(const DepthFusionOptions& options) {
@@ -46,7 +45,7 @@ void check(const DepthFusionOptions& options) {
   require(options.planes.noise.axial_of_range, not_negative, "range_noise");
   require(options.planes.noise.lateral_px, not_negative, "lateral_noise_px");
   require(options.planes.radius_px, radius_range, "plane_radius_px");
-  require(options.planes.min_pairs, pairs_range, "min_pairs");
+  require(options.planes.min_pair_share, zero_to_one, "min_pair_share");
   require(options.planes.max_incidence_deg, incidence_range, "max_incidence_deg");
   require(options.disc_radius_voxels, positive, "disc_radius_voxels");
   require(options.pose_error_m, not_negative, "pose_error_m");
@@ -322,8 +321,8 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "standard deviation across the line of sight");
   table.add("plane_radius_px", planes.radius_px, radius_range,
             "disc of pixels that a plane is fitted to");
-  table.add("min_pairs", planes.min_pairs, pairs_range,
-            "pairs of opposite pixels around a pixel that must lie on its surface");
+  table.add("min_pair_share", planes.min_pair_share, zero_to_one,
+            "share of the pairs of opposite pixels around a pixel that must agree with it");
   table.add("disc_radius_voxels", options.disc_radius_voxels, positive,
             "disc of the surface whose measurements make a point");
   table.add("pose_error_m", options.pose_error_m, not_negative,

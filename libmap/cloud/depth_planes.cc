@@ -176,7 +176,7 @@ InversePlanes PlaneFit::fit_pairs() const {
                        std::vector<float>(size_), std::vector<std::uint8_t>(size_)};
   const std::vector<Offset> offsets = pair_offsets();
   const auto min_pairs =
-      std::min(static_cast<float>(options_.min_pairs), static_cast<float>(offsets.size()));
+      static_cast<float>(options_.min_pair_share * static_cast<double>(offsets.size()));
   for (int y = 0; y < height_; ++y)
     for (int first = 0; first < width_; first += 4) {
       const PairSums sums = sum_pairs(first, y, offsets);

@@ -20,8 +20,8 @@ struct DepthPlaneOptions {
   double min_depth_m = 0.1;
   double max_depth_m = 4.0;
   DepthNoise noise{};
-  int radius_px = 2;                // 1 to 7: of the disc of pixels that a plane is fitted to
-  int min_pairs = 6;                // of opposite pixels that must agree with the one between them
+  int radius_px = 3;                // 1 to 7: of the disc of pixels that a plane is fitted to
+  double min_pair_share = 0.5;      // of the pairs of opposite pixels in it that must agree
   double max_incidence_deg = 85.0;  // between line of sight and normal: more is grazing
 };
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <tuple>
 #include <utility>
 #include <vector>
 
@@ -15,9 +16,11 @@ namespace libmap {
 namespace {
 
 // Beyond an edge a surface is believed as far as it goes on straight: in voxels along the normal.
-constexpr double max_extended_shift = 0.4;
+constexpr double max_extended_shift = 0.5;
 // Part of its neighbour's uncertainty below which a point makes the neighbour an echo.
 constexpr float echo_certainty = 0.5F;
+// Voxels along the normal within which points of two voxels are the same.
+constexpr double max_echo_distance = 0.5;
 constexpr double normal_radius_voxels = 2.0;
 
 // Points that share a voxel, weighted by their certainty.
@@ -59,6 +62,7 @@ class PointMaker {
  private:
   bool is_confirmed(const SurfaceElement& element, const RefinedElement& refined);
   void merge(const SurfaceElement& element, const RefinedElement& refined);
+  bool is_echo(std::size_t point, std::size_t other, int axis) const;
   void drop_echoes();
   SurfacePoints make_cloud();
 
@@ -113,30 +117,37 @@ void PointMaker::merge(const SurfaceElement& element, const RefinedElement& refi
   point.frames = std::max(point.frames, refined.frames);
 }
 
-// A point of a voxel next to a much more certain one, before or behind it, is what noise or a pose
-// error has left of the same surface.
+// Whether `other`, in a voxel before or behind that of `point`, makes it one point too many: noise,
+// a pose error or a surface on the border of two voxels has left two of the same place.
+bool PointMaker::is_echo(std::size_t point, std::size_t other, int axis) const {
+  const MergedPoint& one = points_[point];
+  const MergedPoint& two = points_[other];
+  if (two.normal.dot(one.normal) <= 0.0F || (two.extended && !one.extended)) return false;
+  if (!two.extended && two.expected_error_m < echo_certainty * one.expected_error_m) return true;
+  const float apart = std::abs(two.position[axis] / two.weight - one.position[axis] / one.weight);
+  if (static_cast<double>(apart) > max_echo_distance * options_.voxel_size_m) return false;
+  return std::tuple(two.extended, two.expected_error_m, other) <
+         std::tuple(one.extended, one.expected_error_m, point);
+}
+
 void PointMaker::drop_echoes() {
-  std::vector<char> is_echo(points_.size(), 0);
+  std::vector<char> is_surplus(points_.size(), 0);
   parallel_for(points_.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      const MergedPoint& point = points_[n];
       VoxelPlace place = unpack(index_.keys()[n]);
       int axis = 2;
-      point.normal.cwiseAbs().maxCoeff(&axis);
+      points_[n].normal.cwiseAbs().maxCoeff(&axis);
       place.cell[axis] -= 1;
       for (int step = 0; step < 2; ++step, place.cell[axis] += 2)
         for (place.side = 0; place.side < 2; ++place.side) {
           const std::uint32_t other = index_.find(pack(place));
-          if (other == VoxelIndex::none || points_[other].extended) continue;
-          if (points_[other].normal.dot(point.normal) > 0.0F &&
-              points_[other].expected_error_m < echo_certainty * point.expected_error_m)
-            is_echo[n] = 1;
+          if (other != VoxelIndex::none && is_echo(n, other, axis)) is_surplus[n] = 1;
         }
     }
   });
   std::size_t kept = 0;
   for (std::size_t n = 0; n < points_.size(); ++n) {
-    if (is_echo[n] != 0)
+    if (is_surplus[n] != 0)
       ++counts_.merged;
     else
       points_[kept++] = points_[n];

@@ -116,6 +116,9 @@ void SurfaceVoxels::merge_frame(const SurfaceVoxels& frame) {
 
 namespace {
 
+// Voxels within which two pieces of a column are one surface, spread by noise.
+constexpr float one_surface = 1.0F;
+
 // The surface of one voxel, seen along its column.
 struct Piece {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
@@ -195,13 +198,17 @@ class ElementMaker {
   bool speaks_for_column(std::size_t n) const {
     const Piece& piece = pieces_[n];
     const VoxelPlace place = unpack(key_of(n));
-    const int height = static_cast<int>(std::floor(piece.height));
-    if (height == place.cell[piece.axis]) return true;
-    const auto other = piece_at(place.cell, piece.axis, height, piece.normal);
-    if (!other) return true;
-    const float own = voxels_.sums()[n].weight;
-    const float others = voxels_.sums()[*other].weight;
-    return own > others || (own == others && key_of(n) < key_of(*other));
+    const int cell = place.cell[piece.axis];
+    for (const int beside : {cell - 1, cell + 1}) {
+      const auto other = piece_at(place.cell, piece.axis, beside, piece.normal);
+      if (!other || pieces_[*other].axis != piece.axis ||
+          std::abs(pieces_[*other].height - piece.height) > one_surface)
+        continue;
+      const float own = voxels_.sums()[n].weight;
+      const float others = voxels_.sums()[*other].weight;
+      if (others > own || (others == own && key_of(*other) < key_of(n))) return false;
+    }
+    return true;
   }
 
   // Where a piece goes on in the column beside it.

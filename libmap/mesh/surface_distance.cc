@@ -125,10 +125,33 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
   return {search.best + scene_->centre, search.triangle, search.distance};
 }
 
+namespace {
+
+Eigen::Vector3d nearest_on_segment(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                                   const Eigen::Vector3d& b) {
+  const double square = (b - a).squaredNorm();
+  if (!(square > 0.0)) return a;
+  return a + std::clamp((point - a).dot(b - a) / square, 0.0, 1.0) * (b - a);
+}
+
+// Of a triangle without area: of its sides.
+Eigen::Vector3d nearest_on_sides(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
+                                 const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
+  Eigen::Vector3d nearest = nearest_on_segment(point, a, b);
+  for (const Eigen::Vector3d& other :
+       {nearest_on_segment(point, b, c), nearest_on_segment(point, c, a)})
+    if ((other - point).squaredNorm() < (nearest - point).squaredNorm()) nearest = other;
+  return nearest;
+}
+
+}  // namespace
+
 Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                                     const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
   const Eigen::Vector3d ab = b - a;
   const Eigen::Vector3d ac = c - a;
+  if (!(ab.cross(ac).squaredNorm() > 1e-24 * ab.squaredNorm() * ac.squaredNorm()))
+    return nearest_on_sides(point, a, b, c);
   const Eigen::Vector3d ap = point - a;
   const double d1 = ab.dot(ap);
   const double d2 = ac.dot(ap);
@@ -142,14 +165,13 @@ Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::V
   const double d6 = ac.dot(cp);
   if (d6 >= 0.0 && d5 <= d6) return c;
   const double of_c = d1 * d4 - d3 * d2;
-  if (of_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return d1 == d3 ? a : a + d1 / (d1 - d3) * ab;
+  if (of_c <= 0.0 && d1 >= 0.0 && d3 <= 0.0) return a + d1 / (d1 - d3) * ab;
   const double of_b = d5 * d2 - d1 * d6;
-  if (of_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return d2 == d6 ? a : a + d2 / (d2 - d6) * ac;
+  if (of_b <= 0.0 && d2 >= 0.0 && d6 <= 0.0) return a + d2 / (d2 - d6) * ac;
   const double of_a = d3 * d6 - d5 * d4;
   const double along = d4 - d3;
   const double back = d5 - d6;
-  if (of_a <= 0.0 && along >= 0.0 && back >= 0.0)
-    return along + back == 0.0 ? b : b + along / (along + back) * (c - b);
+  if (of_a <= 0.0 && along >= 0.0 && back >= 0.0) return b + along / (along + back) * (c - b);
   const double scale = 1.0 / (of_a + of_b + of_c);
   return a + of_b * scale * ab + of_c * scale * ac;
 }

@@ -80,7 +80,7 @@ SurfaceVoxels thick_plane(const Eigen::Vector3f& normal, int half) {
     Eigen::Vector3f place(static_cast<float>(uniform(-half, half)),
                           static_cast<float>(uniform(-half, half)), 0);
     place.z() = -(normal.x() * place.x() + normal.y() * place.y()) / normal.z();
-    voxels.add(place + static_cast<float>(uniform(-0.7, 0.7)) * normal, normal, 1.0F);
+    voxels.add(place + static_cast<float>(uniform(-0.4, 0.4)) * normal, normal, 1.0F);
   }
   return voxels;
 }
@@ -92,7 +92,7 @@ TEST(SurfaceVoxels, OneElementAColumn) {
   std::map<std::pair<int, int>, int> columns;
   for (const SurfaceElement& element : elements) {
     EXPECT_FALSE(element.extended);
-    EXPECT_NEAR(element.position.dot(normal), 0, 0.6) << "nearer than the noise is wide";
+    EXPECT_NEAR(element.position.dot(normal), 0, 0.4) << "nearer than the noise is wide";
     EXPECT_FLOAT_EQ(element.position.x() - std::floor(element.position.x()), 0.5F);
     ++columns[{static_cast<int>(std::floor(element.position.x())),
                static_cast<int>(std::floor(element.position.y()))}];
@@ -119,7 +119,9 @@ TEST(SurfaceVoxels, EdgesReachOneVoxelFurther) {
     const int y = static_cast<int>(std::floor(element.position.y()));
     const bool is_outside = x < 0 || y < 0 || x > 4 || y > 4;
     EXPECT_EQ(element.extended, is_outside) << x << " " << y;
-    if (is_outside) EXPECT_TRUE(beyond.insert({x, y}).second) << "twice";
+    if (is_outside) {
+      EXPECT_TRUE(beyond.insert({x, y}).second) << "twice";
+    }
   }
   EXPECT_EQ(beyond.size(), 20U) << "four sides of five, no corners";
 }

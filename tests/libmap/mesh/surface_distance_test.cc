@@ -1,0 +1,211 @@
+#include "libmap/mesh/surface_distance.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <limits>
+
+#include "libmap/core/parallel.h"
+#include "tests/support/test_support.h"
+
+namespace libmap {
+namespace {
+
+using graspmap_test::error_of;
+using graspmap_test::uniform;
+using ::testing::HasSubstr;
+
+// A bumpy square of 2 m about `centre`, (n - 1)^2 * 2 triangles.
+TriangleMesh bumpy(std::uint32_t n, const Eigen::Vector3d& centre = Eigen::Vector3d::Zero()) {
+  TriangleMesh mesh;
+  for (std::uint32_t y = 0; y < n; ++y)
+    for (std::uint32_t x = 0; x < n; ++x) {
+      const double u = 2.0 * x / (n - 1) - 1;
+      const double v = 2.0 * y / (n - 1) - 1;
+      mesh.vertices.push_back(centre +
+                              Eigen::Vector3d(u, v, 0.2 * std::sin(5 * u) * std::cos(4 * v)));
+    }
+  for (std::uint32_t y = 0; y + 1 < n; ++y)
+    for (std::uint32_t x = 0; x + 1 < n; ++x) {
+      const std::uint32_t a = y * n + x;
+      mesh.triangles.push_back({a, a + 1, a + n});
+      mesh.triangles.push_back({a + 1, a + n + 1, a + n});
+    }
+  return mesh;
+}
+
+TriangleMesh unit_square() {
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {1, 1, 0}, {0, 1, 0}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}};
+  return mesh;
+}
+
+Eigen::Vector3d random_point(double half) {
+  return {uniform(-half, half), uniform(-half, half), uniform(-half, half)};
+}
+
+TEST(SurfaceDistance, FacesEdgesAndCornersInClosedForm) {
+  const SurfaceDistance surface(unit_square());
+  EXPECT_DOUBLE_EQ(surface.nearest({0.3, 0.6, -0.25}).distance_m, 0.25);
+  EXPECT_DOUBLE_EQ(surface.nearest({0.3, -0.3, 0.4}).distance_m, 0.5);
+  EXPECT_DOUBLE_EQ(surface.nearest({3, 3, 1}).distance_m, 3);
+  EXPECT_EQ(surface.nearest({3, 3, 1}).position, Eigen::Vector3d(1, 1, 0));
+  EXPECT_DOUBLE_EQ(surface.nearest({0.5, 0.5, 0}).distance_m, 0);
+  EXPECT_EQ(surface.nearest({0.9, 0.1, 0.1}).triangle, 0U);
+  EXPECT_EQ(surface.nearest({0.1, 0.9, 0.1}).triangle, 1U);
+}
+
+TEST(SurfaceDistance, NearestOnATriangleIsNoFurtherThanAnyOfItsPoints) {
+  for (int round = 0; round < 300; ++round) {
+    const Eigen::Vector3d a = random_point(1);
+    const Eigen::Vector3d b = random_point(1);
+    const Eigen::Vector3d c = random_point(1);
+    const Eigen::Vector3d point = random_point(2);
+    const Eigen::Vector3d nearest = nearest_on_triangle(point, a, b, c);
+    // It lies in the triangle: its parts add up to the whole.
+    const double whole = (b - a).cross(c - a).norm();
+    const double parts = (a - nearest).cross(b - nearest).norm() +
+                         (b - nearest).cross(c - nearest).norm() +
+                         (c - nearest).cross(a - nearest).norm();
+    ASSERT_NEAR(parts, whole, 1e-9);
+    double best = std::numeric_limits<double>::infinity();
+    for (int i = 0; i <= 40; ++i)
+      for (int j = 0; i + j <= 40; ++j)
+        best = std::min(best, (a + i / 40.0 * (b - a) + j / 40.0 * (c - a) - point).norm());
+    ASSERT_LE((nearest - point).norm(), best + 1e-12);
+    ASSERT_GE((nearest - point).norm(), best - 0.1);
+  }
+}
+
+TEST(SurfaceDistance, DegenerateTrianglesAreSegmentsAndPoints) {
+  const Eigen::Vector3d o(0, 0, 0);
+  const Eigen::Vector3d x(1, 0, 0);
+  for (const auto& corners : {std::array{o, x, x}, std::array{o, o, x}, std::array{x, o, x},
+                              std::array{o, x, Eigen::Vector3d(0.5, 0, 0)}}) {
+    const Eigen::Vector3d nearest =
+        nearest_on_triangle({0.75, 2, 0}, corners[0], corners[1], corners[2]);
+    EXPECT_LT((nearest - Eigen::Vector3d(0.75, 0, 0)).norm(), 1e-12);
+  }
+  EXPECT_EQ(nearest_on_triangle({3, 4, 0}, o, o, o), o);
+}
+
+TEST(SurfaceDistance, AgreesWithASearchOfAllTriangles) {
+  for (const Eigen::Vector3d& centre : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(4e5, -3e6, 70)}) {
+    const TriangleMesh mesh = bumpy(25, centre);
+    const SurfaceDistance surface(mesh);
+    for (int round = 0; round < 300; ++round) {
+      const Eigen::Vector3d point = centre + random_point(round % 3 == 0 ? 10 : 1.2);
+      double best = std::numeric_limits<double>::infinity();
+      for (const Triangle& t : mesh.triangles)
+        best = std::min(best, (nearest_on_triangle(point, mesh.vertices[t[0]], mesh.vertices[t[1]],
+                                                   mesh.vertices[t[2]]) -
+                               point)
+                                  .norm());
+      const SurfacePoint found = surface.nearest(point);
+      ASSERT_NEAR(found.distance_m, best, 1e-8);
+      ASSERT_NEAR((found.position - point).norm(), best, 1e-8);
+    }
+  }
+}
+
+TEST(SurfaceDistance, MeshesThatCannotBe) {
+  EXPECT_THAT(error_of([] { SurfaceDistance({}); }).what(), HasSubstr("no triangles"));
+  TriangleMesh mesh = unit_square();
+  mesh.triangles[0][1] = 9;
+  EXPECT_THROW(SurfaceDistance{mesh}, Error);
+  mesh = unit_square();
+  mesh.vertices[2].y() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THAT(error_of([&] { SurfaceDistance{mesh}; }).what(), HasSubstr("not finite"));
+}
+
+TEST(SurfaceDistance, Statistics) {
+  std::vector<double> distances;
+  for (int n = 100; n >= 1; --n) distances.push_back(0.001 * n);
+  const DistanceStatistics statistics = distance_statistics(distances);
+  EXPECT_EQ(statistics.count, 100U);
+  EXPECT_NEAR(statistics.mean_m, 0.0505, 1e-12);
+  EXPECT_NEAR(statistics.median_m, 0.0505, 1e-12);
+  EXPECT_NEAR(statistics.p95_m, 0.095, 1e-12);
+  EXPECT_NEAR(statistics.max_m, 0.1, 1e-12);
+  EXPECT_NEAR(statistics.rmse_m, 0.001 * std::sqrt(101.0 * 201.0 / 6.0), 1e-12);
+  EXPECT_EQ(distance_statistics({}).count, 0U);
+  EXPECT_EQ(distance_statistics({0.3}).p95_m, 0.3);
+}
+
+TEST(SurfaceDistance, SamplesAreSpreadByArea) {
+  TriangleMesh mesh = unit_square();
+  mesh.vertices[3] = {0, 3, 0};  // the second triangle has three times the area of the first
+  const auto samples = sample_surface(mesh, 4000, 7);
+  EXPECT_EQ(samples.size(), 8000U);
+  std::size_t second = 0;
+  const SurfaceDistance surface(mesh);
+  for (const SurfacePoint& sample : samples) {
+    second += sample.triangle == 1 ? 1 : 0;
+    ASSERT_LT(surface.nearest(sample.position).distance_m, 1e-12);
+  }
+  EXPECT_NEAR(static_cast<double>(second), 6000, 2);
+  EXPECT_NE(sample_surface(mesh, 4000, 8)[0].position, samples[0].position);
+  EXPECT_EQ(sample_surface(mesh, 4000, 7)[77].position, samples[77].position);
+  EXPECT_THAT(error_of([&] { sample_surface(mesh, 1e12, 1); }).what(), HasSubstr("too many"));
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {2, 0, 0}, {3, 0, 0}};
+  EXPECT_THAT(error_of([&] { sample_surface(mesh, 10, 1); }).what(), HasSubstr("no area"));
+}
+
+TEST(SurfaceDistance, CoverageAgreesWithASearchOfAllPoints) {
+  std::vector<Eigen::Vector3d> samples;
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 1000; ++n) samples.push_back(random_point(1));
+  for (int n = 0; n < 300; ++n) points.push_back(random_point(1));
+  const std::vector<bool> flags = covered(samples, points, 0.15);
+  for (std::size_t n = 0; n < samples.size(); ++n) {
+    double best = 9;
+    for (const Eigen::Vector3d& point : points) best = std::min(best, (point - samples[n]).norm());
+    ASSERT_EQ(flags[n], best <= 0.15);
+  }
+  EXPECT_GT(share_of(flags), 0.1);
+  EXPECT_LT(share_of(flags), 0.9);
+  EXPECT_EQ(share_of(covered(samples, {}, 0.15)), 0.0);
+  EXPECT_EQ(share_of({}), 0.0);
+}
+
+TEST(SurfaceDistance, ViewsStopAtWhatStandsBefore) {
+  // A floor of 1 m with a small plate above its middle, seen from straight above.
+  TriangleMesh mesh = unit_square();
+  TriangleMesh plate = unit_square();
+  for (Eigen::Vector3d& vertex : plate.vertices)
+    vertex = 0.2 * (vertex - Eigen::Vector3d(0.5, 0.5, 0)) + Eigen::Vector3d(0.5, 0.5, 0.5);
+  mesh = join_meshes(mesh, plate);
+  ViewingCamera above;
+  above.camera.width = 101;
+  above.camera.height = 101;
+  above.camera.fx = above.camera.fy = 150;
+  above.camera.cx = above.camera.cy = 50;
+  above.mesh_from_camera =
+      make_pose_from_rpy({0.5, 0.5, 1.5}, {180, 0, 0});  // looks down the z axis
+  const std::vector<Eigen::Vector3d> samples = {{0.5, 0.5, 0.5},  {0.5, 0.5, 0.0},
+                                                {0.3, 0.5, 0.0},  {0.63, 0.5, 0.0},
+                                                {0.66, 0.5, 0.0}, {0.01, 0.5, 0.0}};
+  EXPECT_EQ(count_views(mesh, samples, {above, above}, 4.0), (std::vector<int>{2, 0, 2, 0, 2, 2}));
+  EXPECT_EQ(count_views(mesh, samples, {above}, 1.2), (std::vector<int>{1, 0, 0, 0, 0, 0}));
+  above.camera.fx = 155;  // the image ends before x = 0.01
+  EXPECT_EQ(count_views(mesh, samples, {above}, 4.0), (std::vector<int>{1, 0, 1, 0, 1, 0}));
+  above.mesh_from_camera = make_pose_from_rpy({0.5, 0.5, 1.5}, {0, 0, 0});  // looks up
+  EXPECT_EQ(count_views(mesh, samples, {above}, 4.0), std::vector<int>(6, 0));
+}
+
+TEST(SurfaceDistance, ThreadsMakeNoDifference) {
+  const TriangleMesh mesh = bumpy(40);
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 5000; ++n) points.push_back(random_point(1));
+  std::vector<std::vector<double>> results;
+  for (const unsigned threads : {1U, 2U, 8U}) {
+    const ThreadLimit limit(threads);
+    results.push_back(distances_to_surface(points, mesh));
+  }
+  EXPECT_EQ(results[0], results[1]);
+  EXPECT_EQ(results[0], results[2]);
+}
+
+}  // namespace
+}  // namespace libmap

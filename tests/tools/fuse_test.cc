@@ -1,0 +1,156 @@
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <sstream>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/poses/trajectory_io.h"
+#include "libmap/scan/scan_source.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::data_folder;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using Words = std::vector<std::string>;
+
+std::string scan_file(const std::string& name) { return data_folder() / "scans" / name; }
+
+nlohmann::json compared(const std::string& cloud) {
+  const auto result =
+      graspmap({"compare", cloud, scan_file("site_ground_truth_mesh.ply"),
+                "--transform=0,0,0,0,0,-90", "--box=-1.5,-1.5,-1,1.5,1.5,2", "--json"});
+  EXPECT_TRUE(succeeded(result));
+  return nlohmann::json::parse(result.standard_output);
+}
+
+TEST(Fuse, TrueAndStoredPosesLieNearTheTrueSurface) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_full.db");
+  ASSERT_TRUE(succeeded(graspmap({"fuse", scan, "--poses", "ground-truth", "-o", "true.ply"})));
+  const nlohmann::json by_truth = compared("true.ply");
+  EXPECT_LT(by_truth.at("rmse_m"), 0.0020);
+  EXPECT_LT(by_truth.at("median_m"), 0.0005);
+  EXPECT_LT(by_truth.at("p95_m"), 0.0030);
+  EXPECT_GT(by_truth.at("completeness"), 0.90) << "of all of the surface, seen or not";
+  ASSERT_TRUE(succeeded(graspmap(
+      {"fuse", scan, "--poses", "stored", "--frame", "ground-truth", "-o", "stored.ply"})));
+  EXPECT_LT(compared("stored.ply").at("rmse_m"), 0.0065);
+  const nlohmann::json manifest = json_of("stored.ply.json");
+  EXPECT_EQ(manifest.at("frame"), "ground truth");
+  EXPECT_EQ(manifest.at("results").at("frames"), 40);
+  EXPECT_NEAR(manifest.at("results").at("trajectory_rmse_m"), 0.0068, 0.0002);
+  EXPECT_TRUE(manifest.at("transforms").contains("ground_truth_from_poses"));
+}
+
+TEST(Fuse, ManifestCountsEveryPixel) {
+  GRASPMAP_REQUIRE_DATA();
+  ASSERT_TRUE(succeeded(graspmap({"fuse", scan_file("site_tiny_q.db"), "-o", "cloud.ply"})));
+  const nlohmann::json manifest = json_of("cloud.ply.json");
+  const nlohmann::json& results = manifest.at("results");
+  std::int64_t sum = results.at("measurements_used").get<std::int64_t>();
+  for (const char* reason : {"unmeasured", "out_of_range", "without_ray", "flying", "grazing"})
+    sum += results.at("rejected_" + std::string(reason)).get<std::int64_t>();
+  EXPECT_EQ(sum, results.at("pixels"));
+  EXPECT_EQ(results.at("frames"), 6);
+  EXPECT_EQ(manifest.at("parameters").at("poses"), "stored");
+  EXPECT_EQ(manifest.at("parameters").at("voxel_size_m"), 0.01);
+  const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.ply")).cloud;
+  EXPECT_EQ(static_cast<std::int64_t>(cloud.size()), results.at("points"));
+  EXPECT_TRUE(cloud.has_normals());
+  EXPECT_TRUE(cloud.has_colors());
+  ASSERT_NE(cloud.find_field("views"), nullptr);
+  ASSERT_NE(cloud.find_field("expected_error"), nullptr);
+  for (const double views : cloud.find_field("views")->values) {
+    ASSERT_GE(views, 1);
+    ASSERT_LE(views, 6);
+  }
+}
+
+TEST(Fuse, SameBytesForAnyNumberOfThreads) {
+  GRASPMAP_REQUIRE_DATA();
+  std::string first;
+  for (const std::string threads : {"1", "2", "8"}) {
+    ASSERT_TRUE(succeeded(graspmap(
+        {"fuse", scan_file("site_tiny_q.db"), "--threads", threads, "-o", threads + ".ply"})));
+    if (first.empty()) first = content(threads + ".ply");
+    EXPECT_TRUE(content(threads + ".ply") == first) << threads;
+  }
+}
+
+TEST(Fuse, PosesOfAFile) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_tiny_q.db");
+  const auto source = libmap::open_scan(scan);
+  libmap::Trajectory poses = libmap::trajectory_of(source->graph(), libmap::PoseSource::odometry);
+  ASSERT_TRUE(succeeded(graspmap({"fuse", scan, "--poses", "odometry", "-o", "odometry.pcd"})));
+  const libmap::PointCloud wanted = libmap::read_cloud(scratch("odometry.pcd")).cloud;
+  for (const std::string file : {"poses.tum", "poses.g2o", "poses.kitti"}) {
+    libmap::write_trajectory(scratch(file), {poses, {}}, true);
+    const auto result = graspmap({"fuse", scan, "--poses", file, "-o", "cloud.pcd"});
+    ASSERT_TRUE(succeeded(result)) << file;
+    EXPECT_NE(result.standard_error.find("6 of 6 poses"), std::string::npos);
+    const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.pcd")).cloud;
+    // The file's numbers are rounded.
+    EXPECT_NEAR(static_cast<double>(cloud.size()), static_cast<double>(wanted.size()),
+                0.002 * static_cast<double>(wanted.size()));
+    EXPECT_EQ(json_of("cloud.pcd.json").at("inputs").size(), 2U);
+  }
+  // Stamps alone, and a pose that belongs to no node.
+  poses.pop_back();
+  poses.push_back({0, 1e9, libmap::Pose::Identity()});
+  libmap::write_trajectory(scratch("five.tum"), {poses, {}});
+  const auto result = graspmap({"fuse", scan, "--poses", "five.tum", "-o", "five.pcd"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("5 of 6 poses"), std::string::npos);
+  EXPECT_EQ(json_of("five.pcd.json").at("results").at("frames"), 5);
+}
+
+TEST(Fuse, EveryScanOfTheTestData) {
+  GRASPMAP_REQUIRE_DATA();
+  for (const std::string name : {"site_tiny.db", "site_tiny_v0160.db", "site_tiny_v0180.db"}) {
+    ASSERT_TRUE(
+        succeeded(graspmap({"fuse", scan_file(name), "--poses", "odometry", "-o", "cloud.ply"})));
+    EXPECT_GT(json_of("cloud.ply.json").at("results").at("points"), 50000) << name;
+  }
+}
+
+TEST(Fuse, PosesThatAreNotThere) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string killed = scan_file("site_killed.db");
+  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "stored", "-o", "cloud.ply"}),
+                        {"site_killed.db", "--poses", "stored", "odometry, ground-truth"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "odometri", "-o", "cloud.ply"}),
+                        {"odometri", "did you mean 'odometry'?"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "none.tum", "-o", "cloud.ply"}),
+                        {"none.tum", "no such file"}));
+  graspmap_test::write_text(scratch("far.tum"), "1 0 0 0 0 0 0 1\n");
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", killed, "--poses", "far.tum", "-o", "cloud.ply"}), {"far.tum"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("cloud.ply")));
+}
+
+TEST(Fuse, BadInput) {
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", "none.db", "-o", "cloud.ply"}), {"none.db", "no such file"}));
+  graspmap_test::write_text(scratch("text.db"), "this is no database at all, but it is a file\n");
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply"}), {"text.db"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.obj"}), {"cloud.obj"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply", "--voxel-size", "0"}),
+                        {"--voxel-size", "> 0"}));
+  EXPECT_TRUE(graspmap_test::names_in_scratch() == std::vector<std::string>{"text.db"});
+}
+
+TEST(Fuse, DryRunWritesNothing) {
+  GRASPMAP_REQUIRE_DATA();
+  ASSERT_TRUE(
+      succeeded(graspmap({"fuse", scan_file("site_tiny_q.db"), "-o", "cloud.ply", "--dry-run"})));
+  EXPECT_TRUE(graspmap_test::names_in_scratch().empty());
+}
+
+}  // namespace
