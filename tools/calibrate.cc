@@ -292,6 +292,9 @@ void calibrate(CalibrateOptions& options, Run& run) {
   options.calibration.board.square_mm = square_mm;
   const std::vector<std::string> files = image_files(options.images);
   run.claim_output(options.output, files);
+  if (!options.output.ends_with(".yaml") && !options.output.ends_with(".yml"))
+    throw libmap::Error("a camera is written as YAML",
+                        {.file = options.output, .field = {}, .value = {}, .bound = "a name.yaml"});
   if (!options.report.empty()) run.claim_output_folder(options.report);
   const std::vector<Picture> pictures = run.timed(
       "find boards", [&] { return read_pictures(files, options.calibration.board, run); });

@@ -97,6 +97,24 @@ libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
   return libmap::select_points(cloud, inside);
 }
 
+// Distances to a mesh take the longer the farther a point is from it; a cloud that lies so far off
+// was carried there by a wrong transform.
+void require_nearness(const libmap::TriangleMesh& mesh, const libmap::PointCloud& cloud,
+                      const CompareOptions& options) {
+  constexpr double most_sizes = 100;
+  const libmap::Bounds3d surface = libmap::bounds_of(mesh.vertices);
+  const libmap::Bounds3d points = libmap::bounds_of(cloud.positions);
+  const double size = (surface.max - surface.min).norm();
+  const double apart = ((points.max + points.min) / 2 - (surface.max + surface.min) / 2).norm();
+  if (!(apart <= most_sizes * size))
+    throw libmap::Error("the cloud lies too far from the mesh to be compared",
+                        {.file = options.cloud,
+                         .field = "distance of the centres",
+                         .value = libmap::to_text(static_cast<float>(apart)) + " m",
+                         .bound = "<= " + libmap::to_text(static_cast<float>(most_sizes * size)) +
+                                  " m, 100 times the mesh"});
+}
+
 struct Comparison {
   libmap::DistanceStatistics distances;
   std::size_t samples = 0;  // of the surface in the box
@@ -162,6 +180,7 @@ void compare(const CompareOptions& options, Run& run) {
                                                            mesh_from_cloud(options.transform));
   libmap::PointCloud cloud = part_in_box(whole, box, options.cloud);
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
+  require_nearness(mesh, cloud, options);
   std::vector<double> distances =
       run.timed("distances", [&] { return libmap::distances_to_surface(cloud.positions, mesh); });
   Comparison comparison;

@@ -122,7 +122,10 @@ void add_results(libmap::Manifest& manifest, const libmap::PoseGraph& graph, con
 void extract(const ExtractOptions& options, Run& run) {
   run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
   const auto scan = run.timed("open", [&] { return libmap::open_scan(options.scan); });
-  for (const std::string& warning : scan->warnings()) run.warn(options.scan + ": " + warning);
+  for (const std::string& warning : scan->warnings()) {
+    if (options.strict) throw libmap::Error(warning).in_file(options.scan);
+    run.warn(options.scan + ": " + warning);
+  }
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   const auto work = [&](const fs::path& folder) {
     std::optional<libmap::FrameFolderWriter> writer;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -29,7 +30,7 @@ enum class CloudFrame { poses, ground_truth };
 struct FuseOptions {
   std::string scan;
   std::string output;
-  std::string poses = "stored";
+  std::string poses = "auto";
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
 };
@@ -59,7 +60,7 @@ libmap::Trajectory poses_in_file(const std::string& file, const libmap::PoseGrap
         {.file = {},
          .field = "--poses",
          .value = file,
-         .bound = "odometry, stored, ground-truth or a file"});
+         .bound = "auto, odometry, stored, ground-truth or a file"});
   const libmap::TrajectoryFile read = libmap::read_trajectory(file);
   try {
     libmap::NodeTrajectory assigned = libmap::assign_nodes(read.poses, graph);
@@ -72,6 +73,15 @@ libmap::Trajectory poses_in_file(const std::string& file, const libmap::PoseGrap
   } catch (const libmap::Error& error) {
     throw error.in_file(file);
   }
+}
+
+// The best poses that the scan has of its own: optimised, else by odometry, else ground truth.
+std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) {
+  for (const PoseSource source :
+       {PoseSource::stored, PoseSource::odometry, PoseSource::ground_truth})
+    if (!libmap::trajectory_of(graph, source).empty()) return to_text(source);
+  throw libmap::Error("the scan has no poses: give a file of poses with --poses",
+                      {.file = scan, .field = {}, .value = {}, .bound = {}});
 }
 
 libmap::Trajectory wanted_poses(const FuseOptions& options, const libmap::PoseGraph& graph,
@@ -149,19 +159,44 @@ void say_result(const libmap::DepthFusionResult& result, Run& run) {
   if (result.cloud.empty()) run.warn("nothing was measured within the limits: the cloud is empty");
 }
 
-void fuse(const FuseOptions& options, Run& run) {
+// Nodes that cannot be placed cost their frames; with --strict that is an error.
+void report_nodes_without_pose(const FuseOptions& options, const libmap::PoseGraph& graph,
+                               const libmap::Trajectory& poses, Run& run) {
+  constexpr int invalid_weight = -9;
+  std::size_t nodes = 0;
+  for (const libmap::GraphNode& node : graph.nodes) nodes += node.weight != invalid_weight ? 1 : 0;
+  if (poses.size() >= nodes) return;
+  const std::string text =
+      fmt::format("{} of {} nodes have no pose there", nodes - poses.size(), nodes);
+  if (options.fusion.strict)
+    throw libmap::Error(
+        text, {.file = options.scan, .field = "--poses", .value = options.poses, .bound = {}});
+  run.warn(options.scan + ": " + text + ": their frames are left out");
+}
+
+void fuse(FuseOptions options, Run& run) {
   libmap::require_cloud_format(options.output);
   std::vector<std::string> inputs = {options.scan};
-  if (!source_named(options.poses)) inputs.push_back(options.poses);
+  if (options.poses != "auto" && !source_named(options.poses)) inputs.push_back(options.poses);
   run.claim_output(options.output, inputs);
   const auto scan = run.timed("open", [&] { return libmap::open_scan(options.scan); });
-  for (const std::string& warning : scan->warnings()) run.warn(options.scan + ": " + warning);
+  for (const std::string& warning : scan->warnings()) {
+    if (options.fusion.strict) throw libmap::Error(warning).in_file(options.scan);
+    run.warn(options.scan + ": " + warning);
+  }
+  if (options.poses == "auto") {
+    options.poses = best_poses(scan->graph(), options.scan);
+    run.say("poses: " + options.poses);
+  }
   const libmap::Trajectory poses = wanted_poses(options, scan->graph(), run);
+  report_nodes_without_pose(options, scan->graph(), poses, run);
   const auto alignment = truth_from_poses(options, scan->graph(), poses, run);
   libmap::DepthFusionResult result;
   try {
     result = libmap::fuse_depth(*scan, poses, options.fusion, run.progress());
   } catch (const libmap::Error& error) {
+    // A broken frame's message names the file already.
+    if (std::string_view(error.what()).starts_with(options.scan)) throw;
     throw error.in_file(options.scan);
   }
   for (const auto& [node, fault] : result.skipped) run.warn("skipped: " + fault);
@@ -184,8 +219,10 @@ int main(int argc, char** argv) {
                                   "The depth images of a scan -> one oriented, coloured cloud.");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
-  command.option("--poses", "odometry|stored|ground-truth|FILE", options.poses,
-                 "where the frames were: by the scan, or a file of poses (.tum, .kitti, .g2o)");
+  command.option(
+      "--poses", "auto|odometry|stored|ground-truth|FILE", options.poses,
+      "where the frames were: by the scan, or a file of poses (.tum, .kitti, .g2o); auto: "
+      "the first of stored, odometry and ground-truth that the scan has");
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},

@@ -36,7 +36,8 @@ void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
             "the moment to show; fullest: the one at which most cameras saw something");
   table.add("tolerance_s", options.tolerance_s, libmap::not_negative,
             "images further from the moment are left out");
-  table.add("strict", options.strict, "end with an error if a camera's image is late or missing");
+  table.add("strict", options.strict,
+            "end with an error if a camera's image is late, missing or broken");
   bind(table, options.panorama);
 }
 
@@ -83,7 +84,7 @@ void add_results(const libmap::CameraRig& rig, const RigMoment& moment,
   };
   manifest.results.emplace_back("stamp_s", moment.stamp_s);
   count("cameras", rig.cameras.size());
-  count("cameras_seen", moment.seen());
+  count("cameras_seen", views.size());
   count("points", result.cloud.size());
   for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
     const RigMoment::Camera& camera = moment.cameras[n];
@@ -110,15 +111,24 @@ void add_results(const libmap::CameraRig& rig, const RigMoment& moment,
 
 std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
                                              const std::vector<libmap::RigImage>& images,
-                                             const RigMoment& moment, Run& run) {
+                                             const RigMoment& moment, bool strict, Run& run) {
   std::vector<libmap::PanoramaView> views;
   for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
     if (moment.cameras[n].state != State::seen) continue;
     const libmap::RigCamera& camera = rig.cameras[n];
     const libmap::RigImage& image = images[moment.cameras[n].image];
+    libmap::DepthImage depth;
+    try {
+      depth = libmap::read_rig_depth(image, camera);
+    } catch (const libmap::Error& error) {
+      // A broken image costs its camera, not the panorama.
+      if (strict) throw;
+      run.warn(std::string(error.what()) + "; " + camera.name + " is left out");
+      continue;
+    }
     run.add_input(image.file);
-    views.push_back({camera.name, static_cast<int>(n), camera.camera,
-                     libmap::read_rig_depth(image, camera), camera.near_m, camera.far_m});
+    views.push_back({camera.name, static_cast<int>(n), camera.camera, std::move(depth),
+                     camera.near_m, camera.far_m});
   }
   return views;
 }
@@ -141,12 +151,14 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
                                : libmap::fullest_rig_moment(images, cameras, options.tolerance_s);
   report_absent(rig, moment, options, run);
   const std::vector<libmap::PanoramaView> views =
-      run.timed("read", [&] { return read_views(rig, images, moment, run); });
+      run.timed("read", [&] { return read_views(rig, images, moment, options.strict, run); });
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
+  if (views.empty() && moment.seen() > 0)
+    throw libmap::Error("no image of the moment can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
   add_results(rig, moment, result, views, run.manifest());
-  run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), moment.seen(),
+  run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(),
                       cameras, libmap::to_text(moment.stamp_s)));
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_cloud(temporary, result.cloud);

@@ -58,6 +58,17 @@ libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
   run.add_input(file);
   if (options.depth_scale_m > 0)
     for (libmap::RigCamera& camera : rig.cameras) camera.depth_scale_m = options.depth_scale_m;
+  for (const libmap::RigCamera& camera : rig.cameras) {
+    // 16 bits hold no more; 65535 stands for saturated pixels.
+    constexpr double largest = 65534;
+    if (camera.far_m / camera.depth_scale_m > largest)
+      throw libmap::Error("16-bit images cannot hold what this camera measures",
+                          {.file = {},
+                           .field = "depth_scale_m of " + camera.name,
+                           .value = libmap::to_text(camera.depth_scale_m),
+                           .bound = ">= far_m / 65534, " +
+                                    libmap::to_text(static_cast<float>(camera.far_m / largest))});
+  }
   return rig;
 }
 

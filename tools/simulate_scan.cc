@@ -104,6 +104,9 @@ void simulate(SimulateScanOptions& options, Run& run) {
     simulation.trajectory.target = graspmap_tools::parse_vector(options.target, "--target");
   simulation.depth.check();
   run.claim_output(options.output, {options.mesh, options.camera});
+  if (!options.output.ends_with(".db"))
+    throw libmap::Error("a scan is written as a database",
+                        {.file = options.output, .field = {}, .value = {}, .bound = "a name.db"});
   if (!options.camera.empty()) simulation.camera = libmap::read_camera(options.camera).camera;
   const libmap::TriangleMesh mesh =
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });

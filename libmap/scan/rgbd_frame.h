@@ -34,7 +34,8 @@ struct RgbdFrame {
 // One camera's part of a frame.
 struct CameraView {
   Camera color_camera;
-  Camera depth_camera;  // color_camera at the size of `depth`
+  // color_camera at the size of `depth`; the principal point goes with the size, as in RTAB-Map.
+  Camera depth_camera;
   ColorImage color;
   DepthImage depth;
 };

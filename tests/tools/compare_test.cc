@@ -78,6 +78,9 @@ TEST(Compare, CloudWithDistances) {
 
 TEST(Compare, BadInput) {
   write_square_and_points();
+  EXPECT_TRUE(
+      bad_input(graspmap({"compare", "points.ply", "square.ply", "--transform", "1e300,0,0,0,0,0"}),
+                {"points.ply", "too far from the mesh"}));
   const auto run = [](const Words& more) {
     Words words = {"compare", "points.ply", "square.ply"};
     words.insert(words.end(), more.begin(), more.end());

@@ -120,6 +120,30 @@ TEST(Fuse, EveryScanOfTheTestData) {
   }
 }
 
+TEST(Fuse, TakesTheBestPosesThatAScanHas) {
+  GRASPMAP_REQUIRE_DATA();
+  const auto result = graspmap({"fuse", scan_file("site_tiny_v0160.db"), "-o", "cloud.ply"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("poses: odometry"), std::string::npos);
+  EXPECT_EQ(json_of("cloud.ply.json").at("parameters").at("poses"), "odometry");
+}
+
+TEST(Fuse, NodesWithoutAPoseAreCounted) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_tiny_q.db");
+  libmap::Trajectory poses =
+      trajectory_of(libmap::open_scan(scan)->graph(), libmap::PoseSource::odometry);
+  poses.resize(4);
+  libmap::write_trajectory(scratch("four.tum"), {poses, {}}, true);
+  const Words words = {"fuse", scan, "--poses", "four.tum", "-o", "cloud.ply"};
+  const auto result = graspmap(words);
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("2 of 6 nodes have no pose"), std::string::npos);
+  Words strict = words;
+  strict.insert(strict.end(), {"--strict", "--quiet"});
+  EXPECT_TRUE(bad_input(graspmap(strict), {"2 of 6 nodes have no pose"}));
+}
+
 TEST(Fuse, PosesThatAreNotThere) {
   GRASPMAP_REQUIRE_DATA();
   const std::string killed = scan_file("site_killed.db");

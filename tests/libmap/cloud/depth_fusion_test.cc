@@ -380,7 +380,12 @@ TEST(DepthFusion, ColourImageOfAnotherSize) {
   frame.color = ColorImage(256, 192, Color{0, 0, 255});
   for (int y = 0; y < 192; ++y)
     for (int x = 128; x < 256; ++x) frame.color.at(x, y) = {255, 255, 0};
-  frame.cameras = {scale_camera(small_camera(), 256, 192)};
+  Camera color_camera = small_camera();
+  color_camera.width *= 2;
+  color_camera.height *= 2;
+  for (double* number : {&color_camera.fx, &color_camera.fy, &color_camera.cx, &color_camera.cy})
+    *number *= 2;
+  frame.cameras = {color_camera};
   const PointCloud cloud = fuse_depth(scan, scan.poses).cloud;
   const Pose base_from_world = scan.poses[0].world_from_base.inverse();
   for (std::size_t n = 0; n < cloud.size(); ++n) {

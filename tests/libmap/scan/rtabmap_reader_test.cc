@@ -373,7 +373,7 @@ TEST(RtabmapReader, DepthOfAnotherSizeThanColour) {
   ASSERT_EQ(views.size(), 1U);
   EXPECT_EQ(views[0].depth_camera.width, 16);
   EXPECT_EQ(views[0].depth_camera.fx, 15);
-  EXPECT_EQ(views[0].depth_camera.cx, 7.5);  // of 32 columns with the centre at 15.5
+  EXPECT_EQ(views[0].depth_camera.cx, 7.75);  // half of 15.5: every other pixel is taken
   EXPECT_EQ(views[0].color_camera.fx, 30);
 }
 

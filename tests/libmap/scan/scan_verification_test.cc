@@ -242,7 +242,7 @@ TEST(HostileDatabase, SizesThatLieTakeNoMemory) {
   execute(file, "UPDATE Data SET calibration = ? WHERE id = 3",
           {int32s({0, 23, 0, 0, 32, 24, 9, 0x7fffffffU, 0, 0, 12}) + std::string(200, '\0')});
   execute(file, "UPDATE Admin SET opt_poses = ?", {std::string(40, '\x78') + scan_trailer});
-  const long before = peak_kb();
+  [[maybe_unused]] const long before = peak_kb();
   EXPECT_EQ(parts_of(verify(file)),
             (std::vector<std::string>{"0 Admin.opt_poses", "1 Data.depth", "2 Data.depth",
                                       "2 Data.scan", "2 Data.user_data", "3 Data.calibration"}));
