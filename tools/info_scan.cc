@@ -352,9 +352,6 @@ ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progr
   info.json["warnings"] = warnings;
   if (verify) {
     libmap::ScanVerificationResult result = verify_scan(*scan, progress);
-    // What the graph had to leave out is broken too.
-    for (const std::string& warning : scan->warnings())
-      result.faults.push_back({0, "graph", warning});
     info.json["verification"] = verification_json(result);
     info.faults = std::move(result.faults);
   }

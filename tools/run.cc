@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <optional>
 #include <utility>
 
 #include "libmap/core/error.h"
@@ -20,13 +21,15 @@ fs::path without_trailing_slash(const fs::path& folder) {
   return folder.has_filename() ? folder : folder.parent_path();
 }
 
-bool written_by_this_toolkit(const fs::path& output) {
+std::optional<libmap::Manifest> own_manifest_of(const fs::path& output) {
   try {
-    return libmap::read_manifest_of(output).has_value();
+    return libmap::read_manifest_of(output);
   } catch (const libmap::Error&) {
-    return false;
+    return std::nullopt;
   }
 }
+
+bool written_by_this_toolkit(const fs::path& output) { return own_manifest_of(output).has_value(); }
 
 // A file of the user's own that happens to stand where the manifest will.
 void require_no_foreign_manifest(const fs::path& output) {
@@ -111,13 +114,22 @@ void Run::write_output(const fs::path& path, const std::function<void(const fs::
 }
 
 void Run::claim_output_folder(const fs::path& given) {
+  require_own_folder(given, ": --force writes into it");
+}
+
+void Run::require_own_folder(const fs::path& given, const std::string& remedy) {
   const fs::path folder = without_trailing_slash(given);
   if (fs::exists(folder) && !fs::is_directory(folder))
     throw libmap::Error("is a file, not a folder", {.file = folder.string()});
-  if (fs::exists(folder) && !fs::is_empty(folder) && !options_.force &&
-      !written_by_this_toolkit(folder))
-    throw libmap::Error("is not empty and was not written by graspmap: --force writes into it",
-                        {.file = folder.string()});
+  if (fs::exists(folder) && !fs::is_empty(folder) && !options_.force) {
+    const auto manifest = own_manifest_of(folder);
+    if (!manifest)
+      throw libmap::Error("is not empty and was not written by graspmap" + remedy,
+                          {.file = folder.string()});
+    if (manifest->command != command_)
+      throw libmap::Error("holds what graspmap " + manifest->command + " wrote" + remedy,
+                          {.file = folder.string()});
+  }
   if (!options_.force) require_no_foreign_manifest(folder);
 }
 
@@ -142,7 +154,7 @@ void Run::write_output_folder(const fs::path& given,
 void Run::claim_output_tree(const fs::path& given, const std::vector<std::string>& names,
                             const std::vector<std::string>& inputs) {
   require_other_than_inputs(given, inputs);
-  claim_output_folder(given);
+  require_own_folder(given, "");
   // Made and dropped at once: what cannot be written or replaced is found before the work.
   const libmap::OutputFolder probe(given, names);
 }

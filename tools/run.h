@@ -88,6 +88,8 @@ class Run {
     std::chrono::steady_clock::time_point start_;
   };
 
+  // What stands in a folder must be of an earlier run of this command; `remedy` ends the message.
+  void require_own_folder(const std::filesystem::path& folder, const std::string& remedy);
   void write_manifest(const std::filesystem::path& output);
 
   std::string command_;

@@ -1,8 +1,6 @@
 #include "libmap/core/file_output.h"
 
 #include <fcntl.h>
-#include <sys/file.h>
-#include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
@@ -11,6 +9,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/output_lock.h"
 
 namespace libmap {
 
@@ -18,44 +17,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-Error failed(const fs::path& path, const std::string& what, int code) {
-  return Error(what + ": " + std::strerror(code), {.file = path.string()}, ErrorKind::failed);
-}
-
 void sync_path(const fs::path& path, int flags) {
   const int descriptor = open(path.c_str(), flags);
-  if (descriptor < 0) throw failed(path, "cannot be opened to sync it", errno);
+  if (descriptor < 0) throw system_failure(path, "cannot be opened to sync it", errno);
   const int result = fsync(descriptor);
   const int code = errno;
   close(descriptor);
-  if (result != 0) throw failed(path, "cannot be synced", code);
+  if (result != 0) throw system_failure(path, "cannot be synced", code);
 }
 
-bool is_still_named(int descriptor, const fs::path& path) {
-  struct stat held {};
-  struct stat named {};
-  return fstat(descriptor, &held) == 0 && stat(path.c_str(), &named) == 0 &&
-         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
-}
-
-// Opens and locks the temporary of `final_path`.
-int lock_temporary(const fs::path& temporary, const fs::path& final_path) {
-  for (;;) {
-    const int lock = open(temporary.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
-    if (lock < 0) throw failed(final_path, "cannot be written", errno);
-    if (flock(lock, LOCK_EX | LOCK_NB) != 0) {
-      close(lock);
-      throw Error("another process is writing it", {.file = final_path.string()},
-                  ErrorKind::failed);
-    }
-    // Between opening and locking, another process may have put this very file in place.
-    if (is_still_named(lock, temporary)) return lock;
-    close(lock);
-  }
-}
-
-fs::path folder_of(const fs::path& path) {
-  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+int open_file(const char* path) {
+  return open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
 }
 
 }  // namespace
@@ -72,7 +44,7 @@ OutputFile::OutputFile(fs::path final_path) : final_path_(std::move(final_path))
   // The extension stays at the end: writers choose the format by it.
   temporary_path_ =
       folder / ("." + final_path_.stem().string() + ".partial" + final_path_.extension().string());
-  lock_ = lock_temporary(temporary_path_, final_path_);
+  lock_ = lock_temporary(temporary_path_, final_path_, open_file);
 }
 
 OutputFile::~OutputFile() {
@@ -91,7 +63,7 @@ void OutputFile::commit() {
   sync_path(temporary_path_, O_RDONLY | O_CLOEXEC);
   std::error_code code;
   fs::rename(temporary_path_, final_path_, code);
-  if (code) throw failed(final_path_, "cannot be put in place", code.value());
+  if (code) throw system_failure(final_path_, "cannot be put in place", code.value());
   close(std::exchange(lock_, -1));
   sync_path(folder_of(final_path_), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
 }
@@ -100,7 +72,7 @@ void write_text(const fs::path& path, std::string_view content) {
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   file.write(content.data(), static_cast<std::streamsize>(content.size()));
   file.flush();
-  if (!file) throw failed(path, "cannot be written", errno);
+  if (!file) throw system_failure(path, "cannot be written", errno);
 }
 
 void write_whole_file(const fs::path& path, std::string_view content) {

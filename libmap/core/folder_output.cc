@@ -8,24 +8,16 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <cstring>
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/output_lock.h"
 
 namespace libmap {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-Error failed(const fs::path& path, const std::string& what, int code) {
-  return Error(what + ": " + std::strerror(code), {.file = path.string()}, ErrorKind::failed);
-}
-
-fs::path folder_of(const fs::path& path) {
-  return path.has_parent_path() ? path.parent_path() : fs::path(".");
-}
 
 void require_own_content(const fs::path& path, const std::vector<std::string>& names) {
   const fs::file_status status = fs::symlink_status(path);
@@ -40,28 +32,9 @@ void require_own_content(const fs::path& path, const std::vector<std::string>& n
 }
 
 // The lock is on the folder itself, which commit() takes away from its name.
-bool is_still_named(int descriptor, const fs::path& path) {
-  struct stat held {};
-  struct stat named {};
-  return fstat(descriptor, &held) == 0 && stat(path.c_str(), &named) == 0 &&
-         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
-}
-
-int lock_temporary(const fs::path& temporary, const fs::path& final_path) {
-  for (;;) {
-    if (mkdir(temporary.c_str(), 0777) != 0 && errno != EEXIST)
-      throw failed(final_path, "cannot be written", errno);
-    const int lock = open(temporary.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
-    if (lock < 0 && errno == ENOENT) continue;
-    if (lock < 0) throw failed(final_path, "cannot be written", errno);
-    if (flock(lock, LOCK_EX | LOCK_NB) != 0) {
-      close(lock);
-      throw Error("another process is writing it", {.file = final_path.string()},
-                  ErrorKind::failed);
-    }
-    if (is_still_named(lock, temporary)) return lock;
-    close(lock);
-  }
+int open_folder(const char* path) {
+  if (mkdir(path, 0777) != 0 && errno != EEXIST) return -1;
+  return open(path, O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
 }
 
 // Whether an earlier folder took the temporary's name.
@@ -69,12 +42,12 @@ bool put_in_place(const fs::path& temporary, const fs::path& final_path) {
   if (renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, final_path.c_str(), RENAME_EXCHANGE) == 0)
     return true;
   if (errno != ENOENT && errno != EINVAL && errno != ENOSYS)
-    throw failed(final_path, "cannot be put in place", errno);
+    throw system_failure(final_path, "cannot be put in place", errno);
   // Nothing is there, or the file system cannot exchange.
   std::error_code code;
   fs::remove_all(final_path, code);
   if (!code) fs::rename(temporary, final_path, code);
-  if (code) throw failed(final_path, "cannot be put in place", code.value());
+  if (code) throw system_failure(final_path, "cannot be put in place", code.value());
   return false;
 }
 
@@ -90,7 +63,7 @@ OutputFolder::OutputFolder(fs::path final_path, const std::vector<std::string>& 
     throw Error("no such folder: " + folder.string(), {.file = final_path_.string()});
   require_own_content(final_path_, names);
   temporary_path_ = folder / ("." + final_path_.filename().string() + ".partial");
-  lock_ = lock_temporary(temporary_path_, final_path_);
+  lock_ = lock_temporary(temporary_path_, final_path_, open_folder);
   // What a run that was killed has left.
   for (const fs::directory_entry& entry : fs::directory_iterator(temporary_path_))
     fs::remove_all(entry.path());
@@ -105,7 +78,7 @@ OutputFolder::~OutputFolder() {
 
 void OutputFolder::commit() {
   // All files at once: one by one it takes a write to the disk each.
-  if (syncfs(lock_) != 0) throw failed(final_path_, "cannot be synced", errno);
+  if (syncfs(lock_) != 0) throw system_failure(final_path_, "cannot be synced", errno);
   // The earlier folder is locked too, so that nobody takes it for a temporary of his own.
   const int earlier = open(final_path_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (earlier >= 0) flock(earlier, LOCK_EX | LOCK_NB);

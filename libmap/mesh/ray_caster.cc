@@ -9,6 +9,7 @@
 #include <string>
 
 #include "libmap/core/error.h"
+#include "libmap/mesh/embree_mesh.h"
 
 namespace libmap {
 
@@ -16,22 +17,6 @@ namespace {
 
 constexpr double largest_float = std::numeric_limits<float>::max();
 constexpr std::size_t packet_size = 8;
-
-struct DeviceRelease {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct SceneRelease {
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-using Device = std::unique_ptr<RTCDeviceTy, DeviceRelease>;
-using SceneHandle = std::unique_ptr<RTCSceneTy, SceneRelease>;
-
-void require_success(RTCDevice device) {
-  if (const RTCError code = rtcGetDeviceError(device); code != RTC_ERROR_NONE)
-    throw Error(
-        "Embree cannot build the scene (error " + std::to_string(static_cast<int>(code)) + ")", {},
-        ErrorKind::failed);
-}
 
 // A ray as Embree sees it: of unit length, about the mesh's centre, and begun just outside the
 // mesh's box, where single precision is finest.
@@ -47,57 +32,19 @@ struct LocalRay {
 }  // namespace
 
 struct RayCaster::Scene {
-  Device device;
-  SceneHandle scene;
-  Eigen::Vector3d centre;
-  Eigen::AlignedBox3d box;                // about the centre, a little larger than the mesh
-  std::vector<Eigen::Vector3d> vertices;  // about the centre
-  std::vector<Triangle> triangles;
+  EmbreeMesh mesh;
+  Eigen::AlignedBox3d box;  // about the centre, a little larger than the mesh
 
-  explicit Scene(const TriangleMesh& mesh);
+  explicit Scene(const TriangleMesh& of) : mesh(of, true) {
+    const Eigen::Vector3d half =
+        0.5 * mesh.size() + Eigen::Vector3d::Constant(1e-3 * mesh.size().norm() + 1e-6);
+    box = Eigen::AlignedBox3d(-half, half);
+  }
   LocalRay localize(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double near,
                     double far) const;
   RayHit refine(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                 const LocalRay& ray, float found, unsigned triangle, float u, float v) const;
 };
-
-RayCaster::Scene::Scene(const TriangleMesh& mesh) {
-  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
-  mesh.check();
-  Eigen::AlignedBox3d bounds;
-  for (const Eigen::Vector3d& vertex : mesh.vertices) {
-    if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
-    bounds.extend(vertex);
-  }
-  centre = bounds.center();
-  const Eigen::Vector3d half =
-      0.5 * bounds.sizes() + Eigen::Vector3d::Constant(1e-3 * bounds.diagonal().norm() + 1e-6);
-  box = Eigen::AlignedBox3d(-half, half);
-  triangles = mesh.triangles;
-  vertices.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices.push_back(vertex - centre);
-
-  device.reset(rtcNewDevice(nullptr));
-  if (!device) throw Error("Embree cannot start", {}, ErrorKind::failed);
-  scene.reset(rtcNewScene(device.get()));
-  rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
-  const RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
-  auto* indices = static_cast<unsigned*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                              3 * sizeof(unsigned), triangles.size()));
-  require_success(device.get());
-  for (const Eigen::Vector3d& vertex : vertices)
-    for (int axis = 0; axis < 3; ++axis) *corners++ = static_cast<float>(vertex[axis]);
-  for (const Triangle& triangle : triangles)
-    for (const std::uint32_t index : triangle) *indices++ = index;
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene.get(), geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene.get());
-  require_success(device.get());
-}
 
 LocalRay RayCaster::Scene::localize(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                                     double near, double far) const {
@@ -105,7 +52,7 @@ LocalRay RayCaster::Scene::localize(const Eigen::Vector3d& origin, const Eigen::
   ray.length = direction.stableNorm();
   if (!(ray.length > 0.0) || !std::isfinite(ray.length) || !origin.allFinite()) return ray;
   const Eigen::Vector3d unit = direction / ray.length;
-  const Eigen::Vector3d start = origin - centre;
+  const Eigen::Vector3d start = origin - mesh.centre();
   double enter = 0.0;
   double leave = largest_float;
   for (int axis = 0; axis < 3; ++axis) {
@@ -136,11 +83,11 @@ RayHit RayCaster::Scene::refine(const Eigen::Vector3d& origin, const Eigen::Vect
   hit.distance = unit_distance / ray.length;
   hit.u = static_cast<double>(u);
   hit.v = static_cast<double>(v);
-  const Eigen::Vector3d& a = vertices[triangles[triangle][0]];
-  const Eigen::Vector3d ab = vertices[triangles[triangle][1]] - a;
-  const Eigen::Vector3d ac = vertices[triangles[triangle][2]] - a;
+  const Eigen::Vector3d& a = mesh.corner(triangle, 0);
+  const Eigen::Vector3d ab = mesh.corner(triangle, 1) - a;
+  const Eigen::Vector3d ac = mesh.corner(triangle, 2) - a;
   const Eigen::Vector3d normal = ab.cross(ac);
-  const Eigen::Vector3d start = origin - centre;
+  const Eigen::Vector3d start = origin - mesh.centre();
   const double exact = normal.dot(a - start) / normal.dot(direction);
   // Where a ray grazes its triangle the plane says less about the hit than Embree does.
   if (!(std::abs(exact - hit.distance) * ray.length <= 1e-5 * (1e-3 + std::abs(unit_distance))))
@@ -186,7 +133,7 @@ std::optional<RayHit> RayCaster::cast(const Eigen::Vector3d& origin,
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcIntersect1(scene_->scene.get(), &context, &ray);
+  rtcIntersect1(scene_->mesh.scene(), &context, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
   return scene_->refine(origin, direction, local, ray.ray.tfar, ray.hit.primID, ray.hit.u,
                         ray.hit.v);
@@ -199,7 +146,7 @@ bool RayCaster::is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d&
   RTCRay ray = embree_ray(local);
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcOccluded1(scene_->scene.get(), &context, &ray);
+  rtcOccluded1(scene_->mesh.scene(), &context, &ray);
   return ray.tfar < 0.0F;  // Embree's mark of a blocked ray
 }
 
@@ -232,7 +179,7 @@ void RayCaster::cast_bundle(const Eigen::Vector3d& origin,
       packet.ray.tfar[i] = ray.far;
       packet.ray.mask[i] = ~0U;
     }
-    rtcIntersect8(valid.data(), scene_->scene.get(), &context, &packet);
+    rtcIntersect8(valid.data(), scene_->mesh.scene(), &context, &packet);
     for (std::size_t i = 0; i < count; ++i) {
       RayHit& hit = hits[first + i];
       if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {

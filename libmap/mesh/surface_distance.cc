@@ -11,75 +11,20 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/mesh/embree_mesh.h"
 #include "libmap/mesh/ray_caster.h"
 
 namespace libmap {
 
-namespace {
-
-struct DeviceRelease {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct SceneRelease {
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-
-void require_success(RTCDevice device) {
-  if (const RTCError code = rtcGetDeviceError(device); code != RTC_ERROR_NONE)
-    throw Error(
-        "Embree cannot build the scene (error " + std::to_string(static_cast<int>(code)) + ")", {},
-        ErrorKind::failed);
-}
-
-}  // namespace
-
 struct SurfaceDistance::Scene {
-  std::unique_ptr<RTCDeviceTy, DeviceRelease> device;
-  std::unique_ptr<RTCSceneTy, SceneRelease> scene;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double extent = 0.0;
-  std::vector<Eigen::Vector3d> vertices;  // about the centre
-  std::vector<Triangle> triangles;
+  EmbreeMesh mesh;
 
-  explicit Scene(const TriangleMesh& mesh);
+  explicit Scene(const TriangleMesh& of) : mesh(of, false) {}
   Eigen::Vector3d nearest_on(std::uint32_t triangle, const Eigen::Vector3d& point) const {
-    const Triangle& corners = triangles[triangle];
-    return nearest_on_triangle(point, vertices[corners[0]], vertices[corners[1]],
-                               vertices[corners[2]]);
+    return nearest_on_triangle(point, mesh.corner(triangle, 0), mesh.corner(triangle, 1),
+                               mesh.corner(triangle, 2));
   }
 };
-
-SurfaceDistance::Scene::Scene(const TriangleMesh& mesh) : triangles(mesh.triangles) {
-  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
-  mesh.check();
-  for (const Eigen::Vector3d& vertex : mesh.vertices)
-    if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
-  const Bounds3d bounds = bounds_of(mesh.vertices);
-  centre = 0.5 * (bounds.min + bounds.max);
-  extent = (bounds.max - bounds.min).norm();
-  vertices.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices.push_back(vertex - centre);
-
-  device.reset(rtcNewDevice(nullptr));
-  if (!device) throw Error("Embree cannot start", {}, ErrorKind::failed);
-  scene.reset(rtcNewScene(device.get()));
-  const RTCGeometry geometry = rtcNewGeometry(device.get(), RTC_GEOMETRY_TYPE_TRIANGLE);
-  auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
-      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices.size()));
-  auto* indices = static_cast<unsigned*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                              3 * sizeof(unsigned), triangles.size()));
-  require_success(device.get());
-  for (const Eigen::Vector3d& vertex : vertices)
-    for (int axis = 0; axis < 3; ++axis) *corners++ = static_cast<float>(vertex[axis]);
-  for (const Triangle& triangle : triangles)
-    for (const std::uint32_t index : triangle) *indices++ = index;
-  rtcCommitGeometry(geometry);
-  rtcAttachGeometry(scene.get(), geometry);
-  rtcReleaseGeometry(geometry);
-  rtcCommitScene(scene.get());
-  require_success(device.get());
-}
 
 SurfaceDistance::SurfaceDistance(const TriangleMesh& mesh)
     : scene_(std::make_unique<Scene>(mesh)) {}
@@ -96,9 +41,13 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
     std::uint32_t triangle;
     double distance;
   };
-  const Eigen::Vector3d local = point - scene_->centre;
-  Search search{
-      *scene_, local, 1e-6 * (scene_->extent + local.norm()), scene_->nearest_on(0, local), 0, 0.0};
+  const Eigen::Vector3d local = point - scene_->mesh.centre();
+  Search search{*scene_,
+                local,
+                1e-6 * (scene_->mesh.size().norm() + local.norm()),
+                scene_->nearest_on(0, local),
+                0,
+                0.0};
   search.distance = (search.best - local).norm();
   RTCPointQuery query{};
   query.x = static_cast<float>(local.x());
@@ -121,8 +70,8 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
     arguments->query->radius = static_cast<float>(distance + found.slack);
     return true;
   };
-  rtcPointQuery(scene_->scene.get(), &query, &context, visit, &search);
-  return {search.best + scene_->centre, search.triangle, search.distance};
+  rtcPointQuery(scene_->mesh.scene(), &query, &context, visit, &search);
+  return {search.best + scene_->mesh.centre(), search.triangle, search.distance};
 }
 
 namespace {

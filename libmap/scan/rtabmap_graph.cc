@@ -79,7 +79,7 @@ std::string node_text(std::int64_t id) { return "node " + std::to_string(id); }
 std::optional<Pose> pose_in(const SqliteRow& row, int column, const std::string& what,
                             Warnings& warnings) {
   const std::string bytes = row.bytes(column);
-  if (bytes.size() <= absent_bytes) return std::nullopt;
+  if (bytes.empty()) return std::nullopt;
   return warnings.attempt(what, [&] { return decode_pose(bytes); });
 }
 
@@ -94,9 +94,9 @@ GraphNode node_in(const SqliteRow& row, int id, Warnings& warnings) {
   node.label = row.bytes(4);
   node.odometry_from_base = pose_in(row, 5, what + ": pose", warnings);
   node.truth_from_base = pose_in(row, 6, what + ": ground_truth_pose", warnings);
-  if (const std::string bytes = row.bytes(7); bytes.size() > absent_bytes)
+  if (const std::string bytes = row.bytes(7); !bytes.empty())
     node.velocity = warnings.attempt(what + ": velocity", [&] { return decode_velocity(bytes); });
-  if (const std::string bytes = row.bytes(8); bytes.size() > absent_bytes)
+  if (const std::string bytes = row.bytes(8); !bytes.empty())
     node.gps = warnings.attempt(what + ": gps", [&] { return decode_gps(bytes); });
   return node;
 }

@@ -89,10 +89,13 @@ class Findings {
     result_.bytes += blob.size();
   }
 
-  // One blob; whether it is sound.
+  // One blob of Data, where a few bytes mean none; whether it is sound.
   template <typename Check>
   bool check(int node, const std::string& part, const std::string& blob, const Check& use) {
-    if (blob.size() <= absent_bytes) return true;
+    return blob.size() <= absent_bytes || check_present(node, part, blob, use);
+  }
+  template <typename Check>
+  bool check_present(int node, const std::string& part, const std::string& blob, const Check& use) {
     count(blob);
     return attempt(node, part, [&] { use(blob); });
   }
@@ -150,10 +153,15 @@ class DatabaseVerification {
     if (!scan_.columns().has(of.table, of.column)) return;
     if (of.node != nullptr && !scan_.columns().has(of.table, of.node)) return;
     const std::string node = of.node == nullptr ? "0" : of.node;
-    scan_.file().each_row(
-        "SELECT " + node + ", " + of.column + " FROM " + of.table, {}, [&](const SqliteRow& row) {
-          findings_.check(node_in(row, 0), part_of(of.table, of.column), row.bytes(1), of.check);
-        });
+    scan_.file().each_row("SELECT " + node + ", " + of.column + " FROM " + of.table, {},
+                          [&](const SqliteRow& row) {
+                            const std::string blob = row.bytes(1);
+                            const std::string part = part_of(of.table, of.column);
+                            if (row.is_text(1) && !blob.empty())
+                              findings_.add(node_in(row, 0), part, Error("is a text, not a blob"));
+                            else if (!blob.empty())
+                              findings_.check_present(node_in(row, 0), part, blob, of.check);
+                          });
   }
 
   // Plain text before 0.15.
@@ -208,6 +216,9 @@ class DatabaseVerification {
     });
     progress_.end();
     result_.nodes = ids.size();
+    for (const GraphNode& node : scan_.graph().nodes)
+      if (!std::binary_search(ids.begin(), ids.end(), node.id))
+        findings_.add(node.id, table, Error("the node has no row"));
   }
 
   // The blobs of Data that belong to no frame.
@@ -287,6 +298,13 @@ ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress) {
     DatabaseVerification(*database, result, progress).run();
   else
     verify_frames(scan, result, progress);
+  // What the graph had to leave out, unless its blob is listed.
+  for (const std::string& warning : scan.warnings()) {
+    const bool is_listed =
+        std::any_of(result.faults.begin(), result.faults.end(),
+                    [&](const ScanFault& fault) { return warning.ends_with(fault.reason); });
+    if (!is_listed) result.faults.push_back({0, "graph", warning});
+  }
   std::sort(result.faults.begin(), result.faults.end(), [](const auto& a, const auto& b) {
     return std::tie(a.node, a.part, a.reason) < std::tie(b.node, b.part, b.reason);
   });

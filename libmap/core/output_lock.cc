@@ -1,0 +1,50 @@
+#include "libmap/core/output_lock.h"
+
+#include <sys/file.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+bool is_still_named(int descriptor, const fs::path& path) {
+  struct stat held {};
+  struct stat named {};
+  return fstat(descriptor, &held) == 0 && stat(path.c_str(), &named) == 0 &&
+         held.st_dev == named.st_dev && held.st_ino == named.st_ino;
+}
+
+}  // namespace
+
+Error system_failure(const fs::path& path, const std::string& what, int code) {
+  return Error(what + ": " + std::strerror(code), {.file = path.string()}, ErrorKind::failed);
+}
+
+fs::path folder_of(const fs::path& path) {
+  return path.has_parent_path() ? path.parent_path() : fs::path(".");
+}
+
+int lock_temporary(const fs::path& temporary, const fs::path& final_path,
+                   const std::function<int(const char*)>& open_temporary) {
+  for (;;) {
+    const int lock = open_temporary(temporary.c_str());
+    if (lock < 0 && errno == ENOENT && fs::is_directory(folder_of(temporary))) continue;
+    if (lock < 0) throw system_failure(final_path, "cannot be written", errno);
+    if (flock(lock, LOCK_EX | LOCK_NB) != 0) {
+      close(lock);
+      throw Error("another process is writing it", {.file = final_path.string()},
+                  ErrorKind::failed);
+    }
+    // Between opening and locking, another process may have put this very file in place.
+    if (is_still_named(lock, temporary)) return lock;
+    close(lock);
+  }
+}
+
+}  // namespace libmap

@@ -1,0 +1,73 @@
+#include "libmap/mesh/embree_mesh.h"
+
+#include <embree3/rtcore.h>
+
+#include <string>
+
+#include "libmap/core/error.h"
+
+namespace libmap {
+
+namespace {
+
+struct DeviceRelease {
+  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
+};
+struct SceneRelease {
+  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
+};
+
+void require_success(RTCDevice device) {
+  if (const RTCError code = rtcGetDeviceError(device); code != RTC_ERROR_NONE)
+    throw Error(
+        "Embree cannot build the scene (error " + std::to_string(static_cast<int>(code)) + ")", {},
+        ErrorKind::failed);
+}
+
+}  // namespace
+
+struct EmbreeMesh::Handles {
+  std::unique_ptr<RTCDeviceTy, DeviceRelease> device;
+  std::unique_ptr<RTCSceneTy, SceneRelease> scene;
+};
+
+EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust)
+    : handles_(std::make_unique<Handles>()), triangles_(mesh.triangles) {
+  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  mesh.check();
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
+  const Bounds3d bounds = bounds_of(mesh.vertices);
+  centre_ = 0.5 * (bounds.min + bounds.max);
+  size_ = bounds.max - bounds.min;
+  vertices_.reserve(mesh.vertices.size());
+  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices_.push_back(vertex - centre_);
+
+  handles_->device.reset(rtcNewDevice(nullptr));
+  RTCDevice device = handles_->device.get();
+  if (device == nullptr) throw Error("Embree cannot start", {}, ErrorKind::failed);
+  handles_->scene.reset(rtcNewScene(device));
+  if (robust) rtcSetSceneFlags(scene(), RTC_SCENE_FLAG_ROBUST);
+  const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
+  auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
+      geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices_.size()));
+  auto* indices = static_cast<unsigned*>(
+      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                              3 * sizeof(unsigned), triangles_.size()));
+  require_success(device);
+  for (const Eigen::Vector3d& vertex : vertices_)
+    for (int axis = 0; axis < 3; ++axis) *corners++ = static_cast<float>(vertex[axis]);
+  for (const Triangle& triangle : triangles_)
+    for (const std::uint32_t index : triangle) *indices++ = index;
+  rtcCommitGeometry(geometry);
+  rtcAttachGeometry(scene(), geometry);
+  rtcReleaseGeometry(geometry);
+  rtcCommitScene(scene());
+  require_success(device);
+}
+
+EmbreeMesh::~EmbreeMesh() = default;
+
+RTCSceneTy* EmbreeMesh::scene() const { return handles_->scene.get(); }
+
+}  // namespace libmap

@@ -1,0 +1,44 @@
+// A triangle mesh in Embree, about its centre. Inner part of libmap/mesh: rays and distances stand
+// on it.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <memory>
+#include <vector>
+
+#include "libmap/core/triangle_mesh.h"
+
+struct RTCSceneTy;  // embree3/rtcore.h
+
+namespace libmap {
+
+// Positions are relative to `centre`, where single precision is finest.
+class EmbreeMesh {
+ public:
+  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
+  // `robust`: rays do not slip through shared edges.
+  EmbreeMesh(const TriangleMesh& mesh, bool robust);
+  ~EmbreeMesh();
+  EmbreeMesh(const EmbreeMesh&) = delete;
+  EmbreeMesh& operator=(const EmbreeMesh&) = delete;
+
+  RTCSceneTy* scene() const;
+  const Eigen::Vector3d& centre() const { return centre_; }
+  Eigen::Vector3d size() const { return size_; }  // of the bounding box, m
+  const std::vector<Triangle>& triangles() const { return triangles_; }
+  // A corner of a triangle about the centre, in double precision.
+  const Eigen::Vector3d& corner(std::uint32_t triangle, int k) const {
+    return vertices_[triangles_[triangle][static_cast<std::size_t>(k)]];
+  }
+
+ private:
+  struct Handles;
+  std::unique_ptr<Handles> handles_;
+  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d size_ = Eigen::Vector3d::Zero();
+  std::vector<Eigen::Vector3d> vertices_;
+  std::vector<Triangle> triangles_;
+};
+
+}  // namespace libmap

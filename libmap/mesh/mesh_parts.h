@@ -1,0 +1,44 @@
+// Parts of a mesh with all that belongs to their vertices and faces: normals, colours, fields.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+// The triangles that are marked, in their order, and the vertices that they use, in theirs.
+// `keep_triangle` is one a triangle.
+TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle);
+
+// Connected components over shared edges, numbered by their first triangle.
+struct MeshComponents {
+  std::vector<std::uint32_t> of_triangle;
+  std::vector<double> areas_m2;  // of each component
+};
+MeshComponents connected_components(const TriangleMesh& mesh);
+
+// A new vertex on the segment from a (t = 0) to b (t = 1), all of its values interpolated linearly;
+// normals are made unit again. Fields of whole numbers take the nearer end's value.
+std::uint32_t append_vertex_between(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, double t);
+
+// Positions, unit normals and a known viewpoint carried by `target_from_source`.
+TriangleMesh transform_mesh(const TriangleMesh& mesh, const Pose& target_from_source);
+
+// A place on a triangle: (1 - u - v) * a + u * b + v * c.
+struct TrianglePoint {
+  std::uint32_t triangle = 0;
+  double u = 0.0;
+  double v = 0.0;
+};
+Eigen::Vector3d position_on(const TriangleMesh& mesh, const TrianglePoint& point);
+
+// The surface at `points` as a cloud: unit normals (of the vertices, interpolated, or else of the
+// triangle), colours and vertex fields by barycentric interpolation, face fields of the triangle.
+// Fields of whole numbers take the nearest vertex's value.
+PointCloud points_on_surface(const TriangleMesh& mesh, const std::vector<TrianglePoint>& points);
+
+}  // namespace libmap
