@@ -1,6 +1,6 @@
 # The thesis's scenario 4 without leaving the desk: a simulated site of rocks, its scan by a Kinect
-# v2 carried round it by hand, the cloud of that scan and its distance to the true mesh, and the map.
-# Needs no data.
+# v2 carried round it by hand, and all of scan.mk: cloud, surface, the 3 x 3 m site, texture, samples,
+# map, each with its distance to the true mesh. Needs no data.
 #
 #   make -f pipelines/rock_site.mk OUT=folder [SEED=1] [FRAMES=60] [SITE=rocks] [EDGE=0.008] -j2
 
@@ -12,6 +12,7 @@ FRAMES ?= 60
 SITE ?= rocks
 EDGE ?= 0.008
 POSES ?= odometry
+CROP ?= --size 3x3
 SCENARIO ?= artificial_rocks_prescan
 METHOD ?= corrected
 SHARES ?= 4
@@ -42,5 +43,6 @@ $(OUT)/scan.db: $(OUT)/site/mesh.ply
 
 map: $(OUT)/scan.db $(OUT)/site/field_points.csv
 	@$(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$< OUT=$(OUT)/scan POSES=$(POSES) \
+	  CROP="$(CROP)" \
 	  TRUTH=$(OUT)/site/mesh.ply POINTS=$(OUT)/site/field_points.csv SCENARIO=$(SCENARIO) \
 	  METHOD=$(METHOD) SHARES=$(SHARES) GRASPMAP=$(GRASPMAP) TITLE='simulated scan'

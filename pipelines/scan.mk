@@ -1,13 +1,18 @@
-# A scan from its database to pictures: what it holds, one cloud of all its frames, the cloud's
-# distance to a true mesh where there is one, and the graspability map with look-up and evaluation.
+# A scan from its database to pictures: one cloud of all its frames, a clean surface, the levelled
+# and cropped site with its photographs as texture, evenly spread samples of it, and the
+# graspability map with look-up and evaluation. Where there is a true mesh, each stage's distance to
+# it.
 #
 #   make -f pipelines/scan.mk SCAN=scan.db OUT=folder [POSES=odometry] [TRUTH=mesh.ply] \
-#        [POINTS=points.csv] [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] -j2
+#        [CROP="--size 3x3"] [RESAMPLE="--count 73000"] [POINTS=points.csv] \
+#        [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] -j2
 #
 # SCAN is an RTAB-Map database or a folder of images. POSES is odometry, stored, ground-truth or a
 # file of poses (stored). With TRUTH, a mesh in the frame of the scan's true poses, the cloud is
-# carried into that frame. POINTS lie in the cloud's frame. FUSE and SCORE hold further flags.
-# A second run does nothing; other variables or changed files make again what depends on them.
+# carried into that frame. POINTS lie in the cloud's frame. FUSE, MESH, CROP, RESAMPLE and SCORE hold
+# further flags of their commands; without CROP the map is levelled and kept whole. TEXTURE= leaves
+# the texture out. A second run does nothing; other variables or changed files make again what
+# depends on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -18,12 +23,16 @@ SCENARIO ?= artificial_rocks_prescan
 METHOD ?=
 SHARES ?= 8
 FUSE ?=
+MESH ?= --cell-size 0.01
+CROP ?=
+RESAMPLE ?=
+TEXTURE ?= model.glb
 SCORE ?=
 export TITLE ?= $(basename $(notdir $(SCAN)))
 
 # make splits names at spaces; better an error than half a name.
 one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
-$(foreach name,SCAN OUT POSES TRUTH POINTS SCENARIO,$(call one_word,$(name)))
+$(foreach name,SCAN OUT POSES TRUTH POINTS SCENARIO TEXTURE,$(call one_word,$(name)))
 ifeq ($(SCAN),)
   $(error SCAN is not set: the scan, e.g. SCAN=scan.db)
 endif
@@ -31,8 +40,9 @@ ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 
-fuse_flags := --poses $(POSES) $(if $(TRUTH),--frame ground-truth) $(FUSE)
-results := $(OUT)/scan.txt $(OUT)/cloud.png $(if $(TRUTH),$(OUT)/accuracy.txt)
+poses_flags := --poses $(POSES) $(if $(TRUTH),--frame ground-truth)
+results := $(OUT)/scan.txt $(OUT)/cloud.png $(OUT)/site.png $(OUT)/spot_check.txt \
+  $(if $(TRUTH),$(OUT)/accuracy.txt) $(if $(TEXTURE),$(OUT)/texture.png)
 
 .DELETE_ON_ERROR:
 .PHONY: all map FORCE
@@ -41,24 +51,55 @@ all: $(results) map
 $(OUT):
 	@mkdir -p $@
 
-# A stamp of the variables that the cloud depends on: written anew only if they change.
-export fused_with := $(SCAN) $(fuse_flags)
-$(OUT)/fused_with: FORCE | $(OUT)
+# Stamps of the variables that a result depends on: written anew only if they change.
+export fused_with := $(SCAN) $(poses_flags) $(FUSE)
+export meshed_with := $(MESH)
+export cropped_with := $(CROP)
+export resampled_with := $(RESAMPLE)
+stamps := $(addprefix $(OUT)/,fused_with meshed_with cropped_with resampled_with)
+$(stamps): FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
 $(OUT)/scan.txt: $(SCAN) | $(OUT)
 	@$(GRASPMAP) info $< > $@
 
 $(OUT)/cloud.ply: $(SCAN) $(wildcard $(POSES)) $(OUT)/fused_with
-	@$(GRASPMAP) fuse $(SCAN) -o $@ $(fuse_flags)
+	@$(GRASPMAP) fuse $(SCAN) -o $@ $(poses_flags) $(FUSE)
+
+$(OUT)/mesh.ply $(OUT)/mesh.txt &: $(OUT)/cloud.ply $(OUT)/meshed_with
+	@$(GRASPMAP) mesh $< -o $(OUT)/mesh.ply --report $(MESH) > $(OUT)/mesh.txt
+
+$(OUT)/site.ply: $(OUT)/mesh.ply $(OUT)/cropped_with
+	@$(GRASPMAP) crop $< -o $@ $(CROP)
+
+$(OUT)/terrain.pcd: $(OUT)/site.ply $(OUT)/resampled_with
+	@$(GRASPMAP) resample $< -o $@ $(RESAMPLE)
+
+$(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(wildcard $(POSES))
+	@$(GRASPMAP) texture $< --scan $(SCAN) $(poses_flags) -o $@
 
 $(OUT)/cloud.png: $(OUT)/cloud.ply
-	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE" --quiet
+	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: cloud" --quiet
 
-$(OUT)/accuracy.txt: $(OUT)/cloud.ply $(TRUTH)
-	@$(GRASPMAP) compare $(OUT)/cloud.ply $(TRUTH) > $@
+$(OUT)/site.png: $(OUT)/site.ply
+	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: site" --quiet
+
+$(OUT)/texture.png: $(OUT)/$(TEXTURE)
+	@$(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
+
+# Without a true mesh the ground is the plane that was found.
+$(OUT)/spot_check.txt: $(OUT)/site.ply $(TRUTH)
+	@$(GRASPMAP) spot-check $< -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
+	  --truth-frame map) > $@
+
+$(OUT)/accuracy.txt: $(OUT)/cloud.ply $(OUT)/site.ply $(TRUTH)
+	@echo 'cloud:' > $@
+	@$(GRASPMAP) compare $(OUT)/cloud.ply $(TRUTH) >> $@
+	@echo 'surface of the site:' >> $@
+	@$(GRASPMAP) compare $(OUT)/site.ply $(TRUTH) --transform crop | sed '/^surface within/d' >> $@
 	@cat $@
 
-map: $(OUT)/cloud.ply
-	@$(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(POINTS) SCENARIO=$(SCENARIO) \
-	  METHOD=$(METHOD) OUT=$(OUT)/map SHARES=$(SHARES) SCORE="$(SCORE)" GRASPMAP=$(GRASPMAP)
+map: $(OUT)/terrain.pcd
+	@$(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(POINTS) POINTS_FRAME=map \
+	  SCENARIO=$(SCENARIO) METHOD=$(METHOD) OUT=$(OUT)/map SHARES=$(SHARES) SCORE="$(SCORE)" \
+	  GRASPMAP=$(GRASPMAP)

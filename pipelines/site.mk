@@ -1,11 +1,12 @@
 # A site from its cloud to pictures: graspability map tile by tile, look-up, evaluation, pictures.
 #
 #   make -f pipelines/site.mk SITE=cloud.pcd POINTS=points.csv SCENARIO=artificial_rocks_prescan \
-#        OUT=folder [METHOD=thesis] [SHARES=8] [SCORE="..."] [TITLE="..."] -j2
+#        OUT=folder [METHOD=thesis] [SHARES=8] [SCORE="..."] [POINTS_FRAME=map] [TITLE="..."] -j2
 #
 # POINTS (columns x, y, z; first column: name) may be left out; if it has a column `graspable` (1 or
 # 0), the map is evaluated against it. SCENARIO is a name of data/scenarios or a file. METHOD, if
-# set, replaces the scenario's method. A second run does nothing; a run that was stopped goes on;
+# set, replaces the scenario's method. POINTS lie in the site's frame, or with POINTS_FRAME=map in
+# that of the map which the site was cropped from. A second run does nothing; a run that was stopped goes on;
 # other variables or changed files make again what depends on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
@@ -13,6 +14,7 @@ GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
 SCENARIO ?= artificial_rocks_prescan
 SHARES ?= 8
 METHOD ?=
+POINTS_FRAME ?= input
 SCORE ?=
 export TITLE ?= $(basename $(notdir $(SITE)))
 
@@ -44,7 +46,7 @@ results := $(OUT)/map.pcd $(OUT)/map.vtp $(OUT)/top.png $(OUT)/oblique.png $(OUT
 markers :=
 ifneq ($(POINTS),)
   results += $(OUT)/lookup.csv
-  markers := --points $(POINTS)
+  markers := --points $(POINTS) --points-frame $(POINTS_FRAME)
   columns := $(shell grep -v '^ *\#' '$(POINTS)' | head -n 1 | tr -d '\r' | tr ',' ' ')
   ifneq ($(filter graspable,$(columns)),)
     results += $(OUT)/roc.png
@@ -62,7 +64,7 @@ $(OUT) $(OUT)/tiles:
 
 # Stamps of the variables that a result depends on: written anew only if they change.
 export scored_with := $(SITE) $(score_flags)
-export shown_with := $(POINTS) $(TITLE)
+export shown_with := $(POINTS) $(POINTS_FRAME) $(TITLE)
 $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
@@ -78,7 +80,7 @@ $(OUT)/map.vtp: $(OUT)/map.pcd
 	@$(GRASPMAP) convert $< $@ --quiet
 
 $(OUT)/lookup.csv: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
-	@$(GRASPMAP) lookup $< $(POINTS) -o $@
+	@$(GRASPMAP) lookup $< $(POINTS) --points-frame $(POINTS_FRAME) -o $@
 
 $(OUT)/roc.png: $(OUT)/lookup.csv
 	@$(GRASPMAP) evaluate $< -o $(OUT)/evaluation --label graspable --score score --quiet \

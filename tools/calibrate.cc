@@ -45,6 +45,7 @@ struct Picture {
   int width = 0;
   int height = 0;
   std::optional<std::vector<Eigen::Vector2d>> corners;
+  std::optional<libmap::Error> fault{};  // it cannot be read
 };
 
 void bind(libmap::ParameterTable& table, CalibrateOptions& options) {
@@ -89,8 +90,15 @@ Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
                                             : libmap::decode_gray(bytes);
     return {file, image.width, image.height, libmap::find_chessboard(image, board)};
   } catch (const libmap::Error& error) {
-    throw error.in_file(file);
+    return {.name = file, .corners = std::nullopt, .fault = error.in_file(file)};
   }
+}
+
+// Throws the first one's Error if none can be read.
+const Picture& first_readable(const std::vector<Picture>& pictures) {
+  for (const Picture& picture : pictures)
+    if (!picture.fault) return picture;
+  throw libmap::Error(*pictures.front().fault);
 }
 
 std::vector<Picture> read_pictures(const std::vector<std::string>& files,
@@ -104,16 +112,20 @@ std::vector<Picture> read_pictures(const std::vector<std::string>& files,
     }
   });
   run.progress().end();
+  const Picture& first = first_readable(pictures);
   const auto size = [](const Picture& picture) {
     return fmt::format("{} x {}", picture.width, picture.height);
   };
-  for (const Picture& picture : pictures)
-    if (size(picture) != size(pictures.front()))
+  for (const Picture& picture : pictures) {
+    if (picture.fault)
+      run.warn(std::string(picture.fault->what()) + "; it is left out");
+    else if (size(picture) != size(first))
       throw libmap::Error("the images are not of one size",
                           {.file = picture.name,
                            .field = "size",
                            .value = size(picture),
-                           .bound = size(pictures.front()) + " as " + pictures.front().name});
+                           .bound = size(first) + " as " + first.name});
+  }
   return pictures;
 }
 
@@ -129,7 +141,7 @@ std::vector<libmap::BoardPicture> boards_of(const std::vector<Picture>& pictures
                          .value = options.board,
                          .bound = "the number of inner corners, one less than of squares"});
   for (const Picture& picture : pictures)
-    if (!picture.corners)
+    if (!picture.corners && !picture.fault)
       run.warn(fmt::format("{}: no board of {} inner corners", picture.name, options.board));
   return boards;
 }
@@ -184,9 +196,10 @@ libmap::Table picture_table(const std::vector<Picture>& pictures,
                                        picture.name) != result.repeated.end();
     if (found == result.pictures.end()) {
       table.rows.push_back({picture.name,
-                            !picture.corners ? "no board"
-                            : is_repeated    ? "repeated"
-                                             : "rejected",
+                            picture.fault      ? "unreadable"
+                            : !picture.corners ? "no board"
+                            : is_repeated      ? "repeated"
+                                               : "rejected",
                             "", "", "", ""});
       continue;
     }
@@ -219,9 +232,11 @@ void note_results(const std::vector<Picture>& pictures, const CameraCalibrationR
     manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
   };
   count("images", pictures.size());
-  count("images_without_board",
-        static_cast<std::size_t>(std::count_if(pictures.begin(), pictures.end(),
-                                               [](const Picture& p) { return !p.corners; })));
+  const auto count_if = [&](const std::string& name, const auto& is) {
+    count(name, static_cast<std::size_t>(std::count_if(pictures.begin(), pictures.end(), is)));
+  };
+  count_if("images_unreadable", [](const Picture& p) { return p.fault.has_value(); });
+  count_if("images_without_board", [](const Picture& p) { return !p.corners && !p.fault; });
   count("images_repeated", result.repeated.size());
   count("images_rejected", result.rejected.size());
   count("images_used", result.pictures.size());
@@ -291,6 +306,7 @@ void calibrate(CalibrateOptions& options, Run& run) {
   options.calibration.board = libmap::parse_chessboard(options.board, "--board");
   options.calibration.board.square_mm = square_mm;
   const std::vector<std::string> files = image_files(options.images);
+  for (const std::string& file : files) libmap::require_readable_file(file);
   run.claim_output(options.output, files);
   if (!options.output.ends_with(".yaml") && !options.output.ends_with(".yml"))
     throw libmap::Error("a camera is written as YAML",
@@ -301,8 +317,8 @@ void calibrate(CalibrateOptions& options, Run& run) {
   for (const std::string& file : files) run.add_input(file);
   const std::vector<libmap::BoardPicture> boards = boards_of(pictures, options, run);
   const CameraCalibrationResult result = run.timed("calibrate", [&] {
-    return libmap::calibrate_camera(boards, pictures.front().width, pictures.front().height,
-                                    options.calibration);
+    const Picture& first = first_readable(pictures);
+    return libmap::calibrate_camera(boards, first.width, first.height, options.calibration);
   });
   note_results(pictures, result, run.manifest());
   warn_of_weaknesses(result, run);

@@ -1,22 +1,29 @@
-// graspmap compare: how far a cloud lies from a true surface, and how much of it the cloud covers.
+// graspmap compare: how far one cloud or mesh lies from another.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
+#include <numbers>
 #include <optional>
 #include <string>
-#include <string_view>
+#include <utility>
 #include <vector>
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/reference_surface.h"
+#include "libmap/mesh/surface_alignment.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/view/scene_view.h"
 #include "tools/command_line.h"
+#include "tools/map_frame.h"
+#include "tools/placement.h"
 
 namespace {
 
@@ -24,180 +31,365 @@ using graspmap_tools::Run;
 using Json = nlohmann::ordered_json;
 
 struct CompareOptions {
-  std::string cloud;
-  std::string mesh;
+  std::string a;
+  std::string b;
   std::string output;
+  std::string picture;
   std::string transform;
   std::string box;
   double within_m = 0.01;
   double samples_per_m2 = 20000.0;
   std::uint64_t seed = 1;
+  bool icp = false;
+  libmap::SurfaceAlignmentOptions alignment;
+  double picture_range_m = 0.0;
+  libmap::SceneViewOptions view;
   bool json = false;
 };
 
 void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("within_m", options.within_m, libmap::positive,
-            "the surface is covered where a point of the cloud is this near");
+            "one covers the other where it is this near");
   table.add("samples_per_m2", options.samples_per_m2, libmap::positive,
-            "points of the surface at which its coverage is asked");
+            "points of a mesh's surface that stand for it");
   table.add("seed", options.seed, {}, "of those points");
+  table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
+  bind(table, options.alignment);
+  table.add("picture_range_m", options.picture_range_m, libmap::not_negative,
+            "distance at the end of the picture's colours, m; 0: that of 98 of 100 points");
+  table.add("picture_view", options.view.view,
+            {{"top", libmap::Viewpoint::top},
+             {"oblique", libmap::Viewpoint::oblique},
+             {"front", libmap::Viewpoint::front},
+             {"side", libmap::Viewpoint::side}},
+            "from where the picture is seen");
 }
 
-// Six finite numbers with commas between them.
-std::vector<double> parse_six(const std::string& text, const char* field, const char* bound) {
-  std::vector<double> numbers;
-  std::string_view rest = text;
-  while (true) {
-    const std::size_t comma = rest.find(',');
-    const auto number = libmap::parse_double(rest.substr(0, comma));
-    if (!number || !std::isfinite(*number)) break;
-    numbers.push_back(*number);
-    if (comma == std::string_view::npos) {
-      if (numbers.size() == 6) return numbers;
-      break;
-    }
-    rest = rest.substr(comma + 1);
+// A cloud, or a mesh and points of its surface.
+struct Shape {
+  std::optional<libmap::TriangleMesh> mesh;
+  libmap::PointCloud points;
+};
+
+Shape read_shape(const std::string& file, const CompareOptions& options) {
+  Shape shape;
+  if (libmap::file_kind(file) == libmap::FileKind::cloud) {
+    shape.points = libmap::read_cloud(file).cloud;
+    return shape;
   }
-  throw libmap::Error("not six numbers",
-                      {.file = {}, .field = field, .value = text, .bound = bound});
-}
-
-libmap::Pose mesh_from_cloud(const std::string& text) {
-  if (text.empty()) return libmap::Pose::Identity();
-  const std::vector<double> n =
-      parse_six(text, "--transform", "X,Y,Z,ROLL,PITCH,YAW in metres and degrees");
-  return libmap::make_pose_from_rpy({n[0], n[1], n[2]}, {n[3], n[4], n[5]});
-}
-
-std::optional<libmap::Bounds3d> parse_box(const std::string& text) {
-  if (text.empty()) return std::nullopt;
-  const char* bound = "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX in metres";
-  const std::vector<double> n = parse_six(text, "--box", bound);
-  const libmap::Bounds3d box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
-  if ((box.min.array() > box.max.array()).any())
-    throw libmap::Error("the box is inside out",
-                        {.file = {}, .field = "--box", .value = text, .bound = bound});
-  return box;
-}
-
-bool is_inside(const std::optional<libmap::Bounds3d>& box, const Eigen::Vector3d& point) {
-  return !box ||
-         ((point.array() >= box->min.array()).all() && (point.array() <= box->max.array()).all());
-}
-
-libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
-                               const std::optional<libmap::Bounds3d>& box,
-                               const std::string& file) {
-  std::vector<std::size_t> inside;
-  for (std::size_t n = 0; n < cloud.size(); ++n)
-    if (is_inside(box, cloud.positions[n])) inside.push_back(n);
-  if (inside.empty())
-    throw libmap::Error(cloud.empty() ? "the cloud has no points" : "no point lies in the box",
-                        {.file = file});
-  return libmap::select_points(cloud, inside);
+  shape.mesh = libmap::read_mesh(file).mesh;
+  try {
+    shape.points = libmap::points_on_surface(
+        *shape.mesh, libmap::sample_triangles(*shape.mesh, options.samples_per_m2, options.seed));
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file);
+  }
+  return shape;
 }
 
 // Distances to a mesh take the longer the farther a point is from it; a cloud that lies so far off
 // was carried there by a wrong transform.
-void require_nearness(const libmap::TriangleMesh& mesh, const libmap::PointCloud& cloud,
+void require_nearness(const libmap::ReferenceSurface& surface, const libmap::PointCloud& cloud,
                       const CompareOptions& options) {
   constexpr double most_sizes = 100;
-  const libmap::Bounds3d surface = libmap::bounds_of(mesh.vertices);
-  const libmap::Bounds3d points = libmap::bounds_of(cloud.positions);
-  const double size = (surface.max - surface.min).norm();
-  const double apart = ((points.max + points.min) / 2 - (surface.max + surface.min) / 2).norm();
+  const libmap::Bounds3d& b = surface.bounds();
+  const libmap::Bounds3d a = libmap::bounds_of(cloud.positions);
+  const double size = (b.max - b.min).norm();
+  const double apart = ((a.max + a.min) / 2 - (b.max + b.min) / 2).norm();
   if (!(apart <= most_sizes * size))
-    throw libmap::Error("the cloud lies too far from the mesh to be compared",
-                        {.file = options.cloud,
+    throw libmap::Error("the two lie too far apart to be compared",
+                        {.file = options.a,
                          .field = "distance of the centres",
                          .value = libmap::to_text(static_cast<float>(apart)) + " m",
                          .bound = "<= " + libmap::to_text(static_cast<float>(most_sizes * size)) +
-                                  " m, 100 times the mesh"});
+                                  " m, 100 times the size of " + options.b});
+}
+
+libmap::ReferenceSurface reference_of(const Shape& shape, const std::string& file) {
+  try {
+    if (shape.mesh) return libmap::ReferenceSurface(*shape.mesh);
+    return libmap::ReferenceSurface(shape.points);
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file);
+  }
+}
+
+// `crop`: by the crops that the manifests of A and B tell of.
+libmap::Pose b_from_a_of(const CompareOptions& options) {
+  if (options.transform != "crop")
+    return graspmap_tools::parse_transform(options.transform, "--transform");
+  const auto a_from_map = graspmap_tools::site_from_map_of(options.a);
+  const auto b_from_map = graspmap_tools::site_from_map_of(options.b);
+  if (!a_from_map && !b_from_map)
+    throw libmap::Error(
+        "neither A nor B was cropped",
+        {.file = options.a,
+         .field = "--transform",
+         .value = options.transform,
+         .bound = "a manifest with " + std::string(graspmap_tools::site_from_map_name)});
+  return b_from_map.value_or(libmap::Pose::Identity()) *
+         a_from_map.value_or(libmap::Pose::Identity()).inverse();
 }
 
 struct Comparison {
-  libmap::DistanceStatistics distances;
-  std::size_t samples = 0;  // of the surface in the box
-  double completeness = 0.0;
+  libmap::Pose b_from_a = libmap::Pose::Identity();
+  std::optional<libmap::SurfaceAlignmentResult> alignment;
+  libmap::PointCloud points;  // of A, in B's frame, in the box
+  libmap::PointDistances distances;
+  libmap::DistanceStatistics statistics;
+  std::optional<double> bias_m;
+  double precision = 0.0;     // share of A near B
+  double completeness = 0.0;  // share of B near A
+  std::size_t samples = 0;    // of B, in the box
 };
 
-// Of the surface in the box, by all of the cloud: points just outside cover its border.
-double completeness_of(const libmap::TriangleMesh& mesh, const libmap::PointCloud& cloud,
-                       const std::optional<libmap::Bounds3d>& box, const CompareOptions& options,
-                       std::size_t& samples) {
-  std::vector<Eigen::Vector3d> inside;
-  for (const libmap::SurfacePoint& sample :
-       libmap::sample_surface(mesh, options.samples_per_m2, options.seed))
-    if (is_inside(box, sample.position)) inside.push_back(sample.position);
-  samples = inside.size();
-  return libmap::share_of(libmap::covered(inside, cloud.positions, options.within_m));
-}
-
-void print(const Comparison& comparison, const CompareOptions& options) {
-  const libmap::DistanceStatistics& distances = comparison.distances;
-  if (options.json) {
-    const Json json = {{"cloud", options.cloud},
-                       {"mesh", options.mesh},
-                       {"points", distances.count},
-                       {"rmse_m", distances.rmse_m},
-                       {"mean_m", distances.mean_m},
-                       {"median_m", distances.median_m},
-                       {"p95_m", distances.p95_m},
-                       {"max_m", distances.max_m},
-                       {"surface_samples", comparison.samples},
-                       {"within_m", options.within_m},
-                       {"completeness", comparison.completeness}};
-    std::cout << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+// Which points of B, in the box, A comes near to. All of A counts: what lies just outside covers
+// the border.
+void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& options,
+                          const std::optional<libmap::Bounds3d>& box, Comparison& comparison) {
+  const libmap::Pose a_from_b = comparison.b_from_a.inverse();
+  std::vector<Eigen::Vector3d> samples;
+  for (const Eigen::Vector3d& point : b.points.positions)
+    if (graspmap_tools::is_inside(box, point)) samples.push_back(a_from_b * point);
+  comparison.samples = samples.size();
+  if (!a.mesh) {
+    comparison.completeness =
+        libmap::share_of(libmap::covered(samples, a.points.positions, options.within_m));
     return;
   }
+  // What lies outside the mesh's box takes long to measure and is known to be too far.
+  const libmap::Bounds3d bounds = libmap::bounds_of(a.mesh->vertices);
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(options.within_m);
+  const libmap::Bounds3d near{bounds.min - margin, bounds.max + margin};
+  std::erase_if(samples,
+                [&](const auto& point) { return !graspmap_tools::is_inside(near, point); });
+  std::size_t covered = 0;
+  for (const double distance : libmap::distances_to_surface(samples, *a.mesh))
+    covered += distance <= options.within_m ? 1 : 0;
+  if (comparison.samples > 0)
+    comparison.completeness =
+        static_cast<double>(covered) / static_cast<double>(comparison.samples);
+}
+
+void align(const Shape& a, const libmap::ReferenceSurface& surface, const CompareOptions& options,
+           const std::optional<libmap::Bounds3d>& box, Comparison& comparison, Run& run) {
+  const libmap::PointCloud start = graspmap_tools::part_in_box(
+      libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
+  require_nearness(surface, start, options);
+  try {
+    comparison.alignment = libmap::align_to_surface(start.positions, surface, options.alignment);
+  } catch (const libmap::Error& error) {
+    throw error.in_file(surface.is_oriented() ? options.a : options.b);
+  }
+  const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
+  comparison.b_from_a = found.surface_from_points * comparison.b_from_a;
+  if (!found.converged)
+    run.warn(fmt::format("ICP has not converged in {} iterations", found.iterations));
+  if (found.free_motions > 0)
+    run.warn(fmt::format("{} of 6 motions are not determined by the surface: ICP left them alone",
+                         found.free_motions));
+}
+
+Comparison compare_shapes(const Shape& a, const Shape& b, const CompareOptions& options, Run& run) {
+  const auto box = graspmap_tools::parse_box(options.box);
+  Comparison comparison;
+  comparison.b_from_a = b_from_a_of(options);
+  const libmap::ReferenceSurface surface =
+      run.timed("reference", [&] { return reference_of(b, options.b); });
+  if (options.icp) run.timed("icp", [&] { align(a, surface, options, box, comparison, run); });
+  comparison.points = graspmap_tools::part_in_box(
+      libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
+  require_nearness(surface, comparison.points, options);
+  comparison.distances = run.timed(
+      "distances", [&] { return libmap::distances_to(surface, comparison.points.positions); });
+  const std::vector<double>& distances = comparison.distances.distance_m;
+  comparison.statistics = libmap::distance_statistics(distances);
+  std::size_t near = 0;
+  double sum = 0.0;
+  for (std::size_t n = 0; n < distances.size(); ++n) {
+    near += distances[n] <= options.within_m ? 1 : 0;
+    sum += comparison.distances.signed_distance_m[n];
+  }
+  const auto count = static_cast<double>(distances.size());
+  comparison.precision = static_cast<double>(near) / count;
+  if (surface.is_oriented()) comparison.bias_m = sum / count;
+  run.timed("completeness", [&] { measure_completeness(a, b, options, box, comparison); });
+  return comparison;
+}
+
+double turn_deg(const libmap::Pose& pose) {
+  return Eigen::AngleAxisd(pose.linear()).angle() * 180.0 / std::numbers::pi;
+}
+
+// How far ICP moved the middle of A's points.
+double moved_m(const Comparison& comparison) {
+  const libmap::Bounds3d bounds = libmap::bounds_of(comparison.points.positions);
+  const Eigen::Vector3d middle = (bounds.min + bounds.max) / 2;
+  return (comparison.alignment->surface_from_points.inverse() * middle - middle).norm();
+}
+
+Json to_json(const Comparison& comparison, const Shape& a, const Shape& b,
+             const CompareOptions& options) {
+  const libmap::DistanceStatistics& statistics = comparison.statistics;
+  Json json = {{"a", options.a},
+               {"a_kind", a.mesh ? "mesh" : "cloud"},
+               {"b", options.b},
+               {"b_kind", b.mesh ? "mesh" : "cloud"},
+               {"points", statistics.count},
+               {"rmse_m", statistics.rmse_m},
+               {"mean_m", statistics.mean_m},
+               {"median_m", statistics.median_m},
+               {"p95_m", statistics.p95_m},
+               {"max_m", statistics.max_m},
+               {"bias_m", comparison.bias_m ? Json(*comparison.bias_m) : Json()},
+               {"within_m", options.within_m},
+               {"precision", comparison.precision},
+               {"completeness", comparison.completeness},
+               {"surface_samples", comparison.samples}};
+  Json rows = Json::array();
+  for (int row = 0; row < 4; ++row) {
+    Json numbers = Json::array();
+    for (int column = 0; column < 4; ++column)
+      numbers.push_back(comparison.b_from_a.matrix()(row, column));
+    rows.push_back(numbers);
+  }
+  json["b_from_a"] = rows;
+  if (!comparison.alignment) return json;
+  const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
+  json["icp"] = {{"converged", found.converged},
+                 {"iterations", found.iterations},
+                 {"points", found.points},
+                 {"overlap", found.overlap},
+                 {"inliers", found.inliers},
+                 {"rmse_m", found.rmse_m},
+                 {"free_motions", found.free_motions},
+                 {"curvature", found.curvature},
+                 {"moved_m", moved_m(comparison)},
+                 {"turned_deg", turn_deg(found.surface_from_points)}};
+  return json;
+}
+
+void print(const Comparison& comparison, const Shape& a, const Shape& b,
+           const CompareOptions& options) {
+  if (options.json) {
+    std::cout
+        << to_json(comparison, a, b, options).dump(2, ' ', false, Json::error_handler_t::replace)
+        << "\n";
+    return;
+  }
+  if (comparison.alignment) {
+    const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
+    std::cout << fmt::format(
+        "icp: {} after {} iterations, {} of {} points, rmse {:.2f} mm, moved {:.2f} mm and {:.3f} "
+        "deg\ntransform: {}\n",
+        found.converged ? "converged" : "not converged", found.iterations, found.inliers,
+        found.points, 1e3 * found.rmse_m, 1e3 * moved_m(comparison),
+        turn_deg(found.surface_from_points), graspmap_tools::transform_text(comparison.b_from_a));
+  }
+  const libmap::DistanceStatistics& statistics = comparison.statistics;
   std::cout << fmt::format(
       "points: {}\nrmse: {:.2f} mm\nmean: {:.2f} mm\nmedian: {:.2f} mm\n95th percentile: {:.2f} "
-      "mm\nmax: {:.2f} mm\nsurface within {:g} mm of a point: {:.2f} %\n",
-      distances.count, 1e3 * distances.rmse_m, 1e3 * distances.mean_m, 1e3 * distances.median_m,
-      1e3 * distances.p95_m, 1e3 * distances.max_m, 1e3 * options.within_m,
-      1e2 * comparison.completeness);
+      "mm\nmax: {:.2f} mm\n",
+      statistics.count, 1e3 * statistics.rmse_m, 1e3 * statistics.mean_m, 1e3 * statistics.median_m,
+      1e3 * statistics.p95_m, 1e3 * statistics.max_m);
+  if (comparison.bias_m) std::cout << fmt::format("bias: {:+.2f} mm\n", 1e3 * *comparison.bias_m);
+  const char* of_b = b.mesh ? "surface" : "cloud";
+  std::cout << fmt::format("points within {:g} mm of the {}: {:.2f} %\n", 1e3 * options.within_m,
+                           of_b, 1e2 * comparison.precision)
+            << fmt::format("{} within {:g} mm of a point: {:.2f} %\n", of_b, 1e3 * options.within_m,
+                           1e2 * comparison.completeness);
 }
 
 void add_results(const Comparison& comparison, libmap::Manifest& manifest) {
-  const libmap::DistanceStatistics& distances = comparison.distances;
-  manifest.frame = "mesh";
-  manifest.results.emplace_back("points", static_cast<std::int64_t>(distances.count));
-  manifest.results.emplace_back("rmse_m", distances.rmse_m);
-  manifest.results.emplace_back("mean_m", distances.mean_m);
-  manifest.results.emplace_back("median_m", distances.median_m);
-  manifest.results.emplace_back("p95_m", distances.p95_m);
-  manifest.results.emplace_back("max_m", distances.max_m);
-  manifest.results.emplace_back("completeness", comparison.completeness);
+  manifest.frame = "b";
+  manifest.transforms.emplace_back("b_from_a", comparison.b_from_a);
+  const auto add = [&](const char* name, const libmap::ManifestValue& value) {
+    manifest.results.emplace_back(name, value);
+  };
+  const libmap::DistanceStatistics& statistics = comparison.statistics;
+  add("points", static_cast<std::int64_t>(statistics.count));
+  add("rmse_m", statistics.rmse_m);
+  add("mean_m", statistics.mean_m);
+  add("median_m", statistics.median_m);
+  add("p95_m", statistics.p95_m);
+  add("max_m", statistics.max_m);
+  if (comparison.bias_m) add("bias_m", *comparison.bias_m);
+  add("precision", comparison.precision);
+  add("completeness", comparison.completeness);
+  if (!comparison.alignment) return;
+  const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
+  add("icp_converged", found.converged);
+  add("icp_iterations", static_cast<std::int64_t>(found.iterations));
+  add("icp_overlap", static_cast<std::int64_t>(found.overlap));
+  add("icp_inliers", static_cast<std::int64_t>(found.inliers));
+  add("icp_rmse_m", found.rmse_m);
+  add("icp_free_motions", static_cast<std::int64_t>(found.free_motions));
 }
 
-void compare(const CompareOptions& options, Run& run) {
-  const auto box = parse_box(options.box);
-  if (!options.output.empty()) {
-    libmap::require_cloud_format(options.output);
-    run.claim_output(options.output, {options.cloud, options.mesh});
-  }
-  const libmap::PointCloud whole = libmap::transform_cloud(libmap::read_cloud(options.cloud).cloud,
-                                                           mesh_from_cloud(options.transform));
-  libmap::PointCloud cloud = part_in_box(whole, box, options.cloud);
-  const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
-  require_nearness(mesh, cloud, options);
-  std::vector<double> distances =
-      run.timed("distances", [&] { return libmap::distances_to_surface(cloud.positions, mesh); });
-  Comparison comparison;
-  comparison.distances = libmap::distance_statistics(distances);
-  comparison.completeness = run.timed("completeness", [&] {
-    return completeness_of(mesh, whole, box, options, comparison.samples);
-  });
-  print(comparison, options);
-  if (options.output.empty()) return;
-  cloud.add_field("distance", libmap::ScalarType::float32).values = std::move(distances);
-  run.add_input(options.cloud);
-  run.add_input(options.mesh);
+// The points of A by their signed distance, in millimetres.
+libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions& options) {
+  const bool has_sides = comparison.bias_m.has_value();
+  const std::string name = has_sides ? "signed distance [mm]" : "distance [mm]";
+  libmap::PointCloud cloud;
+  cloud.positions = comparison.points.positions;
+  libmap::ScalarField& field = cloud.add_field(name, libmap::ScalarType::float32);
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    field.values[n] = 1e3 * comparison.distances.signed_distance_m[n];
+  libmap::SceneLayer layer;
+  layer.shape = std::move(cloud);
+  layer.coloring.mode = libmap::ColorMode::field;
+  layer.coloring.field = name;
+  if (has_sides) layer.coloring.scale = libmap::ColorScale::diverging;
+  layer.coloring.range_max = 1e3 * options.picture_range_m;
+  layer.coloring.range_min = has_sides ? -layer.coloring.range_max : 0.0;
+  libmap::Scene scene;
+  scene.layers.push_back(std::move(layer));
+  libmap::SceneViewOptions view = options.view;
+  view.title = fmt::format(
+      "{} to {}: RMSE {:.2f} mm", std::filesystem::path(options.a).filename().string(),
+      std::filesystem::path(options.b).filename().string(), 1e3 * comparison.statistics.rmse_m);
+  return libmap::render_scene(scene, view);
+}
+
+void write_outputs(Comparison& comparison, const CompareOptions& options, Run& run) {
+  if (options.output.empty() && options.picture.empty()) return;
+  run.add_input(options.a);
+  run.add_input(options.b);
   run.manifest().parameters.emplace_back("transform", options.transform);
   run.manifest().parameters.emplace_back("box", options.box);
   add_results(comparison, run.manifest());
+  if (!options.picture.empty()) {
+    const libmap::ColorImage image =
+        run.timed("picture", [&] { return picture_of(comparison, options); });
+    run.write_output(options.picture, [&](const auto& temporary) {
+      libmap::write_text(temporary, libmap::to_png(image));
+    });
+  }
+  if (options.output.empty()) return;
+  libmap::PointCloud& cloud = comparison.points;
+  cloud.add_field("distance", libmap::ScalarType::float32).values = comparison.distances.distance_m;
+  if (comparison.bias_m)
+    cloud.add_field("signed_distance", libmap::ScalarType::float32).values =
+        comparison.distances.signed_distance_m;
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
+}
+
+void compare(const CompareOptions& options, Run& run) {
+  if (!options.output.empty()) {
+    libmap::require_cloud_format(options.output);
+    run.claim_output(options.output, {options.a, options.b, options.transform});
+  }
+  if (!options.picture.empty()) {
+    if (libmap::format_of(options.picture) != ".png")
+      throw libmap::Error("pictures are written as .png", {.file = options.picture});
+    run.claim_output(options.picture, {options.a, options.b, options.transform});
+  }
+  const Shape a = run.timed("read", [&] { return read_shape(options.a, options); });
+  const Shape b = run.timed("read", [&] { return read_shape(options.b, options); });
+  Comparison comparison = compare_shapes(a, b, options, run);
+  print(comparison, a, b, options);
+  write_outputs(comparison, options, run);
 }
 
 }  // namespace
@@ -205,14 +397,19 @@ void compare(const CompareOptions& options, Run& run) {
 int main(int argc, char** argv) {
   CompareOptions options;
   graspmap_tools::Command command(
-      "compare", "How far a cloud lies from a true surface, and how much of it the cloud covers.");
-  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .vtp, .csv)");
-  command.input("MESH", options.mesh, "the true surface (.ply, .obj, .stl, .off, .glb, .vtp)");
-  command.output(options.output, "the cloud in the mesh's frame with the field `distance`", false);
-  command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW", options.transform,
-                 "mesh_from_cloud, metres and degrees about the fixed axes, roll first");
+      "compare", "How far a cloud or mesh A lies from B, and how much of B it covers.");
+  command.input("A", options.a, "cloud or mesh (.pcd, .ply, .vtp, .csv, .obj, .stl, .off, .glb)");
+  command.input("B", options.b, "the surface that A is measured by: a mesh, or a cloud");
+  command.output(options.output,
+                 "A's points in B's frame with the fields distance and signed_distance", false);
+  command.option("--picture", "FILE.png", options.picture,
+                 "A's points coloured by their signed distance");
+  command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
+                 "b_from_a: metres and degrees about the fixed axes, roll first; a file of four "
+                 "rows of four numbers, as crop writes; crop: A or B was cropped from the other's "
+                 "map, as the manifests say");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
-                 "compare only what lies in this box of the mesh's frame");
+                 "compare only what lies in this box of B's frame");
   command.flag("--json", options.json, "as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { compare(options, run); });

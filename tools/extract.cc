@@ -15,6 +15,8 @@
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
+#include "tools/extract_bundler.h"
+#include "tools/scan_poses.h"
 
 namespace {
 
@@ -25,6 +27,7 @@ struct ExtractOptions {
   std::string scan;
   std::string output;
   bool strict = false;
+  graspmap_tools::BundlerOptions bundler;
 };
 
 struct Counts {
@@ -119,24 +122,17 @@ void add_results(libmap::Manifest& manifest, const libmap::PoseGraph& graph, con
   manifest.results.emplace_back("depth_unit_m", 0.001);
 }
 
-void extract(const ExtractOptions& options, Run& run) {
-  run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
-  const auto scan = run.timed("open", [&] { return libmap::open_scan(options.scan); });
-  for (const std::string& warning : scan->warnings()) {
-    if (options.strict) throw libmap::Error(warning).in_file(options.scan);
-    run.warn(options.scan + ": " + warning);
-  }
-  if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
+void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan, Run& run) {
   const auto work = [&](const fs::path& folder) {
     std::optional<libmap::FrameFolderWriter> writer;
     if (!run.options().dry_run) writer.emplace(folder);
-    const Counts counts = extract_frames(*scan, writer ? &*writer : nullptr, options, run);
+    const Counts counts = extract_frames(scan, writer ? &*writer : nullptr, options, run);
     if (!writer) return;
-    const libmap::FrameFolderCounts written = writer->finish(scan->graph());
-    add_results(run.manifest(), scan->graph(), counts, written);
+    const libmap::FrameFolderCounts written = writer->finish(scan.graph());
+    add_results(run.manifest(), scan.graph(), counts, written);
     run.say(fmt::format("{} nodes: {} colour, {} depth images, {} calibrations, {} links",
-                        scan->graph().nodes.size(), written.color_images, written.depth_images,
-                        written.calibrations, scan->graph().links.size()));
+                        scan.graph().nodes.size(), written.color_images, written.depth_images,
+                        written.calibrations, scan.graph().links.size()));
     if (written.right_images > 0)
       run.say(fmt::format("{} right images of stereo pairs", written.right_images));
     if (counts.rounded_depth_images > 0)
@@ -146,13 +142,30 @@ void extract(const ExtractOptions& options, Run& run) {
   run.write_output_tree(options.output, libmap::frame_folder_names(), work);
 }
 
+void extract(ExtractOptions& options, Run& run) {
+  const bool pictures = !options.bundler.folder.empty();
+  if (options.output.empty() && !pictures)
+    throw libmap::Error("nothing to write: -o or --bundler names a folder");
+  if (!options.output.empty())
+    run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
+  if (pictures) graspmap_tools::claim_bundler_folder(options.bundler, options.scan, run);
+  const auto scan = graspmap_tools::open_scan(options.scan, options.strict, run);
+  if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
+  // Each folder's manifest holds what was done for it alone.
+  const libmap::Manifest start = run.manifest();
+  if (!options.output.empty()) write_folder(options, *scan, run);
+  run.manifest() = start;
+  if (pictures) graspmap_tools::write_bundler_folder(options.bundler, *scan, options.strict, run);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   ExtractOptions options;
   graspmap_tools::Command command("extract", "A scan as plain files: images, calibrations, poses.");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
-  command.output(options.output, "folder, replaced as a whole");
+  command.output(options.output, "folder of the whole scan, replaced as a whole", false);
   command.flag("--strict", options.strict, "end at a frame that is broken");
+  graspmap_tools::add_options(command, options.bundler);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });
 }

@@ -1,28 +1,24 @@
 // graspmap fuse: the depth images of a scan -> one oriented, coloured cloud.
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
-#include <utility>
 #include <vector>
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/depth_fusion.h"
 #include "libmap/core/error.h"
-#include "libmap/core/text.h"
-#include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
+#include "tools/scan_poses.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 using graspmap_tools::Run;
-using libmap::PoseSource;
 
 // Frame of the cloud: that of the poses, or ground truth's.
 enum class CloudFrame { poses, ground_truth };
@@ -31,94 +27,10 @@ struct FuseOptions {
   std::string scan;
   std::string output;
   std::string poses = "auto";
+  std::string corrected_poses;
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
 };
-
-constexpr PoseSource sources[] = {PoseSource::odometry, PoseSource::stored,
-                                  PoseSource::ground_truth};
-
-std::string sources_in(const libmap::PoseGraph& graph) {
-  std::string names;
-  for (const PoseSource source : sources)
-    if (!libmap::trajectory_of(graph, source).empty())
-      names += (names.empty() ? "" : ", ") + to_text(source);
-  return names.empty() ? "no poses at all" : names;
-}
-
-std::optional<PoseSource> source_named(const std::string& name) {
-  for (const PoseSource source : sources)
-    if (to_text(source) == name) return source;
-  return std::nullopt;
-}
-
-libmap::Trajectory poses_in_file(const std::string& file, const libmap::PoseGraph& graph,
-                                 Run& run) {
-  if (!fs::exists(file) && !libmap::is_trajectory_path(file))
-    throw libmap::Error(
-        "no such poses" + libmap::did_you_mean(file, {"odometry", "stored", "ground-truth"}),
-        {.file = {},
-         .field = "--poses",
-         .value = file,
-         .bound = "auto, odometry, stored, ground-truth or a file"});
-  const libmap::TrajectoryFile read = libmap::read_trajectory(file);
-  try {
-    libmap::NodeTrajectory assigned = libmap::assign_nodes(read.poses, graph);
-    run.add_input(file);
-    run.say(fmt::format("{} of {} poses belong to nodes of the scan", assigned.poses.size(),
-                        read.poses.size()));
-    run.manifest().results.emplace_back("poses_in_file",
-                                        static_cast<std::int64_t>(read.poses.size()));
-    return std::move(assigned.poses);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file);
-  }
-}
-
-// The best poses that the scan has of its own: optimised, else by odometry, else ground truth.
-std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) {
-  for (const PoseSource source :
-       {PoseSource::stored, PoseSource::odometry, PoseSource::ground_truth})
-    if (!libmap::trajectory_of(graph, source).empty()) return to_text(source);
-  throw libmap::Error("the scan has no poses: give a file of poses with --poses",
-                      {.file = scan, .field = {}, .value = {}, .bound = {}});
-}
-
-libmap::Trajectory wanted_poses(const FuseOptions& options, const libmap::PoseGraph& graph,
-                                Run& run) {
-  const std::optional<PoseSource> source = source_named(options.poses);
-  if (!source) return poses_in_file(options.poses, graph, run);
-  libmap::Trajectory poses = libmap::trajectory_of(graph, *source);
-  if (poses.empty())
-    throw libmap::Error("the scan has none", {.file = options.scan,
-                                              .field = "--poses",
-                                              .value = options.poses,
-                                              .bound = "what it has: " + sources_in(graph)});
-  return poses;
-}
-
-// Into the frame of ground truth by the rigid alignment of the trajectories.
-std::optional<libmap::Pose> truth_from_poses(const FuseOptions& options,
-                                             const libmap::PoseGraph& graph,
-                                             const libmap::Trajectory& poses, Run& run) {
-  const libmap::Trajectory truth = libmap::trajectory_of(graph, PoseSource::ground_truth);
-  if (options.frame == CloudFrame::poses) return std::nullopt;
-  if (truth.empty())
-    throw libmap::Error("the scan has no ground truth",
-                        {.file = options.scan, .field = "--frame", .value = "ground-truth"});
-  if (options.poses == to_text(PoseSource::ground_truth)) return libmap::Pose::Identity();
-  libmap::AbsoluteTrajectoryError error;
-  try {
-    error = libmap::absolute_trajectory_error(poses, truth);
-  } catch (const libmap::Error& failure) {
-    throw failure.in_file(options.scan);
-  }
-  run.say(
-      fmt::format("aligned with {} true poses: RMSE {:.1f} mm", error.poses, 1e3 * error.rmse_m));
-  run.manifest().results.emplace_back("trajectory_rmse_m", error.rmse_m);
-  run.manifest().transforms.emplace_back("ground_truth_from_poses", error.truth_from_estimate);
-  return error.truth_from_estimate;
-}
 
 void add_results(const libmap::DepthFusionResult& result, libmap::Manifest& manifest) {
   const auto count = [&](const char* name, std::size_t value) {
@@ -133,6 +45,11 @@ void add_results(const libmap::DepthFusionResult& result, libmap::Manifest& mani
   count("rejected_without_ray", result.pixels.without_ray);
   count("rejected_flying", result.pixels.flying);
   count("rejected_grazing", result.pixels.grazing);
+  count("registration_rounds", static_cast<std::size_t>(result.registration_rounds));
+  manifest.results.emplace_back("registration_shift_m", result.registration_shift_m);
+  manifest.results.emplace_back("registration_turn_deg", result.registration_turn_deg);
+  manifest.results.emplace_back("disagreement_before_m", result.disagreement_before_m);
+  manifest.results.emplace_back("disagreement_after_m", result.disagreement_after_m);
   count("occupied_voxels", result.occupied_voxels);
   count("surface_elements", result.elements);
   count("dropped_too_few_views", result.points.unconfirmed);
@@ -145,7 +62,7 @@ void add_results(const libmap::DepthFusionResult& result, libmap::Manifest& mani
                             result.timings_s.end());
 }
 
-void say_result(const libmap::DepthFusionResult& result, Run& run) {
+void say_result(const libmap::DepthFusionResult& result, const FuseOptions& options, Run& run) {
   for (const auto& [name, seconds] : result.timings_s)
     run.detail(fmt::format("{}: {:.3f} s", name, seconds));
   const libmap::DepthPixelCounts& pixels = result.pixels;
@@ -154,43 +71,39 @@ void say_result(const libmap::DepthFusionResult& result, Run& run) {
                   "grazing, {} without a ray",
                   pixels.used, pixels.pixels, pixels.unmeasured, pixels.out_of_range, pixels.flying,
                   pixels.grazing, pixels.without_ray));
+  if (result.registration_rounds > 0)
+    run.say(fmt::format("poses corrected so that frames agree: by {:.1f} mm and {:.2f} deg (RMS)",
+                        1e3 * result.registration_shift_m, result.registration_turn_deg));
   run.say(fmt::format("{} frames, {} measurements -> {} points", result.frames, pixels.used,
                       result.cloud.size()));
-  if (result.cloud.empty()) run.warn("nothing was measured within the limits: the cloud is empty");
-}
-
-// Nodes that cannot be placed cost their frames; with --strict that is an error.
-void report_nodes_without_pose(const FuseOptions& options, const libmap::PoseGraph& graph,
-                               const libmap::Trajectory& poses, Run& run) {
-  constexpr int invalid_weight = -9;
-  std::size_t nodes = 0;
-  for (const libmap::GraphNode& node : graph.nodes) nodes += node.weight != invalid_weight ? 1 : 0;
-  if (poses.size() >= nodes) return;
-  const std::string text =
-      fmt::format("{} of {} nodes have no pose there", nodes - poses.size(), nodes);
-  if (options.fusion.strict)
-    throw libmap::Error(
-        text, {.file = options.scan, .field = "--poses", .value = options.poses, .bound = {}});
-  run.warn(options.scan + ": " + text + ": their frames are left out");
+  if (!result.cloud.empty()) return;
+  if (result.points.unconfirmed > 0)
+    run.warn(
+        fmt::format("--min-views {} leaves no point: the cloud is empty; {} frames see one "
+                    "at most",
+                    options.fusion.min_views, result.points.most_views));
+  else
+    run.warn("nothing was measured within the limits: the cloud is empty");
 }
 
 void fuse(FuseOptions options, Run& run) {
   libmap::require_cloud_format(options.output);
-  std::vector<std::string> inputs = {options.scan};
-  if (options.poses != "auto" && !source_named(options.poses)) inputs.push_back(options.poses);
-  run.claim_output(options.output, inputs);
-  const auto scan = run.timed("open", [&] { return libmap::open_scan(options.scan); });
-  for (const std::string& warning : scan->warnings()) {
-    if (options.fusion.strict) throw libmap::Error(warning).in_file(options.scan);
-    run.warn(options.scan + ": " + warning);
+  run.claim_output(options.output, graspmap_tools::scan_inputs(options.scan, options.poses));
+  if (!options.corrected_poses.empty()) {
+    if (!libmap::is_trajectory_path(options.corrected_poses))
+      throw libmap::Error("not a format of poses", {.file = {},
+                                                    .field = "--corrected-poses",
+                                                    .value = options.corrected_poses,
+                                                    .bound = ".tum, .kitti or .g2o"});
+    run.claim_output(options.corrected_poses,
+                     graspmap_tools::scan_inputs(options.scan, options.poses));
   }
-  if (options.poses == "auto") {
-    options.poses = best_poses(scan->graph(), options.scan);
-    run.say("poses: " + options.poses);
-  }
-  const libmap::Trajectory poses = wanted_poses(options, scan->graph(), run);
-  report_nodes_without_pose(options, scan->graph(), poses, run);
-  const auto alignment = truth_from_poses(options, scan->graph(), poses, run);
+  const bool strict = options.fusion.strict;
+  const auto scan = graspmap_tools::open_scan(options.scan, strict, run);
+  const libmap::Trajectory poses = graspmap_tools::find_poses(*scan, options.poses, strict, run);
+  std::optional<libmap::Pose> alignment;
+  if (options.frame == CloudFrame::ground_truth)
+    alignment = graspmap_tools::truth_from_poses(*scan, poses, options.poses, run);
   libmap::DepthFusionResult result;
   try {
     result = libmap::fuse_depth(*scan, poses, options.fusion, run.progress());
@@ -203,12 +116,16 @@ void fuse(FuseOptions options, Run& run) {
   if (alignment) result.cloud = libmap::transform_cloud(result.cloud, *alignment);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   libmap::Manifest& manifest = run.manifest();
-  manifest.parameters.emplace_back("poses", options.poses);
   manifest.frame = alignment ? "ground truth" : "poses";
   add_results(result, manifest);
-  say_result(result, run);
+  say_result(result, options, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, result.cloud); });
+  if (options.corrected_poses.empty()) return;
+  manifest.frame = "poses";
+  run.write_output(options.corrected_poses, [&](const auto& temporary) {
+    libmap::write_trajectory(temporary, {result.poses, {}});
+  });
 }
 
 }  // namespace
@@ -219,10 +136,10 @@ int main(int argc, char** argv) {
                                   "The depth images of a scan -> one oriented, coloured cloud.");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
-  command.option(
-      "--poses", "auto|odometry|stored|ground-truth|FILE", options.poses,
-      "where the frames were: by the scan, or a file of poses (.tum, .kitti, .g2o); auto: "
-      "the first of stored, odometry and ground-truth that the scan has");
+  graspmap_tools::add_poses_option(command, options.poses);
+  command.option("--corrected-poses", "FILE", options.corrected_poses,
+                 "also write the poses that the frames were fused by (.tum, .kitti, .g2o), in the "
+                 "frame of --poses");
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},

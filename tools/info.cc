@@ -12,6 +12,7 @@
 #include "libmap/core/manifest.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_report.h"
 #include "tools/command_line.h"
 #include "tools/info_scan.h"
 
@@ -24,7 +25,11 @@ struct InfoOptions {
   std::string file;
   bool json = false;
   bool verify = false;
+  bool quick = false;
 };
+
+// Of a mesh that has more, the longest.
+constexpr std::size_t listed_boundaries = 10;
 
 Json range_of(const std::vector<double>& values) {
   double low = HUGE_VAL;
@@ -77,17 +82,59 @@ Json cloud_json(const std::string& path) {
           {"fields", fields_json(read.cloud.fields)}};
 }
 
-Json mesh_json(const std::string& path) {
-  const libmap::MeshReadResult read = libmap::read_mesh(path);
+Json boundaries_json(const std::vector<libmap::MeshBoundary>& boundaries) {
+  double length = 0.0;
+  Json longest = Json::array();
+  for (const libmap::MeshBoundary& boundary : boundaries) {
+    length += boundary.length_m;
+    if (longest.size() < listed_boundaries)
+      longest.push_back({{"length_m", boundary.length_m},
+                         {"diameter_m", boundary.diameter_m},
+                         {"edges", boundary.edges}});
+  }
+  return {{"count", boundaries.size()}, {"length_m", length}, {"longest", longest}};
+}
+
+Json surface_json(const libmap::MeshReport& report) {
+  const bool has_genus = report.genus >= 0;
+  const libmap::EdgeLengths& lengths = report.edge_lengths;
+  return {
+      {"watertight", report.is_watertight()},
+      {"manifold", report.is_manifold()},
+      {"oriented", report.is_oriented()},
+      {"components", report.components},
+      {"largest_component_area_m2", report.largest_component_area_m2},
+      {"genus", has_genus ? Json(report.genus) : Json(nullptr)},
+      {"euler_characteristic", report.euler_characteristic},
+      {"volume_m3", has_genus && report.is_closed() ? Json(report.volume_m3) : Json(nullptr)},
+      {"edge_lengths_m", Json::array({lengths.min_m, lengths.median_m, lengths.max_m})},
+      {"boundaries", boundaries_json(report.boundaries)},
+      {"filled_triangles", report.filled_triangles},
+      {"faults",
+       {{"non_manifold_edges", report.non_manifold_edges},
+        {"non_manifold_vertices", report.non_manifold_vertices},
+        {"misoriented_edges", report.misoriented_edges},
+        {"degenerate_triangles", report.degenerate_triangles},
+        {"duplicate_triangles", report.duplicate_triangles},
+        {"unused_vertices", report.unused_vertices},
+        {"self_intersections",
+         report.self_intersections_counted ? Json(report.self_intersections) : Json(nullptr)}}}};
+}
+
+Json mesh_json(const InfoOptions& options) {
+  const libmap::MeshReadResult read = libmap::read_mesh(options.file);
   const libmap::TriangleMesh& mesh = read.mesh;
+  const libmap::MeshReport report =
+      libmap::report_mesh(mesh, {.self_intersections = !options.quick});
   return {{"kind", "mesh"},
           {"file", file_json(read.info)},
           {"vertices", mesh.vertices.size()},
           {"triangles", mesh.triangles.size()},
-          {"area_m2", libmap::surface_area(mesh)},
+          {"area_m2", report.area_m2},
           {"normals", !mesh.vertex_normals.empty()},
           {"colors", !mesh.vertex_colors.empty()},
           {"bounds_m", bounds_json(mesh.vertices)},
+          {"surface", surface_json(report)},
           {"fields", fields_json(mesh.vertex_fields)},
           {"face_fields", fields_json(mesh.face_fields)}};
 }
@@ -147,7 +194,7 @@ Json content_json(const InfoOptions& options, Run& run, std::vector<libmap::Scan
   }
   if (options.verify)
     throw libmap::Error("only scans are verified", {.file = options.file, .field = "--verify"});
-  return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options.file)
+  return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
                                                                    : cloud_json(options.file);
 }
 
@@ -191,5 +238,6 @@ int main(int argc, char** argv) {
   command.input("FILE", options.file, "scan, cloud, mesh or map");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify, "decode all that a scan stores and list what is broken");
+  command.flag("--quick", options.quick, "do not look for self-intersections of a mesh");
   return command.run(argc, argv, [&](Run& run) { info(options, run); });
 }

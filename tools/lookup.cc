@@ -82,8 +82,9 @@ int main(int argc, char** argv) {
   command.input("POINTS", options.points, "CSV with the columns x, y, z in metres, and any others");
   command.output(options.output, "CSV: the points, each with the map's values there");
   bind(command.parameters(), options.lookup);
-  command.parameters().add("points_frame", options.points_frame,
-                           graspmap_tools::point_frame_names(),
-                           "frame of the points: of the cloud that was scored, or the terrain's");
+  command.parameters().add(
+      "points_frame", options.points_frame, graspmap_tools::point_frame_names(),
+      "frame of the points: of the cloud that was scored, the terrain's, or the map's "
+      "before it was cropped");
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

@@ -7,7 +7,7 @@ namespace graspmap_tools {
 
 const std::vector<std::pair<std::string, PointFrame>>& point_frame_names() {
   static const std::vector<std::pair<std::string, PointFrame>> names = {
-      {"input", PointFrame::input}, {"terrain", PointFrame::terrain}};
+      {"input", PointFrame::input}, {"terrain", PointFrame::terrain}, {"map", PointFrame::map}};
   return names;
 }
 
@@ -25,8 +25,32 @@ std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
   return positions;
 }
 
+std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
+  const auto manifest = libmap::read_manifest_of(file);
+  if (!manifest) return std::nullopt;
+  const libmap::Pose* site_from_map = manifest->find_transform(site_from_map_name);
+  const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
+  if (manifest->frame != "terrain" || terrain_from_input == nullptr)
+    return site_from_map == nullptr ? std::nullopt : std::optional(*site_from_map);
+  return site_from_map == nullptr ? *terrain_from_input : *terrain_from_input * *site_from_map;
+}
+
+void carry_site_transform(const std::string& input, Run& run) {
+  if (const auto site_from_map = site_from_map_of(input))
+    run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
+}
+
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run) {
   const auto manifest = libmap::read_manifest_of(map);
+  if (points_frame == PointFrame::map) {
+    if (!manifest || manifest->find_transform(site_from_map_name) == nullptr)
+      throw libmap::Error(
+          manifest ? "was not made from what `graspmap crop` wrote: it does not know of the map "
+                     "before it"
+                   : "no manifest beside it says how it lies in the map",
+          {.file = map, .field = "--points-frame", .value = "map", .bound = "input or terrain"});
+    return *site_from_map_of(map);
+  }
   if (!manifest) {
     run.warn(map + ": no manifest beside it: listed points are taken in its own frame");
     return libmap::Pose::Identity();

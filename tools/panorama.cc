@@ -138,7 +138,9 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const fs::path rig_file = options.rig.empty() ? fs::path(options.folder) / libmap::rig_file_name
-                                                : fs::path(options.rig);
+                            : fs::exists(options.rig)
+                                ? fs::path(options.rig)
+                                : graspmap_tools::find_data_file("rigs", options.rig);
   if (!fs::is_directory(options.folder))
     throw libmap::Error(fs::exists(options.folder) ? "is no folder" : "no such folder",
                         {.file = options.folder});
@@ -173,7 +175,9 @@ int main(int argc, char** argv) {
       "panorama", "One cloud in the robot's frame from the depth images of its cameras.");
   command.input("DIR", options.folder, "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
-  command.option("--rig", "FILE", options.rig, "the rig, if it is not DIR/rig.yaml");
+  command.option(
+      "--rig", "FILE|NAME", options.rig,
+      "the rig, if it is not DIR/rig.yaml: a file, or one of the toolkit's own, e.g. scar-e");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { panorama(options, run); });
 }

@@ -9,6 +9,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/textured_mesh_io.h"
 #include "libmap/view/scene_view.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
@@ -42,6 +43,8 @@ void bind(libmap::ParameterTable& table, RenderOptions& options) {
   table.add("title", options.view.title, "above the scene");
   table.add("color", options.coloring.mode, libmap::color_mode_names(), "what colours show");
   table.add("field", options.coloring.field, "field that is shown with color: field");
+  table.add("color_scale", options.coloring.scale, libmap::color_scale_names(),
+            "colours of continuous values; diverging: blue below and red above 0");
   table.add("range_min", options.coloring.range_min, libmap::any_number,
             "value at the lower end of the colours");
   table.add("range_max", options.coloring.range_max, libmap::any_number,
@@ -61,7 +64,8 @@ void bind(libmap::ParameterTable& table, RenderOptions& options) {
   table.add("label", options.label, "column of the marked points' names; auto: the first column");
   table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
   table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
-            "frame of the marked points: of the cloud that was scored, or the terrain's");
+            "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
+            "before it was cropped");
   table.add("camera_position", options.camera_position, "X,Y,Z with view: camera");
   table.add("camera_target", options.camera_target, "X,Y,Z with view: camera");
 }
@@ -116,7 +120,9 @@ double zero_plane_of(const RenderOptions& options, const libmap::Manifest* manif
 libmap::Scene read_scene(const RenderOptions& options, Run& run) {
   libmap::Scene scene;
   libmap::SceneLayer layer;
-  if (libmap::file_kind(options.file) == libmap::FileKind::mesh)
+  if (libmap::is_textured_format(options.file))
+    layer.shape = libmap::read_textured_mesh(options.file);
+  else if (libmap::file_kind(options.file) == libmap::FileKind::mesh)
     layer.shape = libmap::read_mesh(options.file).mesh;
   else
     layer.shape = libmap::read_cloud(options.file).cloud;

@@ -45,6 +45,19 @@ void require_other_than_inputs(const fs::path& output, const std::vector<std::st
       throw libmap::Error("is the input: the output needs another name", {.file = output.string()});
 }
 
+// The user knows the output by its own name.
+void write_named(const libmap::OutputFile& output,
+                 const std::function<void(const fs::path&)>& writer) {
+  try {
+    writer(output.temporary_path());
+  } catch (const libmap::Error& error) {
+    if (error.context().file != output.temporary_path().string()) throw;
+    libmap::ErrorContext context = error.context();
+    context.file = output.final_path().string();
+    throw libmap::Error(error.reason(), context, error.kind());
+  }
+}
+
 }  // namespace
 
 fs::path toolkit_data_folder() {
@@ -96,21 +109,35 @@ void Run::write_manifest(const fs::path& output) {
 }
 
 void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
+  write_outputs(path, {{path, writer}});
+}
+
+void Run::require_own_companions(const fs::path& path, const std::vector<fs::path>& others) {
+  const auto earlier = own_manifest_of(path);
+  if (options_.force || (earlier && earlier->command == command_)) return;
+  for (const fs::path& file : others)
+    if (file != path && fs::exists(file))
+      throw libmap::Error(
+          "exists and was not written with " + path.string() + ": --force overwrites it",
+          {.file = file.string()});
+}
+
+void Run::write_outputs(const fs::path& path, const Files& files) {
   if (options_.dry_run) return;
-  libmap::OutputFile output(path);
-  try {
-    timed("write", [&] { writer(output.temporary_path()); });
-  } catch (const libmap::Error& error) {
-    if (error.context().file != output.temporary_path().string()) throw;
-    // The user knows the output by its own name.
-    libmap::ErrorContext context = error.context();
-    context.file = path.string();
-    throw libmap::Error(error.reason(), context, error.kind());
-  }
+  std::vector<fs::path> paths;
+  for (const auto& [file, writer] : files) paths.push_back(file);
+  require_own_companions(path, paths);
+  std::vector<libmap::OutputFile> outputs;
+  timed("write", [&] {
+    for (const auto& [file, writer] : files) {
+      outputs.emplace_back(file);
+      write_named(outputs.back(), writer);
+    }
+  });
   // The manifest goes first: an output without one would not be recognised as ours, and `make`
   // judges by the output, which is then still the old one.
   write_manifest(path);
-  output.commit();
+  for (libmap::OutputFile& output : outputs) output.commit();
 }
 
 void Run::claim_output_folder(const fs::path& given) {

@@ -57,6 +57,16 @@ class Run {
   void write_output(const std::filesystem::path& path,
                     const std::function<void(const std::filesystem::path& temporary)>& writer);
 
+  // The same of an output in several files, `path` among them: all are written before the first is
+  // put in place, in their order. The others must not stand there already unless an earlier run of
+  // this command wrote `path`, or --force: require_own_companions throws Error if one does, and may
+  // be called before the work.
+  void require_own_companions(const std::filesystem::path& path,
+                              const std::vector<std::filesystem::path>& others);
+  using Files = std::vector<std::pair<std::filesystem::path,
+                                      std::function<void(const std::filesystem::path& temporary)>>>;
+  void write_outputs(const std::filesystem::path& path, const Files& files);
+
   // A folder of outputs, made if it is missing. All files are written before the first is put in
   // place; the manifest FOLDER.json stands beside the folder. With --dry-run nothing is written.
   using Writer = std::function<void(const std::filesystem::path& temporary)>;

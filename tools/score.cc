@@ -126,6 +126,7 @@ void score(ScoreOptions& options, Run& run) {
   run.add_input(options.terrain);
   run.add_input(gripper_file);
   add_results(manifest, result, options);
+  graspmap_tools::carry_site_transform(options.terrain, run);
   say_result(result, options, run);
   const libmap::PointCloud cloud = libgtd::to_cloud(result.map, options.frame);
   run.write_output(options.output,

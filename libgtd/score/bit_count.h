@@ -1,5 +1,6 @@
-// The innermost loop of voxel matching. Its source sees no library type, so that it alone may be
-// compiled for several instruction sets; the one to run is chosen when the program starts.
+// The innermost loops of voxel matching, each for several instruction sets. Plain pointers alone:
+// sources that are compiled for more than the base instruction set must see no type whose inline
+// functions other sources compile too.
 #pragma once
 
 #include <cstddef>
@@ -7,23 +8,35 @@
 
 namespace libgtd {
 
-// One row of a mask layer: up to 64 bits of row `row` of the window from bit `bit` on.
-struct MaskRow {
-  std::uint32_t row_offset = 0;  // row of the window, relative to the pivot's first row
-  std::uint32_t bit_offset = 0;  // bit within the row, relative to the pivot's first bit
-  std::uint64_t counted = 0;     // V
-  std::uint64_t solid = 0;       // V and M
+// 64 bytes of a mask: the bits of up to 32 neighbouring columns, 16 layers each.
+struct MaskChunk {
+  static constexpr std::size_t columns = 32;
+  alignas(64) std::uint16_t bits[columns];
 };
 
-struct BitCounts {
-  std::uint32_t ssv = 0;
-  std::uint32_t gsv = 0;
+// avx512: F, BW, VL and VPOPCNTDQ.
+enum class BitPath { portable, avx2, avx512 };
+
+struct BitLoops {
+  // For each origin the sum over all chunks of popcount(window[origin + offset ...] & chunk), where
+  // origins and offsets count 16-bit words. Reads 64 bytes at each of them.
+  void (*count)(const std::uint16_t* window, const std::uint32_t* origins, std::size_t origin_count,
+                const MaskChunk* chunks, const std::uint32_t* offsets, std::size_t chunk_count,
+                std::uint32_t* counts);
+  // Moves the bits of each column down by 1 <= distance < 16 layers; `planes` arrays of `columns`
+  // words one after the other hold layers 0..15, 16..31, ... Zeros come in at the top.
+  void (*lower)(std::uint16_t* planes, std::size_t plane_count, std::size_t columns,
+                unsigned distance);
+  // sums[n] += entering[n] - leaving[n].
+  void (*slide)(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16_t* leaving,
+                std::size_t count);
+  // For each place the sum of `length` values of `sums` from there on. Reads up to 64 bytes beyond.
+  void (*add_runs)(const std::uint16_t* sums, const std::uint32_t* places, std::size_t place_count,
+                   std::size_t length, std::uint32_t* totals);
 };
 
-// Population counts of the window's bits under the rows of a mask. `bits` holds rows of
-// `words_per_row` words, the last of each row zero, so that reading one word too far is allowed;
-// the window of this pivot begins at row `first_row`, bit `first_bit`.
-BitCounts count_bits(const std::uint64_t* bits, std::size_t words_per_row, std::size_t first_row,
-                     std::size_t first_bit, const MaskRow* rows, std::size_t row_count);
+bool has_path(BitPath path);  // whether this processor can run it
+BitPath best_path();
+const BitLoops& loops_of(BitPath path);
 
 }  // namespace libgtd

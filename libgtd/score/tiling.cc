@@ -11,6 +11,8 @@ namespace libgtd {
 
 namespace {
 
+constexpr std::size_t grain = 4096;
+
 // Columns of voxels as a summed-area table (Crow 1984): how many columns of a rectangle are set.
 class ColumnSums {
  public:
@@ -90,20 +92,26 @@ ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds) {
   return unscanned;
 }
 
-std::vector<ScoredVoxel> score_tile(const VoxelGrid& grid, const GripperMask& mask,
-                                    const TileBounds& tile, const std::vector<std::size_t>& pivots,
-                                    const ScoringOptions& options) {
-  const std::vector<VoxelCounts> counts = match_voxels(grid, mask, tile, pivots);
+constexpr std::uint8_t is_pivot = 1;
+constexpr std::uint8_t is_edge = 2;
+
+// Of each of the grid's voxels, whether it is a pivot of the tiles, and one at an edge.
+std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& mask,
+                                      const std::vector<TileBounds>& tiles) {
+  std::vector<std::uint8_t> flags(grid.voxels.size(), 0);
   // The other methods do not score the border at all.
   const bool flag_edges = mask.method == Method::corrected;
-  const std::vector<std::uint8_t> edges = flag_edges ? find_edges(grid, mask, tile, pivots)
-                                                     : std::vector<std::uint8_t>(pivots.size(), 0);
-  std::vector<ScoredVoxel> scored(pivots.size());
-  for (std::size_t n = 0; n < pivots.size(); ++n)
-    scored[n] = {grid.voxels[pivots[n]], counts[n],
-                 score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0,
-                 edges[n] != 0};
-  return scored;
+  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      const std::vector<std::size_t> pivots = pivots_in(grid, mask, tiles[t]);
+      for (const std::size_t at : pivots) flags[at] = is_pivot;
+      if (!flag_edges) continue;
+      const std::vector<std::uint8_t> edges = find_edges(grid, mask, tiles[t], pivots);
+      for (std::size_t n = 0; n < pivots.size(); ++n)
+        if (edges[n] != 0) flags[pivots[n]] |= is_edge;
+    }
+  });
+  return flags;
 }
 
 }  // namespace
@@ -160,27 +168,22 @@ std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& m
 std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& mask,
                                      const std::vector<TileBounds>& tiles,
                                      const ScoringOptions& options, libmap::Progress& progress) {
-  std::vector<std::vector<std::size_t>> pivots(tiles.size());
-  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) pivots[t] = pivots_in(grid, mask, tiles[t]);
-  });
-  // All of them before the first window is made: the last tile may be the one that does not fit.
-  for (std::size_t t = 0; t < tiles.size(); ++t)
-    require_window_room(grid, mask, tiles[t], pivots[t]);
-  std::vector<std::vector<ScoredVoxel>> parts(tiles.size());
-  progress.begin("voxel matching", tiles.size());
-  libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      parts[t] = score_tile(grid, mask, tiles[t], pivots[t], options);
-      progress.advance(1);
+  const std::vector<std::uint8_t> flags = find_pivots(grid, mask, tiles);
+  std::vector<std::size_t> pivots;
+  pivots.reserve(flags.size());
+  for (std::size_t at = 0; at < flags.size(); ++at)
+    if (flags[at] != 0) pivots.push_back(at);
+  const std::vector<VoxelCounts> counts = match_voxels(grid, mask, pivots, options.path, progress);
+  std::vector<ScoredVoxel> scored(pivots.size());
+  libmap::parallel_for(pivots.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      ScoredVoxel& one = scored[n];
+      one.voxel = grid.voxels[pivots[n]];
+      one.counts = counts[n];
+      one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0;
+      one.edge = (flags[pivots[n]] & is_edge) != 0;
     }
   });
-  progress.end();
-  std::vector<ScoredVoxel> scored;
-  for (const std::vector<ScoredVoxel>& part : parts)
-    scored.insert(scored.end(), part.begin(), part.end());
-  std::sort(scored.begin(), scored.end(),
-            [](const ScoredVoxel& a, const ScoredVoxel& b) { return a.voxel < b.voxel; });
   return scored;
 }
 

@@ -1,105 +1,54 @@
 #include "libgtd/score/voxel_matching.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "libgtd/score/bit_count.h"
-#include "libmap/core/error.h"
-#include "libmap/core/text.h"
+#include "libgtd/score/level_window.h"
+#include "libmap/core/parallel.h"
 
 namespace libgtd {
 
 namespace {
 
-// The voxels around a tile as rows of bits along j; the rows of one (i) lie side by side in k.
-struct BitWindow {
-  TileBounds columns;
-  Voxel low;  // of the first bit
-  std::size_t rows_per_i = 0;
-  std::size_t words_per_row = 0;
-  std::vector<std::uint64_t> bits;
+// Side of a block of pivots, in columns: its window stays in the first two caches for the masks
+// that are in use, and is not all halo.
+constexpr int block_columns = 80;
 
-  std::size_t row_of(int i, int k) const {
-    return static_cast<std::size_t>(i - low.i) * rows_per_i + static_cast<std::size_t>(k - low.k);
-  }
-  double words() const {
-    return static_cast<double>(columns.i_end - columns.i_begin) * static_cast<double>(rows_per_i) *
-           static_cast<double>(words_per_row);
-  }
-  void set(const Voxel& voxel) {
-    const auto bit = static_cast<std::size_t>(voxel.j - low.j);
-    bits[row_of(voxel.i, voxel.k) * words_per_row + bit / 64] |= std::uint64_t{1} << (bit % 64);
-  }
+struct Blocks {
+  std::vector<BlockMatcher::Run> runs;      // block after block
+  std::vector<std::size_t> first_of_block;  // in runs; one more for the end
 };
 
-struct KRange {
-  int min = 0;
-  int max = 0;
-};
-
-TileBounds with_halo(const TileBounds& tile, const GripperMask& mask) {
-  const int below = mask.pivot_xy;
-  const int above = mask.side - mask.pivot_xy - 1;
-  return {tile.i_begin - below, tile.i_end + above, tile.j_begin - below, tile.j_end + above};
-}
-
-// Every window of a pivot lies in the box from its own k range, widened by the mask.
-KRange k_range(const VoxelGrid& grid, const std::vector<std::size_t>& pivots) {
-  KRange range{grid.voxels[pivots.front()].k, grid.voxels[pivots.front()].k};
-  for (const std::size_t pivot : pivots) {
-    range.min = std::min(range.min, grid.voxels[pivot].k);
-    range.max = std::max(range.max, grid.voxels[pivot].k);
+// Blocks lie on a lattice of their own. Pivots ascend, so that those of a row and a block follow
+// each other; nothing is made for blocks without pivots.
+Blocks cut_into_blocks(const VoxelGrid& grid, const std::vector<std::size_t>& pivots) {
+  struct Piece {
+    int row, column;  // of the block
+    BlockMatcher::Run run;
+  };
+  std::vector<Piece> pieces;
+  int i = 0;
+  int j_end = 0;  // of the piece
+  for (std::size_t n = 0; n < pivots.size(); ++n) {
+    const Voxel& voxel = grid.voxels[pivots[n]];
+    if (pieces.empty() || voxel.i != i || voxel.j >= j_end) {
+      if (!pieces.empty()) pieces.back().run.last = n;
+      const int column = floor_divide(voxel.j, block_columns);
+      pieces.push_back({floor_divide(voxel.i, block_columns), column, {n, pivots.size()}});
+      i = voxel.i;
+      j_end = (column + 1) * block_columns;
+    }
   }
-  return range;
-}
-
-// The frame of a tile's window, its bits not yet allocated.
-BitWindow frame_window(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
-                       const std::vector<std::size_t>& pivots) {
-  const TileBounds columns = with_halo(tile, mask);
-  const KRange pivots_k = k_range(grid, pivots);
-  const int k_low = pivots_k.min - mask.pivot_z;
-  const int k_high = pivots_k.max + mask.layers - mask.pivot_z - 1;
-  BitWindow window;
-  window.columns = columns;
-  window.low = {columns.i_begin, columns.j_begin, k_low};
-  window.rows_per_i = static_cast<std::size_t>(k_high - k_low) + 1;
-  // A spare word at the end: count_bits reads one word beyond a row's last bit.
-  window.words_per_row = static_cast<std::size_t>(columns.j_end - columns.j_begin) / 64 + 2;
-  return window;
-}
-
-BitWindow make_window(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
-                      const std::vector<std::size_t>& pivots) {
-  BitWindow window = frame_window(grid, mask, tile, pivots);
-  window.bits.assign(static_cast<std::size_t>(window.words()), 0);
-  const int k_end = window.low.k + static_cast<int>(window.rows_per_i);
-  visit_columns(grid, window.columns, [&](std::size_t at) {
-    const Voxel& voxel = grid.voxels[at];
-    if (voxel.k >= window.low.k && voxel.k < k_end) window.set(voxel);
+  std::stable_sort(pieces.begin(), pieces.end(), [](const Piece& a, const Piece& b) {
+    return a.row != b.row ? a.row < b.row : a.column < b.column;
   });
-  return window;
-}
-
-// The mask's rows, cut into words, without those that count nothing.
-std::vector<MaskRow> make_rows(const GripperMask& mask, std::size_t rows_per_i) {
-  std::vector<MaskRow> rows;
-  for (int x = 0; x < mask.side; ++x)
-    for (int z = 0; z < mask.layers; ++z)
-      for (int first = 0; first < mask.side; first += 64) {
-        MaskRow row;
-        row.row_offset = static_cast<std::uint32_t>(static_cast<std::size_t>(x) * rows_per_i) +
-                         static_cast<std::uint32_t>(z);
-        row.bit_offset = static_cast<std::uint32_t>(first);
-        for (int y = first; y < std::min(mask.side, first + 64); ++y) {
-          const std::uint64_t bit = std::uint64_t{1} << (y - first);
-          if (!mask.is_counted(x, y, z)) continue;
-          row.counted |= bit;
-          if (mask.is_solid(x, y, z)) row.solid |= bit;
-        }
-        if (row.counted != 0) rows.push_back(row);
-      }
-  return rows;
+  Blocks blocks;
+  for (std::size_t p = 0; p < pieces.size(); ++p) {
+    if (p == 0 || pieces[p].row != pieces[p - 1].row || pieces[p].column != pieces[p - 1].column)
+      blocks.first_of_block.push_back(p);
+    blocks.runs.push_back(pieces[p].run);
+  }
+  blocks.first_of_block.push_back(pieces.size());
+  return blocks;
 }
 
 }  // namespace
@@ -119,36 +68,24 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
   return pivots;
 }
 
-void require_window_room(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
-                         const std::vector<std::size_t>& pivots) {
-  if (pivots.empty()) return;
-  const double bytes = 8.0 * frame_window(grid, mask, tile, pivots).words();
-  if (bytes > max_window_bytes)
-    throw libmap::Error(
-        "too small for this cloud and gripper: the window of one tile would take " +
-            libmap::to_text(static_cast<float>(bytes / 0x1p30)) +
-            " GiB at a bit a voxel, more than " + libmap::to_text(max_window_bytes / 0x1p30) +
-            " GiB",
-        {.field = "voxel_size_m", .value = libmap::to_text(grid.lattice.voxel_size_m)});
-}
-
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
-                                      const TileBounds& tile,
-                                      const std::vector<std::size_t>& pivots) {
-  if (pivots.empty()) return {};
-  require_window_room(grid, mask, tile, pivots);
-  const BitWindow window = make_window(grid, mask, tile, pivots);
-  const std::vector<MaskRow> rows = make_rows(mask, window.rows_per_i);
-  std::vector<VoxelCounts> counts;
-  counts.reserve(pivots.size());
-  for (const std::size_t at : pivots) {
-    const Voxel& pivot = grid.voxels[at];
-    const std::size_t first_row = window.row_of(pivot.i - mask.pivot_xy, pivot.k - mask.pivot_z);
-    const auto first_bit = static_cast<std::size_t>(pivot.j - mask.pivot_xy - window.low.j);
-    const BitCounts counted = count_bits(window.bits.data(), window.words_per_row, first_row,
-                                         first_bit, rows.data(), rows.size());
-    counts.push_back({counted.ssv, counted.gsv});
-  }
+                                      const std::vector<std::size_t>& pivots, BitPath path,
+                                      libmap::Progress& progress) {
+  const MatchingPlan plan = plan_matching(mask);
+  const Blocks blocks = cut_into_blocks(grid, pivots);
+  std::vector<VoxelCounts> counts(pivots.size());
+  const std::size_t count = blocks.first_of_block.size() - 1;
+  progress.begin("voxel matching", count);
+  libmap::parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
+    BlockMatcher matcher(grid, plan, path);
+    for (std::size_t b = begin; b < end; ++b) {
+      const std::size_t first = blocks.first_of_block[b];
+      matcher.match(pivots, &blocks.runs[first], blocks.first_of_block[b + 1] - first,
+                    counts.data());
+      progress.advance(1);
+    }
+  });
+  progress.end();
   return counts;
 }
 

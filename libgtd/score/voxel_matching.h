@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libgtd/gripper/gripper_mask.h"
+#include "libgtd/score/bit_count.h"
 #include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/progress.h"
 
@@ -24,18 +25,14 @@ struct VoxelCounts {
 std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mask,
                                    const TileBounds& tile);
 
-// Counts of each pivot of one tile, by population counts over rows of bits. Only the voxels of the
-// tile and of a halo of half a mask are read, and the counts of a pivot do not depend on the tile
-// that it is counted in. Throws what require_window_room throws.
+// Counts of each pivot, by population counts over bits of the terrain around blocks of pivots.
+// Blocks run in parallel; the counts of a pivot do not depend on which others are asked for, on the
+// number of threads or on `path`, which the processor must have. Memory goes with the number of
+// voxels and the size of the mask, not with the box around them.
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
-                                      const TileBounds& tile,
-                                      const std::vector<std::size_t>& pivots);
-
-// Throws Error naming voxel_size_m if the bits of that window would take more than
-// max_window_bytes; it says how much they would take.
-void require_window_room(const VoxelGrid& grid, const GripperMask& mask, const TileBounds& tile,
-                         const std::vector<std::size_t>& pivots);
-inline constexpr double max_window_bytes = 1024.0 * 1024.0 * 1024.0;
+                                      const std::vector<std::size_t>& pivots,
+                                      BitPath path = best_path(),
+                                      libmap::Progress& progress = libmap::no_progress());
 
 // The same by the plain triple loop of listing A.6, over a dense array of the whole box, one
 // thread: the oracle of the tests and the baseline of the benchmarks.

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <string>
 
-#include "libgtd/shape/pcl_curvature.h"
+#include "libgtd/shape/thesis_curvature.h"
 #include "libgtd/shape/point_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -324,7 +324,7 @@ CurvatureResult estimate_curvature(const libmap::PointCloud& cloud, const Curvat
   result.method = options.method;
   result.radius_m = options.radius_m;
   result.points = options.method == CurvatureMethod::thesis
-                      ? estimate_pcl_curvature(cloud, options.radius_m, indices)
+                      ? estimate_thesis_curvature(cloud, options.radius_m, indices)
                       : fit_quadrics(cloud, options, indices);
   result.valid_count = static_cast<std::size_t>(std::count_if(
       result.points.begin(), result.points.end(), [](const Curvature& c) { return c.valid; }));

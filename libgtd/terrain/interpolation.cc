@@ -2,10 +2,7 @@
 
 #include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Spatial_sort_traits_adapter_2.h>
 #include <CGAL/Triangulation_vertex_base_with_info_2.h>
-#include <CGAL/property_map.h>
-#include <CGAL/spatial_sort.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -17,7 +14,9 @@
 #include <utility>
 #include <vector>
 
+#include "libgtd/terrain/radix_sort.h"
 #include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 
 namespace libgtd {
@@ -31,6 +30,11 @@ using Triangulation =
 using Point = Kernel::Point_2;
 using Eigen::Vector3d;
 
+constexpr std::size_t grain = 4096;
+constexpr std::uint32_t hilbert_cells = 4096;  // a side
+constexpr unsigned hilbert_bits = 24;
+constexpr std::size_t columns_at_once = 16;  // of the grid that one thread fills
+
 // Where the grid's nodes stand along one axis, in increasing order.
 using Axis = std::vector<double>;
 
@@ -42,6 +46,23 @@ struct Box {
 struct Triangle {
   std::array<Point, 3> at;
   std::array<double, 3> z;
+};
+
+Triangle triangle_of(const Triangulation::Face_handle& face) {
+  Triangle t;
+  for (int a = 0; a < 3; ++a) {
+    t.at[static_cast<std::size_t>(a)] = face->vertex(a)->point();
+    t.z[static_cast<std::size_t>(a)] = face->vertex(a)->info();
+  }
+  return t;
+}
+
+// A triangle and the columns of the grid, first .. last - 1, that may cross it.
+struct PlacedFace {
+  Triangulation::Face_handle face;
+  std::uint32_t first = 0;
+  std::uint32_t last = 0;
+  bool refused = false;
 };
 
 std::vector<Vector3d> finite_points(const libmap::PointCloud& cloud, InterpolationMethod method) {
@@ -66,22 +87,58 @@ Box box_of(const std::vector<Vector3d>& points) {
   return box;
 }
 
-// Of points with the same x and y the highest stays, whatever their order.
-Triangulation triangulate(const std::vector<Vector3d>& points) {
-  std::vector<Point> sites(points.size());
-  std::vector<std::size_t> order(points.size());
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    sites[i] = Point(points[i].x(), points[i].y());
-    order[i] = i;
+// The place of a cell of a square of 4096 x 4096 on Hilbert's curve (Hilbert 1891).
+std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
+  std::uint32_t place = 0;
+  for (std::uint32_t bit = hilbert_cells / 2; bit > 0; bit /= 2) {
+    const std::uint32_t right = (x & bit) != 0 ? 1 : 0;
+    const std::uint32_t up = (y & bit) != 0 ? 1 : 0;
+    place = place << 2 | ((3 * right) ^ up);
+    // In the lower quadrants the curve runs transposed, in the right one of them mirrored as well:
+    // without branches, which could not be foretold.
+    const std::uint32_t transposed = up - 1;
+    const std::uint32_t mirrored = transposed & (0U - right);
+    x ^= mirrored;
+    y ^= mirrored;
+    const std::uint32_t swapped = (x ^ y) & transposed;
+    x ^= swapped;
+    y ^= swapped;
   }
-  const auto site_of = CGAL::make_property_map(sites);
-  CGAL::spatial_sort(order.begin(), order.end(),
-                     CGAL::Spatial_sort_traits_adapter_2<Kernel, decltype(site_of)>(site_of));
+  return place;
+}
+
+// The points' indices along Hilbert's curve: neighbours follow each other, so that each is found
+// within a few triangles of the one before.
+std::vector<std::uint32_t> hilbert_order(const std::vector<Vector3d>& points, const Box& box) {
+  struct Item {
+    std::uint32_t place;
+    std::uint32_t index;
+  };
+  const double side = std::max(box.max_x - box.min_x, box.max_y - box.min_y);
+  const auto cell = [&](double offset) {
+    const double at = offset / side * hilbert_cells;
+    return at < hilbert_cells ? static_cast<std::uint32_t>(at) : hilbert_cells - 1;
+  };
+  std::vector<Item> items(points.size());
+  libmap::parallel_for(points.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i)
+      items[i] = {hilbert_place(cell(points[i].x() - box.min_x), cell(points[i].y() - box.min_y)),
+                  static_cast<std::uint32_t>(i)};
+  });
+  radix_sort(items, hilbert_bits, [](const Item& item) { return item.place; });
+  std::vector<std::uint32_t> order;
+  order.reserve(items.size());
+  for (const Item& item : items) order.push_back(item.index);
+  return order;
+}
+
+// Of points with the same x and y the highest stays, whatever their order.
+Triangulation triangulate(const std::vector<Vector3d>& points, const Box& box) {
   Triangulation triangulation;
   Triangulation::Face_handle hint;
-  for (const std::size_t i : order) {
+  for (const std::uint32_t i : hilbert_order(points, box)) {
     const std::size_t before = triangulation.number_of_vertices();
-    const auto vertex = triangulation.insert(sites[i], hint);
+    const auto vertex = triangulation.insert(Point(points[i].x(), points[i].y()), hint);
     const bool added = triangulation.number_of_vertices() > before;
     vertex->info() = added ? points[i].z() : std::max(vertex->info(), points[i].z());
     hint = vertex->face();
@@ -143,10 +200,12 @@ Axis lattice(double min, double max, double spacing) {
   return axis;
 }
 
-// The first node of `axis` that may be >= `at`: never one too far.
+// The first node of `axis` at or after `at`; all but its neighbours are passed over by the spacing.
 std::size_t first_node(const Axis& axis, double at, double spacing) {
-  const double index = std::floor((at - axis.front()) / spacing) - 1;
-  std::size_t i = index <= 0 ? 0 : std::min(static_cast<std::size_t>(index), axis.size());
+  const double index = (at - axis.front()) / spacing - 1;
+  std::size_t i = !(index > 0)                               ? 0
+                  : index < static_cast<double>(axis.size()) ? static_cast<std::size_t>(index)
+                                                             : axis.size();
   while (i > 0 && axis[i - 1] >= at) --i;
   while (i < axis.size() && axis[i] < at) ++i;
   return i;
@@ -220,17 +279,33 @@ class HeightGrid {
         spacing_(spacing),
         z_(xs_.size() * ys_.size(), std::numeric_limits<double>::quiet_NaN()) {}
 
-  template <typename Height>
-  void fill(const Triangle& t, const Height& height) {
-    if (z_.empty()) return;
+  void place(PlacedFace& placed, const Triangle& t) const {
+    if (xs_.empty()) return;
     const auto [low, high] = std::minmax({t.at[0].x(), t.at[1].x(), t.at[2].x()});
-    for (std::size_t i = first_node(xs_, low, spacing_); i < xs_.size() && xs_[i] <= high; ++i) {
-      const auto [bottom, top] = crossing(t, xs_[i]);
-      double* const column = z_.data() + i * ys_.size();
-      for (std::size_t j = first_node(ys_, bottom, spacing_); j < ys_.size() && ys_[j] <= top; ++j)
-        if (std::isnan(column[j]) && covers(t, Point(xs_[i], ys_[j])))
-          column[j] = height(t, xs_[i], ys_[j]);
+    std::size_t last = first_node(xs_, low, spacing_);
+    placed.first = static_cast<std::uint32_t>(last);
+    while (last < xs_.size() && xs_[last] <= high) ++last;
+    placed.last = static_cast<std::uint32_t>(last);
+  }
+
+  // Triangle by triangle in their order; strips of columns run in parallel.
+  template <typename Height>
+  void fill(const std::vector<PlacedFace>& faces, const Height& height) {
+    if (z_.empty()) return;
+    std::vector<std::vector<std::size_t>> of_strip((xs_.size() - 1) / columns_at_once + 1);
+    for (std::size_t n = 0; n < faces.size(); ++n) {
+      const PlacedFace& one = faces[n];
+      if (one.refused || one.first == one.last) continue;
+      for (std::size_t s = one.first / columns_at_once; s <= (one.last - 1) / columns_at_once; ++s)
+        of_strip[s].push_back(n);
     }
+    libmap::parallel_for(of_strip.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t s = begin; s < end; ++s)
+        for (const std::size_t n : of_strip[s])
+          fill_columns(triangle_of(faces[n].face),
+                       std::max<std::size_t>(faces[n].first, s * columns_at_once),
+                       std::min<std::size_t>(faces[n].last, (s + 1) * columns_at_once), height);
+    });
   }
 
   template <typename Visit>
@@ -241,6 +316,17 @@ class HeightGrid {
   }
 
  private:
+  template <typename Height>
+  void fill_columns(const Triangle& t, std::size_t begin, std::size_t end, const Height& height) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const auto [bottom, top] = crossing(t, xs_[i]);
+      double* const column = z_.data() + i * ys_.size();
+      for (std::size_t j = first_node(ys_, bottom, spacing_); j < ys_.size() && ys_[j] <= top; ++j)
+        if (std::isnan(column[j]) && covers(t, Point(xs_[i], ys_[j])))
+          column[j] = height(t, xs_[i], ys_[j]);
+    }
+  }
+
   Axis xs_;
   Axis ys_;
   double spacing_;
@@ -262,26 +348,27 @@ void check_options(const InterpolationOptions& options) {
 
 void fill_triangles(const Triangulation& triangulation, const InterpolationOptions& options,
                     HeightGrid& grid, InterpolationResult& result) {
-  for (const auto& face : triangulation.finite_face_handles()) {
-    Triangle t;
-    for (int a = 0; a < 3; ++a) {
-      t.at[static_cast<std::size_t>(a)] = face->vertex(a)->point();
-      t.z[static_cast<std::size_t>(a)] = face->vertex(a)->info();
+  std::vector<PlacedFace> faces;
+  faces.reserve(triangulation.number_of_faces());
+  for (const auto& face : triangulation.finite_face_handles()) faces.push_back({.face = face});
+  libmap::parallel_for(faces.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const Triangle t = triangle_of(faces[n].face);
+      faces[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
+      grid.place(faces[n], t);
     }
-    ++result.triangles;
-    if (options.max_edge_m > 0 && longer_than(t, options.max_edge_m)) {
-      ++result.refused_triangles;
-    } else if (options.method == InterpolationMethod::thesis) {
-      grid.fill(t, plane_height);
-    } else {
-      grid.fill(t, barycentric_height);
-    }
-  }
+  });
+  result.triangles = faces.size();
+  result.refused_triangles = static_cast<std::size_t>(
+      std::count_if(faces.begin(), faces.end(), [](const PlacedFace& one) { return one.refused; }));
+  if (options.method == InterpolationMethod::thesis)
+    grid.fill(faces, plane_height);
+  else
+    grid.fill(faces, barycentric_height);
 }
 
-HeightGrid make_grid(const std::vector<Vector3d>& points, const InterpolationOptions& options,
-                     InterpolationResult& result) {
-  const Box box = box_of(points);
+HeightGrid make_grid(const std::vector<Vector3d>& points, const Box& box,
+                     const InterpolationOptions& options, InterpolationResult& result) {
   if (options.method == InterpolationMethod::thesis) {
     result.area_m2 = box.area();
     const double spacing = result.grid_spacing_m = thesis_spacing(points.size(), box);
@@ -310,10 +397,11 @@ InterpolationResult interpolate(const libmap::PointCloud& cloud,
                         {.field = "points",
                          .value = libmap::to_text(static_cast<std::int64_t>(points.size())),
                          .bound = ">= 3"});
-  const Triangulation triangulation = triangulate(points);
+  const Box box = box_of(points);
+  const Triangulation triangulation = triangulate(points, box);
   InterpolationResult result;
   result.skipped_points = cloud.size() - triangulation.number_of_vertices();
-  HeightGrid grid = make_grid(points, options, result);
+  HeightGrid grid = make_grid(points, box, options, result);
   fill_triangles(triangulation, options, grid, result);
 
   result.cloud.viewpoint = cloud.viewpoint;

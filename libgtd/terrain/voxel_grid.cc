@@ -4,8 +4,8 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <numeric>
 
+#include "libgtd/terrain/radix_sort.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -41,9 +41,79 @@ std::pair<Vector, Vector> bounds_of(const std::vector<Vector>& points) {
   return bounds;
 }
 
+using Cell = BoxKey::Cell;
+
+// std::floor of a number in an int's range, without a call into the mathematics library.
+int floor_to_int(float value) {
+  const int whole = static_cast<int>(value);
+  return static_cast<float>(whole) > value ? whole - 1 : whole;
+}
+
+template <typename Range, typename CellOf>
+BoxKey box_key(const Range& items, const CellOf& cell_of) {
+  Cell low = cell_of(items.front());
+  Cell high = low;
+  for (const auto& item : items) {
+    const Cell cell = cell_of(item);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], cell[axis]);
+      high[axis] = std::max(high[axis], cell[axis]);
+    }
+  }
+  return {low, high};
+}
+
 void sort_and_unite(std::vector<Voxel>& voxels) {
-  std::sort(voxels.begin(), voxels.end());
-  voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+  if (voxels.empty()) return;
+  const auto cell_of = [](const Voxel& voxel) { return Cell{voxel.i, voxel.j, voxel.k}; };
+  const BoxKey key = box_key(voxels, cell_of);
+  if (!key.fits()) {
+    std::sort(voxels.begin(), voxels.end());
+    voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
+    return;
+  }
+  std::vector<std::uint64_t> keys;
+  keys.reserve(voxels.size());
+  for (const Voxel& voxel : voxels) keys.push_back(key.of(cell_of(voxel)));
+  radix_sort(keys, key.bits(), [](std::uint64_t one) { return one; });
+  keys.erase(std::unique(keys.begin(), keys.end()), keys.end());
+  voxels.resize(keys.size());
+  for (std::size_t n = 0; n < keys.size(); ++n) {
+    const Cell cell = key.cell(keys[n]);
+    voxels[n] = {cell[0], cell[1], cell[2]};
+  }
+}
+
+// The points of each cell side by side, cells ascending, points within one in their own order.
+struct SortedCells {
+  std::vector<std::uint32_t> order;
+  std::vector<std::size_t> begins;  // of each cell in `order`, and the end
+};
+
+SortedCells sort_by_cell(const std::vector<Cell>& cells) {
+  struct Item {
+    std::uint64_t key;
+    std::uint32_t index;
+  };
+  SortedCells sorted;
+  const BoxKey key = box_key(cells, [](const Cell& cell) { return cell; });
+  std::vector<Item> items;
+  items.reserve(cells.size());
+  for (const Cell& cell : cells)
+    items.push_back({key.of(cell), static_cast<std::uint32_t>(items.size())});
+  const auto is_same = [&](std::uint32_t a, std::uint32_t b) { return cells[a] == cells[b]; };
+  if (key.fits())
+    radix_sort(items, key.bits(), [](const Item& item) { return item.key; });
+  else
+    std::stable_sort(items.begin(), items.end(),
+                     [&](const Item& a, const Item& b) { return cells[a.index] < cells[b.index]; });
+  for (const Item& item : items) {
+    if (sorted.order.empty() || !is_same(sorted.order.back(), item.index))
+      sorted.begins.push_back(sorted.order.size());
+    sorted.order.push_back(item.index);
+  }
+  sorted.begins.push_back(sorted.order.size());
+  return sorted;
 }
 
 }  // namespace
@@ -77,26 +147,20 @@ std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f
   const auto [low, high] = bounds_of(points);
   require_room(Eigen::Vector3f(low * inverse_leaf), leaf_m);
   require_room(Eigen::Vector3f(high * inverse_leaf), leaf_m);
-  using Cell = std::array<int, 3>;  // z, y, x
-  std::vector<Cell> cells;
+  std::vector<Cell> cells;  // z, y, x
   cells.reserve(points.size());
   for (const Eigen::Vector3f& point : points)
-    cells.push_back({static_cast<int>(std::floor(point.z() * inverse_leaf)),
-                     static_cast<int>(std::floor(point.y() * inverse_leaf)),
-                     static_cast<int>(std::floor(point.x() * inverse_leaf))});
-  std::vector<std::uint32_t> order(points.size());
-  std::iota(order.begin(), order.end(), 0U);
-  // Stable: points of a cell are added up in the order of the cloud.
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) { return cells[a] < cells[b]; });
+    cells.push_back({floor_to_int(point.z() * inverse_leaf), floor_to_int(point.y() * inverse_leaf),
+                     floor_to_int(point.x() * inverse_leaf)});
+  const SortedCells sorted = sort_by_cell(cells);
   std::vector<Eigen::Vector3f> centroids;
-  for (std::size_t first = 0; first < order.size();) {
+  centroids.reserve(sorted.begins.size());
+  for (std::size_t c = 0; c + 1 < sorted.begins.size(); ++c) {
+    const std::size_t first = sorted.begins[c];
+    const std::size_t last = sorted.begins[c + 1];
     Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-    std::size_t last = first;
-    for (; last < order.size() && cells[order[last]] == cells[order[first]]; ++last)
-      sum += points[order[last]];
+    for (std::size_t n = first; n < last; ++n) sum += points[sorted.order[n]];
     centroids.push_back(sum / static_cast<float>(last - first));
-    first = last;
   }
   return centroids;
 }

@@ -4,6 +4,8 @@
 #include <Eigen/Core>
 #include <algorithm>
 #include <cstddef>
+#include <iterator>
+#include <limits>
 #include <vector>
 
 #include "libgtd/terrain/voxel_lattice.h"
@@ -27,22 +29,42 @@ struct TileBounds {
   int j_end = 0;
 };
 
+// The first of `at` .. `end` that is not below `voxel`, in steps that double: near `at` it takes
+// few.
+template <typename Iterator>
+Iterator first_not_below(Iterator at, Iterator end, const Voxel& voxel) {
+  auto step = typename std::iterator_traits<Iterator>::difference_type{1};
+  while (step < end - at && *(at + step) < voxel) {
+    at += step;
+    step *= 2;
+  }
+  return std::lower_bound(at, step < end - at ? at + step : end, voxel);
+}
+
+// Calls visit(first, last) for each row of voxels of one i in the columns, ascending: positions
+// first .. last - 1 in grid.voxels.
+template <typename Visit>
+void visit_rows(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
+  const auto begin = grid.voxels.begin();
+  const auto end = grid.voxels.end();
+  constexpr int lowest = std::numeric_limits<int>::min();
+  auto at = std::lower_bound(begin, end, Voxel{columns.i_begin, columns.j_begin, lowest});
+  while (at != end && at->i < columns.i_end) {
+    const int i = at->i;
+    const auto first = first_not_below(at, end, {i, columns.j_begin, lowest});
+    at = first_not_below(first, end, {i, columns.j_end, lowest});
+    if (first != at)
+      visit(static_cast<std::size_t>(first - begin), static_cast<std::size_t>(at - begin));
+    at = first_not_below(at, end, {i + 1, columns.j_begin, lowest});
+  }
+}
+
 // Calls visit(position in grid.voxels) for each voxel of the columns, ascending.
 template <typename Visit>
 void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit& visit) {
-  const auto begin = grid.voxels.begin();
-  const auto end = grid.voxels.end();
-  auto at = std::lower_bound(begin, end, Voxel{columns.i_begin, columns.j_begin, grid.min.k});
-  while (at != end && at->i < columns.i_end) {
-    if (at->j < columns.j_begin) {
-      at = std::lower_bound(at, end, Voxel{at->i, columns.j_begin, grid.min.k});
-    } else if (at->j >= columns.j_end) {
-      at = std::lower_bound(at, end, Voxel{at->i + 1, columns.j_begin, grid.min.k});
-    } else {
-      visit(static_cast<std::size_t>(at - begin));
-      ++at;
-    }
-  }
+  visit_rows(grid, columns, [&](std::size_t first, std::size_t last) {
+    for (std::size_t at = first; at < last; ++at) visit(at);
+  });
 }
 
 // `corrected`: index = floor(p / voxel_size_m) on the lattice through the frame's origin, so that a

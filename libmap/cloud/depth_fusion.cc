@@ -6,8 +6,10 @@
 #include <iterator>
 #include <limits>
 #include <memory>
+#include <numbers>
 #include <span>
 
+#include "libmap/cloud/frame_registration.h"
 #include "libmap/cloud/surface_points.h"
 #include "libmap/cloud/surface_refinement.h"
 #include "libmap/cloud/surface_voxels.h"
@@ -22,6 +24,12 @@ namespace {
 
 // Frames in memory at a time; not the number of threads, which results must not depend on.
 constexpr std::size_t frames_in_flight = 8;
+// Elements, about, by which frames are registered.
+constexpr std::size_t registration_elements = 20000;
+// By which frames may lie off the coarse surface when they are first registered.
+constexpr double first_search_voxels = 3.0;
+// Corrections of heights, root mean square, that are not worth another coarse surface.
+constexpr double least_correction_voxels = 0.05;
 
 void require(double value, const Range& range, const char* field) {
   const bool low = range.min_open ? value > range.min : value >= range.min;
@@ -32,6 +40,7 @@ void require(double value, const Range& range, const char* field) {
 }
 
 constexpr Range radius_range{1, 7};
+constexpr Range rounds_range{0, 20};
 constexpr Range incidence_range{0, 89.5, true, false};
 
 void check(const DepthFusionOptions& options) {
@@ -49,6 +58,7 @@ void check(const DepthFusionOptions& options) {
   require(options.planes.max_incidence_deg, incidence_range, "max_incidence_deg");
   require(options.disc_radius_voxels, positive, "disc_radius_voxels");
   require(options.pose_error_m, not_negative, "pose_error_m");
+  require(options.registration_rounds, rounds_range, "registration_rounds");
   require(options.min_views, {1}, "min_views");
   require(options.max_seen_through, not_negative, "max_seen_through");
 }
@@ -73,6 +83,7 @@ class Fusion {
   DepthFusionResult run(const Trajectory& world_from_base) {
     take_poses(world_from_base);
     timed("coarse surface", [&] { find_surface(); });
+    timed("registration", [&] { register_poses(world_from_base); });
     if (used_.empty()) throw no_frames(world_from_base.size());
     result_.frames = used_.size();
     result_.occupied_voxels = voxels_.size();
@@ -108,7 +119,28 @@ class Fusion {
   CoarseFrame coarse_frame(const FusedFrame& frame) const;
   void merge_coarse(std::span<const FusedFrame> frames, std::span<const CoarseFrame> coarse);
   void find_surface();
-  std::vector<RefinementView> views_of(const FusedFrame& frame, std::uint32_t number) const;
+  // use(views) of some frames at a time, in their order.
+  template <typename Use>
+  void each_view_group(bool color, const Use& use) const {
+    for (std::size_t first = 0; first < used_.size(); first += frames_in_flight) {
+      const std::size_t count = std::min(frames_in_flight, used_.size() - first);
+      std::vector<std::vector<RefinementView>> frames(count);
+      parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+          frames[n] = views_of(used_[first + n], static_cast<std::uint32_t>(first + n), color);
+      });
+      std::vector<RefinementView> views;
+      for (std::vector<RefinementView>& frame : frames)
+        std::move(frame.begin(), frame.end(), std::back_inserter(views));
+      use(std::span<const RefinementView>(views), count);
+    }
+  }
+  FrameRegistration registration(int round);
+  void register_poses(const Trajectory& world_from_base);
+  void note_poses(const Trajectory& world_from_base);
+  SurfaceRefinementOptions refinement_options() const;
+  std::vector<RefinementView> views_of(const FusedFrame& frame, std::uint32_t number,
+                                       bool color) const;
   RefinedSurface refine();
   void make_cloud(const RefinedSurface& surface);
 
@@ -140,7 +172,15 @@ void Fusion::take_poses(const Trajectory& world_from_base) {
     frame.grid_from_base.translation() -= origin_;
     const double reach = frame.grid_from_base.translation().cwiseAbs().maxCoeff();
     const double bound = 0.9 * voxel_cell_limit * options_.voxel_size_m;
-    if (reach + options_.planes.max_depth_m > bound)
+    const double needed = reach + options_.planes.max_depth_m;
+    if (needed > bound && reach <= options_.planes.max_depth_m)
+      throw Error(
+          "voxels too small for the reach of the depth images",
+          {.file = {},
+           .field = "voxel_size_m",
+           .value = to_text(options_.voxel_size_m),
+           .bound = "> " + to_text(static_cast<float>(options_.voxel_size_m * needed / bound))});
+    if (needed > bound)
       throw Error("poses lie too far apart for the voxel size",
                   {.file = {},
                    .field = "node " + std::to_string(pose.node),
@@ -241,14 +281,15 @@ void Fusion::find_surface() {
   merge_coarse(before, coarse_before);
 }
 
-std::vector<RefinementView> Fusion::views_of(const FusedFrame& frame, std::uint32_t number) const {
+std::vector<RefinementView> Fusion::views_of(const FusedFrame& frame, std::uint32_t number,
+                                             bool color) const {
   std::vector<RefinementView> views;
   RgbdFrame images;
   try {
-    images = read_frame(frame.node, options_.color);
+    images = read_frame(frame.node, color);
   } catch (const Error&) {
     // Its depth was read before: only the colours are broken.
-    if (!options_.color || options_.strict) throw;
+    if (!color || options_.strict) throw;
     images = read_frame(frame.node, false);
   }
   for (CameraView& view : camera_views(images)) {
@@ -261,35 +302,95 @@ std::vector<RefinementView> Fusion::views_of(const FusedFrame& frame, std::uint3
   return views;
 }
 
+SurfaceRefinementOptions Fusion::refinement_options() const {
+  SurfaceRefinementOptions options;
+  options.disc_radius_m = options_.disc_radius_voxels * options_.voxel_size_m;
+  options.search_m = options_.voxel_size_m;
+  options.min_depth_m = options_.planes.min_depth_m;
+  options.max_depth_m = options_.planes.max_depth_m;
+  options.max_incidence_deg = options_.planes.max_incidence_deg;
+  options.noise = options_.planes.noise;
+  options.pose_error_m = options_.pose_error_m;
+  return options;
+}
+
+// By what the frames measured of some of the coarse surface.
+FrameRegistration Fusion::registration(int round) {
+  std::vector<SurfaceElement> elements = surface_elements(voxels_, false);
+  const std::size_t step = std::max<std::size_t>(1, elements.size() / registration_elements);
+  for (std::size_t n = 0; n * step < elements.size(); ++n) {
+    elements[n] = elements[n * step];
+    elements[n].position *= static_cast<float>(options_.voxel_size_m);
+  }
+  elements.resize((elements.size() + step - 1) / step);
+  SurfaceRefinementOptions options = refinement_options();
+  options.search_m = first_search_voxels * options_.voxel_size_m / round;
+  std::vector<SurfaceObservation> observations;
+  each_view_group(false, [&](std::span<const RefinementView> views, std::size_t) {
+    const auto more = observe_surface(elements, views, options);
+    observations.insert(observations.end(), more.begin(), more.end());
+  });
+  std::stable_sort(observations.begin(), observations.end(),
+                   [](const auto& a, const auto& b) { return a.element < b.element; });
+  std::vector<Eigen::Vector3d> centres;
+  for (const FusedFrame& frame : used_) centres.push_back(frame.grid_from_base.translation());
+  return register_frames(elements, observations, centres);
+}
+
+void Fusion::register_poses(const Trajectory& world_from_base) {
+  for (int round = 1; round <= options_.registration_rounds && used_.size() > 1; ++round) {
+    const FrameRegistration found = registration(round);
+    if (round == 1) result_.disagreement_before_m = found.disagreement_before_m;
+    result_.disagreement_after_m = found.disagreement_before_m;
+    // Poses that are right stay as they are, and with them the coarse surface.
+    if (!(found.correction_m > least_correction_voxels * options_.voxel_size_m)) break;
+    frames_ = std::move(used_);
+    for (std::size_t n = 0; n < frames_.size(); ++n)
+      frames_[n].grid_from_base = found.corrected_from_given[n] * frames_[n].grid_from_base;
+    result_.disagreement_after_m = found.disagreement_after_m;
+    ++result_.registration_rounds;
+    voxels_ = {};
+    used_.clear();
+    result_.pixels = {};
+    find_surface();
+  }
+  note_poses(world_from_base);
+}
+
+void Fusion::note_poses(const Trajectory& world_from_base) {
+  double turns = 0.0;
+  double shifts = 0.0;
+  for (const FusedFrame& frame : used_) {
+    const auto given =
+        std::find_if(world_from_base.begin(), world_from_base.end(),
+                     [&](const TrajectoryPose& pose) { return pose.node == frame.node; });
+    TrajectoryPose pose = *given;
+    if (result_.registration_rounds > 0) {
+      pose.world_from_base = Eigen::Translation3d(origin_) * frame.grid_from_base;
+      const Pose given_from_used = given->world_from_base.inverse() * pose.world_from_base;
+      const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
+      turns += turn * turn;
+      shifts += given_from_used.translation().squaredNorm();
+    }
+    result_.poses.push_back(pose);
+  }
+  const auto count = static_cast<double>(used_.size());
+  result_.registration_turn_deg = std::sqrt(turns / count) * 180.0 / std::numbers::pi;
+  result_.registration_shift_m = std::sqrt(shifts / count);
+}
+
 RefinedSurface Fusion::refine() {
   std::vector<SurfaceElement> elements = surface_elements(voxels_, options_.extend_edges);
   voxels_ = {};
   const auto voxel = static_cast<float>(options_.voxel_size_m);
   for (SurfaceElement& element : elements) element.position *= voxel;
   result_.elements = elements.size();
-  SurfaceRefinementOptions refine_options;
-  refine_options.disc_radius_m = options_.disc_radius_voxels * options_.voxel_size_m;
-  refine_options.search_m = options_.voxel_size_m;
-  refine_options.min_depth_m = options_.planes.min_depth_m;
-  refine_options.max_depth_m = options_.planes.max_depth_m;
-  refine_options.max_incidence_deg = options_.planes.max_incidence_deg;
-  refine_options.noise = options_.planes.noise;
-  refine_options.pose_error_m = options_.pose_error_m;
-  SurfaceRefinement refinement(std::move(elements), refine_options);
+  SurfaceRefinement refinement(std::move(elements), refinement_options());
   progress_.begin("refinement", used_.size());
-  for (std::size_t first = 0; first < used_.size(); first += frames_in_flight) {
-    const std::size_t count = std::min(frames_in_flight, used_.size() - first);
-    std::vector<std::vector<RefinementView>> frames(count);
-    parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        frames[n] = views_of(used_[first + n], static_cast<std::uint32_t>(first + n));
-    });
-    std::vector<RefinementView> views;
-    for (std::vector<RefinementView>& frame : frames)
-      std::move(frame.begin(), frame.end(), std::back_inserter(views));
+  each_view_group(options_.color, [&](std::span<const RefinementView> views, std::size_t frames) {
     refinement.add(views);
-    progress_.advance(count);
-  }
+    progress_.advance(frames);
+  });
   return std::move(refinement).finish();
 }
 
@@ -327,6 +428,8 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "disc of the surface whose measurements make a point");
   table.add("pose_error_m", options.pose_error_m, not_negative,
             "standard deviation of a whole frame, along a normal");
+  table.add("registration_rounds", options.registration_rounds, rounds_range,
+            "times, at most, that poses are corrected so that frames agree; 0: not at all");
   table.add("min_views", options.min_views, {1}, "points that fewer frames measured are dropped");
   table.add("max_seen_through", options.max_seen_through, not_negative,
             "points are dropped that are seen through more often, against being seen");

@@ -1,11 +1,12 @@
 // One oriented, coloured cloud from all depth images of a scan.
 //
-// Two passes over the frames. The first fits a plane to the pixels around each pixel
-// (depth_planes) and averages places and normals in a hashed voxel grid (surface_voxels): a coarse
-// surface, one element a voxel. The second moves each element along its normal to the weighted mean
-// of what all frames measured within a disc around it (surface_refinement). Both average where the
-// rays meet the surface, not where noise has put the measurements: that is what makes the means
-// free of bias. Memory grows with the occupied voxels alone.
+// Frames whose poses do not agree are moved together first (frame_registration): a map is as sharp
+// as its poses. Then two passes over the frames. The first fits a plane to the pixels around each
+// pixel (depth_planes) and averages places and normals in a hashed voxel grid (surface_voxels): a
+// coarse surface, one element a voxel. The second moves each element along its normal to the
+// weighted mean of what all frames measured within a disc around it (surface_refinement). Both
+// average where the rays meet the surface, not where noise has put the measurements: that is what
+// makes the means free of bias. Memory grows with the occupied voxels alone.
 #pragma once
 
 #include <cstddef>
@@ -30,6 +31,9 @@ struct DepthFusionOptions {
   // >= 0: by which a whole frame may lie wrong along a normal. It keeps the frame nearest to a
   // place from speaking for it alone.
   double pose_error_m = 0.0;
+  // >= 0: times, at most, that all poses are corrected so that frames agree before they are fused
+  // (frame_registration); 0: poses are taken as they are.
+  int registration_rounds = 3;
   int min_views = 1;  // distinct frames that must have measured a point
   // A point is dropped that more views see through than see, each counted by its cosine (Merrell et
   // al. 2007); larger keeps more.
@@ -49,7 +53,17 @@ struct DepthFusionResult {
   // where the surface bends within a disc.
   PointCloud cloud;
   DepthPixelCounts pixels;
-  std::size_t frames = 0;                            // used
+  std::size_t frames = 0;  // used
+  // The frames that were used, by ascending node, with the poses that they were fused by.
+  Trajectory poses;
+  int registration_rounds = 0;  // that moved frames; 0: the poses are those that were given
+  // Root mean squares over the frames, against the poses that were given.
+  double registration_shift_m = 0.0;
+  double registration_turn_deg = 0.0;
+  // Of heights that frames measured of a place, about their mean: by the poses given, and in the
+  // end.
+  double disagreement_before_m = 0.0;
+  double disagreement_after_m = 0.0;
   std::vector<std::pair<int, std::string>> skipped;  // node and what it lacks
   std::size_t occupied_voxels = 0;
   std::size_t elements = 0;  // of the surface, before points were made of them

@@ -74,6 +74,7 @@ class PointMaker {
 };
 
 bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElement& refined) {
+  counts_.most_views = std::max(counts_.most_views, std::size_t{refined.frames});
   if (refined.frames < static_cast<std::uint32_t>(options_.min_views)) {
     ++counts_.unconfirmed;
     return false;

@@ -16,6 +16,7 @@ struct SurfacePointOptions {
 
 struct SurfacePointCounts {
   std::size_t unconfirmed = 0;      // dropped: measured by too few frames
+  std::size_t most_views = 0;       // frames that measured one element, at most
   std::size_t seen_through = 0;     // dropped: views see through them
   std::size_t bent_away = 0;        // dropped: beyond an edge where the surface does not go on
   std::size_t merged = 0;           // with another one of the same voxel, or an echo of one

@@ -394,6 +394,31 @@ RefinedSurface SurfaceRefinement::finish() && {
   return surface;
 }
 
+std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> elements,
+                                                std::span<const RefinementView> views,
+                                                const SurfaceRefinementOptions& options) {
+  std::vector<ViewGather> gathers;
+  gathers.reserve(views.size());
+  for (const RefinementView& view : views) gathers.emplace_back(view, options);
+  const std::size_t chunks = (elements.size() + chunk_size - 1) / chunk_size;
+  std::vector<std::vector<SurfaceObservation>> found(chunks);
+  parallel_for(chunks, 4, [&](std::size_t first, std::size_t last) {
+    for (std::size_t c = first; c < last; ++c)
+      for (std::size_t n = c * chunk_size; n < std::min((c + 1) * chunk_size, elements.size()); ++n)
+        for (std::size_t v = 0; v < views.size(); ++v) {
+          ElementSum sum;
+          gathers[v].gather(elements[n], sum);
+          const HeightSum& one = sum.current;
+          if (!(one.weight > 0.0F)) continue;
+          found[c].push_back({static_cast<std::uint32_t>(n), views[v].frame,
+                              one.height / one.weight, one.squares / (one.weight * one.weight)});
+        }
+  });
+  std::vector<SurfaceObservation> observations;
+  for (const auto& part : found) observations.insert(observations.end(), part.begin(), part.end());
+  return observations;
+}
+
 RefinementView make_refinement_view(CameraView view, std::shared_ptr<const PixelRays> rays,
                                     const Pose& camera_from_grid, std::uint32_t frame) {
   RefinementView made;

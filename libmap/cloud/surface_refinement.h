@@ -75,4 +75,17 @@ class SurfaceRefinement {
   std::unique_ptr<Parts> parts_;
 };
 
+// What one frame measured of an element: the mean height within its disc.
+struct SurfaceObservation {
+  std::uint32_t element = 0;
+  std::uint32_t frame = 0;
+  float height_m = 0.0F;     // over the element, along its normal
+  float variance_m2 = 0.0F;  // by noise
+};
+
+// By element, then by view. The same for any number of threads.
+std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> elements,
+                                                std::span<const RefinementView> views,
+                                                const SurfaceRefinementOptions& options);
+
 }  // namespace libmap

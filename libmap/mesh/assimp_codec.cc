@@ -10,6 +10,7 @@
 #include <cmath>
 #include <memory>
 #include <new>
+#include <optional>
 #include <stdexcept>
 #include <string_view>
 #include <unordered_map>
@@ -68,6 +69,9 @@ Eigen::Matrix3d z_up_from_y_up() {
   return rotation;
 }
 
+// Of a triangle without texture coordinates.
+constexpr unsigned no_material = 0xffffffff;
+
 // Gathers the parts of a scene into one mesh.
 class MeshBuilder {
  public:
@@ -90,7 +94,22 @@ class MeshBuilder {
   }
   TriangleMesh take() { return std::move(mesh_); }
 
+  // One a triangle, from the top left; and the material of each.
+  const std::vector<TextureCorners>& coordinates() const { return coordinates_; }
+  const std::vector<unsigned>& materials() const { return materials_; }
+
  private:
+  TextureCorners coordinates_of(const aiMesh& part, const std::array<unsigned, 3>& corners) const {
+    TextureCorners result;
+    result.fill(Eigen::Vector2f::Zero());
+    if (!part.HasTextureCoords(0)) return result;
+    for (std::size_t k = 0; k < 3; ++k) {
+      // assimp counts from the bottom in every format.
+      const aiVector3D& c = part.mTextureCoords[0][corners[k]];
+      result[k] = {c.x, 1.0F - c.y};
+    }
+    return result;
+  }
   void add_mesh(const aiMesh& part, const Eigen::Affine3d& root_from_node) {
     const Eigen::Matrix3d normal_matrix = root_from_node.linear().inverse().transpose();
     const bool mirrored = root_from_node.linear().determinant() < 0.0;
@@ -107,9 +126,14 @@ class MeshBuilder {
                                                 .bound = {}});
         corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
       }
+      std::vector<unsigned> indices(face.mIndices, face.mIndices + face.mNumIndices);
       if (mirrored) std::reverse(corners.begin(), corners.end());
-      for (std::size_t k = 2; k < corners.size(); ++k)
+      if (mirrored) std::reverse(indices.begin(), indices.end());
+      for (std::size_t k = 2; k < corners.size(); ++k) {
         mesh_.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+        coordinates_.push_back(coordinates_of(part, {indices[0], indices[k - 1], indices[k]}));
+        materials_.push_back(part.HasTextureCoords(0) ? part.mMaterialIndex : no_material);
+      }
     }
   }
 
@@ -147,6 +171,8 @@ class MeshBuilder {
   bool has_normals_ = false;
   bool has_colors_ = false;
   TriangleMesh mesh_;
+  std::vector<TextureCorners> coordinates_;
+  std::vector<unsigned> materials_;
   std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
 };
 
@@ -214,26 +240,79 @@ std::string first_line(const char* text) {
   return std::string(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
 }
 
-}  // namespace
+// The picture of a material's own colour, or nothing.
+std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial& material) {
+  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
+    aiString path;
+    if (material.GetTexture(type, 0, &path) != aiReturn_SUCCESS) continue;
+    const aiTexture* const embedded = scene.GetEmbeddedTexture(path.C_Str());
+    if (embedded == nullptr) return TexturePicture{{}, path.C_Str()};
+    // Compressed pictures have no height; their width counts bytes.
+    if (embedded->mHeight != 0) continue;
+    return TexturePicture{
+        std::string(reinterpret_cast<const char*>(embedded->pcData), embedded->mWidth), {}};
+  }
+  return std::nullopt;
+}
 
-TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format) {
+DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
+  DecodedModel result;
+  // Pages in the order of the materials; several materials may have one picture.
+  std::vector<std::int32_t> page_of_material(scene.mNumMaterials, no_page);
+  for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
+    std::optional<TexturePicture> picture = picture_of(scene, *scene.mMaterials[m]);
+    if (!picture) continue;
+    const auto same = std::find_if(
+        result.pictures.begin(), result.pictures.end(), [&](const TexturePicture& other) {
+          return other.path == picture->path && other.bytes == picture->bytes;
+        });
+    page_of_material[m] = static_cast<std::int32_t>(same - result.pictures.begin());
+    if (same == result.pictures.end()) result.pictures.push_back(std::move(*picture));
+  }
+  result.model.texture_coordinates = builder.coordinates();
+  for (const unsigned material : builder.materials())
+    result.model.page_of_triangle.push_back(
+        material < page_of_material.size() ? page_of_material[material] : no_page);
+  result.model.mesh = builder.take();
+  return result;
+}
+
+// read(importer) gives the scene, take(scene, builder) the result.
+template <typename Read, typename Take>
+auto decode(const std::string& format, const Read& read, const Take& take) {
   try {
     Assimp::Importer importer;
     // No aiProcess_Triangulate: on some broken files it ends the program by an assertion.
-    const aiScene* const scene =
-        importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
+    const aiScene* const scene = read(importer);
     if (scene == nullptr || scene->mRootNode == nullptr)
       throw Error("not a readable " + format + " file: " + first_line(importer.GetErrorString()));
     Eigen::Affine3d root = Eigen::Affine3d::Identity();
     if (format == "glb") root.linear() = z_up_from_y_up();
     MeshBuilder builder(*scene, format != "stl");
     builder.add_node(*scene->mRootNode, root);
-    return builder.take();
+    return take(*scene, builder);
   } catch (const std::bad_alloc&) {
     throw Error("claims more data than the memory holds");
   } catch (const std::length_error&) {
     throw Error("claims more data than the memory holds");
   }
+}
+
+}  // namespace
+
+TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format) {
+  return decode(
+      format,
+      [&](Assimp::Importer& importer) {
+        return importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
+      },
+      [](const aiScene&, MeshBuilder& builder) { return builder.take(); });
+}
+
+DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format) {
+  return decode(
+      format, [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); },
+      [](const aiScene& scene, MeshBuilder& builder) { return model_of(scene, builder); });
 }
 
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {

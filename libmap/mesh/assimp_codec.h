@@ -1,9 +1,13 @@
 // OBJ, STL and GLB through assimp, in memory.
 #pragma once
 
+#include <cstdint>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "libmap/cloud/geometry_file.h"
+#include "libmap/core/textured_mesh.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -11,6 +15,21 @@ namespace libmap {
 // `format` is "obj", "stl" or "glb". Equal corners become one vertex. Throws Error (without
 // the file's name) with assimp's own reason.
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format);
+
+// A picture of a file: its bytes where they lie within, else its path as the file names it.
+struct TexturePicture {
+  std::string bytes;
+  std::string path;
+};
+
+// A mesh whose pages are still files: page_of_triangle counts `pictures`.
+struct DecodedModel {
+  TexturedMesh model;
+  std::vector<TexturePicture> pictures;
+};
+
+// The .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
+DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format);
 
 // `format` is "stl" or "glb". Throws Error.
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii);

@@ -5,12 +5,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <nanoflann.hpp>
 #include <random>
-#include <string>
 
+#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
 #include "libmap/mesh/embree_mesh.h"
 #include "libmap/mesh/ray_caster.h"
 
@@ -156,8 +156,9 @@ DistanceStatistics distance_statistics(std::vector<double> distances_m) {
   return statistics;
 }
 
-std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,
-                                         std::uint64_t seed) {
+std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
+                                            std::uint64_t seed) {
+  constexpr double most = 1e8;
   std::vector<double> area_before;
   double area = 0.0;
   for (const Triangle& triangle : mesh.triangles) {
@@ -166,64 +167,47 @@ std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2
   }
   if (!(area > 0.0) || !std::isfinite(area)) throw Error("the mesh has no area");
   const double wanted = std::ceil(per_m2 * area);
-  if (!(wanted >= 0.0 && wanted < 2147483648.0))
-    throw Error("too many samples of the surface", {.file = {},
-                                                    .field = "samples",
-                                                    .value = std::to_string(wanted),
-                                                    .bound = ">= 0 and < 2147483648"});
+  if (!(wanted >= 0.0 && wanted <= most))
+    throw Error(
+        "too many samples of the surface",
+        {.file = {},
+         .field = "samples",
+         .value = to_text(per_m2) + " on each of " + to_text(static_cast<float>(area)) + " m2",
+         .bound = "<= 100000000 in all"});
   const auto count = static_cast<std::size_t>(wanted);
   std::mt19937_64 engine(seed);
   // Not a distribution of the standard library: those differ between libraries.
   const auto uniform = [&] { return static_cast<double>(engine() >> 11U) * 0x1p-53; };
-  std::vector<SurfacePoint> samples(count);
+  std::vector<TrianglePoint> samples(count);
   for (std::size_t n = 0; n < count; ++n) {
     // One in each of `count` strata of equal area.
     const double at = (static_cast<double>(n) + uniform()) / static_cast<double>(count) * area;
     const auto above = std::upper_bound(area_before.begin(), area_before.end(), at);
-    const auto number = static_cast<std::size_t>(above - area_before.begin()) - 1;
-    const Triangle& corners = mesh.triangles[number];
     const double root = std::sqrt(uniform());
     const double share = uniform();
-    samples[n].position = (1.0 - root) * mesh.vertices[corners[0]] +
-                          root * (1.0 - share) * mesh.vertices[corners[1]] +
-                          root * share * mesh.vertices[corners[2]];
-    samples[n].triangle = static_cast<std::uint32_t>(number);
+    samples[n] = {static_cast<std::uint32_t>(above - area_before.begin() - 1), root * (1.0 - share),
+                  root * share};
   }
   return samples;
 }
 
-namespace {
-
-// nanoflann's view of a list of points.
-struct PointList {
-  const std::vector<Eigen::Vector3d>& points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t n, std::size_t axis) const {
-    return points[n][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointList>,
-                                                 PointList, 3, std::size_t>;
-
-}  // namespace
+std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,
+                                         std::uint64_t seed) {
+  const std::vector<TrianglePoint> places = sample_triangles(mesh, per_m2, seed);
+  std::vector<SurfacePoint> samples(places.size());
+  for (std::size_t n = 0; n < places.size(); ++n)
+    samples[n] = {position_on(mesh, places[n]), places[n].triangle, 0.0};
+  return samples;
+}
 
 std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
                           const std::vector<Eigen::Vector3d>& points, double radius_m) {
   std::vector<char> flags(samples.size(), 0);
   if (!points.empty()) {
-    const PointList list{points};
-    const Tree tree(3, list, nanoflann::KDTreeSingleIndexAdaptorParams(16));
+    const PointTree tree(points);
     parallel_for(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) {
-        std::size_t nearest = 0;
-        double square = std::numeric_limits<double>::infinity();
-        tree.knnSearch(samples[n].data(), 1, &nearest, &square);
-        flags[n] = square <= radius_m * radius_m ? 1 : 0;
-      }
+      for (std::size_t n = begin; n < end; ++n)
+        flags[n] = tree.nearest(samples[n]).square_m2 <= radius_m * radius_m ? 1 : 0;
     });
   }
   return {flags.begin(), flags.end()};

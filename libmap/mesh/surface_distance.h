@@ -9,6 +9,7 @@
 
 #include "libmap/core/camera.h"
 #include "libmap/core/triangle_mesh.h"
+#include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {
 
@@ -55,7 +56,9 @@ struct DistanceStatistics {
 DistanceStatistics distance_statistics(std::vector<double> distances_m);
 
 // Points of the surface, `per_m2` on each square metre on the mean, drawn with `seed`: the same for
-// any number of threads. Throws Error if the mesh has no area or more than 2^31 were asked for.
+// any number of threads. Throws Error if the mesh has no area or more than 10^8 were asked for.
+std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
+                                            std::uint64_t seed);
 std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,
                                          std::uint64_t seed);
 

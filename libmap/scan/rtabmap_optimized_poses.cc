@@ -4,6 +4,7 @@
 #include <set>
 #include <stdexcept>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "libmap/core/error.h"
@@ -52,10 +53,20 @@ std::optional<int> node_of_localization(SQLite::Database& database) {
 }
 
 void require_nodes(SQLite::Database& database, const std::map<int, Pose>& poses,
-                   const std::string& source) {
+                   const std::vector<PoseLink>& links, const std::string& source) {
   std::set<int> nodes;
   SQLite::Statement statement(database, "SELECT id FROM Node");
   while (statement.executeStep()) nodes.insert(statement.getColumn(0).getInt());
+  for (const PoseLink& link : links) {
+    const std::string field =
+        "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);
+    for (const int id : {link.from, link.to})
+      if (nodes.count(id) == 0)
+        throw Error("the scan has no such node",
+                    {.file = source, .field = field, .value = std::to_string(id)});
+    if (!link.from_from_to.matrix().allFinite() || !link.information.allFinite())
+      throw Error("is not finite", {.field = field});
+  }
   for (const auto& [id, pose] : poses) {
     if (id > 0 && nodes.count(id) == 0)
       throw Error("the scan has no such node",
@@ -102,17 +113,53 @@ void update_poses(SQLite::Database& database, const std::map<int, Pose>& map_fro
   update.exec();
 }
 
+void add_links(SQLite::Database& database, const std::vector<PoseLink>& links,
+               const std::string& source) {
+  if (links.empty()) return;
+  if (columns_of(database, "Link").count("information_matrix") == 0)
+    throw Error("has no place for links with information matrices: RTAB-Map before 0.13 made it",
+                {.file = source});
+  std::set<std::pair<int, int>> known;
+  SQLite::Statement rows(database, "SELECT from_id, to_id FROM Link");
+  while (rows.executeStep())
+    known.insert(std::minmax(rows.getColumn(0).getInt(), rows.getColumn(1).getInt()));
+  SQLite::Statement insert(database,
+                           "INSERT INTO Link (from_id, to_id, type, information_matrix, transform) "
+                           "VALUES (?,?,?,?,?)");
+  const auto add = [&](int from, int to, const PoseLink& link, const Pose& from_from_to) {
+    const std::string information = to_blob(link.information);
+    const std::string transform = to_blob(from_from_to);
+    insert.bind(1, from);
+    insert.bind(2, to);
+    insert.bind(3, static_cast<int>(link.type));
+    insert.bindNoCopy(4, information.data(), static_cast<int>(information.size()));
+    insert.bindNoCopy(5, transform.data(), static_cast<int>(transform.size()));
+    insert.exec();
+    insert.reset();
+  };
+  for (const PoseLink& link : links) {
+    if (!known.insert(std::minmax(link.from, link.to)).second) continue;
+    add(link.from, link.to, link, link.from_from_to);
+    // RTAB-Map keeps the same matrix for both directions.
+    add(link.to, link.from, link, link.from_from_to.inverse());
+  }
+}
+
 }  // namespace
 
 void copy_with_optimized_poses(const fs::path& source, const fs::path& target,
-                               const std::map<int, Pose>& map_from_base) {
+                               const std::map<int, Pose>& map_from_base,
+                               const std::vector<PoseLink>& links) {
   SqliteFile(source).copy_to(target);
   try {
     SQLite::Database copy(target.string(), SQLite::OPEN_READWRITE);
     copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = MEMORY;");
     require_columns(copy, source.string());
-    require_nodes(copy, map_from_base, source.string());
+    require_nodes(copy, map_from_base, links, source.string());
+    SQLite::Transaction transaction(copy);
     update_poses(copy, map_from_base);
+    add_links(copy, links, source.string());
+    transaction.commit();
   } catch (const SQLite::Exception& error) {
     throw Error(std::string("cannot be updated: ") + error.what(), {.file = source.string()},
                 ErrorKind::failed);

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
-#include "libmap/simulate/random_stream.h"
+#include "libmap/core/random_stream.h"
 
 namespace libmap {
 

@@ -13,8 +13,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/mesh/ray_caster.h"
-#include "libmap/simulate/random_stream.h"
 #include "libmap/simulate/rock_texture.h"
 
 namespace libmap {

@@ -4,9 +4,9 @@
 #include <string>
 
 #include "libmap/core/error.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/ray_caster.h"
-#include "libmap/simulate/random_stream.h"
 
 namespace libmap {
 

@@ -7,7 +7,7 @@
 #include <map>
 #include <utility>
 
-#include "libmap/simulate/random_stream.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/simulate/solid_noise.h"
 
 namespace libmap {

@@ -6,8 +6,8 @@
 #include <cmath>
 
 #include "libmap/core/error.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
-#include "libmap/simulate/random_stream.h"
 #include "libmap/simulate/scene_geometry.h"
 #include "libmap/simulate/solid_noise.h"
 

@@ -9,7 +9,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/simulate/random_stream.h"
+#include "libmap/core/random_stream.h"
 
 namespace libmap {
 

@@ -45,17 +45,6 @@ double mix(double a, double b, double t) { return a + t * (b - a); }
 
 }  // namespace
 
-std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
-  std::uint64_t bits = a * 0x9e3779b97f4a7c15U + b + 0x9e3779b97f4a7c15U;
-  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9U;
-  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebU;
-  return bits ^ (bits >> 31);
-}
-
-double unit_noise(std::uint64_t a, std::uint64_t b) {
-  return static_cast<double>(mix_bits(a, b) >> 11) * 0x1p-53;
-}
-
 double gradient_noise(const Eigen::Vector3d& point, std::uint64_t seed) {
   const Cell cell = cell_of(point);
   const double x = point.x() - static_cast<double>(cell.x);

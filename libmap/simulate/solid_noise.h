@@ -4,12 +4,9 @@
 #include <Eigen/Core>
 #include <cstdint>
 
-namespace libmap {
+#include "libmap/core/random_stream.h"
 
-// Well mixed 64 bits of two numbers (the finaliser of SplitMix64, Steele et al. 2014).
-std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b);
-// The same as a number, 0 <= u < 1.
-double unit_noise(std::uint64_t a, std::uint64_t b);
+namespace libmap {
 
 // Gradient noise on the unit lattice, -1 to 1, zero at lattice points, twice differentiable
 // (Perlin 2002). Coordinates must stay within +-2^30. Its slope stays below 3.5 (3.23 in 3 million

@@ -33,6 +33,17 @@ constexpr std::array<std::array<double, 3>, 18> viridis_points{{
     {0.993248, 0.906157, 0.143936},
 }};
 
+// The 33 colours of the paper's table, from blue over grey to red.
+constexpr std::array<Color, 33> diverging_points{{
+    {59, 76, 192},   {68, 90, 204},   {77, 104, 215},  {87, 117, 225},  {98, 130, 234},
+    {108, 142, 241}, {119, 154, 247}, {130, 165, 251}, {141, 176, 254}, {152, 185, 255},
+    {163, 194, 255}, {174, 201, 253}, {184, 208, 249}, {194, 213, 244}, {204, 217, 238},
+    {213, 219, 230}, {221, 221, 221}, {229, 216, 209}, {236, 211, 197}, {241, 204, 185},
+    {245, 196, 173}, {247, 187, 160}, {247, 177, 148}, {247, 166, 135}, {244, 154, 123},
+    {241, 141, 111}, {236, 127, 99},  {229, 112, 88},  {222, 96, 77},   {213, 80, 66},
+    {203, 62, 56},   {192, 40, 47},   {180, 4, 38},
+}};
+
 struct NamedColor {
   const char* name;
   Color color;
@@ -84,16 +95,19 @@ std::vector<double> values_of(const ColorSource& source, const std::string& name
   return values;
 }
 
-// The 2nd and the 98th percentile, by nearest rank.
-std::pair<double, double> percentile_range(std::vector<double> values) {
+// The 2nd and the 98th percentile, by nearest rank; of a diverging scale as far below 0 as above.
+std::pair<double, double> percentile_range(std::vector<double> values, ColorScale scale) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return {0.0, 0.0};
+  if (scale == ColorScale::diverging)
+    for (double& value : values) value = std::abs(value);
   const auto at = [&values](double share) {
     const auto rank =
         static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
     std::nth_element(values.begin(), values.begin() + rank, values.end());
     return values[static_cast<std::size_t>(rank)];
   };
+  if (scale == ColorScale::diverging) return {-at(0.98), at(0.98)};
   return {at(0.02), at(0.98)};
 }
 
@@ -134,16 +148,21 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
                  .bound = ">= range_min = " + to_text(coloring.range_min)});
   const std::vector<double> values = values_of(source, name);
   auto [low, high] = std::pair{coloring.range_min, coloring.range_max};
-  if (low == high) std::tie(low, high) = percentile_range(values);
+  if (low == high) std::tie(low, high) = percentile_range(values, coloring.scale);
   for (const double value : values) {
     // A constant field has the middle colour.
     const double t = high > low ? (value - low) / (high - low) : value - value + 0.5;
-    result.colors.push_back(viridis(t));
+    result.colors.push_back(color_at(coloring.scale, t));
   }
-  result.legend = {
-      .title = title, .continuous = high > low, .min = low, .max = high, .entries = {}};
+  result.legend = {.title = title,
+                   .continuous = high > low,
+                   .min = low,
+                   .max = high,
+                   .scale = coloring.scale,
+                   .entries = {}};
   if (high == low)
-    result.legend.entries.push_back({viridis(0.5), to_text(static_cast<float>(low))});
+    result.legend.entries.push_back(
+        {color_at(coloring.scale, 0.5), to_text(static_cast<float>(low))});
   add_no_value(values, result.legend);
   finish(source, coloring, result);
 }
@@ -180,13 +199,24 @@ std::uint8_t to_byte(double share) {
   return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
 }
 
+// Between which of `count` evenly spaced colours t lies, and how far towards the upper one.
+std::pair<std::size_t, double> place_in(std::size_t count, double t) {
+  const double place = std::clamp(t, 0.0, 1.0) * static_cast<double>(count - 1);
+  const std::size_t below = std::min(static_cast<std::size_t>(place), count - 2);
+  return {below, place - static_cast<double>(below)};
+}
+
 }  // namespace
 
 std::vector<std::pair<std::string, ColorMode>> color_mode_names() {
   return {{"automatic", ColorMode::automatic}, {"own", ColorMode::own},
           {"score", ColorMode::score},         {"field", ColorMode::field},
           {"flags", ColorMode::flags},         {"height", ColorMode::height},
-          {"single", ColorMode::single}};
+          {"single", ColorMode::single},       {"texture", ColorMode::texture}};
+}
+
+std::vector<std::pair<std::string, ColorScale>> color_scale_names() {
+  return {{"viridis", ColorScale::viridis}, {"diverging", ColorScale::diverging}};
 }
 
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) {
@@ -215,6 +245,7 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
       break;
     case ColorMode::single:
     case ColorMode::automatic:
+    case ColorMode::texture:
       result.colors.assign(source.positions.size(), parse_color(coloring.color, "color"));
       break;
   }
@@ -230,14 +261,27 @@ Legend score_legend() {
 
 Color viridis(double t) {
   if (std::isnan(t)) return no_value_color;
-  const double place = std::clamp(t, 0.0, 1.0) * static_cast<double>(viridis_points.size() - 1);
-  const std::size_t below = std::min(static_cast<std::size_t>(place), viridis_points.size() - 2);
-  const double share = place - static_cast<double>(below);
+  const auto [below, share] = place_in(viridis_points.size(), t);
   Color color{};
   for (std::size_t c = 0; c < 3; ++c)
     color[c] =
         to_byte((1.0 - share) * viridis_points[below][c] + share * viridis_points[below + 1][c]);
   return color;
+}
+
+Color diverging(double t) {
+  if (std::isnan(t)) return no_value_color;
+  const auto [below, share] = place_in(diverging_points.size(), t);
+  Color color{};
+  for (std::size_t c = 0; c < 3; ++c)
+    color[c] = to_byte(
+        ((1.0 - share) * diverging_points[below][c] + share * diverging_points[below + 1][c]) /
+        255.0);
+  return color;
+}
+
+Color color_at(ColorScale scale, double t) {
+  return scale == ColorScale::diverging ? diverging(t) : viridis(t);
 }
 
 Color parse_color(std::string_view text, const std::string& field) {

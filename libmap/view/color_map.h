@@ -17,17 +17,25 @@ namespace libmap {
 //   same, else height.
 // own:    the colours that the data bring.
 // score:  the seven classes of the graspability map's legend.
-// field:  any scalar field, or "x", "y", "z", on the perceptual colour map viridis.
+// field:  any scalar field, or "x", "y", "z", on a colour scale.
 // flags:  convex points blue, intersection ("graspable") dark green, the rest light grey.
-// height: z of the terrain frame on viridis.
+// height: z of the terrain frame on a colour scale.
 // single: one colour.
-enum class ColorMode { automatic, own, score, field, flags, height, single };
+// texture: the pictures that a textured mesh brings; `automatic` where there are any.
+enum class ColorMode { automatic, own, score, field, flags, height, single, texture };
 std::vector<std::pair<std::string, ColorMode>> color_mode_names();
+
+// Colours of continuous values. diverging: blue below and red above the grey middle, for values
+// with a sign.
+enum class ColorScale { viridis, diverging };
+std::vector<std::pair<std::string, ColorScale>> color_scale_names();
 
 struct Coloring {
   ColorMode mode = ColorMode::automatic;
   std::string field;  // of mode `field`; another field than "score" in mode `score`
-  // Values at the ends of viridis. Both equal: the data's 2nd and 98th percentile.
+  ColorScale scale = ColorScale::viridis;  // of the modes field and height
+  // Values at the ends of the scale. Both equal: the data's 2nd and 98th percentile; of a diverging
+  // scale plus and minus the 98th percentile of their sizes.
   double range_min = 0.0;
   double range_max = 0.0;
   // Points with z below it are white in the modes score, field, flags and height.
@@ -48,6 +56,7 @@ struct Legend {
   bool continuous = false;
   double min = 0.0;
   double max = 0.0;
+  ColorScale scale = ColorScale::viridis;
   std::vector<LegendEntry> entries;
 
   bool empty() const { return !continuous && entries.empty(); }
@@ -75,6 +84,10 @@ Legend score_legend();
 
 // viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is grey.
 Color viridis(double t);
+
+// Blue, grey, red (Moreland 2009, "Diverging Color Maps for Scientific Visualization"), likewise.
+Color diverging(double t);
+Color color_at(ColorScale scale, double t);
 
 // "#rrggbb", or white, black, grey, light-grey, dark-grey, red, green, blue, yellow, orange.
 // Throws Error naming `field`.

@@ -6,6 +6,10 @@
 #include <cstdint>
 #include <limits>
 #include <nanoflann.hpp>
+#include <variant>
+
+#include "libmap/core/error.h"
+#include "libmap/view/scene_texture.h"
 
 namespace libmap {
 namespace {
@@ -128,6 +132,7 @@ bool colored_by_face(const TriangleMesh& mesh, const Coloring& coloring) {
     case ColorMode::own:
     case ColorMode::height:
     case ColorMode::single:
+    case ColorMode::texture:
       break;
   }
   return false;
@@ -304,6 +309,8 @@ ColoredTriangles mesh_triangles(const PreparedLayer& layer, const SceneCamera& c
     if (layer.shaded)
       result.colors[i] = darkened(layer.colors[i], shade_of(layer.normals[i], camera));
   }
+  result.texture = layer.texture;
+  result.coordinates = layer.coordinates;
   return result;
 }
 
@@ -312,7 +319,21 @@ ColoredTriangles mesh_triangles(const PreparedLayer& layer, const SceneCamera& c
 PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene) {
   if (const auto* cloud = std::get_if<PointCloud>(&layer.shape))
     return prepare_cloud(*cloud, layer, terrain_from_scene);
+  if (const auto* textured = std::get_if<TexturedMesh>(&layer.shape))
+    return prepare_mesh(textured->mesh, layer, terrain_from_scene);
   return prepare_mesh(std::get<TriangleMesh>(layer.shape), layer, terrain_from_scene);
+}
+
+std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene) {
+  const auto* textured = std::get_if<TexturedMesh>(&layer.shape);
+  const bool has_texture = textured != nullptr && textured->has_texture();
+  const ColorMode mode = layer.coloring.mode;
+  if (mode == ColorMode::texture && !has_texture)
+    throw Error("the data bring no texture",
+                {.file = {}, .field = "color mode", .value = "texture", .bound = {}});
+  if (has_texture && (mode == ColorMode::texture || mode == ColorMode::automatic))
+    return prepare_textured(*textured, layer, terrain_from_scene);
+  return {prepare_layer(layer, terrain_from_scene)};
 }
 
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {

@@ -4,6 +4,7 @@
 #include <Eigen/Core>
 #include <vector>
 
+#include "libmap/core/image.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/view/color_map.h"
@@ -24,10 +25,17 @@ struct PreparedLayer {
   double point_size_m = 0.0;   // 0 for a mesh
   double filler_size_m = 0.0;  // of the squares that close gaps; 0: none
   Legend legend;
+  // Of a page of a textured mesh: its colours are times `colors`.
+  const ColorImage* texture = nullptr;
+  std::vector<Eigen::Vector2f> coordinates{};  // one a position, from the top left
 };
 
-// Throws Error: arrays of a wrong length, and what color_points throws.
+// Not by its texture. Throws Error: arrays of a wrong length, and what color_points throws.
 PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene);
+
+// The same, but a textured mesh that is to be shown so is a layer a page. Throws Error too where
+// the texture is asked of a layer without any.
+std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 struct PointSpacing {
   // Metres, 0 if no two points are apart: on a lattice along the axes its pitch, else the median
@@ -42,6 +50,8 @@ struct ColoredTriangles {
   std::vector<Eigen::Vector3f> vertices;  // metres from the `origin` that was given
   std::vector<Color> colors;              // one a vertex
   std::vector<Triangle> triangles;
+  const ColorImage* texture = nullptr;  // as in PreparedLayer
+  std::vector<Eigen::Vector2f> coordinates{};
 };
 
 // Squares or the visible sides of cubes for a cloud, at least 1.3 pixels wide; a mesh as it is. The

@@ -114,7 +114,7 @@ void draw_scalar_bar(const Legend& legend, double left, double top, int font, Ov
     const double share = static_cast<double>(strip) / strips;
     // Each reaches up to the next ones, so that no seam shows.
     overlay.rectangle({bar.left, bar.top, bar.width, height * (1.0 - share)},
-                      viridis((strip + 0.5) / strips));
+                      color_at(legend.scale, (strip + 0.5) / strips));
   }
   const std::vector<double> ticks = ticks_of(legend);
   const std::vector<std::string> texts = tick_texts(ticks);

@@ -4,6 +4,7 @@
 #include <vtkCamera.h>
 #include <vtkCellArray.h>
 #include <vtkFloatArray.h>
+#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkOutputWindow.h>
@@ -15,6 +16,7 @@
 #include <vtkRenderWindow.h>
 #include <vtkRenderer.h>
 #include <vtkSmartPointer.h>
+#include <vtkTexture.h>
 #include <vtkTypeInt64Array.h>
 #include <vtkUnsignedCharArray.h>
 
@@ -82,12 +84,13 @@ Setup set_up(const Scene& scene, const SceneViewOptions& options) {
   Setup setup;
   std::vector<Eigen::Vector3d> positions;
   for (const SceneLayer& layer : scene.layers) {
-    setup.layers.push_back(prepare_layer(layer, scene.terrain_from_scene));
-    const PreparedLayer& prepared = setup.layers.back();
-    positions.insert(positions.end(), prepared.positions.begin(), prepared.positions.end());
-    if (!prepared.positions.empty())
-      setup.radius_m = std::max(setup.radius_m, prepared.point_size_m / 2.0);
-    add_legend(prepared.legend, setup.legends);
+    for (PreparedLayer& prepared : prepare_layers(layer, scene.terrain_from_scene)) {
+      positions.insert(positions.end(), prepared.positions.begin(), prepared.positions.end());
+      if (!prepared.positions.empty())
+        setup.radius_m = std::max(setup.radius_m, prepared.point_size_m / 2.0);
+      add_legend(prepared.legend, setup.legends);
+      setup.layers.push_back(std::move(prepared));
+    }
   }
   if (positions.empty()) throw Error("there is nothing to draw: no point with finite coordinates");
   for (Marker marker : scene.markers) {
@@ -140,6 +143,33 @@ class QuietScope {
   vtkNew<QuietOutput> quiet_;
 };
 
+// VTK counts rows and coordinates from the bottom: given from the top, both fit together.
+vtkSmartPointer<vtkFloatArray> coordinates_of(const ColoredTriangles& triangles) {
+  auto array = vtkSmartPointer<vtkFloatArray>::New();
+  array->SetNumberOfComponents(2);
+  array->SetNumberOfTuples(static_cast<vtkIdType>(triangles.coordinates.size()));
+  float* value = array->GetPointer(0);
+  for (const Eigen::Vector2f& coordinate : triangles.coordinates) {
+    *value++ = coordinate.x();
+    *value++ = coordinate.y();
+  }
+  return array;
+}
+
+vtkSmartPointer<vtkTexture> texture_of(const ColorImage& page) {
+  vtkNew<vtkImageData> image;
+  image->SetDimensions(page.width, page.height, 1);
+  image->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+  std::memcpy(image->GetScalarPointer(), page.pixels.data(), page.pixels.size() * sizeof(Color));
+  auto texture = vtkSmartPointer<vtkTexture>::New();
+  texture->SetInputData(image);
+  texture->InterpolateOn();
+  texture->RepeatOff();
+  texture->EdgeClampOn();
+  texture->MipmapOn();
+  return texture;
+}
+
 vtkSmartPointer<vtkActor> actor_of(const ColoredTriangles& triangles) {
   vtkNew<vtkFloatArray> coordinates;
   coordinates->SetNumberOfComponents(3);
@@ -176,6 +206,10 @@ vtkSmartPointer<vtkActor> actor_of(const ColoredTriangles& triangles) {
   mapper->SetColorModeToDirectScalars();
   auto actor = vtkSmartPointer<vtkActor>::New();
   actor->SetMapper(mapper);
+  if (triangles.texture != nullptr) {
+    data->GetPointData()->SetTCoords(coordinates_of(triangles));
+    actor->SetTexture(texture_of(*triangles.texture));
+  }
   // Shades are in the colours already.
   actor->GetProperty()->LightingOff();
   return actor;

@@ -9,6 +9,7 @@
 
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/textured_mesh.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/view/color_map.h"
 #include "libmap/view/image_io.h"
@@ -23,15 +24,16 @@ enum class PointShape { automatic, cube, square };
 std::vector<std::pair<std::string, PointShape>> point_shape_names();
 
 // automatic: meshes, the sides of cubes, and clouds of one colour (by their normals) are shaded;
-//            all else has exactly the colours of the legend.
+//            all else has exactly the colours of the legend, or those of its texture.
 // none:      exact colours everywhere.
-// full:      squares of a cloud with normals are shaded too.
+// full:      squares of a cloud with normals and textures are shaded too.
 enum class Shading { automatic, none, full };
 std::vector<std::pair<std::string, Shading>> shading_names();
 
-// One cloud or mesh. Points that are not finite are left out, as are triangles with such corners.
+// One cloud or mesh; a textured mesh that has no pages is a mesh. Points that are not finite are
+// left out, as are triangles with such corners.
 struct SceneLayer {
-  std::variant<PointCloud, TriangleMesh> shape{};
+  std::variant<PointCloud, TriangleMesh, TexturedMesh> shape{};
   Coloring coloring{};
   PointShape point_shape = PointShape::automatic;
   Shading shading = Shading::automatic;

@@ -101,6 +101,35 @@ TEST(Calibrate, RecoversTheCameraOfItsPictures) {
   EXPECT_EQ(content("again.yaml"), content("camera.yaml"));
 }
 
+TEST(Calibrate, GoesOnWithoutPicturesThatItCannotRead) {
+  write_shots(6);
+  graspmap_test::write_text(scratch("shots") / "00a.png", content("shots/00.png").substr(0, 3000));
+  graspmap_test::write_text(scratch("shots") / "text.jpg", "no picture");
+  const auto result = graspmap({"calibrate", "shots", "-o", "camera.yaml", "--report", "report"});
+  ASSERT_TRUE(succeeded(result));
+  for (const char* name : {"shots/00a.png", "shots/text.jpg"}) {
+    const std::size_t place = result.standard_error.find(name);
+    EXPECT_NE(place, std::string::npos) << name;
+    EXPECT_EQ(result.standard_error.find(name, place + 1), std::string::npos) << "one warning";
+  }
+  const nlohmann::json results = json_of("camera.yaml.json").at("results");
+  EXPECT_EQ(results.at("images"), 8);
+  EXPECT_EQ(results.at("images_unreadable"), 2);
+  EXPECT_EQ(results.at("images_without_board"), 0);
+  EXPECT_EQ(results.at("images_used"), 6);
+  const libmap::Table images = libmap::read_csv(scratch("report") / "images.csv");
+  EXPECT_EQ(images.rows[1][images.column("used")], "unreadable");
+  // The first picture that can be read says what size they all have.
+  fs::remove(scratch("shots/00.png"));
+  EXPECT_TRUE(succeeded(graspmap({"calibrate", "shots", "-o", "camera.yaml"})));
+  // Too few remain.
+  const auto few =
+      graspmap({"calibrate", "shots/00a.png", "shots/01.png", "shots/02.jpg", "-o", "few.yaml"});
+  EXPECT_EQ(few.exit_code, 3);
+  EXPECT_NE(few.standard_error.find("shots/00a.png"), std::string::npos);
+  EXPECT_NE(few.standard_error.find("pictures is 2"), std::string::npos);
+}
+
 TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
   write_shots(3);
   const auto run = [](Words words) {

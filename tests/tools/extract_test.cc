@@ -4,9 +4,11 @@
 #include <algorithm>
 #include <filesystem>
 #include <map>
+#include <sstream>
 #include <string>
 #include <vector>
 
+#include "libmap/scan/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/scan/scan_source.h"
@@ -198,6 +200,141 @@ TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
   EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "text.db"}), {"text.db"}));
   ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
   EXPECT_TRUE(bad_input(graspmap({"extract", "out", "-o", "out/"}), {"is the input"}));
+}
+
+TEST(Extract, FoldersOfOtherCommandsAreKept) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  ASSERT_TRUE(succeeded(graspmap({"simulate", "site", "-o", "site", "--edge-length", "0.1"})));
+  const auto site = files_in("site");
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "site"}),
+                        {"site", "holds what graspmap simulate site wrote"}));
+  EXPECT_TRUE(files_in("site") == site);
+  const auto before = files_in("out");
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1"}),
+                        {"out", "holds what graspmap extract wrote", "--force"}));
+  EXPECT_TRUE(files_in("out") == before);
+  EXPECT_TRUE(
+      succeeded(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1", "--force"})));
+}
+
+// What Bundler's text says of its cameras: f, then R and t.
+std::vector<std::vector<double>> bundle_cameras(const std::string& name) {
+  std::istringstream lines(content(name));
+  std::string header;
+  std::getline(lines, header);
+  std::size_t count = 0;
+  std::size_t points = 0;
+  lines >> count >> points;
+  std::vector<std::vector<double>> cameras(count, std::vector<double>(15));
+  for (std::vector<double>& camera : cameras)
+    for (double& number : camera) lines >> number;
+  EXPECT_FALSE(lines.fail());
+  return cameras;
+}
+
+TEST(ExtractBundler, CamerasAndPicturesOfEveryPose) {
+  const ExampleScan scan = write_example({.color = libmap::ImageFormat::png});
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "--bundler", "out", "--radius", "0",
+                                  "--poses", "odometry", "--transform", "1,2,3,0,0,90"})));
+  const libmap::Trajectory poses = libmap::trajectory_of(scan.graph, libmap::PoseSource::odometry);
+  const auto cameras = bundle_cameras("out/bundle.out");
+  ASSERT_EQ(cameras.size(), poses.size());
+  std::istringstream list(content("out/list.txt"));
+  const libmap::Pose site_from_map = libmap::make_pose_from_rpy({1, 2, 3}, {0, 0, 90});
+  for (std::size_t n = 0; n < poses.size(); ++n) {
+    std::string image;
+    ASSERT_TRUE(std::getline(list, image));
+    EXPECT_EQ(image, "images/00000" + std::to_string(poses[n].node) + ".jpg");
+    const libmap::Camera& lens = scan.frames.at(poses[n].node).cameras.at(0);
+    const libmap::ColorImage picture = libmap::decode_color(content("out/" + image));
+    const std::vector<double>& c = cameras[n];
+    EXPECT_EQ(c[0], std::max(lens.fx, lens.fy));
+    // A point on the optical axis falls on the middle of the picture, one to the right and below
+    // it right and below.
+    const libmap::Pose world_from_camera =
+        site_from_map * poses[n].world_from_base * lens.base_from_camera;
+    for (const Eigen::Vector3d& in_camera :
+         {Eigen::Vector3d(0, 0, 2), Eigen::Vector3d(0.1, 0.05, 1)}) {
+      const Eigen::Vector3d world = world_from_camera * in_camera;
+      Eigen::Vector3d p(c[12], c[13], c[14]);
+      for (std::size_t row = 0; row < 3; ++row)
+        for (std::size_t column = 0; column < 3; ++column)
+          p[static_cast<Eigen::Index>(row)] +=
+              c[3 + 3 * row + column] * world[static_cast<Eigen::Index>(column)];
+      EXPECT_NEAR(-c[0] * p.x() / p.z(), c[0] * in_camera.x() / in_camera.z(), 1e-3);
+      EXPECT_NEAR(-c[0] * p.y() / p.z(), -c[0] * in_camera.y() / in_camera.z(), 1e-3);
+    }
+    EXPECT_LE(picture.width, lens.width);
+    EXPECT_GT(picture.width, lens.width / 2);
+  }
+  const auto manifest = json_of("out.json");
+  EXPECT_EQ(manifest["results"]["kept_pictures"], poses.size());
+  EXPECT_EQ(manifest["parameters"]["poses"], "odometry");
+}
+
+TEST(ExtractBundler, KeepsOneOfPicturesThatLookTheSameWay) {
+  ExampleScan scan = graspmap_test::example_scan();
+  // Three places 10 cm apart with one view, and one that looks the other way.
+  const libmap::Pose there = libmap::make_pose_from_rpy({0, 0, 1}, {0, 0, 0});
+  double x = 0;
+  for (libmap::GraphNode& node : scan.graph.nodes) {
+    node.odometry_from_base =
+        libmap::make_pose_from_rpy({x, 0, 0}, {0, 0, node.id == 9 ? 180.0 : 0.0});
+    x += 0.1;
+    for (libmap::Camera& camera : scan.frames.at(node.id).cameras)
+      camera.base_from_camera = there * libmap::optical_to_body_rotation();
+  }
+  libmap::RtabmapWriter writer(scratch("scan.db"), {});
+  for (const libmap::GraphNode& node : scan.graph.nodes)
+    writer.add_node(node, scan.frames.at(node.id));
+  writer.finish();
+  const auto kept = [&](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"extract", "scan.db", "--bundler",
+                                      "out",     "--poses", "odometry"};
+    words.insert(words.end(), more.begin(), more.end());
+    EXPECT_TRUE(succeeded(graspmap(words)));
+    return content("out/list.txt");
+  };
+  EXPECT_EQ(kept({"--keep", "first"}), "images/000001.jpg\nimages/000009.jpg\n");
+  EXPECT_EQ(files_in("out").size(), 4U) << "no picture of an earlier run is left";
+  EXPECT_EQ(kept({"--keep", "first", "--radius", "0.15"}),
+            "images/000001.jpg\nimages/000005.jpg\nimages/000009.jpg\n");
+  EXPECT_EQ(kept({"--keep", "first", "--angle", "180"}), "images/000001.jpg\n");
+  const std::string sharpest = kept({});
+  EXPECT_EQ(std::count(sharpest.begin(), sharpest.end(), '\n'), 2);
+  EXPECT_EQ(kept({"--threads", "1"}), sharpest);
+}
+
+TEST(ExtractBundler, BesideTheWholeScan) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "all", "--bundler", "pictures"})));
+  EXPECT_EQ(files_in("all").count("nodes.csv"), 1U);
+  EXPECT_EQ(files_in("pictures").count("bundle.out"), 1U);
+  EXPECT_FALSE(json_of("all.json")["results"].contains("kept_pictures"));
+  EXPECT_FALSE(json_of("pictures.json")["results"].contains("depth_images"));
+}
+
+TEST(ExtractBundler, BadInput) {
+  write_example();
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db"}), {"-o or --bundler"}));
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--angle", "181"}),
+                        {"--angle is 181"}));
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--poses", "stord"}),
+                        {"--poses is stord", "did you mean 'stored'"}));
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--transform", "1,2"}),
+                        {"--transform is 1,2"}));
+  EXPECT_TRUE(succeeded(graspmap({"extract", "scan.db", "--bundler", "out", "--dry-run"})));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
+  break_frames();
+  const auto result =
+      graspmap({"extract", "scan.db", "--bundler", "out", "--radius", "0", "--poses", "odometry"});
+  EXPECT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("node 5: image"), std::string::npos);
+  EXPECT_EQ(files_in("out").count("images/000005.jpg"), 0U);
+  EXPECT_TRUE(bad_input(
+      graspmap({"extract", "scan.db", "--bundler", "two", "--poses", "odometry", "--strict"}),
+      {"node 5: image"}));
 }
 
 TEST(Extract, TakesEveryRealScan) {

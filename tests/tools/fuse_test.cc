@@ -170,6 +170,18 @@ TEST(Fuse, BadInput) {
   EXPECT_TRUE(graspmap_test::names_in_scratch() == std::vector<std::string>{"text.db"});
 }
 
+TEST(Fuse, SaysWhichLimitLeavesNothing) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_tiny_q.db");
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", scan, "-o", "cloud.ply", "--quiet", "--voxel-size", "1e-9"}),
+                {"voxel_size_m is 1e-09", "must be > 4.2"}));
+  const auto result = graspmap({"fuse", scan, "-o", "cloud.ply", "--min-views", "99"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("--min-views 99 leaves no point"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("6 frames see one at most"), std::string::npos);
+}
+
 TEST(Fuse, DryRunWritesNothing) {
   GRASPMAP_REQUIRE_DATA();
   ASSERT_TRUE(

@@ -92,6 +92,21 @@ TEST(InfoScan, VerifyListsWhatIsBrokenNodeByNode) {
   EXPECT_EQ(faults.at(1).at("part"), "Data.depth");
 }
 
+TEST(InfoScan, VerifyListsWhatTheGraphLeavesOut) {
+  write_sample(scratch("a.db"));
+  execute(scratch("a.db"), "UPDATE Node SET pose = x'01' WHERE id = 1");
+  execute(scratch("a.db"), "UPDATE Node SET env_sensors = 'warm' WHERE id = 2");
+  execute(scratch("a.db"), "DELETE FROM Data WHERE id = 3");
+  const ProgramResult result = graspmap({"info", "a.db", "--verify"});
+  expect_broken(result, "3 parts are broken, in 3 nodes");
+  for (const char* line :
+       {"node 1, part Node.pose", "node 2, part Node.env_sensors, reason is a text",
+        "node 3, part Data, reason the node has no row"})
+    EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
+  // Without --verify such a scan can still be looked at.
+  EXPECT_EQ(graspmap({"info", "a.db"}).exit_code, 0);
+}
+
 TEST(InfoScan, SessionsAndErrorsOfTheirOdometry) {
   write_sample(scratch("a.db"));
   execute(scratch("a.db"),

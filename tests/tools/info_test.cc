@@ -56,6 +56,78 @@ TEST(Info, Mesh) {
   EXPECT_EQ(json.at("area_m2"), 3);
 }
 
+// Two faults: a wing on an inner edge, and a triangle that runs through others.
+libmap::TriangleMesh faulty_mesh() {
+  libmap::TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {2, 0, 0},  {2, 2, 0},   {0, 2, 0},  {0, 0, 1},
+                   {9, 9, 9}, {1, 1, -1}, {1, 1.2, 1}, {1.2, 1, 1}};
+  mesh.triangles = {{0, 1, 2}, {0, 2, 3}, {0, 2, 4}, {6, 7, 8}};
+  mesh.face_fields = {{"filled", libmap::ScalarType::uint8, {0, 1, 0, 0}}};
+  return mesh;
+}
+
+TEST(Info, MeshAsASurface) {
+  libmap::write_mesh(scratch("m.ply"), faulty_mesh());
+  const nlohmann::json surface = info("m.ply").at("surface");
+  EXPECT_EQ(surface.at("watertight"), false);
+  EXPECT_EQ(surface.at("manifold"), false);
+  EXPECT_EQ(surface.at("components"), 2);
+  EXPECT_TRUE(surface.at("genus").is_null());
+  EXPECT_TRUE(surface.at("volume_m3").is_null());
+  EXPECT_EQ(surface.at("filled_triangles"), 1);
+  const nlohmann::json& faults = surface.at("faults");
+  EXPECT_EQ(faults.at("non_manifold_edges"), 1);
+  EXPECT_EQ(faults.at("unused_vertices"), 1);
+  EXPECT_GE(faults.at("self_intersections"), 1);
+}
+
+TEST(Info, BoundariesLongestFirst) {
+  libmap::TriangleMesh mesh;
+  for (int n = 0; n < 14; ++n) {
+    const double size = n + 1;
+    const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+    for (const Eigen::Vector3d& corner : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(3 * size, 0, 0),
+                                          Eigen::Vector3d(0, 4 * size, 0)})
+      mesh.vertices.push_back(corner + Eigen::Vector3d(0, 0, n));
+    mesh.triangles.push_back({first, first + 1, first + 2});
+  }
+  libmap::write_mesh(scratch("m.ply"), mesh);
+  const nlohmann::json boundaries = info("m.ply").at("surface").at("boundaries");
+  EXPECT_EQ(boundaries.at("count"), 14);
+  EXPECT_EQ(boundaries.at("length_m"), 12 * 105);
+  ASSERT_EQ(boundaries.at("longest").size(), 10U);
+  EXPECT_EQ(boundaries.at("longest").at(0).at("length_m"), 12 * 14);
+  EXPECT_EQ(boundaries.at("longest").at(0).at("diameter_m"), 5 * 14);
+  EXPECT_EQ(boundaries.at("longest").at(0).at("edges"), 3);
+  const ProgramResult plain = graspmap({"info", "m.ply"});
+  EXPECT_TRUE(succeeded(plain));
+  EXPECT_NE(plain.standard_output.find("      length_m 168, diameter_m 70, edges 3\n"),
+            std::string::npos);
+}
+
+TEST(Info, ClosedMesh) {
+  libmap::TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {3, 0, 0}, {0, 3, 0}, {0, 0, 2}};
+  mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {1, 2, 3}, {2, 0, 3}};
+  libmap::write_mesh(scratch("m.off"), mesh);
+  const nlohmann::json surface = info("m.off").at("surface");
+  EXPECT_EQ(surface.at("watertight"), true);
+  EXPECT_EQ(surface.at("genus"), 0);
+  EXPECT_EQ(surface.at("volume_m3"), 3);
+  EXPECT_EQ(surface.at("boundaries").at("count"), 0);
+  const ProgramResult plain = graspmap({"info", "m.off"});
+  EXPECT_NE(plain.standard_output.find("  watertight: yes\n"), std::string::npos);
+}
+
+TEST(Info, QuickLeavesSelfIntersectionsOut) {
+  libmap::write_mesh(scratch("m.ply"), faulty_mesh());
+  const ProgramResult result = graspmap({"info", "m.ply", "--quick", "--json"});
+  ASSERT_TRUE(succeeded(result));
+  const auto surface = nlohmann::json::parse(result.standard_output).at("surface");
+  EXPECT_TRUE(surface.at("faults").at("self_intersections").is_null());
+  EXPECT_EQ(surface.at("faults").at("non_manifold_edges"), 1);
+}
+
 TEST(Info, MapSaysWhatMadeIt) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(

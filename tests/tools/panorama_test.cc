@@ -123,6 +123,23 @@ TEST(PanoramaCommand, OwnRigAndTable) {
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("points"), width * height);
 }
 
+TEST(PanoramaCommand, ShippedRigsGoByTheirNames) {
+  // The shipped rig's own images, 1 m away, level.
+  for (const char* camera : {"front", "rear"}) {
+    const fs::path file = scratch("run") / libmap::rig_image_name(camera, 3.0);
+    fs::create_directories(file.parent_path());
+    graspmap_test::write_text(file,
+                              libmap::encode_png(libmap::Image<std::uint16_t>(640, 360, 1000)));
+  }
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "--rig", "scar-e", "-o", "cloud.pcd"})));
+  const nlohmann::json manifest = json_of("cloud.pcd.json");
+  EXPECT_EQ(manifest.at("results").at("cameras"), 6);
+  EXPECT_EQ(manifest.at("results").at("points"), 2 * 640 * 360);
+  EXPECT_EQ(manifest.at("inputs").at(0).at("path"), "rigs/scar-e.yaml");
+  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "--rig", "scare", "-o", "c.pcd"}),
+                        {"rig is scare", "did you mean 'scar-e'"}));
+}
+
 TEST(PanoramaCommand, BrokenImageCostsItsCameraAlone) {
   write_run();
   const std::string image = "run/" + libmap::rig_image_name("camera_3", 12.009);

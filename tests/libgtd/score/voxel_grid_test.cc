@@ -2,7 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <limits>
+#include <map>
+#include <set>
 
 #include "tests/libgtd/score/score_test_support.h"
 
@@ -82,6 +85,48 @@ TEST(Thinning, AveragesThePointsOfACell) {
   EXPECT_FLOAT_EQ(centroids[0].x(), 0.002F);
   EXPECT_FLOAT_EQ(centroids[0].y(), 0.003F);
   EXPECT_EQ(centroids[1], points[2]);
+}
+
+// Boxes of few and of too many voxels to be numbered in 64 bits.
+TEST(Voxelize, SortsVoxelsOfAnyBox) {
+  for (const double extent_m : {0.05, 0.9, 2e6}) {
+    std::vector<Eigen::Vector3d> points;
+    std::set<Voxel> expected;
+    for (int n = 0; n < 4000; ++n) {
+      points.emplace_back(uniform(-extent_m, extent_m), uniform(-extent_m, extent_m),
+                          uniform(-extent_m, extent_m));
+      if (n % 3 == 0) points.push_back(points[points.size() / 2]);
+    }
+    for (const Eigen::Vector3d& point : points) expected.insert(VoxelLattice().voxel_of(point));
+    const auto voxels = libgtd::voxelize(points, 0.01).voxels;
+    EXPECT_TRUE(std::equal(voxels.begin(), voxels.end(), expected.begin(), expected.end()));
+  }
+}
+
+TEST(Thinning, CellsOfAnyBoxInOrder) {
+  for (const float extent_m : {0.2F, 4e6F}) {
+    std::vector<Eigen::Vector3f> points;
+    std::map<std::array<int, 3>, std::vector<Eigen::Vector3f>> cells;
+    const auto coordinate = [&] { return static_cast<float>(uniform(-1, 1)) * extent_m; };
+    for (int n = 0; n < 3000; ++n) {
+      points.emplace_back(coordinate(), coordinate(), coordinate());
+      if (n % 2 == 0) points.push_back(points[points.size() / 3]);
+    }
+    const float inverse = 1.0F / static_cast<float>(0.02);
+    for (const Eigen::Vector3f& p : points)
+      cells[{static_cast<int>(std::floor(p.z() * inverse)),
+             static_cast<int>(std::floor(p.y() * inverse)),
+             static_cast<int>(std::floor(p.x() * inverse))}]
+          .push_back(p);
+    const auto centroids = libgtd::thin_to_centroids(points, 0.02);
+    ASSERT_EQ(centroids.size(), cells.size());
+    auto centroid = centroids.begin();
+    for (const auto& [cell, members] : cells) {
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      for (const Eigen::Vector3f& p : members) sum += p;
+      EXPECT_EQ(*centroid++, (sum / static_cast<float>(members.size())).eval());
+    }
+  }
 }
 
 TEST(Voxelize, OfNothingIsNothing) {

@@ -15,7 +15,9 @@ namespace {
 
 using graspmap_test::grid_of;
 using graspmap_test::gripper_named;
+using graspmap_test::uniform;
 using graspmap_test::whole_box;
+using libgtd::BitPath;
 using libgtd::Gripper;
 using libgtd::GripperMask;
 using libgtd::Method;
@@ -35,6 +37,14 @@ struct ReferenceCase {
 };
 
 void PrintTo(const ReferenceCase& given, std::ostream* out) { *out << given.name; }
+
+// The loops for vector registers that this processor has.
+std::vector<BitPath> paths() {
+  std::vector<BitPath> here;
+  for (const BitPath path : {BitPath::portable, BitPath::avx2, BitPath::avx512})
+    if (libgtd::has_path(path)) here.push_back(path);
+  return here;
+}
 
 class AuthorsProgram : public testing::TestWithParam<ReferenceCase> {
  protected:
@@ -72,7 +82,9 @@ TEST_P(AuthorsProgram, SameCountsAndScoreOfEveryPivot) {
   const GripperMask mask = libgtd::make_gripper_mask(
       gripper, {given.method, given.voxel_size_m, given.extra_void_layers});
   const auto pivots = libgtd::pivots_in(voxelized, mask, whole_box(voxelized));
-  const auto counts = libgtd::match_voxels(voxelized, mask, whole_box(voxelized), pivots);
+  const auto counts = libgtd::match_voxels(voxelized, mask, pivots);
+  for (const BitPath path : paths())
+    EXPECT_TRUE(libgtd::match_voxels(voxelized, mask, pivots, path) == counts);
   const auto reference = graspmap_test::read_scores_gz(file("scores.csv.gz"));
   ASSERT_EQ(pivots.size(), reference.rows.size());
   std::size_t differences = 0;
@@ -126,7 +138,7 @@ TEST(ClimbLab, SameGraspableVoxels) {
   const GripperMask mask =
       libgtd::make_gripper_mask(gripper_named("hubrobo"), {Method::climblab, 0.001, 0});
   const auto pivots = libgtd::pivots_in(grid, mask, whole_box(grid));
-  const auto counts = libgtd::match_voxels(grid, mask, whole_box(grid), pivots);
+  const auto counts = libgtd::match_voxels(grid, mask, pivots);
   std::set<std::array<int, 4>> graspable;
   for (std::size_t n = 0; n < pivots.size(); ++n) {
     const Voxel& voxel = grid.voxels[pivots[n]];
@@ -144,17 +156,154 @@ TEST(ClimbLab, SameGraspableVoxels) {
   EXPECT_EQ(graspable, reference);
 }
 
+void expect_as_plainly(const VoxelGrid& grid, const GripperMask& mask,
+                       const std::vector<std::size_t>& pivots, const std::string& what) {
+  const auto expected = libgtd::match_voxels_plainly(grid, mask, pivots);
+  for (const BitPath path : paths())
+    EXPECT_TRUE(libgtd::match_voxels(grid, mask, pivots, path) == expected)
+        << what << ", path " << static_cast<int>(path);
+}
+
+void expect_as_plainly(const VoxelGrid& grid, const GripperMask& mask, const std::string& what) {
+  expect_as_plainly(grid, mask, libgtd::pivots_in(grid, mask, whole_box(grid)), what);
+}
+
 TEST(VoxelMatching, AgreesWithTheTripleLoop) {
   for (const auto& [name, method] : libgtd::method_names())
-    for (const double voxel_size_m : {0.01, 0.003}) {
-      const GripperMask mask =
-          libgtd::make_gripper_mask(gripper_named("scar-e"), {method, voxel_size_m, 2});
-      const VoxelGrid grid = grid_of(graspmap_test::random_ground(95, -40, 9));
-      const auto pivots = libgtd::pivots_in(grid, mask, whole_box(grid));
-      EXPECT_EQ(libgtd::match_voxels(grid, mask, whole_box(grid), pivots),
-                libgtd::match_voxels_plainly(grid, mask, pivots))
-          << name << " " << voxel_size_m;
+    for (const double voxel_size_m : {0.01, 0.004})
+      expect_as_plainly(
+          grid_of(graspmap_test::random_ground(voxel_size_m < 0.01 ? 70 : 95, -40, 9)),
+          libgtd::make_gripper_mask(gripper_named("scar-e"), {method, voxel_size_m, 2}),
+          name + " " + std::to_string(voxel_size_m));
+}
+
+// A mask of random bits, of which `share` are set; V = 1 everywhere where `counts_all` says so.
+GripperMask random_mask(int side, int layers, double share, bool counts_all) {
+  GripperMask mask;
+  mask.method = Method::corrected;
+  mask.side = side;
+  mask.layers = mask.solid_layers = layers;
+  mask.pivot_xy = static_cast<int>(uniform(0, side));
+  mask.pivot_z = static_cast<int>(uniform(0, layers));
+  const auto size = static_cast<std::size_t>(side * side * layers);
+  for (std::size_t n = 0; n < size; ++n) {
+    mask.solid.push_back(uniform(0, 1) < share ? 1 : 0);
+    mask.counted.push_back(counts_all || uniform(0, 1) < share ? 1 : 0);
+  }
+  return mask;
+}
+
+// Ground of many voxels in each column.
+std::vector<Voxel> porous_ground(int side, int layers) {
+  std::vector<Voxel> voxels;
+  for (int i = 0; i < side; ++i)
+    for (int j = 0; j < side; ++j)
+      for (int k = 0; k < layers; ++k)
+        if (uniform(0, 1) < 0.3) voxels.push_back({i - 5, j + 77, k - 3});
+  return voxels;
+}
+
+TEST(VoxelMatching, MasksOfAnySizeAndAnyNumberOfLayers) {
+  for (const int side : {1, 2, 7, 31, 32, 33, 64, 65, 97})
+    for (const int layers : {1, 3, 15, 16, 17, 31, 32, 33, 70}) {
+      if (side * side * layers > 80000) continue;
+      for (const bool counts_all : {true, false})
+        for (const double share : {0.02, 0.6})
+          expect_as_plainly(grid_of(porous_ground(6, 18)),
+                            random_mask(side, layers, share, counts_all),
+                            std::to_string(side) + " x " + std::to_string(layers));
     }
+}
+
+TEST(VoxelMatching, MasksWithoutASolidVoxelOrOfNothingElse) {
+  const VoxelGrid grid = grid_of(porous_ground(12, 40));
+  for (const double share : {0.0, 1.0})
+    for (const bool counts_all : {true, false})
+      expect_as_plainly(grid, random_mask(13, 37, share, counts_all), std::to_string(share));
+}
+
+// Sums over boxes are kept in 16 bits: 260 x 255 voxels a row of columns do not fit.
+TEST(VoxelMatching, FullGroundUnderAMaskTooLargeForSmallSums) {
+  std::vector<Voxel> voxels;
+  for (int i = 0; i < 260; ++i)
+    for (int k = 0; k < 255; ++k) voxels.push_back({i, 3, k});
+  const VoxelGrid grid = grid_of(voxels);
+  GripperMask mask = random_mask(260, 255, 1.0, true);
+  mask.pivot_xy = 130;
+  mask.pivot_z = 127;
+  const std::vector<std::size_t> pivots = {0, 130 * 255 + 127, voxels.size() - 1};
+  expect_as_plainly(grid, mask, pivots, "full ground");
+}
+
+// Every bit of every chunk: counts of bytes must be added up before they overflow.
+TEST(VoxelMatching, FullGroundUnderAFullMask) {
+  constexpr int side = 68, layers = 32;
+  std::vector<Voxel> voxels;
+  for (int i = 0; i < side; ++i)
+    for (int j = 0; j < side; ++j)
+      for (int k = 0; k < layers; ++k) voxels.push_back({i, j, k});
+  const VoxelGrid grid = grid_of(voxels);
+  GripperMask mask = random_mask(64, layers, 1.0, true);
+  mask.pivot_xy = 32;
+  mask.pivot_z = 16;
+  std::vector<std::size_t> pivots;
+  for (const std::size_t i : {33, 34, 67})
+    for (const std::size_t j : {32, 33, 35}) pivots.push_back((i * side + j) * layers + 16);
+  expect_as_plainly(grid, mask, pivots, "V = 1");
+  mask.counted.front() = 0;
+  expect_as_plainly(grid, mask, pivots, "one voxel not counted");
+}
+
+// Levels far apart: the bits move by less than a plane, by planes, and away.
+TEST(VoxelMatching, GapsBetweenLevels) {
+  std::vector<Voxel> voxels;
+  for (const int level : {0, 1, 3, 15, 31, 32, 64, 113, 114, 500})
+    for (int i = 0; i < 9; ++i)
+      for (int j = 0; j < 9; ++j)
+        if (uniform(0, 1) < 0.5) voxels.push_back({i, j, level});
+  for (const int layers : {10, 40, 100})
+    expect_as_plainly(grid_of(voxels), random_mask(7, layers, 0.5, layers == 40),
+                      std::to_string(layers));
+}
+
+TEST(VoxelMatching, AnyChoiceOfPivots) {
+  const VoxelGrid grid = grid_of(graspmap_test::random_ground(200, -90, 30));
+  const GripperMask mask =
+      libgtd::make_gripper_mask(gripper_named("scar-e"), {Method::corrected, 0.01, 1});
+  const auto all = libgtd::pivots_in(grid, mask, whole_box(grid));
+  const auto counts = libgtd::match_voxels(grid, mask, all);
+  std::vector<std::size_t> some;
+  std::vector<VoxelCounts> expected;
+  for (std::size_t n = 0; n < all.size(); ++n)
+    if (uniform(0, 1) < 0.01) {
+      some.push_back(all[n]);
+      expected.push_back(counts[n]);
+    }
+  EXPECT_EQ(libgtd::match_voxels(grid, mask, some), expected);
+  EXPECT_TRUE(libgtd::match_voxels(grid, mask, {}).empty());
+}
+
+// Empty space between far points costs neither time nor memory.
+TEST(VoxelMatching, StrayVoxelsFarAway) {
+  std::vector<Voxel> voxels = graspmap_test::random_ground(40);
+  const GripperMask mask =
+      libgtd::make_gripper_mask(gripper_named("scar-e"), {Method::corrected, 0.01, 1});
+  VoxelGrid grid = grid_of(voxels);
+  const auto counts =
+      libgtd::match_voxels(grid, mask, libgtd::pivots_in(grid, mask, whole_box(grid)));
+  for (const Voxel far : {Voxel{20, 20, 1 << 28}, Voxel{1 << 28, -(1 << 28), 3}}) {
+    voxels.push_back(far);
+    grid = grid_of(voxels);
+    const auto pivots = libgtd::pivots_in(grid, mask, whole_box(grid));
+    const auto with_far = libgtd::match_voxels(grid, mask, pivots);
+    std::size_t same = 0;
+    for (std::size_t n = 0; n < pivots.size(); ++n)
+      if (std::abs(grid.voxels[pivots[n]].i) < 100 && grid.voxels[pivots[n]].k < 100)
+        EXPECT_EQ(with_far[n], counts[same++]);
+      else
+        EXPECT_EQ(with_far[n], (VoxelCounts{1, 1}));
+    EXPECT_EQ(same, counts.size());
+  }
 }
 
 }  // namespace

@@ -449,7 +449,12 @@ TEST(DepthFusion, OptionsOutOfTheirRangesAreNamed) {
   EXPECT_THAT(refused([](auto& o) { o.planes.radius_px = 8; }), HasSubstr("plane_radius_px"));
   EXPECT_THAT(refused([](auto& o) { o.planes.noise.axial_m = 0; }), HasSubstr("axial_noise_m"));
   EXPECT_THAT(refused([](auto& o) { o.min_views = 0; }), HasSubstr("min_views"));
-  EXPECT_THAT(refused([](auto& o) { o.voxel_size_m = 1e-7; }), HasSubstr("too far apart"));
+  EXPECT_THAT(refused([](auto& o) { o.voxel_size_m = 1e-7; }),
+              HasSubstr("voxel_size_m is 1e-07: voxels too small"));
+  MemoryScan far = ring_scan(plane_z(0), 2, {});
+  far.poses[1].world_from_base.translation().x() += 1e6;
+  EXPECT_THAT(error_of([&] { fuse_depth(far, far.poses); }).what(),
+              HasSubstr("poses lie too far apart"));
 }
 
 TEST(DepthFusion, OtherVoxelSizes) {
@@ -467,7 +472,9 @@ TEST(DepthFusion, OtherVoxelSizes) {
 
 TEST(DepthFusion, PoseErrorsShowInTheExpectedError) {
   const auto expected = [](const MemoryScan& scan, const Trajectory& poses) {
-    const PointCloud cloud = fuse_depth(scan, poses).cloud;
+    DepthFusionOptions options;
+    options.registration_rounds = 0;
+    const PointCloud cloud = fuse_depth(scan, poses, options).cloud;
     std::vector<double> errors;
     for (std::size_t n = 0; n < cloud.size(); ++n)
       if (cloud.positions[n].head<2>().norm() < 0.3)

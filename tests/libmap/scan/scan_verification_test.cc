@@ -1,9 +1,11 @@
 #include "libmap/scan/scan_verification.h"
 
 #include <SQLiteCpp/SQLiteCpp.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
 
+#include <algorithm>
 #include <cstring>
 
 #include "libmap/core/parallel.h"
@@ -75,6 +77,66 @@ TEST(ScanVerification, ImagesThatDoNotFitTheirCameras) {
   const ScanVerificationResult result = verify(file);
   ASSERT_EQ(parts_of(result), std::vector<std::string>{"2 Data"});
   EXPECT_NE(to_text(result.faults[0]).find("a multiple of 3"), std::string::npos);
+}
+
+std::string lines_of(const ScanVerificationResult& result) {
+  std::string lines;
+  for (const libmap::ScanFault& fault : result.faults) lines += to_text(fault) + "\n";
+  return lines;
+}
+
+// Pose columns have no few bytes that mean "none", as images have.
+TEST(ScanVerification, PosesOfAFewBytes) {
+  const fs::path file = scratch_folder() / "a.db";
+  for (const char* blob : {"x'00'", "x'00000000'"}) {
+    write_sample(file);
+    execute(file, std::string("UPDATE Node SET pose = ") + blob + " WHERE id = 1");
+    execute(file, std::string("UPDATE Link SET transform = ") + blob + " WHERE from_id = 3");
+    const std::vector<std::string> parts = parts_of(verify(file));
+    EXPECT_THAT(parts, testing::Contains("1 Node.pose")) << blob;
+    EXPECT_THAT(parts, testing::Contains("3 Link.transform")) << blob;
+    fs::remove(file);
+  }
+}
+
+TEST(ScanVerification, TextWhereABlobBelongs) {
+  const fs::path file = scratch_folder() / "a.db";
+  write_sample(file);
+  execute(file, "UPDATE Node SET velocity = 'fast' WHERE id = 2");
+  execute(file, "UPDATE Link SET information_matrix = 'certain' WHERE from_id = 2 AND to_id = 3");
+  const ScanVerificationResult result = verify(file);
+  EXPECT_THAT(parts_of(result), testing::IsSupersetOf({std::string("2 Node.velocity"),
+                                                       std::string("2 Link.information_matrix")}));
+  EXPECT_THAT(lines_of(result), testing::HasSubstr("node 2: Node.velocity: is a text, not a blob"));
+  // A text of no letters is no value.
+  write_sample(scratch_folder() / "b.db");
+  execute(scratch_folder() / "b.db", "UPDATE Node SET velocity = '' WHERE id = 2");
+  EXPECT_EQ(lines_of(verify(scratch_folder() / "b.db")), "");
+}
+
+TEST(ScanVerification, NodesWithoutARowInData) {
+  const fs::path file = scratch_folder() / "a.db";
+  write_sample(file);
+  execute(file, "DELETE FROM Data WHERE id = 2");
+  const ScanVerificationResult result = verify(file);
+  EXPECT_EQ(lines_of(result), "node 2: Data: the node has no row\n");
+  EXPECT_EQ(result.nodes, 2U);
+}
+
+TEST(ScanVerification, WhatTheGraphLeavesOut) {
+  const fs::path file = scratch_folder() / "a.db";
+  write_sample(file);
+  // Sound as a blob, but of a node that is not there.
+  execute(file, "UPDATE Link SET to_id = 77 WHERE from_id = 3 AND to_id = 1");
+  const RtabmapDatabase scan(file);
+  ASSERT_EQ(scan.warnings().size(), 1U);
+  const ScanVerificationResult result = libmap::verify_scan(scan);
+  EXPECT_EQ(lines_of(result), "graph: " + scan.warnings().front() + "\n");
+  // A pose that is listed by its blob is not listed again.
+  execute(file, "UPDATE Node SET pose = x'01' WHERE id = 1");
+  const std::string lines = lines_of(verify(file));
+  EXPECT_THAT(lines, testing::HasSubstr("node 1: Node.pose"));
+  EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2) << lines;
 }
 
 TEST(ScanVerification, IsTheSameForAnyNumberOfThreads) {

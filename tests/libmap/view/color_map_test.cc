@@ -53,6 +53,38 @@ TEST(ScoreColor, NoTwoClassesLookTheSame) {
     }
 }
 
+TEST(Diverging, IsGreyInTheMiddleAndSymmetricInItsRange) {
+  EXPECT_EQ(diverging(0.0), (Color{59, 76, 192}));
+  EXPECT_EQ(diverging(0.5), (Color{221, 221, 221}));
+  EXPECT_EQ(diverging(1.0), (Color{180, 4, 38}));
+  EXPECT_EQ(diverging(-3.0), diverging(0.0));
+  EXPECT_EQ(diverging(nan_value), no_value_color);
+  // Blue becomes less and red more, all the way up to the middle of each side.
+  for (double t = 0.02; t < 0.48; t += 0.02) {
+    EXPECT_GT(diverging(t)[2], diverging(t)[0]);
+    EXPECT_LT(diverging(1 - t)[2], diverging(1 - t)[0]);
+  }
+  // Errors of -1..3 and two that stray: the ends are at 98 of 100 of their sizes, 0 in the middle.
+  PointCloud cloud = row_of_points(1000);
+  ScalarField& error = cloud.add_field("error", ScalarType::float64);
+  for (std::size_t n = 0; n < 1000; ++n) error.values[n] = -1.0 + 4.0 * double(n) / 999;
+  error.values[0] = -500;
+  error.values[999] = 700;
+  Coloring coloring{.mode = ColorMode::field, .field = "error", .scale = ColorScale::diverging};
+  ColoredPoints colored = color(cloud, coloring);
+  EXPECT_NEAR(colored.legend.max, 2.92, 0.02);
+  EXPECT_EQ(colored.legend.min, -colored.legend.max);
+  EXPECT_EQ(colored.legend.scale, ColorScale::diverging);
+  EXPECT_EQ(colored.colors[0], diverging(0.0));
+  EXPECT_NEAR(colored.colors[250][0], 221, 2);
+  coloring.range_min = -10;
+  coloring.range_max = 10;
+  EXPECT_EQ(color(cloud, coloring).legend.min, -10);
+  for (double& value : error.values) value = 0.0;
+  coloring.range_min = coloring.range_max = 0.0;
+  EXPECT_EQ(color(cloud, coloring).colors[3], diverging(0.5));
+}
+
 TEST(Viridis, EndsAreThePublishedOnesAndLightnessGrows) {
   EXPECT_EQ(viridis(0.0), (Color{68, 1, 84}));
   EXPECT_EQ(viridis(1.0), (Color{253, 231, 37}));

@@ -6,9 +6,20 @@
 #include <cstdint>
 #include <numbers>
 
-#include "libmap/simulate/solid_noise.h"
-
 namespace libmap {
+
+// Well mixed 64 bits of two numbers (the finaliser of SplitMix64, Steele et al. 2014).
+inline std::uint64_t mix_bits(std::uint64_t a, std::uint64_t b) {
+  std::uint64_t bits = a * 0x9e3779b97f4a7c15U + b + 0x9e3779b97f4a7c15U;
+  bits = (bits ^ (bits >> 30)) * 0xbf58476d1ce4e5b9U;
+  bits = (bits ^ (bits >> 27)) * 0x94d049bb133111ebU;
+  return bits ^ (bits >> 31);
+}
+
+// The same as a number, 0 <= u < 1.
+inline double unit_noise(std::uint64_t a, std::uint64_t b) {
+  return static_cast<double>(mix_bits(a, b) >> 11) * 0x1p-53;
+}
 
 class RandomStream {
  public:

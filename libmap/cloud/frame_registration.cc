@@ -1,0 +1,204 @@
+#include "libmap/cloud/frame_registration.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <numbers>
+
+namespace libmap {
+
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+using Matrix6d = Eigen::Matrix<double, 6, 6>;
+
+constexpr int robust_rounds = 3;
+constexpr int max_iterations = 200;
+constexpr double tolerance = 1e-8;
+
+struct Equation {
+  std::uint32_t frame = 0;
+  double height = 0.0;
+  double information = 0.0;  // inverse variance
+  double weight = 0.0;       // the same, made robust
+  Vector6d slope;            // of the height: by a turn, by a shift
+};
+
+// Sums over the frames' corrections; heights about the mean of each element.
+class Adjustment {
+ public:
+  Adjustment(std::span<const SurfaceElement> elements,
+             std::span<const SurfaceObservation> observations,
+             std::span<const Eigen::Vector3d> centres, const FrameRegistrationOptions& options)
+      : options_(options), corrections_(centres.size(), Vector6d::Zero()) {
+    const double turn = options.rotation_error_deg * std::numbers::pi / 180.0;
+    prior_.head<3>().setConstant(1.0 / (turn * turn));
+    prior_.tail<3>().setConstant(1.0 / (options.place_error_m * options.place_error_m));
+    const double scatter = options.scatter_m * options.scatter_m;
+    for (const SurfaceObservation& one : observations) {
+      const SurfaceElement& element = elements[one.element];
+      Equation equation;
+      equation.frame = one.frame;
+      equation.height = static_cast<double>(one.height_m);
+      equation.information = 1.0 / (static_cast<double>(one.variance_m2) + scatter);
+      const Eigen::Vector3d normal = element.normal.cast<double>();
+      const Eigen::Vector3d arm = element.position.cast<double>() - centres[one.frame];
+      equation.slope << arm.cross(normal), normal;
+      if (starts_.empty() || one.element != last_element_) starts_.push_back(equations_.size());
+      last_element_ = one.element;
+      equations_.push_back(equation);
+    }
+    starts_.push_back(equations_.size());
+  }
+
+  double disagreement() const {
+    double squares = 0.0;
+    double weights = 0.0;
+    each_element([&](std::size_t begin, std::size_t end) {
+      const double mean = mean_of(begin, end, [&](const Equation& e) { return residual(e); });
+      for (std::size_t n = begin; n < end; ++n) {
+        const double off = residual(equations_[n]) - mean;
+        squares += equations_[n].weight * off * off;
+        weights += equations_[n].weight;
+      }
+    });
+    return weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
+  }
+
+  double correction() const {
+    double squares = 0.0;
+    double weights = 0.0;
+    for (const Equation& equation : equations_) {
+      const double change = equation.slope.dot(corrections_[equation.frame]);
+      squares += equation.weight * change * change;
+      weights += equation.weight;
+    }
+    return weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
+  }
+
+  void weigh() {
+    const double scale = options_.scatter_m * options_.scatter_m;
+    for (Equation& equation : equations_)
+      if (!(equation.weight > 0.0)) equation.weight = equation.information;
+    each_element([&](std::size_t begin, std::size_t end) {
+      const double mean = mean_of(begin, end, [&](const Equation& e) { return residual(e); });
+      for (std::size_t n = begin; n < end; ++n) {
+        const double off = residual(equations_[n]) - mean;
+        const double share = scale / (scale + off * off);
+        equations_[n].weight = equations_[n].information * share * share;
+      }
+    });
+  }
+
+  void solve() {
+    // From here: (J' W J + P) step = -J' W r - P x.
+    std::vector<Vector6d> gradient(corrections_.size());
+    for (std::size_t f = 0; f < gradient.size(); ++f)
+      gradient[f] = -prior_.cwiseProduct(corrections_[f]);
+    accumulate([&](const Equation& e) { return -residual(e); }, gradient);
+    const std::vector<Matrix6d> inverses = block_inverses();
+    std::vector<Vector6d> residuals = gradient;
+    std::vector<Vector6d> direction(residuals.size(), Vector6d::Zero());
+    std::vector<Vector6d> product(residuals.size());
+    double before = 0.0;
+    double first = 0.0;
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      double rho = 0.0;
+      for (std::size_t f = 0; f < residuals.size(); ++f)
+        rho += residuals[f].dot(inverses[f] * residuals[f]);
+      if (iteration == 0) first = rho;
+      if (!(rho > tolerance * tolerance * first)) break;
+      for (std::size_t f = 0; f < residuals.size(); ++f)
+        direction[f] =
+            inverses[f] * residuals[f] + (iteration == 0 ? 0.0 : rho / before) * direction[f];
+      before = rho;
+      for (std::size_t f = 0; f < residuals.size(); ++f)
+        product[f] = prior_.cwiseProduct(direction[f]);
+      accumulate([&](const Equation& e) { return e.slope.dot(direction[e.frame]); }, product);
+      double curvature = 0.0;
+      for (std::size_t f = 0; f < residuals.size(); ++f) curvature += direction[f].dot(product[f]);
+      const double alpha = rho / curvature;
+      for (std::size_t f = 0; f < residuals.size(); ++f) {
+        corrections_[f] += alpha * direction[f];
+        residuals[f] -= alpha * product[f];
+      }
+    }
+  }
+
+  const std::vector<Vector6d>& corrections() const { return corrections_; }
+
+ private:
+  template <typename Use>
+  void each_element(const Use& use) const {
+    for (std::size_t n = 0; n + 1 < starts_.size(); ++n) use(starts_[n], starts_[n + 1]);
+  }
+  template <typename Value>
+  double mean_of(std::size_t begin, std::size_t end, const Value& value) const {
+    double sum = 0.0;
+    double weights = 0.0;
+    for (std::size_t n = begin; n < end; ++n) {
+      sum += equations_[n].weight * value(equations_[n]);
+      weights += equations_[n].weight;
+    }
+    return weights > 0.0 ? sum / weights : 0.0;
+  }
+  double residual(const Equation& equation) const {
+    return equation.height + equation.slope.dot(corrections_[equation.frame]);
+  }
+  // Adds J' W (value - its mean on the element): the elements' heights are eliminated.
+  template <typename Value>
+  void accumulate(const Value& value, std::vector<Vector6d>& sums) const {
+    each_element([&](std::size_t begin, std::size_t end) {
+      const double mean = mean_of(begin, end, value);
+      for (std::size_t n = begin; n < end; ++n) {
+        const Equation& equation = equations_[n];
+        sums[equation.frame] += equation.weight * (value(equation) - mean) * equation.slope;
+      }
+    });
+  }
+  std::vector<Matrix6d> block_inverses() const {
+    std::vector<Matrix6d> blocks(corrections_.size(), prior_.asDiagonal());
+    for (const Equation& equation : equations_)
+      blocks[equation.frame] += equation.weight * equation.slope * equation.slope.transpose();
+    for (Matrix6d& block : blocks) block = block.llt().solve(Matrix6d::Identity());
+    return blocks;
+  }
+
+  const FrameRegistrationOptions& options_;
+  Vector6d prior_;
+  std::vector<Equation> equations_;
+  std::vector<std::size_t> starts_;  // of each element's equations
+  std::uint32_t last_element_ = 0;
+  std::vector<Vector6d> corrections_;
+};
+
+}  // namespace
+
+FrameRegistration register_frames(std::span<const SurfaceElement> elements,
+                                  std::span<const SurfaceObservation> observations,
+                                  std::span<const Eigen::Vector3d> centres,
+                                  const FrameRegistrationOptions& options) {
+  FrameRegistration result;
+  Adjustment adjustment(elements, observations, centres, options);
+  for (int round = 0; round < robust_rounds; ++round) {
+    adjustment.weigh();
+    if (round == 0) result.disagreement_before_m = adjustment.disagreement();
+    adjustment.solve();
+  }
+  result.disagreement_after_m = adjustment.disagreement();
+  result.correction_m = adjustment.correction();
+  for (std::size_t f = 0; f < centres.size(); ++f) {
+    const Vector6d& correction = adjustment.corrections()[f];
+    const Eigen::Vector3d turn = correction.head<3>();
+    const double angle = turn.norm();
+    Pose pose = Pose::Identity();
+    if (angle > 0.0) pose.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+    pose.translation() = centres[f] + correction.tail<3>() - pose.linear() * centres[f];
+    result.corrected_from_given.push_back(pose);
+  }
+  return result;
+}
+
+}  // namespace libmap

@@ -1,0 +1,63 @@
+// A closed outline on the ground: a simple polygon, convex or not.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+class Outline {
+ public:
+  // Corners in order, either way round; a last one equal to the first is dropped. Throws Error:
+  // fewer than three, not finite, two in one place, edges that cross or touch, no area.
+  explicit Outline(std::vector<Eigen::Vector2d> corners);
+
+  // Counter-clockwise.
+  const std::vector<Eigen::Vector2d>& corners() const { return corners_; }
+  double area_m2() const { return area_m2_; }
+  Eigen::Vector2d min() const { return min_; }
+  Eigen::Vector2d max() const { return max_; }
+
+  // Inside, or within 1e-9 m of the border.
+  bool contains(const Eigen::Vector2d& point) const;
+
+  // The edges, each named by its first corner, that come near the box, ascending.
+  std::vector<std::uint32_t> edges_near(const Eigen::Vector2d& box_min,
+                                        const Eigen::Vector2d& box_max) const;
+
+ private:
+  std::size_t strip_of(double y) const;
+  void make_strips();
+  void require_simple() const;
+
+  std::vector<Eigen::Vector2d> corners_;
+  Eigen::Vector2d min_ = Eigen::Vector2d::Zero();
+  Eigen::Vector2d max_ = Eigen::Vector2d::Zero();
+  double area_m2_ = 0.0;
+  std::vector<std::vector<std::uint32_t>> strips_;  // edges by where they are along y
+};
+
+// The rectangle from min to max.
+Outline make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
+
+// What stands on an outline, between two heights. No outline: between the heights, everywhere.
+struct UprightPrism {
+  std::optional<Outline> outline{};
+  double min_z = -std::numeric_limits<double>::infinity();
+  double max_z = std::numeric_limits<double>::infinity();
+
+  bool contains(const Eigen::Vector3d& point) const {
+    return point.z() >= min_z && point.z() <= max_z &&
+           (!outline || outline->contains(point.head<2>()));
+  }
+};
+
+// The points inside, those on its border included, with all that belongs to them.
+PointCloud cut_cloud(const PointCloud& cloud, const UprightPrism& prism);
+
+}  // namespace libmap

@@ -1,0 +1,92 @@
+#include "libmap/cloud/point_tree.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <nanoflann.hpp>
+#include <utility>
+
+#include "libmap/core/parallel.h"
+
+namespace libmap {
+
+namespace {
+
+// nanoflann's view of a list of points.
+struct PointList {
+  const std::vector<Eigen::Vector3d>& points;
+  std::size_t kdtree_get_point_count() const { return points.size(); }
+  double kdtree_get_pt(std::size_t n, std::size_t axis) const {
+    return points[n][static_cast<Eigen::Index>(axis)];
+  }
+  template <typename Box>
+  bool kdtree_get_bbox(Box&) const {
+    return false;
+  }
+};
+using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointList>,
+                                                 PointList, 3, std::size_t>;
+
+}  // namespace
+
+struct PointTree::Index {
+  PointList list;
+  Tree tree;
+  explicit Index(const std::vector<Eigen::Vector3d>& points)
+      : list{points}, tree(3, list, nanoflann::KDTreeSingleIndexAdaptorParams(16)) {}
+};
+
+PointTree::PointTree(const std::vector<Eigen::Vector3d>& points)
+    : index_(std::make_unique<Index>(points)) {}
+PointTree::~PointTree() = default;
+PointTree::PointTree(PointTree&&) noexcept = default;
+PointTree& PointTree::operator=(PointTree&&) noexcept = default;
+
+std::vector<NeighborPoint> PointTree::nearest(const Eigen::Vector3d& point,
+                                              std::size_t count) const {
+  count = std::min(count, index_->list.points.size());
+  std::vector<std::size_t> indices(count);
+  std::vector<double> squares(count);
+  if (count > 0) index_->tree.knnSearch(point.data(), count, indices.data(), squares.data());
+  std::vector<NeighborPoint> neighbors(count);
+  for (std::size_t n = 0; n < count; ++n) neighbors[n] = {indices[n], squares[n]};
+  return neighbors;
+}
+
+NeighborPoint PointTree::nearest(const Eigen::Vector3d& point) const {
+  NeighborPoint neighbor{0, std::numeric_limits<double>::infinity()};
+  index_->tree.knnSearch(point.data(), 1, &neighbor.index, &neighbor.square_m2);
+  return neighbor;
+}
+
+std::vector<NeighborPoint> PointTree::within(const Eigen::Vector3d& point, double radius_m) const {
+  std::vector<NeighborPoint> neighbors;
+  if (index_->list.points.empty()) return neighbors;
+  std::vector<std::pair<std::size_t, double>> matches;
+  // nanoflann leaves out what lies exactly at the radius.
+  const double square =
+      std::nextafter(radius_m * radius_m, std::numeric_limits<double>::infinity());
+  index_->tree.radiusSearch(point.data(), square, matches, nanoflann::SearchParams());
+  std::sort(matches.begin(), matches.end());
+  neighbors.reserve(matches.size());
+  for (const auto& [index, square_m2] : matches) neighbors.push_back({index, square_m2});
+  return neighbors;
+}
+
+double median_spacing(const std::vector<Eigen::Vector3d>& points) {
+  constexpr std::size_t most = 10000;
+  if (points.size() < 2) return 0.0;
+  const PointTree tree(points);
+  std::vector<double> squares(std::min(points.size(), most));
+  parallel_for(squares.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::size_t index = n * points.size() / squares.size();
+      squares[n] = tree.nearest(points[index], 2).back().square_m2;
+    }
+  });
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  return std::sqrt(*middle);
+}
+
+}  // namespace libmap

@@ -1,0 +1,41 @@
+// Nearest neighbours among points (a k-d tree by nanoflann).
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <memory>
+#include <vector>
+
+namespace libmap {
+
+struct NeighborPoint {
+  std::size_t index = 0;
+  double square_m2 = 0.0;  // of the distance
+};
+
+class PointTree {
+ public:
+  // The points, all finite, must stay while the tree lives.
+  explicit PointTree(const std::vector<Eigen::Vector3d>& points);
+  ~PointTree();
+  PointTree(PointTree&&) noexcept;
+  PointTree& operator=(PointTree&&) noexcept;
+
+  // The `count` nearest points, or all if there are fewer, the nearest first. May be called from
+  // several threads at once.
+  std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
+  // The nearest one; there must be one.
+  NeighborPoint nearest(const Eigen::Vector3d& point) const;
+  // All points at most `radius_m` away, by index.
+  std::vector<NeighborPoint> within(const Eigen::Vector3d& point, double radius_m) const;
+
+ private:
+  struct Index;
+  std::unique_ptr<Index> index_;
+};
+
+// Median of the distances from points to their nearest other point, m; of at most 10000 of them,
+// spread evenly over the list. 0 if there are fewer than two.
+double median_spacing(const std::vector<Eigen::Vector3d>& points);
+
+}  // namespace libmap

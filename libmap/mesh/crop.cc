@@ -1,0 +1,313 @@
+#include "libmap/mesh/crop.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <string>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/mesh/mesh_cutting.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/surface_distance.h"
+
+namespace libmap {
+
+namespace {
+
+using Eigen::Vector2d;
+using Eigen::Vector3d;
+
+constexpr double ground_samples = 100000.0;  // of a mesh
+constexpr double most_view_samples = 4e6;
+
+Pose turn_about(const Vector2d& place, double yaw_deg) {
+  const Vector3d pivot(place.x(), place.y(), 0.0);
+  Pose turn = make_pose_from_rpy(Vector3d::Zero(), {0.0, 0.0, yaw_deg});
+  turn.translation() = pivot - turn.linear() * pivot;
+  return turn;
+}
+
+bool is_identity(const Pose& pose) { return pose.matrix().isIdentity(0.0); }
+
+std::vector<Vector2d> seen_from_above(const std::vector<Vector3d>& points) {
+  std::vector<Vector2d> places;
+  places.reserve(points.size());
+  for (const Vector3d& point : points) places.emplace_back(point.head<2>());
+  return places;
+}
+
+// Where the map goes, and how it is cut.
+struct Plan {
+  Pose cut_from_map = Pose::Identity();   // the frame in which it is cut
+  Pose site_from_cut = Pose::Identity();  // the identity but for a box or polygon in the map
+  UprightPrism prism;
+  CropReport report;
+};
+
+// What the plan is made from, of a cloud or a mesh.
+struct Source {
+  std::vector<Vector3d> ground_points;
+  std::vector<Eigen::Vector3f> normals;
+  Vector2d middle = Vector2d::Zero();  // about which a given yaw turns
+  // The map seen from above in the level frame, densely.
+  std::function<PointCloud(const Pose& level_from_map, double cell)> view;
+};
+
+// The mean direction of the sides, modulo a right angle, weighted by their lengths.
+double yaw_of(const std::vector<Vector2d>& corners) {
+  double sine = 0.0;
+  double cosine = 0.0;
+  for (std::size_t n = 0; n < corners.size(); ++n) {
+    const Vector2d side = corners[(n + 1) % corners.size()] - corners[n];
+    const double angle = 4.0 * std::atan2(side.y(), side.x());
+    sine += side.norm() * std::sin(angle);
+    cosine += side.norm() * std::cos(angle);
+  }
+  return std::atan2(sine, cosine) / 4.0 * 180.0 / std::numbers::pi;
+}
+
+std::vector<Vector2d> moved(const std::vector<Vector2d>& corners, const Pose& pose) {
+  std::vector<Vector2d> result;
+  for (const Vector2d& corner : corners)
+    result.emplace_back((pose * Vector3d(corner.x(), corner.y(), 0.0)).head<2>());
+  return result;
+}
+
+Pose level_frame(const Source& source, const CropOptions& options, CropReport& report) {
+  if (!options.level) return Pose::Identity();
+  report.up = options.up ? *options.up : up_of_normals(source.normals);
+  GroundPlaneOptions ground = options.ground;
+  ground.up = report.up;
+  report.ground = find_ground_plane(source.ground_points, ground);
+  return level_from_map(*report.ground);
+}
+
+// The rectangle that was asked for by its size, in the frame turned so that it lies straight.
+void lay_rectangle(const Source& source, const CropOptions& options, const Pose& level,
+                   Plan& plan) {
+  const PointCloud view = source.view(level, options.rectangle.cell_m);
+  const SiteRectangle rectangle =
+      find_site_rectangle(seen_from_above(view.positions), options.size_m, options.rectangle);
+  plan.report.rectangle = rectangle;
+  const Vector2d half = options.size_m / 2.0;
+  if (!options.yaw_deg) {
+    plan.cut_from_map = turn_about(rectangle.centre, -rectangle.yaw_deg) * level;
+    plan.prism.outline = make_rectangle(rectangle.centre - half, rectangle.centre + half);
+    return;
+  }
+  const Pose turn = turn_about(source.middle, *options.yaw_deg);
+  const Pose from_rectangle = turn_about(rectangle.centre, rectangle.yaw_deg);
+  const Outline straight = make_rectangle(rectangle.centre - half, rectangle.centre + half);
+  plan.cut_from_map = turn * level;
+  plan.prism.outline = Outline(moved(straight.corners(), turn * from_rectangle));
+}
+
+void lay_border(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
+  const PointCloud view = source.view(level, options.band.cell_m);
+  plan.report.band = find_border_band(view, options.rectangle.margin_m, options.band);
+  const std::vector<Vector2d>& corners = plan.report.band->corners;
+  Vector2d centre = Vector2d::Zero();
+  for (const Vector2d& corner : corners) centre += corner / static_cast<double>(corners.size());
+  const Pose turn = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg)
+                                    : turn_about(centre, -yaw_of(corners));
+  plan.cut_from_map = turn * level;
+  plan.prism.outline = Outline(moved(corners, turn));
+}
+
+// A box or polygon that the user gave.
+void lay_given(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
+  const Pose turned = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg) * level : level;
+  if (options.frame == CropFrame::map)
+    plan.site_from_cut = turned;
+  else
+    plan.cut_from_map = turned;
+  if (options.region == CropRegion::polygon) plan.prism.outline = Outline(options.polygon);
+  if (options.region != CropRegion::box) return;
+  plan.prism.outline = make_rectangle(options.box.min.head<2>(), options.box.max.head<2>());
+  plan.prism.min_z = options.box.min.z();
+  plan.prism.max_z = options.box.max.z();
+}
+
+// x = y = 0 in the middle of the outline's box.
+void center_outline(const CropOptions& options, Plan& plan) {
+  const Outline& outline = *plan.prism.outline;
+  const Vector2d middle = (outline.min() + outline.max()) / 2.0;
+  Pose shift = Pose::Identity();
+  shift.translation().head<2>() = -middle;
+  plan.cut_from_map = shift * plan.cut_from_map;
+  if (options.region == CropRegion::size && !options.yaw_deg) {
+    const Vector2d half = options.size_m / 2.0;
+    plan.prism.outline = make_rectangle(-half, half);
+    return;
+  }
+  std::vector<Vector2d> corners = outline.corners();
+  for (Vector2d& corner : corners) corner -= middle;
+  plan.prism.outline = Outline(std::move(corners));
+}
+
+void require_sound(const CropOptions& options) {
+  const bool found = options.region == CropRegion::size || options.region == CropRegion::border;
+  if (options.rectangle.margin_m > 0.0 && !found)
+    throw Error("a margin is kept from what is found: it goes with a size or a border",
+                {.field = "margin_m", .value = to_text(options.rectangle.margin_m)});
+  if (options.frame == CropFrame::map && found)
+    throw Error("sites are found in the level frame",
+                {.field = "frame", .value = "map", .bound = "level with a size or a border"});
+  if (options.yaw_deg && !std::isfinite(*options.yaw_deg))
+    throw Error("not an angle", {.field = "yaw", .value = to_text(*options.yaw_deg)});
+  if (options.region == CropRegion::box &&
+      !(options.box.min.array() < options.box.max.array()).all())
+    throw Error("the box is inside out or empty", {.field = "box"});
+}
+
+Plan make_plan(const Source& source, const CropOptions& options) {
+  require_sound(options);
+  Plan plan;
+  const Pose level = level_frame(source, options, plan.report);
+  if (options.region == CropRegion::size)
+    lay_rectangle(source, options, level, plan);
+  else if (options.region == CropRegion::border)
+    lay_border(source, options, level, plan);
+  else
+    lay_given(source, options, level, plan);
+  const bool cut_in_site = options.frame == CropFrame::level || !plan.prism.outline;
+  if (options.center && plan.prism.outline && cut_in_site) center_outline(options, plan);
+  if (plan.prism.outline) plan.report.outline = plan.prism.outline->corners();
+  return plan;
+}
+
+// What is done with a cut cloud or mesh: into the site, centred if the outline was not.
+template <typename Move>
+void finish(Plan& plan, const CropOptions& options, const std::vector<Vector3d>& positions,
+            const Move& move) {
+  CropReport& report = plan.report;
+  Pose site_from_cut = plan.site_from_cut;
+  const bool to_center = options.center && (!plan.prism.outline || options.frame == CropFrame::map);
+  if (to_center) {
+    std::vector<Vector3d> in_site = positions;
+    for (Vector3d& position : in_site) position = site_from_cut * position;
+    const Bounds3d bounds = bounds_of(in_site);
+    Pose shift = Pose::Identity();
+    shift.translation().head<2>() = -(bounds.min + bounds.max).head<2>() / 2.0;
+    site_from_cut = shift * site_from_cut;
+  }
+  if (!is_identity(site_from_cut)) move(site_from_cut);
+  report.outline = moved(report.outline, site_from_cut);
+  report.site_from_map = site_from_cut * plan.cut_from_map;
+}
+
+Error nothing_inside(const std::vector<Vector3d>& positions, const char* what) {
+  const Bounds3d bounds = bounds_of(positions);
+  const auto text = [](const Vector3d& p) {
+    return to_fixed_text(p.x(), 2) + ", " + to_fixed_text(p.y(), 2) + ", " +
+           to_fixed_text(p.z(), 2);
+  };
+  return Error(std::string("nothing of the ") + what + " lies inside the cut: it reaches from " +
+               text(bounds.min) + " to " + text(bounds.max));
+}
+
+// The surface seen from above: a sample in each cell that a triangle covers, its corners, and its
+// sides, which are all that is seen of an upright one.
+PointCloud view_of(const TriangleMesh& mesh, double cell) {
+  std::vector<TrianglePoint> samples;
+  double area = 0.0;
+  for (const Triangle& triangle : mesh.triangles) area += std::abs(area_normal(mesh, triangle).z());
+  cell = std::max(cell, std::sqrt(area / 2.0 / most_view_samples));
+  for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {
+    const Triangle& corners = mesh.triangles[n];
+    const Vector2d a = mesh.vertices[corners[0]].head<2>();
+    const Vector2d ab = mesh.vertices[corners[1]].head<2>() - a;
+    const Vector2d ac = mesh.vertices[corners[2]].head<2>() - a;
+    const auto sides = [&](double length) { return std::min(std::ceil(length / cell), 1e6); };
+    const double on_ab = std::max(sides(ab.norm()), 1.0);
+    const double on_ac = std::max(sides(ac.norm()), 1.0);
+    const double on_bc = std::max(sides((ac - ab).norm()), 1.0);
+    for (double k = 0.0; k < on_ab; ++k) samples.push_back({n, k / on_ab, 0.0});
+    for (double k = 0.0; k < on_bc; ++k) samples.push_back({n, 1.0 - k / on_bc, k / on_bc});
+    for (double k = 0.0; k < on_ac; ++k) samples.push_back({n, 0.0, 1.0 - k / on_ac});
+    const double twice = ab.x() * ac.y() - ab.y() * ac.x();
+    if (!(std::abs(twice) > cell * cell)) continue;
+    const Vector2d low = (a + ab.cwiseMin(ac).cwiseMin(0.0)) / cell;
+    const Vector2d high = (a + ab.cwiseMax(ac).cwiseMax(0.0)) / cell;
+    for (double y = std::floor(low.y()); y <= high.y(); ++y)
+      for (double x = std::floor(low.x()); x <= high.x(); ++x) {
+        const Vector2d offset = cell * Vector2d(x + 0.5, y + 0.5) - a;
+        const double u = (offset.x() * ac.y() - offset.y() * ac.x()) / twice;
+        const double v = (ab.x() * offset.y() - ab.y() * offset.x()) / twice;
+        if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) samples.push_back({n, u, v});
+      }
+  }
+  return points_on_surface(mesh, samples);
+}
+
+Vector2d middle_of(const std::vector<Vector3d>& positions) {
+  const Bounds3d bounds = bounds_of(positions);
+  return (bounds.min + bounds.max).head<2>() / 2.0;
+}
+
+PointCloud finite_part(const PointCloud& cloud) {
+  std::vector<std::size_t> finite;
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (cloud.positions[n].allFinite()) finite.push_back(n);
+  return finite.size() == cloud.size() ? cloud : select_points(cloud, finite);
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, CropOptions& options) {
+  bind(table, options.ground);
+  table.add("center", options.center, "x = y = 0 in the middle of the outline");
+  bind(table, options.rectangle);
+  bind(table, options.band);
+}
+
+CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) {
+  cloud.check();
+  PointCloud kept = finite_part(cloud);
+  if (kept.empty()) throw Error("there are no points to crop");
+  Source source{kept.positions, kept.normals, middle_of(kept.positions), {}};
+  source.view = [&](const Pose& level_from_map, double) {
+    return transform_cloud(kept, level_from_map);
+  };
+  Plan plan = make_plan(source, options);
+  if (!is_identity(plan.cut_from_map)) kept = transform_cloud(kept, plan.cut_from_map);
+  PointCloud inside = cut_cloud(kept, plan.prism);
+  if (inside.empty()) throw nothing_inside(kept.positions, "cloud");
+  finish(plan, options, inside.positions,
+         [&](const Pose& pose) { inside = transform_cloud(inside, pose); });
+  return {std::move(inside), std::move(plan.report)};
+}
+
+CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options) {
+  mesh.check();
+  const double area = surface_area(mesh);
+  if (!std::isfinite(area)) throw Error("a corner of a triangle is not finite");
+  if (!(area > 0.0))
+    throw Error("the mesh has no surface to crop",
+                {.field = "area", .value = to_text(area) + " m2", .bound = "> 0"});
+  Source source;
+  source.middle = middle_of(mesh.vertices);
+  if (options.level)
+    for (const SurfacePoint& sample :
+         sample_surface(mesh, ground_samples / area, options.ground.seed)) {
+      source.ground_points.push_back(sample.position);
+      source.normals.push_back(
+          area_normal(mesh, mesh.triangles[sample.triangle]).normalized().cast<float>());
+    }
+  source.view = [&](const Pose& level_from_map, double cell) {
+    return view_of(transform_mesh(mesh, level_from_map), cell);
+  };
+  Plan plan = make_plan(source, options);
+  const TriangleMesh moved_mesh =
+      is_identity(plan.cut_from_map) ? mesh : transform_mesh(mesh, plan.cut_from_map);
+  TriangleMesh inside = cut_mesh(moved_mesh, plan.prism);
+  if (inside.triangles.empty()) throw nothing_inside(moved_mesh.vertices, "mesh");
+  finish(plan, options, inside.vertices,
+         [&](const Pose& pose) { inside = transform_mesh(inside, pose); });
+  return {std::move(inside), std::move(plan.report)};
+}
+
+}  // namespace libmap

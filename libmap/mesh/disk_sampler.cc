@@ -1,0 +1,334 @@
+#include "libmap/mesh/disk_sampler.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <utility>
+
+#include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
+#include "libmap/core/single_precision.h"
+#include "libmap/mesh/sample_grid.h"
+
+namespace libmap {
+
+namespace {
+
+// In radii.
+constexpr double piece_size = 4.0;
+constexpr double first_gap_size = 1.0 / 3.0;
+constexpr double smallest_gap = 1e-3;
+
+constexpr std::size_t grain = 256;
+constexpr double samples_a_part = 131072.0;
+constexpr std::size_t most_pieces = 30'000'000;
+
+// Darts of each round over the whole surface, in expected samples.
+constexpr std::array<double, 5> dart_rounds = {0.5, 0.5, 1.0, 2.0, 4.0};
+
+struct Candidate {
+  double order;  // who comes first
+  TrianglePoint place;
+  Eigen::Vector3d position;
+};
+
+// What chunk(begin, end, found) finds in each range of at most `at_once`, in their order.
+template <typename T, typename Chunk>
+std::vector<T> collect(std::size_t count, std::size_t at_once, const Chunk& chunk) {
+  std::vector<std::vector<T>> parts((count + at_once - 1) / at_once);
+  parallel_for(count, at_once, [&](std::size_t begin, std::size_t end) {
+    chunk(begin, end, parts[begin / at_once]);
+  });
+  std::size_t total = 0;
+  for (const std::vector<T>& part : parts) total += part.size();
+  std::vector<T> all;
+  all.reserve(total);
+  for (std::vector<T>& part : parts) {
+    all.insert(all.end(), part.begin(), part.end());
+    std::vector<T>().swap(part);
+  }
+  return all;
+}
+
+// Finds the parts of a fragment that no single disc covers.
+class GapSearch {
+ public:
+  GapSearch(const SampleGrid& samples, double radius_m)
+      : samples_(samples), radius_m_(radius_m), square_m2_(radius_m * radius_m) {}
+
+  // Whether a single disc covers all of the block.
+  bool is_covered(const SurfaceBlock& block) const {
+    const double room = radius_m_ - block.reach_m;
+    return room > 0.0 && samples_.any_nearer(block.centre, room, room * room);
+  }
+
+  // Appends those parts, cut until their sides are at most `longest_m`.
+  void find(const PlacedFragment& fragment, double longest_m, std::vector<Fragment>& gaps) {
+    if (covers(last_, fragment) || !(fragment.area_m2() > 0.0)) return;
+    if (fragment.square_of_longest_side() > 4.0 * square_m2_) {
+      for (const PlacedFragment& half : fragment.halves()) find(half, longest_m, gaps);
+      return;
+    }
+    near_.clear();
+    const Reach reach = reach_of(fragment);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(radius_m_);
+    const Eigen::Vector3d low =
+        fragment.corners[0].cwiseMin(fragment.corners[1]).cwiseMin(fragment.corners[2]) - margin;
+    const Eigen::Vector3d high =
+        fragment.corners[0].cwiseMax(fragment.corners[1]).cwiseMax(fragment.corners[2]) + margin;
+    const bool covered =
+        samples_.any_in_box(low, high, [&](const Eigen::Vector3d& sample, std::uint32_t) {
+          return is_covered(sample, fragment, reach);
+        });
+    if (!covered) cut(fragment, 0, longest_m * longest_m, gaps);
+  }
+
+ private:
+  // Discs whose centres lie farther from `centre` do not meet the fragment.
+  struct Reach {
+    Eigen::Vector3d centre;
+    double square_m2;
+  };
+  Reach reach_of(const PlacedFragment& fragment) const {
+    const Eigen::Vector3d centre =
+        (fragment.corners[0] + fragment.corners[1] + fragment.corners[2]) / 3.0;
+    double square = 0.0;
+    for (const Eigen::Vector3d& corner : fragment.corners)
+      square = std::max(square, (corner - centre).squaredNorm());
+    const double reach = radius_m_ + std::sqrt(square);
+    return {centre, reach * reach};
+  }
+
+  bool covers(const Eigen::Vector3d& sample, const PlacedFragment& fragment) const {
+    return (sample - fragment.corners[0]).squaredNorm() <= square_m2_ &&
+           (sample - fragment.corners[1]).squaredNorm() <= square_m2_ &&
+           (sample - fragment.corners[2]).squaredNorm() <= square_m2_;
+  }
+
+  // Whether the sample's disc does; keeps it among the near ones if it only meets the fragment.
+  bool is_covered(const Eigen::Vector3d& sample, const PlacedFragment& fragment,
+                  const Reach& reach) {
+    if (!((sample - reach.centre).squaredNorm() <= reach.square_m2)) return false;
+    if (covers(sample, fragment)) {
+      last_ = sample;
+      return true;
+    }
+    near_.push_back(sample);
+    return false;
+  }
+
+  // Of a fragment that the near samples from `begin` on do not cover.
+  void cut(const PlacedFragment& fragment, std::size_t begin, double longest_m2,
+           std::vector<Fragment>& gaps) {
+    const std::size_t end = near_.size();
+    if (begin == end || !(fragment.square_of_longest_side() > longest_m2)) {
+      gaps.push_back(fragment.fragment);
+      return;
+    }
+    for (const PlacedFragment& half : fragment.halves()) {
+      const Reach reach = reach_of(half);
+      bool covered = false;
+      for (std::size_t n = begin; n < end && !covered; ++n)
+        covered = is_covered(Eigen::Vector3d(near_[n]), half, reach);
+      if (!covered) cut(half, end, longest_m2, gaps);
+      near_.resize(end);
+    }
+  }
+
+  const SampleGrid& samples_;
+  double radius_m_;
+  double square_m2_;
+  Eigen::Vector3d last_ = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
+  std::vector<Eigen::Vector3d> near_;
+};
+
+class Sampler {
+ public:
+  Sampler(const SampledSurface& surface, double radius_m, std::uint64_t seed)
+      : surface_(surface),
+        radius_m_(radius_m),
+        // However a reader sums and roots, it finds no pair below the radius.
+        least_square_m2_(radius_m * radius_m * (1.0 + 1e-14)),
+        seed_(seed),
+        expected_(saturation_density * surface.area_m2 / (radius_m * radius_m)),
+        samples_(surface.low, 2.0 * radius_m, static_cast<std::size_t>(1.1 * expected_) + 16),
+        pieces_(surface.triangles, piece_size * radius_m, most_pieces) {}
+
+  DiskSamples run(const std::function<bool(std::size_t)>& goes_on, Progress& progress) {
+    progress.begin("darts", dart_rounds.size());
+    for (std::uint64_t round = 0; round < dart_rounds.size(); ++round) {
+      accept(darts(round, dart_rounds[round] * std::max(expected_, 1.0) / surface_.area_m2));
+      progress.advance(1);
+    }
+    if (goes_on(samples_.size())) fill_gaps(progress);
+    progress.end();
+    DiskSamples result;
+    result.positions.reserve(samples_.size());
+    for (std::size_t n = 0; n < samples_.size(); ++n) result.positions.push_back(samples_[n]);
+    result.places = std::move(places_);
+    return result;
+  }
+
+ private:
+  // Part by part of the surface, so that not all gaps are held at once.
+  void fill_gaps(Progress& progress) {
+    const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
+    const double most_m2 = samples_a_part * radius_m_ * radius_m_ / saturation_density;
+    progress.begin("gaps", blocks.size());
+    std::uint64_t round = dart_rounds.size();
+    for (std::size_t begin = 0; begin < blocks.size();) {
+      double area = 0.0;
+      std::size_t end = begin;
+      while (end < blocks.size() && area < most_m2) area += blocks[end++].area_m2;
+      for (std::vector<Fragment> gaps = first_gaps(begin, end); !gaps.empty(); ++round) {
+        accept(darts_into(gaps, round));
+        gaps = remaining(gaps);
+      }
+      progress.advance(end - begin);
+      begin = end;
+    }
+  }
+
+  bool place(const Fragment& fragment, RandomStream& random, Candidate& candidate) const {
+    const double first = random.uniform();
+    candidate.place = point_of(fragment, first, random.uniform());
+    candidate.position = position_on(surface_.mesh, candidate.place);
+    if (surface_.rounding_m > 0.0) candidate.position = rounded_to_single(candidate.position);
+    return !samples_.any_nearer(candidate.position, radius_m_, least_square_m2_);
+  }
+
+  // Of darts that are thrown evenly over the surface, those that no sample forbids.
+  std::vector<Candidate> darts(std::uint64_t round, double per_m2) const {
+    const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
+    return collect<Candidate>(
+        blocks.size(), 1, [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
+          for (std::size_t n = begin; n < end; ++n) {
+            RandomStream random(mix_bits(seed_, round), n);
+            throw_darts(blocks[n], per_m2, random, found);
+          }
+        });
+  }
+
+  // One into each of so many parts of the block of equal area.
+  void throw_darts(const SurfaceBlock& block, double per_m2, RandomStream& random,
+                   std::vector<Candidate>& found) const {
+    const double count = std::floor(block.area_m2 * per_m2 + random.uniform());
+    if (!(count >= 1.0)) return;
+    const double share = block.area_m2 / count;
+    double thrown = 0.0;
+    double next = random.uniform() * share;  // area before the next dart
+    double area = 0.0;
+    Candidate candidate{};
+    for (std::size_t n = block.begin; n < block.end && thrown < count; ++n) {
+      const PlacedFragment piece = pieces_.piece(n);
+      area += piece.area_m2();
+      while (next < area && thrown < count) {
+        candidate.order = random.uniform();
+        if (place(piece.fragment, random, candidate)) found.push_back(candidate);
+        thrown += 1.0;
+        next = (thrown + random.uniform()) * share;
+      }
+    }
+  }
+
+  // One dart into each gap. The larger a gap, the earlier its dart comes, as in a race in which
+  // darts fall evenly.
+  std::vector<Candidate> darts_into(const std::vector<Fragment>& gaps, std::uint64_t round) const {
+    return collect<Candidate>(
+        gaps.size(), grain, [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
+          Candidate candidate{};
+          for (std::size_t n = begin; n < end; ++n) {
+            RandomStream random(mix_bits(seed_, round), n);
+            if (!place(gaps[n], random, candidate)) continue;
+            candidate.order =
+                -std::log(1.0 - random.uniform()) / placed(surface_.mesh, gaps[n]).area_m2();
+            found.push_back(candidate);
+          }
+        });
+  }
+
+  // In their order, each that the ones before leave room for.
+  void accept(std::vector<Candidate> candidates) {
+    std::stable_sort(candidates.begin(), candidates.end(),
+                     [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
+    for (const Candidate& candidate : candidates) {
+      if (samples_.any_nearer(candidate.position, radius_m_, least_square_m2_)) continue;
+      samples_.add(candidate.position);
+      places_.push_back(candidate.place);
+    }
+  }
+
+  std::vector<Fragment> first_gaps(std::size_t first, std::size_t last) const {
+    return collect<Fragment>(last - first, 1,
+                             [&](std::size_t begin, std::size_t end, std::vector<Fragment>& found) {
+                               GapSearch search(samples_, radius_m_);
+                               for (std::size_t n = first + begin; n < first + end; ++n) {
+                                 const SurfaceBlock& block = pieces_.blocks()[n];
+                                 if (search.is_covered(block)) continue;
+                                 for (std::size_t p = block.begin; p < block.end; ++p)
+                                   search.find(pieces_.piece(p), first_gap_size * radius_m_, found);
+                               }
+                             });
+  }
+
+  // What is still uncovered, in smaller parts. A dart into each was in vain: the smallest lie
+  // within their own size of a disc.
+  std::vector<Fragment> remaining(const std::vector<Fragment>& gaps) const {
+    // Rounding may carry every dart into a smaller gap out of it.
+    const double smallest_m = std::max(smallest_gap * radius_m_, surface_.rounding_m);
+    return collect<Fragment>(gaps.size(), grain,
+                             [&](std::size_t begin, std::size_t end, std::vector<Fragment>& found) {
+                               GapSearch search(samples_, radius_m_);
+                               for (std::size_t n = begin; n < end; ++n) {
+                                 const PlacedFragment gap = placed(surface_.mesh, gaps[n]);
+                                 const double longest_m = std::sqrt(gap.square_of_longest_side());
+                                 if (longest_m > smallest_m)
+                                   search.find(gap, 0.5 * longest_m, found);
+                               }
+                             });
+  }
+
+  const SampledSurface& surface_;
+  double radius_m_;
+  double least_square_m2_;
+  std::uint64_t seed_;
+  double expected_;
+  SampleGrid samples_;
+  std::vector<TrianglePoint> places_;
+  SurfacePieces pieces_;
+};
+
+}  // namespace
+
+DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::uint64_t seed,
+                         const std::function<bool(std::size_t)>& goes_on, Progress& progress) {
+  return Sampler(surface, radius_m, seed).run(goes_on, progress);
+}
+
+double smallest_distance(const std::vector<Eigen::Vector3d>& positions, double expected_m) {
+  if (positions.size() < 2) return 0.0;
+  for (double reach = 1.01 * expected_m;; reach *= 2.0) {
+    SampleGrid grid(positions.front(), 2.0 * reach, positions.size());
+    for (const Eigen::Vector3d& position : positions) grid.add(position);
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(reach);
+    const double least = parallel_reduce(
+        positions.size(), grain, std::numeric_limits<double>::infinity(),
+        [&](std::size_t begin, std::size_t end) {
+          double square = std::numeric_limits<double>::infinity();
+          for (std::size_t n = begin; n < end; ++n)
+            grid.any_in_box(positions[n] - margin, positions[n] + margin,
+                            [&](const Eigen::Vector3d& other, std::uint32_t index) {
+                              if (index != n)
+                                square = std::min(square, (other - positions[n]).squaredNorm());
+                              return false;
+                            });
+          return square;
+        },
+        [](double a, double b) { return std::min(a, b); });
+    if (least <= reach * reach) return std::sqrt(least);
+  }
+}
+
+}  // namespace libmap

@@ -1,0 +1,79 @@
+// From any triangles to a clean surface: an oriented manifold without degenerate, doubled or
+// intersecting triangles, without scraps, small holes closed; smoothed and decimated if wanted.
+//
+// The steps, in this order; each keeps the order of what it keeps:
+//  1. vertices nearer than a tolerance are made one (the first); triangles without area and
+//     repeated ones are dropped, caps (a corner on the opposite edge) by flipping that edge
+//  2. cutting at edges of more than two triangles, at vertices of more than one fan and where no
+//     consistent orientation exists (mesh_manifold); orientation as most of the area has it
+//  3. islands dropped
+//  4. triangles that intersect others are removed with those around them, and the place closed
+//     again (self_intersections, hole_filling); what cannot be closed stays open
+//  5. holes filled (hole_filling)
+//  6. smoothing (mesh_smoothing), decimation (mesh_decimation), then step 4 again
+//  7. islands dropped again, unused vertices dropped, vertex normals estimated
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/parameters.h"
+#include "libmap/core/progress.h"
+#include "libmap/core/triangle_mesh.h"
+
+namespace libmap {
+
+struct MeshCleaningOptions {
+  bool repair = true;  // steps 1, 2 and 4
+  // >= 0: vertices this near are one; 0: 1e-7 of the diagonal of the mesh's bounding box.
+  double merge_distance_m = 0.0;
+  double min_island_area_m2 = 0.01;  // >= 0: smaller components are dropped
+  double min_island_share = 0.0;     // 0 to 1: so are those smaller than this share of the largest
+  // >= 0: holes are filled whose diameter (the largest distance between two vertices of the
+  // boundary) is not larger. The longest boundary of a component is its outer one and never
+  // filled, unless it reaches less than half as far as the component does (the hole of a ball).
+  double max_hole_m = 0.1;
+  int smoothing_iterations = 0;  // >= 0
+  // >= 0: no point of the decimated surface lies farther from the surface before, nor a vertex of
+  // that one from the decimated surface; 0: no decimation.
+  double decimation_error_m = 0.0;
+};
+void bind(ParameterTable& table, MeshCleaningOptions& options);
+
+struct MeshCleaningResult {
+  // With unit vertex normals and the face field `filled` (uint8): 1 on triangles that close holes.
+  // Colours and fields are those of the input; new vertices take them from the hole's boundary.
+  TriangleMesh mesh;
+
+  std::size_t merged_vertices = 0;
+  std::size_t unused_vertices = 0;
+  std::size_t degenerate_triangles = 0;
+  std::size_t duplicate_triangles = 0;
+  std::size_t cut_edges = 0;       // non-manifold, or without a consistent orientation
+  std::size_t split_vertices = 0;  // copies made of vertices so that each has one fan
+  std::size_t turned_triangles = 0;
+  std::size_t islands = 0;
+  double island_area_m2 = 0.0;
+  // Removed since they met others (or stayed degenerate), without those around them.
+  std::size_t intersecting_triangles = 0;
+  std::size_t closing_triangles = 0;  // put there to close these places again
+  std::size_t open_places = 0;        // boundaries that are left of them
+  std::size_t remaining_intersecting_triangles = 0;
+  std::size_t filled_holes = 0;
+  std::size_t filled_triangles = 0;
+  double filled_area_m2 = 0.0;
+  std::size_t unfilled_holes = 0;  // small enough, but no filling was found that meets nothing else
+  std::size_t decimated_triangles = 0;
+  double decimation_deviation_m = 0.0;  // bound on the distance, either way, that was proved
+  std::vector<std::pair<std::string, double>> timings_s;
+};
+
+// The same bytes for any number of threads. A mesh that is clean comes back as it was but for
+// `filled` and normals. Throws Error: an option outside its range, arrays that do not fit, an index
+// out of range, a vertex that is not finite, no triangle to begin with or none left.
+MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options = {},
+                              Progress& progress = no_progress());
+
+}  // namespace libmap

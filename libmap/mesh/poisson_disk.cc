@@ -1,0 +1,187 @@
+#include "libmap/mesh/poisson_disk.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/random_stream.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/disk_sampler.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr double most_samples = 1e8;
+constexpr double count_tolerance = 0.01;
+// Within this distance of the origin along each axis, single precision moves no coordinate by more
+// than 1e-5 m: that is how files keep positions.
+constexpr double single_precision_m = 256.0;
+
+class Stopwatch {
+ public:
+  double lap() {
+    const auto now = std::chrono::steady_clock::now();
+    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
+  }
+
+ private:
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+SampledSurface surface_of(const TriangleMesh& mesh) {
+  mesh.check();
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    if (!vertex.allFinite()) throw Error("the mesh has a vertex that is not finite");
+  const Bounds3d bounds = bounds_of(mesh.vertices);
+  const double farthest =
+      std::max(bounds.min.cwiseAbs().maxCoeff(), bounds.max.cwiseAbs().maxCoeff());
+  SampledSurface surface{mesh, bounds.min, SurfacePieces(mesh), 0.0, 0.0};
+  if (farthest <= single_precision_m) {
+    const auto single = static_cast<float>(farthest);
+    const float step = std::nextafter(single, std::numeric_limits<float>::infinity()) - single;
+    surface.rounding_m = 0.5 * std::numbers::sqrt3 * static_cast<double>(step);
+  }
+  surface.area_m2 = surface.triangles.area_m2();
+  if (!(surface.area_m2 > 0.0) || !std::isfinite(surface.area_m2))
+    throw Error("the mesh has no area");
+  return surface;
+}
+
+void require_sense(const SampledSurface& surface, const PoissonDiskOptions& options) {
+  if (options.count > 0) {
+    if (static_cast<double>(options.count) > most_samples)
+      throw Error("too many samples", {.file = {},
+                                       .field = "count",
+                                       .value = std::to_string(options.count),
+                                       .bound = "<= " + to_text(most_samples)});
+    return;
+  }
+  if (!(options.radius_m > 0.0) || !std::isfinite(options.radius_m))
+    throw Error(
+        "not a radius",
+        {.file = {}, .field = "radius_m", .value = to_text(options.radius_m), .bound = "> 0"});
+  const double least = std::sqrt(saturation_density * surface.area_m2 / most_samples);
+  if (!(options.radius_m >= least))
+    throw Error("too many samples", {.file = {},
+                                     .field = "radius_m",
+                                     .value = to_text(options.radius_m),
+                                     .bound = ">= " + to_text(static_cast<float>(least))});
+}
+
+// Looks for the radius that yields a number of samples. The number falls with the square of the
+// radius, but not evenly: each radius yields another draw.
+class CountSearch {
+ public:
+  CountSearch(const SampledSurface& surface, const PoissonDiskOptions& options)
+      : surface_(surface),
+        seed_(options.seed),
+        wanted_(static_cast<double>(options.count)),
+        random_(options.seed, options.count) {}
+
+  // Of all radii that were tried, the samples of the one nearest to the wanted number.
+  DiskSamples run(double& radius_m, std::size_t& tries, Progress& progress) {
+    radius_ = std::sqrt(saturation_density * surface_.area_m2 / wanted_);
+    DiskSamples best;
+    double best_miss = 0.0;
+    for (tries = 1;; ++tries) {
+      DiskSamples samples = sample_disks(
+          surface_, radius_, seed_, [&](std::size_t thrown) { return is_near(thrown, tries); },
+          progress);
+      const double found = static_cast<double>(samples.positions.size());
+      const double miss = is_full_ ? std::abs(found - wanted_) : 2.0 * most_samples;
+      if (best.positions.empty() || miss < best_miss) {
+        best = std::move(samples);
+        best_miss = miss;
+        radius_m = radius_;
+      }
+      const bool hit = is_full_ && miss <= count_tolerance * wanted_;
+      if (hit || tries == most_tries) return best;
+      if (is_full_) share_of_darts_ = thrown_ / found;
+      aim(is_full_ ? found : thrown_ / share_of_darts_, tries);
+    }
+  }
+
+ private:
+  static constexpr std::size_t most_tries = 100;
+  static constexpr std::size_t direct_tries = 8;  // before chance helps
+
+  // Whether the darts over the whole surface foretell about the wanted number.
+  bool is_near(std::size_t thrown, std::size_t tries) {
+    thrown_ = static_cast<double>(thrown);
+    const double miss = std::abs(thrown_ / share_of_darts_ / wanted_ - 1.0);
+    is_full_ = tries > direct_tries || miss <= 0.5 * count_tolerance + 1.0 / std::sqrt(wanted_);
+    return is_full_;
+  }
+
+  // The next radius, after this one has yielded `found`.
+  void aim(double found, std::size_t tries) {
+    if (is_full_ && found > wanted_) too_small_ = std::max(too_small_, radius_);
+    if (is_full_ && found < wanted_) too_large_ = std::min(too_large_, radius_);
+    const bool is_bracketed = too_small_ > 0.0 && std::isfinite(too_large_);
+    if (tries < direct_tries || !is_bracketed) {
+      // Islands much smaller than the radius keep their samples until it spans their distances.
+      const double step = std::sqrt(found / wanted_);
+      radius_ *= tries < direct_tries ? step : (step > 1.0 ? std::max(step, 1.5) : step);
+      return;
+    }
+    const double low = 0.95 * std::min(too_small_, too_large_);
+    const double high = 1.05 * std::max(too_small_, too_large_);
+    radius_ = low * std::pow(high / low, random_.uniform());
+  }
+
+  const SampledSurface& surface_;
+  std::uint64_t seed_;
+  double wanted_;
+  RandomStream random_;
+  double radius_ = 0.0;
+  double thrown_ = 0.0;
+  double share_of_darts_ = share_of_darts;
+  bool is_full_ = false;  // the last try filled the gaps
+  double too_small_ = 0.0;
+  double too_large_ = std::numeric_limits<double>::infinity();
+};
+
+}  // namespace
+
+void bind(ParameterTable& table, PoissonDiskOptions& options) {
+  table.add("radius_m", options.radius_m, positive,
+            "least distance of two samples; no point of the surface is farther from one");
+  table.add("count", options.count, {0.0, most_samples},
+            "> 0: so many samples, to 1 %, of the radius that yields them");
+  table.add("seed", options.seed, {}, "of the random draws");
+}
+
+PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
+                                      Progress& progress) {
+  const SampledSurface surface = surface_of(mesh);
+  require_sense(surface, options);
+  PoissonDiskResult result;
+  result.area_m2 = surface.area_m2;
+  Stopwatch stopwatch;
+  DiskSamples samples;
+  if (options.count > 0) {
+    samples = CountSearch(surface, options).run(result.radius_m, result.tries, progress);
+  } else {
+    result.radius_m = options.radius_m;
+    result.tries = 1;
+    samples = sample_disks(
+        surface, options.radius_m, options.seed, [](std::size_t) { return true; }, progress);
+  }
+  result.timings_s.emplace_back("samples", stopwatch.lap());
+  result.smallest_distance_m = smallest_distance(samples.positions, result.radius_m);
+  const double per_sample_m2 = surface.area_m2 / static_cast<double>(samples.positions.size());
+  result.relative_radius =
+      result.smallest_distance_m / (2.0 * std::sqrt(per_sample_m2 / (2.0 * std::numbers::sqrt3)));
+  result.timings_s.emplace_back("smallest distance", stopwatch.lap());
+  result.cloud = points_on_surface(mesh, samples.places);
+  result.cloud.positions = std::move(samples.positions);
+  result.timings_s.emplace_back("attributes", stopwatch.lap());
+  return result;
+}
+
+}  // namespace libmap

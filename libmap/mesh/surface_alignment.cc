@@ -1,0 +1,210 @@
+#include "libmap/mesh/surface_alignment.h"
+
+#include <Eigen/Eigenvalues>
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/pose_graph.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
+  table.add("icp_max_distance_m", options.max_distance_m, positive,
+            "points farther from the surface do not count in ICP");
+  table.add("icp_min_overlap", options.min_overlap, zero_to_one,
+            "share of the points that must count in ICP");
+  table.add("icp_max_iterations", options.max_iterations, {1.0, 1e6}, "steps of ICP at most");
+  table.add("icp_tolerance_m", options.tolerance_m, positive,
+            "ICP has converged when its step is smaller, m");
+  table.add("icp_max_points", options.max_points, {6.0, 1e8}, "points that ICP uses at most");
+  table.add("icp_min_curvature", options.min_curvature, zero_to_one,
+            "share of the greatest curvature below which ICP leaves a motion alone");
+}
+
+namespace {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+constexpr std::size_t grain = 512;
+
+void check(SurfaceAlignmentOptions options) {
+  ParameterTable table;
+  bind(table, options);
+  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+}
+
+std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points, int most) {
+  const std::size_t count = std::min(points.size(), static_cast<std::size_t>(most));
+  std::vector<Eigen::Vector3d> part;
+  part.reserve(count);
+  for (std::size_t n = 0; n < count; ++n) part.push_back(points[n * points.size() / count]);
+  return part;
+}
+
+struct Pair {
+  Eigen::Vector3d point;  // moved
+  NearestPlace place;
+  double weight = 0.0;
+};
+
+// Those that overlap the surface.
+std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pose& moved,
+                           const ReferenceSurface& surface,
+                           const SurfaceAlignmentOptions& options) {
+  std::vector<Pair> pairs(points.size());
+  parallel_for(points.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      pairs[n].point = moved * points[n];
+      pairs[n].place = surface.nearest(pairs[n].point);
+    }
+  });
+  std::erase_if(pairs, [&](const Pair& pair) {
+    return pair.place.on_border || !(pair.place.distance_m <= options.max_distance_m);
+  });
+  const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
+  if (pairs.size() < 6 || share < options.min_overlap)
+    throw Error("too little overlap to align by",
+                {.file = {},
+                 .field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
+                          " m over the surface",
+                 .value = to_fixed_text(100.0 * share, 1) + " %",
+                 .bound = ">= " + to_fixed_text(100.0 * options.min_overlap, 1) + " %"});
+  return pairs;
+}
+
+// Tukey's biweight; its scale is the normalised median absolute deviation. Returns the number of
+// pairs with a weight.
+std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
+  constexpr double efficient = 4.685;       // 95 % efficiency for Gaussian errors
+  constexpr double normal_median = 1.4826;  // standard deviation over median absolute deviation
+  std::vector<double> distances;
+  distances.reserve(pairs.size());
+  for (const Pair& pair : pairs) distances.push_back(pair.place.distance_m);
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  const double reach = std::max(floor_m, efficient * normal_median * *middle);
+  std::size_t inliers = 0;
+  for (Pair& pair : pairs) {
+    const double share = pair.place.distance_m / reach;
+    pair.weight = share < 1.0 ? (1.0 - share * share) * (1.0 - share * share) : 0.0;
+    if (pair.weight > 0.0) ++inliers;
+  }
+  return inliers;
+}
+
+// Rotations count by how far they move the points, so that all six are lengths: turned about
+// `centre` by an angle times `radius_m`.
+struct NormalEquations {
+  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  double radius_m = 0.0;
+  Matrix6d matrix = Matrix6d::Zero();
+  Vector6d right = Vector6d::Zero();
+};
+
+NormalEquations equations_of(const std::vector<Pair>& pairs) {
+  NormalEquations equations;
+  double weights = 0.0;
+  for (const Pair& pair : pairs) {
+    equations.centre += pair.weight * pair.point;
+    weights += pair.weight;
+  }
+  equations.centre /= weights;
+  double squares = 0.0;
+  for (const Pair& pair : pairs)
+    squares += pair.weight * (pair.point - equations.centre).squaredNorm();
+  equations.radius_m = std::sqrt(squares / weights);
+  if (!(equations.radius_m > 0.0)) equations.radius_m = 1.0;
+  for (const Pair& pair : pairs) {
+    const Eigen::Vector3d& normal = pair.place.normal;
+    Vector6d row;
+    row << (pair.point - equations.centre).cross(normal) / equations.radius_m, normal;
+    const double residual = (pair.place.position - pair.point).dot(normal);
+    equations.matrix += pair.weight / weights * row * row.transpose();
+    equations.right += pair.weight / weights * residual * row;
+  }
+  return equations;
+}
+
+struct Step {
+  Pose motion = Pose::Identity();
+  double length_m = 0.0;
+  int free_motions = 0;
+  double curvature = 1.0;
+};
+
+Step solve(const NormalEquations& equations, double min_curvature) {
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(equations.matrix);
+  const double greatest = solver.eigenvalues()[5];
+  Step step;
+  Vector6d motion = Vector6d::Zero();
+  for (Eigen::Index n = 5; n >= 0; --n) {
+    const double curvature = solver.eigenvalues()[n] / greatest;
+    // Rounding leaves some 1e-16 where there is nothing.
+    if (!(curvature >= std::max(min_curvature, 1e-13))) {
+      ++step.free_motions;
+      continue;
+    }
+    step.curvature = curvature;
+    const Vector6d direction = solver.eigenvectors().col(n);
+    motion += direction.dot(equations.right) / solver.eigenvalues()[n] * direction;
+  }
+  const Eigen::Vector3d turn = motion.head<3>() / equations.radius_m;
+  step.length_m = motion.norm();
+  if (turn.norm() > 0.0)
+    step.motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  step.motion.translation() =
+      equations.centre + motion.tail<3>() - step.motion.linear() * equations.centre;
+  return step;
+}
+
+double rmse_of(const std::vector<Pair>& pairs) {
+  double squares = 0.0;
+  std::size_t count = 0;
+  for (const Pair& pair : pairs) {
+    if (pair.weight <= 0.0) continue;
+    squares += pair.place.distance_m * pair.place.distance_m;
+    ++count;
+  }
+  return count == 0 ? 0.0 : std::sqrt(squares / static_cast<double>(count));
+}
+
+}  // namespace
+
+SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& points,
+                                        const ReferenceSurface& surface,
+                                        const SurfaceAlignmentOptions& options) {
+  check(options);
+  if (!surface.is_oriented()) throw Error("a surface without normals cannot be aligned to");
+  if (points.size() < 6)
+    throw Error(
+        "too few points to align",
+        {.file = {}, .field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});
+  for (const Eigen::Vector3d& point : points)
+    if (!point.allFinite()) throw Error("a point is not finite");
+  const std::vector<Eigen::Vector3d> used = thinned(points, options.max_points);
+  // Distances below it are rounding.
+  const double floor_m = 1e-9 * (surface.bounds().max - surface.bounds().min).norm();
+  SurfaceAlignmentResult result;
+  result.points = used.size();
+  while (true) {
+    std::vector<Pair> pairs = pairs_of(used, result.surface_from_points, surface, options);
+    result.overlap = pairs.size();
+    result.inliers = weigh(pairs, floor_m);
+    result.rmse_m = rmse_of(pairs);
+    if (result.converged || result.iterations == options.max_iterations) return result;
+    const Step step = solve(equations_of(pairs), options.min_curvature);
+    result.surface_from_points = step.motion * result.surface_from_points;
+    result.surface_from_points.linear() = nearest_rotation(result.surface_from_points.linear());
+    result.free_motions = step.free_motions;
+    result.curvature = step.curvature;
+    result.converged = step.length_m <= options.tolerance_m;
+    ++result.iterations;
+  }
+}
+
+}  // namespace libmap

@@ -1,0 +1,197 @@
+#include "libmap/mesh/texture_model.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/mesh_subdivision.h"
+#include "libmap/mesh/texture_painting.h"
+#include "libmap/mesh/texture_photos.h"
+
+namespace libmap {
+
+namespace {
+
+// Views of a triangle among which one is chosen.
+constexpr std::size_t views_a_triangle = 12;
+
+constexpr Range size_range{64, 16384};
+constexpr Range padding_range{1, 64};
+constexpr Range texels_range{0.05, 8.0};
+constexpr Range incidence_range{0, 90, true, true};
+constexpr Range view_range{1, 16};
+
+void require(double value, const Range& range, const char* field) {
+  const bool low = range.min_open ? value > range.min : value >= range.min;
+  const bool high = range.max_open ? value < range.max : value <= range.max;
+  if (low && high && std::isfinite(value)) return;
+  throw Error("a mesh cannot be textured so",
+              {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
+}
+
+void check(const TextureOptions& options) {
+  require(options.atlas.texture_size, size_range, "texture_size_px");
+  require(options.atlas.texel_size_m, not_negative, "texel_size_m");
+  require(options.atlas.texels_a_pixel, texels_range, "texels_a_pixel");
+  require(options.atlas.max_pages, not_negative, "max_pages");
+  require(options.atlas.padding_px, padding_range, "padding_px");
+  require(options.views.max_incidence_deg, incidence_range, "max_incidence_deg");
+  require(options.views.occlusion_tolerance_m, not_negative, "occlusion_tolerance_m");
+  require(options.views.border_px, not_negative, "border_px");
+  require(options.views.occlusion_margin_px, not_negative, "occlusion_margin_px");
+  require(options.labelling.seam_cost_m, not_negative, "seam_cost_m");
+  require(options.blend_views, view_range, "blend_views");
+  require(options.blend_exponent, not_negative, "blend_exponent");
+  require(options.max_side_m, not_negative, "max_side_m");
+}
+
+class Texturing {
+ public:
+  Texturing(const TextureOptions& options, Progress& progress)
+      : options_(options), progress_(progress) {}
+
+  TextureResult run(const TriangleMesh& input, const ScanSource& scan,
+                    const Trajectory& world_from_base);
+
+ private:
+  template <typename Step>
+  auto timed(const char* name, const Step& step) {
+    const auto start = std::chrono::steady_clock::now();
+    auto result = step();
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+    result_.timings_s.emplace_back(name, taken.count());
+    return result;
+  }
+  TriangleMesh cut_finely(const TriangleMesh& input);
+  void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);
+  void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh,
+                    const TexturePhotos& photos);
+
+  const TextureOptions& options_;
+  Progress& progress_;
+  TextureResult result_;
+};
+
+TriangleMesh Texturing::cut_finely(const TriangleMesh& input) {
+  if (!(options_.max_side_m > 0.0)) return input;
+  SubdivisionResult fine = split_long_sides(input, options_.max_side_m);
+  result_.cut_triangles = fine.mesh.triangles.size() - input.triangles.size();
+  return std::move(fine.mesh);
+}
+
+void Texturing::count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label) {
+  for (std::size_t t = 0; t < label.size(); ++t) {
+    const double area = 0.5 * area_normal(mesh, mesh.triangles[t]).norm();
+    (label[t] == no_photo ? result_.unseen_m2 : result_.seen_m2) += area;
+    ++(label[t] == no_photo ? result_.unseen_triangles : result_.seen_triangles);
+  }
+  if (result_.seen_triangles == 0)
+    throw Error("none of its triangles is seen by any of " + std::to_string(result_.photos) +
+                " photographs: mesh and poses may lie in different frames");
+}
+
+void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh,
+                             const TexturePhotos& photos) {
+  result_.charts = atlas.charts.size();
+  result_.split_charts = atlas.split_charts;
+  result_.shrunk_charts = atlas.shrunk_charts;
+  result_.atlas_scale = atlas.scale;
+  double texels = 0.0;
+  for (const TextureChart& chart : atlas.charts)
+    for (const std::uint32_t t : chart.triangles) {
+      const PhotoProjector& projector = photos[chart.photo].projector;
+      const Triangle& corners = mesh.triangles[t];
+      const Eigen::Vector2d a = place_on_page(chart, projector, mesh.vertices[corners[0]]);
+      const Eigen::Vector2d ab = place_on_page(chart, projector, mesh.vertices[corners[1]]) - a;
+      const Eigen::Vector2d ac = place_on_page(chart, projector, mesh.vertices[corners[2]]) - a;
+      texels += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
+    }
+  result_.texel_size_m = texels > 0.0 ? std::sqrt(result_.seen_m2 / texels) : 0.0;
+}
+
+TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
+                             const Trajectory& world_from_base) {
+  check(options_);
+  input.check();
+  if (input.triangles.empty()) throw Error("the mesh has no triangles");
+  const TriangleMesh mesh = timed("cutting", [&] { return cut_finely(input); });
+  const auto photos = timed("photographs", [&] {
+    return std::make_unique<TexturePhotos>(scan, world_from_base, options_.strict, progress_);
+  });
+  result_.photos = photos->size();
+  result_.skipped = photos->skipped();
+  const TextureViews views = timed("views", [&] {
+    return find_texture_views(mesh, *photos, options_.views, views_a_triangle,
+                              static_cast<std::size_t>(options_.blend_views) + 1, progress_);
+  });
+  const auto opposite = timed("edges", [&] {
+    return opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));
+  });
+  const TextureLabels labels = timed("labelling", [&] {
+    return label_triangles(mesh, opposite, views.of_triangles, options_.labelling);
+  });
+  result_.seams_before_m = labels.seams_before_m;
+  result_.seams_m = labels.seams_m;
+  count_seen(mesh, labels.photos);
+  result_.exposure = timed("exposure", [&] {
+    return even_out_exposure(views.observations, photos->size(), options_.exposure);
+  });
+  const TextureAtlas atlas = timed("atlas", [&] {
+    return make_texture_atlas(mesh, opposite, labels.photos, *photos, options_.atlas);
+  });
+  count_charts(atlas, mesh, *photos);
+  result_.model = timed("painting", [&] {
+    TexturedMesh model = atlas.make_model(mesh, *photos);
+    const BlendingShares shares =
+        share_views(views.of_vertices, options_.blend_views, options_.blend_exponent);
+    paint_texture(atlas, {*photos, result_.exposure, shares, options_.unseen_color}, model,
+                  progress_);
+    return model;
+  });
+  return std::move(result_);
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, TextureOptions& options) {
+  table.add("texture_size_px", options.atlas.texture_size, size_range,
+            "no page of the texture is wider or higher, pixels");
+  table.add("texel_size_m", options.atlas.texel_size_m, not_negative,
+            "side of a texel on the surface, m; 0: by the photographs' own pixels");
+  table.add("texels_a_pixel", options.atlas.texels_a_pixel, texels_range,
+            "with texel_size_m 0: texels along a side of the photographs' pixels");
+  table.add("max_pages", options.atlas.max_pages, not_negative,
+            "texels are made larger where more pages would be needed; 0: any number of pages");
+  table.add("padding_px", options.atlas.padding_px, padding_range,
+            "texels around each chart that continue its colours");
+  table.add("max_incidence_deg", options.views.max_incidence_deg, incidence_range,
+            "views that are more aslant are not used");
+  table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
+            "a surface is hidden that lies further behind another, m");
+  table.add("occlusion_margin_px", options.views.occlusion_margin_px, not_negative,
+            "so near to what stands before it a surface is better shown by another view, pixels");
+  table.add("border_px", options.views.border_px, not_negative,
+            "border of each photograph that is not used, pixels");
+  table.add("seam_cost_m", options.labelling.seam_cost_m, not_negative,
+            "larger: fewer seams and larger charts, of views that are not the best");
+  table.add("blend_views", options.blend_views, view_range,
+            "photographs that are blended at a place; 1: one a triangle");
+  table.add("blend_exponent", options.blend_exponent, not_negative,
+            "how much the better of them count for more");
+  table.add("exposure", options.exposure.gains, "even out the brightness of the photographs");
+  table.add("vignetting", options.exposure.vignetting, "even out darkening towards their corners");
+  table.add("max_side_m", options.max_side_m, not_negative,
+            "triangles with longer sides are cut, m; 0: none");
+  table.add("strict", options.strict, "a frame that cannot be used is an error");
+}
+
+TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
+                           const Trajectory& world_from_base, const TextureOptions& options,
+                           Progress& progress) {
+  return Texturing(options, progress).run(mesh, scan, world_from_base);
+}
+
+}  // namespace libmap

@@ -1,0 +1,91 @@
+// The photographs of a scan as a texture's source: where each was taken, how sharp it is, and its
+// pixels when they are needed. Inner part of libmap/mesh.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+#include "libmap/core/pose_graph.h"
+#include "libmap/core/progress.h"
+#include "libmap/scan/scan_source.h"
+
+namespace libmap {
+
+// Points of the world in a photograph.
+class PhotoProjector {
+ public:
+  PhotoProjector(const Camera& camera, const Pose& world_from_camera);
+
+  const Camera& camera() const { return camera_; }
+  const Eigen::Vector3d& position() const { return position_; }  // of the camera, world frame
+  Eigen::Vector3d to_world(const Eigen::Vector3d& direction_in_camera) const {
+    return camera_from_world_.transpose() * direction_in_camera;
+  }
+
+  // Column and row, and z in metres; z is 0 where the camera cannot see such a direction. The pixel
+  // may lie outside the image.
+  Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
+
+ private:
+  Camera camera_;
+  Eigen::Matrix3d camera_from_world_;
+  Eigen::Vector3d position_;
+  bool distorted_ = false;
+  double max_ray_ = 0.0;  // beyond it a lens's polynomial means nothing
+};
+
+// One camera of one frame.
+struct TexturePhoto {
+  int node = 0;
+  std::size_t camera = 0;  // of the frame's cameras
+  PhotoProjector projector;
+  double sharpness = 1.0;  // relative to the median photograph
+};
+
+// Between the centres of pixels; the image goes on as at its border. Bicubic: Keys 1981, a = -1/2.
+Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y);
+Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y);
+
+// How fine the structures of an image are that have contrast at all: the variance of its Laplacian
+// over that of its gradient (both after a blur of one pixel, against noise). Zero for a plain one.
+double sharpness_of(const ColorImage& image);
+
+class TexturePhotos {
+ public:
+  // Reads each frame of `world_from_base` once, by ascending node. Frames without colour, with a
+  // pose that is not finite or that cannot be decoded are skipped and listed; with `strict` they
+  // are an Error. Throws Error if no photograph is left. `scan` must outlive this.
+  TexturePhotos(const ScanSource& scan, const Trajectory& world_from_base, bool strict,
+                Progress& progress);
+
+  std::size_t size() const { return photos_.size(); }
+  const TexturePhoto& operator[](std::size_t photo) const { return photos_[photo]; }
+  const std::vector<std::pair<int, std::string>>& skipped() const { return skipped_; }
+
+  // Decoded anew where memory did not allow to keep it. May be called from several threads.
+  std::shared_ptr<const ColorImage> image(std::size_t photo) const;
+
+ private:
+  struct Frame;
+  Frame read_frame(const TrajectoryPose& pose) const;
+  void keep(std::size_t photo, std::shared_ptr<const ColorImage> image) const;
+
+  const ScanSource& scan_;
+  std::vector<TexturePhoto> photos_;
+  std::vector<std::pair<int, std::string>> skipped_;
+
+  mutable std::mutex mutex_;
+  mutable std::vector<std::shared_ptr<const ColorImage>> images_;
+  mutable std::list<std::size_t> order_;  // of the images that are kept, the oldest first
+  mutable std::size_t kept_bytes_ = 0;
+};
+
+}  // namespace libmap

@@ -1,0 +1,54 @@
+// A depth image thinned to a grid of small planes, to be looked up by rays.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "libmap/cloud/depth_planes.h"
+#include "libmap/core/camera.h"
+
+namespace libmap {
+
+// The surface through one pixel of the grid, in the camera's optical frame.
+struct SurfaceElement {
+  Eigen::Vector3d point = Eigen::Vector3d::Zero();
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // towards the camera
+  double noise_m = 0.0;                              // standard deviation along the normal
+};
+
+class DepthSurface {
+ public:
+  DepthSurface() = default;
+  // Every step_px-th pixel of `planes`. Planes of fewer than a quarter of their disc's pixels, as
+  // at edges, are left out.
+  DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
+               double surface_noise_m, int step_px);
+
+  const Camera& camera() const { return camera_; }
+  int columns() const { return columns_; }
+  int rows() const { return rows_; }
+  // The element at a grid place; false where nothing was measured.
+  bool at(int column, int row, SurfaceElement& element) const;
+  // The element whose pixel lies nearest to where the camera sees `point_in_camera`.
+  bool seen_at(const Eigen::Vector3d& point_in_camera, SurfaceElement& element) const;
+
+ private:
+  struct Cell {
+    float depth_m = 0.0F;       // 0: none
+    std::int16_t normal_x = 0;  // of 32767
+    std::int16_t normal_y = 0;
+    std::uint16_t noise = 0;  // of 1e-6 m
+  };
+  Camera camera_{};
+  int step_px_ = 1;
+  int columns_ = 0;
+  int rows_ = 0;
+  std::vector<Cell> cells_;
+  std::vector<Eigen::Vector2f> rays_;  // of a lens that distorts; else empty
+
+  Eigen::Vector2d ray_at(int column, int row) const;
+};
+
+}  // namespace libmap

@@ -1,0 +1,267 @@
+#include "libmap/poses/features.h"
+
+#include <algorithm>
+#include <cmath>
+#include <memory>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgproc.hpp>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t sift_bytes = 128;
+constexpr std::size_t orb_bytes = 32;
+constexpr double sift_scale = 512.0;  // square-rooted SIFT of unit length in bytes, as in most uses
+
+// OpenCV's SIFT doubles the picture about its corner, not about its first pixel's centre, and
+// halves the places of features again: they lie a quarter of a pixel too far right and down.
+constexpr float sift_offset_px = 0.25F;
+
+std::size_t descriptor_bytes(FeatureType type) {
+  return type == FeatureType::sift ? sift_bytes : orb_bytes;
+}
+
+// OpenCV runs on our threads alone while this lives.
+class SingleThreadedOpenCv {
+ public:
+  SingleThreadedOpenCv() : threads_(cv::getNumThreads()) { cv::setNumThreads(1); }
+  ~SingleThreadedOpenCv() { cv::setNumThreads(threads_); }
+  SingleThreadedOpenCv(const SingleThreadedOpenCv&) = delete;
+  SingleThreadedOpenCv& operator=(const SingleThreadedOpenCv&) = delete;
+
+ private:
+  int threads_;
+};
+
+cv::Mat gray_of(const ColorImage& color) {
+  cv::Mat gray(color.height, color.width, CV_8UC1);
+  for (int y = 0; y < color.height; ++y)
+    for (int x = 0; x < color.width; ++x) {
+      const Color& c = color.at(x, y);
+      // ITU-R BT.601.
+      gray.at<std::uint8_t>(y, x) =
+          static_cast<std::uint8_t>((299 * c[0] + 587 * c[1] + 114 * c[2] + 500) / 1000);
+    }
+  return gray;
+}
+
+void detect(const cv::Mat& gray, const FeatureOptions& options, std::vector<cv::KeyPoint>& points,
+            cv::Mat& descriptors) {
+  if (options.type == FeatureType::sift) {
+    const auto sift = cv::SIFT::create(options.max_features, 3, options.min_contrast, 10, 1.6);
+    sift->detectAndCompute(gray, cv::noArray(), points, descriptors);
+    for (cv::KeyPoint& point : points) {
+      point.pt.x -= sift_offset_px;
+      point.pt.y -= sift_offset_px;
+    }
+  } else {
+    const auto orb =
+        cv::ORB::create(options.max_features, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
+    orb->detectAndCompute(gray, cv::noArray(), points, descriptors);
+  }
+}
+
+void append_descriptor(const cv::Mat& descriptors, int row, FrameFeatures& frame) {
+  if (frame.type == FeatureType::orb) {
+    const auto* bytes = descriptors.ptr<std::uint8_t>(row);
+    frame.descriptors.insert(frame.descriptors.end(), bytes, bytes + orb_bytes);
+    return;
+  }
+  const float* values = descriptors.ptr<float>(row);
+  double sum = 0.0;
+  for (std::size_t n = 0; n < sift_bytes; ++n) sum += static_cast<double>(values[n]);
+  for (std::size_t n = 0; n < sift_bytes; ++n) {
+    const double root =
+        sum > 0.0 ? std::sqrt(std::max(0.0, static_cast<double>(values[n])) / sum) : 0.0;
+    frame.descriptors.push_back(
+        static_cast<std::uint8_t>(std::min(255.0, std::round(root * sift_scale))));
+  }
+}
+
+// The plane at the pixel of a depth camera through which the ray goes, carried to the ray.
+struct DepthAtRay {
+  double depth_m = 0.0;
+  double per_pixel = 0.0;  // how fast the depth changes, m/px
+  int support = 0;
+};
+
+DepthAtRay depth_at(const DepthPlanes& planes, const Camera& camera, const Eigen::Vector2d& ray) {
+  const Eigen::Vector2d pixel = distort_to_pixel(camera, ray);
+  const double x = std::round(pixel.x());
+  const double y = std::round(pixel.y());
+  if (!(x >= 0.0 && y >= 0.0 && x < planes.width && y < planes.height)) return {};
+  const auto n = static_cast<std::size_t>(y) * static_cast<std::size_t>(planes.width) +
+                 static_cast<std::size_t>(x);
+  if (planes.support[n] < 4) return {};
+  const auto centre = pixel_to_ray(camera, Eigen::Vector2d(x, y));
+  if (!centre) return {};
+  const Eigen::Vector3d normal = planes.normals[n].cast<double>();
+  const double depth = static_cast<double>(planes.depth_m[n]);
+  const double facing = normal.dot(ray.homogeneous());
+  if (!(facing < 0.0)) return {};
+  DepthAtRay result;
+  result.depth_m = depth * normal.dot(centre->homogeneous()) / facing;
+  result.per_pixel = result.depth_m / std::abs(facing) *
+                     std::hypot(normal.x() / camera.fx, normal.y() / camera.fy);
+  result.support = planes.support[n];
+  return result;
+}
+
+void require_range(double value, const Range& range, const char* field) {
+  const bool low = range.min_open ? value > range.min : value >= range.min;
+  if (low && value <= range.max && std::isfinite(value)) return;
+  throw Error("features cannot be found so",
+              {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
+}
+
+void check(const FeatureOptions& options) {
+  require_range(options.max_features, {1, 100000}, "max_features");
+  require_range(options.min_contrast, positive, "min_contrast");
+  require_range(options.pixel_noise_px, positive, "pixel_noise_px");
+  require_range(options.scale_noise, not_negative, "scale_noise");
+  require_range(options.surface_noise_m, not_negative, "surface_noise_m");
+  require_range(options.surface_step_px, {1, 32}, "surface_step_px");
+  require_range(options.planes.min_depth_m, positive, "min_depth_m");
+  require_range(options.planes.max_depth_m, {options.planes.min_depth_m, positive.max, true, false},
+                "max_depth_m");
+}
+
+FrameFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
+                          PixelRayCache& rays) {
+  const RgbdFrame read = scan.read_frame(node);
+  if (read.depth.empty()) throw Error("has no depth");
+  FrameFeatures frame;
+  frame.node = node;
+  frame.type = options.type;
+  for (const CameraView& view : camera_views(read)) {
+    frame.cameras.push_back(view.color_camera);
+    const DepthPlanes planes =
+        fit_depth_planes(view.depth, *rays.rays_of(view.depth_camera), options.planes);
+    frame.surfaces.emplace_back(planes, view.depth_camera, options.planes.noise,
+                                options.surface_noise_m, options.surface_step_px);
+    if (!view.color.empty()) add_features(view, planes, options, frame);
+  }
+  return frame;
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, FeatureOptions& options) {
+  table.add("features", options.type, {{"sift", FeatureType::sift}, {"orb", FeatureType::orb}},
+            "kind of features");
+  table.add("max_features", options.max_features, {1, 100000}, "features a picture, at most");
+  table.add("min_contrast", options.min_contrast, positive,
+            "least contrast of a SIFT feature, of 1");
+  table.add("pixel_noise_px", options.pixel_noise_px, positive,
+            "standard deviation of a feature's place at the finest scale");
+  table.add("scale_noise", options.scale_noise, not_negative,
+            "what each pixel of a feature's size adds to that, px a px");
+  table.add("surface_noise_m", options.surface_noise_m, not_negative,
+            "standard deviation of fitted depth that more pixels do not lessen");
+  table.add("surface_step_px", options.surface_step_px, {1, 32},
+            "step of the grid to which depth images are thinned");
+  table.add("min_depth_m", options.planes.min_depth_m, positive, "nearer depths are left out");
+  table.add("max_depth_m", options.planes.max_depth_m, positive, "farther depths are left out");
+  table.add("axial_noise_m", options.planes.noise.axial_m, positive,
+            "standard deviation of depth at range 0");
+  table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
+            "what each metre of range adds to it, m a m");
+}
+
+Eigen::Vector3d FrameFeatures::point_in_camera(std::size_t n) const {
+  return static_cast<double>(features[n].depth_m) * features[n].ray.cast<double>().homogeneous();
+}
+
+Eigen::Vector3d FrameFeatures::point_in_base(std::size_t n) const {
+  return cameras[features[n].camera].base_from_camera * point_in_camera(n);
+}
+
+void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
+                  FrameFeatures& frame) {
+  std::vector<cv::KeyPoint> points;
+  cv::Mat descriptors;
+  detect(gray_of(view.color), options, points, descriptors);
+  const auto camera = static_cast<std::uint16_t>(frame.cameras.size() - 1);
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const auto ray = pixel_to_ray(
+        view.color_camera,
+        Eigen::Vector2d(static_cast<double>(points[n].pt.x), static_cast<double>(points[n].pt.y)));
+    if (!ray) continue;
+    const DepthAtRay depth = depth_at(planes, view.depth_camera, *ray);
+    if (!(depth.depth_m > 0.0)) {
+      ++frame.without_depth;
+      continue;
+    }
+    const double pixel_noise = std::hypot(
+        options.pixel_noise_px, options.scale_noise * static_cast<double>(points[n].size));
+    const double axial = options.planes.noise.axial_at(depth.depth_m) /
+                         std::sqrt(static_cast<double>(depth.support));
+    Feature feature;
+    feature.ray = ray->cast<float>();
+    feature.depth_m = static_cast<float>(depth.depth_m);
+    feature.depth_noise_m = static_cast<float>(
+        std::sqrt(axial * axial + options.surface_noise_m * options.surface_noise_m +
+                  depth.per_pixel * depth.per_pixel * pixel_noise * pixel_noise));
+    feature.pixel_noise_px = static_cast<float>(pixel_noise);
+    feature.camera = camera;
+    frame.features.push_back(feature);
+    append_descriptor(descriptors, static_cast<int>(n), frame);
+  }
+}
+
+FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
+                            const FeatureOptions& options, Progress& progress) {
+  check(options);
+  const SingleThreadedOpenCv single;
+  std::vector<FrameFeatures> frames(nodes.size());
+  std::vector<std::string> faults(nodes.size());
+  PixelRayCache rays;
+  progress.begin("features", nodes.size());
+  parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      try {
+        frames[n] = features_of(scan, nodes[n], options, rays);
+      } catch (const Error& error) {
+        faults[n] = error.what();
+      }
+      progress.advance(1);
+    }
+  });
+  progress.end();
+  FeatureResult result;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    if (faults[n].empty())
+      result.frames.push_back(std::move(frames[n]));
+    else
+      result.skipped.emplace_back(nodes[n], faults[n]);
+  }
+  return result;
+}
+
+Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame) {
+  const std::size_t bytes = descriptor_bytes(frame.type);
+  const auto count = static_cast<Eigen::Index>(frame.features.size());
+  if (frame.type == FeatureType::sift) {
+    Eigen::MatrixXf vectors =
+        Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic>>(
+            frame.descriptors.data(), static_cast<Eigen::Index>(bytes), count)
+            .cast<float>();
+    vectors.colwise().normalize();
+    return vectors;
+  }
+  Eigen::MatrixXf vectors(8 * static_cast<Eigen::Index>(bytes), count);
+  for (Eigen::Index n = 0; n < count; ++n)
+    for (Eigen::Index bit = 0; bit < vectors.rows(); ++bit) {
+      const std::uint8_t byte =
+          frame
+              .descriptors[static_cast<std::size_t>(n) * bytes + static_cast<std::size_t>(bit / 8)];
+      vectors(bit, n) = ((byte >> (bit % 8)) & 1) != 0 ? 0.0625F : -0.0625F;
+    }
+  return vectors;
+}
+
+}  // namespace libmap

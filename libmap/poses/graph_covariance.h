@@ -1,0 +1,45 @@
+// How certain the poses of a graph are, from the information of its links at the optimum.
+#pragma once
+
+#include <cstddef>
+#include <map>
+#include <memory>
+#include <vector>
+
+#include "libmap/poses/block_system.h"
+#include "libmap/poses/pose_graph_optimization.h"
+
+namespace libmap {
+
+// For one thread at a time.
+class GraphCovariance {
+ public:
+  // Links that were rejected do not count; others do by their weight. Components are bound at their
+  // gauge nodes.
+  explicit GraphCovariance(const PoseGraphResult& graph);
+  // Of any system whose blocks are those of `nodes`, in their order, of which the first of each
+  // component is held.
+  GraphCovariance(const std::map<int, Pose>& map_from_base, const BlockSystem& information,
+                  const std::vector<GraphComponent>& components);
+  ~GraphCovariance();
+  GraphCovariance(const GraphCovariance&) = delete;
+  GraphCovariance& operator=(const GraphCovariance&) = delete;
+
+  bool valid() const;
+  bool connected(int a, int b) const;
+  // Of a step of the node's pose against the gauge node of its component.
+  Matrix6d of_node(int node) const;
+  // Of a step of a_from_b, for each b of `nodes` that is connected with a.
+  std::vector<Matrix6d> of_relative(int a, const std::vector<int>& nodes) const;
+
+ private:
+  struct Parts;
+  std::unique_ptr<Parts> parts_;
+};
+
+// The information of links between poses as a system over `map_from_base`'s nodes, in their order,
+// and its right-hand side: minus the gradient of half the weighted squares.
+BlockSystem link_system(const std::map<int, Pose>& map_from_base,
+                        const std::vector<GraphLinkResult>& links);
+
+}  // namespace libmap

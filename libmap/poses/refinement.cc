@@ -1,0 +1,401 @@
+#include "libmap/poses/refinement.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/poses/graph_covariance.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr int invalid_weight = -9;
+constexpr const char* feature_group = "features";
+
+// Of a scan that has poses and no links, such as a folder of images: links from pose to pose within
+// each session, with deviations that recalibration is to find.
+std::vector<GraphLink> links_of_odometry(const PoseGraph& graph) {
+  std::vector<GraphLink> links;
+  const GraphNode* last = nullptr;
+  for (const GraphNode& node : graph.nodes) {
+    if (!node.odometry_from_base || node.weight == invalid_weight) continue;
+    if (last != nullptr && last->session == node.session) {
+      PoseLink link{last->id,
+                    node.id,
+                    LinkType::neighbor,
+                    last->odometry_from_base->inverse() * *node.odometry_from_base,
+                    {}};
+      const double shift = 0.002 + 0.02 * link.from_from_to.translation().norm();
+      const double turn = 0.01;
+      Vector6d weights;
+      weights << Eigen::Vector3d::Constant(1.0 / (shift * shift)),
+          Eigen::Vector3d::Constant(1.0 / (turn * turn));
+      link.information = weights.asDiagonal();
+      links.push_back({link, "odometry", false});
+    }
+    last = &node;
+  }
+  return links;
+}
+
+class Refinement {
+ public:
+  Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress)
+      : scan_(scan), options_(options), progress_(progress) {
+    truth_ = trajectory_of(scan.graph(), PoseSource::ground_truth);
+  }
+  RefinementResult run();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void start();
+  void find_frames();
+  bool round(int number);
+  std::vector<FramePair> candidates(int number);
+  PoseGraphResult optimized(const std::vector<FeatureLink>& links) const;
+  void join_new(const std::vector<FeatureLink>& links);
+  void bundle();
+  void free_intrinsics();
+  void icp();
+  void finish();
+  Trajectory trajectory(const std::map<int, Pose>& poses) const;
+  void close(StageReport stage);
+  // Compares poses with those before; true if they are worse.
+  bool judge(StageReport& stage, const std::map<int, Pose>& before,
+             const std::map<int, Pose>& after) const;
+  std::optional<StageError> error_of(const std::map<int, Pose>& poses) const;
+
+  const ScanSource& scan_;
+  const RefinementOptions& options_;
+  Progress& progress_;
+  Trajectory truth_;
+  Clock::time_point stage_begin_ = Clock::now();
+  RefinementResult result_;
+  std::map<int, Pose> poses_;
+  std::vector<std::vector<int>> parts_;
+  std::vector<FrameFeatures> frames_;
+  std::vector<GraphLink> stored_;
+  std::vector<FeatureLink> links_;
+  std::set<FramePair> tried_;
+  PoseGraphResult graph_;
+  BlockSystem information_{0};
+};
+
+Trajectory Refinement::trajectory(const std::map<int, Pose>& poses) const {
+  Trajectory trajectory;
+  for (const auto& [node, pose] : poses)
+    if (const GraphNode* known = node > 0 ? scan_.graph().find_node(node) : nullptr)
+      trajectory.push_back({node, known->stamp_s, pose});
+  return trajectory;
+}
+
+std::optional<StageError> Refinement::error_of(const std::map<int, Pose>& poses) const {
+  if (truth_.empty()) return std::nullopt;
+  try {
+    const Trajectory estimate = trajectory(poses);
+    return StageError{absolute_trajectory_error(estimate, truth_),
+                      relative_trajectory_error(estimate, truth_)};
+  } catch (const Error&) {
+    return std::nullopt;  // fewer than three poses in common
+  }
+}
+
+bool Refinement::judge(StageReport& stage, const std::map<int, Pose>& before,
+                       const std::map<int, Pose>& after) const {
+  stage.held_out = compare_held_out(held_out_costs(frames_, links_, before),
+                                    held_out_costs(frames_, links_, after));
+  stage.undone = stage.held_out.is_worse();
+  if (stage.undone) stage.undone_error = error_of(after);
+  return stage.undone;
+}
+
+void Refinement::close(StageReport stage) {
+  const auto now = Clock::now();
+  stage.seconds = std::chrono::duration<double>(now - stage_begin_).count();
+  stage_begin_ = now;
+  stage.error = error_of(poses_);
+  result_.stages.push_back(std::move(stage));
+}
+
+void Refinement::start() {
+  InitialPoses initial = initial_poses(scan_.graph(), options_.start);
+  poses_ = std::move(initial.map_from_base);
+  parts_ = std::move(initial.parts);
+  result_.without_pose = std::move(initial.without_pose);
+  stored_ = stored_links(scan_.graph());
+  if (stored_.empty()) stored_ = links_of_odometry(scan_.graph());
+  if (!result_.without_pose.empty())
+    result_.warnings.push_back(std::to_string(result_.without_pose.size()) +
+                               " nodes have no pose, by odometry or by links: they are left out");
+  StageReport stage;
+  stage.name = "start: " + initial.source;
+  close(std::move(stage));
+}
+
+void Refinement::find_frames() {
+  std::vector<int> nodes;
+  for (const auto& [node, pose] : poses_) nodes.push_back(node);
+  FeatureResult found = find_features(scan_, nodes, options_.features, progress_);
+  frames_ = std::move(found.frames);
+  result_.skipped = std::move(found.skipped);
+  std::size_t without_depth = 0;
+  for (const FrameFeatures& frame : frames_) {
+    result_.features += frame.features.size();
+    without_depth += frame.without_depth;
+  }
+  StageReport stage;
+  stage.name = "features";
+  stage.figures = {{"frames", static_cast<double>(frames_.size())},
+                   {"features", static_cast<double>(result_.features)},
+                   {"without_depth", static_cast<double>(without_depth)}};
+  close(std::move(stage));
+}
+
+// First frames that follow each other: they say how good the odometry is. Then what looks alike,
+// then what is near by the poses of the last round.
+std::vector<FramePair> Refinement::candidates(int number) {
+  std::set<FramePair> pairs;
+  if (number == 0) {
+    pairs = consecutive_pairs(frames_, options_.closures.neighbors);
+  } else {
+    pairs = near_pairs(frames_, poses_, graph_.components, options_.closures);
+    if (number == 1) pairs.merge(similar_pairs(frames_, options_.closures, options_.seed));
+  }
+  std::vector<FramePair> fresh;
+  for (const FramePair& pair : pairs)
+    if (tried_.insert(pair).second) fresh.push_back(pair);
+  return fresh;
+}
+
+PoseGraphResult Refinement::optimized(const std::vector<FeatureLink>& links) const {
+  std::vector<GraphLink> all = stored_;
+  for (const FeatureLink& link : links) all.push_back({link.link, feature_group, true});
+  return optimize_pose_graph(poses_, all, options_.graph);
+}
+
+// Parts that closures connect get into one frame before the graph is optimised.
+void Refinement::join_new(const std::vector<FeatureLink>& links) {
+  if (parts_.size() < 2) return;
+  std::vector<PoseLink> between;
+  for (const FeatureLink& link : links) between.push_back(link.link);
+  parts_ = join_parts(poses_, parts_, between);
+}
+
+// False if there was nothing new to try.
+bool Refinement::round(int number) {
+  const std::vector<FramePair> pairs = candidates(number);
+  if (pairs.empty()) return false;
+  StageReport stage;
+  stage.name = number == 0 ? "neighbours" : "closures " + std::to_string(number);
+  PairVerification verified =
+      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_);
+  stage.closures = verified.counts;
+  check_against_graph(verified.links, graph_, options_.closures, stage.closures);
+  const std::size_t before = links_.size();
+  const std::map<int, Pose> poses_before = poses_;
+  const auto parts_before = parts_;
+  links_.insert(links_.end(), verified.links.begin(), verified.links.end());
+  join_new(verified.links);
+  PoseGraphResult graph = optimized(links_);
+  stage.groups = graph.groups;
+  if (judge(stage, poses_before, graph.map_from_base)) {
+    links_.resize(before);
+    poses_ = poses_before;
+    parts_ = parts_before;
+  } else {
+    // Those that the optimisation has rejected do not come back.
+    std::vector<FeatureLink> kept;
+    for (std::size_t n = 0; n < links_.size(); ++n)
+      if (!graph.links[stored_.size() + n].rejected) kept.push_back(links_[n]);
+    stage.figures.emplace_back("rejected_by_optimization",
+                               static_cast<double>(links_.size() - kept.size()));
+    std::vector<GraphLinkResult> results(
+        graph.links.begin(), graph.links.begin() + static_cast<std::ptrdiff_t>(stored_.size()));
+    for (std::size_t n = stored_.size(); n < graph.links.size(); ++n)
+      if (!graph.links[n].rejected) results.push_back(graph.links[n]);
+    graph.links = std::move(results);
+    links_ = std::move(kept);
+    poses_ = graph.map_from_base;
+    graph_ = std::move(graph);
+  }
+  close(std::move(stage));
+  return true;
+}
+
+std::vector<GraphLinkResult> without_features(const std::vector<GraphLinkResult>& links,
+                                              std::size_t stored) {
+  return {links.begin(), links.begin() + static_cast<std::ptrdiff_t>(stored)};
+}
+
+void Refinement::bundle() {
+  StageReport stage;
+  stage.name = "bundle adjustment";
+  const FeatureTracks tracks = build_tracks(frames_, links_);
+  BundleAdjustmentResult adjusted =
+      adjust_bundle(frames_, tracks.tracks, poses_, without_features(graph_.links, stored_.size()),
+                    graph_.components, options_.bundle_adjustment);
+  judge(stage, poses_, adjusted.map_from_base);
+  stage.undone = stage.undone || !adjusted.converged;
+  stage.figures = {{"tracks", static_cast<double>(adjusted.tracks)},
+                   {"observations", static_cast<double>(adjusted.observations)},
+                   {"conflicts", static_cast<double>(tracks.conflicts)},
+                   {"outliers", static_cast<double>(adjusted.outliers)},
+                   {"iterations", static_cast<double>(adjusted.iterations)},
+                   {"initial_cost", adjusted.initial_cost},
+                   {"final_cost", adjusted.final_cost},
+                   {"reprojection_rms_px", adjusted.reprojection_rms_px},
+                   {"depth_rms_m", adjusted.depth_rms_m}};
+  if (!stage.undone) {
+    poses_ = std::move(adjusted.map_from_base);
+    information_ = std::move(adjusted.information);
+  }
+  close(std::move(stage));
+}
+
+// The same with the intrinsics free. What the camera's file says is kept unless the held-out
+// matches speak against it: the pictures of RTAB-Map's own thinning, for one, are a fraction of a
+// pixel off.
+void Refinement::free_intrinsics() {
+  StageReport stage;
+  stage.name = "intrinsics";
+  const FeatureTracks tracks = build_tracks(frames_, links_);
+  BundleAdjustmentOptions options = options_.bundle_adjustment;
+  options.refine_intrinsics = true;
+  BundleAdjustmentResult adjusted =
+      adjust_bundle(frames_, tracks.tracks, poses_, without_features(graph_.links, stored_.size()),
+                    graph_.components, options);
+  const std::vector<double> before = held_out_costs(frames_, links_, poses_);
+  std::vector<IntrinsicsStep> back;
+  for (const IntrinsicsStep& step : adjusted.intrinsics)
+    back.push_back({1.0 / (1.0 + step.fx_share) - 1.0, 1.0 / (1.0 + step.fy_share) - 1.0,
+                    -step.cx_px, -step.cy_px});
+  for (FrameFeatures& frame : frames_) move_intrinsics(frame, adjusted.intrinsics);
+  stage.held_out =
+      compare_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
+  for (std::size_t n = 0; n < adjusted.intrinsics.size(); ++n) {
+    const IntrinsicsStep& step = adjusted.intrinsics[n];
+    const std::string camera = "camera_" + std::to_string(n) + "_";
+    stage.figures.emplace_back(camera + "fx_share", step.fx_share);
+    stage.figures.emplace_back(camera + "fy_share", step.fy_share);
+    stage.figures.emplace_back(camera + "cx_px", step.cx_px);
+    stage.figures.emplace_back(camera + "cy_px", step.cy_px);
+  }
+  stage.undone = !adjusted.converged ||
+                 (options_.intrinsics == IntrinsicsMode::automatic ? !stage.held_out.is_better()
+                                                                   : stage.held_out.is_worse());
+  if (stage.undone) {
+    stage.undone_error = error_of(adjusted.map_from_base);
+    for (FrameFeatures& frame : frames_) move_intrinsics(frame, back);
+  } else {
+    poses_ = std::move(adjusted.map_from_base);
+    information_ = std::move(adjusted.information);
+    result_.intrinsics = std::move(adjusted.intrinsics);
+  }
+  close(std::move(stage));
+}
+
+void Refinement::icp() {
+  StageReport stage;
+  stage.name = options_.icp.mode == IcpMode::links ? "surfaces of links" : "surfaces";
+  std::vector<PoseLink> links;
+  for (const GraphLinkResult& link : graph_.links)
+    if (!link.rejected) links.push_back(link.link);
+  IcpResult aligned = align_surfaces(frames_, poses_, information_, graph_.components, links,
+                                     options_.icp, progress_);
+  judge(stage, poses_, aligned.map_from_base);
+  stage.figures = {{"pairs", static_cast<double>(aligned.pairs)},
+                   {"samples", static_cast<double>(aligned.samples)},
+                   {"degenerate_directions", static_cast<double>(aligned.degenerate_directions)},
+                   {"iterations", static_cast<double>(aligned.iterations)},
+                   {"initial_rms_m", aligned.initial_rms_m},
+                   {"final_rms_m", aligned.final_rms_m}};
+  if (!stage.undone) {
+    poses_ = std::move(aligned.map_from_base);
+    information_ = std::move(aligned.information);
+  }
+  close(std::move(stage));
+}
+
+void Refinement::finish() {
+  result_.poses = trajectory(poses_);
+  for (std::size_t n = 0; n < graph_.links.size(); ++n) {
+    const GraphLinkResult& link = graph_.links[n];
+    if (link.rejected) {
+      result_.rejected_links.push_back(link.link);
+      continue;
+    }
+    result_.links.push_back(link.link);
+    if (n >= stored_.size()) result_.closures.push_back(link.link);
+  }
+  result_.components = graph_.components;
+  result_.without_links = graph_.without_links;
+  const GraphCovariance covariance(poses_, information_, graph_.components);
+  if (covariance.valid())
+    for (const auto& [node, pose] : poses_)
+      if (node > 0) result_.covariance[node] = covariance.of_node(node);
+  if (result_.components.size() > 1)
+    result_.warnings.push_back(
+        "the scan is in " + std::to_string(result_.components.size()) +
+        " parts that no link joins: their poses say nothing about each other");
+}
+
+RefinementResult Refinement::run() {
+  start();
+  find_frames();
+  // The parts of stored odometry and links, at the poses of the start: closures are checked
+  // against it.
+  PoseGraphOptions as_stored = options_.graph;
+  as_stored.recalibrate = false;
+  graph_ = optimize_pose_graph(poses_, stored_, as_stored);
+  for (int number = 0; number <= options_.rounds; ++number)
+    if (!round(number) && number > 0) break;
+  information_ = link_system(poses_, graph_.links);
+  if (links_.empty()) {
+    result_.warnings.push_back(
+        "no two frames could be matched by features: the poses rest on the stored links alone");
+  } else {
+    if (options_.bundle) bundle();
+    if (options_.bundle && options_.intrinsics != IntrinsicsMode::fixed) free_intrinsics();
+    if (options_.icp.mode != IcpMode::off) icp();
+  }
+  finish();
+  return std::move(result_);
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, RefinementOptions& options) {
+  table.add("start", options.start,
+            {{"auto", StartPoses::automatic},
+             {"odometry", StartPoses::odometry},
+             {"stored", StartPoses::stored}},
+            "poses that the work starts from");
+  table.add("rounds", options.rounds, not_negative,
+            "of loop closures, each on the poses of the last, at most");
+  bind(table, options.features);
+  bind(table, options.closures);
+  bind(table, options.graph);
+  table.add("bundle", options.bundle, "adjust poses and points together");
+  table.add("intrinsics", options.intrinsics,
+            {{"fixed", IntrinsicsMode::fixed},
+             {"refined", IntrinsicsMode::refined},
+             {"auto", IntrinsicsMode::automatic}},
+            "focal length and principal point: as stored, or estimated; auto: estimated where the "
+            "held-out matches fit better then");
+  bind(table, options.bundle_adjustment);
+  bind(table, options.icp);
+  table.add("seed", options.seed, not_negative, "of all that is random");
+}
+
+RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options,
+                              Progress& progress) {
+  return Refinement(scan, options, progress).run();
+}
+
+}  // namespace libmap

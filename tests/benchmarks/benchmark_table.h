@@ -1,0 +1,72 @@
+// What the benchmarks of scoring share: timing with repetitions, and a table of the whole run.
+#pragma once
+
+#include <benchmark/benchmark.h>
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdlib>
+#include <ctime>
+#include <filesystem>
+#include <limits>
+#include <optional>
+#include <vector>
+
+namespace graspmap_bench {
+
+// Seconds on the clock, and the least processor time of all threads and finished children: what the
+// code costs where the machine has other work too.
+struct Times {
+  std::vector<double> seconds;
+  double processor_s = std::numeric_limits<double>::infinity();
+
+  double least() const { return *std::min_element(seconds.begin(), seconds.end()); }
+  double median() const {
+    std::vector<double> sorted = seconds;
+    std::sort(sorted.begin(), sorted.end());
+    return sorted[sorted.size() / 2];
+  }
+};
+
+inline double processor_seconds() {
+  timespec own{};
+  clock_gettime(CLOCK_PROCESS_CPUTIME_ID, &own);
+  rusage children{};
+  getrusage(RUSAGE_CHILDREN, &children);
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return static_cast<double>(own.tv_sec) + 1e-9 * static_cast<double>(own.tv_nsec) +
+         seconds(children.ru_utime) + seconds(children.ru_stime);
+}
+
+template <typename Work>
+void time_once(const Work& work, Times& times) {
+  const double processor_start = processor_seconds();
+  const auto start = std::chrono::steady_clock::now();
+  work();
+  times.seconds.push_back(
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count());
+  times.processor_s = std::min(times.processor_s, processor_seconds() - processor_start);
+}
+
+// Runs the benchmark's iterations and leaves the counters min_ms, median_ms and processor_ms.
+template <typename Work>
+Times time_iterations(benchmark::State& state, const Work& work) {
+  Times times;
+  for (auto _ : state) time_once(work, times);
+  state.counters["min_ms"] = 1e3 * times.least();
+  state.counters["median_ms"] = 1e3 * times.median();
+  state.counters["processor_ms"] = 1e3 * times.processor_s;
+  return times;
+}
+
+// The folder that the environment names, if it does.
+inline std::optional<std::filesystem::path> folder_of(const char* variable) {
+  const char* const value = std::getenv(variable);
+  if (value == nullptr || *value == '\0') return std::nullopt;
+  return value;
+}
+
+}  // namespace graspmap_bench

@@ -1,0 +1,63 @@
+#include "libmap/cloud/point_tree.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "tests/support/test_support.h"
+
+namespace libmap {
+namespace {
+
+using graspmap_test::uniform;
+
+std::vector<Eigen::Vector3d> random_points(int count) {
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < count; ++n)
+    points.emplace_back(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+  return points;
+}
+
+TEST(PointTree, AgreesWithASearchOfAllPoints) {
+  const std::vector<Eigen::Vector3d> points = random_points(500);
+  const PointTree tree(points);
+  for (const Eigen::Vector3d& at : random_points(50)) {
+    std::vector<std::pair<double, std::size_t>> all;
+    for (std::size_t n = 0; n < points.size(); ++n)
+      all.emplace_back((points[n] - at).squaredNorm(), n);
+    std::sort(all.begin(), all.end());
+    EXPECT_EQ(tree.nearest(at).index, all[0].second);
+    const std::vector<NeighborPoint> seven = tree.nearest(at, 7);
+    ASSERT_EQ(seven.size(), 7U);
+    for (std::size_t n = 0; n < 7; ++n) EXPECT_NEAR(seven[n].square_m2, all[n].first, 1e-15);
+    std::vector<std::size_t> near;
+    for (const auto& [square, n] : all)
+      if (square <= 0.09) near.push_back(n);
+    std::sort(near.begin(), near.end());
+    const std::vector<NeighborPoint> found = tree.within(at, 0.3);
+    ASSERT_EQ(found.size(), near.size());
+    for (std::size_t n = 0; n < near.size(); ++n) EXPECT_EQ(found[n].index, near[n]);
+  }
+}
+
+TEST(PointTree, AsksForMoreThanThereIs) {
+  const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {1, 0, 0}};
+  EXPECT_EQ(PointTree(points).nearest({0.2, 0, 0}, 9).size(), 2U);
+  EXPECT_EQ(PointTree(points).within({0, 0, 0}, 1.0).size(), 2U) << "the radius itself counts";
+  const std::vector<Eigen::Vector3d> none;
+  EXPECT_TRUE(PointTree(none).nearest({0, 0, 0}, 3).empty());
+  EXPECT_TRUE(PointTree(none).within({0, 0, 0}, 3).empty());
+}
+
+TEST(PointTree, SpacingOfALattice) {
+  std::vector<Eigen::Vector3d> points;
+  for (int x = 0; x < 150; ++x)
+    for (int y = 0; y < 150; ++y) points.emplace_back(0.01 * x, 0.02 * y, 5.0);
+  EXPECT_NEAR(median_spacing(points), 0.01, 1e-12);
+  EXPECT_EQ(median_spacing({{1, 2, 3}}), 0.0);
+  EXPECT_EQ(median_spacing({}), 0.0);
+}
+
+}  // namespace
+}  // namespace libmap

@@ -1,0 +1,131 @@
+#include "tools/placement.h"
+
+#include <cmath>
+#include <filesystem>
+#include <numbers>
+#include <string_view>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/text_lines.h"
+
+namespace graspmap_tools {
+
+namespace fs = std::filesystem;
+
+std::vector<double> parse_numbers(const std::string& text, std::size_t count,
+                                  const std::string& field, const std::string& bound) {
+  std::vector<double> numbers;
+  std::string_view rest = text;
+  while (true) {
+    const std::size_t comma = rest.find(',');
+    const auto number = libmap::parse_double(rest.substr(0, comma));
+    if (!number || !std::isfinite(*number)) break;
+    numbers.push_back(*number);
+    if (comma == std::string_view::npos) {
+      if (numbers.size() == count) return numbers;
+      break;
+    }
+    rest = rest.substr(comma + 1);
+  }
+  throw libmap::Error("not " + std::to_string(count) + " numbers",
+                      {.file = {}, .field = field, .value = text, .bound = bound});
+}
+
+namespace {
+
+libmap::Pose read_matrix(const fs::path& path) {
+  const std::string file = path.string();
+  const std::string text = libmap::read_whole_file(path, std::uint64_t{1} << 16U);
+  Eigen::Matrix4d matrix;
+  Eigen::Index row = 0;
+  for (const libmap::TextLine& line : libmap::split_lines(text)) {
+    if (libmap::is_comment(line)) continue;
+    if (row == 4 || line.words.size() != 4)
+      throw libmap::Error("no transform", {.file = file,
+                                           .field = libmap::name_of(line),
+                                           .value = {},
+                                           .bound = "four rows of four numbers"});
+    const std::vector<double> numbers = libmap::numbers_of(line, 0, 4, file);
+    for (Eigen::Index column = 0; column < 4; ++column)
+      matrix(row, column) = numbers[static_cast<std::size_t>(column)];
+    ++row;
+  }
+  if (row != 4)
+    throw libmap::Error("no transform", {.file = file,
+                                         .field = "rows",
+                                         .value = std::to_string(row),
+                                         .bound = "four rows of four numbers"});
+  constexpr double tolerance = 1e-3;
+  const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
+  if (!(rotation.transpose() * rotation).isApprox(Eigen::Matrix3d::Identity(), tolerance) ||
+      !(rotation.determinant() > 0.0) || matrix.row(3) != Eigen::RowVector4d(0, 0, 0, 1))
+    throw libmap::Error("the matrix is no rotation and translation", {.file = file});
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.linear() = libmap::nearest_rotation(rotation);
+  pose.translation() = matrix.topRightCorner<3, 1>();
+  return pose;
+}
+
+}  // namespace
+
+libmap::Pose parse_transform(const std::string& text, const std::string& field) {
+  if (text.empty()) return libmap::Pose::Identity();
+  if (fs::exists(text)) return read_matrix(text);
+  const std::vector<double> n = parse_numbers(
+      text, 6, field, "X,Y,Z,ROLL,PITCH,YAW in metres and degrees, or a file of a 4 x 4 matrix");
+  return libmap::make_pose_from_rpy({n[0], n[1], n[2]}, {n[3], n[4], n[5]});
+}
+
+std::string transform_text(const libmap::Pose& pose) {
+  // Rz(yaw) Ry(pitch) Rx(roll).
+  const Eigen::Matrix3d& r = pose.matrix().topLeftCorner<3, 3>();
+  const double pitch = std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2)));
+  const bool upright = std::hypot(r(2, 1), r(2, 2)) < 1e-9;
+  const double roll = upright ? 0.0 : std::atan2(r(2, 1), r(2, 2));
+  const double yaw = upright ? std::atan2(-r(0, 1), r(1, 1)) : std::atan2(r(1, 0), r(0, 0));
+  std::string text;
+  const auto add = [&](double value, int decimals) {
+    const std::string number = libmap::to_fixed_text(value, decimals);
+    // No sign before what rounds to zero.
+    text += (number.find_first_of("123456789") == std::string::npos
+                 ? libmap::to_fixed_text(0.0, decimals)
+                 : number) +
+            ",";
+  };
+  for (const double length : pose.translation()) add(length, 7);
+  for (const double angle : {roll, pitch, yaw}) add(angle * 180.0 / std::numbers::pi, 6);
+  text.pop_back();
+  return text;
+}
+
+std::optional<libmap::Bounds3d> parse_box(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const char* bound = "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX in metres";
+  const std::vector<double> n = parse_numbers(text, 6, "--box", bound);
+  const libmap::Bounds3d box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
+  if ((box.min.array() > box.max.array()).any())
+    throw libmap::Error("the box is inside out",
+                        {.file = {}, .field = "--box", .value = text, .bound = bound});
+  return box;
+}
+
+bool is_inside(const std::optional<libmap::Bounds3d>& box, const Eigen::Vector3d& point) {
+  return !box ||
+         ((point.array() >= box->min.array()).all() && (point.array() <= box->max.array()).all());
+}
+
+libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
+                               const std::optional<libmap::Bounds3d>& box,
+                               const std::string& file) {
+  std::vector<std::size_t> inside;
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (is_inside(box, cloud.positions[n])) inside.push_back(n);
+  if (inside.empty())
+    throw libmap::Error(cloud.empty() ? "the cloud has no points" : "no point lies in the box",
+                        {.file = file});
+  return libmap::select_points(cloud, inside);
+}
+
+}  // namespace graspmap_tools

@@ -1,0 +1,37 @@
+// A scan and the poses at which its frames were, as commands take them: SCAN and `--poses`.
+#pragma once
+
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "libmap/core/pose_graph.h"
+#include "libmap/scan/scan_source.h"
+#include "tools/command_line.h"
+#include "tools/run.h"
+
+namespace graspmap_tools {
+
+// --poses auto|odometry|stored|ground-truth|FILE. auto: the first of stored, odometry and
+// ground-truth that the scan has; FILE: .tum, .kitti, .g2o.
+void add_poses_option(Command& command, std::string& poses);
+
+// The files among the two, for Run::claim_output.
+std::vector<std::string> scan_inputs(const std::string& scan, const std::string& poses);
+
+// Opens a scan; what it had to leave out is a warning, an Error if `strict`.
+std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run);
+
+// The poses that `poses` names, by ascending node; "auto" becomes the source that was taken. Says
+// so, and keeps it in the manifest. Nodes without a pose are a warning, an Error if `strict`.
+// Throws Error if there are no such poses.
+libmap::Trajectory find_poses(const libmap::ScanSource& scan, std::string& poses, bool strict,
+                              Run& run);
+
+// The rigid transform that aligns `poses` with the scan's true ones; the identity where they are
+// those. Says how well, and keeps it in the manifest as ground_truth_from_poses. Throws Error if
+// the scan has no ground truth.
+libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
+                              const std::string& poses_name, Run& run);
+
+}  // namespace graspmap_tools

@@ -1,0 +1,299 @@
+// graspmap spot-check: how far the ground along the edges of a site lies from where it is.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iostream>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/ground_plane.h"
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/table.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/spot_check.h"
+#include "libmap/mesh/surface_distance.h"
+#include "tools/command_line.h"
+#include "tools/map_frame.h"
+#include "tools/placement.h"
+
+namespace {
+
+using graspmap_tools::Run;
+using Json = nlohmann::ordered_json;
+
+// "Graspable Target Detection for Hexapod Robots" (2023), table B 2-2: mean of 28 places.
+constexpr double published_mean_m = 0.040;
+constexpr const char* edge_names[] = {"a", "b", "c", "d"};
+
+// automatic: z = 0 where the manifest says that the site was levelled, else the fitted plane.
+enum class Ground { automatic, zero, fit };
+enum class SiteOutline { axes, turned };
+// Of the true mesh: that of the site, or of the map that the site was cropped from.
+enum class TruthFrame { site, map };
+
+struct SpotCheckCommandOptions {
+  std::string file;
+  std::string output;
+  std::string truth;
+  std::string box;
+  Ground ground = Ground::automatic;
+  SiteOutline outline = SiteOutline::axes;
+  TruthFrame truth_frame = TruthFrame::site;
+  double radius_m = 0.02;
+  int min_points = 3;
+  libmap::SpotCheckOptions check;
+  libmap::GroundPlaneOptions plane;
+  bool json = false;
+};
+
+void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
+  bind(table, options.check);
+  table.add("radius_m", options.radius_m, libmap::positive,
+            "of a cloud: the height is the median of the points this near to the vertical");
+  table.add("min_points", options.min_points, {1.0, 1e9},
+            "of a cloud: a place with fewer points has no height");
+  table.add("outline", options.outline,
+            {{"axes", SiteOutline::axes}, {"turned", SiteOutline::turned}},
+            "the site is the least rectangle around it: along the axes, or turned");
+  table.add("ground", options.ground,
+            {{"auto", Ground::automatic}, {"zero", Ground::zero}, {"fit", Ground::fit}},
+            "height 0, or a plane fitted to the data; auto: height 0 of a levelled site");
+  table.add("truth_frame", options.truth_frame,
+            {{"site", TruthFrame::site}, {"map", TruthFrame::map}},
+            "frame of --truth: the site's, or that of the map which the site was cropped from");
+  bind(table, options.plane);
+}
+
+// A cloud, or a mesh.
+struct Shape {
+  std::optional<libmap::TriangleMesh> mesh{};
+  libmap::PointCloud cloud{};
+
+  const std::vector<Eigen::Vector3d>& positions() const {
+    return mesh ? mesh->vertices : cloud.positions;
+  }
+};
+
+Shape read_shape(const std::string& file) {
+  Shape shape;
+  if (libmap::file_kind(file) == libmap::FileKind::mesh)
+    shape.mesh = libmap::read_mesh(file).mesh;
+  else
+    shape.cloud = libmap::read_cloud(file).cloud;
+  return shape;
+}
+
+struct Check {
+  libmap::SiteCorners site;
+  libmap::SpotCheckResult result;
+  std::string ground;  // what the heights are compared with
+  std::optional<libmap::GroundPlane> plane{};
+};
+
+// In the frame of the site.
+libmap::TriangleMesh read_truth(const SpotCheckCommandOptions& options) {
+  libmap::TriangleMesh truth = libmap::read_mesh(options.truth).mesh;
+  if (options.truth_frame == TruthFrame::site) return truth;
+  const auto site_from_map = graspmap_tools::site_from_map_of(options.file);
+  if (!site_from_map)
+    throw libmap::Error("the site was not cropped from a map",
+                        {.file = options.file, .field = "--truth-frame", .value = "map"});
+  return libmap::transform_mesh(truth, *site_from_map);
+}
+
+// Points spread evenly, as the fit of a plane wants them.
+libmap::GroundPlane fit_ground(const Shape& shape, libmap::GroundPlaneOptions options) {
+  constexpr double samples = 100000;
+  const libmap::PointCloud cloud =
+      shape.mesh ? libmap::points_on_surface(
+                       *shape.mesh,
+                       libmap::sample_triangles(
+                           *shape.mesh, samples / libmap::surface_area(*shape.mesh), options.seed))
+                 : shape.cloud;
+  options.up = libmap::up_of_normals(cloud.normals);
+  return libmap::find_ground_plane(cloud.positions, options);
+}
+
+// What is known of the ground; a fitted plane becomes z = 0.
+libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape& shape,
+                                   Check& check, Run& run) {
+  if (!options.truth.empty()) {
+    check.ground = options.truth;
+    run.add_input(options.truth);
+    return libmap::heights_of(read_truth(options));
+  }
+  const bool zero =
+      options.ground == Ground::zero ||
+      (options.ground == Ground::automatic && graspmap_tools::site_from_map_of(options.file));
+  check.ground = zero ? "z = 0" : "fitted plane";
+  const libmap::HeightFunction at_zero = [](const Eigen::Vector2d&) { return 0.0; };
+  if (zero) return at_zero;
+  check.plane = run.timed("ground", [&] { return fit_ground(shape, options.plane); });
+  const libmap::Pose level_from_map = libmap::level_from_map(*check.plane);
+  run.say(fmt::format("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm",
+                      check.plane->tilt_deg, check.plane->inliers, 1e3 * check.plane->rmse_m));
+  run.manifest().transforms.emplace_back("level_from_map", level_from_map);
+  if (shape.mesh)
+    shape.mesh = libmap::transform_mesh(*shape.mesh, level_from_map);
+  else
+    shape.cloud = libmap::transform_cloud(shape.cloud, level_from_map);
+  return at_zero;
+}
+
+Check check_site(const SpotCheckCommandOptions& options, Run& run) {
+  Shape shape = read_shape(options.file);
+  Check check;
+  const libmap::HeightFunction ground = find_ground(options, shape, check, run);
+  try {
+    const auto box = graspmap_tools::parse_box(options.box);
+    check.site =
+        box ? libmap::corners_of(box->min.head<2>(), box->max.head<2>())
+            : libmap::bounding_corners(shape.positions(), options.outline == SiteOutline::turned);
+    if (box)
+      std::erase_if(shape.cloud.positions, [&](const Eigen::Vector3d& point) {
+        return point.z() < box->min.z() || point.z() > box->max.z();
+      });
+    const double top = box ? box->max.z() : std::numeric_limits<double>::infinity();
+    check.result = run.timed("check", [&] {
+      return libmap::check_edges(
+          check.site,
+          shape.mesh
+              ? libmap::heights_of(*shape.mesh, top)
+              : libmap::heights_of(shape.cloud.positions, options.radius_m, options.min_points),
+          ground, options.check);
+    });
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.file);
+  }
+  return check;
+}
+
+std::string cell_of(const std::optional<double>& value) {
+  return value ? libmap::to_fixed_text(std::abs(*value), 4) : "";
+}
+
+libmap::Table table_of(const libmap::SpotCheckResult& result) {
+  libmap::Table table;
+  table.columns = {"edge"};
+  for (std::size_t n = 1; n <= result.edges[0].size(); ++n)
+    table.columns.push_back("e" + std::to_string(n) + "_m");
+  table.columns.emplace_back("mean_m");
+  for (std::size_t e = 0; e < result.edges.size(); ++e) {
+    std::vector<std::string>& row = table.rows.emplace_back();
+    row.emplace_back(edge_names[e]);
+    for (const libmap::SpotCheckPlace& place : result.edges[e])
+      row.push_back(cell_of(place.error_m()));
+    row.push_back(cell_of(result.mean_m[e]));
+  }
+  return table;
+}
+
+Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+
+Json to_json(const Check& check, const SpotCheckCommandOptions& options) {
+  const libmap::SpotCheckResult& result = check.result;
+  Json edges = Json::array();
+  for (std::size_t e = 0; e < result.edges.size(); ++e) {
+    Json places = Json::array();
+    for (const libmap::SpotCheckPlace& place : result.edges[e])
+      places.push_back({{"x_m", place.position.x()},
+                        {"y_m", place.position.y()},
+                        {"z_m", number_or_null(place.height_m)},
+                        {"ground_m", number_or_null(place.ground_m)},
+                        {"error_m", number_or_null(place.error_m())}});
+    edges.push_back({{"edge", edge_names[e]},
+                     {"mean_m", number_or_null(result.mean_m[e])},
+                     {"places", places}});
+  }
+  Json corners = Json::array();
+  for (const Eigen::Vector2d& corner : check.site.corners)
+    corners.push_back({corner.x(), corner.y()});
+  return {{"file", options.file},         {"ground", check.ground},
+          {"corners_m", corners},         {"edges", edges},
+          {"measured", result.measured},  {"missing", result.missing},
+          {"mean_m", result.mean_size_m}, {"mean_signed_m", result.mean_error_m},
+          {"max_m", result.max_size_m},   {"published_mean_m", published_mean_m}};
+}
+
+void print(const Check& check, const SpotCheckCommandOptions& options) {
+  const libmap::SpotCheckResult& result = check.result;
+  if (options.json) {
+    std::cout << to_json(check, options).dump(2, ' ', false, Json::error_handler_t::replace)
+              << "\n";
+    return;
+  }
+  std::cout << fmt::format("height error in m along the edges (ground: {})\n{:<6}", check.ground,
+                           "edge");
+  for (std::size_t n = 1; n <= result.edges[0].size(); ++n)
+    std::cout << fmt::format("{:>8}", "e" + std::to_string(n));
+  std::cout << fmt::format("{:>8}\n", "mean");
+  const libmap::Table table = table_of(result);
+  for (const std::vector<std::string>& row : table.rows) {
+    std::cout << fmt::format("{:<6}", row[0]);
+    for (std::size_t n = 1; n < row.size(); ++n)
+      std::cout << fmt::format("{:>8}", row[n].empty() ? "-" : row[n]);
+    std::cout << "\n";
+  }
+  std::cout << fmt::format("mean of {} places: {:.4f} m, largest {:.4f} m\n", result.measured,
+                           result.mean_size_m, result.max_size_m);
+  if (result.missing > 0) std::cout << fmt::format("places without data: {}\n", result.missing);
+  std::cout << fmt::format("published (thesis of 2023, table B 2-2, mean of 28): {:.3f} m\n",
+                           published_mean_m);
+}
+
+void spot_check(const SpotCheckCommandOptions& options, Run& run) {
+  if (!options.output.empty()) {
+    if (libmap::format_of(options.output) != ".csv")
+      throw libmap::Error("tables are written as .csv", {.file = options.output});
+    run.claim_output(options.output, {options.file, options.truth});
+  }
+  if (!options.truth.empty() && options.ground != Ground::automatic)
+    throw libmap::Error("--truth gives the ground already", {.file = {}, .field = "--ground"});
+  const Check check = check_site(options, run);
+  print(check, options);
+  if (options.output.empty()) return;
+  run.add_input(options.file);
+  libmap::Manifest& manifest = run.manifest();
+  manifest.parameters.emplace_back("truth", options.truth);
+  manifest.parameters.emplace_back("box", options.box);
+  manifest.frame = check.plane ? "level" : "input";
+  const auto add = [&](const char* name, const libmap::ManifestValue& value) {
+    manifest.results.emplace_back(name, value);
+  };
+  add("ground", check.ground);
+  add("measured", static_cast<std::int64_t>(check.result.measured));
+  add("missing", static_cast<std::int64_t>(check.result.missing));
+  add("mean_m", check.result.mean_size_m);
+  add("mean_signed_m", check.result.mean_error_m);
+  add("max_m", check.result.max_size_m);
+  run.write_output(options.output, [&](const auto& temporary) {
+    libmap::write_text(temporary, libmap::to_csv(table_of(check.result)));
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  SpotCheckCommandOptions options;
+  graspmap_tools::Command command(
+      "spot-check",
+      "Height errors at places along the four edges of a site: a (y = min), then "
+      "counter-clockwise b (x = max), c (y = max), d (x = min).");
+  command.input("SITE", options.file, "cloud or mesh");
+  command.output(options.output, "table: edge, e1_m, e2_m, ..., mean_m (.csv)", false);
+  command.option("--truth", "MESH", options.truth,
+                 "the true surface (see --truth-frame): the ground is its height at each place");
+  command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,
+                 "the site, in place of the rectangle around the data");
+  command.flag("--json", options.json, "as JSON, with each place");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { spot_check(options, run); });
+}
