@@ -7,8 +7,8 @@
 #        [CROP="--size 3x3"] [RESAMPLE="--count 73000"] [POINTS=points.csv] \
 #        [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] -j2
 #
-# SCAN is an RTAB-Map database or a folder of images. POSES is odometry, stored, ground-truth or a
-# file of poses (stored). With TRUTH, a mesh in the frame of the scan's true poses, the cloud is
+# SCAN is an RTAB-Map database or a folder of images. POSES is refined (by graspmap refine), odometry,
+# stored, ground-truth or a file of poses (stored). With TRUTH, a mesh in the frame of the scan's true poses, the cloud is
 # carried into that frame. POINTS lie in the cloud's frame. FUSE, MESH, CROP, RESAMPLE and SCORE hold
 # further flags of their commands; without CROP the map is levelled and kept whole. TEXTURE= leaves
 # the texture out. A second run does nothing; other variables or changed files make again what
@@ -40,7 +40,9 @@ ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 
-poses_flags := --poses $(POSES) $(if $(TRUTH),--frame ground-truth)
+refined := $(if $(filter refined,$(POSES)),$(OUT)/poses.tum)
+poses := $(or $(refined),$(POSES))
+poses_flags := --poses $(poses) $(if $(TRUTH),--frame ground-truth)
 results := $(OUT)/scan.txt $(OUT)/cloud.png $(OUT)/site.png $(OUT)/spot_check.txt \
   $(if $(TRUTH),$(OUT)/accuracy.txt) $(if $(TEXTURE),$(OUT)/texture.png)
 
@@ -63,7 +65,10 @@ $(stamps): FORCE | $(OUT)
 $(OUT)/scan.txt: $(SCAN) | $(OUT)
 	@$(GRASPMAP) info $< > $@
 
-$(OUT)/cloud.ply: $(SCAN) $(wildcard $(POSES)) $(OUT)/fused_with
+$(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) | $(OUT)
+	@$(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json
+
+$(OUT)/cloud.ply: $(SCAN) $(or $(refined),$(wildcard $(POSES))) $(OUT)/fused_with
 	@$(GRASPMAP) fuse $(SCAN) -o $@ $(poses_flags) $(FUSE)
 
 $(OUT)/mesh.ply $(OUT)/mesh.txt &: $(OUT)/cloud.ply $(OUT)/meshed_with
@@ -75,7 +80,7 @@ $(OUT)/site.ply: $(OUT)/mesh.ply $(OUT)/cropped_with
 $(OUT)/terrain.pcd: $(OUT)/site.ply $(OUT)/resampled_with
 	@$(GRASPMAP) resample $< -o $@ $(RESAMPLE)
 
-$(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(wildcard $(POSES))
+$(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(or $(refined),$(wildcard $(POSES)))
 	@$(GRASPMAP) texture $< --scan $(SCAN) $(poses_flags) -o $@
 
 $(OUT)/cloud.png: $(OUT)/cloud.ply

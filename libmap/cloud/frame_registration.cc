@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
@@ -37,12 +38,15 @@ class Adjustment {
     prior_.head<3>().setConstant(1.0 / (turn * turn));
     prior_.tail<3>().setConstant(1.0 / (options.place_error_m * options.place_error_m));
     const double scatter = options.scatter_m * options.scatter_m;
+    const double share =
+        std::min(1.0, options.independent_heights * static_cast<double>(centres.size()) /
+                          static_cast<double>(std::max<std::size_t>(1, observations.size())));
     for (const SurfaceObservation& one : observations) {
       const SurfaceElement& element = elements[one.element];
       Equation equation;
       equation.frame = one.frame;
       equation.height = static_cast<double>(one.height_m);
-      equation.information = 1.0 / (static_cast<double>(one.variance_m2) + scatter);
+      equation.information = share / (static_cast<double>(one.variance_m2) + scatter);
       const Eigen::Vector3d normal = element.normal.cast<double>();
       const Eigen::Vector3d arm = element.position.cast<double>() - centres[one.frame];
       equation.slope << arm.cross(normal), normal;

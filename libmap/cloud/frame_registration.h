@@ -17,6 +17,10 @@ struct FrameRegistrationOptions {
   double rotation_error_deg = 1.0;
   // > 0: frames that differ from the others by more than this have less weight.
   double scatter_m = 0.005;
+  // > 0: heights of a frame, on the mean, that count as independent, however many there are.
+  // Against the errors of the poses: normals of a plane scatter a little, and a frame slid along it
+  // would seem to fit better.
+  double independent_heights = 150.0;
 };
 
 struct FrameRegistration {

@@ -19,7 +19,7 @@ namespace libmap {
 namespace {
 
 // A boundary of more edges is left open: its triangulation may take the square of them.
-constexpr std::size_t max_hole_edges = 20000;
+constexpr std::size_t max_hole_edges = 5000;
 
 // Rings of triangles around a hole that its patch is fitted to; the curvature at the boundary
 // needs one.

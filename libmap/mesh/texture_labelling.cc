@@ -276,6 +276,12 @@ Regions regions_of(const Graph& graph) {
   return regions;
 }
 
+// What a view costs for each square metre: nothing for the best one, 1 for one of half its quality.
+double lack_of(const ViewQuality& view, const ViewQuality& best) {
+  constexpr double most = 50.0;
+  return std::min(most, static_cast<double>(best.quality / view.quality) - 1.0);
+}
+
 // The graph of the triangles that are seen, each with its best view; `node` is one a triangle.
 Graph graph_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                const ViewTable& views, double seam_cost_m,
@@ -287,10 +293,7 @@ Graph graph_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
     const auto first = static_cast<std::ptrdiff_t>(graph.labels.size());
     for (const ViewQuality& view : views[t])
       graph.labels.push_back(
-          {view.photo,
-           static_cast<float>(area *
-                              (1.0 - static_cast<double>(view.quality / views[t][0].quality))),
-           0.0F});
+          {view.photo, static_cast<float>(area * lack_of(view, views[t][0])), 0.0F});
     std::sort(graph.labels.begin() + first, graph.labels.end(),
               [](const Label& a, const Label& b) { return a.photo < b.photo; });
     graph.first_label.push_back(static_cast<std::uint32_t>(graph.labels.size()));

@@ -21,7 +21,8 @@ namespace libmap {
 constexpr std::uint32_t no_photo = 0xffffffff;
 
 struct LabellingOptions {
-  // A seam of 1 m costs as much as this times 1 m2 of triangles with views that are worth nothing.
+  // A seam of 1 m costs as much as this times 1 m2 of triangles with views of half the best
+  // quality.
   double seam_cost_m = 0.1;
 };
 

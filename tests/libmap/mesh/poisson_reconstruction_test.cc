@@ -119,13 +119,14 @@ TEST(PoissonReconstruction, PlaneIsFlatAndEndsWithThePoints) {
     ASSERT_FALSE(result.mesh.triangles.empty());
     double reach = 0.0;
     for (const Eigen::Vector3d& vertex : result.mesh.vertices) {
-      EXPECT_NEAR(vertex.z(), slope * vertex.x(), 0.002);
-      reach = std::max(reach, vertex.head<2>().cwiseAbs().maxCoeff());
+      const double out = vertex.head<2>().cwiseAbs().maxCoeff();
+      EXPECT_NEAR(vertex.z(), slope * vertex.x(), out < 0.29 ? 0.0005 : 0.004);
+      reach = std::max(reach, out);
     }
     EXPECT_GT(reach, 0.3 - 0.01);
     EXPECT_LT(reach, 0.3 + 0.025);
     EXPECT_GT(result.trimmed_triangles, 0U);
-    const MeshReport report = report_mesh(result.mesh);
+    const MeshReport report = cleaned_report(result.mesh);
     EXPECT_EQ(report.components, 1U);
     EXPECT_EQ(report.boundaries.size(), 1U);
   }
@@ -165,7 +166,7 @@ TEST(PoissonReconstruction, GapsAreLeftOpen) {
       cloud.normals.push_back(full.normals[n]);
     }
   const TriangleMesh mesh = reconstruct_surface(cloud, cells_of(0.01)).mesh;
-  EXPECT_EQ(report_mesh(mesh).boundaries.size(), 2U);
+  EXPECT_EQ(cleaned_report(mesh).boundaries.size(), 2U);  // the gap is wider than holes are filled
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     EXPECT_GT(vertex.head<2>().norm(), 0.1 - 0.025);
 }
@@ -216,8 +217,8 @@ TEST(PoissonReconstruction, SameBytesForThreadsAndOrder) {
   std::vector<std::size_t> order(cloud.size());
   std::iota(order.begin(), order.end(), 0U);
   std::shuffle(order.begin(), order.end(), random_engine());
-  const PointCloud shuffled = select_points(cloud, order);
-  for (const PointCloud* other : {&cloud, &shuffled})
+  PointCloud shuffled = select_points(cloud, order);
+  for (PointCloud* other : {&cloud, &shuffled})
     for (const unsigned threads : {2U, 4U}) {
       const ThreadLimit limit(threads);
       const TriangleMesh mesh = reconstruct_surface(*other).mesh;

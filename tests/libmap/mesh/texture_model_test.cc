@@ -199,9 +199,32 @@ TEST(TextureModel, WhatIsHiddenDoesNotTakeTheColorOfWhatHidesIt) {
   });
   EXPECT_LT(errors.mean, 1.5);
 
+  // Rays alone find what is hidden, but not what is so near an edge that pixels mix.
+  TextureOptions sharp;
+  sharp.views.occlusion_margin_px = 0;
+  EXPECT_LT(red_places_on_ground(libmap::texture_mesh(mesh, scan, scan.poses(), sharp)), 20);
   TextureOptions blind;
   blind.views.occlusion_tolerance_m = 10.0;
   EXPECT_GT(red_places_on_ground(libmap::texture_mesh(mesh, scan, scan.poses(), blind)), 50);
+}
+
+TEST(TextureModel, BesideWhatHidesItAnotherViewIsTaken) {
+  const TriangleMesh mesh = ground_and_plate();
+  const PaintedScan scan(mesh, red_plate, small_camera(), circle_of_cameras(6, 0.6, 1.0));
+  libmap::Trajectory poses = scan.poses();
+  // Poses are wrong by a few pixels.
+  for (libmap::TrajectoryPose& pose : poses)
+    pose.world_from_base =
+        pose.world_from_base *
+        libmap::make_pose_from_rpy({0, 0, 0}, {uniform(-1.0, 1.0), uniform(-1.0, 1.0), 0});
+  TextureOptions options;
+  options.blend_views = 1;
+  options.views.occlusion_margin_px = 0;
+  const int without = red_places_on_ground(libmap::texture_mesh(mesh, scan, poses, options));
+  options.views.occlusion_margin_px = 5;
+  const int with = red_places_on_ground(libmap::texture_mesh(mesh, scan, poses, options));
+  EXPECT_GT(without, 10);
+  EXPECT_LT(with, without / 5);
 }
 
 TEST(TextureModel, WhatNobodySeesIsGreyAndCounted) {
@@ -280,12 +303,17 @@ TEST(TextureModel, SameForAnyThreadsAndOrderOfFrames) {
   const TriangleMesh mesh = ground_and_plate();
   const PaintedScan scan(mesh, red_plate, small_camera(), circle_of_cameras(5, 0.6, 1.0));
   libmap::TexturedMesh reference;
+  std::vector<Eigen::Vector3f> gains;
   for (const unsigned threads : {1U, 2U, 5U}) {
     const libmap::ThreadLimit limit(threads);
     libmap::Trajectory poses = scan.poses();
     std::shuffle(poses.begin(), poses.end(), graspmap_test::random_engine());
     const TextureResult result = libmap::texture_mesh(mesh, scan, poses);
-    if (threads == 1) reference = result.model;
+    if (threads == 1) {
+      reference = result.model;
+      gains = result.exposure.gains;
+    }
+    EXPECT_TRUE(result.exposure.gains == gains);
     EXPECT_TRUE(result.model.pages == reference.pages);
     EXPECT_TRUE(result.model.texture_coordinates == reference.texture_coordinates);
     EXPECT_TRUE(result.model.page_of_triangle == reference.page_of_triangle);
