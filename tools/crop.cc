@@ -253,8 +253,7 @@ void crop(CropCommandOptions& options, Run& run) {
   std::vector<std::string> inputs = {options.input};
   if (!options.polygon.empty()) inputs.push_back(options.polygon);
   run.claim_output(options.output, inputs);
-  // Found before the work; that it is an earlier run's own is seen when it is written.
-  if (!fs::exists(options.output)) run.claim_output(transform_path(options.output), inputs);
+  run.require_own_companions(options.output, {transform_path(options.output)});
   run.add_input(options.input);
   if (!options.polygon.empty()) run.add_input(options.polygon);
   run.manifest().parameters.emplace_back("box", options.box);

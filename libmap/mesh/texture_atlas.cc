@@ -161,8 +161,12 @@ void AtlasMaker::fit(TextureChart chart, TextureAtlas& atlas) const {
     chart.scale *= room / larger;
     ++atlas.shrunk_charts;
   }
-  chart.width = static_cast<int>(std::ceil(size.x() * chart.scale)) + 1 + 2 * padding_;
-  chart.height = static_cast<int>(std::ceil(size.y() * chart.scale)) + 1 + 2 * padding_;
+  // Rounding may carry a shrunk chart past what there is room for.
+  const auto texels = [&](double size_px) {
+    return std::min(room, static_cast<int>(std::ceil(size_px * chart.scale))) + 1 + 2 * padding_;
+  };
+  chart.width = texels(size.x());
+  chart.height = texels(size.y());
   atlas.charts.push_back(std::move(chart));
 }
 

@@ -1,8 +1,8 @@
 #include "libmap/mesh/texture_model.h"
 
-#include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <memory>
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"

@@ -1,6 +1,6 @@
 // Depth fusion against the true mesh, and against the cloud that RTAB-Map's export makes of the
 // same frames: every pixel to 4 m, the mean of each 1 cm voxel of a frame, all frames' points
-// together. Prints a table in Markdown.
+// together. Then the surfaces made of the fused clouds, sampled evenly. Prints a table in Markdown.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -16,7 +16,9 @@
 #include "libmap/cloud/depth_fusion.h"
 #include "libmap/cloud/depth_projection.h"
 #include "libmap/core/error.h"
+#include "libmap/mesh/mesh_cleaning.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/poisson_reconstruction.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/scan/scan_source.h"
@@ -74,6 +76,18 @@ Baselines make_baselines(const libmap::ScanSource& scan, const libmap::Trajector
 
 // The mesh lies in the frame of the true poses turned by -90 degrees about z.
 Pose mesh_from_truth() { return libmap::make_pose_from_rpy({0, 0, 0}, {0, 0, -90}); }
+
+// Of the cleaned surface with cells as wide as the voxels, evenly spread.
+Points surface_of(const libmap::PointCloud& cloud) {
+  libmap::PoissonReconstructionOptions options;
+  options.cell_size_m = voxel_size_m;
+  const libmap::TriangleMesh mesh =
+      libmap::clean_mesh(libmap::reconstruct_surface(cloud, options).mesh).mesh;
+  Points points;
+  for (const libmap::SurfacePoint& sample : libmap::sample_surface(mesh, samples_per_m2, 1))
+    points.push_back(sample.position);
+  return points;
+}
 
 struct Truth {
   libmap::TriangleMesh mesh;
@@ -150,6 +164,10 @@ void run(const std::filesystem::path& folder) {
       const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
       print_row(name, poses_name, "fuse_depth", fused.cloud.positions, mesh_from_world, truth,
                 taken.count());
+      const auto meshing = std::chrono::steady_clock::now();
+      const Points surface = surface_of(fused.cloud);
+      const std::chrono::duration<double> meshed = std::chrono::steady_clock::now() - meshing;
+      print_row(name, poses_name, "surface of it", surface, mesh_from_world, truth, meshed.count());
     }
   }
 }

@@ -215,6 +215,9 @@ TEST(Crop, BadInput) {
   EXPECT_TRUE(bad_input(with({}), {"new.site_from_map.txt", "--force"}));
   EXPECT_EQ(content("new.site_from_map.txt"), "mine");
   EXPECT_TRUE(succeeded(with({"--force"})));
+  // That of an earlier run whose site is gone.
+  std::filesystem::remove(scratch("new.ply"));
+  EXPECT_TRUE(succeeded(with({})));
 }
 
 TEST(Crop, PointsOfTheMapAreFoundOnTheScoredSite) {

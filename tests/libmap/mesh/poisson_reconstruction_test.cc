@@ -69,7 +69,7 @@ PoissonReconstructionOptions cells_of(double cell_size_m) {
 
 MeshReport cleaned_report(const TriangleMesh& mesh) {
   MeshCleaningOptions options;
-  options.min_island_area_m2 = 0.0;
+  options.min_island_area_m2 = 0.001;
   return report_mesh(clean_mesh(mesh, options).mesh);
 }
 

@@ -256,6 +256,22 @@ TEST(TextureAtlas, ChartsLieApartInsideTheirPagesWithPadding) {
   }
 }
 
+TEST(TextureAtlas, ATriangleLargerThanAPageFillsIt) {
+  AtlasCase c;
+  c.mesh.triangles = {{0, 30, 960}};
+  c.opposite.assign(3, libmap::open_edge);
+  for (int size = 64; size < 130; ++size) {
+    libmap::TextureAtlasOptions options;
+    options.texture_size = size;
+    const libmap::TextureAtlas atlas =
+        libmap::make_texture_atlas(c.mesh, c.opposite, {2}, c.photos, options);
+    ASSERT_EQ(atlas.charts.size(), 1U);
+    EXPECT_EQ(atlas.shrunk_charts, 1U);
+    EXPECT_EQ(atlas.pages.size(), 1U);
+    EXPECT_EQ(std::max(atlas.charts[0].width, atlas.charts[0].height), size);
+  }
+}
+
 TEST(TextureAtlas, TexelsAreThePhotographsPixels) {
   const AtlasCase c;
   const std::vector<std::uint32_t> label(c.mesh.triangles.size(), 1);
