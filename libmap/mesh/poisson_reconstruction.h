@@ -23,7 +23,7 @@ struct PoissonReconstructionOptions {
   // more than one of the median error.
   bool weigh_by_error = true;
   // > 0: points (or their weights) in a cell; with fewer the cells are larger there.
-  double samples_per_cell = 2.0;
+  double samples_per_cell = 2.15;
   // > 0: no surface farther than this from all points, in cells or, where that is more, in the
   // local distance between points.
   double trim_distance_cells = 1.5;
