@@ -7,8 +7,8 @@
 #include <cmath>
 #include <string>
 
-#include "libgtd/shape/thesis_curvature.h"
 #include "libgtd/shape/point_grid.h"
+#include "libgtd/shape/thesis_curvature.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
