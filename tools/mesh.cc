@@ -81,9 +81,9 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::estimate_normals(cloud, options.estimation); });
   cloud.normals = estimated.normals;
   const std::string way(to_text(estimated.orientation));
-  run.say(fmt::format("{}: normals estimated, their sides chosen by {}",
-                      options.normals == NormalSource::automatic ? "the cloud has none" : "normals",
-                      way));
+  run.say(fmt::format(
+      "normals estimated{}, their sides chosen by {}",
+      options.normals == NormalSource::automatic ? ", since the cloud has none" : "", way));
   run.manifest().results.emplace_back("normals_oriented_by", way);
   run.manifest().results.emplace_back("normals_undefined",
                                       static_cast<std::int64_t>(estimated.undefined));

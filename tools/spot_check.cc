@@ -151,8 +151,8 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape
 Check check_site(const SpotCheckCommandOptions& options, Run& run) {
   Shape shape = read_shape(options.file);
   Check check;
-  const libmap::HeightFunction ground = find_ground(options, shape, check, run);
   try {
+    const libmap::HeightFunction ground = find_ground(options, shape, check, run);
     const auto box = graspmap_tools::parse_box(options.box);
     check.site =
         box ? libmap::corners_of(box->min.head<2>(), box->max.head<2>())

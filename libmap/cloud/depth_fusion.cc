@@ -1,7 +1,6 @@
 #include "libmap/cloud/depth_fusion.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <iterator>
 #include <limits>
@@ -96,10 +95,7 @@ class Fusion {
  private:
   template <typename Step>
   void timed(const char* name, const Step& step) {
-    const auto start = std::chrono::steady_clock::now();
-    step();
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    result_.timings_s.emplace_back(name, taken.count());
+    libmap::timed(result_.timings_s, name, step);
   }
 
   Error no_frames(std::size_t poses) const {

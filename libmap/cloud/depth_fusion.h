@@ -20,6 +20,7 @@
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 #include "libmap/scan/scan_source.h"
 
 namespace libmap {
@@ -68,7 +69,7 @@ struct DepthFusionResult {
   std::size_t occupied_voxels = 0;
   std::size_t elements = 0;  // of the surface, before points were made of them
   SurfacePointCounts points;
-  std::vector<std::pair<std::string, double>> timings_s;
+  StageTimings timings_s;
 };
 
 // The frames of `world_from_base` that have depth, by ascending node. The same bytes for any number

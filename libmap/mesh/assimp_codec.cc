@@ -8,8 +8,10 @@
 #include <assimp/Importer.hpp>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <memory>
 #include <new>
+#include <numeric>
 #include <optional>
 #include <stdexcept>
 #include <string_view>
@@ -176,10 +178,11 @@ class MeshBuilder {
   std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
 };
 
-std::unique_ptr<aiNode> make_root(bool y_up) {
+std::unique_ptr<aiNode> make_root(std::size_t parts, bool y_up) {
   auto root = std::make_unique<aiNode>();
-  root->mNumMeshes = 1;
-  root->mMeshes = new unsigned[1]{0};
+  root->mNumMeshes = static_cast<unsigned>(parts);
+  root->mMeshes = new unsigned[parts];
+  std::iota(root->mMeshes, root->mMeshes + parts, 0U);
   // y up from z up, as glTF's readers expect.
   if (y_up) root->mTransformation = aiMatrix4x4(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
   return root;
@@ -221,18 +224,68 @@ void copy_faces(const TriangleMesh& mesh, aiMesh& part) {
   }
 }
 
+// Unlit: photographs hold the light that fell.
+std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
+  auto material = std::make_unique<aiMaterial>();
+  // Not as an int: the exporter looks for the enumeration's own type.
+  const aiShadingMode unlit = aiShadingMode_Unlit;
+  material->AddProperty(&unlit, 1, AI_MATKEY_SHADING_MODEL);
+  if (page == no_page) {
+    const aiColor4D grey(0.5F, 0.5F, 0.5F, 1.0F);
+    material->AddProperty(&grey, 1, AI_MATKEY_BASE_COLOR);
+    return material;
+  }
+  const aiString picture("*" + std::to_string(page));
+  material->AddProperty(&picture, AI_MATKEY_TEXTURE(aiTextureType_BASE_COLOR, 0));
+  const int clamp = aiTextureMapMode_Clamp;
+  material->AddProperty(&clamp, 1, AI_MATKEY_MAPPINGMODE_U(aiTextureType_BASE_COLOR, 0));
+  material->AddProperty(&clamp, 1, AI_MATKEY_MAPPINGMODE_V(aiTextureType_BASE_COLOR, 0));
+  return material;
+}
+
+// A compressed picture has no height; its width counts bytes.
+std::unique_ptr<aiTexture> make_texture(const EncodedPicture& picture) {
+  auto texture = std::make_unique<aiTexture>();
+  texture->mWidth = static_cast<unsigned>(picture.bytes.size());
+  texture->pcData = new aiTexel[picture.bytes.size() / sizeof(aiTexel) + 1];
+  std::memcpy(static_cast<void*>(texture->pcData), picture.bytes.data(), picture.bytes.size());
+  picture.format.copy(texture->achFormatHint, sizeof(texture->achFormatHint) - 1);
+  return texture;
+}
+
+void copy_coordinates(const std::vector<Eigen::Vector2f>& coordinates, aiMesh& part) {
+  if (coordinates.empty()) return;
+  part.mTextureCoords[0] = new aiVector3D[coordinates.size()];
+  part.mNumUVComponents[0] = 2;
+  // assimp counts from the bottom.
+  for (std::size_t i = 0; i < coordinates.size(); ++i)
+    part.mTextureCoords[0][i] = aiVector3D(coordinates[i].x(), 1.0F - coordinates[i].y(), 0.0F);
+}
+
 // The scene owns all that is hung into it.
-std::unique_ptr<aiScene> make_scene(const TriangleMesh& mesh, bool y_up) {
+template <typename T>
+T** hang(std::vector<std::unique_ptr<T>>& things, unsigned& count) {
+  count = static_cast<unsigned>(things.size());
+  T** hung = new T*[things.size()];
+  for (std::size_t i = 0; i < things.size(); ++i) hung[i] = things[i].release();
+  return hung;
+}
+
+std::unique_ptr<aiScene> scene_of(std::vector<std::unique_ptr<aiMesh>> meshes,
+                                  std::vector<std::unique_ptr<aiMaterial>> materials, bool y_up) {
   auto scene = std::make_unique<aiScene>();
-  scene->mRootNode = make_root(y_up).release();
-  scene->mNumMaterials = 1;
-  scene->mMaterials = new aiMaterial* [1] { new aiMaterial() };
-  scene->mNumMeshes = 1;
-  scene->mMeshes = new aiMesh* [1] { new aiMesh() };
-  scene->mMeshes[0]->mMaterialIndex = 0;
-  copy_vertices(mesh, *scene->mMeshes[0]);
-  copy_faces(mesh, *scene->mMeshes[0]);
+  scene->mRootNode = make_root(meshes.size(), y_up).release();
+  scene->mMeshes = hang(meshes, scene->mNumMeshes);
+  scene->mMaterials = hang(materials, scene->mNumMaterials);
   return scene;
+}
+
+std::unique_ptr<aiMesh> mesh_of(const TriangleMesh& mesh, unsigned material) {
+  auto part = std::make_unique<aiMesh>();
+  part->mMaterialIndex = material;
+  copy_vertices(mesh, *part);
+  copy_faces(mesh, *part);
+  return part;
 }
 
 std::string first_line(const char* text) {
@@ -298,6 +351,15 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
   }
 }
 
+std::string exported(const aiScene& scene, const char* format) {
+  Assimp::Exporter exporter;
+  const aiExportDataBlob* const blob = exporter.ExportToBlob(&scene, format);
+  if (blob == nullptr)
+    throw Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
+                ErrorKind::failed);
+  return std::string(static_cast<const char*>(blob->data), blob->size);
+}
+
 }  // namespace
 
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format) {
@@ -319,15 +381,28 @@ std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format
   if (mesh.triangles.empty())
     throw Error("a mesh without triangles cannot be written as " + format);
   const bool is_glb = format == "glb";
-  const std::unique_ptr<aiScene> scene = make_scene(mesh, is_glb);
-  Assimp::Exporter exporter;
-  const aiExportDataBlob* const blob = exporter.ExportToBlob(scene.get(), is_glb  ? "glb2"
-                                                                          : ascii ? "stl"
-                                                                                  : "stlb");
-  if (blob == nullptr)
-    throw Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
-                ErrorKind::failed);
-  return std::string(static_cast<const char*>(blob->data), blob->size);
+  std::vector<std::unique_ptr<aiMesh>> meshes;
+  meshes.push_back(mesh_of(mesh, 0));
+  std::vector<std::unique_ptr<aiMaterial>> materials;
+  materials.push_back(std::make_unique<aiMaterial>());
+  const auto scene = scene_of(std::move(meshes), std::move(materials), is_glb);
+  return exported(*scene, is_glb ? "glb2" : ascii ? "stl" : "stlb");
+}
+
+std::string encode_model_by_assimp(const std::vector<ModelPart>& parts,
+                                   const std::vector<EncodedPicture>& pictures) {
+  std::vector<std::unique_ptr<aiMesh>> meshes;
+  std::vector<std::unique_ptr<aiMaterial>> materials;
+  std::vector<std::unique_ptr<aiTexture>> textures;
+  for (const ModelPart& part : parts) {
+    meshes.push_back(mesh_of(part.mesh, static_cast<unsigned>(materials.size())));
+    copy_coordinates(part.texture_coordinates, *meshes.back());
+    materials.push_back(make_material(part.page));
+  }
+  for (const EncodedPicture& picture : pictures) textures.push_back(make_texture(picture));
+  const auto scene = scene_of(std::move(meshes), std::move(materials), true);
+  scene->mTextures = hang(textures, scene->mNumTextures);
+  return exported(*scene, "glb2");
 }
 
 }  // namespace libmap

@@ -34,4 +34,22 @@ DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std
 // `format` is "stl" or "glb". Throws Error.
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii);
 
+// A piece of a model that has one page: a texture coordinate a vertex, as in TexturedMesh, none
+// without a page.
+struct ModelPart {
+  TriangleMesh mesh;
+  std::vector<Eigen::Vector2f> texture_coordinates;
+  std::int32_t page = no_page;
+};
+
+// A picture as the bytes of a file; `format` is "png" or "jpg".
+struct EncodedPicture {
+  std::string bytes;
+  std::string format;
+};
+
+// .glb with the pictures within, unlit (KHR_materials_unlit). Throws Error.
+std::string encode_model_by_assimp(const std::vector<ModelPart>& parts,
+                                   const std::vector<EncodedPicture>& pictures);
+
 }  // namespace libmap

@@ -1,7 +1,6 @@
 #include "libmap/mesh/mesh_cleaning.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -70,10 +69,7 @@ class Cleaning {
 
   void step(const std::string& name, const std::function<void()>& body) {
     progress_.begin("cleaning: " + name, 0);
-    const auto begin = std::chrono::steady_clock::now();
-    body();
-    result_.timings_s.emplace_back(
-        name, std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count());
+    timed(result_.timings_s, name.c_str(), body);
     progress_.end();
   }
 

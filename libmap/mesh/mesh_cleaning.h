@@ -21,6 +21,7 @@
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -67,7 +68,7 @@ struct MeshCleaningResult {
   std::size_t unfilled_holes = 0;  // small enough, but no filling was found that meets nothing else
   std::size_t decimated_triangles = 0;
   double decimation_deviation_m = 0.0;  // bound on the distance, either way, that was proved
-  std::vector<std::pair<std::string, double>> timings_s;
+  StageTimings timings_s;
 };
 
 // The same bytes for any number of threads. A mesh that is clean comes back as it was but for

@@ -1,7 +1,6 @@
 #include "libmap/mesh/poisson_disk.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -21,17 +20,6 @@ constexpr double count_tolerance = 0.01;
 // Within this distance of the origin along each axis, single precision moves no coordinate by more
 // than 1e-5 m: that is how files keep positions.
 constexpr double single_precision_m = 256.0;
-
-class Stopwatch {
- public:
-  double lap() {
-    const auto now = std::chrono::steady_clock::now();
-    return std::chrono::duration<double>(now - std::exchange(start_, now)).count();
-  }
-
- private:
-  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
-};
 
 SampledSurface surface_of(const TriangleMesh& mesh) {
   mesh.check();
@@ -162,25 +150,23 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
   require_sense(surface, options);
   PoissonDiskResult result;
   result.area_m2 = surface.area_m2;
-  Stopwatch stopwatch;
-  DiskSamples samples;
-  if (options.count > 0) {
-    samples = CountSearch(surface, options).run(result.radius_m, result.tries, progress);
-  } else {
+  DiskSamples samples = timed(result.timings_s, "samples", [&] {
+    if (options.count > 0)
+      return CountSearch(surface, options).run(result.radius_m, result.tries, progress);
     result.radius_m = options.radius_m;
     result.tries = 1;
-    samples = sample_disks(
+    return sample_disks(
         surface, options.radius_m, options.seed, [](std::size_t) { return true; }, progress);
-  }
-  result.timings_s.emplace_back("samples", stopwatch.lap());
-  result.smallest_distance_m = smallest_distance(samples.positions, result.radius_m);
+  });
+  result.smallest_distance_m = timed(result.timings_s, "smallest distance", [&] {
+    return smallest_distance(samples.positions, result.radius_m);
+  });
   const double per_sample_m2 = surface.area_m2 / static_cast<double>(samples.positions.size());
   result.relative_radius =
       result.smallest_distance_m / (2.0 * std::sqrt(per_sample_m2 / (2.0 * std::numbers::sqrt3)));
-  result.timings_s.emplace_back("smallest distance", stopwatch.lap());
-  result.cloud = points_on_surface(mesh, samples.places);
+  result.cloud = timed(result.timings_s, "attributes",
+                       [&] { return points_on_surface(mesh, samples.places); });
   result.cloud.positions = std::move(samples.positions);
-  result.timings_s.emplace_back("attributes", stopwatch.lap());
   return result;
 }
 

@@ -10,6 +10,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -34,7 +35,7 @@ struct PoissonDiskResult {
   // sqrt(A / (2 sqrt(3) N))) (Lagae and Dutre 2008). At most 1 in the plane.
   double relative_radius = 0.0;
   std::size_t tries = 0;  // radii that were tried
-  std::vector<std::pair<std::string, double>> timings_s;
+  StageTimings timings_s;
 };
 
 // Distances are Euclidean: two sheets of a thin plate share their samples. Every point of the

@@ -2,7 +2,6 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -81,10 +80,7 @@ class Reconstruction {
  private:
   template <typename Step>
   void timed(const char* name, const Step& step) {
-    const auto start = std::chrono::steady_clock::now();
-    step();
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    result_.timings_s.emplace_back(name, taken.count());
+    libmap::timed(result_.timings_s, name, step);
   }
 
   Eigen::Vector3d in_cells(const Eigen::Vector3d& position) const {

@@ -10,6 +10,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -43,7 +44,7 @@ struct PoissonReconstructionResult {
   std::size_t samples = 0;         // the points of one cell and side are one
   int octree_depth = 0;
   std::size_t trimmed_triangles = 0;
-  std::vector<std::pair<std::string, double>> timings_s;
+  StageTimings timings_s;
 };
 
 // Oriented; open where points end. PCL leaves out single faces: the holes, and what else is not

@@ -15,9 +15,8 @@ struct PackedRectangle {
   int row = 0;
 };
 
-// Places each rectangle where its top is nearest to the page's (skyline, bottom left: Jylanki 2010,
-// "A Thousand Ways to Pack the Bin", section 4), the highest first, on the first page with room.
-// Pages are squares of `page_size`, and no rectangle may be larger. Returns the number of pages.
+// Fills one page after the other (skyline, bottom left: stb_rect_pack). Pages are squares of
+// `page_size`. Returns the number of pages. Throws Error if a rectangle is larger than a page.
 std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_size);
 
 }  // namespace libmap

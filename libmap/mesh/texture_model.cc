@@ -1,6 +1,5 @@
 #include "libmap/mesh/texture_model.h"
 
-#include <chrono>
 #include <cmath>
 #include <memory>
 
@@ -59,11 +58,7 @@ class Texturing {
  private:
   template <typename Step>
   auto timed(const char* name, const Step& step) {
-    const auto start = std::chrono::steady_clock::now();
-    auto result = step();
-    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-    result_.timings_s.emplace_back(name, taken.count());
-    return result;
+    return libmap::timed(result_.timings_s, name, step);
   }
   TriangleMesh cut_finely(const TriangleMesh& input);
   void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);

@@ -14,6 +14,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 #include "libmap/core/textured_mesh.h"
 #include "libmap/mesh/texture_atlas.h"
 #include "libmap/mesh/texture_exposure.h"
@@ -57,7 +58,7 @@ struct TextureResult {
   double seams_before_m = 0.0;  // with the best photograph for every triangle
   double seams_m = 0.0;
   TextureExposure exposure;
-  std::vector<std::pair<std::string, double>> timings_s;
+  StageTimings timings_s;
 };
 
 // `mesh` lies in the world of the poses. The same bytes for any number of threads. Throws Error:

@@ -7,6 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/scan/image_sharpness.h"
 
 namespace libmap {
 
@@ -29,23 +30,6 @@ double largest_ray(const Camera& camera) {
     largest = std::max(largest, ray->norm());
   }
   return 1.1 * largest;
-}
-
-// Luminance after a binomial blur of 3 x 3 pixels.
-Image<float> smoothed_luminance(const ColorImage& image) {
-  Image<float> gray(image.width, image.height);
-  for (std::size_t i = 0; i < image.pixels.size(); ++i) {
-    const Color& c = image.pixels[i];
-    gray.pixels[i] = 0.299F * c[0] + 0.587F * c[1] + 0.114F * c[2];
-  }
-  Image<float> rows = gray;
-  for (int y = 0; y < gray.height; ++y)
-    for (int x = 1; x + 1 < gray.width; ++x)
-      rows.at(x, y) = 0.25F * (gray.at(x - 1, y) + gray.at(x + 1, y)) + 0.5F * gray.at(x, y);
-  for (int y = 1; y + 1 < gray.height; ++y)
-    for (int x = 0; x < gray.width; ++x)
-      gray.at(x, y) = 0.25F * (rows.at(x, y - 1) + rows.at(x, y + 1)) + 0.5F * rows.at(x, y);
-  return gray;
 }
 
 Error no_photographs(const std::vector<std::pair<int, std::string>>& skipped, std::size_t poses) {
@@ -124,24 +108,6 @@ Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y) {
   return color.cwiseMax(0.0F).cwiseMin(255.0F);
 }
 
-double sharpness_of(const ColorImage& image) {
-  if (image.width < 5 || image.height < 5) return 0.0;
-  const Image<float> gray = smoothed_luminance(image);
-  double laplacian = 0.0;
-  double gradient = 0.0;
-  for (int y = 1; y + 1 < gray.height; ++y)
-    for (int x = 1; x + 1 < gray.width; ++x) {
-      const double left = gray.at(x - 1, y);
-      const double right = gray.at(x + 1, y);
-      const double above = gray.at(x, y - 1);
-      const double below = gray.at(x, y + 1);
-      const double bend = left + right + above + below - 4.0 * static_cast<double>(gray.at(x, y));
-      laplacian += bend * bend;
-      gradient += (right - left) * (right - left) + (below - above) * (below - above);
-    }
-  return gradient > 0.0 ? laplacian / gradient : 0.0;
-}
-
 struct TexturePhotos::Frame {
   std::vector<TexturePhoto> photos{};
   std::vector<ColorImage> images{};
@@ -163,7 +129,7 @@ TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const
           {pose.node, i,
            PhotoProjector(views[i].color_camera,
                           pose.world_from_base * views[i].color_camera.base_from_camera),
-           sharpness_of(views[i].color)});
+           image_sharpness(views[i].color)});
       frame.images.push_back(std::move(views[i].color));
     }
   } catch (const Error& error) {

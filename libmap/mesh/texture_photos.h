@@ -54,10 +54,6 @@ struct TexturePhoto {
 Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y);
 Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y);
 
-// How fine the structures of an image are that have contrast at all: the variance of its Laplacian
-// over that of its gradient (both after a blur of one pixel, against noise). Zero for a plain one.
-double sharpness_of(const ColorImage& image);
-
 class TexturePhotos {
  public:
   // Reads each frame of `world_from_base` once, by ascending node. Frames without colour, with a

@@ -1,5 +1,7 @@
 #include "libmap/mesh/textured_mesh_io.h"
 
+#include <cstdint>
+#include <limits>
 #include <ostream>
 
 #include "libmap/cloud/cloud_io.h"
@@ -7,7 +9,6 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/assimp_codec.h"
-#include "libmap/mesh/glb_writer.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/texture_corners.h"
 
@@ -80,6 +81,68 @@ void write_textured_obj(const fs::path& path, const TexturedMesh& model, std::os
   }
 }
 
+Eigen::Vector3f unit(const Eigen::Vector3f& normal) {
+  const float length = normal.norm();
+  return length > 0.0F && std::isfinite(length) ? Eigen::Vector3f(normal / length)
+                                                : Eigen::Vector3f::UnitZ();
+}
+
+// The triangles of one page, with vertices of their own: one a texture corner.
+ModelPart part_of(const TexturedMesh& model, const UnitedCorners& united, std::int32_t page) {
+  ModelPart part;
+  part.page = page;
+  constexpr auto unused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> vertex_of_corner(united.corners.size(), unused);
+  for (std::size_t t = 0; t < model.mesh.triangles.size(); ++t) {
+    if (model.page_of_triangle[t] != page) continue;
+    std::array<std::uint32_t, 3> triangle{};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const TextureCorner& corner = united.corners[united.of_triangle[t][k]];
+      std::uint32_t& vertex = vertex_of_corner[united.of_triangle[t][k]];
+      if (vertex == unused) {
+        vertex = static_cast<std::uint32_t>(part.mesh.vertices.size());
+        part.mesh.vertices.push_back(model.mesh.vertices[corner.vertex]);
+        if (!model.mesh.vertex_normals.empty())
+          part.mesh.vertex_normals.push_back(unit(model.mesh.vertex_normals[corner.vertex]));
+        if (page != no_page) part.texture_coordinates.push_back(corner.coordinate);
+      }
+      triangle[k] = vertex;
+    }
+    part.mesh.triangles.push_back(triangle);
+  }
+  return part;
+}
+
+// The lengths in the format's header have 32 bits; assimp does not check them.
+void require_room_in_glb(const std::vector<ModelPart>& parts,
+                         const std::vector<EncodedPicture>& pictures) {
+  std::size_t bytes = std::size_t{1} << 20;  // of the description
+  for (const ModelPart& part : parts)
+    bytes += part.mesh.vertices.size() * (3 + 3 + 2) * sizeof(float) +
+             part.mesh.triangles.size() * 3 * sizeof(std::uint32_t);
+  for (const EncodedPicture& picture : pictures) bytes += picture.bytes.size();
+  if (bytes > std::numeric_limits<std::uint32_t>::max())
+    throw Error("too large for a .glb file", {.file = {},
+                                              .field = "size",
+                                              .value = std::to_string(bytes) + " bytes",
+                                              .bound = "< 4 GB"});
+}
+
+std::string textured_glb(const TexturedMesh& model, const TexturedMeshWriteOptions& options) {
+  const UnitedCorners united = unite_corners(model);
+  std::vector<ModelPart> parts;
+  for (std::int32_t page = no_page; page < static_cast<std::int32_t>(model.pages.size()); ++page) {
+    ModelPart part = part_of(model, united, page);
+    if (!part.mesh.triangles.empty()) parts.push_back(std::move(part));
+  }
+  std::vector<EncodedPicture> pictures;
+  for (const ColorImage& page : model.pages)
+    pictures.push_back(
+        {encode_page(page, options), file_extension(options.image_format).substr(1)});
+  require_room_in_glb(parts, pictures);
+  return encode_model_by_assimp(parts, pictures);
+}
+
 ColorImage read_picture(const TexturePicture& picture, const fs::path& model) {
   if (!picture.bytes.empty()) return decode_color(picture.bytes);
   const fs::path path = model.parent_path() / picture.path;
@@ -124,7 +187,7 @@ std::vector<ModelFile> textured_mesh_files(const fs::path& path, const TexturedM
   std::vector<ModelFile> files;
   if (format_of(path) == ".glb") {
     files.push_back({path, [&model, options](const fs::path& temporary) {
-                       write_text(temporary, encode_textured_glb(model, options));
+                       write_text(temporary, textured_glb(model, options));
                      }});
     return files;
   }

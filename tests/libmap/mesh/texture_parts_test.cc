@@ -364,27 +364,4 @@ TEST(SplitLongSides, SameSurfaceWithoutGaps) {
   EXPECT_GT(bounded.max_side_m, 50.0);
 }
 
-TEST(Sharpness, FallsWithBlurNotWithContrast) {
-  libmap::ColorImage image(200, 150);
-  for (int y = 0; y < 150; ++y)
-    for (int x = 0; x < 200; ++x) {
-      const double value = 128 + 60 * std::sin(x * 1.1) * std::cos(y * 0.9);
-      image.at(x, y) = {static_cast<std::uint8_t>(value), static_cast<std::uint8_t>(value),
-                        static_cast<std::uint8_t>(value)};
-    }
-  libmap::ColorImage dull = image;
-  libmap::ColorImage coarse = image;
-  for (int y = 0; y < 150; ++y)
-    for (int x = 0; x < 200; ++x) {
-      for (std::uint8_t& c : dull.at(x, y)) c = static_cast<std::uint8_t>(64 + c / 2);
-      coarse.at(x, y) = image.at(x / 2, y / 2);
-    }
-  const double sharp = libmap::sharpness_of(image);
-  EXPECT_GT(sharp, 0.0);
-  EXPECT_NEAR(libmap::sharpness_of(dull), sharp, 0.05 * sharp);
-  EXPECT_LT(libmap::sharpness_of(coarse), 0.6 * sharp);
-  EXPECT_EQ(libmap::sharpness_of(libmap::ColorImage(50, 50)), 0.0);
-  EXPECT_EQ(libmap::sharpness_of(libmap::ColorImage(2, 2)), 0.0);
-}
-
 }  // namespace

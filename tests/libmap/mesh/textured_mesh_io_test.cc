@@ -4,7 +4,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <filesystem>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <vector>
 
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
@@ -17,6 +21,7 @@ using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
 using graspmap_test::uniform;
 using libmap::TexturedMesh;
+using Json = nlohmann::json;
 
 // Two pages of random colours, a triangle of none, and normals where `normals` is set.
 TexturedMesh random_model(bool normals) {
@@ -136,12 +141,44 @@ TEST(TexturedMeshIo, GlbIsWhatItsStandardSays) {
   const std::size_t binary = 20 + word(12);
   EXPECT_EQ(bytes.substr(binary + 4, 3), "BIN");
   EXPECT_EQ(binary + 8 + word(binary), bytes.size());
-  // y up: the first position is x, z, -y of the first corner.
-  const Eigen::Vector3d first = model.mesh.vertices[model.mesh.triangles[0][0]];
-  float position[3];
-  std::copy_n(bytes.data() + binary + 8, sizeof(position), reinterpret_cast<char*>(position));
-  EXPECT_EQ(Eigen::Vector3d(position[0], position[1], position[2]),
-            Eigen::Vector3d(first.x(), first.z(), -first.y()));
+  const Json json = Json::parse(bytes.substr(20, word(12)));
+  // Each primitive's positions, carried by the node's matrix, are x, z, -y of a vertex: y is up.
+  const auto node = json["nodes"][json["scenes"][0]["nodes"][0].get<std::size_t>()];
+  const auto matrix = node["matrix"].get<std::vector<double>>();
+  const Eigen::Matrix4d scene_from_mesh = Eigen::Map<const Eigen::Matrix4d>(matrix.data());
+  std::set<std::vector<double>> expected;
+  for (const Eigen::Vector3d& v : model.mesh.vertices) expected.insert({v.x(), v.z(), -v.y()});
+  std::set<std::vector<double>> found;
+  std::size_t corners = 0;
+  const auto view_start = [&](const Json& accessor) {
+    const Json& view = json["bufferViews"][accessor["bufferView"].get<std::size_t>()];
+    return binary + 8 + view["byteOffset"].get<std::size_t>() +
+           accessor.value("byteOffset", std::size_t{0});
+  };
+  for (const Json& mesh : json["meshes"])
+    for (const Json& primitive : mesh["primitives"]) {
+      const Json& positions =
+          json["accessors"][primitive["attributes"]["POSITION"].get<std::size_t>()];
+      for (std::size_t n = 0; n < positions["count"].get<std::size_t>(); ++n) {
+        float place[3];
+        std::memcpy(place, bytes.data() + view_start(positions) + n * sizeof(place), sizeof(place));
+        const Eigen::Vector4d carried =
+            scene_from_mesh * Eigen::Vector4d(place[0], place[1], place[2], 1.0);
+        found.insert({carried.x(), carried.y(), carried.z()});
+      }
+      corners +=
+          json["accessors"][primitive["indices"].get<std::size_t>()]["count"].get<std::size_t>();
+      const Json& material = json["materials"][primitive["material"].get<std::size_t>()];
+      EXPECT_TRUE(material["extensions"].contains("KHR_materials_unlit"));
+    }
+  EXPECT_EQ(found, expected);
+  EXPECT_EQ(corners, 3 * model.mesh.triangles.size());
+  ASSERT_EQ(json["images"].size(), 2U);
+  for (const Json& image : json["images"]) {
+    EXPECT_EQ(image["mimeType"], "image/png");
+    const Json& view = json["bufferViews"][image["bufferView"].get<std::size_t>()];
+    EXPECT_EQ(bytes.substr(binary + 8 + view["byteOffset"].get<std::size_t>(), 4), "\x89PNG");
+  }
 }
 
 TEST(TexturedMeshIo, MeshesWithoutTexture) {

@@ -1,0 +1,38 @@
+// Wall times of the steps of a stage, as its result struct and the manifest keep them.
+#pragma once
+
+#include <chrono>
+#include <string>
+#include <utility>
+#include <vector>
+
+namespace libmap {
+
+using StageTimings = std::vector<std::pair<std::string, double>>;  // step, seconds
+
+// Adds the time from its construction to its end, by an exception too.
+class StageTimer {
+ public:
+  StageTimer(StageTimings& timings_s, std::string name)
+      : timings_s_(timings_s), name_(std::move(name)) {}
+  ~StageTimer() {
+    const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
+    timings_s_.emplace_back(std::move(name_), taken.count());
+  }
+  StageTimer(const StageTimer&) = delete;
+  StageTimer& operator=(const StageTimer&) = delete;
+
+ private:
+  StageTimings& timings_s_;
+  std::string name_;
+  std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
+};
+
+// What `step` returns, its time added.
+template <typename Step>
+auto timed(StageTimings& timings_s, const char* name, const Step& step) {
+  const StageTimer timer(timings_s, name);
+  return step();
+}
+
+}  // namespace libmap
