@@ -1,12 +1,10 @@
 #include "libgtd/detect.h"
 
 #include <chrono>
-#include <cmath>
+#include <utility>
 
-#include "libgtd/score/scoring.h"
-#include "libgtd/shape/convexity.h"
-#include "libgtd/shape/curvature.h"
 #include "libgtd/terrain/interpolation.h"
+#include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
 
 namespace libgtd {
@@ -14,11 +12,6 @@ namespace libgtd {
 namespace {
 
 using libmap::PointCloud;
-
-// The author's program and its two siblings share its preparation of the cloud.
-bool follows_thesis(Method method) {
-  return method == Method::thesis || method == Method::envelope;
-}
 
 // Runs `step` and keeps its wall time under `name`.
 template <typename Step>
@@ -99,79 +92,6 @@ VoxelGrid make_grid(const std::vector<Eigen::Vector3d>& points, const Scenario& 
   });
 }
 
-// The points whose convexity matters for the scored voxels: those that lie near a tile.
-std::vector<std::size_t> points_near_tiles(const PointCloud& terrain, const VoxelLattice& lattice,
-                                           const std::vector<TileBounds>& tiles, double margin_m) {
-  std::vector<std::size_t> near;
-  for (std::size_t n = 0; n < terrain.size(); ++n) {
-    const Eigen::Vector3d cell = lattice.cell_of(terrain.positions[n]);
-    const double margin = margin_m / lattice.voxel_size_m + 1.0;
-    for (const TileBounds& tile : tiles)
-      if (cell.x() >= tile.i_begin - margin && cell.x() <= tile.i_end + margin &&
-          cell.y() >= tile.j_begin - margin && cell.y() <= tile.j_end + margin) {
-        near.push_back(n);
-        break;
-      }
-  }
-  return near;
-}
-
-std::vector<Eigen::Vector3d> find_convex_points(const PointCloud& terrain,
-                                                const std::vector<TileBounds>& tiles,
-                                                bool all_tiles, const Scenario& scenario,
-                                                DetectionResult& result) {
-  const CurvatureMethod method =
-      follows_thesis(scenario.method) ? CurvatureMethod::thesis : CurvatureMethod::corrected;
-  std::optional<std::vector<std::size_t>> queries;
-  std::vector<Eigen::Vector3d> positions = terrain.positions;
-  if (!all_tiles) {
-    queries =
-        points_near_tiles(terrain, result.map.lattice, tiles, scenario.intersection_distance_m);
-    positions.clear();
-    for (const std::size_t n : *queries) positions.push_back(terrain.positions[n]);
-  }
-  const CurvatureResult curvature = estimate_curvature(
-      terrain, {.method = method, .radius_m = scenario.curvature_radius_m}, queries);
-  ConvexityOptions convexity;
-  convexity.zero_plane_m = scenario.zero_plane_m;
-  const std::vector<std::uint8_t> convex = find_convex(curvature, positions, convexity);
-  std::vector<Eigen::Vector3d> convex_points;
-  for (std::size_t n = 0; n < positions.size(); ++n)
-    if (convex[n] != 0) convex_points.push_back(positions[n]);
-  result.curvature_points = positions.size();
-  result.convex_points = convex_points.size();
-  return convex_points;
-}
-
-void fill_map(const std::vector<ScoredVoxel>& scored, const std::vector<std::uint8_t>& convex,
-              const Scenario& scenario, DetectionResult& result) {
-  const bool judge_convexity = scenario.curvature_radius_m > 0.0;
-  for (std::size_t n = 0; n < scored.size(); ++n) {
-    MapVoxel voxel{.voxel = scored[n].voxel,
-                   .counts = scored[n].counts,
-                   .score = scored[n].score,
-                   .convex = convex[n] != 0,
-                   .graspable = false,
-                   .edge = scored[n].edge};
-    const double height = result.map.lattice.center_of(voxel.voxel).z();
-    voxel.graspable =
-        meets_threshold(voxel.counts, voxel.score, scenario.method, scenario.solid_voxel_threshold,
-                        scenario.graspability_threshold) &&
-        height >= scenario.zero_plane_m && (voxel.convex || !judge_convexity);
-    result.graspable_voxels += voxel.graspable ? 1 : 0;
-    result.edge_voxels += voxel.edge ? 1 : 0;
-    result.map.voxels.push_back(voxel);
-  }
-}
-
-int tile_voxels(const Scenario& scenario) {
-  const double voxels = std::round(scenario.tile_size_m / scenario.voxel_size_m);
-  if (voxels >= 1.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
-  throw libmap::Error("out of range", {.field = "tile_size_m",
-                                       .value = libmap::to_text(scenario.tile_size_m),
-                                       .bound = "1 to 2^20 voxels"});
-}
-
 }  // namespace
 
 const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names() {
@@ -200,21 +120,19 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.map.zero_plane_m = scenario.zero_plane_m;
   const std::vector<TileBounds> tiles = share_of(make_tiles(grid, voxels_a_tile), options.share);
   result.tiles = tiles.size();
-  const std::vector<ScoredVoxel> scored = timed(result, "voxel matching", [&] {
-    return score_tiles(grid, result.mask, tiles,
-                       {.solid_voxel_threshold = scenario.solid_voxel_threshold}, progress);
-  });
-  std::vector<std::uint8_t> convex(scored.size(), 0);
-  if (scenario.curvature_radius_m > 0.0 && !scored.empty()) {
-    convex = timed(result, "convexity", [&] {
-      const std::vector<Eigen::Vector3d> convex_points =
-          find_convex_points(in_frame, tiles, options.share.count == 1, scenario, result);
-      std::vector<Eigen::Vector3d> centers;
-      for (const ScoredVoxel& one : scored) centers.push_back(grid.lattice.center_of(one.voxel));
-      return mark_near_convex(centers, convex_points, scenario.intersection_distance_m);
-    });
+  TileDetectionResult detected = detect_tiles(
+      in_frame, grid, result.mask, tiles,
+      options.share.count == 1 ? CurvatureAt::all_points : CurvatureAt::points_near_tiles, scenario,
+      progress);
+  result.curvature_points = detected.curvature_points;
+  result.convex_points = detected.convex_points;
+  result.timings_s.insert(result.timings_s.end(), detected.timings_s.begin(),
+                          detected.timings_s.end());
+  result.map.voxels = std::move(detected.voxels);
+  for (const MapVoxel& voxel : result.map.voxels) {
+    result.graspable_voxels += voxel.graspable ? 1 : 0;
+    result.edge_voxels += voxel.edge ? 1 : 0;
   }
-  fill_map(scored, convex, scenario, result);
   return result;
 }
 

@@ -6,19 +6,29 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/poses/trajectory_io.h"
 #include "tools/command_line.h"
 
 namespace {
 
 using graspmap_tools::Run;
 using libmap::FileEncoding;
+using libmap::TrajectoryFormat;
 
 struct ConvertOptions {
   std::string input;
   std::string output;
   FileEncoding encoding = FileEncoding::binary;
   bool big_endian = false;
+  TrajectoryFormat poses_format = TrajectoryFormat::automatic;
+  TrajectoryFormat output_poses_format = TrajectoryFormat::automatic;
 };
+
+bool holds_poses(const ConvertOptions& options) {
+  return libmap::is_trajectory_path(options.input) || libmap::is_trajectory_path(options.output) ||
+         options.poses_format != TrajectoryFormat::automatic ||
+         options.output_poses_format != TrajectoryFormat::automatic;
+}
 
 bool holds_meshes_alone(const std::string& path) {
   const std::string format = libmap::format_of(path);
@@ -67,6 +77,24 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
   });
 }
 
+void convert_poses(const ConvertOptions& options, Run& run) {
+  const bool named = options.output_poses_format != TrajectoryFormat::automatic;
+  if (!named) libmap::require_trajectory_format(options.output);
+  const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
+  if (!read.images.empty())
+    throw libmap::Error("poses of photographs: only those of the scan know its base (fuse --poses)",
+                        {.file = options.input});
+  run.manifest().results.emplace_back("poses", static_cast<std::int64_t>(read.poses.size()));
+  run.manifest().results.emplace_back("links", static_cast<std::int64_t>(read.links.size()));
+  const bool nodes = read.poses.front().node != 0;
+  run.write_output(options.output, [&](const auto& temporary) {
+    if (named)
+      libmap::write_trajectory_as(options.output_poses_format, temporary, read, nodes);
+    else
+      libmap::write_trajectory(temporary, read, nodes);
+  });
+}
+
 // The manifest of a converted map still says in which frame it is.
 void keep_frame(const ConvertOptions& options, Run& run) {
   run.add_input(options.input);
@@ -77,8 +105,13 @@ void keep_frame(const ConvertOptions& options, Run& run) {
 }
 
 void convert(const ConvertOptions& options, Run& run) {
-  libmap::format_of(options.output);
+  const bool poses = holds_poses(options);
+  if (!poses) libmap::format_of(options.output);
   run.claim_output(options.output, {options.input});
+  if (poses) {
+    keep_frame(options, run);
+    return convert_poses(options, run);
+  }
   const libmap::FileKind kind = libmap::file_kind(options.input);
   keep_frame(options, run);
   if (kind == libmap::FileKind::mesh)
@@ -91,8 +124,12 @@ void convert(const ConvertOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   ConvertOptions options;
-  graspmap_tools::Command command("convert", "Any format of clouds, maps and meshes to any other.");
-  command.input("IN", options.input, "cloud (.pcd .ply .vtp .csv) or mesh (.ply .obj .stl ...)");
+  graspmap_tools::Command command("convert",
+                                  "Any format of clouds, maps, meshes and poses to any other.");
+  command.input(
+      "IN", options.input,
+      "cloud (.pcd .ply .vtp .csv), mesh (.ply .obj .stl ...) or poses (.tum .kitti .g2o .toro "
+      "...)");
   command.input("OUT", options.output, "the same in the format of this extension");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},
@@ -100,5 +137,11 @@ int main(int argc, char** argv) {
                             {"binary_compressed", FileEncoding::binary_compressed}},
                            "how numbers are written, where the format has a choice");
   command.parameters().add("big_endian", options.big_endian, "binary PLY with the high byte first");
+  command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),
+                           "of poses in IN; auto: by its extension, else by its content");
+  command.parameters().add(
+      "output_poses_format", options.output_poses_format, libmap::trajectory_format_names(),
+      "of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, "
+      "1 tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }

@@ -15,7 +15,7 @@
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
-#include "tools/extract_bundler.h"
+#include "tools/extract_pictures.h"
 #include "tools/scan_poses.h"
 
 namespace {
@@ -27,7 +27,7 @@ struct ExtractOptions {
   std::string scan;
   std::string output;
   bool strict = false;
-  graspmap_tools::BundlerOptions bundler;
+  graspmap_tools::PictureOptions pictures;
 };
 
 struct Counts {
@@ -143,19 +143,19 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
 }
 
 void extract(ExtractOptions& options, Run& run) {
-  const bool pictures = !options.bundler.folder.empty();
+  const bool pictures = options.pictures.wanted();
   if (options.output.empty() && !pictures)
-    throw libmap::Error("nothing to write: -o or --bundler names a folder");
+    throw libmap::Error("nothing to write: -o, --bundler or --colmap names a folder");
   if (!options.output.empty())
     run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
-  if (pictures) graspmap_tools::claim_bundler_folder(options.bundler, options.scan, run);
+  if (pictures) graspmap_tools::claim_picture_folders(options.pictures, options.scan, run);
   const auto scan = graspmap_tools::open_scan(options.scan, options.strict, run);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   // Each folder's manifest holds what was done for it alone.
   const libmap::Manifest start = run.manifest();
   if (!options.output.empty()) write_folder(options, *scan, run);
   run.manifest() = start;
-  if (pictures) graspmap_tools::write_bundler_folder(options.bundler, *scan, options.strict, run);
+  if (pictures) graspmap_tools::write_picture_folders(options.pictures, *scan, options.strict, run);
 }
 
 }  // namespace
@@ -166,6 +166,6 @@ int main(int argc, char** argv) {
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "folder of the whole scan, replaced as a whole", false);
   command.flag("--strict", options.strict, "end at a frame that is broken");
-  graspmap_tools::add_options(command, options.bundler);
+  graspmap_tools::add_options(command, options.pictures);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });
 }

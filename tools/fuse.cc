@@ -26,7 +26,7 @@ enum class CloudFrame { poses, ground_truth };
 struct FuseOptions {
   std::string scan;
   std::string output;
-  std::string poses = "auto";
+  graspmap_tools::PosesOption poses;
   std::string corrected_poses;
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
@@ -94,7 +94,7 @@ void fuse(FuseOptions options, Run& run) {
       throw libmap::Error("not a format of poses", {.file = {},
                                                     .field = "--corrected-poses",
                                                     .value = options.corrected_poses,
-                                                    .bound = ".tum, .kitti or .g2o"});
+                                                    .bound = ".tum, .kitti, .g2o or .toro"});
     run.claim_output(options.corrected_poses,
                      graspmap_tools::scan_inputs(options.scan, options.poses));
   }
@@ -137,9 +137,10 @@ int main(int argc, char** argv) {
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
   graspmap_tools::add_poses_option(command, options.poses);
-  command.option("--corrected-poses", "FILE", options.corrected_poses,
-                 "also write the poses that the frames were fused by (.tum, .kitti, .g2o), in the "
-                 "frame of --poses");
+  command.option(
+      "--corrected-poses", "FILE", options.corrected_poses,
+      "also write the poses that the frames were fused by (.tum, .kitti, .g2o, .toro), in the "
+      "frame of --poses");
   command.parameters().add(
       "frame", options.frame,
       {{"poses", CloudFrame::poses}, {"ground-truth", CloudFrame::ground_truth}},

@@ -15,6 +15,8 @@
 #include "libmap/mesh/mesh_report.h"
 #include "tools/command_line.h"
 #include "tools/info_scan.h"
+#include "tools/info_tiles.h"
+#include "tools/map_tiles.h"
 
 namespace {
 
@@ -185,21 +187,40 @@ void print_plainly(const Json& json, const std::string& indent) {
   }
 }
 
-Json content_json(const InfoOptions& options, Run& run, std::vector<libmap::ScanFault>& faults) {
+// What --verify finds.
+struct Faults {
+  std::vector<libmap::ScanFault> scan;
+  std::vector<std::string> tiles;
+};
+
+Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
+  if (graspmap_tools::is_tile_store(options.file)) {
+    graspmap_tools::TilesInfo tiles =
+        graspmap_tools::tiles_info(options.file, options.verify, run.progress());
+    faults.tiles = std::move(tiles.faults);
+    return std::move(tiles.json);
+  }
   if (graspmap_tools::may_be_scan(options.file)) {
     graspmap_tools::ScanInfo scan =
         graspmap_tools::scan_info(options.file, options.verify, run.progress());
-    faults = std::move(scan.faults);
+    faults.scan = std::move(scan.faults);
     return std::move(scan.json);
   }
   if (options.verify)
-    throw libmap::Error("only scans are verified", {.file = options.file, .field = "--verify"});
+    throw libmap::Error("only scans and tile stores are verified",
+                        {.file = options.file, .field = "--verify"});
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
                                                                    : cloud_json(options.file);
 }
 
-// Of a scan that was verified: what is broken, in one line; the list stands on stdout.
-void require_sound(const std::string& file, const std::vector<libmap::ScanFault>& faults) {
+// Of a scan or a tile store that was verified: what is broken, in one line; the list stands on
+// stdout.
+void require_sound(const std::string& file, const Faults& found) {
+  if (!found.tiles.empty())
+    throw libmap::Error(fmt::format("{} {} broken", found.tiles.size(),
+                                    found.tiles.size() == 1 ? "tile is" : "tiles are"),
+                        {.file = file});
+  const std::vector<libmap::ScanFault>& faults = found.scan;
   if (faults.empty()) return;
   std::set<int> nodes;
   for (const libmap::ScanFault& fault : faults)
@@ -210,9 +231,10 @@ void require_sound(const std::string& file, const std::vector<libmap::ScanFault>
                       {.file = file});
 }
 
-void info(const InfoOptions& options, Run& run) {
+void info(InfoOptions& options, Run& run) {
+  options.file = graspmap_tools::without_trailing_slash(options.file);
   Json json = {{"path", options.file}};
-  std::vector<libmap::ScanFault> faults;
+  Faults faults;
   json.update(content_json(options, run, faults));
   if (const auto manifest = libmap::read_manifest_of(options.file)) {
     json["made_by"] = "graspmap " + manifest->command + " " + manifest->version;
@@ -235,9 +257,10 @@ int main(int argc, char** argv) {
   InfoOptions options;
   graspmap_tools::Command command("info",
                                   "What a scan, a cloud, a mesh or a graspability map holds.");
-  command.input("FILE", options.file, "scan, cloud, mesh or map");
+  command.input("FILE", options.file, "scan, cloud, mesh, map or tile store (.tiles)");
   command.flag("--json", options.json, "as JSON");
-  command.flag("--verify", options.verify, "decode all that a scan stores and list what is broken");
+  command.flag("--verify", options.verify,
+               "read all that a scan or a tile store holds and list what is broken");
   command.flag("--quick", options.quick, "do not look for self-intersections of a mesh");
   return command.run(argc, argv, [&](Run& run) { info(options, run); });
 }

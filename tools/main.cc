@@ -34,6 +34,7 @@ constexpr CommandEntry commands[] = {
     {"merge", "tiles of a map into one map"},
     {"lookup", "the map's values at listed locations"},
     {"evaluate", "ROC, AUC and accuracy of looked-up scores against a field test"},
+    {"footholds", "the best places of a map, for a planner of steps"},
     {"render", "a picture of a cloud, a mesh or a map"},
     {"mask", "a gripper's mask as text, cloud or picture data"},
     {"spot-check", "height errors at places along the edges of a site"},

@@ -2,14 +2,18 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "libgtd/score/graspability_map.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/pcd_parts.h"
 #include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
 #include "tools/command_line.h"
+#include "tools/map_tiles.h"
 
 namespace {
 
@@ -97,9 +101,80 @@ std::int64_t count_of(const libmap::PointCloud& map, const char* flag) {
   return field == nullptr ? 0 : std::count(field->values.begin(), field->values.end(), 1.0);
 }
 
+// The tiles of a store that share their i, one after the other: consecutive in the map's order.
+struct TileRow {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+std::vector<TileRow> rows_of(const libgtd::TileStoreIndex& index) {
+  std::vector<TileRow> rows;
+  for (std::size_t n = 0; n < index.tiles.size(); ++n) {
+    if (n == 0 || index.tiles[n].number.i != index.tiles[n - 1].number.i) rows.push_back({n, n});
+    rows.back().end = n + 1;
+  }
+  return rows;
+}
+
+libmap::PointCloud load_row(const graspmap_tools::MapTiles& tiles, const TileRow& row) {
+  std::vector<libmap::PointCloud> parts(row.end - row.begin);
+  libmap::parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) parts[n] = tiles.load_checked(row.begin + n);
+  });
+  return libgtd::merge_map_clouds(parts);
+}
+
+// A PCD row by row; other formats need the whole map in memory.
+void write_store(const graspmap_tools::MapTiles& tiles, const std::filesystem::path& file,
+                 Run& run) {
+  const std::vector<TileRow> rows = rows_of(tiles.index());
+  run.progress().begin("merge", rows.size());
+  if (libmap::format_of(file) == ".pcd") {
+    libmap::PcdPartsWriter writer(
+        file, {.points = tiles.index().voxels(), .float64_positions = tiles.float64_positions()});
+    for (const TileRow& row : rows) {
+      writer.append(load_row(tiles, row));
+      run.progress().advance(1);
+    }
+    writer.finish();
+  } else {
+    libmap::write_cloud(file, load_row(tiles, {0, tiles.index().tiles.size()}));
+  }
+  run.progress().end();
+}
+
+void merge_store(const MergeOptions& options, Run& run) {
+  const graspmap_tools::MapTiles tiles(options.tiles.front());
+  const libgtd::TileStoreIndex& index = tiles.index();
+  std::uint64_t edge = 0;
+  std::uint64_t graspable = 0;
+  for (const libgtd::StoredTile& tile : index.tiles) {
+    edge += tile.edge_voxels;
+    graspable += tile.graspable_voxels;
+  }
+  copy_common_facts(index.manifest, run.manifest());
+  run.manifest().inputs = index.manifest.inputs;
+  run.add_input(graspmap_tools::store_index_path(options.tiles.front()));
+  const auto count = [&](const char* name, std::uint64_t value) {
+    run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  count("scored_voxels", index.voxels());
+  count("edge_voxels", edge);
+  count("graspable_voxels", graspable);
+  run.write_output(options.output,
+                   [&](const auto& temporary) { write_store(tiles, temporary, run); });
+  run.say(fmt::format("{} scored voxels from {} tiles", index.voxels(), index.tiles.size()));
+}
+
 void merge(const MergeOptions& options, Run& run) {
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, options.tiles);
+  const auto store =
+      std::find_if(options.tiles.begin(), options.tiles.end(), graspmap_tools::is_tile_store);
+  if (store != options.tiles.end()) {
+    if (options.tiles.size() > 1)
+      throw libmap::Error("a tile store is merged by itself", {.file = *store});
+    return merge_store(options, run);
+  }
   std::vector<libmap::Manifest> manifests;
   for (const std::string& tile : options.tiles) {
     manifests.push_back(manifest_of(tile));
@@ -125,8 +200,10 @@ void merge(const MergeOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   MergeOptions options;
-  graspmap_tools::Command command("merge", "The shares of a map's tiles into one map.");
-  command.inputs("TILE", options.tiles, "maps that `graspmap score --tile K/N` wrote, all N");
+  graspmap_tools::Command command("merge", "The tiles of a map into one map.");
+  command.inputs(
+      "TILE", options.tiles,
+      "a tile store (.tiles), or the maps that `graspmap score --tile K/N` wrote, all N");
   command.output(options.output, "the whole map, the same bytes as without --tile");
   return command.run(argc, argv, [&](Run& run) { merge(options, run); });
 }

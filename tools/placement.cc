@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <filesystem>
-#include <numbers>
 #include <string_view>
 
 #include "libmap/core/error.h"
@@ -79,12 +78,6 @@ libmap::Pose parse_transform(const std::string& text, const std::string& field) 
 }
 
 std::string transform_text(const libmap::Pose& pose) {
-  // Rz(yaw) Ry(pitch) Rx(roll).
-  const Eigen::Matrix3d& r = pose.matrix().topLeftCorner<3, 3>();
-  const double pitch = std::atan2(-r(2, 0), std::hypot(r(2, 1), r(2, 2)));
-  const bool upright = std::hypot(r(2, 1), r(2, 2)) < 1e-9;
-  const double roll = upright ? 0.0 : std::atan2(r(2, 1), r(2, 2));
-  const double yaw = upright ? std::atan2(-r(0, 1), r(1, 1)) : std::atan2(r(1, 0), r(0, 0));
   std::string text;
   const auto add = [&](double value, int decimals) {
     const std::string number = libmap::to_fixed_text(value, decimals);
@@ -95,7 +88,7 @@ std::string transform_text(const libmap::Pose& pose) {
             ",";
   };
   for (const double length : pose.translation()) add(length, 7);
-  for (const double angle : {roll, pitch, yaw}) add(angle * 180.0 / std::numbers::pi, 6);
+  for (const double angle_deg : libmap::roll_pitch_yaw_deg(pose)) add(angle_deg, 6);
   text.pop_back();
   return text;
 }

@@ -1,8 +1,11 @@
 // graspmap render: a picture of a cloud, a mesh or a map.
 #include <fmt/format.h>
 
+#include <filesystem>
 #include <limits>
 #include <string>
+#include <utility>
+#include <variant>
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
@@ -13,6 +16,7 @@
 #include "libmap/view/scene_view.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
+#include "tools/map_window.h"
 
 namespace {
 
@@ -29,6 +33,8 @@ struct RenderOptions {
   std::string camera_target;
   graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
   double point_size_m = 0.0;
+  std::string box;  // of the plan that is shown
+  std::uint64_t max_points = 1'000'000;
   libmap::Coloring coloring;
   libmap::PointShape point_shape = libmap::PointShape::automatic;
   libmap::Shading shading = libmap::Shading::automatic;
@@ -56,6 +62,10 @@ void bind(libmap::ParameterTable& table, RenderOptions& options) {
   table.add("point_shape", options.point_shape, libmap::point_shape_names(), "shape of a point");
   table.add("point_size_m", options.point_size_m, libmap::not_negative,
             "edge of a point, m; 0: from their spacing");
+  table.add("box", options.box,
+            "show this rectangle of a cloud or map alone: X0,Y0,X1,Y1 in its frame, m");
+  table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
+            "of a tile store: larger parts are thinned to about so many points");
   table.add("shading", options.shading, libmap::shading_names(), "where light falls");
   table.add("legend", options.view.legend, "show the legend");
   table.add("axes", options.view.axes, "show the axes");
@@ -117,15 +127,33 @@ double zero_plane_of(const RenderOptions& options, const libmap::Manifest* manif
   return none;
 }
 
+libmap::PointCloud read_store(const RenderOptions& options, Run& run) {
+  const graspmap_tools::MapTiles tiles(options.file);
+  graspmap_tools::MapWindow window = graspmap_tools::read_window(
+      tiles, graspmap_tools::parse_box(options.box), options.max_points);
+  const auto width = static_cast<std::int64_t>(window.columns_a_point);
+  run.manifest().results.emplace_back("columns_a_point", width);
+  if (width > 1)
+    run.say(fmt::format("one point for {} x {} columns: --box shows a part in full", width, width));
+  return std::move(window.cloud);
+}
+
 libmap::Scene read_scene(const RenderOptions& options, Run& run) {
   libmap::Scene scene;
   libmap::SceneLayer layer;
-  if (libmap::is_textured_format(options.file))
+  const auto box = graspmap_tools::parse_box(options.box);
+  if (graspmap_tools::is_tile_store(options.file))
+    layer.shape = read_store(options, run);
+  else if (libmap::is_textured_format(options.file))
     layer.shape = libmap::read_textured_mesh(options.file);
   else if (libmap::file_kind(options.file) == libmap::FileKind::mesh)
     layer.shape = libmap::read_mesh(options.file).mesh;
   else
     layer.shape = libmap::read_cloud(options.file).cloud;
+  if (auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape); box && cloud != nullptr)
+    *cloud = graspmap_tools::points_in_box(*cloud, *box);
+  else if (box)
+    throw libmap::Error("only clouds and maps are cut", {.file = options.file, .field = "--box"});
   const auto manifest = libmap::read_manifest_of(options.file);
   layer.coloring = options.coloring;
   layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
@@ -149,6 +177,7 @@ libmap::Scene read_scene(const RenderOptions& options, Run& run) {
 void render(RenderOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".png")
     throw libmap::Error("pictures are written as .png", {.file = options.output});
+  options.file = graspmap_tools::without_trailing_slash(options.file);
   run.claim_output(options.output, {options.file, options.points});
   if (options.view.view == libmap::Viewpoint::camera) {
     options.view.camera.position =
@@ -164,7 +193,9 @@ void render(RenderOptions& options, Run& run) {
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.file) : error;
   }
-  run.add_input(options.file);
+  run.add_input(graspmap_tools::is_tile_store(options.file)
+                    ? graspmap_tools::store_index_path(options.file)
+                    : std::filesystem::path(options.file));
   if (!options.points.empty()) run.add_input(options.points);
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_text(temporary, libmap::to_png(image));
@@ -176,7 +207,7 @@ void render(RenderOptions& options, Run& run) {
 int main(int argc, char** argv) {
   RenderOptions options;
   graspmap_tools::Command command("render", "A picture of a cloud, a mesh or a map.");
-  command.input("FILE", options.file, "cloud, mesh or graspability map");
+  command.input("FILE", options.file, "cloud, mesh, graspability map or tile store (.tiles)");
   command.output(options.output, "picture (.png)");
   command.option("--points", "POINTS.csv", options.points,
                  "places to mark: CSV with the columns x, y, z in metres");

@@ -8,6 +8,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/poses/pose_import.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
 
@@ -36,8 +37,9 @@ std::string sources_in(const libmap::PoseGraph& graph) {
   return names.empty() ? "no poses at all" : names;
 }
 
-libmap::Trajectory poses_in_file(const std::string& file, const libmap::PoseGraph& graph,
+libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSource& scan,
                                  Run& run) {
+  const std::string& file = poses.source;
   if (!fs::exists(file) && !libmap::is_trajectory_path(file))
     throw libmap::Error(
         "no such poses" + libmap::did_you_mean(file, {"odometry", "stored", "ground-truth"}),
@@ -45,18 +47,22 @@ libmap::Trajectory poses_in_file(const std::string& file, const libmap::PoseGrap
          .field = "--poses",
          .value = file,
          .bound = "auto, odometry, stored, ground-truth or a file"});
-  const libmap::TrajectoryFile read = libmap::read_trajectory(file);
-  try {
-    libmap::NodeTrajectory assigned = libmap::assign_nodes(read.poses, graph);
-    run.add_input(file);
-    run.say(fmt::format("{} of {} poses belong to nodes of the scan", assigned.poses.size(),
-                        read.poses.size()));
-    run.manifest().results.emplace_back("poses_in_file",
-                                        static_cast<std::int64_t>(read.poses.size()));
-    return std::move(assigned.poses);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file);
+  libmap::ImportedPoses imported = libmap::import_poses(file, scan, poses.file);
+  run.add_input(libmap::file_of_trajectory(file));
+  for (const std::string& warning : imported.warnings) run.warn(file + ": " + warning);
+  run.say(fmt::format("{} of {} poses belong to nodes of the scan",
+                      imported.poses_in_file - imported.trajectory.foreign,
+                      imported.poses_in_file));
+  if (imported.scale != 1.0) run.say(fmt::format("scaled by {:.9g}", imported.scale));
+  libmap::Manifest& manifest = run.manifest();
+  manifest.results.emplace_back("poses_in_file", static_cast<std::int64_t>(imported.poses_in_file));
+  manifest.results.emplace_back("poses_scale_taken", imported.scale);
+  if (imported.largest_rig_deviation_m > 0.0) {
+    run.say(fmt::format("cameras of one node agree within {:.1f} mm",
+                        1e3 * imported.largest_rig_deviation_m));
+    manifest.results.emplace_back("largest_rig_deviation_m", imported.largest_rig_deviation_m);
   }
+  return std::move(imported.trajectory.poses);
 }
 
 std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) {
@@ -66,16 +72,16 @@ std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) 
                       {.file = scan, .field = {}, .value = {}, .bound = {}});
 }
 
-libmap::Trajectory wanted_poses(const std::string& scan, const std::string& wanted,
-                                const libmap::PoseGraph& graph, Run& run) {
-  const std::optional<PoseSource> source = source_named(wanted);
-  if (!source) return poses_in_file(wanted, graph, run);
-  libmap::Trajectory poses = libmap::trajectory_of(graph, *source);
+libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOption& wanted,
+                                Run& run) {
+  const std::optional<PoseSource> source = source_named(wanted.source);
+  if (!source) return poses_in_file(wanted, scan, run);
+  libmap::Trajectory poses = libmap::trajectory_of(scan.graph(), *source);
   if (poses.empty())
-    throw libmap::Error("the scan has none", {.file = scan,
+    throw libmap::Error("the scan has none", {.file = scan.path().string(),
                                               .field = "--poses",
-                                              .value = wanted,
-                                              .bound = "what it has: " + sources_in(graph)});
+                                              .value = wanted.source,
+                                              .bound = "what it has: " + sources_in(scan.graph())});
   return poses;
 }
 
@@ -95,15 +101,17 @@ void report_nodes_without_pose(const std::string& scan, const std::string& wante
 
 }  // namespace
 
-void add_poses_option(Command& command, std::string& poses) {
-  command.option("--poses", "auto|odometry|stored|ground-truth|FILE", poses,
-                 "where the frames were: by the scan, or a file of poses (.tum, .kitti, .g2o); "
-                 "auto: the first of stored, odometry and ground-truth that the scan has");
+void add_poses_option(Command& command, PosesOption& poses) {
+  command.option("--poses", "auto|odometry|stored|ground-truth|FILE", poses.source,
+                 "where the frames were: by the scan, or a file of poses (TUM, KITTI, g2o, TORO; "
+                 "a folder: COLMAP); auto: the first of stored, odometry and ground-truth that the "
+                 "scan has");
+  libmap::bind(command.parameters(), poses.file);
 }
 
-std::vector<std::string> scan_inputs(const std::string& scan, const std::string& poses) {
+std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses) {
   std::vector<std::string> inputs = {scan};
-  if (poses != "auto" && !source_named(poses)) inputs.push_back(poses);
+  if (poses.source != "auto" && !source_named(poses.source)) inputs.push_back(poses.source);
   return inputs;
 }
 
@@ -116,27 +124,27 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool stri
   return scan;
 }
 
-libmap::Trajectory find_poses(const libmap::ScanSource& scan, std::string& poses, bool strict,
+libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run) {
   const std::string path = scan.path().string();
-  if (poses == "auto") {
-    poses = best_poses(scan.graph(), path);
-    run.say("poses: " + poses);
+  if (poses.source == "auto") {
+    poses.source = best_poses(scan.graph(), path);
+    run.say("poses: " + poses.source);
   }
-  libmap::Trajectory found = wanted_poses(path, poses, scan.graph(), run);
-  report_nodes_without_pose(path, poses, scan.graph(), found, strict, run);
-  run.manifest().parameters.emplace_back("poses", poses);
+  libmap::Trajectory found = wanted_poses(scan, poses, run);
+  report_nodes_without_pose(path, poses.source, scan.graph(), found, strict, run);
+  run.manifest().parameters.emplace_back("poses", poses.source);
   return found;
 }
 
 libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
-                              const std::string& poses_name, Run& run) {
+                              const PosesOption& taken, Run& run) {
   const std::string path = scan.path().string();
   const libmap::Trajectory truth = libmap::trajectory_of(scan.graph(), PoseSource::ground_truth);
   if (truth.empty())
     throw libmap::Error("the scan has no ground truth",
                         {.file = path, .field = "--frame", .value = "ground-truth", .bound = {}});
-  if (poses_name == to_text(PoseSource::ground_truth)) return libmap::Pose::Identity();
+  if (taken.source == to_text(PoseSource::ground_truth)) return libmap::Pose::Identity();
   libmap::AbsoluteTrajectoryError error;
   try {
     error = libmap::absolute_trajectory_error(poses, truth);

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/poses/pose_import.h"
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
 #include "tools/run.h"
@@ -13,11 +14,15 @@
 namespace graspmap_tools {
 
 // --poses auto|odometry|stored|ground-truth|FILE. auto: the first of stored, odometry and
-// ground-truth that the scan has; FILE: .tum, .kitti, .g2o.
-void add_poses_option(Command& command, std::string& poses);
+// ground-truth that the scan has; FILE: any that import_poses reads.
+struct PosesOption {
+  std::string source = "auto";
+  libmap::PoseImportOptions file;
+};
+void add_poses_option(Command& command, PosesOption& poses);
 
 // The files among the two, for Run::claim_output.
-std::vector<std::string> scan_inputs(const std::string& scan, const std::string& poses);
+std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses);
 
 // Opens a scan; what it had to leave out is a warning, an Error if `strict`.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run);
@@ -25,13 +30,13 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool stri
 // The poses that `poses` names, by ascending node; "auto" becomes the source that was taken. Says
 // so, and keeps it in the manifest. Nodes without a pose are a warning, an Error if `strict`.
 // Throws Error if there are no such poses.
-libmap::Trajectory find_poses(const libmap::ScanSource& scan, std::string& poses, bool strict,
+libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 
 // The rigid transform that aligns `poses` with the scan's true ones; the identity where they are
 // those. Says how well, and keeps it in the manifest as ground_truth_from_poses. Throws Error if
 // the scan has no ground truth.
 libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
-                              const std::string& poses_name, Run& run);
+                              const PosesOption& taken, Run& run);
 
 }  // namespace graspmap_tools

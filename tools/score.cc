@@ -5,11 +5,14 @@
 
 #include "libgtd/detect.h"
 #include "libgtd/gripper/gripper_io.h"
+#include "libgtd/score/tile_store_io.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/cloud_pieces.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
+#include "tools/score_store.h"
 
 namespace {
 
@@ -20,6 +23,8 @@ struct ScoreOptions {
   std::string output;
   std::string tile = "1/1";
   std::string up = "auto";
+  bool append = false;
+  std::string points_at_once = "1000000";
   libgtd::MapFrame frame = libgtd::MapFrame::terrain;
   libgtd::DetectionOptions detection;
 };
@@ -42,6 +47,14 @@ libgtd::TileShare parse_share(const std::string& text) {
     throw libmap::Error("no such share of the tiles",
                         {.field = "--tile", .value = text, .bound = "K/N with 1 <= K <= N"});
   return {static_cast<int>(*number), static_cast<int>(*count)};
+}
+
+std::size_t parse_points_at_once(const std::string& text) {
+  const auto count = libmap::parse_integer(text);
+  if (!count || *count < 1)
+    throw libmap::Error("not a number of points",
+                        {.field = "--points-at-once", .value = text, .bound = ">= 1"});
+  return static_cast<std::size_t>(*count);
 }
 
 std::optional<Eigen::Vector3d> parse_up(const std::string& text) {
@@ -94,6 +107,17 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }
 
+// A cloud file, or the pieces of a folder one after the other.
+libmap::PiecesReadResult read_terrain(const std::string& path) {
+  if (std::filesystem::is_directory(path)) return libmap::read_pieces(libmap::cloud_pieces(path));
+  libmap::CloudReadResult read = libmap::read_cloud(path);
+  return {std::move(read.cloud), read.dropped_points};
+}
+
+void add_terrain_input(const std::string& path, Run& run) {
+  for (const auto& piece : libmap::cloud_pieces(path)) run.add_input(piece);
+}
+
 void score(ScoreOptions& options, Run& run) {
   libgtd::Scenario& scenario = options.detection.scenario;
   options.detection.share = parse_share(options.tile);
@@ -104,10 +128,23 @@ void score(ScoreOptions& options, Run& run) {
   // Before any work: a voxel size that does not suit the gripper shows here.
   libgtd::make_gripper_mask(options.detection.gripper,
                             {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
+  if (libgtd::is_tile_store_name(options.output)) {
+    graspmap_tools::score_into_store(
+        {.terrain = options.terrain,
+         .store = options.output,
+         .gripper_file = gripper_file,
+         .frame = options.frame,
+         .append = options.append,
+         .points_at_once = parse_points_at_once(options.points_at_once),
+         .detection = options.detection},
+        run);
+    return;
+  }
+  if (options.append) throw libmap::Error("adds to a tile store, MAP.tiles", {.field = "--append"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
-  const libmap::CloudReadResult read =
-      run.timed("read", [&] { return libmap::read_cloud(options.terrain); });
+  const libmap::PiecesReadResult read =
+      run.timed("read", [&] { return read_terrain(options.terrain); });
   if (read.cloud.empty() && read.dropped_points > 0)
     throw libmap::Error(fmt::format("none of its {} points has a position", read.dropped_points),
                         {.file = options.terrain});
@@ -123,7 +160,7 @@ void score(ScoreOptions& options, Run& run) {
   }
   libmap::Manifest& manifest = run.manifest();
   manifest.parameters.emplace_back("tile", options.tile);
-  run.add_input(options.terrain);
+  add_terrain_input(options.terrain, run);
   run.add_input(gripper_file);
   add_results(manifest, result, options);
   graspmap_tools::carry_site_transform(options.terrain, run);
@@ -138,10 +175,17 @@ void score(ScoreOptions& options, Run& run) {
 int main(int argc, char** argv) {
   ScoreOptions options;
   graspmap_tools::Command command("score", "Graspability map of a terrain, tile by tile.");
-  command.input("TERRAIN", options.terrain, "cloud of the terrain (.pcd, .ply, .vtp, .csv)");
-  command.output(options.output, "graspability map (.pcd, .ply, .vtp, .csv)");
+  command.input("TERRAIN", options.terrain,
+                "cloud of the terrain (.pcd, .ply, .vtp, .csv), or a folder of its pieces");
+  command.output(options.output,
+                 "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,
                  "score share K of N of the tiles alone; `graspmap merge` joins the shares");
+  command.option("--points-at-once", "N", options.points_at_once,
+                 "into a tile store: how many points are in memory at once, about 250 bytes each; "
+                 "the map is the same");
+  command.flag("--append", options.append,
+               "the terrain has more pieces than the tile store: score the tiles that they touch");
   bind(command.parameters(), options);
   command.config_resolver(
       [](const std::string& name) { return graspmap_tools::find_data_file("scenarios", name); });

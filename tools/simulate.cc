@@ -22,6 +22,8 @@ constexpr Entry entries[] = {
     {"scene", "a scene of primitive shapes as cloud or mesh", graspmap_tools::simulate_scene},
     {"site", "rocks, slopes or a climbing wall: true mesh and field points",
      graspmap_tools::simulate_site},
+    {"terrain", "rocky ground of any size, as a folder of clouds",
+     graspmap_tools::simulate_terrain},
 };
 
 void print_help() {

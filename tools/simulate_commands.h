@@ -7,5 +7,6 @@ int simulate_cameras(int argc, char** argv);
 int simulate_scan(int argc, char** argv);
 int simulate_scene(int argc, char** argv);
 int simulate_site(int argc, char** argv);
+int simulate_terrain(int argc, char** argv);
 
 }  // namespace graspmap_tools

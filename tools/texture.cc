@@ -29,7 +29,7 @@ struct TextureCommandOptions {
   std::string mesh;
   std::string output;
   std::string scan;
-  std::string poses = "auto";
+  graspmap_tools::PosesOption poses;
   MeshFrame frame = MeshFrame::automatic;
   libmap::TextureOptions texture;
   libmap::TexturedMeshWriteOptions writing;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <nanoflann.hpp>
+#include <tuple>
+#include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -31,17 +33,19 @@ std::vector<double> values_of(const libmap::PointCloud& map, std::size_t point) 
   return values;
 }
 
-// Points within the radius by index, so that a mean does not depend on the tree's order.
-std::vector<std::size_t> points_within(const Tree& tree, const Eigen::Vector3d& point,
-                                       double radius_m) {
+// The points with a squared distance of at most `squared`, by index, so that a mean does not depend
+// on the tree's order.
+std::vector<std::pair<std::size_t, double>> points_within(const Tree& tree,
+                                                          const Eigen::Vector3d& point,
+                                                          double squared) {
   std::vector<std::pair<std::size_t, double>> matches;
-  // The tree counts distances < r; a point at the radius itself belongs to it.
-  const double reach = std::nextafter(radius_m * radius_m, HUGE_VAL);
+  // The tree rounds the distances of its boxes: it is asked for a little more.
+  constexpr double margin = 1e-9;
+  const double reach = std::nextafter(squared * (1.0 + margin), HUGE_VAL);
   tree.radiusSearch(point.data(), reach, matches, nanoflann::SearchParams());
-  std::vector<std::size_t> indices;
-  for (const auto& [index, squared] : matches) indices.push_back(index);
-  std::sort(indices.begin(), indices.end());
-  return indices;
+  std::erase_if(matches, [&](const auto& match) { return match.second > squared; });
+  std::sort(matches.begin(), matches.end());
+  return matches;
 }
 
 std::vector<double> mean_values(const libmap::PointCloud& map,
@@ -58,17 +62,14 @@ std::vector<double> mean_values(const libmap::PointCloud& map,
 std::size_t best_of(const libmap::PointCloud& map, const std::vector<double>& scores,
                     const std::vector<std::size_t>& points, const Eigen::Vector3d& at) {
   const auto rank = [&](std::size_t n) {
-    return std::pair(-scores[n], (map.positions[n] - at).squaredNorm());
+    return std::pair(-scores[n], squared_distance(map.positions[n], at));
   };
   return *std::min_element(points.begin(), points.end(),
                            [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
 }
 
 void check(const libmap::PointCloud& map, const LookupOptions& options) {
-  LookupOptions copy = options;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  options.check();
   if (map.empty()) throw libmap::Error("the map has no points");
   if (options.mode == LookupMode::maximum && map.find_field("score") == nullptr)
     throw libmap::Error("the map has no such field", {.field = "score"});
@@ -83,6 +84,10 @@ LookupAnswer answer_of(const libmap::PointCloud& map, const Tree& tree, const Ei
   }
   double squared = 0.0;
   tree.knnSearch(at.data(), 1, &answer.map_point, &squared);
+  // Of equals the first.
+  for (const auto& [index, distance] : points_within(tree, at, squared))
+    if (distance < squared || (distance == squared && index < answer.map_point))
+      std::tie(answer.map_point, squared) = std::pair(index, distance);
   answer.distance_m = std::sqrt(squared);
   if (options.mode == LookupMode::nearest) {
     answer.found = answer.distance_m <= options.max_distance_m;
@@ -91,7 +96,9 @@ LookupAnswer answer_of(const libmap::PointCloud& map, const Tree& tree, const Ei
     answer.values = values_of(map, answer.map_point);
     return answer;
   }
-  const std::vector<std::size_t> points = points_within(tree, at, options.radius_m);
+  std::vector<std::size_t> points;
+  for (const auto& [index, distance] : points_within(tree, at, options.radius_m * options.radius_m))
+    points.push_back(index);
   answer.map_points = points.size();
   answer.found = !points.empty();
   if (!answer.found) return answer;
@@ -120,6 +127,13 @@ void bind(libmap::ParameterTable& table, LookupOptions& options) {
   table.add("radius_m", options.radius_m, libmap::positive, "radius of maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,
             "nearest: farther off there is nothing, m");
+}
+
+void LookupOptions::check() const {
+  LookupOptions copy = *this;
+  libmap::ParameterTable table;
+  bind(table, copy);
+  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
 }
 
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,

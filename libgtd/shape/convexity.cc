@@ -1,6 +1,7 @@
 #include "libgtd/shape/convexity.h"
 
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "libgtd/shape/point_grid.h"
@@ -29,19 +30,32 @@ void check_bound(const char* field, double value) {
   if (std::isnan(value)) throw libmap::Error("not a number", {.field = field, .value = "nan"});
 }
 
-bool is_near(const Eigen::Vector3d& place, const std::vector<Eigen::Vector3d>& points,
-             const PointGrid& grid, double distance) {
-  const PointGrid::Cell cell = grid.cell_of(place);
-  PointGrid::Cell near;
-  for (near[0] = cell[0] - 1; near[0] <= cell[0] + 1; ++near[0])
-    for (near[1] = cell[1] - 1; near[1] <= cell[1] + 1; ++near[1])
-      for (near[2] = cell[2] - 1; near[2] <= cell[2] + 1; ++near[2]) {
-        const PointGrid::Range range = grid.range_of(near);
-        for (std::uint32_t k = range.first; k < range.last; ++k)
-          if ((points[grid.order()[k]] - place).squaredNorm() < distance * distance) return true;
-      }
-  return false;
-}
+// Whether places are near to one of the points; neighbouring places share a search.
+class NearSearch {
+ public:
+  NearSearch(const std::vector<Eigen::Vector3d>& points, const PointGrid& grid, double distance)
+      : points_(points), grid_(grid), square_(distance * distance) {}
+
+  bool is_near(const Eigen::Vector3d& place) {
+    if (!grid_.reaches(place)) return false;
+    const PointGrid::Cell cell = grid_.cell_of(place);
+    if (!cell_ || *cell_ != cell) {
+      grid_.find_near(cell, 1, runs_);
+      cell_ = cell;
+    }
+    for (const PointGrid::Range& run : runs_)
+      for (std::uint32_t k = run.first; k < run.last; ++k)
+        if ((points_[grid_.order()[k]] - place).squaredNorm() < square_) return true;
+    return false;
+  }
+
+ private:
+  const std::vector<Eigen::Vector3d>& points_;
+  const PointGrid& grid_;
+  double square_;
+  std::optional<PointGrid::Cell> cell_;
+  std::vector<PointGrid::Range> runs_;
+};
 
 }  // namespace
 
@@ -70,13 +84,12 @@ std::vector<std::uint8_t> mark_near_convex(const std::vector<Eigen::Vector3d>& p
         "not a distance",
         {.field = "distance_m", .value = libmap::to_text(distance_m), .bound = "> 0 and finite"});
   // Cells a little wider than the distance, against rounding at their borders.
-  const PointGrid grid(convex_points, distance_m * (1 + 1e-9));
+  const PointGrid grid(convex_points, distance_m * (1 + 1e-6));
   std::vector<std::uint8_t> near(positions.size(), 0);
   if (grid.cells().empty()) return near;
   libmap::parallel_for(positions.size(), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      if (grid.reaches(positions[i]))
-        near[i] = is_near(positions[i], convex_points, grid, distance_m) ? 1 : 0;
+    NearSearch search(convex_points, grid, distance_m);
+    for (std::size_t i = begin; i < end; ++i) near[i] = search.is_near(positions[i]) ? 1 : 0;
   });
   return near;
 }

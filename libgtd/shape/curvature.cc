@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <string>
 
+#include "libgtd/shape/neighbor_loops.h"
 #include "libgtd/shape/point_grid.h"
 #include "libgtd/shape/thesis_curvature.h"
 #include "libmap/core/error.h"
@@ -19,11 +21,10 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
-using Lanes = Eigen::Array2d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr std::size_t lanes = 2;
+constexpr std::size_t lanes = NeighborLoops::lanes;
 constexpr std::size_t min_neighbors = 6;  // a quadric has six coefficients
 // Squares of widths relative to each other: below the first a neighbourhood is a line, above the
 // second it is a lump in which no plane is tangent.
@@ -34,90 +35,40 @@ constexpr double min_pivot = 1e-6;
 // A surface this near to being along `up` (0.06 deg) has no known outside.
 constexpr double min_side_cosine = 1e-3;
 
-// Coordinates one after the other, so that the loops below run on vector registers.
-struct Coordinates {
-  std::vector<double> x, y, z;
-
-  void resize(std::size_t count) {
-    x.resize(count);
-    y.resize(count);
-    z.resize(count);
+// Coordinates one after the other, with room for a full set of lanes beyond the last.
+class Coordinates {
+ public:
+  // Keeps no values.
+  void make_room(std::size_t count) {
+    if (stride_ >= count + lanes) return;
+    stride_ = 2 * (count + lanes);
+    values_.resize(3 * stride_);
   }
-  std::size_t size() const { return x.size(); }
+  NeighborLoops::Places places() {
+    return {values_.data(), values_.data() + stride_, values_.data() + 2 * stride_};
+  }
+
+ private:
+  std::size_t stride_ = 0;
+  std::vector<double> values_;
 };
 
-Lanes load(const std::vector<double>& values, std::size_t i) {
-  return Eigen::Map<const Lanes>(values.data() + i);
-}
-
-// The points of all cells that can hold a neighbour of a point in `cell`.
-void gather(const libmap::PointCloud& cloud, const PointGrid& grid, const PointGrid::Cell& cell,
-            Coordinates& candidates) {
-  candidates.resize(0);
-  PointGrid::Cell near;
-  for (near[0] = cell[0] - 2; near[0] <= cell[0] + 2; ++near[0])
-    for (near[1] = cell[1] - 2; near[1] <= cell[1] + 2; ++near[1])
-      for (near[2] = cell[2] - 2; near[2] <= cell[2] + 2; ++near[2]) {
-        const PointGrid::Range range = grid.range_of(near);
-        for (std::uint32_t k = range.first; k < range.last; ++k) {
-          const Vector3d& p = cloud.positions[grid.order()[k]];
-          candidates.x.push_back(p.x());
-          candidates.y.push_back(p.y());
-          candidates.z.push_back(p.z());
-        }
-      }
-}
-
-// The candidates within the radius, relative to `center` and in units of the radius; zeros follow
-// up to a full set of lanes. Returns their number.
-std::size_t select_neighbors(const Coordinates& candidates, const Vector3d& center, double radius,
-                             Coordinates& neighbors) {
-  neighbors.resize(candidates.size() + lanes);
-  const double inverse = 1 / radius;
-  const double limit = radius * radius;
-  std::size_t count = 0;
-  for (std::size_t k = 0; k < candidates.size(); ++k) {
-    const double x = candidates.x[k] - center.x();
-    const double y = candidates.y[k] - center.y();
-    const double z = candidates.z[k] - center.z();
-    neighbors.x[count] = x * inverse;
-    neighbors.y[count] = y * inverse;
-    neighbors.z[count] = z * inverse;
-    count += x * x + y * y + z * z <= limit ? 1 : 0;
-  }
-  for (std::size_t k = count; k < count + lanes; ++k)
-    neighbors.x[k] = neighbors.y[k] = neighbors.z[k] = 0;
-  return count;
-}
-
-Matrix3d covariance_of(const Coordinates& neighbors, std::size_t count) {
-  std::array<Lanes, 9> s;
-  s.fill(Lanes::Zero());
-  for (std::size_t k = 0; k < count; k += lanes) {
-    const Lanes x = load(neighbors.x, k), y = load(neighbors.y, k), z = load(neighbors.z, k);
-    s[0] += x;
-    s[1] += y;
-    s[2] += z;
-    s[3] += x * x;
-    s[4] += x * y;
-    s[5] += x * z;
-    s[6] += y * y;
-    s[7] += y * z;
-    s[8] += z * z;
-  }
-  std::array<double, 9> sum;
-  for (std::size_t i = 0; i < 9; ++i) sum[i] = s[i].sum() / static_cast<double>(count);
-  const Vector3d mean(sum[0], sum[1], sum[2]);
+Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
+                       std::size_t count) {
+  std::array<double, NeighborLoops::moments> m;
+  loops.sum_moments(neighbors, count, m.data());
+  for (double& sum : m) sum /= static_cast<double>(count);
+  const Vector3d mean(m[0], m[1], m[2]);
   Matrix3d second;
-  second << sum[3], sum[4], sum[5], sum[4], sum[6], sum[7], sum[5], sum[7], sum[8];
+  second << m[3], m[4], m[5], m[4], m[6], m[7], m[5], m[7], m[8];
   return second - mean * mean.transpose();
 }
 
 // Columns u, v, w: the neighbourhood's widest, second and thinnest direction. False if it is a line
 // or a lump.
-bool tangent_frame(const Coordinates& neighbors, std::size_t count, Matrix3d& frame) {
+bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
-  solver.computeDirect(covariance_of(neighbors, count));
+  solver.computeDirect(covariance);
   const Vector3d& widths = solver.eigenvalues();
   if (!(widths[1] > min_width_ratio * widths[2]) || widths[0] > max_lump_ratio * widths[1])
     return false;
@@ -129,39 +80,10 @@ bool tangent_frame(const Coordinates& neighbors, std::size_t count, Matrix3d& fr
 }
 
 // The normal equations of w = f + d u + e v + a u^2 + b u v + c v^2.
-void normal_equations(const Coordinates& neighbors, std::size_t count, const Matrix3d& frame,
-                      Matrix6d& matrix, Vector6d& right) {
-  std::array<Lanes, 20> s;
-  s.fill(Lanes::Zero());
-  for (std::size_t k = 0; k < count; k += lanes) {
-    const Lanes x = load(neighbors.x, k), y = load(neighbors.y, k), z = load(neighbors.z, k);
-    const Lanes u = x * frame(0, 0) + y * frame(1, 0) + z * frame(2, 0);
-    const Lanes v = x * frame(0, 1) + y * frame(1, 1) + z * frame(2, 1);
-    const Lanes w = x * frame(0, 2) + y * frame(1, 2) + z * frame(2, 2);
-    const Lanes uu = u * u, uv = u * v, vv = v * v;
-    s[0] += u;
-    s[1] += v;
-    s[2] += uu;
-    s[3] += uv;
-    s[4] += vv;
-    s[5] += uu * u;
-    s[6] += uu * v;
-    s[7] += u * vv;
-    s[8] += vv * v;
-    s[9] += uu * uu;
-    s[10] += uu * uv;
-    s[11] += uu * vv;
-    s[12] += uv * vv;
-    s[13] += vv * vv;
-    s[14] += w;
-    s[15] += u * w;
-    s[16] += v * w;
-    s[17] += uu * w;
-    s[18] += uv * w;
-    s[19] += vv * w;
-  }
-  std::array<double, 20> m;
-  for (std::size_t i = 0; i < 20; ++i) m[i] = s[i].sum();
+void normal_equations(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
+                      std::size_t count, const Matrix3d& frame, Matrix6d& matrix, Vector6d& right) {
+  std::array<double, NeighborLoops::quadric_sums> m;
+  loops.sum_quadric(neighbors, count, frame.data(), m.data());
   matrix << static_cast<double>(count), m[0], m[1], m[2], m[3], m[4],  //
       m[0], m[2], m[3], m[5], m[6], m[7],                              //
       m[1], m[3], m[4], m[6], m[7], m[8],                              //
@@ -222,21 +144,42 @@ int side_of(const Vector3d& normal, const libmap::PointCloud& cloud, std::size_t
 
 class QuadricFitter {
  public:
-  QuadricFitter(const libmap::PointCloud& cloud, const PointGrid& grid, double radius,
-                const Vector3d& up)
-      : cloud_(cloud), grid_(grid), radius_(radius), up_(up.normalized()) {}
+  // `in_order` are the cloud's points in the order of the grid.
+  QuadricFitter(const libmap::PointCloud& cloud, const PointGrid& grid,
+                const std::vector<Vector3d>& in_order, double radius, const Vector3d& up)
+      : cloud_(cloud), grid_(grid), in_order_(in_order), radius_(radius), up_(up.normalized()) {}
 
-  void enter(const PointGrid::Cell& cell) { gather(cloud_, grid_, cell, candidates_); }
+  // Gathers the points of all cells that can hold a neighbour of a point in `cell`.
+  void enter(const PointGrid::Cell& cell) {
+    grid_.find_near(cell, 2, runs_);
+    candidate_count_ = 0;
+    for (const PointGrid::Range& run : runs_) candidate_count_ += run.last - run.first;
+    candidates_.make_room(candidate_count_);
+    neighbors_.make_room(candidate_count_);
+    const NeighborLoops::Places to = candidates_.places();
+    std::size_t n = 0;
+    const auto put = [&](const Vector3d& p) {
+      to.x[n] = p.x();
+      to.y[n] = p.y();
+      to.z[n++] = p.z();
+    };
+    for (const PointGrid::Range& run : runs_)
+      for (std::uint32_t k = run.first; k < run.last; ++k) put(in_order_[k]);
+    for (std::size_t k = 0; k < lanes; ++k)
+      put(Vector3d::Constant(std::numeric_limits<double>::infinity()));
+  }
 
   // At a point of the cell that was entered last.
   Curvature fit(std::size_t point) {
-    const std::size_t count =
-        select_neighbors(candidates_, cloud_.positions[point], radius_, neighbors_);
+    const NeighborLoops::Places neighbors = neighbors_.places();
+    const std::size_t count = loops_.select(candidates_.places(), candidate_count_,
+                                            cloud_.positions[point].data(), radius_, neighbors);
     Matrix3d frame;
     Matrix6d matrix;
     Vector6d right, quadric;
-    if (count < min_neighbors || !tangent_frame(neighbors_, count, frame)) return {};
-    normal_equations(neighbors_, count, frame, matrix, right);
+    if (count < min_neighbors || !tangent_frame(covariance_of(loops_, neighbors, count), frame))
+      return {};
+    normal_equations(loops_, neighbors, count, frame, matrix, right);
     if (!solve(matrix, right, quadric)) return {};
     const Vector3d normal = (frame * Vector3d(-quadric[1], -quadric[2], 1)).normalized();
     const int side = side_of(normal, cloud_, point, up_);
@@ -253,39 +196,57 @@ class QuadricFitter {
  private:
   const libmap::PointCloud& cloud_;
   const PointGrid& grid_;
+  const std::vector<Vector3d>& in_order_;
   double radius_;
   Vector3d up_;
+  const NeighborLoops& loops_ = neighbor_loops_of(best_path());
+  std::vector<PointGrid::Range> runs_;
   Coordinates candidates_;
+  std::size_t candidate_count_ = 0;
   Coordinates neighbors_;
 };
 
 // The queries of each cell of the grid, so that a cell's surroundings are gathered once.
-std::vector<std::vector<std::size_t>> queries_by_cell(const PointGrid& grid, std::size_t points,
-                                                      const std::vector<std::size_t>& queries) {
-  constexpr std::size_t nowhere = static_cast<std::size_t>(-1);
+struct QueriesByCell {
+  std::vector<std::size_t> queries;  // positions in the list of queries, cell after cell
+  std::vector<std::size_t> begins;   // of each cell, and the end
+};
+
+QueriesByCell queries_by_cell(const PointGrid& grid, std::size_t points,
+                              const std::vector<std::size_t>& queries) {
+  const std::size_t nowhere = grid.cells().size();
   std::vector<std::size_t> cell_of_point(points, nowhere);
   for (std::size_t c = 0; c < grid.cells().size(); ++c)
     for (std::uint32_t k = grid.ranges()[c].first; k < grid.ranges()[c].last; ++k)
       cell_of_point[grid.order()[k]] = c;
-  std::vector<std::vector<std::size_t>> groups(grid.cells().size());
+  QueriesByCell sorted;
+  sorted.begins.assign(nowhere + 2, 0);
+  for (const std::size_t query : queries) ++sorted.begins[cell_of_point[query] + 1];
+  for (std::size_t c = 1; c < sorted.begins.size(); ++c) sorted.begins[c] += sorted.begins[c - 1];
+  sorted.queries.resize(queries.size());
+  std::vector<std::size_t> at = sorted.begins;
   for (std::size_t q = 0; q < queries.size(); ++q)
-    if (cell_of_point[queries[q]] != nowhere) groups[cell_of_point[queries[q]]].push_back(q);
-  return groups;
+    sorted.queries[at[cell_of_point[queries[q]]]++] = q;
+  return sorted;
 }
 
 std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
                                     const CurvatureOptions& options,
                                     const std::vector<std::size_t>& queries) {
   // Half the radius, a little more against rounding at the cells' borders.
-  const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-9));
-  const auto groups = queries_by_cell(grid, cloud.size(), queries);
+  const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-6));
+  std::vector<Vector3d> in_order;
+  in_order.reserve(grid.order().size());
+  for (const std::uint32_t i : grid.order()) in_order.push_back(cloud.positions[i]);
+  const QueriesByCell groups = queries_by_cell(grid, cloud.size(), queries);
   std::vector<Curvature> results(queries.size());
-  libmap::parallel_for(groups.size(), 16, [&](std::size_t begin, std::size_t end) {
-    QuadricFitter fitter(cloud, grid, options.radius_m, options.up);
+  libmap::parallel_for(grid.cells().size(), 16, [&](std::size_t begin, std::size_t end) {
+    QuadricFitter fitter(cloud, grid, in_order, options.radius_m, options.up);
     for (std::size_t c = begin; c < end; ++c) {
-      if (groups[c].empty()) continue;
+      if (groups.begins[c] == groups.begins[c + 1]) continue;
       fitter.enter(grid.cells()[c]);
-      for (const std::size_t q : groups[c]) results[q] = fitter.fit(queries[q]);
+      for (std::size_t n = groups.begins[c]; n < groups.begins[c + 1]; ++n)
+        results[groups.queries[n]] = fitter.fit(queries[groups.queries[n]]);
     }
   });
   return results;

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <limits>
 
+#include "libgtd/terrain/radix_sort.h"
+#include "libgtd/terrain/voxel_lattice.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -16,63 +18,100 @@ PointGrid::PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_siz
                         {.value = libmap::to_text(cell_size_m), .bound = "> 0 and finite"});
   if (points.size() > std::numeric_limits<std::uint32_t>::max())
     throw libmap::Error("too many points for one search grid");
-  far_ = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
-  origin_ = -far_;
+  high_ = Eigen::Vector3d::Constant(-std::numeric_limits<double>::infinity());
+  low_ = -high_;
   for (std::size_t i = 0; i < points.size(); ++i) {
     if (!points[i].allFinite()) continue;
     order_.push_back(static_cast<std::uint32_t>(i));
-    origin_ = origin_.cwiseMin(points[i]);
-    far_ = far_.cwiseMax(points[i]);
+    low_ = low_.cwiseMin(points[i]);
+    high_ = high_.cwiseMax(points[i]);
   }
   if (order_.empty()) return;
-  const double extent = (far_ - origin_).maxCoeff();
+  const double extent = low_.cwiseAbs().cwiseMax(high_.cwiseAbs()).maxCoeff();
   if (!(extent / cell_size_m <= 0x1.0p40))
     throw libmap::Error("the points lie too far apart for a search radius this small",
-                        {.value = libmap::to_text(cell_size_m) + " m cells over " +
-                                  libmap::to_text(extent) + " m"});
+                        {.value = libmap::to_text(cell_size_m) + " m cells up to " +
+                                  libmap::to_text(extent) + " m from the origin"});
 
+  sort_by_cell(points);
+}
+
+void PointGrid::sort_by_cell(const std::vector<Eigen::Vector3d>& points) {
+  struct Item {
+    std::uint64_t key;
+    std::uint32_t index;
+  };
   std::vector<Cell> cell_of_point(points.size());
   for (const std::uint32_t i : order_) cell_of_point[i] = cell_of(points[i]);
-  std::sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
-    return cell_of_point[a] != cell_of_point[b] ? cell_of_point[a] < cell_of_point[b] : a < b;
-  });
+  const BoxKey<std::int64_t> key(cell_of(low_), cell_of(high_));
+  if (key.fits()) {
+    std::vector<Item> items;
+    items.reserve(order_.size());
+    for (const std::uint32_t i : order_) items.push_back({key.of(cell_of_point[i]), i});
+    radix_sort(items, key.bits(), [](const Item& item) { return item.key; });
+    for (std::size_t k = 0; k < items.size(); ++k) order_[k] = items[k].index;
+  } else {
+    std::stable_sort(order_.begin(), order_.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return cell_of_point[a] < cell_of_point[b];
+    });
+  }
   for (std::uint32_t k = 0; k < order_.size(); ++k) {
     const Cell& cell = cell_of_point[order_[k]];
-    if (cells_.empty() || cells_.back() != cell) {
+    const bool is_first = cells_.empty();
+    const bool is_row = is_first || cells_.back()[0] != cell[0];
+    const bool is_column = is_row || cells_.back()[1] != cell[1];
+    if (is_row) rows_.push_back({cell[0], columns_.size()});
+    if (is_column) columns_.push_back({cell[1], cells_.size()});
+    if (is_column || cells_.back()[2] != cell[2]) {
       cells_.push_back(cell);
       ranges_.push_back({k, k});
     }
     ++ranges_.back().last;
   }
-  range_of_.reserve(2 * cells_.size());
-  for (std::size_t c = 0; c < cells_.size(); ++c) range_of_.emplace(cells_[c], ranges_[c]);
+  rows_.push_back({0, columns_.size()});
+  columns_.push_back({0, cells_.size()});
 }
 
 bool PointGrid::reaches(const Eigen::Vector3d& place) const {
-  return (place.array() >= origin_.array() - cell_size_m_).all() &&
-         (place.array() <= far_.array() + cell_size_m_).all();
+  return (place.array() >= low_.array() - cell_size_m_).all() &&
+         (place.array() <= high_.array() + cell_size_m_).all();
 }
 
 PointGrid::Cell PointGrid::cell_of(const Eigen::Vector3d& place) const {
   Cell cell;
   for (int a = 0; a < 3; ++a)
-    cell[static_cast<std::size_t>(a)] =
-        static_cast<std::int64_t>(std::floor((place[a] - origin_[a]) / cell_size_m_));
+    cell[static_cast<std::size_t>(a)] = floor_to<std::int64_t>(place[a] / cell_size_m_);
   return cell;
 }
 
-PointGrid::Range PointGrid::range_of(const Cell& cell) const {
-  const auto found = range_of_.find(cell);
-  return found == range_of_.end() ? Range{} : found->second;
-}
-
-std::size_t PointGrid::Hash::operator()(const Cell& cell) const {
-  std::uint64_t hash = 0;
-  for (const std::int64_t c : cell) {
-    hash = (hash ^ static_cast<std::uint64_t>(c)) * 0x9e3779b97f4a7c15u;
-    hash ^= hash >> 29;
+void PointGrid::find_near(const Cell& cell, std::int64_t reach, std::vector<Range>& runs) const {
+  runs.clear();
+  if (cells_.empty()) return;
+  const auto last_row = rows_.end() - 1;
+  auto row = std::lower_bound(rows_.begin(), last_row, cell[0] - reach,
+                              [](const Row& one, std::int64_t x) { return one.x < x; });
+  for (; row != last_row && row->x <= cell[0] + reach; ++row) {
+    const auto at = [&](std::size_t n) {
+      return columns_.begin() + static_cast<std::ptrdiff_t>(n);
+    };
+    const auto last_column = at((row + 1)->first_column);
+    auto column = std::lower_bound(at(row->first_column), last_column, cell[1] - reach,
+                                   [](const Column& one, std::int64_t y) { return one.y < y; });
+    for (; column != last_column && column->y <= cell[1] + reach; ++column) {
+      // Of the cells of a column, those from z on.
+      const auto first_from = [&](std::int64_t z) {
+        const auto begin = cells_.begin();
+        return static_cast<std::size_t>(
+            std::lower_bound(begin + static_cast<std::ptrdiff_t>(column->first_cell),
+                             begin + static_cast<std::ptrdiff_t>((column + 1)->first_cell), z,
+                             [](const Cell& one, std::int64_t low) { return one[2] < low; }) -
+            begin);
+      };
+      const std::size_t first = first_from(cell[2] - reach);
+      const std::size_t last = first_from(cell[2] + reach + 1);
+      if (first < last) runs.push_back({ranges_[first].first, ranges_[last - 1].last});
+    }
   }
-  return static_cast<std::size_t>(hash);
 }
 
 }  // namespace libgtd

@@ -1,12 +1,13 @@
 // Points sorted into cubic cells: whoever asks for all points near a place walks few cells and
-// always meets them in the same order, so that sums over neighbours are the same to the bit.
+// always meets them in the same order, so that sums over neighbours are the same to the bit. The
+// cells lie on the lattice through the frame's origin, so that this order does not depend on what
+// else is in the cloud: a tile with its surroundings yields what the whole cloud yields there.
 #pragma once
 
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 namespace libgtd {
@@ -16,7 +17,7 @@ class PointGrid {
   using Cell = std::array<std::int64_t, 3>;
 
   // Points that are not finite are left out. Throws Error where `cell_size_m` is not a positive
-  // length, or so small that the points span more than 2^40 cells.
+  // length, or so small that a point lies more than 2^40 cells from the frame's origin.
   PointGrid(const std::vector<Eigen::Vector3d>& points, double cell_size_m);
 
   // Whether a place is finite and at most one cell away from the box around the points.
@@ -30,23 +31,33 @@ class PointGrid {
     std::uint32_t first = 0;
     std::uint32_t last = 0;
   };
-  Range range_of(const Cell& cell) const;
+  // The runs of order() that hold the points of all cells at most `reach` away along each axis,
+  // ascending and not empty: a column of cells is one run.
+  void find_near(const Cell& cell, std::int64_t reach, std::vector<Range>& runs) const;
   // Those that hold points, in the order of order().
   const std::vector<Cell>& cells() const { return cells_; }
   const std::vector<Range>& ranges() const { return ranges_; }
 
  private:
-  struct Hash {
-    std::size_t operator()(const Cell& cell) const;
+  // Cells of the same first, and of the same first two numbers, follow each other.
+  struct Row {
+    std::int64_t x = 0;
+    std::size_t first_column = 0;
   };
+  struct Column {
+    std::int64_t y = 0;
+    std::size_t first_cell = 0;
+  };
+  void sort_by_cell(const std::vector<Eigen::Vector3d>& points);
 
-  Eigen::Vector3d origin_;  // the box's corners
-  Eigen::Vector3d far_;
+  Eigen::Vector3d low_;  // the box's corners
+  Eigen::Vector3d high_;
   double cell_size_m_;
   std::vector<std::uint32_t> order_;
   std::vector<Cell> cells_;
   std::vector<Range> ranges_;
-  std::unordered_map<Cell, Range, Hash> range_of_;
+  std::vector<Row> rows_;        // and one more for the end
+  std::vector<Column> columns_;  // the same
 };
 
 }  // namespace libgtd

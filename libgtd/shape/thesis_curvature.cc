@@ -7,7 +7,10 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <limits>
+#include <span>
 
+#include "libgtd/shape/neighbor_loops.h"
 #include "libgtd/shape/point_grid.h"
 #include "libmap/core/parallel.h"
 
@@ -22,65 +25,81 @@ constexpr std::size_t cells_at_once = 16;
 // Neighbours are found once and kept for the second pass while there is room for them.
 constexpr std::size_t max_kept_neighbors = std::size_t{1} << 26;
 
-struct Place {
-  float x, y, z;
+// Three numbers side by side, and a fourth for the register.
+using Quad [[gnu::vector_size(16)]] = float;
+using QuadOrder [[gnu::vector_size(16)]] = int;
+
+Quad quad(float x, float y, float z) { return Quad{x, y, z, 0.0F}; }
+// y, z, x: beside the numbers themselves, those that they are multiplied with for xy, yz, zx.
+Quad turned(const Quad& q) { return __builtin_shuffle(q, QuadOrder{1, 2, 0, 3}); }
+
+// Sums of x, y, z, of their squares and of xy, yz, zx, each in the order in which it is added to.
+struct Sums {
+  Quad of{}, squares{}, products{};
+
+  void add(const Quad& q) {
+    of += q;
+    add_products(q);
+  }
+  void add_products(const Quad& q) {
+    squares += q * q;
+    products += q * turned(q);
+  }
 };
 
-// The points near one cell of the grid, of which each point of the cell takes its neighbours.
+using Numbers = std::vector<std::uint32_t>;  // of candidates
+
+// The points near one cell of the grid, of which each point of the cell takes its neighbours: the
+// candidates, by number.
 class NeighborSearch {
  public:
-  NeighborSearch(const std::vector<Place>& places, const PointGrid& grid, double radius)
+  NeighborSearch(const std::vector<Quad>& places, const PointGrid& grid, double radius)
       : places_(places), grid_(grid), limit_(static_cast<float>(radius * radius)) {}
 
-  void enter(const PointGrid::Cell& cell) {
+  // The points of a cell's surroundings by number.
+  void list(const PointGrid::Cell& cell) {
+    grid_.find_near(cell, 2, runs_);
     candidates_.clear();
-    PointGrid::Cell near;
-    for (near[0] = cell[0] - 2; near[0] <= cell[0] + 2; ++near[0])
-      for (near[1] = cell[1] - 2; near[1] <= cell[1] + 2; ++near[1])
-        for (near[2] = cell[2] - 2; near[2] <= cell[2] + 2; ++near[2]) {
-          const PointGrid::Range range = grid_.range_of(near);
-          candidates_.insert(candidates_.end(), grid_.order().begin() + range.first,
-                             grid_.order().begin() + range.last);
-        }
+    for (const PointGrid::Range& run : runs_)
+      candidates_.insert(candidates_.end(), grid_.order().begin() + run.first,
+                         grid_.order().begin() + run.last);
+  }
+  const std::vector<std::uint32_t>& candidates() const { return candidates_; }
+
+  // The same, and makes ready for find().
+  void enter(const PointGrid::Cell& cell) {
+    list(cell);
     const std::size_t count = candidates_.size();
-    for (std::vector<float>* values : {&x_, &y_, &z_, &distances_}) values->resize(count);
+    const std::size_t room = count + NeighborLoops::rank_lanes;
+    near_.resize(count);
+    for (std::vector<float>* values : {&x_, &y_, &z_})
+      values->assign(room, std::numeric_limits<float>::infinity());
     for (std::size_t n = 0; n < count; ++n) {
-      const Place& place = places_[candidates_[n]];
-      x_[n] = place.x;
-      y_[n] = place.y;
-      z_[n] = place.z;
+      const Quad& place = near_[n] = places_[candidates_[n]];
+      x_[n] = place[0];
+      y_[n] = place[1];
+      z_[n] = place[2];
     }
-    keys_.resize(count);
-    sorted_.resize(count);
+    keys_.resize(room);
+    sorted_.resize(room);
   }
+  // The candidates' places.
+  const std::vector<Quad>& near() const { return near_; }
 
-  // The neighbours of a point of that cell, among them itself.
-  void find(const Place& at, std::vector<std::uint32_t>& neighbors) {
-    const std::size_t count = select(at);
+  // Keys of the neighbours of a point of that cell, among them itself, by distance, then by the
+  // point's index.
+  std::span<const std::uint64_t> find(const Quad& at) {
+    const float center[3] = {at[0], at[1], at[2]};
+    const std::size_t count = loops_.rank(x_.data(), y_.data(), z_.data(), candidates_.size(),
+                                          center, limit_, keys_.data());
     sort(count);
-    neighbors.resize(count);
-    for (std::size_t n = 0; n < count; ++n) neighbors[n] = candidates_[candidate_of(sorted_[n])];
-  }
-
- private:
-  // Squared distance above, candidate below: positive floats order as their bits do.
-  static std::uint32_t distance_of(std::uint64_t key) {
-    return static_cast<std::uint32_t>(key >> 32);
+    return {sorted_.data(), count};
   }
   static std::uint32_t candidate_of(std::uint64_t key) { return static_cast<std::uint32_t>(key); }
 
-  std::size_t select(const Place& at) {
-    const std::size_t all = candidates_.size();
-    for (std::size_t n = 0; n < all; ++n) {
-      const float x = at.x - x_[n], y = at.y - y_[n], z = at.z - z_[n];
-      distances_[n] = x * x + y * y + z * z;
-    }
-    std::size_t count = 0;
-    for (std::size_t n = 0; n < all; ++n) {
-      keys_[count] = std::uint64_t{std::bit_cast<std::uint32_t>(distances_[n])} << 32 | n;
-      count += distances_[n] < limit_ ? 1 : 0;
-    }
-    return count;
+ private:
+  static std::uint32_t distance_of(std::uint64_t key) {
+    return static_cast<std::uint32_t>(key >> 32);
   }
 
   // Squared distances to points of a surface are spread evenly: buckets leave little to sort.
@@ -104,56 +123,47 @@ class NeighborSearch {
   }
 
   bool comes_before(std::uint64_t a, std::uint64_t b) const {
-    if (distance_of(a) != distance_of(b)) return distance_of(a) < distance_of(b);
+    if (distance_of(a) != distance_of(b)) return a < b;
     return candidates_[candidate_of(a)] < candidates_[candidate_of(b)];
   }
 
-  const std::vector<Place>& places_;
+  const std::vector<Quad>& places_;
   const PointGrid& grid_;
   float limit_;
+  const NeighborLoops& loops_ = neighbor_loops_of(best_path());
+  std::vector<PointGrid::Range> runs_;
   std::vector<std::uint32_t> candidates_;
-  std::vector<float> x_, y_, z_, distances_;
+  std::vector<Quad> near_;
+  std::vector<float> x_, y_, z_;
   std::vector<std::uint64_t> keys_, sorted_;
 };
 
+Matrix3f symmetric(float xx, float xy, float xz, float yy, float yz, float zz) {
+  Matrix3f matrix;
+  matrix << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  return matrix;
+}
+
 // Sums relative to the first point, as computeMeanAndCovarianceMatrix.
-Matrix3f covariance_of(const std::vector<Place>& places,
-                       const std::vector<std::uint32_t>& neighbors) {
-  const Place origin = places[neighbors.front()];
-  float xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0, x_sum = 0, y_sum = 0, z_sum = 0;
-  for (const std::uint32_t n : neighbors) {
-    const float x = places[n].x - origin.x, y = places[n].y - origin.y, z = places[n].z - origin.z;
-    xx += x * x;
-    xy += x * y;
-    xz += x * z;
-    yy += y * y;
-    yz += y * z;
-    zz += z * z;
-    x_sum += x;
-    y_sum += y;
-    z_sum += z;
-  }
+Matrix3f covariance_of(const std::vector<Quad>& near, const Numbers& neighbors) {
+  const Quad origin = near[neighbors.front()];
+  Sums sums;
+  for (const std::uint32_t n : neighbors) sums.add(near[n] - origin);
   const auto count = static_cast<float>(neighbors.size());
-  const float x = x_sum / count, y = y_sum / count, z = z_sum / count;
-  Matrix3f covariance;
-  covariance(0, 0) = xx / count - x * x;
-  covariance(0, 1) = covariance(1, 0) = xy / count - x * y;
-  covariance(0, 2) = covariance(2, 0) = xz / count - x * z;
-  covariance(1, 1) = yy / count - y * y;
-  covariance(1, 2) = covariance(2, 1) = yz / count - y * z;
-  covariance(2, 2) = zz / count - z * z;
-  return covariance;
+  const Quad mean = sums.of / count;
+  const Quad squares = sums.squares / count - mean * mean;
+  const Quad products = sums.products / count - mean * turned(mean);
+  return symmetric(squares[0], products[0], products[2], squares[1], products[1], squares[2]);
 }
 
 // Toward the frame's origin, as computePointNormal and flipNormalTowardsViewpoint.
-Vector3f normal_of(const std::vector<Place>& places, const Place& at,
-                   const std::vector<std::uint32_t>& neighbors) {
+Vector3f normal_of(const std::vector<Quad>& near, const Quad& at, const Numbers& neighbors) {
   if (neighbors.size() < 3) return Vector3f::Constant(Curvature::nan);
   float smallest = 0;
   Vector3f normal;
-  pcl::eigen33(covariance_of(places, neighbors), smallest, normal);
+  pcl::eigen33(covariance_of(near, neighbors), smallest, normal);
   // Of four components, whose products are added in another order than those of three.
-  const Eigen::Vector4f to_origin(0.0F - at.x, 0.0F - at.y, 0.0F - at.z, 0.0F);
+  const Eigen::Vector4f to_origin(0.0F - at[0], 0.0F - at[1], 0.0F - at[2], 0.0F);
   const Eigen::Vector4f plane(normal[0], normal[1], normal[2], 0.0F);
   if (to_origin.dot(plane) < 0) normal *= -1;
   return normal;
@@ -161,33 +171,30 @@ Vector3f normal_of(const std::vector<Place>& places, const Place& at,
 
 // The covariance of the neighbours' normals in the tangent plane, as
 // computePointPrincipalCurvatures. One neighbour without a normal spoils the sum, as in PCL.
-Curvature curvature_of(const std::vector<Vector3f>& normals, std::size_t point,
-                       const std::vector<std::uint32_t>& neighbors,
-                       std::vector<Vector3f>& projected) {
-  const Vector3f& normal = normals[point];
+// `normals` are the candidates'.
+Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
+                       const Numbers& neighbors, std::vector<Quad>& projected) {
   const Matrix3f to_tangent = Matrix3f::Identity() - normal * normal.transpose();
-  Vector3f mean = Vector3f::Zero();
+  const auto column = [&](int n) {
+    return quad(to_tangent(0, n), to_tangent(1, n), to_tangent(2, n));
+  };
+  const Quad a = column(0), b = column(1), c = column(2);
+  Quad mean{};
   projected.resize(neighbors.size());
   for (std::size_t n = 0; n < neighbors.size(); ++n) {
-    projected[n] = to_tangent * normals[neighbors[n]];
+    const Quad& one = normals[neighbors[n]];
+    // In the order of Eigen's product of a matrix and a vector of three.
+    projected[n] = a * one[0] + (b * one[1] + c * one[2]);
     mean += projected[n];
   }
   const auto count = static_cast<float>(neighbors.size());
   mean /= count;
-  float xx = 0, xy = 0, xz = 0, yy = 0, yz = 0, zz = 0;
-  for (const Vector3f& one : projected) {
-    const float x = one[0] - mean[0], y = one[1] - mean[1], z = one[2] - mean[2];
-    xx += x * x;
-    xy += x * y;
-    xz += x * z;
-    yy += y * y;
-    yz += y * z;
-    zz += z * z;
-  }
-  Matrix3f covariance;
-  covariance << xx, xy, xz, xy, yy, yz, xz, yz, zz;
+  Sums sums;
+  for (const Quad& one : projected) sums.add_products(one - mean);
   Vector3f widths;
-  pcl::eigen33(covariance, widths);
+  pcl::eigen33(symmetric(sums.squares[0], sums.products[0], sums.products[2], sums.squares[1],
+                         sums.products[1], sums.squares[2]),
+               widths);
   Curvature result;
   const float inverse = 1.0F / count;
   result.k1 = widths[2] * inverse;
@@ -200,7 +207,7 @@ Curvature curvature_of(const std::vector<Vector3f>& normals, std::size_t point,
 // The neighbours of the points of a run of cells, one list after the other.
 struct KeptNeighbors {
   bool complete = false;
-  std::vector<std::uint32_t> lists;
+  Numbers lists;
   std::vector<std::size_t> ends;
 };
 
@@ -212,18 +219,13 @@ class CurvatureEstimation {
         grid_(positions_of(places_), 0.5 * radius * (1 + 1e-5)) {}
 
   std::vector<Curvature> run(std::size_t points, const std::vector<std::size_t>& queries) {
-    normals_.assign(points, Vector3f::Constant(Curvature::nan));
+    std::vector<Quad> normals(points, quad(Curvature::nan, Curvature::nan, Curvature::nan));
     kept_.resize((grid_.cells().size() + cells_at_once - 1) / cells_at_once);
-    for_each_neighborhood([&](std::size_t point, const List& neighbors, Scratch&) {
-      normals_[point] = normal_of(places_, places_[point], neighbors);
-    });
+    for_each_run([&](const Run& run) { find_normals(run, normals); });
     std::vector<std::uint8_t> wanted(points, 0);
     for (const std::size_t query : queries) wanted[query] = 1;
     std::vector<Curvature> of_points(points);
-    for_each_neighborhood([&](std::size_t point, const List& neighbors, Scratch& projected) {
-      if (wanted[point] != 0)
-        of_points[point] = curvature_of(normals_, point, neighbors, projected);
-    });
+    for_each_run([&](const Run& run) { find_curvatures(run, normals, wanted, of_points); });
     std::vector<Curvature> results;
     results.reserve(queries.size());
     for (const std::size_t query : queries) results.push_back(of_points[query]);
@@ -231,83 +233,104 @@ class CurvatureEstimation {
   }
 
  private:
-  using List = std::vector<std::uint32_t>;
-  using Scratch = std::vector<Vector3f>;
+  // Cells begin .. end - 1, and what is kept of them.
+  struct Run {
+    std::size_t begin = 0;
+    std::size_t end = 0;
+    KeptNeighbors& kept;
+  };
 
-  static std::vector<Place> places_of(const libmap::PointCloud& cloud) {
-    std::vector<Place> places;
+  static std::vector<Quad> places_of(const libmap::PointCloud& cloud) {
+    std::vector<Quad> places;
     places.reserve(cloud.size());
     for (const Eigen::Vector3d& p : cloud.positions) {
       const Vector3f at = p.cast<float>();
-      places.push_back({at.x(), at.y(), at.z()});
+      places.push_back(quad(at.x(), at.y(), at.z()));
     }
     return places;
   }
-  static std::vector<Eigen::Vector3d> positions_of(const std::vector<Place>& places) {
+  static std::vector<Eigen::Vector3d> positions_of(const std::vector<Quad>& places) {
     std::vector<Eigen::Vector3d> positions;
     positions.reserve(places.size());
-    for (const Place& place : places)
-      positions.emplace_back(static_cast<double>(place.x), static_cast<double>(place.y),
-                             static_cast<double>(place.z));
+    for (const Quad& place : places)
+      positions.emplace_back(static_cast<double>(place[0]), static_cast<double>(place[1]),
+                             static_cast<double>(place[2]));
     return positions;
   }
 
-  // visit(point, neighbours, scratch) for each finite point, cells in parallel.
-  template <typename Visit>
-  void for_each_neighborhood(const Visit& visit) {
+  template <typename Body>
+  void for_each_run(const Body& body) {
     libmap::parallel_for(grid_.cells().size(), cells_at_once,
                          [&](std::size_t begin, std::size_t end) {
-                           KeptNeighbors& kept = kept_[begin / cells_at_once];
-                           if (kept.complete)
-                             recall(begin, end, kept, visit);
-                           else
-                             search(begin, end, kept, visit);
+                           body(Run{begin, end, kept_[begin / cells_at_once]});
                          });
   }
 
   template <typename Visit>
-  void search(std::size_t begin, std::size_t end, KeptNeighbors& kept, const Visit& visit) {
-    NeighborSearch near(places_, grid_, radius_);
-    List neighbors;
-    Scratch scratch;
-    const bool keep = kept_count_ < max_kept_neighbors;
-    for (std::size_t c = begin; c < end; ++c) {
-      near.enter(grid_.cells()[c]);
-      const PointGrid::Range range = grid_.ranges()[c];
-      for (std::uint32_t k = range.first; k < range.last; ++k) {
-        const std::uint32_t point = grid_.order()[k];
-        near.find(places_[point], neighbors);
-        visit(point, neighbors, scratch);
-        if (!keep) continue;
-        kept.lists.insert(kept.lists.end(), neighbors.begin(), neighbors.end());
-        kept.ends.push_back(kept.lists.size());
-      }
-    }
-    kept.complete = keep;
-    if (keep) kept_count_ += kept.lists.size();
+  void for_each_point(std::size_t cell, const Visit& visit) const {
+    const PointGrid::Range range = grid_.ranges()[cell];
+    for (std::uint32_t k = range.first; k < range.last; ++k) visit(grid_.order()[k]);
   }
 
-  template <typename Visit>
-  void recall(std::size_t begin, std::size_t end, const KeptNeighbors& kept, const Visit& visit) {
-    List neighbors;
-    Scratch scratch;
+  static void numbers_of(std::span<const std::uint64_t> keys, Numbers& numbers) {
+    numbers.resize(keys.size());
+    for (std::size_t n = 0; n < keys.size(); ++n)
+      numbers[n] = NeighborSearch::candidate_of(keys[n]);
+  }
+
+  void find_normals(const Run& run, std::vector<Quad>& normals) {
+    NeighborSearch search(places_, grid_, radius_);
+    Numbers neighbors;
+    const bool keep = kept_count_ < max_kept_neighbors;
+    for (std::size_t c = run.begin; c < run.end; ++c) {
+      search.enter(grid_.cells()[c]);
+      for_each_point(c, [&](std::uint32_t point) {
+        numbers_of(search.find(places_[point]), neighbors);
+        const Vector3f normal = normal_of(search.near(), places_[point], neighbors);
+        normals[point] = quad(normal[0], normal[1], normal[2]);
+        if (!keep) return;
+        run.kept.lists.insert(run.kept.lists.end(), neighbors.begin(), neighbors.end());
+        run.kept.ends.push_back(run.kept.lists.size());
+      });
+    }
+    run.kept.complete = keep;
+    if (keep) kept_count_ += run.kept.lists.size();
+  }
+
+  void find_curvatures(const Run& run, const std::vector<Quad>& normals,
+                       const std::vector<std::uint8_t>& wanted, std::vector<Curvature>& results) {
+    NeighborSearch search(places_, grid_, radius_);
+    Numbers neighbors;
+    std::vector<Quad> near_normals, projected;
     std::size_t list = 0;
     std::size_t first = 0;
-    for (std::size_t c = begin; c < end; ++c) {
-      const PointGrid::Range range = grid_.ranges()[c];
-      for (std::uint32_t k = range.first; k < range.last; ++k, ++list) {
-        neighbors.assign(kept.lists.begin() + static_cast<std::ptrdiff_t>(first),
-                         kept.lists.begin() + static_cast<std::ptrdiff_t>(kept.ends[list]));
-        first = kept.ends[list];
-        visit(grid_.order()[k], neighbors, scratch);
-      }
+    const auto find = [&](std::uint32_t point) {
+      if (!run.kept.complete) return numbers_of(search.find(places_[point]), neighbors);
+      const std::size_t last = run.kept.ends[list++];
+      neighbors.assign(run.kept.lists.begin() + static_cast<std::ptrdiff_t>(first),
+                       run.kept.lists.begin() + static_cast<std::ptrdiff_t>(last));
+      first = last;
+    };
+    for (std::size_t c = run.begin; c < run.end; ++c) {
+      if (run.kept.complete)
+        search.list(grid_.cells()[c]);
+      else
+        search.enter(grid_.cells()[c]);
+      near_normals.clear();
+      for (const std::uint32_t point : search.candidates()) near_normals.push_back(normals[point]);
+      for_each_point(c, [&](std::uint32_t point) {
+        find(point);
+        const Quad& normal = normals[point];
+        if (wanted[point] != 0)
+          results[point] =
+              curvature_of({normal[0], normal[1], normal[2]}, near_normals, neighbors, projected);
+      });
     }
   }
 
   double radius_;
-  std::vector<Place> places_;
+  std::vector<Quad> places_;
   PointGrid grid_;
-  std::vector<Vector3f> normals_;
   std::vector<KeptNeighbors> kept_;
   std::atomic<std::size_t> kept_count_ = 0;
 };

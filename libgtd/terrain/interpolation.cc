@@ -1,8 +1,6 @@
 #include "libgtd/terrain/interpolation.h"
 
-#include <CGAL/Delaunay_triangulation_2.h>
 #include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
-#include <CGAL/Triangulation_vertex_base_with_info_2.h>
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -14,9 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "libgtd/terrain/planar_delaunay.h"
 #include "libgtd/terrain/radix_sort.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/single_precision.h"
 #include "libmap/core/text.h"
 
 namespace libgtd {
@@ -24,15 +24,10 @@ namespace libgtd {
 namespace {
 
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
-using VertexBase = CGAL::Triangulation_vertex_base_with_info_2<double, Kernel>;  // the height
-using Triangulation =
-    CGAL::Delaunay_triangulation_2<Kernel, CGAL::Triangulation_data_structure_2<VertexBase>>;
 using Point = Kernel::Point_2;
 using Eigen::Vector3d;
 
 constexpr std::size_t grain = 4096;
-constexpr std::uint32_t hilbert_cells = 4096;  // a side
-constexpr unsigned hilbert_bits = 24;
 constexpr std::size_t columns_at_once = 16;  // of the grid that one thread fills
 
 // Where the grid's nodes stand along one axis, in increasing order.
@@ -48,18 +43,10 @@ struct Triangle {
   std::array<double, 3> z;
 };
 
-Triangle triangle_of(const Triangulation::Face_handle& face) {
-  Triangle t;
-  for (int a = 0; a < 3; ++a) {
-    t.at[static_cast<std::size_t>(a)] = face->vertex(a)->point();
-    t.z[static_cast<std::size_t>(a)] = face->vertex(a)->info();
-  }
-  return t;
-}
+using Corners = std::array<std::uint32_t, 3>;
 
-// A triangle and the columns of the grid, first .. last - 1, that may cross it.
-struct PlacedFace {
-  Triangulation::Face_handle face;
+// The columns of the grid, first .. last - 1, that may cross a triangle.
+struct Placement {
   std::uint32_t first = 0;
   std::uint32_t last = 0;
   bool refused = false;
@@ -70,7 +57,7 @@ std::vector<Vector3d> finite_points(const libmap::PointCloud& cloud, Interpolati
   points.reserve(cloud.size());
   for (const Vector3d& p : cloud.positions) {
     const bool single = method == InterpolationMethod::thesis;
-    const Vector3d point = single ? p.cast<float>().cast<double>().eval() : p;
+    const Vector3d point = single ? libmap::rounded_to_single(p) : p;
     if (point.allFinite()) points.push_back(point);
   }
   return points;
@@ -87,81 +74,34 @@ Box box_of(const std::vector<Vector3d>& points) {
   return box;
 }
 
-// The place of a cell of a square of 4096 x 4096 on Hilbert's curve (Hilbert 1891).
-std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
-  std::uint32_t place = 0;
-  for (std::uint32_t bit = hilbert_cells / 2; bit > 0; bit /= 2) {
-    const std::uint32_t right = (x & bit) != 0 ? 1 : 0;
-    const std::uint32_t up = (y & bit) != 0 ? 1 : 0;
-    place = place << 2 | ((3 * right) ^ up);
-    // In the lower quadrants the curve runs transposed, in the right one of them mirrored as well:
-    // without branches, which could not be foretold.
-    const std::uint32_t transposed = up - 1;
-    const std::uint32_t mirrored = transposed & (0U - right);
-    x ^= mirrored;
-    y ^= mirrored;
-    const std::uint32_t swapped = (x ^ y) & transposed;
-    x ^= swapped;
-    y ^= swapped;
+double area_of_cells(const std::vector<Vector3d>& points, const Box& box, double cell) {
+  const double column = std::floor(box.min_x / cell), row = std::floor(box.min_y / cell);
+  const double columns = std::floor(box.max_x / cell) - column + 1;
+  const double rows = std::floor(box.max_y / cell) - row + 1;
+  if (!(columns * rows < 0x1p52)) {  // more than whole numbers tell apart
+    std::vector<std::pair<double, double>> cells;
+    for (const Vector3d& p : points)
+      cells.emplace_back(std::floor(p.x() / cell), std::floor(p.y() / cell));
+    std::sort(cells.begin(), cells.end());
+    const auto end = std::unique(cells.begin(), cells.end());
+    return static_cast<double>(end - cells.begin()) * cell * cell;
   }
-  return place;
-}
-
-// The points' indices along Hilbert's curve: neighbours follow each other, so that each is found
-// within a few triangles of the one before.
-std::vector<std::uint32_t> hilbert_order(const std::vector<Vector3d>& points, const Box& box) {
-  struct Item {
-    std::uint32_t place;
-    std::uint32_t index;
-  };
-  const double side = std::max(box.max_x - box.min_x, box.max_y - box.min_y);
-  const auto cell = [&](double offset) {
-    const double at = offset / side * hilbert_cells;
-    return at < hilbert_cells ? static_cast<std::uint32_t>(at) : hilbert_cells - 1;
-  };
-  std::vector<Item> items(points.size());
-  libmap::parallel_for(points.size(), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      items[i] = {hilbert_place(cell(points[i].x() - box.min_x), cell(points[i].y() - box.min_y)),
-                  static_cast<std::uint32_t>(i)};
-  });
-  radix_sort(items, hilbert_bits, [](const Item& item) { return item.place; });
-  std::vector<std::uint32_t> order;
-  order.reserve(items.size());
-  for (const Item& item : items) order.push_back(item.index);
-  return order;
-}
-
-// Of points with the same x and y the highest stays, whatever their order.
-Triangulation triangulate(const std::vector<Vector3d>& points, const Box& box) {
-  Triangulation triangulation;
-  Triangulation::Face_handle hint;
-  for (const std::uint32_t i : hilbert_order(points, box)) {
-    const std::size_t before = triangulation.number_of_vertices();
-    const auto vertex = triangulation.insert(Point(points[i].x(), points[i].y()), hint);
-    const bool added = triangulation.number_of_vertices() > before;
-    vertex->info() = added ? points[i].z() : std::max(vertex->info(), points[i].z());
-    hint = vertex->face();
-  }
-  if (triangulation.dimension() < 2)
-    throw libmap::Error("the points' x and y all lie on a line: nothing to interpolate between");
-  return triangulation;
-}
-
-double area_of_cells(const std::vector<Vector3d>& points, double cell) {
-  std::vector<std::pair<double, double>> cells;
-  cells.reserve(points.size());
+  std::vector<std::uint64_t> keys;
+  keys.reserve(points.size());
   for (const Vector3d& p : points)
-    cells.emplace_back(std::floor(p.x() / cell), std::floor(p.y() / cell));
-  std::sort(cells.begin(), cells.end());
-  const auto end = std::unique(cells.begin(), cells.end());
-  return static_cast<double>(end - cells.begin()) * cell * cell;
+    keys.push_back(static_cast<std::uint64_t>((std::floor(p.x() / cell) - column) * rows +
+                                              (std::floor(p.y() / cell) - row)));
+  unsigned bits = 1;
+  while (columns * rows > std::ldexp(1.0, static_cast<int>(bits))) ++bits;
+  radix_sort(keys, bits, [](std::uint64_t one) { return one; });
+  const auto end = std::unique(keys.begin(), keys.end());
+  return static_cast<double>(end - keys.begin()) * cell * cell;
 }
 
 double occupied_area(const std::vector<Vector3d>& points, const Box& box, double cell) {
-  if (cell > 0) return area_of_cells(points, cell);
+  if (cell > 0) return area_of_cells(points, box, cell);
   cell = 4 * std::sqrt(box.area() / static_cast<double>(points.size()));
-  return std::min(box.area(), area_of_cells(points, cell));
+  return std::min(box.area(), area_of_cells(points, box, cell));
 }
 
 // The program's form of eq. 3-5: its 5/3 is a division of integers, so 1.
@@ -269,8 +209,8 @@ bool longer_than(const Triangle& t, double limit) {
   return false;
 }
 
-// Heights at the grid's nodes; NaN where no triangle covers them. A node on an edge takes the
-// triangle that comes first.
+// Heights at the grid's nodes; NaN where no triangle covers them. A node on an edge takes the lower
+// of its triangles' heights, which differ by rounding: none depends on the triangles' order.
 class HeightGrid {
  public:
   HeightGrid(Axis xs, Axis ys, double spacing)
@@ -279,7 +219,7 @@ class HeightGrid {
         spacing_(spacing),
         z_(xs_.size() * ys_.size(), std::numeric_limits<double>::quiet_NaN()) {}
 
-  void place(PlacedFace& placed, const Triangle& t) const {
+  void place(Placement& placed, const Triangle& t) const {
     if (xs_.empty()) return;
     const auto [low, high] = std::minmax({t.at[0].x(), t.at[1].x(), t.at[2].x()});
     std::size_t last = first_node(xs_, low, spacing_);
@@ -288,25 +228,24 @@ class HeightGrid {
     placed.last = static_cast<std::uint32_t>(last);
   }
 
-  // Triangle by triangle in their order; strips of columns run in parallel.
-  template <typename Height>
-  void fill(const std::vector<PlacedFace>& faces, const Height& height) {
+  // Strips of columns run in parallel. triangle_at(n) is the triangle of placements[n].
+  template <typename TriangleAt, typename Height>
+  void fill(const std::vector<Placement>& placements, const TriangleAt& triangle_at,
+            const Height& height) {
     if (z_.empty()) return;
-    std::vector<std::vector<std::size_t>> of_strip((xs_.size() - 1) / columns_at_once + 1);
-    for (std::size_t n = 0; n < faces.size(); ++n) {
-      const PlacedFace& one = faces[n];
-      if (one.refused || one.first == one.last) continue;
-      for (std::size_t s = one.first / columns_at_once; s <= (one.last - 1) / columns_at_once; ++s)
-        of_strip[s].push_back(n);
-    }
-    libmap::parallel_for(of_strip.size(), 1, [&](std::size_t begin, std::size_t end) {
+    const StripLists lists = list_by_strip(placements);
+    libmap::parallel_for(lists.begins.size() - 1, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t s = begin; s < end; ++s)
-        for (const std::size_t n : of_strip[s])
-          fill_columns(triangle_of(faces[n].face),
-                       std::max<std::size_t>(faces[n].first, s * columns_at_once),
-                       std::min<std::size_t>(faces[n].last, (s + 1) * columns_at_once), height);
+        for (std::size_t at = lists.begins[s]; at < lists.begins[s + 1]; ++at) {
+          const Placement& one = placements[lists.triangles[at]];
+          fill_columns(triangle_at(lists.triangles[at]),
+                       std::max<std::size_t>(one.first, s * columns_at_once),
+                       std::min<std::size_t>(one.last, (s + 1) * columns_at_once), height);
+        }
     });
   }
+
+  std::size_t nodes() const { return z_.size(); }
 
   template <typename Visit>
   void visit(const Visit& visit_node) const {
@@ -316,14 +255,41 @@ class HeightGrid {
   }
 
  private:
+  // The triangles that may cross each strip, strip after strip.
+  struct StripLists {
+    std::vector<std::uint32_t> triangles;
+    std::vector<std::size_t> begins;  // of each strip, and the end
+  };
+  StripLists list_by_strip(const std::vector<Placement>& placements) const {
+    StripLists lists;
+    lists.begins.assign((xs_.size() - 1) / columns_at_once + 2, 0);
+    const auto for_each_entry = [&](const auto& visit) {
+      for (std::uint32_t n = 0; n < placements.size(); ++n) {
+        const Placement& one = placements[n];
+        if (one.refused || one.first == one.last) continue;
+        for (std::size_t s = one.first / columns_at_once; s <= (one.last - 1) / columns_at_once;
+             ++s)
+          visit(s, n);
+      }
+    };
+    for_each_entry([&](std::size_t s, std::uint32_t) { ++lists.begins[s + 1]; });
+    for (std::size_t s = 1; s < lists.begins.size(); ++s) lists.begins[s] += lists.begins[s - 1];
+    lists.triangles.resize(lists.begins.back());
+    std::vector<std::size_t> at = lists.begins;
+    for_each_entry([&](std::size_t s, std::uint32_t n) { lists.triangles[at[s]++] = n; });
+    return lists;
+  }
+
   template <typename Height>
   void fill_columns(const Triangle& t, std::size_t begin, std::size_t end, const Height& height) {
     for (std::size_t i = begin; i < end; ++i) {
       const auto [bottom, top] = crossing(t, xs_[i]);
       double* const column = z_.data() + i * ys_.size();
       for (std::size_t j = first_node(ys_, bottom, spacing_); j < ys_.size() && ys_[j] <= top; ++j)
-        if (std::isnan(column[j]) && covers(t, Point(xs_[i], ys_[j])))
-          column[j] = height(t, xs_[i], ys_[j]);
+        if (covers(t, Point(xs_[i], ys_[j]))) {
+          const double z = height(t, xs_[i], ys_[j]);
+          if (!(z >= column[j])) column[j] = z;
+        }
     }
   }
 
@@ -346,25 +312,33 @@ void check_options(const InterpolationOptions& options) {
   check("area_cell_m", options.area_cell_m);
 }
 
-void fill_triangles(const Triangulation& triangulation, const InterpolationOptions& options,
-                    HeightGrid& grid, InterpolationResult& result) {
-  std::vector<PlacedFace> faces;
-  faces.reserve(triangulation.number_of_faces());
-  for (const auto& face : triangulation.finite_face_handles()) faces.push_back({.face = face});
-  libmap::parallel_for(faces.size(), grain, [&](std::size_t begin, std::size_t end) {
+void fill_triangles(const std::vector<Vector3d>& points, const std::vector<Corners>& triangles,
+                    const InterpolationOptions& options, HeightGrid& grid,
+                    InterpolationResult& result) {
+  const auto triangle_at = [&](std::size_t n) {
+    Triangle t;
+    for (std::size_t a = 0; a < 3; ++a) {
+      const Vector3d& corner = points[triangles[n][a]];
+      t.at[a] = Point(corner.x(), corner.y());
+      t.z[a] = corner.z();
+    }
+    return t;
+  };
+  std::vector<Placement> placements(triangles.size());
+  libmap::parallel_for(triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      const Triangle t = triangle_of(faces[n].face);
-      faces[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
-      grid.place(faces[n], t);
+      const Triangle t = triangle_at(n);
+      placements[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
+      grid.place(placements[n], t);
     }
   });
-  result.triangles = faces.size();
-  result.refused_triangles = static_cast<std::size_t>(
-      std::count_if(faces.begin(), faces.end(), [](const PlacedFace& one) { return one.refused; }));
+  result.triangles = triangles.size();
+  result.refused_triangles = static_cast<std::size_t>(std::count_if(
+      placements.begin(), placements.end(), [](const Placement& one) { return one.refused; }));
   if (options.method == InterpolationMethod::thesis)
-    grid.fill(faces, plane_height);
+    grid.fill(placements, triangle_at, plane_height);
   else
-    grid.fill(faces, barycentric_height);
+    grid.fill(placements, triangle_at, barycentric_height);
 }
 
 HeightGrid make_grid(const std::vector<Vector3d>& points, const Box& box,
@@ -398,13 +372,16 @@ InterpolationResult interpolate(const libmap::PointCloud& cloud,
                          .value = libmap::to_text(static_cast<std::int64_t>(points.size())),
                          .bound = ">= 3"});
   const Box box = box_of(points);
-  const Triangulation triangulation = triangulate(points, box);
+  const PlanarTriangulation triangulation = triangulate_in_plane(points);
+  if (triangulation.triangles.empty())
+    throw libmap::Error("the points' x and y all lie on a line: nothing to interpolate between");
   InterpolationResult result;
-  result.skipped_points = cloud.size() - triangulation.number_of_vertices();
+  result.skipped_points = cloud.size() - triangulation.vertices;
   HeightGrid grid = make_grid(points, box, options, result);
-  fill_triangles(triangulation, options, grid, result);
+  fill_triangles(points, triangulation.triangles, options, grid, result);
 
   result.cloud.viewpoint = cloud.viewpoint;
+  result.cloud.positions.reserve(grid.nodes());
   grid.visit([&](double x, double y, double z) {
     ++result.nodes;
     const bool thesis = options.method == InterpolationMethod::thesis;
@@ -414,7 +391,7 @@ InterpolationResult interpolate(const libmap::PointCloud& cloud,
       ++result.zero_nodes;
     } else {
       const Vector3d node(x, y, z);
-      result.cloud.positions.push_back(thesis ? node.cast<float>().cast<double>().eval() : node);
+      result.cloud.positions.push_back(thesis ? libmap::rounded_to_single(node) : node);
     }
   });
   return result;

@@ -28,9 +28,10 @@ void radix_sort(std::vector<Item>& items, unsigned bits, const KeyOf& key_of) {
 
 // Three whole numbers of a box as one, which orders as they do, x first. Boxes of which no such
 // number fits 64 bits have fits() == false.
+template <typename Integer>
 class BoxKey {
  public:
-  using Cell = std::array<int, 3>;
+  using Cell = std::array<Integer, 3>;
 
   BoxKey(const Cell& low, const Cell& high) : low_(low) {
     for (std::size_t axis = 0; axis < 3; ++axis)
@@ -41,13 +42,13 @@ class BoxKey {
   std::uint64_t of(const Cell& cell) const {
     std::uint64_t key = 0;
     for (std::size_t axis = 0; axis < 3; ++axis)
-      key = key << bits_[axis] | static_cast<std::uint32_t>(cell[axis] - low_[axis]);
+      key = key << bits_[axis] | static_cast<std::uint64_t>(cell[axis] - low_[axis]);
     return key;
   }
   Cell cell(std::uint64_t key) const {
     Cell cell;
     for (std::size_t axis = 3; axis-- > 0; key >>= bits_[axis])
-      cell[axis] = low_[axis] + static_cast<int>(key & ((std::uint64_t{1} << bits_[axis]) - 1));
+      cell[axis] = low_[axis] + static_cast<Integer>(key & ((std::uint64_t{1} << bits_[axis]) - 1));
     return cell;
   }
 

@@ -14,6 +14,8 @@ namespace {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
+using libmap::PointCloud;
+using libmap::PointStream;
 
 constexpr std::size_t grain = 8192;
 // The input's z axis decides only where it is within 75 deg of the normal.
@@ -32,20 +34,31 @@ struct Moments {
   double third = 0;
 };
 
+// Chunk by chunk in the points' order, so that blocks of whole chunks give the sum of all points
+// at once.
 template <typename T, typename Add>
-T sum_over(const libmap::PointCloud& cloud, const T& zero, const Add& add) {
-  return libmap::parallel_reduce(
-      cloud.size(), grain, zero,
+void add_block(const PointCloud& block, const T& zero, const Add& add, T& total) {
+  static_assert(PointStream::block_points % grain == 0);
+  total = libmap::parallel_reduce(
+      block.size(), grain, total,
       [&](std::size_t begin, std::size_t end) {
         T sum = zero;
         for (std::size_t i = begin; i < end; ++i)
-          if (cloud.positions[i].allFinite()) add(sum, i);
+          if (block.positions[i].allFinite()) add(sum, block, i);
         return sum;
       },
       [](T a, const T& b) {
         a += b;
         return a;
       });
+}
+
+template <typename T, typename Add>
+T sum_over(const PointStream& points, const T& zero, const Add& add) {
+  T total = zero;
+  points.for_each_block(PointStream::Need::positions,
+                        [&](const PointCloud& block) { add_block(block, zero, add, total); });
+  return total;
 }
 
 Sum& operator+=(Sum& a, const Sum& b) {
@@ -60,35 +73,70 @@ Moments& operator+=(Moments& a, const Moments& b) {
   return a;
 }
 
-Vector3d mean_about(const libmap::PointCloud& cloud, const Vector3d& origin, std::size_t& count) {
-  const Sum sum = sum_over(cloud, Sum{}, [&](Sum& s, std::size_t i) {
-    s.of += cloud.positions[i] - origin;
-    ++s.count;
+void add_offsets(const PointCloud& block, const Vector3d& origin, Sum& total) {
+  add_block(
+      block, Sum{},
+      [&](Sum& sum, const PointCloud& of, std::size_t i) {
+        sum.of += of.positions[i] - origin;
+        ++sum.count;
+      },
+      total);
+}
+
+Vector3d mean_about(const Vector3d& origin, const Sum& sum) {
+  return sum.count == 0 ? origin : origin + sum.of / static_cast<double>(sum.count);
+}
+
+void add_normals(const PointCloud& block, Vector3d& total) {
+  add_block(
+      block, Vector3d(Vector3d::Zero()),
+      [](Vector3d& sum, const PointCloud& of, std::size_t i) {
+        const Vector3d n = of.normals[i].cast<double>();
+        if (n.allFinite() && n.norm() > 0) sum += n.normalized();
+      },
+      total);
+}
+
+// What a first look at the points tells.
+struct Facts {
+  std::size_t points = 0;         // finite or not
+  std::optional<Vector3d> first;  // finite one
+  Sum offsets;                    // of the finite points from the first
+  Vector3d normals = Vector3d::Zero();
+  libmap::Pose viewpoint = libmap::Pose::Identity();
+};
+
+Facts facts_of(const PointStream& points) {
+  Facts facts;
+  points.for_each_block(PointStream::Need::positions_and_normals, [&](const PointCloud& block) {
+    block.check();
+    facts.points += block.size();
+    facts.viewpoint = block.viewpoint;
+    for (std::size_t i = 0; i < block.size() && !facts.first; ++i)
+      if (block.positions[i].allFinite()) facts.first = block.positions[i];
+    if (facts.first) add_offsets(block, *facts.first, facts.offsets);
+    if (block.has_normals()) add_normals(block, facts.normals);
   });
-  count = sum.count;
-  if (count == 0) return origin;
-  return origin + sum.of / static_cast<double>(count);
+  return facts;
 }
 
 // Eq. 2-13. The second pass takes away the rounding that a far origin leaves in the first.
-Vector3d centroid_of(const libmap::PointCloud& cloud, std::size_t& count) {
-  Vector3d first = Vector3d::Zero();
-  for (const Vector3d& p : cloud.positions) {
-    if (!p.allFinite()) continue;
-    first = p;
-    break;
-  }
-  return mean_about(cloud, mean_about(cloud, first, count), count);
+Vector3d centroid_of(const PointStream& points, const Facts& facts) {
+  const Vector3d near = mean_about(facts.first.value_or(Vector3d::Zero()), facts.offsets);
+  Sum offsets;
+  points.for_each_block(PointStream::Need::positions,
+                        [&](const PointCloud& block) { add_offsets(block, near, offsets); });
+  return mean_about(near, offsets);
 }
 
 // Eq. 2-14, 2-15: the normal without its sign, and the three variances in increasing order.
-Matrix3d principal_axes(const libmap::PointCloud& cloud, const Vector3d& centroid,
-                        std::size_t count, Vector3d& variances) {
-  Matrix3d covariance =
-      sum_over(cloud, Matrix3d(Matrix3d::Zero()), [&](Matrix3d& s, std::size_t i) {
-        const Vector3d d = cloud.positions[i] - centroid;
-        s += d * d.transpose();
-      });
+Matrix3d principal_axes(const PointStream& points, const Vector3d& centroid, std::size_t count,
+                        Vector3d& variances) {
+  Matrix3d covariance = sum_over(points, Matrix3d(Matrix3d::Zero()),
+                                 [&](Matrix3d& s, const PointCloud& block, std::size_t i) {
+                                   const Vector3d d = block.positions[i] - centroid;
+                                   s += d * d.transpose();
+                                 });
   covariance /= static_cast<double>(count);
   // Scaled, so that neither tiny nor huge clouds leave the numbers' range.
   const double scale = covariance.trace();
@@ -110,10 +158,10 @@ void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size
     throw libmap::Error("all points lie on a line: no plane fits");
 }
 
-Moments height_moments(const libmap::PointCloud& cloud, const Vector3d& centroid,
+Moments height_moments(const PointStream& points, const Vector3d& centroid,
                        const Vector3d& normal) {
-  return sum_over(cloud, Moments{}, [&](Moments& m, std::size_t i) {
-    const double h = normal.dot(cloud.positions[i] - centroid);
+  return sum_over(points, Moments{}, [&](Moments& m, const PointCloud& block, std::size_t i) {
+    const double h = normal.dot(block.positions[i] - centroid);
     m.second += h * h;
     m.third += h * h * h;
   });
@@ -127,14 +175,6 @@ double side_of(const Vector3d& normal, const Vector3d& direction) {
   return std::abs(cosine) > in_plane_cosine ? cosine : 0;
 }
 
-Vector3d sum_of_normals(const libmap::PointCloud& cloud) {
-  if (!cloud.has_normals()) return Vector3d::Zero();
-  return sum_over(cloud, Vector3d(Vector3d::Zero()), [&](Vector3d& s, std::size_t i) {
-    const Vector3d n = cloud.normals[i].cast<double>();
-    if (n.allFinite() && n.norm() > 0) s += n.normalized();
-  });
-}
-
 // A fitted plane whose normal may still face either side.
 struct Fit {
   Vector3d centroid;
@@ -144,8 +184,8 @@ struct Fit {
 };
 
 // The sign of the normal: which of the two sides is up, and who said so.
-double choose_up(const libmap::PointCloud& cloud, const RegressionPlaneOptions& options,
-                 const Fit& fit, UpSource& source) {
+double choose_up(const Facts& facts, const RegressionPlaneOptions& options, const Fit& fit,
+                 UpSource& source) {
   if (options.up) {
     source = UpSource::direction;
     const double side = side_of(fit.normal, *options.up);
@@ -157,13 +197,13 @@ double choose_up(const libmap::PointCloud& cloud, const RegressionPlaneOptions& 
     return side;
   }
   double side = 0;
-  if (!cloud.viewpoint.isApprox(libmap::Pose::Identity(), 1e-12)) {
+  if (!facts.viewpoint.isApprox(libmap::Pose::Identity(), 1e-12)) {
     source = UpSource::viewpoint;
-    side = side_of(fit.normal, cloud.viewpoint.translation() - fit.centroid);
+    side = side_of(fit.normal, facts.viewpoint.translation() - fit.centroid);
     if (side != 0) return side;
   }
   source = UpSource::normals;
-  side = side_of(fit.normal, sum_of_normals(cloud));
+  side = side_of(fit.normal, facts.normals);
   if (side != 0) return side;
   source = UpSource::frame_z;
   if (std::abs(fit.normal.z()) >= min_cosine_of_frame_z) return fit.normal.z();
@@ -202,26 +242,27 @@ Matrix3d corrected_axes(const Vector3d& normal) {
 
 }  // namespace
 
-RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
+RegressionPlane fit_regression_plane(const PointStream& points,
                                      const RegressionPlaneOptions& options) {
-  cloud.check();
+  const Facts facts = facts_of(points);
   RegressionPlane plane;
-  plane.centroid = centroid_of(cloud, plane.points);
-  plane.skipped = cloud.size() - plane.points;
+  plane.points = facts.offsets.count;
+  plane.centroid = centroid_of(points, facts);
+  plane.skipped = facts.points - plane.points;
   Vector3d variances = Vector3d::Zero();
   Matrix3d axes = Matrix3d::Identity();
-  if (plane.points >= 3) axes = principal_axes(cloud, plane.centroid, plane.points, variances);
+  if (plane.points >= 3) axes = principal_axes(points, plane.centroid, plane.points, variances);
   check_spread(variances, plane.centroid, plane.points);
 
   Fit fit{.centroid = plane.centroid, .normal = axes.col(0)};
-  const Moments moments = height_moments(cloud, fit.centroid, fit.normal);
+  const Moments moments = height_moments(points, fit.centroid, fit.normal);
   const double count = static_cast<double>(plane.points);
   fit.rmse = std::sqrt(moments.second / count);
   const double cube = fit.rmse * fit.rmse * fit.rmse;
   fit.skewness = cube > 0 ? moments.third / count / cube : 0;
   if (!std::isfinite(fit.skewness)) fit.skewness = 0;
 
-  if (choose_up(cloud, options, fit, plane.up_source) < 0) {
+  if (choose_up(facts, options, fit, plane.up_source) < 0) {
     fit.normal = -fit.normal;
     fit.skewness = -fit.skewness;
   }
@@ -233,6 +274,11 @@ RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
   plane.terrain_from_input.linear() = rotation.transpose();
   plane.terrain_from_input.translation() = -(rotation.transpose() * plane.centroid);
   return plane;
+}
+
+RegressionPlane fit_regression_plane(const PointCloud& cloud,
+                                     const RegressionPlaneOptions& options) {
+  return fit_regression_plane(libmap::CloudAsStream(cloud), options);
 }
 
 libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,

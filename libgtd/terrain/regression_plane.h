@@ -8,6 +8,7 @@
 #include <string_view>
 
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/point_stream.h"
 #include "libmap/core/pose.h"
 
 namespace libgtd {
@@ -49,6 +50,9 @@ struct RegressionPlane {
 // on one line, for an `up` of no length or within the plane, and with `thesis` where c is parallel
 // to n.
 RegressionPlane fit_regression_plane(const libmap::PointCloud& cloud,
+                                     const RegressionPlaneOptions& options = {});
+// The same of points in blocks, in a few passes; equal to the bit.
+RegressionPlane fit_regression_plane(const libmap::PointStream& points,
                                      const RegressionPlaneOptions& options = {});
 
 // The cloud in the terrain frame. `thesis` computes the positions in single precision, as the

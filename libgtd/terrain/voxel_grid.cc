@@ -41,16 +41,11 @@ std::pair<Vector, Vector> bounds_of(const std::vector<Vector>& points) {
   return bounds;
 }
 
-using Cell = BoxKey::Cell;
-
-// std::floor of a number in an int's range, without a call into the mathematics library.
-int floor_to_int(float value) {
-  const int whole = static_cast<int>(value);
-  return static_cast<float>(whole) > value ? whole - 1 : whole;
-}
+using Cell = std::array<int, 3>;
+using Key = BoxKey<int>;
 
 template <typename Range, typename CellOf>
-BoxKey box_key(const Range& items, const CellOf& cell_of) {
+Key box_key(const Range& items, const CellOf& cell_of) {
   Cell low = cell_of(items.front());
   Cell high = low;
   for (const auto& item : items) {
@@ -66,7 +61,7 @@ BoxKey box_key(const Range& items, const CellOf& cell_of) {
 void sort_and_unite(std::vector<Voxel>& voxels) {
   if (voxels.empty()) return;
   const auto cell_of = [](const Voxel& voxel) { return Cell{voxel.i, voxel.j, voxel.k}; };
-  const BoxKey key = box_key(voxels, cell_of);
+  const Key key = box_key(voxels, cell_of);
   if (!key.fits()) {
     std::sort(voxels.begin(), voxels.end());
     voxels.erase(std::unique(voxels.begin(), voxels.end()), voxels.end());
@@ -96,7 +91,7 @@ SortedCells sort_by_cell(const std::vector<Cell>& cells) {
     std::uint32_t index;
   };
   SortedCells sorted;
-  const BoxKey key = box_key(cells, [](const Cell& cell) { return cell; });
+  const Key key = box_key(cells, [](const Cell& cell) { return cell; });
   std::vector<Item> items;
   items.reserve(cells.size());
   for (const Cell& cell : cells)
@@ -150,8 +145,9 @@ std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f
   std::vector<Cell> cells;  // z, y, x
   cells.reserve(points.size());
   for (const Eigen::Vector3f& point : points)
-    cells.push_back({floor_to_int(point.z() * inverse_leaf), floor_to_int(point.y() * inverse_leaf),
-                     floor_to_int(point.x() * inverse_leaf)});
+    cells.push_back({floor_to<int>(point.z() * inverse_leaf),
+                     floor_to<int>(point.y() * inverse_leaf),
+                     floor_to<int>(point.x() * inverse_leaf)});
   const SortedCells sorted = sort_by_cell(cells);
   std::vector<Eigen::Vector3f> centroids;
   centroids.reserve(sorted.begins.size());

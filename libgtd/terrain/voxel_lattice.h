@@ -2,10 +2,16 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cmath>
 #include <compare>
 
 namespace libgtd {
+
+// std::floor of a number in the integer's range, without a call into the mathematics library.
+template <typename Integer, typename Real>
+constexpr Integer floor_to(Real value) {
+  const auto whole = static_cast<Integer>(value);
+  return static_cast<Real>(whole) > value ? whole - 1 : whole;
+}
 
 // Ordered by i, then j, then k: the order of every list of voxels and of every map.
 struct Voxel {
@@ -27,8 +33,7 @@ struct VoxelLattice {
   }
   Voxel voxel_of(const Eigen::Vector3d& point_in_terrain) const {
     const Eigen::Vector3d cell = cell_of(point_in_terrain);
-    return {static_cast<int>(std::floor(cell.x())), static_cast<int>(std::floor(cell.y())),
-            static_cast<int>(std::floor(cell.z()))};
+    return {floor_to<int>(cell.x()), floor_to<int>(cell.y()), floor_to<int>(cell.z())};
   }
   Eigen::Vector3d center_of(const Voxel& voxel) const {
     return origin_m +

@@ -55,8 +55,9 @@ Triple require_positions(const ColumnSet& set) {
 std::vector<Eigen::Vector3d> read_positions(const Triple& triple, std::size_t rows) {
   std::vector<Eigen::Vector3d> positions(rows);
   for (int axis = 0; axis < 3; ++axis)
-    for_each_value(*triple[static_cast<std::size_t>(axis)], rows,
-                   [&](std::size_t row, double value) { positions[row][axis] = value; });
+    for_each_value_in_parallel(
+        *triple[static_cast<std::size_t>(axis)], rows,
+        [&](std::size_t row, double value) { positions[row][axis] = value; });
   // Text declared as float32 reads as the float that was written, unless it has digits beyond it.
   const bool is_float_text = std::any_of(triple.begin(), triple.end(), [](const Column* column) {
     return column->type == ScalarType::float32 && column->stored == StoredType::float64;
@@ -70,10 +71,10 @@ std::vector<Eigen::Vector3d> read_positions(const Triple& triple, std::size_t ro
 std::vector<Eigen::Vector3f> read_normals(const Triple& triple, std::size_t rows) {
   std::vector<Eigen::Vector3f> normals(rows);
   for (int axis = 0; axis < 3; ++axis)
-    for_each_value(*triple[static_cast<std::size_t>(axis)], rows,
-                   [&](std::size_t row, double value) {
-                     normals[row][axis] = static_cast<float>(as_type(value, ScalarType::float32));
-                   });
+    for_each_value_in_parallel(
+        *triple[static_cast<std::size_t>(axis)], rows, [&](std::size_t row, double value) {
+          normals[row][axis] = static_cast<float>(as_type(value, ScalarType::float32));
+        });
   return normals;
 }
 
@@ -92,7 +93,7 @@ std::vector<Color> read_colors(const Triple& triple, std::size_t rows) {
   const double scale = color_scale(triple, rows);
   std::vector<Color> colors(rows);
   for (std::size_t channel = 0; channel < 3; ++channel)
-    for_each_value(*triple[channel], rows, [&](std::size_t row, double value) {
+    for_each_value_in_parallel(*triple[channel], rows, [&](std::size_t row, double value) {
       colors[row][channel] = static_cast<std::uint8_t>(as_type(value * scale, ScalarType::uint8));
     });
   return colors;
@@ -100,8 +101,10 @@ std::vector<Color> read_colors(const Triple& triple, std::size_t rows) {
 
 ScalarField read_field(const Column& column, std::size_t rows) {
   ScalarField field{column.name, column.type, std::vector<double>(rows)};
-  for_each_value(column, rows, [&](std::size_t row, double value) {
-    field.values[row] = as_type(value, column.type);
+  // Numbers that lie in memory as they are declared need no rounding.
+  const bool rounds = column.stored != stored_as(column.type);
+  for_each_value_in_parallel(column, rows, [&](std::size_t row, double value) {
+    field.values[row] = rounds ? as_type(value, column.type) : value;
   });
   return field;
 }
@@ -164,6 +167,27 @@ CloudFromColumns cloud_from_columns(const ColumnSet& set, NotFinite not_finite) 
     if (!uses(positions, column) && !uses(normals, column) && !uses(colors, column))
       cloud.fields.push_back(read_field(column, set.rows));
   return without_holes(std::move(cloud), not_finite);
+}
+
+std::vector<Column> position_columns(const std::vector<Column>& columns) {
+  ColumnSet set;
+  set.columns = columns;
+  const std::optional<Triple> positions = find_triple(set, position_names);
+  std::vector<Column> kept;
+  for (const Column& column : set.columns)
+    if (uses(positions, column)) kept.push_back(column);
+  return kept;
+}
+
+std::vector<Column> geometry_columns(const std::vector<Column>& columns) {
+  ColumnSet set;
+  set.columns = columns;
+  const std::optional<Triple> positions = find_triple(set, position_names);
+  const std::optional<Triple> normals = find_triple(set, normal_names);
+  std::vector<Column> geometry;
+  for (const Column& column : set.columns)
+    if (uses(positions, column) || uses(normals, column)) geometry.push_back(column);
+  return geometry;
 }
 
 std::vector<ScalarField> fields_of_columns(const ColumnSet& set) {

@@ -1,6 +1,8 @@
 #include "libmap/cloud/cloud_io.h"
 
 #include <algorithm>
+#include <boost/interprocess/file_mapping.hpp>
+#include <boost/interprocess/mapped_region.hpp>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
@@ -34,8 +36,25 @@ Error unknown_format(const std::filesystem::path& path) {
                 .bound = ".pcd, .ply, .vtp or .csv"});
 }
 
-GeometryColumns decode(const std::string& format, const std::shared_ptr<const std::string>& bytes) {
-  if (format == ".pcd") return decode_pcd(bytes);
+// The file's bytes as the system's own cache holds them, without a copy.
+GeometryColumns decode_mapped_pcd(const std::filesystem::path& path) {
+  namespace ipc = boost::interprocess;
+  require_readable_file(path);
+  if (std::filesystem::file_size(path) == 0) throw Error("is empty");
+  try {
+    const ipc::file_mapping file(path.c_str(), ipc::read_only);
+    const auto region = std::make_shared<ipc::mapped_region>(file, ipc::read_only);
+    return decode_pcd({static_cast<const char*>(region->get_address()), region->get_size()},
+                      region);
+  } catch (const ipc::interprocess_exception& error) {
+    throw Error(std::string("cannot be read: ") + error.what());
+  }
+}
+
+GeometryColumns decode(const std::filesystem::path& path) {
+  const std::string format = format_of(path);
+  if (format == ".pcd") return decode_mapped_pcd(path);
+  const auto bytes = read_geometry_bytes(path);
   if (format == ".ply") return decode_ply(bytes);
   if (format == ".vtp") return decode_vtp(*bytes);
   return decode_csv(*bytes, {});
@@ -94,9 +113,8 @@ void write_geometry_file(const std::filesystem::path& path,
 
 CloudReadResult read_cloud(const std::filesystem::path& path) {
   require_cloud_format(path);
-  const auto bytes = read_geometry_bytes(path);
   try {
-    GeometryColumns content = decode(format_of(path), bytes);
+    GeometryColumns content = decode(path);
     if (content.info.faces > 0)
       content.info.skipped.push_back(std::to_string(content.info.faces) + " faces");
     CloudFromColumns read = cloud_from_columns(content.vertices, NotFinite::drop);

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -47,25 +48,36 @@ void store(double value, bool swap_bytes, char* at) {
   std::memcpy(at, bytes.data(), sizeof(T));
 }
 
-void store(double value, ScalarType type, bool swap_bytes, char* at) {
-  const double held = as_type(value, type);
-  switch (type) {
+// The column as T, `step` bytes from row to row.
+template <typename T>
+void store_rows(const Column& column, std::size_t rows, bool swap_bytes, char* at,
+                std::size_t step) {
+  // Numbers that lie in memory as they are declared need no rounding.
+  const bool rounds = column.stored != stored_as(column.type);
+  for_each_value(column, rows, [&](std::size_t row, double value) {
+    store<T>(rounds ? as_type(value, column.type) : value, swap_bytes, at + row * step);
+  });
+}
+
+void store_rows(const Column& column, std::size_t rows, bool swap_bytes, char* at,
+                std::size_t step) {
+  switch (column.type) {
     case ScalarType::int8:
-      return store<std::int8_t>(held, swap_bytes, at);
+      return store_rows<std::int8_t>(column, rows, swap_bytes, at, step);
     case ScalarType::uint8:
-      return store<std::uint8_t>(held, swap_bytes, at);
+      return store_rows<std::uint8_t>(column, rows, swap_bytes, at, step);
     case ScalarType::int16:
-      return store<std::int16_t>(held, swap_bytes, at);
+      return store_rows<std::int16_t>(column, rows, swap_bytes, at, step);
     case ScalarType::uint16:
-      return store<std::uint16_t>(held, swap_bytes, at);
+      return store_rows<std::uint16_t>(column, rows, swap_bytes, at, step);
     case ScalarType::int32:
-      return store<std::int32_t>(held, swap_bytes, at);
+      return store_rows<std::int32_t>(column, rows, swap_bytes, at, step);
     case ScalarType::uint32:
-      return store<std::uint32_t>(held, swap_bytes, at);
+      return store_rows<std::uint32_t>(column, rows, swap_bytes, at, step);
     case ScalarType::float32:
-      return store<float>(held, swap_bytes, at);
+      return store_rows<float>(column, rows, swap_bytes, at, step);
     case ScalarType::float64:
-      return store<double>(held, swap_bytes, at);
+      return store_rows<double>(column, rows, swap_bytes, at, step);
   }
 }
 
@@ -143,15 +155,14 @@ void append_records(const std::vector<Column>& columns, std::size_t begin, std::
   const std::size_t record = record_size(columns);
   const std::size_t start = out.size();
   out.resize(start + record * (end - begin));
-  std::size_t offset = start;
-  for (Column column : columns) {
-    char* const first = out.data() + offset;
-    if (begin < end) column.first += begin * column.stride;
-    for_each_value(column, end - begin, [&](std::size_t row, double value) {
-      store(value, column.type, swap_bytes, first + row * record);
-    });
-    offset += size_of(stored_as(column.type));
-  }
+  parallel_for(end - begin, rows_a_chunk, [&](std::size_t first, std::size_t last) {
+    char* at = out.data() + start + first * record;
+    for (Column column : columns) {
+      column.first += (begin + first) * column.stride;
+      store_rows(column, last - first, swap_bytes, at, record);
+      at += size_of(stored_as(column.type));
+    }
+  });
 }
 
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,

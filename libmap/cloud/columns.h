@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "libmap/cloud/geometry_file.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/triangle_mesh.h"
@@ -77,6 +78,9 @@ bool fits_type(double value, ScalarType type);
 // Calls body(row, value) for each row.
 template <typename Body>
 void for_each_value(const Column& column, std::size_t rows, const Body& body);
+// The same on all threads, in any order.
+template <typename Body>
+void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body);
 
 // Rows begin..end-1 one after another, each column as its `type`, without gaps.
 void append_records(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
@@ -108,6 +112,8 @@ class TextRows {
 // Throws Error if `rows` lines of `words` words cannot stand in `bytes` bytes.
 void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
                            const std::string& what);
+
+inline constexpr std::size_t rows_a_chunk = 16384;  // that one thread takes
 
 template <typename T, typename Body>
 void for_each_stored(const Column& column, std::size_t rows, const Body& body) {
@@ -145,6 +151,16 @@ void for_each_value(const Column& column, std::size_t rows, const Body& body) {
     case StoredType::uint64:
       return for_each_stored<std::uint64_t>(column, rows, body);
   }
+}
+
+template <typename Body>
+void for_each_value_in_parallel(const Column& column, std::size_t rows, const Body& body) {
+  parallel_for(rows, rows_a_chunk, [&](std::size_t begin, std::size_t end) {
+    Column part = column;
+    part.first += begin * part.stride;
+    for_each_value(part, end - begin,
+                   [&](std::size_t row, double value) { body(begin + row, value); });
+  });
 }
 
 }  // namespace libmap

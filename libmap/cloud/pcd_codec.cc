@@ -433,27 +433,42 @@ GeometryFileInfo pcd_info(std::string_view head, std::uint64_t file_bytes) {
   return info_of(header, file_bytes);
 }
 
+std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t file_bytes,
+                                         const std::byte* block) {
+  const PcdHeader header = read_header(head);
+  require_data(header, file_bytes);
+  if (header.encoding != FileEncoding::binary) return std::nullopt;
+  ColumnSet set;
+  add_binary(header, block, set);
+  return BinaryRecords{header.data_begin, record_bytes(header, true), header.points,
+                       std::move(set.columns), header.viewpoint};
+}
+
 GeometryColumns decode_pcd(const std::shared_ptr<const std::string>& bytes) {
-  const PcdHeader header = read_header(*bytes);
-  require_data(header, bytes->size());
+  return decode_pcd(*bytes, bytes);
+}
+
+GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner) {
+  const PcdHeader header = read_header(bytes);
+  require_data(header, bytes.size());
   GeometryColumns content;
-  content.info = info_of(header, bytes->size());
+  content.info = info_of(header, bytes.size());
   content.viewpoint = header.viewpoint;
   ColumnSet& set = content.vertices;
   set.rows = header.points;
-  const auto* data = reinterpret_cast<const std::byte*>(bytes->data()) + header.data_begin;
+  const auto* data = reinterpret_cast<const std::byte*>(bytes.data()) + header.data_begin;
   switch (header.encoding) {
     case FileEncoding::ascii:
-      add_text(header, *bytes, set);
+      add_text(header, bytes, set);
       break;
     case FileEncoding::binary:
       add_binary(header, data, set);
       break;
     case FileEncoding::binary_compressed:
-      add_compressed(header, std::string_view(*bytes).substr(header.data_begin), set);
+      add_compressed(header, bytes.substr(header.data_begin), set);
       break;
   }
-  set.storage.push_back(bytes);
+  set.storage.push_back(owner);
   return content;
 }
 

@@ -6,10 +6,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
 
+#include "libmap/cloud/binary_records.h"
 #include "libmap/cloud/columns.h"
 
 namespace libmap {
@@ -17,10 +19,17 @@ namespace libmap {
 // The header alone; `file_bytes` is the size of the whole file. Throws Error as decode_pcd does.
 GeometryFileInfo pcd_info(std::string_view head, std::uint64_t file_bytes);
 
+// The records of a binary file, with columns on records that begin at `block`; nothing if the file
+// has another encoding. Throws Error as decode_pcd does.
+std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t file_bytes,
+                                         const std::byte* block);
+
 // Throws Error (without the file's name): a header line that is missing, unknown, stands twice or
 // does not fit the others; more points promised than there is data; compressed data that is broken.
 // All of this is known before memory for the points is taken.
 GeometryColumns decode_pcd(const std::shared_ptr<const std::string>& bytes);
+// The same of bytes that `owner` keeps, whatever they lie in.
+GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner);
 
 // Colours are written as packed `rgb`, TYPE U. Throws Error: a field name that cannot stand in the
 // header, or more than 4 GiB to compress.

@@ -105,16 +105,27 @@ class RowReader {
   std::uint64_t row_ = 0;
 };
 
+// Columns on the rows, from `at` on, of a binary element without lists.
+std::vector<Column> columns_at(const PlyElement& element, bool swapped, const std::byte* at) {
+  std::vector<Column> columns;
+  for (const PlyProperty& property : element.properties) {
+    columns.push_back({property.name, scalar_type_of(property.type), property.type, at,
+                       element.record_bytes(), swapped});
+    at += size_of(property.type);
+  }
+  return columns;
+}
+
+bool is_swapped(const PlyHeader& header) {
+  return header.big_endian == (std::endian::native == std::endian::little);
+}
+
 // A binary element without lists needs no copy.
 ColumnSet view_rows(const PlyElement& element, bool swapped, Cursor& cursor) {
   ColumnSet set;
   set.rows = element.count;
-  const auto* at = reinterpret_cast<const std::byte*>(cursor.bytes->data()) + cursor.position;
-  for (const PlyProperty& property : element.properties) {
-    set.columns.push_back({property.name, scalar_type_of(property.type), property.type, at,
-                           element.record_bytes(), swapped});
-    at += size_of(property.type);
-  }
+  set.columns = columns_at(
+      element, swapped, reinterpret_cast<const std::byte*>(cursor.bytes->data()) + cursor.position);
   set.storage.push_back(cursor.bytes);
   cursor.position += element.count * element.record_bytes();
   return set;
@@ -177,7 +188,7 @@ ColumnSet read_element(const PlyElement& element, const PlyHeader& header, Curso
   const bool ascii = header.encoding == FileEncoding::ascii;
   require_room(element, header.encoding,
                ascii ? cursor.rows.remaining() : cursor.bytes->size() - cursor.position);
-  const bool swapped = header.big_endian == (std::endian::native == std::endian::little);
+  const bool swapped = is_swapped(header);
   if (element.properties.empty()) return {};
   if (!ascii && !element.has_lists()) return view_rows(element, swapped, cursor);
   return copy_rows(element, header, swapped, cursor, content);
@@ -203,6 +214,15 @@ GeometryFileInfo info_of(const PlyHeader& header, std::uint64_t file_bytes) {
     }
   }
   return info;
+}
+
+// Throws unless all elements can stand in a file of that size.
+void require_rooms(const PlyHeader& header, std::uint64_t file_bytes) {
+  std::uint64_t left = file_bytes - header.data_begin;
+  for (const PlyElement& element : header.elements) {
+    require_room(element, header.encoding, left);
+    if (header.encoding == FileEncoding::binary) left -= element.count * element.record_bytes();
+  }
 }
 
 void require_vertices(const PlyHeader& header) {
@@ -279,12 +299,26 @@ void write_faces(const PlyContent& content, const PlyEncoding& encoding, std::os
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes) {
   const PlyHeader header = read_ply_header(head);
   require_vertices(header);
-  std::uint64_t left = file_bytes - header.data_begin;
-  for (const PlyElement& element : header.elements) {
-    require_room(element, header.encoding, left);
-    if (header.encoding == FileEncoding::binary) left -= element.count * element.record_bytes();
-  }
+  require_rooms(header, file_bytes);
   return info_of(header, file_bytes);
+}
+
+std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
+                                         const std::byte* block) {
+  const PlyHeader header = read_ply_header(head);
+  require_vertices(header);
+  require_rooms(header, file_bytes);
+  if (header.encoding != FileEncoding::binary) return std::nullopt;
+  std::uint64_t begin = header.data_begin;
+  for (const PlyElement& element : header.elements) {
+    if (element.has_lists()) break;
+    if (element.name == "vertex")
+      return BinaryRecords{begin, element.record_bytes(), element.count,
+                           columns_at(element, is_swapped(header), block),
+                           header.viewpoint.value_or(Pose::Identity())};
+    begin += element.count * element.record_bytes();
+  }
+  return std::nullopt;
 }
 
 GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes) {

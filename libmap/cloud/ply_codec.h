@@ -6,10 +6,12 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
 
+#include "libmap/cloud/binary_records.h"
 #include "libmap/cloud/columns.h"
 
 namespace libmap {
@@ -29,6 +31,11 @@ struct PlyContent {
 
 // The header alone; `file_bytes` is the size of the whole file. Throws Error as decode_ply does.
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes);
+
+// The vertices of a binary file without lists in or before them, with columns on records that begin
+// at `block`; nothing for any other file. Throws Error as decode_ply does.
+std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
+                                         const std::byte* block);
 
 // Throws Error (without the file's name): a header line that cannot be understood, more rows
 // promised than there is data (known before memory for them is taken), a face with less than three

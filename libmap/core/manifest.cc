@@ -157,8 +157,12 @@ std::string to_json(const Manifest& manifest) {
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output) {
   const std::filesystem::path path = manifest_path(output);
   if (!std::filesystem::exists(path)) return std::nullopt;
+  return parse_manifest(read_whole_file(path, std::uint64_t{1} << 26), path.string());
+}
+
+Manifest parse_manifest(const std::string& text, const std::string& file) {
   try {
-    const Json json = Json::parse(read_whole_file(path, std::uint64_t{1} << 26));
+    const Json json = Json::parse(text);
     Manifest manifest;
     manifest.version = json.at("version").get<std::string>();
     manifest.command = json.at("command").get<std::string>();
@@ -171,15 +175,17 @@ std::optional<Manifest> read_manifest_of(const std::filesystem::path& output) {
     for (const auto& [name, numbers] : json.at("transforms").items())
       manifest.transforms.emplace_back(name, from_numbers(numbers.get<std::vector<double>>()));
     manifest.results = from_json_object(json.at("results"));
-    manifest.threads = json.at("run").at("threads").get<unsigned>();
-    for (const auto& [name, seconds] : json.at("run").at("timings_s").items())
-      manifest.timings_s.emplace_back(name, seconds.get<double>());
+    if (json.contains("run")) {
+      const Json& run = json.at("run");
+      manifest.threads = run.at("threads").get<unsigned>();
+      for (const auto& [name, seconds] : run.at("timings_s").items())
+        manifest.timings_s.emplace_back(name, seconds.get<double>());
+    }
     return manifest;
   } catch (const nlohmann::json::exception& error) {
-    throw Error(std::string("not a manifest of this toolkit: ") + error.what(),
-                {.file = path.string()});
+    throw Error(std::string("not a manifest of this toolkit: ") + error.what(), {.file = file});
   } catch (const Error& error) {
-    throw error.in_file(path.string());
+    throw error.in_file(file);
   }
 }
 

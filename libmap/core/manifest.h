@@ -45,6 +45,8 @@ struct Manifest {
 std::filesystem::path manifest_path(const std::filesystem::path& output);
 
 std::string to_json(const Manifest& manifest);
+// The other way round; the section "run" may be missing. Throws Error naming `file`.
+Manifest parse_manifest(const std::string& json, const std::string& file);
 // Throws Error naming file and field. Nothing if there is no manifest beside `output`.
 std::optional<Manifest> read_manifest_of(const std::filesystem::path& output);
 

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <optional>
 #include <string>
 
 #include "libmap/core/error.h"
@@ -21,5 +22,22 @@ std::filesystem::path folder_of(const std::filesystem::path& path);
 // it cannot be opened, or another process holds it.
 int lock_temporary(const std::filesystem::path& temporary, const std::filesystem::path& final_path,
                    const std::function<int(const char* path)>& open_temporary);
+
+// Held by at most one process or object at a time. The file of that name is made if it is missing,
+// and is left there. Throws Error (failed): it cannot be made.
+class FileLock {
+ public:
+  // Waits until nobody else holds it.
+  explicit FileLock(const std::filesystem::path& path);
+  ~FileLock();
+  FileLock(FileLock&&) noexcept;
+  FileLock& operator=(FileLock&&) noexcept;
+  // Nothing if somebody else holds it.
+  static std::optional<FileLock> try_lock(const std::filesystem::path& path);
+
+ private:
+  explicit FileLock(int descriptor) : descriptor_(descriptor) {}
+  int descriptor_ = -1;
+};
 
 }  // namespace libmap

@@ -1,6 +1,7 @@
 #include "libmap/core/pose.h"
 
 #include <Eigen/SVD>
+#include <cmath>
 #include <numbers>
 
 namespace libmap {
@@ -22,6 +23,18 @@ Pose make_pose_from_rpy(const Eigen::Vector3d& translation,
                    Eigen::AngleAxisd(angles.x(), Eigen::Vector3d::UnitX()))
                       .toRotationMatrix();
   return pose;
+}
+
+Eigen::Vector3d roll_pitch_yaw_deg(const Pose& pose) {
+  const Eigen::Matrix3d r = pose.linear();
+  const double yaw = std::atan2(r(1, 0), r(0, 0));
+  const double pitch = std::atan2(-r(2, 0), std::hypot(r(0, 0), r(1, 0)));
+  // Of Rz(-yaw) R, whose middle row is (0, cos roll, -sin roll): near +-90 deg of pitch, where yaw
+  // alone is lost, the three together still give R.
+  const double s = std::sin(yaw);
+  const double c = std::cos(yaw);
+  const double roll = std::atan2(s * r(0, 2) - c * r(1, 2), c * r(1, 1) - s * r(0, 1));
+  return Eigen::Vector3d(roll, pitch, yaw) * (180.0 / std::numbers::pi);
 }
 
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {

@@ -17,6 +17,10 @@ Pose make_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rot
 Pose make_pose_from_rpy(const Eigen::Vector3d& translation,
                         const Eigen::Vector3d& roll_pitch_yaw_deg);
 
+// The angles of make_pose_from_rpy: pitch from -90 to 90; where it is one of them yaw and roll turn
+// about the same axis, and yaw is as it happens.
+Eigen::Vector3d roll_pitch_yaw_deg(const Pose& pose);
+
 // The nearest proper rotation in the least-squares sense (Kabsch 1976), for matrices read from
 // text.
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix);

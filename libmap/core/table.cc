@@ -119,19 +119,20 @@ Table read_csv(const std::filesystem::path& path) {
   return parse_csv(read_whole_file(path), path.string());
 }
 
-std::string to_csv(const Table& table) {
+std::string csv_line(const std::vector<std::string>& cells) {
   std::string text;
-  const auto add_line = [&](const std::vector<std::string>& cells) {
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (i > 0) text += ',';
-      text += quoted_cell(cells[i]);
-    }
-    // An empty line would be passed over.
-    if (cells.size() == 1 && cells.front().empty()) text += "\"\"";
-    text += '\n';
-  };
-  add_line(table.columns);
-  for (const std::vector<std::string>& row : table.rows) add_line(row);
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    if (i > 0) text += ',';
+    text += quoted_cell(cells[i]);
+  }
+  // An empty line would be passed over.
+  if (cells.size() == 1 && cells.front().empty()) text += "\"\"";
+  return text + '\n';
+}
+
+std::string to_csv(const Table& table) {
+  std::string text = csv_line(table.columns);
+  for (const std::vector<std::string>& row : table.rows) text += csv_line(row);
   return text;
 }
 

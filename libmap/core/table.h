@@ -29,5 +29,7 @@ struct Table {
 Table parse_csv(std::string_view text, const std::string& file);
 Table read_csv(const std::filesystem::path& path);
 std::string to_csv(const Table& table);
+// One row of it, its end of line included.
+std::string csv_line(const std::vector<std::string>& cells);
 
 }  // namespace libmap

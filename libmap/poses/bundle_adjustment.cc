@@ -14,7 +14,8 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t dense_below = 120;  // poses: more have a sparse Schur complement
+constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
+constexpr int point_steps = 3;
 
 // x, y in the picture and depth, in standard deviations. The intrinsics are steps away from those
 // by which the feature's ray was made: of fx and fy in parts, of cx and cy in pixels.
@@ -138,11 +139,15 @@ class Adjustment {
         cameras_(options.refine_intrinsics ? most_cameras(frames) : 0),
         blocks_(poses, 4 * cameras_) {
     result_.map_from_base = poses;
-    place_points();
+    for (const FeatureTrack& track : tracks_) {
+      const Eigen::Vector3d point = place_of(track);
+      points_.push_back({point.x(), point.y(), point.z()});
+    }
   }
 
   BundleAdjustmentResult run(const std::vector<GraphLinkResult>& links,
-                             const std::vector<GraphComponent>& components);
+                             const std::vector<GraphComponent>& components,
+                             const std::vector<FeatureTrack>& system_tracks);
 
  private:
   const Feature& feature(const Observation& seen) const {
@@ -152,13 +157,20 @@ class Adjustment {
     return blocks_.contains(frames_[seen.frame].node);
   }
   double* intrinsics(std::size_t camera) const { return blocks_.rest() + 4 * camera; }
-  void place_points();
+  Eigen::Vector3d place_of(const FeatureTrack& track) const;
+  // The observation as the refined intrinsics have it.
+  Linearized linearized(const Observation& seen, const Eigen::Vector3d& point) const;
+  double weight_of(const Linearized& l) const {
+    return 1.0 / (1.0 + l.residual.squaredNorm() / (options_.robust_scale * options_.robust_scale));
+  }
   void add_observations(ceres::Problem& problem);
   void add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links);
   void solve(ceres::Problem& problem);
   void add_to_system(const FeatureTrack& track, const Eigen::Vector3d& point,
                      const std::map<int, std::size_t>& place);
-  void eliminate_points(const std::vector<GraphLinkResult>& links);
+  void settle(const FeatureTrack& track, Eigen::Vector3d& point) const;
+  void eliminate_points(const std::vector<GraphLinkResult>& links,
+                        const std::vector<FeatureTrack>& system_tracks);
 
   const std::vector<FrameFeatures>& frames_;
   const std::vector<FeatureTrack>& tracks_;
@@ -169,20 +181,17 @@ class Adjustment {
   std::vector<std::array<double, 3>> points_;
 };
 
-// In the middle of where the frames see them.
-void Adjustment::place_points() {
-  for (const FeatureTrack& track : tracks_) {
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    double count = 0.0;
-    for (const Observation& seen : track.observations) {
-      if (!has_pose(seen)) continue;
-      sum += result_.map_from_base.at(frames_[seen.frame].node) *
-             frames_[seen.frame].point_in_base(seen.feature);
-      count += 1.0;
-    }
-    if (count > 0.0) sum /= count;
-    points_.push_back({sum.x(), sum.y(), sum.z()});
+// In the middle of where the frames see it.
+Eigen::Vector3d Adjustment::place_of(const FeatureTrack& track) const {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  double count = 0.0;
+  for (const Observation& seen : track.observations) {
+    if (!has_pose(seen)) continue;
+    sum += result_.map_from_base.at(frames_[seen.frame].node) *
+           frames_[seen.frame].point_in_base(seen.feature);
+    count += 1.0;
   }
+  return count > 0.0 ? Eigen::Vector3d(sum / count) : sum;
 }
 
 void Adjustment::add_observations(ceres::Problem& problem) {
@@ -240,12 +249,12 @@ void Adjustment::add_links(ceres::Problem& problem, const std::vector<GraphLinkR
 void Adjustment::solve(ceres::Problem& problem) {
   ceres::Solver::Options settings;
   settings.linear_solver_type =
-      blocks_.all().size() < dense_below ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;
-  settings.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
+      blocks_.all().size() < dense_below ? ceres::DENSE_SCHUR : ceres::ITERATIVE_SCHUR;
+  settings.preconditioner_type = ceres::SCHUR_JACOBI;
   settings.dense_linear_algebra_library_type = ceres::EIGEN;
   settings.num_threads = 1;
   settings.max_num_iterations = options_.max_iterations;
-  settings.function_tolerance = 1e-8;
+  settings.function_tolerance = 1e-6;
   settings.gradient_tolerance = 1e-12;
   settings.parameter_tolerance = 1e-10;
   settings.logging_type = ceres::SILENT;
@@ -266,6 +275,16 @@ void Adjustment::solve(ceres::Problem& problem) {
   result_.converged = summary.IsSolutionUsable();
 }
 
+Linearized Adjustment::linearized(const Observation& seen, const Eigen::Vector3d& point) const {
+  Feature its = feature(seen);
+  Camera camera = frames_[seen.frame].cameras[its.camera];
+  if (!result_.intrinsics.empty()) {
+    its.ray = moved_ray(its, camera, result_.intrinsics[its.camera]);
+    camera = moved(camera, result_.intrinsics[its.camera]);
+  }
+  return linearize(its, camera, result_.map_from_base.at(frames_[seen.frame].node), point);
+}
+
 // The track's share of the normal equations, its point eliminated.
 void Adjustment::add_to_system(const FeatureTrack& track, const Eigen::Vector3d& point,
                                const std::map<int, std::size_t>& place) {
@@ -277,15 +296,9 @@ void Adjustment::add_to_system(const FeatureTrack& track, const Eigen::Vector3d&
   for (const Observation& seen : track.observations) {
     if (!has_pose(seen)) continue;
     const int node = frames_[seen.frame].node;
-    Feature its = feature(seen);
-    Camera camera = frames_[seen.frame].cameras[its.camera];
-    if (!result_.intrinsics.empty()) {
-      its.ray = moved_ray(its, camera, result_.intrinsics[its.camera]);
-      camera = moved(camera, result_.intrinsics[its.camera]);
-    }
-    const Linearized l = linearize(its, camera, result_.map_from_base.at(node), point);
-    const double square = l.residual.squaredNorm();
-    const double weight = 1.0 / (1.0 + square / (options_.robust_scale * options_.robust_scale));
+    const Feature& its = feature(seen);
+    const Linearized l = linearized(seen, point);
+    const double weight = weight_of(l);
     if (weight < 0.5) {
       ++result_.outliers;
     } else {
@@ -306,12 +319,36 @@ void Adjustment::add_to_system(const FeatureTrack& track, const Eigen::Vector3d&
                               -mixed[a].second * inverse * mixed[b].second.transpose());
 }
 
-void Adjustment::eliminate_points(const std::vector<GraphLinkResult>& links) {
+// Where the track's observations agree best at the poses as they are.
+void Adjustment::settle(const FeatureTrack& track, Eigen::Vector3d& point) const {
+  for (int step = 0; step < point_steps; ++step) {
+    Eigen::Matrix3d of_point = Eigen::Matrix3d::Zero();
+    Eigen::Vector3d side = Eigen::Vector3d::Zero();
+    for (const Observation& seen : track.observations) {
+      if (!has_pose(seen)) continue;
+      const Linearized l = linearized(seen, point);
+      of_point += weight_of(l) * l.by_point.transpose() * l.by_point;
+      side -= weight_of(l) * l.by_point.transpose() * l.residual;
+    }
+    point += of_point.ldlt().solve(side);
+  }
+}
+
+void Adjustment::eliminate_points(const std::vector<GraphLinkResult>& links,
+                                  const std::vector<FeatureTrack>& system_tracks) {
   std::map<int, std::size_t> place;
   for (const auto& [node, pose] : result_.map_from_base) place.emplace(node, place.size());
   result_.information = BlockSystem(place.size());
-  for (std::size_t t = 0; t < tracks_.size(); ++t)
-    add_to_system(tracks_[t], result_.points[t], place);
+  if (system_tracks.empty()) {
+    for (std::size_t t = 0; t < tracks_.size(); ++t)
+      add_to_system(tracks_[t], result_.points[t], place);
+  } else {
+    for (const FeatureTrack& track : system_tracks) {
+      Eigen::Vector3d point = place_of(track);
+      settle(track, point);
+      add_to_system(track, point, place);
+    }
+  }
   const double kept = std::max(1.0, static_cast<double>(result_.observations - result_.outliers));
   result_.reprojection_rms_px = std::sqrt(result_.reprojection_rms_px / kept);
   result_.depth_rms_m = std::sqrt(result_.depth_rms_m / kept);
@@ -320,7 +357,8 @@ void Adjustment::eliminate_points(const std::vector<GraphLinkResult>& links) {
 }
 
 BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links,
-                                       const std::vector<GraphComponent>& components) {
+                                       const std::vector<GraphComponent>& components,
+                                       const std::vector<FeatureTrack>& system_tracks) {
   ceres::Problem problem;
   add_observations(problem);
   add_links(problem, links);
@@ -342,7 +380,7 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
     const double* step = intrinsics(n);
     result_.intrinsics.push_back({step[0], step[1], step[2], step[3]});
   }
-  eliminate_points(links);
+  eliminate_points(links, system_tracks);
   return std::move(result_);
 }
 
@@ -379,13 +417,30 @@ BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
                                      const std::map<int, Pose>& map_from_base,
                                      const std::vector<GraphLinkResult>& links,
                                      const std::vector<GraphComponent>& components,
-                                     const BundleAdjustmentOptions& options) {
+                                     const BundleAdjustmentOptions& options,
+                                     const std::vector<FeatureTrack>& system_tracks) {
   if (!(options.robust_scale > 0.0) || options.max_iterations < 1)
     throw Error("a bundle cannot be adjusted so", {.file = {},
                                                    .field = "robust_scale",
                                                    .value = to_text(options.robust_scale),
                                                    .bound = describe(positive)});
-  return Adjustment(frames, tracks, map_from_base, options).run(links, components);
+  return Adjustment(frames, tracks, map_from_base, options).run(links, components, system_tracks);
+}
+
+BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
+                                     const std::vector<FeatureLink>& feature_links,
+                                     const std::map<int, Pose>& map_from_base,
+                                     const std::vector<GraphLinkResult>& links,
+                                     const std::vector<GraphComponent>& components,
+                                     const BundleAdjustmentOptions& options) {
+  const FeatureTracks tracks = build_tracks(frames, feature_links);
+  FeatureTracks sparse;
+  if (map_from_base.size() >= dense_below)
+    sparse = build_tracks(frames, feature_links, TrackFrames::linked);
+  BundleAdjustmentResult result = adjust_bundle(frames, tracks.tracks, map_from_base, links,
+                                                components, options, sparse.tracks);
+  result.conflicts = tracks.conflicts;
+  return result;
 }
 
 }  // namespace libmap

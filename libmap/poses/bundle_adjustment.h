@@ -42,6 +42,7 @@ struct BundleAdjustmentResult {
   // (Schur complement), at the end: the links among them.
   BlockSystem information{0};
   std::size_t tracks = 0;
+  std::size_t conflicts = 0;  // matches that are in no track (FeatureTracks)
   std::size_t observations = 0;
   double initial_cost = 0.0;
   double final_cost = 0.0;
@@ -55,9 +56,20 @@ struct BundleAdjustmentResult {
 
 // Poses that the intrinsics were refined with fit features that move_intrinsics has moved. `links`
 // are those of the graph at its optimum (odometry, closures of other sources, priors); the
-// gauge nodes of the components stay where they are.
+// gauge nodes of the components stay where they are. The information is that of `system_tracks`
+// where there are any: of TrackFrames::linked it is a little less, and sparse.
 BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
                                      const std::vector<FeatureTrack>& tracks,
+                                     const std::map<int, Pose>& map_from_base,
+                                     const std::vector<GraphLinkResult>& links,
+                                     const std::vector<GraphComponent>& components,
+                                     const BundleAdjustmentOptions& options = {},
+                                     const std::vector<FeatureTrack>& system_tracks = {});
+
+// The same of all that links of features say. More than a hundred frames or so are adjusted with
+// conjugate gradients, and with a sparse information: in time that grows with the observations.
+BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
+                                     const std::vector<FeatureLink>& feature_links,
                                      const std::map<int, Pose>& map_from_base,
                                      const std::vector<GraphLinkResult>& links,
                                      const std::vector<GraphComponent>& components,

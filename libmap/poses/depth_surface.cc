@@ -3,6 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <string>
+#include <utility>
+
+#include "libmap/core/error.h"
 
 namespace libmap {
 
@@ -20,8 +24,7 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
   rows_ = (planes.height + step_px - 1) / step_px;
   const auto size = static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_);
   cells_.resize(size);
-  const bool distorted = camera_.is_distorted();
-  if (distorted) rays_.resize(size);
+  find_rays();
   const int most =
       planes.support.empty() ? 0 : *std::max_element(planes.support.begin(), planes.support.end());
   for (int row = 0; row < rows_; ++row)
@@ -31,11 +34,7 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
       const auto pixel =
           static_cast<std::size_t>(row * step_px) * static_cast<std::size_t>(planes.width) +
           static_cast<std::size_t>(column * step_px);
-      if (distorted) {
-        const auto ray = pixel_to_ray(camera_, Eigen::Vector2d(column * step_px, row * step_px));
-        rays_[cell] = ray ? Eigen::Vector2f(ray->cast<float>()) : Eigen::Vector2f::Zero();
-        if (!ray) continue;
-      }
+      if (!rays_.empty() && !rays_[cell].allFinite()) continue;
       const int support = planes.support[pixel];
       if (support == 0 || 4 * support < most) continue;
       const double depth = static_cast<double>(planes.depth_m[pixel]);
@@ -50,6 +49,32 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
           std::lround(static_cast<double>(planes.normals[pixel].y()) * normal_scale));
       kept.noise =
           static_cast<std::uint16_t>(std::clamp(along_normal / noise_unit_m, 1.0, 65535.0));
+    }
+}
+
+DepthSurface::DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells)
+    : camera_(depth_camera), step_px_(step_px), cells_(std::move(cells)) {
+  if (step_px > 0) {
+    columns_ = (camera_.width + step_px - 1) / step_px;
+    rows_ = (camera_.height + step_px - 1) / step_px;
+  }
+  if (cells_.empty() ||
+      cells_.size() != static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_))
+    throw Error("a surface does not fit its camera",
+                {.field = "cells",
+                 .value = std::to_string(cells_.size()),
+                 .bound = std::to_string(columns_) + " x " + std::to_string(rows_)});
+  find_rays();
+}
+
+// NaN where no ray belongs to the pixel.
+void DepthSurface::find_rays() {
+  if (!camera_.is_distorted()) return;
+  for (int row = 0; row < rows_; ++row)
+    for (int column = 0; column < columns_; ++column) {
+      const auto ray = pixel_to_ray(camera_, Eigen::Vector2d(column * step_px_, row * step_px_));
+      rays_.emplace_back(ray ? Eigen::Vector2f(ray->cast<float>())
+                             : Eigen::Vector2f::Constant(std::numeric_limits<float>::quiet_NaN()));
     }
 }
 

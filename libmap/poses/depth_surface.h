@@ -20,13 +20,25 @@ struct SurfaceElement {
 
 class DepthSurface {
  public:
+  struct Cell {
+    float depth_m = 0.0F;       // 0: none
+    std::int16_t normal_x = 0;  // of 32767
+    std::int16_t normal_y = 0;
+    std::uint16_t noise = 0;  // of 1e-6 m
+    std::uint16_t unused = 0;
+  };
+
   DepthSurface() = default;
   // Every step_px-th pixel of `planes`. Planes of fewer than a quarter of their disc's pixels, as
   // at edges, are left out.
   DepthSurface(const DepthPlanes& planes, const Camera& depth_camera, const DepthNoise& noise,
                double surface_noise_m, int step_px);
+  // As another was. Throws Error unless there is a cell for each step_px-th pixel of the camera.
+  DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells);
 
   const Camera& camera() const { return camera_; }
+  int step_px() const { return step_px_; }
+  const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   // The element at a grid place; false where nothing was measured.
@@ -35,12 +47,6 @@ class DepthSurface {
   bool seen_at(const Eigen::Vector3d& point_in_camera, SurfaceElement& element) const;
 
  private:
-  struct Cell {
-    float depth_m = 0.0F;       // 0: none
-    std::int16_t normal_x = 0;  // of 32767
-    std::int16_t normal_y = 0;
-    std::uint16_t noise = 0;  // of 1e-6 m
-  };
   Camera camera_{};
   int step_px_ = 1;
   int columns_ = 0;
@@ -48,6 +54,7 @@ class DepthSurface {
   std::vector<Cell> cells_;
   std::vector<Eigen::Vector2f> rays_;  // of a lens that distorts; else empty
 
+  void find_rays();
   Eigen::Vector2d ray_at(int column, int row) const;
 };
 

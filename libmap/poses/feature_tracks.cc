@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <map>
 #include <numeric>
+#include <set>
 #include <tuple>
 #include <utility>
 
@@ -27,19 +28,26 @@ class FeatureSets {
         members_[begin_[f] + n] = {{f, n}};
   }
 
-  // False if the two sets hold different features of one frame.
-  bool join(const Observation& a, const Observation& b) {
+  enum class Join { joined, conflict, unlinked };
+
+  // A conflict if the two sets hold different features of one frame.
+  Join join(const Observation& a, const Observation& b, const std::set<FramePair>* linked) {
     std::size_t one = root(begin_[a.frame] + a.feature);
     std::size_t other = root(begin_[b.frame] + b.feature);
-    if (one == other) return true;
+    if (one == other) return Join::joined;
     if (members_[one].size() < members_[other].size()) std::swap(one, other);
+    Join result = Join::joined;
     for (const Observation& member : members_[other])
-      for (const Observation& its : members_[one])
-        if (member.frame == its.frame) return false;
+      for (const Observation& its : members_[one]) {
+        if (member.frame == its.frame) return Join::conflict;
+        if (linked != nullptr && !linked->contains(std::minmax(member.frame, its.frame)))
+          result = Join::unlinked;
+      }
+    if (result != Join::joined) return result;
     parent_[other] = one;
     members_[one].insert(members_[one].end(), members_[other].begin(), members_[other].end());
     members_[other].clear();
-    return true;
+    return Join::joined;
   }
 
   std::vector<FeatureTrack> tracks() {
@@ -73,7 +81,7 @@ class FeatureSets {
 }  // namespace
 
 FeatureTracks build_tracks(const std::vector<FrameFeatures>& frames,
-                           const std::vector<FeatureLink>& links) {
+                           const std::vector<FeatureLink>& links, TrackFrames together) {
   std::vector<std::tuple<double, std::size_t, std::size_t>> order;  // chi-square, link, match
   for (std::size_t n = 0; n < links.size(); ++n) {
     const FeatureLink& link = links[n];
@@ -84,13 +92,18 @@ FeatureTracks build_tracks(const std::vector<FrameFeatures>& frames,
                          n, m);
   }
   std::sort(order.begin(), order.end());
+  std::set<FramePair> linked;
+  for (const FeatureLink& link : links) linked.insert(link.frames);
   FeatureSets sets(frames);
   FeatureTracks result;
   for (const auto& [chi_square, n, m] : order) {
     const FeatureMatch& match = links[n].matches[m];
-    const bool joined = sets.join({links[n].frames.first, static_cast<std::size_t>(match.a)},
-                                  {links[n].frames.second, static_cast<std::size_t>(match.b)});
-    result.conflicts += joined ? 0 : 1;
+    const FeatureSets::Join join =
+        sets.join({links[n].frames.first, static_cast<std::size_t>(match.a)},
+                  {links[n].frames.second, static_cast<std::size_t>(match.b)},
+                  together == TrackFrames::linked ? &linked : nullptr);
+    result.conflicts += join == FeatureSets::Join::conflict ? 1 : 0;
+    result.split += join == FeatureSets::Join::unlinked ? 1 : 0;
   }
   result.tracks = sets.tracks();
   return result;

@@ -8,6 +8,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/poses/feature_cache.h"
 
 namespace libmap {
 
@@ -130,22 +131,38 @@ void check(const FeatureOptions& options) {
                 "max_depth_m");
 }
 
-FrameFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
-                          PixelRayCache& rays) {
+struct FoundFeatures {
+  FrameFeatures frame;
+  bool from_cache = false;
+};
+
+FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
+                          PixelRayCache& rays, const FeatureCache& cache) {
   const RgbdFrame read = scan.read_frame(node);
   if (read.depth.empty()) throw Error("has no depth");
-  FrameFeatures frame;
+  FoundFeatures result;
+  FrameFeatures& frame = result.frame;
   frame.node = node;
   frame.type = options.type;
-  for (const CameraView& view : camera_views(read)) {
+  const std::vector<CameraView> views = camera_views(read);
+  std::string key;
+  if (cache.enabled()) {
+    std::vector<Camera> depth_cameras;
+    for (const CameraView& view : views) depth_cameras.push_back(view.depth_camera);
+    key = feature_key(read, options);
+    result.from_cache = cache.read(key, depth_cameras, frame);
+  }
+  for (const CameraView& view : views) {
     frame.cameras.push_back(view.color_camera);
+    if (result.from_cache) continue;
     const DepthPlanes planes =
         fit_depth_planes(view.depth, *rays.rays_of(view.depth_camera), options.planes);
     frame.surfaces.emplace_back(planes, view.depth_camera, options.planes.noise,
                                 options.surface_noise_m, options.surface_step_px);
     if (!view.color.empty()) add_features(view, planes, options, frame);
   }
-  return frame;
+  if (!result.from_cache) cache.write(key, frame);
+  return result;
 }
 
 }  // namespace
@@ -214,17 +231,19 @@ void add_features(const CameraView& view, const DepthPlanes& planes, const Featu
 }
 
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
-                            const FeatureOptions& options, Progress& progress) {
+                            const FeatureOptions& options, Progress& progress,
+                            const FeatureCache* cache) {
   check(options);
+  const FeatureCache none;
   const SingleThreadedOpenCv single;
-  std::vector<FrameFeatures> frames(nodes.size());
+  std::vector<FoundFeatures> frames(nodes.size());
   std::vector<std::string> faults(nodes.size());
   PixelRayCache rays;
   progress.begin("features", nodes.size());
   parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       try {
-        frames[n] = features_of(scan, nodes[n], options, rays);
+        frames[n] = features_of(scan, nodes[n], options, rays, cache != nullptr ? *cache : none);
       } catch (const Error& error) {
         faults[n] = error.what();
       }
@@ -234,10 +253,12 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
   progress.end();
   FeatureResult result;
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (faults[n].empty())
-      result.frames.push_back(std::move(frames[n]));
-    else
+    if (!faults[n].empty()) {
       result.skipped.emplace_back(nodes[n], faults[n]);
+      continue;
+    }
+    result.from_cache += frames[n].from_cache ? 1 : 0;
+    result.frames.push_back(std::move(frames[n].frame));
   }
   return result;
 }

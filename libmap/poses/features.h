@@ -48,7 +48,8 @@ struct FrameFeatures {
   std::vector<Camera> cameras;  // of the colour images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
-  std::vector<std::uint8_t> descriptors;  // 128 (SIFT) or 32 (ORB) bytes a feature
+  std::vector<std::uint8_t> descriptors;  // 128 (SIFT) or 32 (ORB) bytes a feature; may be dropped
+                                          // when all that look alike has been found
   std::vector<DepthSurface> surfaces;     // one a camera
   std::size_t without_depth = 0;          // features that were dropped for it
 
@@ -59,13 +60,17 @@ struct FrameFeatures {
 struct FeatureResult {
   std::vector<FrameFeatures> frames;                 // by ascending node
   std::vector<std::pair<int, std::string>> skipped;  // node and what it lacks
+  std::size_t from_cache = 0;                        // frames
 };
 
-// The frames of `nodes`. The same for any number of threads. Frames that cannot be read, or have no
-// depth, are listed and left out; a frame without colour has surfaces only. Throws Error for
-// options out of their ranges.
+class FeatureCache;
+
+// The frames of `nodes`. The same for any number of threads, with a cache and without. Frames that
+// cannot be read, or have no depth, are listed and left out; a frame without colour has surfaces
+// only. Throws Error for options out of their ranges.
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
-                            const FeatureOptions& options = {}, Progress& progress = no_progress());
+                            const FeatureOptions& options = {}, Progress& progress = no_progress(),
+                            const FeatureCache* cache = nullptr);
 
 // The features of one picture with its depth, without surfaces.
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,

@@ -21,16 +21,17 @@ struct GraphCovariance::Parts {
   std::map<int, std::size_t> place;      // among the unknowns, or held
   std::map<int, std::size_t> component;  // by node
   std::unique_ptr<BlockSolver> solver;
-  std::map<int, Matrix6d> of_nodes;  // those asked for before
+  BlockSystem inverse{0};  // where there are links or nodes
 
   void factor(const BlockSystem& system, const std::vector<GraphComponent>& components);
-  Matrix6d part(const std::vector<Matrix6d>& column, int node) const {
-    const std::size_t row = place.at(node);
-    return row == held ? Matrix6d::Zero() : column[row];
-  }
-  std::vector<Matrix6d> column_of(int node) const {
-    const std::size_t column = place.at(node);
-    return column == held ? std::vector<Matrix6d>() : solver->inverse_column(column);
+  // The covariance of steps of two nodes.
+  Matrix6d between(int a, int b) const {
+    const std::size_t row = place.at(a);
+    const std::size_t column = place.at(b);
+    if (row == held || column == held) return Matrix6d::Zero();
+    return inverse.blocks().contains(std::minmax(row, column))
+               ? inverse.block(row, column)
+               : solver->inverse_column(column)[row];
   }
 };
 
@@ -50,12 +51,22 @@ void GraphCovariance::Parts::factor(const BlockSystem& system,
   for (const auto& [key, block] : system.blocks())
     if (row_of[key.first] != held && row_of[key.second] != held)
       reduced.add(row_of[key.first], row_of[key.second], block);
+  for (std::size_t n = 0; n < unknowns; ++n) reduced.add(n, n, Matrix6d::Zero());
   solver = std::make_unique<BlockSolver>(reduced, damping);
+  if (solver->valid()) inverse = solver->selected_inverse(reduced);
 }
 
-GraphCovariance::GraphCovariance(const PoseGraphResult& graph) : parts_(std::make_unique<Parts>()) {
+GraphCovariance::GraphCovariance(const PoseGraphResult& graph,
+                                 const std::vector<std::pair<int, int>>& pairs)
+    : parts_(std::make_unique<Parts>()) {
   parts_->poses = graph.map_from_base;
-  parts_->factor(link_system(graph.map_from_base, graph.links), graph.components);
+  BlockSystem system = link_system(graph.map_from_base, graph.links);
+  std::map<int, std::size_t> place;
+  for (const auto& [node, pose] : graph.map_from_base) place.emplace(node, place.size());
+  for (const auto& [a, b] : pairs)
+    if (a != b && place.contains(a) && place.contains(b))
+      system.add(place.at(a), place.at(b), Matrix6d::Zero());
+  parts_->factor(system, graph.components);
 }
 
 GraphCovariance::GraphCovariance(const std::map<int, Pose>& map_from_base,
@@ -77,29 +88,14 @@ bool GraphCovariance::connected(int a, int b) const {
          of_a->second == of_b->second;
 }
 
-Matrix6d GraphCovariance::of_node(int node) const {
-  const auto [known, fresh] = parts_->of_nodes.try_emplace(node, Matrix6d::Zero());
-  if (fresh && parts_->place.at(node) != held)
-    known->second = parts_->part(parts_->column_of(node), node);
-  return known->second;
-}
+Matrix6d GraphCovariance::of_node(int node) const { return parts_->between(node, node); }
 
-std::vector<Matrix6d> GraphCovariance::of_relative(int a, const std::vector<int>& nodes) const {
-  const std::vector<Matrix6d> of_a = parts_->column_of(a);
-  const auto from_a = [&](int node) {
-    return of_a.empty() ? Matrix6d(Matrix6d::Zero()) : parts_->part(of_a, node);
-  };
-  const Pose a_from_map = parts_->poses.at(a).inverse();
-  std::vector<Matrix6d> result;
-  for (const int b : nodes) {
-    const RelativeJacobian jacobian = relative_jacobian(a_from_map * parts_->poses.at(b));
-    const Matrix6d mixed = jacobian.by_b * from_a(b) * jacobian.by_a.transpose();
-    Matrix6d covariance = jacobian.by_a * from_a(a) * jacobian.by_a.transpose() +
-                          jacobian.by_b * of_node(b) * jacobian.by_b.transpose();
-    covariance += mixed + mixed.transpose();
-    result.push_back(covariance);
-  }
-  return result;
+Matrix6d GraphCovariance::of_relative(int a, int b) const {
+  const RelativeJacobian jacobian =
+      relative_jacobian(parts_->poses.at(a).inverse() * parts_->poses.at(b));
+  const Matrix6d mixed = jacobian.by_b * parts_->between(b, a) * jacobian.by_a.transpose();
+  return jacobian.by_a * of_node(a) * jacobian.by_a.transpose() +
+         jacobian.by_b * of_node(b) * jacobian.by_b.transpose() + mixed + mixed.transpose();
 }
 
 BlockSystem link_system(const std::map<int, Pose>& map_from_base,

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <map>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "libmap/poses/block_system.h"
@@ -11,12 +12,13 @@
 
 namespace libmap {
 
-// For one thread at a time.
 class GraphCovariance {
  public:
   // Links that were rejected do not count; others do by their weight. Components are bound at their
-  // gauge nodes.
-  explicit GraphCovariance(const PoseGraphResult& graph);
+  // gauge nodes. All that the nodes and the links are asked for is found at once, in about the time
+  // of one factorisation; so are `pairs` of nodes that no link joins.
+  explicit GraphCovariance(const PoseGraphResult& graph,
+                           const std::vector<std::pair<int, int>>& pairs = {});
   // Of any system whose blocks are those of `nodes`, in their order, of which the first of each
   // component is held.
   GraphCovariance(const std::map<int, Pose>& map_from_base, const BlockSystem& information,
@@ -29,8 +31,8 @@ class GraphCovariance {
   bool connected(int a, int b) const;
   // Of a step of the node's pose against the gauge node of its component.
   Matrix6d of_node(int node) const;
-  // Of a step of a_from_b, for each b of `nodes` that is connected with a.
-  std::vector<Matrix6d> of_relative(int a, const std::vector<int>& nodes) const;
+  // Of a step of a_from_b, of two nodes that are connected.
+  Matrix6d of_relative(int a, int b) const;
 
  private:
   struct Parts;

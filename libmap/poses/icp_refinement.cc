@@ -10,7 +10,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/poses/pose_neighbors.h"
 #include "libmap/poses/rigid_motion.h"
+#include "libmap/poses/surface_samples.h"
 
 namespace libmap {
 
@@ -20,51 +22,11 @@ constexpr int overlap_samples = 300;
 constexpr double reach_m = 2.5;  // frames further apart are not tried
 constexpr double view_angle_deg = 100.0;
 constexpr std::size_t most_candidates = 24;
+constexpr std::size_t nearest_considered = 8 * most_candidates;
 constexpr double robust_scale = 2.5;  // of Geman and McClure's loss, standard deviations
 constexpr double least_distance_m = 0.004;
 constexpr double settled_m = 2e-6;
 constexpr double farthest_step = 0.2;  // m and rad
-
-// A frame's surfaces in its base.
-struct BaseElement {
-  Eigen::Vector3d point;
-  Eigen::Vector3d normal;
-  double noise_m = 0.0;
-};
-
-bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_base,
-                    BaseElement& element) {
-  for (std::size_t c = 0; c < frame.surfaces.size(); ++c) {
-    const Pose& base_from_camera = frame.surfaces[c].camera().base_from_camera;
-    SurfaceElement seen;
-    if (!frame.surfaces[c].seen_at(base_from_camera.inverse() * point_in_base, seen)) continue;
-    element = {base_from_camera * seen.point, base_from_camera.linear() * seen.normal,
-               seen.noise_m};
-    return true;
-  }
-  return false;
-}
-
-// About `count` elements, evenly over the pictures.
-std::vector<BaseElement> samples_of(const FrameFeatures& frame, int count) {
-  std::size_t cells = 0;
-  for (const DepthSurface& surface : frame.surfaces)
-    cells += static_cast<std::size_t>(surface.columns()) * static_cast<std::size_t>(surface.rows());
-  const int step = std::max(
-      1, static_cast<int>(std::floor(std::sqrt(static_cast<double>(cells) / std::max(1, count)))));
-  std::vector<BaseElement> samples;
-  for (const DepthSurface& surface : frame.surfaces) {
-    const Pose& base_from_camera = surface.camera().base_from_camera;
-    for (int row = step / 2; row < surface.rows(); row += step)
-      for (int column = step / 2; column < surface.columns(); column += step) {
-        SurfaceElement element;
-        if (surface.at(column, row, element))
-          samples.push_back({base_from_camera * element.point,
-                             base_from_camera.linear() * element.normal, element.noise_m});
-      }
-  }
-  return samples;
-}
 
 double overlap_of(const std::vector<BaseElement>& samples, const FrameFeatures& other,
                   const Pose& other_from_base) {
@@ -113,7 +75,9 @@ class Alignment {
   }
   void pairs_of_links(const std::vector<PoseLink>& links);
   void pairs_by_overlap();
-  std::vector<std::size_t> candidates_of(std::size_t frame) const;
+  std::vector<std::size_t> candidates_of(const PoseNeighbors& neighbors,
+                                         const std::vector<std::size_t>& posed,
+                                         std::size_t n) const;
   void accumulate(std::size_t from, std::size_t onto, const Pose& onto_from_from, bool from_is_a,
                   double max_distance_m, PairEquations& equations) const;
   PairEquations equations_of(FramePair pair, double max_distance_m) const;
@@ -146,18 +110,19 @@ void Alignment::pairs_of_links(const std::vector<PoseLink>& links) {
   pairs_.assign(pairs.begin(), pairs.end());
 }
 
-std::vector<std::size_t> Alignment::candidates_of(std::size_t frame) const {
+// Frames that may see what the n-th of those with a pose sees.
+std::vector<std::size_t> Alignment::candidates_of(const PoseNeighbors& neighbors,
+                                                  const std::vector<std::size_t>& posed,
+                                                  std::size_t n) const {
+  const std::size_t frame = posed[n];
   const Pose& pose = *pose_of(frame);
   std::vector<std::pair<double, std::size_t>> ranked;
-  for (std::size_t other = 0; other < frames_.size(); ++other) {
-    const Pose* its = pose_of(other);
-    if (other == frame || its == nullptr ||
-        component_.at(frames_[frame].node) != component_.at(frames_[other].node))
-      continue;
-    const double apart = (its->translation() - pose.translation()).norm();
-    if (apart > reach_m) continue;
-    const double angle = rotation_vector_of(pose.linear().transpose() * its->linear()).norm() *
-                         180.0 / std::numbers::pi;
+  for (const auto& [near, apart] : neighbors.nearest(n, nearest_considered, reach_m)) {
+    const std::size_t other = posed[near];
+    if (component_.at(frames_[frame].node) != component_.at(frames_[other].node)) continue;
+    const double angle =
+        rotation_vector_of(pose.linear().transpose() * pose_of(other)->linear()).norm() * 180.0 /
+        std::numbers::pi;
     if (angle > view_angle_deg) continue;
     ranked.emplace_back(apart / reach_m + angle / view_angle_deg, other);
   }
@@ -169,20 +134,30 @@ std::vector<std::size_t> Alignment::candidates_of(std::size_t frame) const {
 }
 
 void Alignment::pairs_by_overlap() {
-  std::vector<std::vector<FramePair>> of_frame(frames_.size());
-  parallel_for(frames_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f) {
-      if (pose_of(f) == nullptr) continue;
-      const std::vector<BaseElement> few = samples_of(frames_[f], overlap_samples);
+  std::vector<std::size_t> posed;
+  std::vector<Eigen::Vector3d> places;
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    if (pose_of(f) == nullptr) continue;
+    posed.push_back(f);
+    places.emplace_back(pose_of(f)->translation());
+  }
+  if (posed.empty()) return;
+  const PoseNeighbors neighbors(std::move(places));
+  std::vector<std::vector<FramePair>> of_frame(posed.size());
+  parallel_for(posed.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::size_t f = posed[n];
+      const std::vector<BaseElement> few =
+          surface_samples(frames_[f], overlap_samples, SampleUse::estimation);
       std::vector<std::pair<double, std::size_t>> ranked;
-      for (const std::size_t other : candidates_of(f)) {
+      for (const std::size_t other : candidates_of(neighbors, posed, n)) {
         const double share =
             overlap_of(few, frames_[other], pose_of(other)->inverse() * *pose_of(f));
         if (share >= options_.min_overlap) ranked.emplace_back(-share, other);
       }
       std::sort(ranked.begin(), ranked.end());
       ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options_.pairs_per_frame)));
-      for (const auto& [share, other] : ranked) of_frame[f].push_back(std::minmax(f, other));
+      for (const auto& [share, other] : ranked) of_frame[n].push_back(std::minmax(f, other));
     }
   });
   std::set<FramePair> pairs;
@@ -328,7 +303,7 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   samples_.resize(frames_.size());
   parallel_for(frames_.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t f = begin; f < end; ++f)
-      samples_[f] = samples_of(frames_[f], options_.samples);
+      samples_[f] = surface_samples(frames_[f], options_.samples, SampleUse::estimation);
   });
   if (options_.mode == IcpMode::links)
     pairs_of_links(links);

@@ -16,8 +16,12 @@ constexpr int invalid_weight = -9;
 constexpr double agreement_m = 0.1;
 constexpr double agreement_rad = 0.1;
 
+// RTAB-Map's variance of a motion that it does not know is 9999.
+constexpr double unknown_information = 1.001e-4;
+
 bool is_between_nodes(const PoseLink& link) {
-  return link.from > 0 && link.to > 0 && link.from != link.to;
+  return link.from > 0 && link.to > 0 && link.from != link.to &&
+         link.information.diagonal().minCoeff() > unknown_information;
 }
 
 // Poses of nodes that have none, by links to nodes that have one.
@@ -38,6 +42,25 @@ void place_by_links(const PoseGraph& graph, const std::set<int>& wanted,
       }
     }
   }
+}
+
+// Of a scan without any pose: the first node of each chain of links begins a part.
+std::vector<std::vector<int>> begin_by_links(const PoseGraph& graph, const std::set<int>& wanted,
+                                             std::map<int, Pose>& poses) {
+  std::set<int> linked;
+  for (const PoseLink& link : graph.links)
+    if (is_between_nodes(link) && wanted.contains(link.from) && wanted.contains(link.to))
+      linked.insert({link.from, link.to});
+  std::vector<std::vector<int>> parts;
+  std::map<int, Pose> placed;
+  for (const int node : linked) {
+    if (placed.contains(node)) continue;
+    placed.emplace(node, Pose::Identity());
+    poses.emplace(node, Pose::Identity());
+    parts.push_back({node});
+    place_by_links(graph, wanted, placed);
+  }
+  return parts;
 }
 
 // How the second part must move.
@@ -124,19 +147,28 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
     const auto optimized = graph.optimized_map_from_base.find(node.id);
     if (optimized != graph.optimized_map_from_base.end()) stored[node.id] = optimized->second;
   }
+  if (start == StartPoses::visual) {
+    result.source = "visual";
+    result.without_pose.assign(wanted.begin(), wanted.end());
+    return result;
+  }
   const bool by_odometry =
       start == StartPoses::odometry ||
       (start == StartPoses::automatic && (odometry.size() == wanted.size() || stored.empty()));
   result.source = by_odometry ? "odometry" : "stored";
   result.map_from_base = by_odometry ? odometry : stored;
-  if (result.map_from_base.empty())
-    throw Error("the scan has no poses to start from",
-                {.file = {}, .field = "poses", .value = result.source, .bound = {}});
   // Stored poses are in one frame, whatever their session.
   std::map<int, std::vector<int>> parts;
   for (const auto& [node, pose] : result.map_from_base)
     parts[by_odometry ? session.at(node) : 0].push_back(node);
   for (auto& [number, nodes] : parts) result.parts.push_back(std::move(nodes));
+  if (result.map_from_base.empty()) {
+    if (start != StartPoses::automatic)
+      throw Error("the scan has no poses to start from",
+                  {.file = {}, .field = "poses", .value = result.source, .bound = {}});
+    result.parts = begin_by_links(graph, wanted, result.map_from_base);
+    result.source = result.parts.empty() ? "visual" : "links";
+  }
   result.parts = join_parts(result.map_from_base, result.parts, graph.links);
   place_by_links(graph, wanted, result.map_from_base);
   for (const int node : wanted)

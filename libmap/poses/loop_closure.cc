@@ -3,12 +3,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <nanoflann.hpp>
 #include <numbers>
 #include <optional>
 
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
+#include "libmap/poses/pose_neighbors.h"
 #include "libmap/poses/rigid_motion.h"
 
 namespace libmap {
@@ -16,6 +16,7 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
+constexpr std::size_t nearest_considered = 8;  // times as many as are taken, for their directions
 
 bool is_held_out(int feature, std::size_t frame, int every) {
   // Features stand by strength: numbers alone would pick like ones in every frame.
@@ -26,44 +27,26 @@ bool is_held_out(int feature, std::size_t frame, int every) {
 
 FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::max(a, b)}; }
 
-struct PoseCloud {
-  std::vector<Eigen::Vector3d> points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t n, std::size_t axis) const {
-    return points[n][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using PoseTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PoseCloud>, PoseCloud,
-                                        3, std::size_t>;
-
 // One component's poses: each with its nearest in place and direction.
 void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
                     const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
-  PoseCloud cloud;
-  for (const std::size_t f : members) cloud.points.emplace_back(poses[f]->translation());
-  const PoseTree tree(3, cloud, nanoflann::KDTreeSingleIndexAdaptorParams(10));
+  std::vector<Eigen::Vector3d> places;
+  for (const std::size_t f : members) places.emplace_back(poses[f]->translation());
+  const PoseNeighbors neighbors(std::move(places));
+  const auto wanted = static_cast<std::size_t>(options.near_candidates);
   for (std::size_t n = 0; n < members.size(); ++n) {
-    std::vector<std::pair<std::size_t, double>> found;
-    const double square = options.radius_m * options.radius_m;
-    tree.radiusSearch(cloud.points[n].data(), square, found, nanoflann::SearchParams());
     std::vector<std::pair<double, std::size_t>> ranked;
-    for (const auto& [other, distance] : found) {
-      if (other == n) continue;
+    for (const auto& [other, distance] :
+         neighbors.nearest(n, nearest_considered * wanted, options.radius_m)) {
       const double angle = rotation_vector_of(poses[members[n]]->linear().transpose() *
                                               poses[members[other]]->linear())
                                .norm() /
                            degree;
       if (angle > options.angle_deg) continue;
-      ranked.emplace_back(std::sqrt(distance) / options.radius_m + angle / options.angle_deg,
-                          members[other]);
+      ranked.emplace_back(distance / options.radius_m + angle / options.angle_deg, members[other]);
     }
     std::sort(ranked.begin(), ranked.end());
-    ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options.near_candidates)));
+    ranked.resize(std::min(ranked.size(), wanted));
     for (const auto& [measure, other] : ranked) pairs.insert(ordered(members[n], other));
   }
 }
@@ -269,7 +252,9 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
 
 void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,
                          const LoopClosureDetectionOptions& options, RejectionCounts& counts) {
-  const GraphCovariance covariance(graph);
+  std::vector<std::pair<int, int>> pairs;
+  for (const FeatureLink& link : links) pairs.emplace_back(link.link.from, link.link.to);
+  const GraphCovariance covariance(graph, pairs);
   const Matrix6d slack = slack_of(options);
   std::vector<FeatureLink> kept;
   for (std::size_t n = 0; n < links.size(); ++n) {
@@ -280,7 +265,7 @@ void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult&
           step_between(link.from_from_to, graph.map_from_base.at(link.from).inverse() *
                                               graph.map_from_base.at(link.to));
       const Matrix6d expected =
-          covariance.of_relative(link.from, {link.to}).front() + link.information.inverse() + slack;
+          covariance.of_relative(link.from, link.to) + link.information.inverse() + slack;
       good = error.dot(expected.llt().solve(error)) <= options.max_graph_chi_square;
       counts.against_graph += good ? 0 : 1;
     } else {
@@ -297,42 +282,6 @@ void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult&
       --counts.accepted;
   }
   links = std::move(kept);
-}
-
-std::vector<double> held_out_costs(const std::vector<FrameFeatures>& frames,
-                                   const std::vector<FeatureLink>& links,
-                                   const std::map<int, Pose>& map_from_base) {
-  constexpr double scale = 9.0;
-  std::vector<double> costs;
-  for (const FeatureLink& link : links) {
-    const auto a = map_from_base.find(link.link.from);
-    const auto b = map_from_base.find(link.link.to);
-    if (a == map_from_base.end() || b == map_from_base.end()) continue;
-    const Pose a_from_b = a->second.inverse() * b->second;
-    for (const FeatureMatch& match : link.held_out) {
-      const MatchResidual residual =
-          match_residual(frames[link.frames.first], frames[link.frames.second], match, a_from_b);
-      costs.push_back(std::log1p(residual.in_front ? residual.chi_square() / scale : 1e6));
-    }
-  }
-  return costs;
-}
-
-HeldOutChange compare_held_out(const std::vector<double>& before,
-                               const std::vector<double>& after) {
-  HeldOutChange change;
-  change.matches = before.size();
-  if (before.empty() || before.size() != after.size()) return change;
-  const double count = static_cast<double>(before.size());
-  double squares = 0.0;
-  for (std::size_t n = 0; n < before.size(); ++n) {
-    change.before += before[n] / count;
-    change.after += after[n] / count;
-    squares += (after[n] - before[n]) * (after[n] - before[n]);
-  }
-  const double mean = change.after - change.before;
-  change.deviation = std::sqrt(std::max(0.0, squares / count - mean * mean) / count);
-  return change;
 }
 
 }  // namespace libmap

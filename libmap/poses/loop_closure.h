@@ -87,23 +87,4 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
 void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,
                          const LoopClosureDetectionOptions& options, RejectionCounts& counts);
 
-// How the held-out matches fit at some poses: rho = log(1 + chi-square / 9) of each, in the order
-// of the links; matches of nodes without pose are left out. What the stages are compared by.
-std::vector<double> held_out_costs(const std::vector<FrameFeatures>& frames,
-                                   const std::vector<FeatureLink>& links,
-                                   const std::map<int, Pose>& map_from_base);
-
-// The same matches at two sets of poses.
-struct HeldOutChange {
-  std::size_t matches = 0;
-  double before = 0.0;  // means
-  double after = 0.0;
-  double deviation = 0.0;  // standard error of their difference
-
-  // By more than chance explains, and rounding.
-  bool is_worse() const { return after - before > 2.0 * deviation + 1e-6 * before; }
-  bool is_better() const { return before - after > 2.0 * deviation + 1e-6 * before; }
-};
-HeldOutChange compare_held_out(const std::vector<double>& before, const std::vector<double>& after);
-
 }  // namespace libmap

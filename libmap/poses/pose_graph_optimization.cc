@@ -26,6 +26,7 @@ constexpr double least_redundancy = 0.1;  // of a link's residuals: with less th
 constexpr std::size_t least_links = 3;    // fewer do not tell a group's scale
 constexpr double worst_share = 0.25;      // closures near the worst are rejected with it
 constexpr int max_rejections = 20;
+constexpr std::size_t simplicial_below = 120;              // poses
 constexpr double unknown_landmark_information = 1.001e-4;  // RTAB-Map: variance >= 9999
 
 bool is_absolute(const PoseLink& link) {
@@ -108,6 +109,7 @@ void Optimization::add_landmarks() {
     const auto seen_from = result_.map_from_base.find(link.link.from);
     if (seen_from == result_.map_from_base.end()) continue;
     result_.map_from_base.try_emplace(link.link.to, seen_from->second * link.link.from_from_to);
+    start_.try_emplace(link.link.to, seen_from->second * link.link.from_from_to);
   }
 }
 
@@ -215,7 +217,9 @@ void Optimization::solve() {
   hold_gauges(problem, blocks);
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
-  settings.sparse_linear_algebra_library_type = ceres::EIGEN_SPARSE;
+  // CHOLMOD's supernodes pay where much fills in.
+  settings.sparse_linear_algebra_library_type =
+      blocks.all().size() < simplicial_below ? ceres::EIGEN_SPARSE : ceres::SUITE_SPARSE;
   settings.num_threads = 1;
   settings.max_num_iterations = 100;
   settings.function_tolerance = 1e-12;
@@ -288,37 +292,30 @@ bool Optimization::recalibrate() {
   for (GraphLinkResult& link : unweighted.links) link.weight = 1.0;
   const GraphCovariance covariance(unweighted);
   if (!covariance.valid()) return false;
-  std::map<int, std::vector<std::size_t>> by_node;
-  for (std::size_t n = 0; n < links_.size(); ++n)
-    if (used_[n] && !result_.links[n].rejected && !is_absolute(links_[n].link) &&
-        links_[n].link.type != LinkType::landmark)
-      by_node[links_[n].link.from].push_back(n);
   std::map<std::string, std::array<std::vector<double>, 2>> ratios;
   for (auto& [name, group] : result_.groups) group.redundancy = 0.0;
-  for (const auto& [node, numbers] : by_node) {
-    std::vector<int> others;
-    for (const std::size_t n : numbers) others.push_back(links_[n].link.to);
-    const std::vector<Matrix6d> relative = covariance.of_relative(node, others);
-    for (std::size_t i = 0; i < numbers.size(); ++i) {
-      const PoseLink& link = result_.links[numbers[i]].link;
-      const Vector6d residual = residual_of(link, result_.map_from_base);
-      const std::string& group = links_[numbers[i]].group;
-      // Translation and rotation apart where the link tells them apart.
-      const bool apart = link.information.topRightCorner<3, 3>().isZero(0.0);
-      const Matrix6d share = link.information * relative[i];
-      for (std::size_t part = 0; part < 2; ++part) {
-        const auto first = static_cast<Eigen::Index>(apart ? 3 * part : 0);
-        const Eigen::Index size = apart ? 3 : 6;
-        const double all = static_cast<double>(size);
-        const double redundancy = all - share.diagonal().segment(first, size).sum();
-        if (redundancy < least_redundancy * all) continue;
-        const double square = residual.segment(first, size)
-                                  .dot(link.information.block(first, first, size, size) *
-                                       residual.segment(first, size));
-        result_.groups[group].redundancy += apart ? redundancy : 0.5 * redundancy;
-        // The median of chi-square lies below its mean (Wilson and Hilferty 1931).
-        ratios[group][part].push_back(square / redundancy / std::pow(1.0 - 2.0 / (9.0 * all), 3));
-      }
+  for (std::size_t n = 0; n < links_.size(); ++n) {
+    const PoseLink& link = result_.links[n].link;
+    if (!used_[n] || result_.links[n].rejected || is_absolute(link) ||
+        link.type == LinkType::landmark)
+      continue;
+    const Vector6d residual = residual_of(link, result_.map_from_base);
+    const std::string& group = links_[n].group;
+    // Translation and rotation apart where the link tells them apart.
+    const bool apart = link.information.topRightCorner<3, 3>().isZero(0.0);
+    const Matrix6d share = link.information * covariance.of_relative(link.from, link.to);
+    for (std::size_t part = 0; part < 2; ++part) {
+      const auto first = static_cast<Eigen::Index>(apart ? 3 * part : 0);
+      const Eigen::Index size = apart ? 3 : 6;
+      const double all = static_cast<double>(size);
+      const double redundancy = all - share.diagonal().segment(first, size).sum();
+      if (redundancy < least_redundancy * all) continue;
+      const double square = residual.segment(first, size)
+                                .dot(link.information.block(first, first, size, size) *
+                                     residual.segment(first, size));
+      result_.groups[group].redundancy += apart ? redundancy : 0.5 * redundancy;
+      // The median of chi-square lies below its mean (Wilson and Hilferty 1931).
+      ratios[group][part].push_back(square / redundancy / std::pow(1.0 - 2.0 / (9.0 * all), 3));
     }
   }
   double change = 0.0;
@@ -357,20 +354,30 @@ void Optimization::summarize() {
       group.rotation_scale = scales->second.rotation;
     }
     double count = 0.0;
+    Vector6d squares_before = Vector6d::Zero();
+    Vector6d squares = Vector6d::Zero();
     for (std::size_t n = 0; n < links_.size(); ++n) {
       if (links_[n].group != name || !used_[n]) continue;
       if (result_.links[n].rejected) {
         ++group.rejected;
         continue;
       }
-      const Vector6d residual = residual_of(result_.links[n].link, result_.map_from_base);
-      group.translation_rms_m += residual.head<3>().squaredNorm();
-      group.rotation_rms_deg += residual.tail<3>().squaredNorm();
+      const PoseLink& link = result_.links[n].link;
+      squares_before += residual_of(link, start_).cwiseAbs2();
+      squares += residual_of(link, result_.map_from_base).cwiseAbs2();
       count += 1.0;
     }
     if (count == 0.0) continue;
-    group.translation_rms_m = std::sqrt(group.translation_rms_m / count);
-    group.rotation_rms_deg = std::sqrt(group.rotation_rms_deg / count) * 180.0 / std::numbers::pi;
+    const auto translation_rms = [&](const Vector6d& sum) {
+      return std::sqrt(sum.head<3>().sum() / count);
+    };
+    const auto rotation_rms = [&](const Vector6d& sum) {
+      return std::sqrt(sum.tail<3>().sum() / count) * 180.0 / std::numbers::pi;
+    };
+    group.translation_rms_before_m = translation_rms(squares_before);
+    group.rotation_rms_before_deg = rotation_rms(squares_before);
+    group.translation_rms_m = translation_rms(squares);
+    group.rotation_rms_deg = rotation_rms(squares);
   }
 }
 

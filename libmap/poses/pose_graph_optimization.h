@@ -37,8 +37,10 @@ struct LinkGroupResult {
   std::size_t rejected = 0;
   double translation_scale = 1.0;  // by which its standard deviations were multiplied
   double rotation_scale = 1.0;
-  double redundancy = 0.0;         // how many of its residuals the other links check
-  double translation_rms_m = 0.0;  // residuals at the end
+  double redundancy = 0.0;                // how many of its residuals the other links check
+  double translation_rms_before_m = 0.0;  // residuals of those kept, at the poses of the input
+  double rotation_rms_before_deg = 0.0;
+  double translation_rms_m = 0.0;  // ... and at the end
   double rotation_rms_deg = 0.0;
 };
 

@@ -3,12 +3,14 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <ctime>
 #include <limits>
 #include <set>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/poses/graph_covariance.h"
+#include "libmap/poses/intrinsics_refinement.h"
 
 namespace libmap {
 
@@ -16,6 +18,8 @@ namespace {
 
 constexpr int invalid_weight = -9;
 constexpr const char* feature_group = "features";
+constexpr double settled_share = 0.01;  // new links of those before: with less, rounds end
+constexpr const char* odometry_group = "visual odometry";
 
 // Of a scan that has poses and no links, such as a folder of images: links from pose to pose within
 // each session, with deviations that recalibration is to find.
@@ -43,10 +47,39 @@ std::vector<GraphLink> links_of_odometry(const PoseGraph& graph) {
   return links;
 }
 
+// Says how two nodes lie to each other.
+bool is_motion(const PoseLink& link) {
+  return link.from > 0 && link.to > 0 && link.from != link.to;
+}
+
+std::string join_numbers(const std::vector<int>& numbers) {
+  std::string text;
+  for (const int number : numbers) text += (text.empty() ? "" : ", ") + std::to_string(number);
+  return text;
+}
+
+std::string describe(const std::vector<TrackingLoss>& losses) {
+  constexpr std::size_t most = 5;
+  std::string text;
+  for (std::size_t n = 0; n < losses.size() && n < most; ++n) {
+    const TrackingLoss& loss = losses[n];
+    text +=
+        (n > 0 ? "; " : "") + std::string("node ") + std::to_string(loss.node) + ", " + loss.reason;
+    if (loss.found_node == loss.node)
+      text += ", found again at node " + std::to_string(loss.found_at);
+    else if (loss.found_node > 0)
+      text += ", found again by node " + std::to_string(loss.found_node) + " at node " +
+              std::to_string(loss.found_at);
+  }
+  if (losses.size() > most) text += "; and " + std::to_string(losses.size() - most) + " more";
+  return text;
+}
+
 class Refinement {
  public:
-  Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress)
-      : scan_(scan), options_(options), progress_(progress) {
+  Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress,
+             const FeatureCache& cache)
+      : scan_(scan), options_(options), progress_(progress), cache_(cache) {
     truth_ = trajectory_of(scan.graph(), PoseSource::ground_truth);
   }
   RefinementResult run();
@@ -56,9 +89,19 @@ class Refinement {
 
   void start();
   void find_frames();
+  bool may_be_visual() const {
+    return options_.start == StartPoses::visual || options_.start == StartPoses::automatic;
+  }
+  bool is_all_tracked() const {
+    return std::all_of(poses_.begin(), poses_.end(), [&](const auto& pose) {
+      return pose.first < 0 || tracked_.contains(pose.first);
+    });
+  }
+  void odometry();
+  void leave_out_unjoined();
   bool round(int number);
   std::vector<FramePair> candidates(int number);
-  PoseGraphResult optimized(const std::vector<FeatureLink>& links) const;
+  std::vector<GraphLink> with_features(const std::vector<FeatureLink>& links) const;
   void join_new(const std::vector<FeatureLink>& links);
   void bundle();
   void free_intrinsics();
@@ -74,13 +117,16 @@ class Refinement {
   const ScanSource& scan_;
   const RefinementOptions& options_;
   Progress& progress_;
+  const FeatureCache& cache_;
   Trajectory truth_;
   Clock::time_point stage_begin_ = Clock::now();
+  std::clock_t processor_begin_ = std::clock();
   RefinementResult result_;
   std::map<int, Pose> poses_;
   std::vector<std::vector<int>> parts_;
   std::vector<FrameFeatures> frames_;
   std::vector<GraphLink> stored_;
+  std::set<int> tracked_;  // nodes whose poses are by visual odometry
   std::vector<FeatureLink> links_;
   std::set<FramePair> tried_;
   PoseGraphResult graph_;
@@ -108,8 +154,8 @@ std::optional<StageError> Refinement::error_of(const std::map<int, Pose>& poses)
 
 bool Refinement::judge(StageReport& stage, const std::map<int, Pose>& before,
                        const std::map<int, Pose>& after) const {
-  stage.held_out = compare_held_out(held_out_costs(frames_, links_, before),
-                                    held_out_costs(frames_, links_, after));
+  stage.held_out = judge_held_out(held_out_costs(frames_, links_, before),
+                                  held_out_costs(frames_, links_, after));
   stage.undone = stage.held_out.is_worse();
   if (stage.undone) stage.undone_error = error_of(after);
   return stage.undone;
@@ -119,6 +165,10 @@ void Refinement::close(StageReport stage) {
   const auto now = Clock::now();
   stage.seconds = std::chrono::duration<double>(now - stage_begin_).count();
   stage_begin_ = now;
+  const std::clock_t clock = std::clock();
+  stage.processor_seconds =
+      static_cast<double>(clock - processor_begin_) / static_cast<double>(CLOCKS_PER_SEC);
+  processor_begin_ = clock;
   stage.error = error_of(poses_);
   result_.stages.push_back(std::move(stage));
 }
@@ -129,10 +179,17 @@ void Refinement::start() {
   parts_ = std::move(initial.parts);
   result_.without_pose = std::move(initial.without_pose);
   stored_ = stored_links(scan_.graph());
-  if (stored_.empty()) stored_ = links_of_odometry(scan_.graph());
-  if (!result_.without_pose.empty())
+  if (options_.start == StartPoses::visual)
+    std::erase_if(stored_, [](const GraphLink& link) { return is_motion(link.link); });
+  else if (stored_.empty())
+    stored_ = links_of_odometry(scan_.graph());
+  if (may_be_visual()) {
+    tracked_.insert(result_.without_pose.begin(), result_.without_pose.end());
+    result_.without_pose.clear();
+  } else if (!result_.without_pose.empty()) {
     result_.warnings.push_back(std::to_string(result_.without_pose.size()) +
                                " nodes have no pose, by odometry or by links: they are left out");
+  }
   StageReport stage;
   stage.name = "start: " + initial.source;
   close(std::move(stage));
@@ -141,7 +198,9 @@ void Refinement::start() {
 void Refinement::find_frames() {
   std::vector<int> nodes;
   for (const auto& [node, pose] : poses_) nodes.push_back(node);
-  FeatureResult found = find_features(scan_, nodes, options_.features, progress_);
+  nodes.insert(nodes.end(), tracked_.begin(), tracked_.end());
+  std::sort(nodes.begin(), nodes.end());
+  FeatureResult found = find_features(scan_, nodes, options_.features, progress_, &cache_);
   frames_ = std::move(found.frames);
   result_.skipped = std::move(found.skipped);
   std::size_t without_depth = 0;
@@ -155,6 +214,69 @@ void Refinement::find_frames() {
                    {"features", static_cast<double>(result_.features)},
                    {"without_depth", static_cast<double>(without_depth)}};
   close(std::move(stage));
+}
+
+// Of nodes that neither poses nor links place. Its motions are links of features like all others.
+void Refinement::odometry() {
+  if (tracked_.empty()) return;
+  TrackingStart known{{}, poses_, parts_, {}};
+  for (const GraphNode& node : scan_.graph().nodes) {
+    known.session[node.id] = node.session;
+    if (node.odometry_from_base) known.first[node.id] = *node.odometry_from_base;
+  }
+  VisualOdometryResult tracked =
+      track_frames(frames_, known, options_.closures, options_.odometry, options_.seed, progress_);
+  poses_ = std::move(tracked.map_from_base);
+  parts_ = std::move(tracked.parts);
+  links_ = std::move(tracked.links);
+  tried_ = std::move(tracked.tried);
+  result_.losses = std::move(tracked.losses);
+  StageReport stage;
+  stage.name = "odometry";
+  stage.figures = {{"frames", static_cast<double>(tracked_.size())},
+                   {"key_frames", static_cast<double>(tracked.key_frames.size())},
+                   {"links", static_cast<double>(links_.size())},
+                   {"lost_nodes", static_cast<double>(result_.losses.size())},
+                   {"relocalized", static_cast<double>(tracked.relocalized)},
+                   {"parts", static_cast<double>(parts_.size())}};
+  const LinkConsistency consistency = link_consistency(links_, truth_);
+  if (consistency.links > 0)
+    stage.figures.emplace_back("squared_error_per_freedom", consistency.squared_error_per_freedom);
+  if (!result_.losses.empty())
+    result_.warnings.push_back("visual odometry lost its way: " + describe(result_.losses));
+  close(std::move(stage));
+}
+
+// Parts that visual odometry has begun and nothing has joined lie anywhere.
+void Refinement::leave_out_unjoined() {
+  if (tracked_.empty()) return;
+  const bool nothing_known = is_all_tracked();
+  std::vector<int> left;
+  for (std::size_t n = 0; n < result_.components.size(); ++n) {
+    const std::vector<int>& nodes = result_.components[n].nodes;
+    const bool alone = std::all_of(nodes.begin(), nodes.end(),
+                                   [&](int node) { return node < 0 || tracked_.contains(node); });
+    if (alone && !(n == 0 && nothing_known)) left.insert(left.end(), nodes.begin(), nodes.end());
+  }
+  for (const int node : left) result_.covariance.erase(node);
+  std::sort(left.begin(), left.end());
+  std::erase_if(left, [](int node) { return node < 0; });
+  std::erase_if(result_.poses, [&](const TrajectoryPose& pose) {
+    return std::binary_search(left.begin(), left.end(), pose.node);
+  });
+  std::erase_if(result_.links, [&](const PoseLink& link) {
+    return std::binary_search(left.begin(), left.end(), link.from);
+  });
+  std::erase_if(result_.closures, [&](const PoseLink& link) {
+    return std::binary_search(left.begin(), left.end(), link.from);
+  });
+  for (const auto& [node, reason] : result_.skipped)
+    if (tracked_.contains(node)) left.push_back(node);
+  std::sort(left.begin(), left.end());
+  if (!left.empty())
+    result_.warnings.push_back("left out, since nothing joins them to the rest: nodes " +
+                               join_numbers(left));
+  result_.without_pose = std::move(left);
 }
 
 // First frames that follow each other: they say how good the odometry is. Then what looks alike,
@@ -173,10 +295,13 @@ std::vector<FramePair> Refinement::candidates(int number) {
   return fresh;
 }
 
-PoseGraphResult Refinement::optimized(const std::vector<FeatureLink>& links) const {
+std::vector<GraphLink> Refinement::with_features(const std::vector<FeatureLink>& links) const {
   std::vector<GraphLink> all = stored_;
-  for (const FeatureLink& link : links) all.push_back({link.link, feature_group, true});
-  return optimize_pose_graph(poses_, all, options_.graph);
+  for (const FeatureLink& link : links) {
+    const bool odometry = link.link.type == LinkType::neighbor;
+    all.push_back({link.link, odometry ? odometry_group : feature_group, !odometry});
+  }
+  return all;
 }
 
 // Parts that closures connect get into one frame before the graph is optimised.
@@ -187,7 +312,7 @@ void Refinement::join_new(const std::vector<FeatureLink>& links) {
   parts_ = join_parts(poses_, parts_, between);
 }
 
-// False if there was nothing new to try.
+// False if there was nothing new to try, or hardly any link was new.
 bool Refinement::round(int number) {
   const std::vector<FramePair> pairs = candidates(number);
   if (pairs.empty()) return false;
@@ -202,7 +327,7 @@ bool Refinement::round(int number) {
   const auto parts_before = parts_;
   links_.insert(links_.end(), verified.links.begin(), verified.links.end());
   join_new(verified.links);
-  PoseGraphResult graph = optimized(links_);
+  PoseGraphResult graph = optimize_pose_graph(poses_, with_features(links_), options_.graph);
   stage.groups = graph.groups;
   if (judge(stage, poses_before, graph.map_from_base)) {
     links_.resize(before);
@@ -225,7 +350,7 @@ bool Refinement::round(int number) {
     graph_ = std::move(graph);
   }
   close(std::move(stage));
-  return true;
+  return static_cast<double>(verified.links.size()) > settled_share * static_cast<double>(before);
 }
 
 std::vector<GraphLinkResult> without_features(const std::vector<GraphLinkResult>& links,
@@ -236,15 +361,14 @@ std::vector<GraphLinkResult> without_features(const std::vector<GraphLinkResult>
 void Refinement::bundle() {
   StageReport stage;
   stage.name = "bundle adjustment";
-  const FeatureTracks tracks = build_tracks(frames_, links_);
   BundleAdjustmentResult adjusted =
-      adjust_bundle(frames_, tracks.tracks, poses_, without_features(graph_.links, stored_.size()),
+      adjust_bundle(frames_, links_, poses_, without_features(graph_.links, stored_.size()),
                     graph_.components, options_.bundle_adjustment);
   judge(stage, poses_, adjusted.map_from_base);
   stage.undone = stage.undone || !adjusted.converged;
   stage.figures = {{"tracks", static_cast<double>(adjusted.tracks)},
                    {"observations", static_cast<double>(adjusted.observations)},
-                   {"conflicts", static_cast<double>(tracks.conflicts)},
+                   {"conflicts", static_cast<double>(adjusted.conflicts)},
                    {"outliers", static_cast<double>(adjusted.outliers)},
                    {"iterations", static_cast<double>(adjusted.iterations)},
                    {"initial_cost", adjusted.initial_cost},
@@ -258,44 +382,47 @@ void Refinement::bundle() {
   close(std::move(stage));
 }
 
-// The same with the intrinsics free. What the camera's file says is kept unless the held-out
-// matches speak against it: the pictures of RTAB-Map's own thinning, for one, are a fraction of a
-// pixel off.
+// The same with the intrinsics free. What the camera's file says is kept unless what was held out
+// speaks against it: the pictures of RTAB-Map's own thinning, for one, are a fraction of a pixel
+// off.
 void Refinement::free_intrinsics() {
   StageReport stage;
   stage.name = "intrinsics";
-  const FeatureTracks tracks = build_tracks(frames_, links_);
-  BundleAdjustmentOptions options = options_.bundle_adjustment;
-  options.refine_intrinsics = true;
-  BundleAdjustmentResult adjusted =
-      adjust_bundle(frames_, tracks.tracks, poses_, without_features(graph_.links, stored_.size()),
-                    graph_.components, options);
-  const std::vector<double> before = held_out_costs(frames_, links_, poses_);
-  std::vector<IntrinsicsStep> back;
-  for (const IntrinsicsStep& step : adjusted.intrinsics)
-    back.push_back({1.0 / (1.0 + step.fx_share) - 1.0, 1.0 / (1.0 + step.fy_share) - 1.0,
-                    -step.cx_px, -step.cy_px});
-  for (FrameFeatures& frame : frames_) move_intrinsics(frame, adjusted.intrinsics);
-  stage.held_out =
-      compare_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
-  for (std::size_t n = 0; n < adjusted.intrinsics.size(); ++n) {
-    const IntrinsicsStep& step = adjusted.intrinsics[n];
+  const std::vector<GraphLinkResult> others = without_features(graph_.links, stored_.size());
+  IntrinsicsEstimate estimate = estimate_intrinsics(frames_, links_, poses_, others,
+                                                    graph_.components, options_.bundle_adjustment);
+  BundleAdjustmentResult& adjusted = estimate.adjustment;
+  const std::vector<IntrinsicsStep> steps = adjusted.intrinsics;
+  stage.held_out = estimate.held_out;
+  stage.figures.emplace_back("frames", static_cast<double>(estimate.frames));
+  for (std::size_t n = 0; n < steps.size(); ++n) {
     const std::string camera = "camera_" + std::to_string(n) + "_";
-    stage.figures.emplace_back(camera + "fx_share", step.fx_share);
-    stage.figures.emplace_back(camera + "fy_share", step.fy_share);
-    stage.figures.emplace_back(camera + "cx_px", step.cx_px);
-    stage.figures.emplace_back(camera + "cy_px", step.cy_px);
+    stage.figures.emplace_back(camera + "fx_share", steps[n].fx_share);
+    stage.figures.emplace_back(camera + "fy_share", steps[n].fy_share);
+    stage.figures.emplace_back(camera + "cx_px", steps[n].cx_px);
+    stage.figures.emplace_back(camera + "cy_px", steps[n].cy_px);
   }
-  stage.undone = !adjusted.converged ||
-                 (options_.intrinsics == IntrinsicsMode::automatic ? !stage.held_out.is_better()
-                                                                   : stage.held_out.is_worse());
-  if (stage.undone) {
-    stage.undone_error = error_of(adjusted.map_from_base);
-    for (FrameFeatures& frame : frames_) move_intrinsics(frame, back);
-  } else {
+  stage.undone = !adjusted.converged || (options_.intrinsics == IntrinsicsMode::automatic
+                                             ? !stage.held_out.is_clearly_better()
+                                             : stage.held_out.is_worse());
+  if (!stage.undone) {
+    const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
+    for (FrameFeatures& frame : frames_) move_intrinsics(frame, steps);
+    if (estimate.frames < frames_.size())
+      adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components,
+                               options_.bundle_adjustment);
+    stage.held_out =
+        judge_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
+    stage.undone = stage.held_out.is_worse();
+    if (stage.undone)
+      for (FrameFeatures& frame : frames_) move_intrinsics(frame, reversed(steps));
+  }
+  if (!stage.undone) {
     poses_ = std::move(adjusted.map_from_base);
     information_ = std::move(adjusted.information);
-    result_.intrinsics = std::move(adjusted.intrinsics);
+    result_.intrinsics = steps;
+  } else {
+    stage.undone_error = error_of(adjusted.map_from_base);
   }
   close(std::move(stage));
 }
@@ -350,13 +477,19 @@ RefinementResult Refinement::run() {
   find_frames();
   // The parts of stored odometry and links, at the poses of the start: closures are checked
   // against it.
+  odometry();
   PoseGraphOptions as_stored = options_.graph;
   as_stored.recalibrate = false;
-  graph_ = optimize_pose_graph(poses_, stored_, as_stored);
+  graph_ = optimize_pose_graph(poses_, with_features(links_), as_stored);
   for (int number = 0; number <= options_.rounds; ++number)
     if (!round(number) && number > 0) break;
   information_ = link_system(poses_, graph_.links);
+  for (FrameFeatures& frame : frames_) frame.descriptors = {};
   if (links_.empty()) {
+    if (is_all_tracked())
+      throw Error(
+          "its pictures give no poses: no two of them could be matched",
+          {.file = {}, .field = "frames", .value = std::to_string(frames_.size()), .bound = {}});
     result_.warnings.push_back(
         "no two frames could be matched by features: the poses rest on the stored links alone");
   } else {
@@ -365,6 +498,7 @@ RefinementResult Refinement::run() {
     if (options_.icp.mode != IcpMode::off) icp();
   }
   finish();
+  leave_out_unjoined();
   return std::move(result_);
 }
 
@@ -374,11 +508,14 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   table.add("start", options.start,
             {{"auto", StartPoses::automatic},
              {"odometry", StartPoses::odometry},
-             {"stored", StartPoses::stored}},
-            "poses that the work starts from");
+             {"stored", StartPoses::stored},
+             {"visual", StartPoses::visual}},
+            "poses that the work starts from; visual: by the pictures alone; auto: visual where "
+            "neither poses nor links are");
   table.add("rounds", options.rounds, not_negative,
             "of loop closures, each on the poses of the last, at most");
   bind(table, options.features);
+  bind(table, options.odometry);
   bind(table, options.closures);
   bind(table, options.graph);
   table.add("bundle", options.bundle, "adjust poses and points together");
@@ -394,8 +531,8 @@ void bind(ParameterTable& table, RefinementOptions& options) {
 }
 
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options,
-                              Progress& progress) {
-  return Refinement(scan, options, progress).run();
+                              Progress& progress, const FeatureCache& cache) {
+  return Refinement(scan, options, progress, cache).run();
 }
 
 }  // namespace libmap

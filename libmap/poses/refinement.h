@@ -1,6 +1,6 @@
 // The whole way from a scan's odometry to refined poses: features, rounds of loop closures each
 // followed by an optimisation of the pose graph, bundle adjustment, depth against depth. A stage
-// after which the held-out matches fit worse is undone and reported.
+// after which what was held out fits worse is undone and reported.
 #pragma once
 
 #include <cstdint>
@@ -14,17 +14,20 @@
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
 #include "libmap/poses/bundle_adjustment.h"
+#include "libmap/poses/feature_cache.h"
 #include "libmap/poses/features.h"
+#include "libmap/poses/held_out.h"
 #include "libmap/poses/icp_refinement.h"
 #include "libmap/poses/initial_poses.h"
 #include "libmap/poses/loop_closure.h"
 #include "libmap/poses/pose_graph_optimization.h"
 #include "libmap/poses/trajectory_error.h"
+#include "libmap/poses/visual_odometry.h"
 
 namespace libmap {
 
 // Whether the bundle adjustment estimates focal lengths and principal points of the pictures too.
-// automatic: if the held-out matches fit better then, by more than chance explains.
+// automatic: if what was held out fits better then, by more than chance explains.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
 struct RefinementOptions {
@@ -33,6 +36,7 @@ struct RefinementOptions {
   bool bundle = true;
   IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
   FeatureOptions features{};
+  VisualOdometryOptions odometry{};
   LoopClosureDetectionOptions closures{};
   PoseGraphOptions graph{};
   BundleAdjustmentOptions bundle_adjustment{};
@@ -50,13 +54,14 @@ struct StageError {
 struct StageReport {
   std::string name;
   bool undone = false;
-  RejectionCounts closures;  // of this stage
-  HeldOutChange held_out;    // matches of this stage's links and of those before
+  RejectionCounts closures;                             // of this stage
+  HeldOutJudgement held_out;                            // of this stage's links and of those before
   std::map<std::string, LinkGroupResult> groups;        // of an optimised graph
   std::vector<std::pair<std::string, double>> figures;  // what else the stage counts
   std::optional<StageError> error;
   std::optional<StageError> undone_error;  // of the poses that were given up
   double seconds = 0.0;
+  double processor_seconds = 0.0;
 };
 
 struct RefinementResult {
@@ -68,6 +73,7 @@ struct RefinementResult {
   std::vector<StageReport> stages;                   // "start" first
   std::vector<std::pair<int, std::string>> skipped;  // frames without features and why
   std::vector<int> without_pose;
+  std::vector<TrackingLoss> losses;  // of visual odometry
   std::vector<int> without_links;
   std::vector<PoseLink> rejected_links;  // stored ones
   std::size_t features = 0;
@@ -75,9 +81,12 @@ struct RefinementResult {
   std::vector<std::string> warnings;
 };
 
-// The same bytes for any number of threads. Throws Error: options out of their ranges, a scan
-// without any pose.
+// Nodes that neither poses nor links place are placed by visual odometry (StartPoses::automatic,
+// visual); those of its parts that nothing joins to the largest one are left out of the poses, for
+// they would lie anywhere. The same bytes for any number of threads. Throws Error: options out of
+// their ranges, poses asked for that the scan has not, no two frames that could be matched where
+// nothing else gives poses.
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options = {},
-                              Progress& progress = no_progress());
+                              Progress& progress = no_progress(), const FeatureCache& cache = {});
 
 }  // namespace libmap

@@ -3,11 +3,13 @@
 #include <algorithm>
 #include <array>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/scan/colmap_io.h"
 #include "libmap/scan/stamp_pairing.h"
 #include "libmap/scan/trajectory_text.h"
 
@@ -19,7 +21,12 @@ namespace {
 
 constexpr double pairing_tolerance_s = 0.02;
 constexpr int invalid_weight = -9;
-constexpr std::array<const char*, 3> extensions = {".tum", ".kitti", ".g2o"};
+constexpr std::array<std::pair<const char*, TrajectoryFormat>, 4> extensions = {{
+    {".tum", TrajectoryFormat::tum},
+    {".kitti", TrajectoryFormat::kitti},
+    {".g2o", TrajectoryFormat::g2o},
+    {".toro", TrajectoryFormat::toro},
+}};
 
 std::string extension_of(const fs::path& path) {
   std::string extension = path.extension().string();
@@ -55,54 +62,165 @@ NodePairs pair_by_time(const Trajectory& trajectory, const std::vector<const Gra
   return pairs;
 }
 
-NodePairs pair_by_order(const Trajectory& trajectory, const std::vector<const GraphNode*>& nodes) {
+NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
+                        std::vector<const GraphNode*> nodes) {
+  const auto has_stored_pose = [&](const GraphNode* node) {
+    return graph.optimized_map_from_base.contains(node->id);
+  };
+  const std::size_t valid = nodes.size();
+  // What RTAB-Map exports are its optimised poses.
+  if (trajectory.size() != valid)
+    std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
     throw Error("has neither nodes nor stamps and another number of poses than the scan has nodes",
                 {.file = {},
                  .field = "poses",
                  .value = std::to_string(trajectory.size()),
-                 .bound = std::to_string(nodes.size())});
+                 .bound = std::to_string(valid)});
   NodePairs pairs;
   for (std::size_t i = 0; i < nodes.size(); ++i) pairs.emplace_back(nodes[i], &trajectory[i]);
   return pairs;
 }
 
+std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
+  const std::string extension = extension_of(path);
+  for (const auto& [name, format] : extensions)
+    if (extension == name) return format;
+  return std::nullopt;
+}
+
+TrajectoryFormat format_of_text(const std::string& text, const fs::path& path) {
+  if (const auto format = format_of_extension(path)) return *format;
+  switch (recognise_poses(text, path.string())) {
+    case PoseTextFormat::tum:
+      return TrajectoryFormat::tum;
+    case PoseTextFormat::kitti:
+      return TrajectoryFormat::kitti;
+    case PoseTextFormat::toro:
+      return TrajectoryFormat::toro;
+    case PoseTextFormat::g2o:
+      return TrajectoryFormat::g2o;
+  }
+  return TrajectoryFormat::tum;
+}
+
+PoseAxes axes_of(TrajectoryFormat format) {
+  if (format == TrajectoryFormat::tum_motion_capture) return PoseAxes::motion_capture;
+  if (format == TrajectoryFormat::kitti_optical) return PoseAxes::optical;
+  return PoseAxes::map;
+}
+
+// Of images.txt alone: where the photographs were, whatever their cameras.
+TrajectoryFile read_colmap(const fs::path& path) {
+  const fs::path file = file_of_trajectory(path);
+  TrajectoryFile read;
+  for (const auto& [id, image] : parse_colmap_images(read_whole_file(file), file.string()))
+    read.images.push_back({image.name, image.camera_from_world.inverse()});
+  return read;
+}
+
+TrajectoryFile parse_poses(TrajectoryFormat format, const std::string& text,
+                           const std::string& file) {
+  TrajectoryFile read;
+  if (format == TrajectoryFormat::g2o || format == TrajectoryFormat::toro) {
+    PoseGraphText graph =
+        format == TrajectoryFormat::g2o ? parse_g2o(text, file) : parse_toro(text, file);
+    return {std::move(graph.poses), std::move(graph.links)};
+  }
+  const bool is_kitti =
+      format == TrajectoryFormat::kitti || format == TrajectoryFormat::kitti_optical;
+  read.poses = is_kitti ? parse_kitti(text, file) : parse_tum(text, file);
+  for (TrajectoryPose& pose : read.poses)
+    pose.world_from_base = from_axes(axes_of(format), pose.world_from_base);
+  return read;
+}
+
 }  // namespace
 
-bool is_trajectory_path(const fs::path& path) {
-  const std::string extension = extension_of(path);
-  return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
+const std::vector<std::pair<std::string, TrajectoryFormat>>& trajectory_format_names() {
+  static const std::vector<std::pair<std::string, TrajectoryFormat>> names = {
+      {"auto", TrajectoryFormat::automatic},
+      {"tum", TrajectoryFormat::tum},
+      {"tum-motion-capture", TrajectoryFormat::tum_motion_capture},
+      {"kitti", TrajectoryFormat::kitti},
+      {"kitti-optical", TrajectoryFormat::kitti_optical},
+      {"toro", TrajectoryFormat::toro},
+      {"g2o", TrajectoryFormat::g2o},
+      {"colmap", TrajectoryFormat::colmap}};
+  return names;
 }
+
+bool is_trajectory_path(const fs::path& path) { return format_of_extension(path).has_value(); }
 
 void require_trajectory_format(const fs::path& path) {
-  if (!is_trajectory_path(path))
-    throw Error("unknown format of poses", {.file = path.string(),
-                                            .field = "extension",
-                                            .value = path.extension().string(),
-                                            .bound = "one of .tum .kitti .g2o"});
+  if (is_trajectory_path(path)) return;
+  std::string known;
+  for (const auto& [name, format] : extensions) known += std::string(" ") + name;
+  throw Error("unknown format of poses", {.file = path.string(),
+                                          .field = "extension",
+                                          .value = path.extension().string(),
+                                          .bound = "one of" + known});
 }
 
-TrajectoryFile read_trajectory(const fs::path& path) {
-  require_trajectory_format(path);
-  const std::string text = read_whole_file(path);
-  const std::string extension = extension_of(path);
+fs::path file_of_trajectory(const fs::path& path) {
+  return fs::is_directory(path) ? find_colmap_model(path) / "images.txt" : path;
+}
+
+TrajectoryFile read_trajectory(const fs::path& path, TrajectoryFormat format) {
   TrajectoryFile file;
-  if (extension == ".tum") file.poses = parse_tum(text, path.string());
-  if (extension == ".kitti") file.poses = parse_kitti(text, path.string());
-  if (extension == ".g2o") {
-    PoseGraphText graph = parse_g2o(text, path.string());
-    file = {std::move(graph.poses), std::move(graph.links)};
+  const bool may_be_model = fs::is_directory(path) || path.filename() == "images.txt";
+  if (format == TrajectoryFormat::colmap ||
+      (format == TrajectoryFormat::automatic && may_be_model)) {
+    file = read_colmap(path);
+  } else {
+    const std::string text = read_whole_file(path);
+    if (format == TrajectoryFormat::automatic) format = format_of_text(text, path);
+    file = parse_poses(format, text, path.string());
   }
-  if (file.poses.empty()) throw Error("holds no pose", {.file = path.string()});
+  if (file.poses.empty() && file.images.empty())
+    throw Error("holds no pose", {.file = path.string()});
   return file;
+}
+
+namespace {
+
+// Vertices need names: 1, 2, ... where no node is known, as RTAB-Map counts lines.
+void number_nodes(Trajectory& poses) {
+  const auto is_known = [](const TrajectoryPose& pose) { return pose.node != 0; };
+  if (std::any_of(poses.begin(), poses.end(), is_known)) return;
+  int node = 0;
+  for (TrajectoryPose& pose : poses) pose.node = ++node;
+}
+
+}  // namespace
+
+void write_trajectory_as(TrajectoryFormat format, const fs::path& path,
+                         const TrajectoryFile& trajectory, bool nodes) {
+  Trajectory poses = trajectory.poses;
+  if (format == TrajectoryFormat::toro || format == TrajectoryFormat::g2o) number_nodes(poses);
+  for (TrajectoryPose& pose : poses)
+    pose.world_from_base = to_axes(axes_of(format), pose.world_from_base);
+  switch (format) {
+    case TrajectoryFormat::tum:
+    case TrajectoryFormat::tum_motion_capture:
+      return write_text(path, to_tum(poses, nodes));
+    case TrajectoryFormat::kitti:
+    case TrajectoryFormat::kitti_optical:
+      return write_text(path, to_kitti(poses));
+    case TrajectoryFormat::toro:
+      return write_text(path, to_toro(poses, trajectory.links));
+    case TrajectoryFormat::g2o:
+      return write_text(path, to_g2o(poses, trajectory.links));
+    case TrajectoryFormat::automatic:
+    case TrajectoryFormat::colmap:
+      break;
+  }
+  throw Error("no format of a file of poses", {.file = path.string()});
 }
 
 void write_trajectory(const fs::path& path, const TrajectoryFile& trajectory, bool nodes) {
   require_trajectory_format(path);
-  const std::string extension = extension_of(path);
-  if (extension == ".tum") write_text(path, to_tum(trajectory.poses, nodes));
-  if (extension == ".kitti") write_text(path, to_kitti(trajectory.poses));
-  if (extension == ".g2o") write_text(path, to_g2o(trajectory.poses, trajectory.links));
+  write_trajectory_as(*format_of_extension(path), path, trajectory, nodes);
 }
 
 NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph) {
@@ -114,7 +232,7 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
   const std::vector<const GraphNode*> nodes = valid_nodes(graph);
   const NodePairs pairs = have_nodes    ? pair_by_node(trajectory, graph)
                           : have_stamps ? pair_by_time(trajectory, nodes)
-                                        : pair_by_order(trajectory, nodes);
+                                        : pair_by_order(trajectory, graph, nodes);
   if (pairs.empty())
     throw Error(have_nodes ? "none of the poses belongs to a node of the scan"
                            : "no pose lies within 20 ms of a node of the scan");

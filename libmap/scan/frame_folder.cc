@@ -380,6 +380,11 @@ void FrameFolder::read_links() {
                         " of nodes that are not there");
 }
 
+std::string FrameFolder::image_name(int node) const {
+  const auto files = files_.find(node);
+  return files == files_.end() ? std::string() : fs::path(files->second.color).filename().string();
+}
+
 RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   const auto place = files_.find(node);
   if (place == files_.end())

@@ -52,6 +52,7 @@ class FrameFolder : public ScanSource {
 
   const std::filesystem::path& path() const override { return path_; }
   const PoseGraph& graph() const override { return graph_; }
+  std::string image_name(int node) const override;
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
   const FrameFolderOptions& options() const { return options_; }

@@ -1,15 +1,18 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
+#include <algorithm>
 #include <optional>
 #include <set>
-#include <stdexcept>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
 #include "libmap/core/error.h"
 #include "libmap/scan/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
+#include "libmap/scan/rtabmap_graph.h"
+#include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/scan/sqlite_file.h"
 
@@ -32,24 +35,64 @@ std::string blob_of(SQLite::Column column) {
                           : std::string(bytes, static_cast<std::size_t>(column.getBytes()));
 }
 
-// The node at whose optimised pose the last localisation stands.
-std::optional<int> node_of_localization(SQLite::Database& database) {
-  SQLite::Statement row(database, "SELECT opt_ids, opt_poses, opt_last_localization FROM Admin");
-  if (!row.executeStep()) return std::nullopt;
-  const std::string localization = blob_of(row.getColumn(2));
-  if (localization.size() != null_pose_blob().size()) return std::nullopt;
-  try {
-    const std::vector<int> ids = decode_matrix(blob_of(row.getColumn(0))).values<int>();
-    const std::string poses = decode_matrix(blob_of(row.getColumn(1))).bytes;
-    // From the back: RTAB-Map localises at the last node.
-    for (std::size_t i = ids.size(); i-- > 0;)
-      if (poses.compare(i * localization.size(), localization.size(), localization) == 0)
-        return ids[i];
-  } catch (const Error&) {
-    // Broken poses are replaced all the same.
-  } catch (const std::out_of_range&) {
+struct StoredPoses {
+  std::vector<int> ids{};
+  std::string poses{};  // 48 bytes each
+  std::string localization{};
+
+  std::string_view pose(std::size_t index) const {
+    const std::size_t size = null_pose_blob().size();
+    return std::string_view(poses).substr(index * size, size);
   }
+};
+
+// Empty where they are broken: they are replaced all the same.
+StoredPoses stored_poses(SQLite::Database& database) {
+  const bool localizes = columns_of(database, "Admin").contains("opt_last_localization");
+  SQLite::Statement row(database, std::string("SELECT opt_ids, opt_poses, ") +
+                                      (localizes ? "opt_last_localization" : "NULL") +
+                                      " FROM Admin");
+  if (!row.executeStep()) return {};
+  try {
+    StoredPoses stored;
+    stored.localization = blob_of(row.getColumn(2));
+    stored.ids = decode_matrix(blob_of(row.getColumn(0))).values<int>();
+    stored.poses = decode_matrix(blob_of(row.getColumn(1))).bytes;
+    if (stored.poses.size() == stored.ids.size() * null_pose_blob().size()) return stored;
+  } catch (const Error&) {
+  }
+  return {};
+}
+
+// The node at whose optimised pose the last localisation stands.
+std::optional<int> node_of_localization(const StoredPoses& stored) {
+  // From the back: RTAB-Map localises at the last node.
+  for (std::size_t i = stored.ids.size(); i-- > 0;)
+    if (stored.pose(i) == stored.localization) return stored.ids[i];
   return std::nullopt;
+}
+
+// Landmarks (ids below 0) among the stored poses move with the first node that sees them.
+std::map<int, Pose> with_landmarks(const StoredPoses& stored, const std::vector<PoseLink>& links,
+                                   std::map<int, Pose> map_from_base) {
+  const auto earlier = [&](int id) -> std::optional<Pose> {
+    const auto place = std::find(stored.ids.begin(), stored.ids.end(), id);
+    if (place == stored.ids.end()) return std::nullopt;
+    return decode_pose(stored.pose(static_cast<std::size_t>(place - stored.ids.begin())));
+  };
+  for (const int id : stored.ids) {
+    if (id > 0 || map_from_base.contains(id)) continue;
+    for (const PoseLink& link : links) {
+      const auto now = map_from_base.find(link.from);
+      if (link.to != id || now == map_from_base.end()) continue;
+      const auto before = earlier(link.from);
+      const auto landmark = earlier(id);
+      if (!before || !landmark) continue;
+      map_from_base.emplace(id, now->second * before->inverse() * *landmark);
+      break;
+    }
+  }
+  return map_from_base;
 }
 
 void require_nodes(SQLite::Database& database, const std::map<int, Pose>& poses,
@@ -92,15 +135,27 @@ void require_columns(SQLite::Database& database, const std::string& source) {
                                             .bound = "1"});
 }
 
-void update_poses(SQLite::Database& database, const std::map<int, Pose>& map_from_base) {
+// A grid, cloud or mesh of the earlier poses, which RTAB-Map would show beside the new ones; where
+// there is none it makes one anew. So do its own tools that change a graph.
+void clear_stored_map(SQLite::Database& database) {
+  const std::set<std::string> columns = columns_of(database, "Admin");
+  std::string changes;
+  for (const char* column :
+       {"opt_cloud", "opt_polygons_size", "opt_polygons", "opt_tex_coords", "opt_tex_materials",
+        "opt_map", "opt_map_x_min", "opt_map_y_min", "opt_map_resolution"})
+    if (columns.contains(column))
+      changes += (changes.empty() ? "" : ", ") + std::string(column) + " = NULL";
+  if (!changes.empty()) database.exec("UPDATE Admin SET " + changes);
+}
+
+void update_poses(SQLite::Database& database, const StoredPoses& stored,
+                  const std::map<int, Pose>& map_from_base) {
   const OptimizedPoseBlobs blobs = to_blobs(map_from_base);
-  const bool localizes = columns_of(database, "Admin").count("opt_last_localization") > 0;
   std::string localization;
-  if (localizes) {
-    const std::optional<int> node = node_of_localization(database);
-    const auto place = node ? map_from_base.find(*node) : map_from_base.end();
-    if (place != map_from_base.end()) localization = to_blob(place->second);
-  }
+  const std::optional<int> node = node_of_localization(stored);
+  const auto place = node ? map_from_base.find(*node) : map_from_base.end();
+  if (place != map_from_base.end()) localization = to_blob(place->second);
+  const bool localizes = columns_of(database, "Admin").contains("opt_last_localization");
   SQLite::Statement update(database, std::string("UPDATE Admin SET opt_ids = ?, opt_poses = ?") +
                                          (localizes ? ", opt_last_localization = ?" : ""));
   const auto bind = [&](int index, const std::string& blob) {
@@ -156,8 +211,11 @@ void copy_with_optimized_poses(const fs::path& source, const fs::path& target,
     copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = MEMORY;");
     require_columns(copy, source.string());
     require_nodes(copy, map_from_base, links, source.string());
+    const StoredPoses stored = stored_poses(copy);
+    const std::vector<PoseLink> stored_links = RtabmapDatabase(target).graph().links;
     SQLite::Transaction transaction(copy);
-    update_poses(copy, map_from_base);
+    update_poses(copy, stored, with_landmarks(stored, stored_links, map_from_base));
+    clear_stored_map(copy);
     add_links(copy, links, source.string());
     transaction.commit();
   } catch (const SQLite::Exception& error) {

@@ -54,8 +54,9 @@ class RtabmapWriter {
 
 // `source` copied to `target`, whatever stood there, with other optimised poses (Admin.opt_ids,
 // opt_poses); everything else stays as it is, row for row. Where the last localisation stood at an
-// optimised pose it moves with its node, else it is dropped. A map, cloud or mesh that RTAB-Map
-// stored with the earlier poses stays as well. `links` are added, in both directions, where the two
+// optimised pose it moves with its node, else it is dropped; landmarks among the optimised poses
+// move with the first node that sees them. A grid, cloud or mesh that RTAB-Map stored with the
+// earlier poses goes: it makes them anew. `links` are added, in both directions, where the two
 // nodes have no link yet. `source` may be open elsewhere. Throws Error: no database of RTAB-Map
 // 0.13 or later, a pose or a link of a node that is not there.
 void copy_with_optimized_poses(const std::filesystem::path& source,

@@ -31,6 +31,9 @@ class ScanSource {
     static const std::vector<std::string> none;
     return none;
   }
+  // The name of the file of the node's colour image, without its folder; empty where images are not
+  // files.
+  virtual std::string image_name([[maybe_unused]] int node) const { return {}; }
   // May be called from several threads at once. Images that are not stored are left empty. Throws
   // Error naming the file, the node and the part that is broken.
   virtual RgbdFrame read_frame(int node, FrameParts parts = {}) const = 0;

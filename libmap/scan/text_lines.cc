@@ -67,6 +67,17 @@ std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::siz
   return numbers;
 }
 
+std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file) {
+  require_word(line, word, file);
+  const std::optional<std::int64_t> value = parse_integer(line.words[word]);
+  if (!value)
+    throw Error("not a whole number", {.file = file,
+                                       .field = name_of(line),
+                                       .value = std::string(line.words[word]),
+                                       .bound = "of 64 bits"});
+  return *value;
+}
+
 int integer_of(const TextLine& line, std::size_t word, const std::string& file) {
   require_word(line, word, file);
   const std::optional<std::int64_t> value = parse_integer(line.words[word]);
@@ -77,6 +88,24 @@ int integer_of(const TextLine& line, std::size_t word, const std::string& file) 
                                        .value = std::string(line.words[word]),
                                        .bound = "of 32 bits"});
   return static_cast<int>(*value);
+}
+
+Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
+             const Eigen::Quaterniond& rotation, const std::string& file) {
+  constexpr double length_tolerance = 0.05;
+  constexpr double farthest_m = 1e8;
+  const double length = rotation.norm();
+  if (!(std::abs(length - 1.0) <= length_tolerance))
+    throw Error("no rotation", {.file = file,
+                                .field = name_of(line),
+                                .value = to_text(length),
+                                .bound = "a quaternion of length 1"});
+  const double distance = translation.cwiseAbs().maxCoeff();
+  if (!(distance <= farthest_m))
+    throw Error(
+        "no position",
+        {.file = file, .field = name_of(line), .value = to_text(distance), .bound = "<= 1e8 m"});
+  return make_pose(translation, rotation);
 }
 
 }  // namespace libmap

@@ -2,9 +2,12 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include "libmap/core/pose.h"
 
 namespace libmap {
 
@@ -26,5 +29,11 @@ std::string name_of(const TextLine& line);
 std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::size_t count,
                                const std::string& file);
 int integer_of(const TextLine& line, std::size_t word, const std::string& file);
+std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file);
+
+// A pose whose numbers stand in that line. Throws Error: the quaternion's length is off by more
+// than 5 %, the position lies more than 1e8 m away.
+Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
+             const Eigen::Quaterniond& rotation, const std::string& file);
 
 }  // namespace libmap

@@ -15,14 +15,15 @@ namespace libmap {
 // an exponent, which not every reader knows.
 std::string stamp_text(double stamp_s);
 
-// TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m; with `nodes` the node's id as a ninth
-// column, as RTAB-Map's format 11 has it. Reading takes either, and commas for spaces. The parsers
-// throw Error naming `file` and the line: another number of columns, no finite number, a rotation
-// that is none.
+// TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m, RTAB-Map's formats 1 and 10; with
+// `nodes` the node's id as a ninth column, its format 11. Reading takes either, and commas for
+// spaces. The parsers throw Error naming `file` and the line: another number of columns, no finite
+// number, a rotation that is none, a position beyond 1e8 m, a node that stands twice.
 Trajectory parse_tum(std::string_view text, const std::string& file);
 std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 
-// KITTI odometry benchmark: the 12 numbers of [R|t] row by row; neither stamps nor nodes.
+// KITTI odometry benchmark: the 12 numbers of [R|t] row by row, RTAB-Map's formats 0 and 2; neither
+// stamps nor nodes.
 Trajectory parse_kitti(std::string_view text, const std::string& file);
 std::string to_kitti(const Trajectory& trajectory);
 
@@ -47,5 +48,28 @@ struct PoseGraphText {
 // "# graspmap:edge from to ...". Records of other kinds are passed over; planar ones are an Error.
 PoseGraphText parse_g2o(std::string_view text, const std::string& file);
 std::string to_g2o(const Trajectory& poses, const std::vector<PoseLink>& links);
+
+// TORO (Grisetti et al. 2007), RTAB-Map's format 3: "VERTEX3 id x y z roll pitch yaw" and "EDGE3
+// from to x y z roll pitch yaw" with the upper triangle of the information matrix in that order;
+// angles in radians, R = Rz(yaw) Ry(pitch) Rx(roll). Types of links are guessed as those of g2o
+// without comments: RTAB-Map's reader takes no comments, so none are written, and links that are no
+// edges between two poses are left out. (That reader takes at most 400 characters a line, and the
+// translation's information for the rotation's.)
+PoseGraphText parse_toro(std::string_view text, const std::string& file);
+std::string to_toro(const Trajectory& poses, const std::vector<PoseLink>& links);
+
+// Axes of a file's poses. RTAB-Map turns those of its formats 1 and 2; nothing in the file says so.
+enum class PoseAxes {
+  map,            // as the scan's: x forward, z up
+  optical,        // format 2: z forward, x right, y down, of the world and of what moves
+  motion_capture  // format 1: what moves has optical axes, and the world others
+};
+Pose from_axes(PoseAxes axes, const Pose& pose_in_file);
+Pose to_axes(PoseAxes axes, const Pose& world_from_base);
+
+// Which of the formats above a text is, by its first line that is no comment: by its tag or its
+// number of columns. Throws Error if it is none of them.
+enum class PoseTextFormat { tum, kitti, toro, g2o };
+PoseTextFormat recognise_poses(std::string_view text, const std::string& file);
 
 }  // namespace libmap

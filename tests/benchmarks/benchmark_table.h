@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <limits>
 #include <optional>
+#include <string>
 #include <vector>
 
 namespace graspmap_bench {
@@ -60,6 +61,21 @@ Times time_iterations(benchmark::State& state, const Work& work) {
   state.counters["median_ms"] = 1e3 * times.median();
   state.counters["processor_ms"] = 1e3 * times.processor_s;
   return times;
+}
+
+// What is aimed at on the clock with two processors, and what the author's program takes of one.
+struct Marks {
+  double wanted_ms = 0.0;  // 0: nothing
+  double author_ms = 0.0;
+};
+
+inline void set_marks(benchmark::State& state, const Marks& marks) {
+  if (marks.wanted_ms > 0.0) state.counters["wanted_ms"] = marks.wanted_ms;
+  if (marks.author_ms > 0.0) state.counters["author_ms"] = marks.author_ms;
+}
+
+inline std::string threads_text(unsigned threads) {
+  return std::to_string(threads) + (threads == 1 ? " thread" : " threads");
 }
 
 // The folder that the environment names, if it does.

@@ -9,6 +9,7 @@
 #include "libgtd/terrain/regression_plane.h"
 #include "libgtd/terrain/voxel_grid.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/parallel.h"
 #include "tests/benchmarks/benchmark_table.h"
 
 extern char** environ;
@@ -25,11 +26,14 @@ std::filesystem::path cloud_file(const std::string& name) {
 
 void convexity(benchmark::State& state, libgtd::CurvatureMethod method, const char* label) {
   const PointCloud cloud = libmap::read_cloud(cloud_file("artificial_rocks")).cloud;
+  const auto threads = static_cast<unsigned>(state.range(0));
+  const libmap::ThreadLimit limit(threads);
   time_iterations(state, [&] {
     const auto curvature = libgtd::estimate_curvature(cloud, {.method = method, .radius_m = 0.09});
     benchmark::DoNotOptimize(libgtd::find_convex(curvature, cloud.positions));
   });
-  state.SetLabel(label);
+  graspmap_bench::set_marks(state, {150, 1720});
+  state.SetLabel(std::string(label) + ", " + graspmap_bench::threads_text(threads));
 }
 
 // As the command prepares the cloud.
@@ -53,25 +57,23 @@ void interpolation(benchmark::State& state, bool thesis) {
   libgtd::InterpolationOptions options;
   options.method =
       thesis ? libgtd::InterpolationMethod::thesis : libgtd::InterpolationMethod::corrected;
+  const auto threads = static_cast<unsigned>(state.range(0));
+  const libmap::ThreadLimit limit(threads);
   time_iterations(state, [&] { benchmark::DoNotOptimize(libgtd::interpolate(terrain, options)); });
-  state.SetLabel(thesis ? "thesis" : "corrected");
+  graspmap_bench::set_marks(state, {30, 240});
+  state.SetLabel((thesis ? "thesis, " : "corrected, ") + graspmap_bench::threads_text(threads));
 }
 
 // From the start of the process to its end, the map on the disk.
 void command(benchmark::State& state, const std::string& method) {
+  const auto threads = static_cast<unsigned>(state.range(0));
   const auto output = std::filesystem::temp_directory_path() /
                       ("graspmap_bench_" + std::to_string(getpid()) + ".pcd");
-  std::vector<std::string> words = {GRASPMAP_PROGRAM,
-                                    "score",
-                                    cloud_file("artificial_rocks"),
-                                    "-o",
-                                    output,
-                                    "--config",
-                                    "artificial_rocks_prescan",
-                                    "--method",
-                                    method,
-                                    "--quiet",
-                                    "--force"};
+  std::vector<std::string> words = {
+      GRASPMAP_PROGRAM, "score",     cloud_file("artificial_rocks"), "-o",
+      output,           "--config",  "artificial_rocks_prescan",     "--method",
+      method,           "--threads", std::to_string(threads),        "--quiet",
+      "--force"};
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -86,13 +88,16 @@ void command(benchmark::State& state, const std::string& method) {
   std::filesystem::remove(output);
   std::filesystem::remove(output.string() + ".json");
   if (status != 0) state.SkipWithError("the command failed");
-  state.SetLabel(method + ", all threads");
+  graspmap_bench::set_marks(state, {300, 4100});
+  state.SetLabel(method + ", with convexity, " + graspmap_bench::threads_text(threads));
 }
 
 const bool registered = [] {
   if (!folder_of("GRASPMAP_DATA")) return false;
   const auto add = [](const char* name, int iterations, auto function) {
     benchmark::RegisterBenchmark(name, function)
+        ->Arg(1)
+        ->Arg(2)
         ->Iterations(iterations)
         ->UseRealTime()
         ->Unit(benchmark::kMillisecond);

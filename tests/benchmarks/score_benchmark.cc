@@ -31,14 +31,28 @@ struct Set {
   std::string gripper = "scar-e";
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;
+  graspmap_bench::Marks marks = {};
 };
 
-const std::vector<Set> sets = {
-    {"simulated scenario 1, 10 mm", "", "scar-e", 0.01, 1},
-    {"artificial_rocks, 10 mm", "artificial_rocks.thesis.transformed", "scar-e", 0.01, 1},
-    {"primitive_shapes, 5 mm", "primitive_shapes.thesis.interpolated", "scar-e", 0.005, 5},
-    {"leaning_holds_hubrobo, 1 mm", "leaning_holds_hubrobo.thesis.interpolated", "hubrobo", 0.001,
-     3}};
+const std::vector<Set> sets = {{"simulated scenario 1, 10 mm", "", "scar-e", 0.01, 1},
+                               {"artificial_rocks, 10 mm",
+                                "artificial_rocks.thesis.transformed",
+                                "scar-e",
+                                0.01,
+                                1,
+                                {4, 2340}},
+                               {"primitive_shapes, 5 mm",
+                                "primitive_shapes.thesis.interpolated",
+                                "scar-e",
+                                0.005,
+                                5,
+                                {60, 34300}},
+                               {"leaning_holds_hubrobo, 1 mm",
+                                "leaning_holds_hubrobo.thesis.interpolated",
+                                "hubrobo",
+                                0.001,
+                                3,
+                                {20, 8900}}};
 
 struct Workload {
   VoxelGrid grid;
@@ -133,8 +147,8 @@ void matching(benchmark::State& state, const Set& set, BitPath path, const char*
   state.counters["pivots"] = static_cast<double>(work.pivots.size());
   if (work.baseline_s) state.counters["speedup"] = *work.baseline_s / times.least();
   state.counters["peak_percent"] = 100.0 * bytes / times.processor_s / peak_bytes_per_s(path);
-  state.SetLabel(std::string(path_name) + ", " + std::to_string(threads) +
-                 (threads == 1 ? " thread" : " threads"));
+  graspmap_bench::set_marks(state, set.marks);
+  state.SetLabel(std::string(path_name) + ", " + graspmap_bench::threads_text(threads));
 }
 
 const bool registered = [] {

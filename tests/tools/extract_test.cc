@@ -317,7 +317,7 @@ TEST(ExtractBundler, BesideTheWholeScan) {
 
 TEST(ExtractBundler, BadInput) {
   write_example();
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db"}), {"-o or --bundler"}));
+  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db"}), {"-o, --bundler or --colmap"}));
   EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--angle", "181"}),
                         {"--angle is 181"}));
   EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--poses", "stord"}),

@@ -1,7 +1,14 @@
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include "libmap/core/file_output.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
+#include "libmap/scan/image_codec.h"
 #include "libmap/scan/scan_source.h"
 #include "tests/tools/tool_test_support.h"
 
@@ -80,9 +87,148 @@ TEST(Refine, SameBytesForThreadsAndSeed) {
   EXPECT_EQ(content("1.json"), content("2.json"));
 }
 
+// A scan as a TUM RGB-D folder of pictures and depth, the truth beside it for the report alone.
+void extract_plain_folder(const std::string& scan, const std::string& folder) {
+  namespace fs = std::filesystem;
+  ASSERT_TRUE(succeeded(graspmap({"extract", scan, "-o", "whole"})));
+  fs::create_directory(scratch(folder));
+  for (const auto& [from, to] : {std::pair("color", "color"),
+                                 {"depth", "depth"},
+                                 {"poses_ground_truth.tum", "groundtruth.txt"},
+                                 {"calibration/camera_1.yaml", "calibration.yaml"}})
+    fs::rename(scratch("whole") / from, scratch(folder) / to);
+  std::istringstream lines(content("whole/associations.txt"));
+  std::ofstream color(scratch(folder) / "rgb.txt");
+  std::ofstream depth(scratch(folder) / "depth.txt");
+  for (std::string line; std::getline(lines, line);) {
+    if (line.starts_with('#')) continue;
+    std::istringstream words(line);
+    std::string word[4];
+    for (std::string& text : word) words >> text;
+    color << word[0] << ' ' << word[1] << '\n';
+    depth << word[2] << ' ' << word[3] << '\n';
+  }
+  std::ofstream(scratch(folder) / "scan.yaml") << "depth_unit_m: 0.001\npose_frame: base\n";
+}
+
+TEST(RefineWithoutPoses, APlainFolderOfImagesBecomesAMap) {
+  GRASPMAP_REQUIRE_DATA();
+  extract_plain_folder(scan_file("site_tiny_q.db"), "images");
+  ASSERT_TRUE(
+      succeeded(graspmap({"refine", "images", "-o", "poses.tum", "--report", "report.json"})));
+  const nlohmann::json report = json_of("report.json");
+  EXPECT_EQ(report.at("stages").at(0).at("stage"), "start: visual");
+  const nlohmann::json& odometry = report.at("stages").at(2);
+  EXPECT_EQ(odometry.at("stage"), "odometry");
+  EXPECT_EQ(odometry.at("links"), 5);
+  EXPECT_LT(odometry.at("absolute_error").at("rmse_m"), 0.01);
+  EXPECT_TRUE(report.at("nodes_lost_by_odometry").empty());
+  EXPECT_EQ(report.at("parts").size(), 1U);
+  const auto error = error_of_file("poses.tum", scan_file("site_tiny_q.db"));
+  EXPECT_EQ(error.poses, 6U);
+  EXPECT_LT(error.rmse_m, 0.006);
+  const auto fused = graspmap({"fuse", "images", "--poses", "poses.tum", "-o", "cloud.ply"});
+  ASSERT_TRUE(succeeded(fused));
+  EXPECT_NE(fused.standard_error.find("6 of 6 poses"), std::string::npos);
+}
+
+TEST(RefineWithoutPoses, NullPosesInADatabase) {
+  GRASPMAP_REQUIRE_DATA();
+  std::filesystem::copy_file(scan_file("site_tiny_q.db"), scratch("null.db"));
+  std::filesystem::permissions(scratch("null.db"), std::filesystem::perms::owner_write,
+                               std::filesystem::perm_options::add);
+  {
+    SQLite::Database database(scratch("null.db").string(), SQLite::OPEN_READWRITE);
+    database.exec("UPDATE Node SET pose = NULL");
+    database.exec("UPDATE Admin SET opt_ids = NULL, opt_poses = NULL");
+    database.exec("DELETE FROM Link");
+  }
+  ASSERT_TRUE(succeeded(
+      graspmap({"refine", "null.db", "-o", "poses.tum", "--write-database", "posed.db"})));
+  EXPECT_LT(error_of_file("poses.tum", scan_file("site_tiny_q.db")).rmse_m, 0.006);
+  const auto posed = libmap::open_scan(scratch("posed.db"));
+  EXPECT_EQ(posed->graph().optimized_map_from_base.size(), 6U);
+  EXPECT_GE(posed->graph().links.size(), 5U);
+  EXPECT_TRUE(bad_input(graspmap({"refine", "null.db", "-o", "p.tum", "--start", "stored"}),
+                        {"null.db", "stored"}));
+}
+
+// Odometry that drifts by 42 mm on purpose is not asked.
+TEST(RefineWithoutPoses, PicturesAloneDriftLittle) {
+  GRASPMAP_REQUIRE_DATA();
+  ASSERT_TRUE(succeeded(
+      graspmap({"refine", scan_file("site_drift.db"), "-o", "poses.tum", "--start", "visual",
+                "--rounds", "0", "--no-bundle", "--icp", "off", "--report", "report.json"})));
+  const nlohmann::json report = json_of("report.json");
+  const nlohmann::json& odometry = report.at("stages").at(2);
+  EXPECT_LT(odometry.at("absolute_error").at("rmse_m"), 0.0015);
+  EXPECT_LT(odometry.at("absolute_error").at("mean_rotation_deg"), 0.05);
+  EXPECT_EQ(odometry.at("lost_nodes"), 0);
+  // 39 links: a mean of 234 squares of unit variance, correlated by the links' common frames.
+  EXPECT_GT(odometry.at("squared_error_per_freedom"), 0.6);
+  EXPECT_LT(odometry.at("squared_error_per_freedom"), 1.6);
+}
+
+TEST(RefineWithoutPoses, BarePicturesAreBadInput) {
+  GRASPMAP_REQUIRE_DATA();
+  extract_plain_folder(scan_file("site_tiny_q.db"), "images");
+  const auto bare = libmap::encode_png(libmap::ColorImage(512, 424, {90, 90, 90}));
+  std::string list;
+  std::istringstream lines(content("images/rgb.txt"));
+  for (std::string stamp, name; lines >> stamp >> name;) list += stamp + " color/bare.png\n";
+  libmap::write_text(scratch("images/rgb.txt"), list);
+  libmap::write_text(scratch("images/color/bare.png"), bare);
+  EXPECT_TRUE(bad_input(graspmap({"refine", "images", "-o", "poses.tum"}),
+                        {"images", "no two of them could be matched"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("poses.tum")));
+}
+
+TEST(Refine, FeaturesAreKeptBesideTheOutput) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_tiny_q.db");
+  ASSERT_TRUE(succeeded(graspmap({"refine", scan, "-o", "p.tum", "--feature-cache", "off"})));
+  const std::string without = content("p.tum");
+  EXPECT_FALSE(std::filesystem::exists(scratch("p.tum.features")));
+  for (int run = 0; run < 2; ++run) {
+    ASSERT_TRUE(succeeded(graspmap({"refine", scan, "-o", "p.tum"})));
+    EXPECT_EQ(content("p.tum"), without);
+    std::size_t files = 0;
+    for (const auto& file : std::filesystem::directory_iterator(scratch("p.tum.features")))
+      files += file.path().extension() == ".features" ? 1 : 0;
+    EXPECT_EQ(files, 6U);
+  }
+  ASSERT_TRUE(succeeded(graspmap({"refine", scan, "-o", "q.tum", "--dry-run"})));
+  EXPECT_FALSE(std::filesystem::exists(scratch("q.tum.features")));
+}
+
+// What raised the cost of what was held out is undone; both reports say the same.
+TEST(Refine, ReportsInJsonAndInText) {
+  GRASPMAP_REQUIRE_DATA();
+  ASSERT_TRUE(succeeded(graspmap({"refine", scan_file("site_tiny_q.db"), "-o", "p.tum", "--report",
+                                  "r.json", "--report", "r.txt"})));
+  const std::string text = content("r.txt");
+  const nlohmann::json report = json_of("r.json");
+  std::size_t judged = 0;
+  for (const nlohmann::json& stage : report.at("stages")) {
+    const bool undone = stage.at("undone");
+    const std::string name = stage.at("stage");
+    EXPECT_NE(text.find("\n" + name + (undone ? ": undone\n" : "\n")), std::string::npos) << name;
+    if (!stage.contains("held_out")) continue;
+    ++judged;
+    EXPECT_TRUE(undone || stage.at("held_out").at("change").get<double>() <= 1e-6) << name;
+  }
+  EXPECT_GE(judged, 3U);
+  for (const std::string words :
+       {"absolute error: rmse", "relative error: rmse", "held-out matches", "held-out surfaces",
+        "links of neighbor", "standard deviations"})
+    EXPECT_NE(text.find(words), std::string::npos) << words;
+}
+
 TEST(Refine, BadInputIsOneLine) {
   GRASPMAP_REQUIRE_DATA();
   const std::string scan = scan_file("site_tiny_q.db");
+  EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--report", "report.html"}),
+                        {"--report", ".json"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "poses.txt"}), {"poses.txt", ".tum"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--links", "links.tum"}),
                         {"--links", ".g2o"}));

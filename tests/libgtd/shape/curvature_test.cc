@@ -341,6 +341,34 @@ TEST(Curvature, SameBitsWithAnyThreadsAndAnyQueries) {
   }
 }
 
+// What tiles of a terrain too large for the memory rest on.
+TEST(Curvature, SameBitsFromThePointsNearbyAlone) {
+  PointCloud cloud;
+  for (int n = 0; n < 6000; ++n) {
+    const double x = uniform(-1, 1), y = uniform(-1, 1);
+    cloud.positions.emplace_back(x, y, 0.1 * std::sin(5 * x) * std::cos(4 * y) + uniform(0, 0.01));
+  }
+  const CurvatureResult whole = estimate_curvature(cloud, within(0.1));
+  const Vector3d low(-0.31, 0.17, -9), high(0.22, 0.53, 9);
+  const auto inside = [&](const Vector3d& p, double margin) {
+    return (p.array() >= low.array() - margin).all() && (p.array() <= high.array() + margin).all();
+  };
+  std::vector<std::size_t> nearby;
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (inside(cloud.positions[n], 0.11)) nearby.push_back(n);
+  const CurvatureResult part =
+      estimate_curvature(libmap::select_points(cloud, nearby), within(0.1));
+  std::size_t compared = 0;
+  for (std::size_t n = 0; n < nearby.size(); ++n) {
+    if (!inside(cloud.positions[nearby[n]], 0)) continue;
+    const Curvature& one = whole.points[nearby[n]];
+    EXPECT_EQ(std::memcmp(&one.k1, &part.points[n].k1, sizeof one.k1), 0);
+    EXPECT_EQ(std::memcmp(&one.k2, &part.points[n].k2, sizeof one.k2), 0);
+    ++compared;
+  }
+  EXPECT_GT(compared, 200u);
+}
+
 TEST(Curvature, ThesisCannotTellABallFromABowl) {
   const auto ball = [](double x, double y) { return 5 + std::sqrt(0.25 - x * x - y * y); };
   const auto bowl = [](double x, double y) { return 5 - std::sqrt(0.25 - x * x - y * y); };

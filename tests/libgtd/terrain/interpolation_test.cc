@@ -11,6 +11,7 @@
 #include <string>
 #include <utility>
 
+#include "libgtd/terrain/planar_delaunay.h"
 #include "libgtd/terrain/regression_plane.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
@@ -77,6 +78,39 @@ std::optional<double> slow_height(const PointCloud& cloud, const Vector2d& at) {
         if (empty) return weights.dot(Vector3d(p[i].z(), p[j].z(), p[k].z()));
       }
   return std::nullopt;
+}
+
+// Nodes on corners and edges, where triangles disagree by rounding: every triangle is asked.
+TEST(Interpolation, ANodeOnAnEdgeTakesTheLowerOfItsTrianglesHeights) {
+  PointCloud cloud;
+  for (int i = 0; i < 12; ++i)
+    for (int j = 0; j < 12; ++j) cloud.positions.emplace_back(0.5 * i, 0.5 * j, uniform(0.1, 1));
+  InterpolationOptions options;
+  options.grid_spacing_m = 0.25;
+  const InterpolationResult result = interpolate(cloud, options);
+  ASSERT_EQ(result.cloud.size(), 23u * 23u);
+  std::size_t shared = 0;
+  const auto triangles = libgtd::triangulate_in_plane(cloud.positions).triangles;
+  for (const Vector3d& node : result.cloud.positions) {
+    double lowest = std::numeric_limits<double>::infinity(), highest = -lowest;
+    for (const auto& corners : triangles) {
+      const Vector3d a = cloud.positions[corners[0]];
+      const Vector3d b = cloud.positions[corners[1]] - a, c = cloud.positions[corners[2]] - a;
+      const Vector3d p = node - a;
+      const double area = b.x() * c.y() - b.y() * c.x();
+      const double u = (p.x() * c.y() - p.y() * c.x()) / area;
+      const double v = (b.x() * p.y() - b.y() * p.x()) / area;
+      if (u < 0 || v < 0 || u + v > 1) continue;  // exact for these numbers
+      const auto [low, high] =
+          std::minmax({a.z(), cloud.positions[corners[1]].z(), cloud.positions[corners[2]].z()});
+      const double z = std::clamp(a.z() + u * b.z() + v * c.z(), low, high);
+      lowest = std::min(lowest, z);
+      highest = std::max(highest, z);
+    }
+    EXPECT_EQ(node.z(), lowest);
+    shared += lowest < highest ? 1 : 0;
+  }
+  EXPECT_GT(shared, 20u);
 }
 
 TEST(Interpolation, APlaneStaysThatPlane) {

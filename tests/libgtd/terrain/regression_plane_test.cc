@@ -5,9 +5,11 @@
 #include <pcl/point_types.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <string>
 
 #include "libmap/cloud/cloud_io.h"
@@ -303,6 +305,44 @@ TEST(RegressionPlane, PointsThatAreNotFiniteAreSkipped) {
   const RegressionPlane plane = fit_regression_plane(cloud);
   EXPECT_EQ(plane.skipped, 2u);
   EXPECT_LT((plane.terrain_from_input.matrix() - clean.terrain_from_input.matrix()).norm(), 1e-12);
+}
+
+class InBlocks : public libmap::PointStream {
+ public:
+  explicit InBlocks(const PointCloud& cloud) : cloud_(cloud) {}
+  void for_each_block(Need need, const Visit& visit) const override {
+    for (std::size_t begin = 0; begin < cloud_.size(); begin += block_points) {
+      std::vector<std::size_t> indices(std::min(block_points, cloud_.size() - begin));
+      std::iota(indices.begin(), indices.end(), begin);
+      PointCloud block = libmap::select_points(cloud_, indices);
+      if (need == Need::positions) block.normals.clear();
+      visit(block);
+    }
+  }
+
+ private:
+  const PointCloud& cloud_;
+};
+
+TEST(RegressionPlane, SameBitsFromBlocks) {
+  PointCloud cloud = bumpy_ground(2 * libmap::PointStream::block_points + 12345);
+  cloud.positions[3].x() = nan;
+  const auto expect_same = [&] {
+    const RegressionPlane whole = fit_regression_plane(cloud);
+    const RegressionPlane blocks = fit_regression_plane(InBlocks(cloud));
+    EXPECT_EQ(blocks.centroid, whole.centroid);
+    EXPECT_EQ(blocks.terrain_from_input.matrix(), whole.terrain_from_input.matrix());
+    EXPECT_EQ(blocks.rmse_m, whole.rmse_m);
+    EXPECT_EQ(blocks.relief_skewness, whole.relief_skewness);
+    EXPECT_EQ(blocks.up_source, whole.up_source);
+    EXPECT_EQ(blocks.points, whole.points);
+    EXPECT_EQ(blocks.skipped, 1u);
+  };
+  expect_same();
+  cloud.normals.assign(cloud.size(), Eigen::Vector3f(0, 0.1F, -1));
+  expect_same();
+  cloud.viewpoint.translation() = Vector3d(0, 0, 3);
+  expect_same();
 }
 
 TEST(RegressionPlane, NormalsAndViewpointMoveAlong) {

@@ -9,6 +9,7 @@
 #include <limits>
 #include <locale>
 
+#include "libmap/core/parallel.h"
 #include "tests/libmap/cloud/cloud_samples.h"
 #include "tests/support/test_support.h"
 
@@ -160,6 +161,35 @@ TEST_P(CloudFormat, WritesTheSameBytesTwice) {
   PointCloud again = read_cloud(write_sample(GetParam(), cloud)).cloud;
   if (is_csv()) return;
   EXPECT_EQ(read_text(write_sample(GetParam(), again)), first);
+}
+
+TEST_P(CloudFormat, FieldsAreRoundedToTheirTypesAndKeptWithinThem) {
+  PointCloud cloud;
+  cloud.positions.assign(4, Eigen::Vector3d(1, 2, 3));
+  cloud.add_field("byte", ScalarType::uint8).values = {1.6, 300, -2, 7};
+  cloud.add_field("whole", ScalarType::int32).values = {-1.6, 1e12, 2.4, -7};
+  const PointCloud read = read_cloud(write_sample(GetParam(), cloud)).cloud;
+  EXPECT_THAT(read.find_field("byte")->values, ElementsAre(2, 255, 0, 7));
+  EXPECT_THAT(read.find_field("whole")->values, ElementsAre(-2, 2147483647, 2, -7));
+}
+
+// More rows than one thread takes at once.
+TEST_P(CloudFormat, ThreadsDoNotMatter) {
+  if (GetParam().encoding == FileEncoding::ascii) return;
+  const PointCloud cloud = sample_cloud(40000);
+  const std::string bytes = read_text(write_sample(GetParam(), cloud));
+  const PointCloud read = read_as(GetParam().extension, bytes).cloud;
+  const ThreadLimit one(1);
+  EXPECT_EQ(read_text(write_sample(GetParam(), cloud)), bytes);
+  const PointCloud again = read_as(GetParam().extension, bytes).cloud;
+  for (const PointCloud* const one_read : {&read, &again}) {
+    EXPECT_EQ(one_read->positions, cloud.positions);
+    EXPECT_EQ(one_read->normals, cloud.normals);
+    EXPECT_EQ(one_read->colors, cloud.colors);
+    ASSERT_EQ(one_read->fields.size(), cloud.fields.size());
+    for (const ScalarField& field : cloud.fields)
+      EXPECT_EQ(one_read->find_field(field.name)->values, field.values) << field.name;
+  }
 }
 
 TEST_P(CloudFormat, HoldsEmptyAndSinglePoint) {
@@ -320,6 +350,35 @@ TEST(PcdFiles, AnyOrderTypesCountsAndPadding) {
   EXPECT_EQ(read.cloud.viewpoint.translation(), Eigen::Vector3d(1, 2, 3));
   EXPECT_THAT(read.info.skipped, ElementsAre("padding of 3 bytes", "padding of 4 bytes"));
   EXPECT_THAT(read.info.fields, Contains(FileField{"histogram", ScalarType::float32, 2}));
+}
+
+// A header of any length, so that the numbers behind it lie on no whole multiple of their size, and
+// a file whose last byte is the last of a page of memory.
+TEST(PcdFiles, NumbersMayLieAnywhere) {
+  for (const std::size_t filling : {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u, 3900u}) {
+    std::string head =
+        "FIELDS tag x y z\nSIZE 1 8 8 4\nTYPE U F F F\nWIDTH 3\nHEIGHT 1\nDATA binary\n";
+    std::string data;
+    for (int n = 0; n < 3; ++n)
+      data += raw(static_cast<std::uint8_t>(7 + n)) + raw(0.1 + n) + raw(-2.0 * n) + raw(0.5F);
+    std::size_t comment = filling;
+    if (filling == 3900u) comment = 4096 - head.size() - data.size() - 2;
+    const std::string bytes = "#" + std::string(comment, '-') + "\n" + head + data;
+    if (filling == 3900u) {
+      ASSERT_EQ(bytes.size(), 4096u);
+    }
+    const PointCloud cloud = read_as(".pcd", bytes).cloud;
+    ASSERT_EQ(cloud.size(), 3u);
+    for (int n = 0; n < 3; ++n) {
+      const auto at = static_cast<std::size_t>(n);
+      EXPECT_EQ(cloud.positions[at], Eigen::Vector3d(0.1 + n, -2.0 * n, 0.5));
+      EXPECT_EQ(cloud.find_field("tag")->values[at], 7 + n);
+    }
+    for (const std::size_t missing : {1u, 4u, 12u, 21u, 22u, 63u})
+      EXPECT_THAT(error_as(".pcd", bytes.substr(0, bytes.size() - missing)),
+                  HasSubstr("promises 3 points of 21 bytes, but only " +
+                            std::to_string(data.size() - missing) + " bytes of data follow"));
+  }
 }
 
 TEST(PcdFiles, PackedColoursInText) {

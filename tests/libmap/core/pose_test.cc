@@ -90,4 +90,24 @@ TEST(PoseTest, NearestRotationOfAMirrorIsNoMirror) {
   EXPECT_NEAR(libmap::nearest_rotation(Matrix3d::Zero()).determinant(), 1.0, 1e-12);
 }
 
+TEST(PoseTest, RollPitchYawOfAPose) {
+  for (int i = 0; i < 50; ++i) {
+    const Vector3d angles(uniform(-179, 179), uniform(-89, 89), uniform(-179, 179));
+    const Pose pose = libmap::make_pose_from_rpy(Vector3d(1, 2, 3), angles);
+    EXPECT_TRUE(libmap::roll_pitch_yaw_deg(pose).isApprox(angles, 1e-11));
+  }
+}
+
+// Straight up and down roll and yaw are one; near it they are lost alone, not together.
+TEST(PoseTest, RollPitchYawGiveTheRotationBackEverywhere) {
+  for (const double pitch : {90.0, -90.0, 90.0 - 1e-7, 1e-9 - 90.0, 89.99}) {
+    const Pose pose = libmap::make_pose_from_rpy(Vector3d::Zero(), {20, pitch, -140});
+    const Vector3d angles = libmap::roll_pitch_yaw_deg(pose);
+    EXPECT_NEAR(angles.y(), pitch, 1e-5);
+    EXPECT_LT(
+        (libmap::make_pose_from_rpy(Vector3d::Zero(), angles).matrix() - pose.matrix()).norm(),
+        1e-14);
+  }
+}
+
 }  // namespace

@@ -329,9 +329,43 @@ TEST(GraphCovariance, AgreesWithTheDenseInverse) {
     const GraphLink pair = link(a, b, motion_between(poses, a, b), Matrix6d::Identity());
     const Eigen::MatrixXd jacobian =
         derivative([&](const std::vector<Vector6d>& steps) { return residual(pair, steps); });
-    EXPECT_TRUE(sparse.of_relative(a, {b}).front().isApprox(
-        jacobian * covariance * jacobian.transpose(), 1e-4))
+    EXPECT_TRUE(
+        sparse.of_relative(a, b).isApprox(jacobian * covariance * jacobian.transpose(), 1e-4))
         << a << " " << b;
+  }
+}
+
+// Chains with closures, blocks that no system has, and a diagonal one.
+TEST(BlockSolver, SelectedInverseIsThatOfTheColumns) {
+  for (const std::size_t size : {1U, 2U, 40U}) {
+    libmap::BlockSystem system(size);
+    for (std::size_t n = 0; n < size; ++n) system.add(n, n, random_information());
+    for (std::size_t n = 0; n + 1 < size; ++n) {
+      const Matrix6d link = random_information();
+      system.add(n, n, link);
+      system.add(n + 1, n + 1, link);
+      system.add(n, n + 1, -link);
+    }
+    for (std::size_t n = 0; n + 9 < size; n += 5) {
+      const Matrix6d link = random_information();
+      system.add(n, n, link);
+      system.add(n + 9, n + 9, link);
+      system.add(n + 9, n, -link);
+    }
+    libmap::BlockSystem wanted(size);
+    wanted.add(system);
+    if (size > 30) wanted.add(30, 2, Matrix6d::Zero());
+    const libmap::BlockSolver solver(system);
+    ASSERT_TRUE(solver.valid());
+    const libmap::BlockSystem inverse = solver.selected_inverse(wanted);
+    EXPECT_EQ(inverse.blocks().size(), wanted.blocks().size());
+    for (std::size_t column = 0; column < size; ++column) {
+      const std::vector<Matrix6d> expected = solver.inverse_column(column);
+      for (const auto& [key, block] : inverse.blocks()) {
+        if (key.second != column) continue;
+        EXPECT_TRUE(block.isApprox(expected[key.first], 1e-9)) << key.first << " " << column;
+      }
+    }
   }
 }
 

@@ -129,17 +129,29 @@ TEST(Refinement, SessionsAreJoinedWhereTheySeeTheSame) {
   EXPECT_LT(error_of_poses(result), 0.003);
 }
 
-TEST(Refinement, NullPosesComeFromLinksAndUnlinkedNodesAreNamed) {
+TEST(Refinement, NullPosesComeFromLinksOrPicturesAndTheRestIsNamed) {
   TexturedScan scan = loop_of(6);
   scan.graph_.nodes[2].odometry_from_base.reset();
-  libmap::GraphNode lost;
-  lost.id = 7;
-  scan.graph_.nodes.push_back(lost);
-  scan.frames[7] = scan.frames[6];
+  for (const int id : {7, 8}) {
+    libmap::GraphNode lost;
+    lost.id = id;
+    scan.graph_.nodes.push_back(lost);
+    scan.frames[id] = scan.frames[6];
+  }
+  scan.frames[8].color =
+      libmap::ColorImage(scan.frames[6].color.width, scan.frames[6].color.height, {90, 90, 90});
   const RefinementResult result = libmap::refine_poses(scan, small_options());
-  EXPECT_EQ(result.poses.size(), 6U);
-  EXPECT_EQ(result.without_pose, std::vector<int>{7});
+  EXPECT_EQ(result.poses.size(), 7U);
+  EXPECT_LT(
+      libmap::step_between(result.poses[5].world_from_base, result.poses[6].world_from_base).norm(),
+      1e-4);
+  EXPECT_EQ(result.without_pose, std::vector<int>{8});
   EXPECT_LT(error_of_poses(result), 0.002);
+  RefinementOptions stored = small_options();
+  stored.start = libmap::StartPoses::odometry;
+  const RefinementResult without = libmap::refine_poses(scan, stored);
+  EXPECT_EQ(without.poses.size(), 6U);
+  EXPECT_EQ(without.without_pose, (std::vector<int>{7, 8}));
 }
 
 // Ground that is bare but for its relief: only across it do frames bind each other.

@@ -116,6 +116,12 @@ TEST(FeatureTracks, JoinsMatchesAndLeavesConflictsOut) {
     return link;
   };
   std::vector<libmap::FeatureLink> links = {linked(0, 1), linked(1, 2)};
+  // The first and the last frame have no link: no track joins them.
+  const libmap::FeatureTracks apart =
+      libmap::build_tracks(frames, links, libmap::TrackFrames::linked);
+  EXPECT_EQ(apart.tracks.size(), 30U);
+  EXPECT_EQ(apart.split, 30U);
+  for (const auto& track : apart.tracks) EXPECT_EQ(track.observations.size(), 2U);
   libmap::FeatureTracks tracks = libmap::build_tracks(frames, links);
   ASSERT_EQ(tracks.tracks.size(), 30U);
   EXPECT_EQ(tracks.conflicts, 0U);

@@ -29,7 +29,7 @@ libmap::TrajectoryFile example() {
 
 TEST(TrajectoryIo, ChoosesTheFormatByTheExtension) {
   const libmap::TrajectoryFile written = example();
-  for (const char* name : {"poses.tum", "poses.kitti", "poses.g2o", "POSES.TUM"}) {
+  for (const char* name : {"poses.tum", "poses.kitti", "poses.g2o", "poses.toro", "POSES.TUM"}) {
     SCOPED_TRACE(name);
     const fs::path path = graspmap_test::scratch_folder() / name;
     libmap::write_trajectory(path, written, true);
@@ -42,7 +42,7 @@ TEST(TrajectoryIo, ChoosesTheFormatByTheExtension) {
       EXPECT_EQ(read.poses[i].node, extension == ".kitti" ? 0 : written.poses[i].node);
       EXPECT_EQ(read.poses[i].stamp_s, is_tum ? written.poses[i].stamp_s : 0.0);
     }
-    EXPECT_EQ(read.links.size(), extension == ".g2o" ? 1U : 0U);
+    EXPECT_EQ(read.links.size(), extension == ".g2o" || extension == ".toro" ? 1U : 0U);
   }
 }
 
@@ -51,8 +51,31 @@ TEST(TrajectoryIo, NamesTheFormatsItKnows) {
   const libmap::Error error = graspmap_test::error_of(
       [] { libmap::write_trajectory(graspmap_test::scratch_folder() / "poses.csv", example()); });
   EXPECT_EQ(error.context().value, ".csv");
-  EXPECT_EQ(error.context().bound, "one of .tum .kitti .g2o");
+  EXPECT_EQ(error.context().bound, "one of .tum .kitti .g2o .toro");
   EXPECT_FALSE(fs::exists(graspmap_test::scratch_folder() / "poses.csv"));
+}
+
+TEST(TrajectoryIo, KnowsOtherNamesByTheirContent) {
+  const libmap::TrajectoryFile written = example();
+  for (const auto& [extension, other] : std::vector<std::pair<std::string, std::string>>{
+           {"tum", "a.txt"}, {"kitti", "b.txt"}, {"g2o", "c.graph"}, {"toro", "d"}}) {
+    SCOPED_TRACE(extension);
+    const fs::path folder = graspmap_test::scratch_folder();
+    libmap::write_trajectory(folder / ("poses." + extension), written);
+    fs::rename(folder / ("poses." + extension), folder / other);
+    EXPECT_EQ(libmap::read_trajectory(folder / other).poses.size(), 3U);
+  }
+}
+
+TEST(TrajectoryIo, NumbersPosesWithoutNodes) {
+  libmap::TrajectoryFile written = example();
+  for (libmap::TrajectoryPose& pose : written.poses) pose.node = 0;
+  written.links.clear();
+  for (const char* name : {"poses.g2o", "poses.toro"}) {
+    libmap::write_trajectory(graspmap_test::scratch_folder() / name, written);
+    const auto read = libmap::read_trajectory(graspmap_test::scratch_folder() / name);
+    for (int i = 0; i < 3; ++i) EXPECT_EQ(read.poses[static_cast<std::size_t>(i)].node, i + 1);
+  }
 }
 
 TEST(TrajectoryIo, NamesTheFileThatIsOfNoUse) {
@@ -104,7 +127,12 @@ TEST(AssignNodes, TakesPosesWithoutNodesAndStampsInTheirOrder) {
   const libmap::NodeTrajectory result = libmap::assign_nodes(poses, graph_of_nodes());
   EXPECT_EQ(nodes_of(result.poses), (std::vector<int>{1, 2, 4}));
   EXPECT_TRUE(result.poses[2].world_from_base.isApprox(poses[2].world_from_base));
+  // As many as the scan has stored poses: RTAB-Map exports those.
+  libmap::PoseGraph graph = graph_of_nodes();
+  graph.optimized_map_from_base = {{1, random_pose()}, {4, random_pose()}};
   const Trajectory two(poses.begin(), poses.begin() + 2);
+  EXPECT_EQ(nodes_of(libmap::assign_nodes(two, graph).poses), (std::vector<int>{1, 4}));
+  EXPECT_EQ(nodes_of(libmap::assign_nodes(poses, graph).poses), (std::vector<int>{1, 2, 4}));
   const libmap::Error error =
       graspmap_test::error_of([&] { libmap::assign_nodes(two, graph_of_nodes()); });
   EXPECT_EQ(error.context().value, "2");

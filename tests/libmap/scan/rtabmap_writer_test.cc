@@ -13,6 +13,8 @@
 #include <vector>
 
 #include "libmap/core/file_output.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 #include "tests/libmap/scan/example_scan.h"
@@ -453,9 +455,8 @@ TEST(CopyWithOptimizedPoses, ChangesNothingElse) {
     EXPECT_TRUE(tables_of(target) == tables_of(source));
     EXPECT_EQ(query(target, "SELECT * FROM sqlite_master"),
               query(source, "SELECT * FROM sqlite_master"));
-    EXPECT_EQ(
-        query(target, "SELECT version, preview_image, opt_cloud, opt_map, time_enter FROM Admin"),
-        query(source, "SELECT version, preview_image, opt_cloud, opt_map, time_enter FROM Admin"));
+    EXPECT_EQ(query(target, "SELECT version, preview_image, time_enter FROM Admin"),
+              query(source, "SELECT version, preview_image, time_enter FROM Admin"));
     EXPECT_EQ(query(target, "PRAGMA integrity_check"), (Rows{{"3:ok"}}));
   }
 }
@@ -474,6 +475,83 @@ TEST(CopyWithOptimizedPoses, MovesTheLastLocalizationWithItsNode) {
   EXPECT_FALSE(localization_after({}));
   EXPECT_EQ(query(scratch("b.db"), "SELECT opt_ids, opt_poses, opt_last_localization FROM Admin"),
             (Rows{{"NULL", "NULL", "NULL"}}));
+}
+
+// What RTAB-Map made with the earlier poses, it would show with the new ones.
+TEST(CopyWithOptimizedPoses, DropsTheStoredMap) {
+  const ExampleScan scan = graspmap_test::example_scan();
+  write_scan(scratch("a.db"), scan);
+  {
+    SQLite::Database database(scratch("a.db").string(), SQLite::OPEN_READWRITE);
+    database.exec(
+        "UPDATE Admin SET preview_image = x'07', opt_cloud = x'01', opt_polygons_size = 3, "
+        "opt_polygons = x'02', opt_tex_coords = x'03', opt_tex_materials = x'04', opt_map = x'05', "
+        "opt_map_x_min = 1, opt_map_y_min = 2, opt_map_resolution = 0.05, "
+        "dictionary_index = x'06'");
+  }
+  libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), other_poses(scan.graph));
+  EXPECT_EQ(query(scratch("b.db"),
+                  "SELECT opt_cloud, opt_polygons_size, opt_polygons, opt_tex_coords, "
+                  "opt_tex_materials, opt_map, opt_map_x_min, opt_map_y_min, opt_map_resolution "
+                  "FROM Admin"),
+            (Rows{std::vector<std::string>(9, "NULL")}));
+  EXPECT_EQ(query(scratch("b.db"), "SELECT preview_image, dictionary_index FROM Admin"),
+            query(scratch("a.db"), "SELECT preview_image, dictionary_index FROM Admin"));
+}
+
+TEST(CopyWithOptimizedPoses, LandmarksMoveWithTheNodeThatSeesThem) {
+  ExampleScan scan = graspmap_test::example_scan();
+  const Pose landmark = graspmap_test::random_float_pose();
+  scan.graph.optimized_map_from_base[-3] = landmark;
+  scan.graph.links.push_back({.from = 9, .to = -3, .type = libmap::LinkType::landmark});
+  // Seen by no node that has a pose.
+  scan.graph.optimized_map_from_base[-4] = landmark;
+  scan.graph.links.push_back({.from = 5, .to = -4, .type = libmap::LinkType::landmark});
+  write_scan(scratch("a.db"), scan);
+  const std::map<int, Pose> poses = other_poses(scan.graph);
+  libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), poses);
+  SQLite::Database database(scratch("b.db").string());
+  const auto matrix = [&](const char* column) {
+    const auto blob = database.execAndGet(std::string("SELECT ") + column + " FROM Admin");
+    return libmap::decode_matrix(
+        {static_cast<const char*>(blob.getBlob()), static_cast<std::size_t>(blob.getBytes())});
+  };
+  const std::vector<int> ids = matrix("opt_ids").values<int>();
+  EXPECT_EQ(ids, (std::vector<int>{-3, 1, 2, 5, 9}));
+  const std::string stored = matrix("opt_poses").bytes;
+  ASSERT_EQ(stored.size(), 5 * 48U);
+  const Pose moved = *libmap::decode_pose(stored.substr(0, 48));
+  const Pose before = scan.graph.optimized_map_from_base.at(9);
+  EXPECT_TRUE((poses.at(9).inverse() * moved).isApprox(before.inverse() * landmark, 1e-5));
+}
+
+// Links and poses as RTAB-Map itself stores them: both directions, inverse transforms, one matrix;
+// sizes and trailers of the blobs as in the database that it wrote.
+TEST(CopyWithOptimizedPoses, NewRowsHaveTheFormOfRealOnes) {
+  GRASPMAP_REQUIRE_DATA();
+  const fs::path source = graspmap_test::data_folder() / "scans" / "site_full.db";
+  const libmap::PoseGraph graph = libmap::RtabmapDatabase(source).graph();
+  libmap::PoseLink link{.from = 1, .to = 17, .type = libmap::LinkType::local_space_closure};
+  link.from_from_to = graspmap_test::random_float_pose();
+  link.information(0, 5) = link.information(5, 0) = 0.25;
+  libmap::copy_with_optimized_poses(source, scratch("b.db"), graph.optimized_map_from_base, {link});
+  // The same ids and poses: the same matrices, whatever the compression made of them.
+  const char* trailers =
+      "SELECT hex(substr(opt_ids, -12)), hex(substr(opt_poses, -12)), "
+      "typeof(opt_last_localization), length(opt_last_localization) FROM Admin";
+  EXPECT_EQ(query(scratch("b.db"), trailers), query(source, trailers));
+  const std::string form =
+      "SELECT DISTINCT typeof(from_id), typeof(to_id), typeof(type), typeof(information_matrix), "
+      "length(information_matrix), typeof(transform), length(transform), typeof(user_data) "
+      "FROM Link";
+  EXPECT_EQ(query(scratch("b.db"), form), query(source, form));
+  const std::string added =
+      " FROM Link WHERE (from_id = 1 AND to_id = 17) OR "
+      "(from_id = 17 AND to_id = 1)";
+  EXPECT_EQ(query(source, "SELECT COUNT(*)" + added), (Rows{{"1:0"}}));
+  EXPECT_EQ(query(scratch("b.db"), "SELECT COUNT(*), COUNT(DISTINCT information_matrix)" + added),
+            (Rows{{"1:2", "1:1"}}));
+  EXPECT_EQ(query(scratch("b.db"), "PRAGMA foreign_key_check"), Rows{});
 }
 
 TEST(CopyWithOptimizedPoses, DropsALocalizationThatStandsNowhere) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <clocale>
 #include <cmath>
 #include <string>
@@ -105,7 +106,11 @@ TEST(TumText, NamesTheLineThatIsNoPose) {
                                           "1 0 0 0 0 0 0 0",
                                           "1 0 0 0 0 0 0 2",
                                           "1 0 0 0 0 0 0 1 1.5",
-                                          "1 0 0 0 0 0 0 1 99999999999"};
+                                          "1 0 0 0 0 0 0 1 99999999999",
+                                          "1 1e300 0 0 0 0 0 1",
+                                          "1 0 -2e8 0 0 0 0 1",
+                                          "1 0 0 0 0 0 0 1.06",
+                                          "1e999 0 0 0 0 0 0 1"};
   for (const std::string& line : lines) {
     SCOPED_TRACE(line);
     const libmap::Error error =
@@ -113,6 +118,15 @@ TEST(TumText, NamesTheLineThatIsNoPose) {
     EXPECT_EQ(error.context().file, "poses.tum");
     EXPECT_EQ(error.context().field, "line 7");
   }
+}
+
+TEST(TumText, NamesTheLineWhoseNodeStandsTwice) {
+  const std::string pose = " 0 0 0 0 0 0 1 ";
+  const libmap::Error error = graspmap_test::error_of([&] {
+    libmap::parse_tum("1" + pose + "4\r\n\r\n2" + pose + "5\r\n3" + pose + "4\r\n", "poses.tum");
+  });
+  EXPECT_EQ(error.context().field, "line 4");
+  EXPECT_EQ(error.context().value, "node 4");
 }
 
 TEST(TumText, DoesNotFollowTheLocale) {
@@ -258,6 +272,128 @@ TEST(G2oText, NamesTheLineThatIsBroken) {
   }
   const std::string vertex = "VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1\n";
   EXPECT_THROW(libmap::parse_g2o(vertex + vertex, "links.g2o"), libmap::Error);
+}
+
+TEST(ToroText, ReadsWhatIsWrittenByHand) {
+  // A quarter turn about z, and one about x after it; as RTAB-Map writes it, with six decimals.
+  const libmap::PoseGraphText read = libmap::parse_toro(
+      "VERTEX3 1 0.000000 0.000000 0.000000 0.000000 -0.000000 1.570796\r\n"
+      "VERTEX3 4 1.5 2 3 1.5707963267948966 0 1.5707963267948966\r\n"
+      "EDGE3 1 4 1 2 3 0 0 0 11 12 13 14 15 16 22 23 24 25 26 33 34 35 36 44 45 46 55 56 66\r\n",
+      "poses.toro");
+  ASSERT_EQ(read.poses.size(), 2U);
+  EXPECT_EQ(read.poses[1].node, 4);
+  EXPECT_EQ(read.poses[1].world_from_base.translation(), Eigen::Vector3d(1.5, 2.0, 3.0));
+  const Eigen::Vector3d x = read.poses[0].world_from_base.linear() * Eigen::Vector3d::UnitX();
+  EXPECT_TRUE(x.isApprox(Eigen::Vector3d::UnitY(), 1e-6));
+  // R = Rz Ry Rx: y goes to z, x to y.
+  const Pose& turned = read.poses[1].world_from_base;
+  EXPECT_TRUE(
+      (turned.linear() * Eigen::Vector3d::UnitY()).isApprox(Eigen::Vector3d::UnitZ(), 1e-12));
+  EXPECT_TRUE(
+      (turned.linear() * Eigen::Vector3d::UnitX()).isApprox(Eigen::Vector3d::UnitY(), 1e-12));
+  ASSERT_EQ(read.links.size(), 1U);
+  EXPECT_EQ(read.links[0].type, LinkType::neighbor);
+  for (int row = 0; row < 6; ++row)
+    for (int column = 0; column < 6; ++column)
+      EXPECT_EQ(read.links[0].information(row, column),
+                10 * (std::min(row, column) + 1) + std::max(row, column) + 1);
+}
+
+TEST(ToroText, KeepsPosesAndEdges) {
+  Trajectory poses = random_trajectory();
+  // Where yaw and roll turn about the same axis.
+  for (const double pitch : {90.0, -90.0, 89.9999999})
+    poses.push_back({static_cast<int>(poses.size()) + 1, 0.0,
+                     libmap::make_pose_from_rpy({1, 2, 3}, {33.0, pitch, -17.0})});
+  const std::vector<libmap::PoseLink> links = links_of_every_type();
+  const std::string text = libmap::to_toro(poses, links);
+  EXPECT_EQ(text.find('#'), std::string::npos);  // RTAB-Map's reader ends at a comment
+  const libmap::PoseGraphText read = libmap::parse_toro(text, "poses.toro");
+  ASSERT_EQ(read.poses.size(), poses.size());
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    EXPECT_EQ(read.poses[i].node, poses[i].node);
+    EXPECT_EQ(read.poses[i].world_from_base.translation(), poses[i].world_from_base.translation());
+    EXPECT_TRUE(read.poses[i].world_from_base.isApprox(poses[i].world_from_base, 1e-14)) << i;
+  }
+  std::size_t next = 0;
+  for (const libmap::PoseLink& link : links) {
+    if (link.from == link.to || link.to < 0) continue;
+    ASSERT_LT(next, read.links.size());
+    EXPECT_EQ(read.links[next].from, link.from);
+    EXPECT_EQ(read.links[next].to, link.to);
+    EXPECT_TRUE(read.links[next].from_from_to.isApprox(link.from_from_to, 1e-14));
+    for (int row = 0; row < 6; ++row)
+      for (int column = row; column < 6; ++column)
+        EXPECT_EQ(read.links[next].information(row, column), link.information(row, column));
+    ++next;
+  }
+  EXPECT_EQ(next, read.links.size());
+}
+
+TEST(ToroText, NamesTheLineThatIsBroken) {
+  for (const char* line : {"VERTEX3 1 0 0 0 0 0", "VERTEX3 1 0 0 0 0 0 nan", "VERTEX2 1 0 0 0",
+                           "EDGE3 1 2 0 0 0 0 0 0 1 1", "VERTEX3 1 2e9 0 0 0 0 0"}) {
+    SCOPED_TRACE(line);
+    const libmap::Error error =
+        graspmap_test::error_of([&] { libmap::parse_toro(with_line(3, line), "poses.toro"); });
+    EXPECT_EQ(error.context().file, "poses.toro");
+    EXPECT_EQ(error.context().field, "line 3");
+  }
+}
+
+// What a step of 1 m to each side becomes. z of the optical axes is x of ours, x is -y, y is -z.
+TEST(PoseAxes, OpticalOnesTurnTheWorldAndTheBase) {
+  using libmap::PoseAxes;
+  const Pose step = libmap::make_pose({1, 2, 3}, Eigen::Quaterniond::Identity());
+  const Pose turned = libmap::to_axes(PoseAxes::optical, step);
+  EXPECT_TRUE(turned.translation().isApprox(Eigen::Vector3d(-2, -3, 1), 1e-15));
+  EXPECT_TRUE(turned.linear().isIdentity(1e-15));
+  // To the left about z (up) is about -y of the optical axes.
+  const Pose left = libmap::make_pose_from_rpy({0, 0, 0}, {0, 0, 30});
+  EXPECT_TRUE(libmap::to_axes(PoseAxes::optical, left)
+                  .isApprox(libmap::make_pose_from_rpy({0, 0, 0}, {0, -30, 0}), 1e-14));
+}
+
+// Worked out by hand from importPoses of RTAB-Map: P = A O Q O^-1, where A takes (x, y, z) to
+// (z, -y, x) and O to (z, -x, -y).
+TEST(PoseAxes, MotionCaptureTurnsTheWorldOnceMore) {
+  using libmap::PoseAxes;
+  const Pose in_file = libmap::make_pose({1, 2, 3}, Eigen::Quaterniond::Identity());
+  const Pose pose = libmap::from_axes(PoseAxes::motion_capture, in_file);
+  // O (1, 2, 3) = (3, -1, -2); A of that = (-2, 1, 3).
+  EXPECT_TRUE(pose.translation().isApprox(Eigen::Vector3d(-2, 1, 3), 1e-15));
+  Eigen::Matrix3d a;
+  a << 0, 0, 1, 0, -1, 0, 1, 0, 0;
+  EXPECT_TRUE(pose.linear().isApprox(a, 1e-15));
+  EXPECT_FALSE(libmap::from_axes(PoseAxes::optical, in_file).isApprox(pose, 0.1));
+}
+
+TEST(PoseAxes, ThereAndBack) {
+  for (const auto axes :
+       {libmap::PoseAxes::map, libmap::PoseAxes::optical, libmap::PoseAxes::motion_capture}) {
+    const Pose pose = random_pose();
+    EXPECT_TRUE(libmap::from_axes(axes, libmap::to_axes(axes, pose)).isApprox(pose, 1e-14));
+  }
+}
+
+TEST(RecognisePoses, ByTagOrColumns) {
+  using libmap::PoseTextFormat;
+  const auto format = [](const std::string& text) {
+    return libmap::recognise_poses("\xEF\xBB\xBF# 1 2 3\r\n\r\n" + text + "\n", "poses.txt");
+  };
+  EXPECT_EQ(format("1 0 0 0 0 0 0 1"), PoseTextFormat::tum);
+  EXPECT_EQ(format("1,0,0,0,0,0,0,1,7"), PoseTextFormat::tum);
+  EXPECT_EQ(format("1 0 0 0 0 1 0 0 0 0 1 0"), PoseTextFormat::kitti);
+  EXPECT_EQ(format("VERTEX3 1 0 0 0 0 0 0"), PoseTextFormat::toro);
+  EXPECT_EQ(format("EDGE2 1 2 0 0 0"), PoseTextFormat::toro);
+  EXPECT_EQ(format("VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1"), PoseTextFormat::g2o);
+  EXPECT_EQ(format("PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1"), PoseTextFormat::g2o);
+  EXPECT_EQ(format("FIX 1"), PoseTextFormat::g2o);
+  const libmap::Error error = graspmap_test::error_of([&] { format("1 2 3 4 5 6 7"); });
+  EXPECT_EQ(error.context().field, "line 3");
+  EXPECT_EQ(error.context().value, "7 columns");
+  EXPECT_THROW(format(""), libmap::Error);
 }
 
 }  // namespace

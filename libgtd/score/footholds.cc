@@ -1,0 +1,197 @@
+#include "libgtd/score/footholds.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "libgtd/shape/curvature.h"
+#include "libgtd/shape/point_grid.h"
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+
+namespace libgtd {
+
+namespace {
+
+using libmap::PointCloud;
+using libmap::ScalarField;
+
+constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+
+void check(const FootholdOptions& options, const FootholdFrame& frame) {
+  FootholdOptions copy = options;
+  libmap::ParameterTable table;
+  bind(table, copy);
+  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  if (!(frame.up.norm() > 0.0) || !frame.up.allFinite())
+    throw libmap::Error("has no length", {.field = "up"});
+}
+
+const std::vector<double>& values_of(const PointCloud& map, const char* name) {
+  if (const ScalarField* field = map.find_field(name)) return field->values;
+  throw libmap::Error("the map has no such field", {.field = name});
+}
+
+// Calls use(index) for the points within `radius_m` of `place`, which is at most a cell's edge.
+template <typename Use>
+void for_each_near(const PointGrid& grid, const std::vector<Eigen::Vector3d>& positions,
+                   const Eigen::Vector3d& place, double radius_m,
+                   std::vector<PointGrid::Range>& runs, const Use& use) {
+  grid.find_near(grid.cell_of(place), 1, runs);
+  for (const PointGrid::Range& run : runs)
+    for (std::uint32_t n = run.first; n < run.last; ++n) {
+      const std::uint32_t point = grid.order()[n];
+      if ((positions[point] - place).squaredNorm() <= radius_m * radius_m) use(point);
+    }
+}
+
+class FootholdSearch {
+ public:
+  FootholdSearch(const PointCloud& map, const FootholdOptions& options, const FootholdFrame& frame)
+      : map_(map),
+        options_(options),
+        up_(frame.up.normalized()),
+        scores_(values_of(map, "score")),
+        grid_(map.positions, options.separation_m) {}
+
+  FootholdResult run() {
+    std::vector<Foothold> candidates = find_candidates();
+    FootholdResult result;
+    result.candidates = candidates.size();
+    std::sort(candidates.begin(), candidates.end(), [](const Foothold& a, const Foothold& b) {
+      if (a.score != b.score) return a.score > b.score;
+      if (a.mean_score != b.mean_score) return a.mean_score > b.mean_score;
+      return a.map_point < b.map_point;
+    });
+    std::vector<std::uint8_t> suppressed(map_.size(), 0);
+    std::vector<PointGrid::Range> runs;
+    for (const Foothold& candidate : candidates) {
+      if (suppressed[candidate.map_point] != 0) continue;
+      if (options_.max_count > 0 &&
+          result.footholds.size() == static_cast<std::size_t>(options_.max_count))
+        break;
+      result.footholds.push_back(candidate);
+      for_each_near(grid_, map_.positions, map_.positions[candidate.map_point],
+                    options_.separation_m, runs,
+                    [&](std::uint32_t point) { suppressed[point] = 1; });
+    }
+    describe_surface(result.footholds);
+    return result;
+  }
+
+ private:
+  std::vector<Foothold> find_candidates() const {
+    const std::vector<double>* graspable =
+        map_.find_field("graspable") != nullptr || options_.graspable_only
+            ? &values_of(map_, "graspable")
+            : nullptr;
+    const std::vector<double>* edge = options_.edges ? nullptr : &values_of(map_, "edge");
+    std::vector<Foothold> candidates;
+    for (std::size_t n = 0; n < map_.size(); ++n) {
+      if (!map_.positions[n].allFinite() || !(scores_[n] >= options_.min_score)) continue;
+      if (options_.graspable_only && (*graspable)[n] == 0.0) continue;
+      if (edge != nullptr && (*edge)[n] != 0.0) continue;
+      Foothold& candidate = candidates.emplace_back();
+      candidate.map_point = n;
+      candidate.score = scores_[n];
+      candidate.approach = -up_;
+    }
+    libmap::parallel_for(candidates.size(), 256, [&](std::size_t begin, std::size_t end) {
+      std::vector<PointGrid::Range> runs;
+      for (std::size_t c = begin; c < end; ++c) look_around(candidates[c], graspable, runs);
+    });
+    return candidates;
+  }
+
+  void look_around(Foothold& foothold, const std::vector<double>* graspable,
+                   std::vector<PointGrid::Range>& runs) const {
+    const double radius_m = 0.5 * options_.separation_m;
+    const Eigen::Vector3d& place = map_.positions[foothold.map_point];
+    double sum = 0.0;
+    double weights = 0.0;
+    for_each_near(grid_, map_.positions, place, radius_m, runs, [&](std::uint32_t point) {
+      if (!std::isfinite(scores_[point])) return;
+      const double share = (map_.positions[point] - place).squaredNorm() / (radius_m * radius_m);
+      sum += (1.0 - share) * scores_[point];
+      weights += 1.0 - share;
+      if (graspable != nullptr && (*graspable)[point] != 0.0) ++foothold.graspable_points;
+    });
+    foothold.mean_score = sum / weights;
+  }
+
+  void describe_surface(std::vector<Foothold>& footholds) const {
+    std::vector<std::size_t> places;
+    places.reserve(footholds.size());
+    for (const Foothold& foothold : footholds) places.push_back(foothold.map_point);
+    PointCloud surface;  // without what the map may hold else
+    surface.positions = map_.positions;
+    const CurvatureResult shape = estimate_curvature(
+        surface,
+        {.method = CurvatureMethod::corrected, .radius_m = options_.surface_radius_m, .up = up_},
+        places);
+    for (std::size_t n = 0; n < footholds.size(); ++n) {
+      const Curvature& here = shape.points[n];
+      footholds[n].normal = here.normal;
+      footholds[n].k1 = here.k1;
+      footholds[n].k2 = here.k2;
+      const double cosine = here.normal.cast<double>().dot(up_);
+      footholds[n].slope_deg =
+          here.valid ? std::acos(std::clamp(cosine, -1.0, 1.0)) * 180.0 / M_PI : nan;
+    }
+  }
+
+  const PointCloud& map_;
+  const FootholdOptions& options_;
+  Eigen::Vector3d up_;
+  const std::vector<double>& scores_;
+  PointGrid grid_;
+};
+
+}  // namespace
+
+void bind(libmap::ParameterTable& table, FootholdOptions& options) {
+  table.add("separation_m", options.separation_m, libmap::positive,
+            "no two footholds lie nearer to each other, m");
+  table.add("min_score", options.min_score, libmap::zero_to_one, "least score of a foothold");
+  table.add("graspable_only", options.graspable_only,
+            "only where the map's threshold, zero plane and convexity hold");
+  table.add("edges", options.edges, "also where the mask's window leaves the scanned area");
+  table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
+            "radius in which the surface's normal and curvatures are fitted, m");
+  table.add("max_count", options.max_count, libmap::not_negative,
+            "the best footholds alone; 0 for all");
+}
+
+FootholdResult find_footholds(const PointCloud& map, const FootholdOptions& options,
+                              const FootholdFrame& frame) {
+  check(options, frame);
+  if (map.empty()) throw libmap::Error("the map has no points");
+  return FootholdSearch(map, options, frame).run();
+}
+
+PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
+  std::vector<std::size_t> points;
+  for (const Foothold& foothold : result.footholds) points.push_back(foothold.map_point);
+  PointCloud cloud = libmap::select_points(map, points);
+  cloud.normals.clear();
+  for (const Foothold& foothold : result.footholds) cloud.normals.push_back(foothold.normal);
+  const auto add = [&](const char* name, const auto& value_of) {
+    std::vector<double>& values = cloud.add_field(name, libmap::ScalarType::float32).values;
+    for (std::size_t n = 0; n < values.size(); ++n)
+      values[n] = static_cast<double>(value_of(result.footholds[n]));
+  };
+  add("mean_score", [](const Foothold& f) { return f.mean_score; });
+  add("graspable_points", [](const Foothold& f) { return f.graspable_points; });
+  add("approach_x", [](const Foothold& f) { return f.approach.x(); });
+  add("approach_y", [](const Foothold& f) { return f.approach.y(); });
+  add("approach_z", [](const Foothold& f) { return f.approach.z(); });
+  add("slope_deg", [](const Foothold& f) { return f.slope_deg; });
+  add("k1", [](const Foothold& f) { return f.k1; });
+  add("k2", [](const Foothold& f) { return f.k2; });
+  return cloud;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,18 @@
+// Fewer points of a map for pictures of large ones.
+#pragma once
+
+#include "libgtd/score/tile_store.h"
+#include "libmap/core/point_cloud.h"
+
+namespace libgtd {
+
+// One point for each square of `width` x `width` columns of the lattice that holds any: the
+// uppermost of the column nearest to the square's middle, with its own values, so that each value
+// is about as frequent as among all points. Ascending by square. Thinning parts and then their
+// union gives what thinning the union at once gives. `map` is made by to_cloud.
+libmap::PointCloud thin_map(const libmap::PointCloud& map, int width);
+
+// Moves each point, level, to the middle of its square: to a lattice again.
+void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
+
+}  // namespace libgtd

@@ -1,0 +1,57 @@
+#include "libgtd/score/tile_store.h"
+
+#include <algorithm>
+#include <array>
+
+#include "libmap/core/error.h"
+
+namespace libgtd {
+
+TileNumber tile_of(const Voxel& voxel, int tile_voxels) {
+  return {floor_divide(voxel.i, tile_voxels), floor_divide(voxel.j, tile_voxels)};
+}
+
+TileBounds columns_of(const TileNumber& tile, int tile_voxels) {
+  return {tile.i * tile_voxels, (tile.i + 1) * tile_voxels, tile.j * tile_voxels,
+          (tile.j + 1) * tile_voxels};
+}
+
+std::string tile_file_of(const TileNumber& tile) {
+  return "tiles/" + std::to_string(tile.i) + "_" + std::to_string(tile.j) + ".pcd";
+}
+
+libmap::Pose TileStoreIndex::terrain_from_input() const {
+  const libmap::Pose* pose = manifest.find_transform("terrain_from_input");
+  return pose == nullptr ? libmap::Pose::Identity() : *pose;
+}
+
+const StoredTile* TileStoreIndex::find(const TileNumber& tile) const {
+  const auto found = std::lower_bound(
+      tiles.begin(), tiles.end(), tile,
+      [](const StoredTile& one, const TileNumber& number) { return one.number < number; });
+  return found != tiles.end() && found->number == tile ? &*found : nullptr;
+}
+
+std::uint64_t TileStoreIndex::voxels() const {
+  std::uint64_t count = 0;
+  for (const StoredTile& tile : tiles) count += tile.voxels;
+  return count;
+}
+
+void restore_positions(const TileStoreIndex& index, libmap::PointCloud& tile) {
+  const std::array<const libmap::ScalarField*, 3> fields = {
+      tile.find_field("i"), tile.find_field("j"), tile.find_field("k")};
+  for (const libmap::ScalarField* field : fields)
+    if (field == nullptr)
+      throw libmap::Error("is no tile of a map: the fields i, j and k are not all there");
+  const libmap::Pose input_from_terrain = index.terrain_from_input().inverse();
+  for (std::size_t n = 0; n < tile.size(); ++n) {
+    const Voxel voxel{static_cast<int>(fields[0]->values[n]),
+                      static_cast<int>(fields[1]->values[n]),
+                      static_cast<int>(fields[2]->values[n])};
+    const Eigen::Vector3d center = index.lattice.center_of(voxel);
+    tile.positions[n] = index.frame == MapFrame::input ? input_from_terrain * center : center;
+  }
+}
+
+}  // namespace libgtd

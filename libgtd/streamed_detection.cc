@@ -1,0 +1,232 @@
+#include "libgtd/streamed_detection.h"
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "libgtd/tile_detection.h"
+#include "libmap/core/error.h"
+
+namespace libgtd {
+
+namespace {
+
+using libmap::PointCloud;
+
+TileBounds cut(const TileBounds& a, const TileBounds& b) {
+  return {std::max(a.i_begin, b.i_begin), std::min(a.i_end, b.i_end),
+          std::max(a.j_begin, b.j_begin), std::min(a.j_end, b.j_end)};
+}
+
+bool is_empty(const TileBounds& columns) {
+  return columns.i_begin >= columns.i_end || columns.j_begin >= columns.j_end;
+}
+
+// Tiles that lie together, worked on at once.
+struct Block {
+  std::vector<TileNumber> tiles;
+  TileBounds columns;  // around all of them, cut to the terrain's box
+};
+
+class StreamedDetection {
+ public:
+  StreamedDetection(const TerrainFrame& frame, const NearbyPoints& points,
+                    const DetectionOptions& options, const StreamingOptions& streaming)
+      : frame_(frame),
+        points_(points),
+        scenario_(options.scenario),
+        max_points_(std::max<std::size_t>(streaming.max_points, 1)),
+        mask_(make_gripper_mask(options.gripper, {scenario_.method, scenario_.voxel_size_m,
+                                                  scenario_.extra_void_layers})),
+        tile_voxels_(tile_voxels(scenario_)),
+        halo_(halo_voxels(mask_, scenario_)) {}
+
+  // Halves a run of tiles until each part's points are few enough.
+  void run(std::vector<TileNumber> tiles,
+           const std::function<void(std::vector<StreamedTile>)>& visit,
+           libmap::Progress& progress) {
+    const Block block = block_of(std::move(tiles));
+    if (block.tiles.size() > 1 && !is_small(block.columns)) {
+      auto [first, second] = halves(block);
+      run(std::move(first), visit, progress);
+      run(std::move(second), visit, progress);
+      return;
+    }
+    std::map<TileNumber, StreamedTile> results;
+    for (const TileNumber& tile : block.tiles) results[tile].number = tile;
+    detect_columns(block.columns, block.tiles, results);
+    std::vector<StreamedTile> done;
+    for (auto& [number, tile] : results) {
+      const auto is_before = [](const MapVoxel& a, const MapVoxel& b) { return a.voxel < b.voxel; };
+      // Parts of a tile come one after the other.
+      if (!std::is_sorted(tile.voxels.begin(), tile.voxels.end(), is_before))
+        std::sort(tile.voxels.begin(), tile.voxels.end(), is_before);
+      done.push_back(std::move(tile));
+    }
+    const std::size_t count = done.size();
+    visit(std::move(done));
+    progress.advance(count);
+  }
+
+ private:
+  TileBounds columns_of_tile(const TileNumber& tile) const {
+    const TileBounds box{frame_.min.i, frame_.max.i + 1, frame_.min.j, frame_.max.j + 1};
+    return cut(columns_of(tile, tile_voxels_), box);
+  }
+
+  Block block_of(std::vector<TileNumber> tiles) const {
+    Block block{.tiles = std::move(tiles), .columns = {}};
+    block.columns = columns_of_tile(block.tiles.front());
+    for (const TileNumber& tile : block.tiles) {
+      const TileBounds one = columns_of_tile(tile);
+      block.columns = {
+          std::min(block.columns.i_begin, one.i_begin), std::max(block.columns.i_end, one.i_end),
+          std::min(block.columns.j_begin, one.j_begin), std::max(block.columns.j_end, one.j_end)};
+    }
+    return block;
+  }
+
+  bool is_small(const TileBounds& columns) const {
+    const PointsRectangle places = points_for(columns, frame_, halo_);
+    return points_.count_in(places.low, places.high) <= max_points_;
+  }
+
+  // Cut across the longer side, between tiles.
+  static std::pair<std::vector<TileNumber>, std::vector<TileNumber>> halves(const Block& block) {
+    const auto by_i = [](const TileNumber& tile) { return tile.i; };
+    const auto by_j = [](const TileNumber& tile) { return tile.j; };
+    const auto cut_by = [&](const auto& of) {
+      const auto [least, most] = std::minmax_element(
+          block.tiles.begin(), block.tiles.end(),
+          [&](const TileNumber& a, const TileNumber& b) { return of(a) < of(b); });
+      const int middle = of(*least) + (of(*most) - of(*least)) / 2;
+      std::pair<std::vector<TileNumber>, std::vector<TileNumber>> parts;
+      for (const TileNumber& tile : block.tiles)
+        (of(tile) <= middle ? parts.first : parts.second).push_back(tile);
+      return parts;
+    };
+    const TileBounds& columns = block.columns;
+    const bool is_high = columns.i_end - columns.i_begin > columns.j_end - columns.j_begin;
+    auto parts = is_high ? cut_by(by_i) : cut_by(by_j);
+    if (parts.second.empty()) parts = is_high ? cut_by(by_j) : cut_by(by_i);
+    return parts;
+  }
+
+  // A rectangle with too many points is halved as well, while it is wider than its halo.
+  void detect_columns(const TileBounds& columns, const std::vector<TileNumber>& tiles,
+                      std::map<TileNumber, StreamedTile>& results) const {
+    const int height = columns.i_end - columns.i_begin;
+    const int width = columns.j_end - columns.j_begin;
+    const int longer = std::max(height, width);
+    if (longer > std::max(halo_, 1) && !is_small(columns)) {
+      TileBounds first = columns;
+      TileBounds second = columns;
+      if (height >= width)
+        first.i_end = second.i_begin = columns.i_begin + height / 2;
+      else
+        first.j_end = second.j_begin = columns.j_begin + width / 2;
+      detect_columns(first, tiles, results);
+      detect_columns(second, tiles, results);
+      return;
+    }
+    std::vector<TileBounds> parts;
+    for (const TileNumber& tile : tiles) {
+      const TileBounds part = cut(columns_of_tile(tile), columns);
+      if (!is_empty(part)) parts.push_back(part);
+    }
+    const PointsRectangle places = points_for(columns, frame_, halo_);
+    const PointCloud cloud = points_.points_in(places.low, places.high);
+    VoxelGrid grid = voxelize(cloud.positions, scenario_.voxel_size_m);
+    grid.min = frame_.min;
+    grid.max = frame_.max;
+    const TileDetectionResult found =
+        detect_tiles(cloud, grid, mask_, parts, CurvatureAt::points_near_tiles, scenario_);
+    for (const MapVoxel& voxel : found.voxels)
+      results.at(tile_of(voxel.voxel, tile_voxels_)).voxels.push_back(voxel);
+    for (const TileBounds& part : parts)
+      visit_rows(grid, part, [&](std::size_t first, std::size_t last) {
+        results.at(tile_of(grid.voxels[first], tile_voxels_)).occupied_voxels += last - first;
+      });
+  }
+
+  const TerrainFrame& frame_;
+  const NearbyPoints& points_;
+  const Scenario& scenario_;
+  std::size_t max_points_;
+  GripperMask mask_;
+  int tile_voxels_;
+  int halo_;
+};
+
+}  // namespace
+
+void require_streamable(const DetectionOptions& options) {
+  const Method method = options.scenario.method;
+  if (follows_thesis(method))
+    throw libmap::Error("needs the whole cloud in memory: write a map in one file, MAP.pcd",
+                        {.field = "method", .value = name_of(method)});
+  if (options.scenario.interpolation)
+    throw libmap::Error("needs the whole cloud in memory: write a map in one file, MAP.pcd",
+                        {.field = "interpolation", .value = "true"});
+}
+
+TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options) {
+  TerrainFrame frame;
+  if (options.plane == PlaneSource::fit)
+    frame.plane = fit_regression_plane(points, {.up = options.up});
+  std::optional<libmap::Bounds3d> box;
+  const auto positions = libmap::PointStream::Need::positions;
+  points.for_each_block(positions, [&](const PointCloud& block) {
+    if (block.empty()) return;
+    const libmap::Bounds3d part = libmap::bounds_of(to_terrain(block, frame).positions);
+    if (!box) box = part;
+    box->min = box->min.cwiseMin(part.min);
+    box->max = box->max.cwiseMax(part.max);
+  });
+  if (!box) throw libmap::Error("the cloud has no points");
+  const VoxelGrid corners = voxelize({box->min, box->max}, options.scenario.voxel_size_m);
+  frame.lattice = corners.lattice;
+  frame.min = corners.min;
+  frame.max = corners.max;
+  return frame;
+}
+
+PointCloud to_terrain(const PointCloud& block, const TerrainFrame& frame) {
+  return frame.plane ? transform_to_terrain(block, *frame.plane, PlaneMethod::corrected) : block;
+}
+
+std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
+                                 const TileShare& share) {
+  VoxelGrid box;
+  box.lattice = frame.lattice;
+  box.min = frame.min;
+  box.max = frame.max;
+  box.voxels = {frame.min, frame.max};
+  std::vector<TileNumber> numbers;
+  for (const TileBounds& tile : share_of(make_tiles(box, tile_voxels), share))
+    numbers.push_back(tile_of({tile.i_begin, tile.j_begin, 0}, tile_voxels));
+  return numbers;
+}
+
+PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels) {
+  // A voxel more, against rounding.
+  const double margin = 1.0 + halo_voxels;
+  const double size = frame.lattice.voxel_size_m;
+  const Eigen::Vector2d origin = frame.lattice.origin_m.head<2>();
+  return {origin + size * Eigen::Vector2d(columns.i_begin - margin, columns.j_begin - margin),
+          origin + size * Eigen::Vector2d(columns.i_end + margin, columns.j_end + margin)};
+}
+
+void detect_streamed(const TerrainFrame& frame, const NearbyPoints& points,
+                     const std::vector<TileNumber>& wanted, const DetectionOptions& options,
+                     const std::function<void(std::vector<StreamedTile>)>& visit,
+                     libmap::Progress& progress, const StreamingOptions& streaming) {
+  require_streamable(options);
+  if (wanted.empty()) return;
+  StreamedDetection detection(frame, points, options, streaming);
+  progress.begin("tiles", wanted.size());
+  detection.run(wanted, visit, progress);
+  progress.end();
+}
+
+}  // namespace libgtd

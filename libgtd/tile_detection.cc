@@ -1,0 +1,201 @@
+#include "libgtd/tile_detection.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <numeric>
+
+#include "libgtd/score/scoring.h"
+#include "libgtd/shape/convexity.h"
+#include "libgtd/shape/curvature.h"
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+using libmap::PointCloud;
+
+template <typename Step>
+auto timed(TileDetectionResult& result, const char* name, const Step& step) {
+  const auto start = std::chrono::steady_clock::now();
+  auto value = step();
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  result.timings_s.emplace_back(name, taken.count());
+  return value;
+}
+
+CurvatureMethod curvature_method(const Scenario& scenario) {
+  return follows_thesis(scenario.method) ? CurvatureMethod::thesis : CurvatureMethod::corrected;
+}
+
+// How far off the points lie that decide on the curvature at a point: PCL's looks at the normals
+// of its neighbours, which have neighbours of their own.
+double curvature_reach_m(const Scenario& scenario) {
+  const double reach = scenario.curvature_radius_m * (1 + 1e-6);
+  return curvature_method(scenario) == CurvatureMethod::thesis ? 2 * reach : reach;
+}
+
+// The columns of each of the tiles grown by `margin_m` and a voxel more.
+class TilesWithMargin {
+ public:
+  TilesWithMargin(const VoxelLattice& lattice, const std::vector<TileBounds>& tiles,
+                  double margin_m)
+      : lattice_(lattice), tiles_(tiles), margin_(margin_m / lattice.voxel_size_m + 1.0) {
+    double cells = 0.0;
+    box_ = tiles.empty() ? TileBounds{} : tiles.front();
+    for (const TileBounds& tile : tiles) {
+      cells += static_cast<double>(tile.i_end - tile.i_begin) * (tile.j_end - tile.j_begin);
+      box_ = {std::min(box_.i_begin, tile.i_begin), std::max(box_.i_end, tile.i_end),
+              std::min(box_.j_begin, tile.j_begin), std::max(box_.j_end, tile.j_end)};
+    }
+    fill_box_ =
+        cells == static_cast<double>(box_.i_end - box_.i_begin) * (box_.j_end - box_.j_begin);
+  }
+
+  bool hold(const Eigen::Vector3d& point) const {
+    const Eigen::Vector3d cell = lattice_.cell_of(point);
+    if (!holds(box_, cell)) return false;
+    if (fill_box_) return !tiles_.empty();
+    // Neighbouring points lie in the same tile mostly.
+    if (last_ < tiles_.size() && holds(tiles_[last_], cell)) return true;
+    for (last_ = 0; last_ < tiles_.size(); ++last_)
+      if (holds(tiles_[last_], cell)) return true;
+    return false;
+  }
+
+ private:
+  bool holds(const TileBounds& tile, const Eigen::Vector3d& cell) const {
+    return cell.x() >= tile.i_begin - margin_ && cell.x() <= tile.i_end + margin_ &&
+           cell.y() >= tile.j_begin - margin_ && cell.y() <= tile.j_end + margin_;
+  }
+
+  const VoxelLattice& lattice_;
+  const std::vector<TileBounds>& tiles_;
+  double margin_;
+  TileBounds box_;         // around all tiles
+  bool fill_box_ = false;  // whether they leave no gap in it
+  mutable std::size_t last_ = 0;
+};
+
+std::vector<std::size_t> points_within(const PointCloud& cloud, const VoxelLattice& lattice,
+                                       const std::vector<TileBounds>& tiles, double margin_m) {
+  const TilesWithMargin places(lattice, tiles, margin_m);
+  std::vector<std::size_t> within;
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (places.hold(cloud.positions[n])) within.push_back(n);
+  return within;
+}
+
+// The convex ones of the points `queries`.
+std::vector<Eigen::Vector3d> convex_among(const PointCloud& cloud,
+                                          const std::optional<std::vector<std::size_t>>& queries,
+                                          const Scenario& scenario, TileDetectionResult& result) {
+  const CurvatureResult curvature = estimate_curvature(
+      cloud, {.method = curvature_method(scenario), .radius_m = scenario.curvature_radius_m},
+      queries);
+  std::vector<Eigen::Vector3d> queried;
+  if (queries)
+    for (const std::size_t n : *queries) queried.push_back(cloud.positions[n]);
+  const std::vector<Eigen::Vector3d>& positions = queries ? queried : cloud.positions;
+  const std::vector<std::uint8_t> convex =
+      find_convex(curvature, positions, {.zero_plane_m = scenario.zero_plane_m});
+  std::vector<Eigen::Vector3d> convex_points;
+  for (std::size_t n = 0; n < positions.size(); ++n)
+    if (convex[n] != 0) convex_points.push_back(positions[n]);
+  result.curvature_points = positions.size();
+  result.convex_points = convex_points.size();
+  return convex_points;
+}
+
+std::vector<Eigen::Vector3d> find_convex_points(const PointCloud& terrain,
+                                                const VoxelLattice& lattice,
+                                                const std::vector<TileBounds>& tiles,
+                                                CurvatureAt curvature_at, const Scenario& scenario,
+                                                TileDetectionResult& result) {
+  if (curvature_at == CurvatureAt::all_points)
+    return convex_among(terrain, std::nullopt, scenario, result);
+  const double margin_m = scenario.intersection_distance_m;
+  const PointCloud nearby = libmap::select_points(
+      terrain, points_within(terrain, lattice, tiles, margin_m + curvature_reach_m(scenario)));
+  return convex_among(nearby, points_within(nearby, lattice, tiles, margin_m), scenario, result);
+}
+
+std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
+                                 const std::vector<std::uint8_t>& convex,
+                                 const VoxelLattice& lattice, const Scenario& scenario) {
+  const bool judge_convexity = scenario.curvature_radius_m > 0.0;
+  std::vector<MapVoxel> voxels;
+  voxels.reserve(scored.size());
+  for (std::size_t n = 0; n < scored.size(); ++n) {
+    MapVoxel voxel{.voxel = scored[n].voxel,
+                   .counts = scored[n].counts,
+                   .score = scored[n].score,
+                   .convex = convex[n] != 0,
+                   .graspable = false,
+                   .edge = scored[n].edge};
+    const double height = lattice.center_of(voxel.voxel).z();
+    voxel.graspable =
+        meets_threshold(voxel.counts, voxel.score, scenario.method, scenario.solid_voxel_threshold,
+                        scenario.graspability_threshold) &&
+        height >= scenario.zero_plane_m && (voxel.convex || !judge_convexity);
+    voxels.push_back(voxel);
+  }
+  return voxels;
+}
+
+}  // namespace
+
+bool follows_thesis(Method method) {
+  return method == Method::thesis || method == Method::envelope;
+}
+
+int tile_voxels(const Scenario& scenario) {
+  const double voxels = std::round(scenario.tile_size_m / scenario.voxel_size_m);
+  if (voxels >= 1.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
+  throw libmap::Error("out of range", {.field = "tile_size_m",
+                                       .value = libmap::to_text(scenario.tile_size_m),
+                                       .bound = "1 to 2^20 voxels"});
+}
+
+int halo_voxels(const GripperMask& mask, const Scenario& scenario) {
+  const int window = std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1);
+  const int edges = mask.method == Method::corrected ? 2 * scan_gap_voxels : 0;
+  double convexity = 0.0;
+  if (scenario.curvature_radius_m > 0.0)
+    convexity =
+        (scenario.intersection_distance_m + curvature_reach_m(scenario)) / scenario.voxel_size_m +
+        1.0;
+  if (convexity > 0x1p28)
+    throw libmap::Error(
+        "too large for voxels of this size",
+        {.field = "curvature_radius_m", .value = libmap::to_text(scenario.curvature_radius_m)});
+  return std::max(window + edges, static_cast<int>(std::ceil(convexity)));
+}
+
+TileDetectionResult detect_tiles(const PointCloud& terrain, const VoxelGrid& grid,
+                                 const GripperMask& mask, const std::vector<TileBounds>& tiles,
+                                 CurvatureAt curvature_at, const Scenario& scenario,
+                                 libmap::Progress& progress) {
+  TileDetectionResult result;
+  const std::vector<ScoredVoxel> scored = timed(result, "voxel matching", [&] {
+    return score_tiles(grid, mask, tiles, {.solid_voxel_threshold = scenario.solid_voxel_threshold},
+                       progress);
+  });
+  std::vector<std::uint8_t> convex(scored.size(), 0);
+  if (scenario.curvature_radius_m > 0.0 && !scored.empty()) {
+    convex = timed(result, "convexity", [&] {
+      const std::vector<Eigen::Vector3d> convex_points =
+          find_convex_points(terrain, grid.lattice, tiles, curvature_at, scenario, result);
+      std::vector<Eigen::Vector3d> centers;
+      centers.reserve(scored.size());
+      for (const ScoredVoxel& one : scored) centers.push_back(grid.lattice.center_of(one.voxel));
+      return mark_near_convex(centers, convex_points, scenario.intersection_distance_m);
+    });
+  }
+  result.voxels = map_voxels(scored, convex, grid.lattice, scenario);
+  return result;
+}
+
+}  // namespace libgtd

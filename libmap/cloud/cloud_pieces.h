@@ -1,0 +1,75 @@
+// A terrain in one or many cloud files, read block by block: memory goes with a block, not with a
+// file, for binary PCD and for PLY that is binary without lists at its vertices. Files of other
+// encodings are read whole, one at a time. Positions and normals alone are read.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/point_stream.h"
+
+namespace libmap {
+
+// One file, from its first point on.
+class CloudBlockReader {
+ public:
+  // Throws Error naming the file, as read_cloud does.
+  explicit CloudBlockReader(std::filesystem::path path);
+  ~CloudBlockReader();
+  CloudBlockReader(CloudBlockReader&&) noexcept;
+
+  bool is_empty() const;
+  bool has_normals() const;
+  const Pose& viewpoint() const;
+  // Appends the next `rows` points, or as many as are left, without those whose position is not
+  // finite. False if none is left.
+  bool append(std::size_t rows, PointCloud& cloud);
+  // From now on, normals are passed over.
+  void leave_out_normals();
+  std::size_t dropped_points() const;  // so far
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+// The file itself, or the cloud files of a folder in the order of their names; hidden files are
+// passed over. Throws Error: nothing there, or a folder without a cloud file.
+std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& file_or_folder);
+
+// All points of all pieces, one after the other, in blocks of PointStream::block_points.
+class PieceStream : public PointStream {
+ public:
+  // Throws Error naming the file: it cannot be read, or only some pieces have normals. Where the
+  // pieces' viewpoints differ, that of the whole is not known.
+  explicit PieceStream(std::vector<std::filesystem::path> pieces);
+
+  const std::vector<std::filesystem::path>& pieces() const { return pieces_; }
+  bool has_normals() const { return has_normals_; }
+  const Pose& viewpoint() const { return viewpoint_; }
+  void for_each_block(Need need, const Visit& visit) const override;
+
+ private:
+  std::vector<std::filesystem::path> pieces_;
+  bool has_normals_ = false;
+  Pose viewpoint_ = Pose::Identity();
+};
+
+struct PieceFacts {
+  std::size_t points = 0;  // with a position
+  std::size_t dropped_points = 0;
+  Bounds3d box;
+};
+PieceFacts survey_piece(const std::filesystem::path& piece);
+
+struct PiecesReadResult {
+  PointCloud cloud;
+  std::size_t dropped_points = 0;
+};
+// All of it in memory.
+PiecesReadResult read_pieces(const std::vector<std::filesystem::path>& pieces);
+
+}  // namespace libmap

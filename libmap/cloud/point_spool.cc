@@ -1,0 +1,178 @@
+#include "libmap/cloud/point_spool.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/output_lock.h"
+
+namespace libmap {
+
+namespace {
+
+// A record: place in the order of all points, position, normal if there are any.
+constexpr std::size_t bare_record_bytes = sizeof(std::uint64_t) + sizeof(Eigen::Vector3d);
+
+template <typename T>
+char* put(char* at, const T& value) {
+  std::memcpy(at, static_cast<const void*>(&value), sizeof(T));
+  return at + sizeof(T);
+}
+
+template <typename T>
+const char* take(const char* at, T& value) {
+  std::memcpy(static_cast<void*>(&value), at, sizeof(T));
+  return at + sizeof(T);
+}
+
+// Places in the order of all points, and where the points are; ascending runs one after the other.
+struct Order {
+  struct Item {
+    std::uint64_t place = 0;
+    std::size_t index = 0;
+  };
+  std::vector<Item> items;
+  std::vector<std::size_t> ends;  // of the runs
+
+  void merge_runs() {
+    const auto at = [&](std::size_t n) { return items.begin() + static_cast<std::ptrdiff_t>(n); };
+    const auto is_before = [](const Item& a, const Item& b) { return a.place < b.place; };
+    while (ends.size() > 1) {
+      std::vector<std::size_t> merged;
+      for (std::size_t r = 0; r < ends.size(); r += 2) {
+        const std::size_t begin = r == 0 ? 0 : ends[r - 1];
+        const std::size_t last = std::min(r + 1, ends.size() - 1);
+        std::inplace_merge(at(begin), at(ends[r]), at(ends[last]), is_before);
+        merged.push_back(ends[last]);
+      }
+      ends = std::move(merged);
+    }
+  }
+};
+
+}  // namespace
+
+PointSpool::PointSpool(std::filesystem::path folder, const PointSpoolOptions& options)
+    : folder_(std::move(folder)),
+      options_(options),
+      record_bytes_(bare_record_bytes + (options.has_normals ? sizeof(Eigen::Vector3f) : 0)) {
+  std::string name = (folder_ / ".points-XXXXXX").string();
+  file_ = mkostemp(name.data(), O_CLOEXEC);
+  if (file_ < 0) throw system_failure(folder_, "no file can be made in it", errno);
+  unlink(name.c_str());
+}
+
+PointSpool::~PointSpool() { close(file_); }
+
+PointSpool::Square PointSpool::square_of(double x, double y) const {
+  return {static_cast<std::int64_t>(std::floor(x / options_.square_m)),
+          static_cast<std::int64_t>(std::floor(y / options_.square_m))};
+}
+
+void PointSpool::add(const PointCloud& cloud) {
+  Records* records = nullptr;
+  Square last;
+  for (std::size_t n = 0; n < cloud.size(); ++n) {
+    const Eigen::Vector3d& position = cloud.positions[n];
+    const Square square = square_of(position.x(), position.y());
+    if (records == nullptr || square != last) records = &squares_[square];
+    last = square;
+    const std::size_t at = records->buffer.size();
+    records->buffer.resize(at + record_bytes_);
+    char* out = put(records->buffer.data() + at, static_cast<std::uint64_t>(size_));
+    out = put(out, position);
+    if (options_.has_normals) put(out, cloud.normals[n]);
+    ++records->count;
+    ++size_;
+    buffered_ += record_bytes_;
+    if (buffered_ >= options_.buffer_bytes) flush();
+  }
+}
+
+void PointSpool::flush() {
+  for (auto& [square, records] : squares_) {
+    if (records.buffer.empty()) continue;
+    std::size_t done = 0;
+    while (done < records.buffer.size()) {
+      const ssize_t written = pwrite(file_, records.buffer.data() + done,
+                                     records.buffer.size() - done, static_cast<off_t>(end_ + done));
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) throw system_failure(folder_, "points cannot be kept in it", errno);
+      done += static_cast<std::size_t>(written);
+    }
+    records.written.push_back({end_, done});
+    end_ += done;
+    std::vector<char>().swap(records.buffer);  // gives the memory back
+  }
+  buffered_ = 0;
+}
+
+void PointSpool::read_square(const Records& records, std::vector<char>& bytes) const {
+  bytes.resize(records.count * record_bytes_);
+  std::size_t done = 0;
+  for (const Extent& extent : records.written) {
+    std::size_t part = 0;
+    while (part < extent.bytes) {
+      const ssize_t got = pread(file_, bytes.data() + done + part, extent.bytes - part,
+                                static_cast<off_t>(extent.begin + part));
+      if (got < 0 && errno == EINTR) continue;
+      if (got <= 0) throw system_failure(folder_, "the points kept in it cannot be read", errno);
+      part += static_cast<std::size_t>(got);
+    }
+    done += part;
+  }
+  std::copy(records.buffer.begin(), records.buffer.end(),
+            bytes.begin() + static_cast<std::ptrdiff_t>(done));
+}
+
+template <typename Visit>
+void PointSpool::for_squares_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                                const Visit& visit) const {
+  const Square first = square_of(low.x(), low.y());
+  const Square last = square_of(high.x(), high.y());
+  for (auto at = squares_.lower_bound(first); at != squares_.end() && at->first.first <= last.first;
+       ++at)
+    if (at->first.second >= first.second && at->first.second <= last.second) visit(at->second);
+}
+
+PointCloud PointSpool::points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
+  PointCloud found;
+  Order order;
+  std::vector<char> bytes;
+  for_squares_in(low, high, [&](const Records& records) {
+    read_square(records, bytes);
+    for (const char* at = bytes.data(); at < bytes.data() + bytes.size(); at += record_bytes_) {
+      Order::Item item;
+      Eigen::Vector3d position;
+      const char* rest = take(take(at, item.place), position);
+      if (!(position.x() >= low.x() && position.x() <= high.x() && position.y() >= low.y() &&
+            position.y() <= high.y()))
+        continue;
+      item.index = found.size();
+      order.items.push_back(item);
+      found.positions.push_back(position);
+      if (options_.has_normals) take(rest, found.normals.emplace_back());
+    }
+    order.ends.push_back(order.items.size());
+  });
+  order.merge_runs();
+  std::vector<std::size_t> indices;
+  indices.reserve(order.items.size());
+  for (const Order::Item& item : order.items) indices.push_back(item.index);
+  return libmap::select_points(found, indices);
+}
+
+std::size_t PointSpool::count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
+  std::size_t count = 0;
+  for_squares_in(low, high, [&](const Records& records) { count += records.count; });
+  return count;
+}
+
+}  // namespace libmap

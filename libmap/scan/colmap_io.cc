@@ -1,0 +1,319 @@
+#include "libmap/scan/colmap_io.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/text_lines.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr const char* cameras_file = "cameras.txt";
+constexpr const char* images_file = "images.txt";
+constexpr const char* points_file = "points3D.txt";
+// Of COLMAP's pixels against ours.
+constexpr double pixel_offset = 0.5;
+
+// Parameters are focal_lengths, the principal point and then the terms of the distortion, in the
+// order of Camera::distortion; those that a model does not have are 0.
+struct CameraModel {
+  const char* name;
+  std::size_t focal_lengths;
+  DistortionModel distortion;
+  std::size_t terms;       // in COLMAP's model
+  std::size_t full_terms;  // in Camera's
+};
+
+using enum DistortionModel;
+constexpr std::array<CameraModel, 9> camera_models = {{
+    {"SIMPLE_PINHOLE", 1, none, 0, 0},
+    {"PINHOLE", 2, none, 0, 0},
+    {"SIMPLE_RADIAL", 1, radial_tangential, 1, 4},
+    {"RADIAL", 1, radial_tangential, 2, 4},
+    {"OPENCV", 2, radial_tangential, 4, 4},
+    {"FULL_OPENCV", 2, radial_tangential, 8, 8},
+    {"OPENCV_FISHEYE", 2, equidistant, 4, 4},
+    {"SIMPLE_RADIAL_FISHEYE", 1, equidistant, 1, 4},
+    {"RADIAL_FISHEYE", 1, equidistant, 2, 4},
+}};
+
+const CameraModel& model_named(const std::string& name) {
+  std::string known;
+  for (const CameraModel& model : camera_models) {
+    if (model.name == name) return model;
+    known += std::string(" ") + model.name;
+  }
+  throw Error("a model of cameras that is not known",
+              {.field = "camera", .value = name, .bound = "one of" + known});
+}
+
+Error stands_twice(const TextLine& line, const std::string& what, const std::string& file) {
+  return Error("stands twice", {.file = file, .field = name_of(line), .value = what});
+}
+
+int positive_integer_of(const TextLine& line, std::size_t word, const std::string& file) {
+  const int value = integer_of(line, word, file);
+  if (value <= 0)
+    throw Error(
+        "no size of an image",
+        {.file = file, .field = name_of(line), .value = std::to_string(value), .bound = "> 0"});
+  return value;
+}
+
+// From word `first` to the end of the line: names may hold spaces and commas.
+std::string rest_of(const TextLine& line, std::size_t first) {
+  return std::string(trim(
+      line.text.substr(static_cast<std::size_t>(line.words[first].data() - line.text.data()))));
+}
+
+std::vector<ColmapObservation> observations_of(const TextLine& line, const std::string& file) {
+  if (line.words.size() % 3 != 0)
+    throw Error("no features of an image", {.file = file,
+                                            .field = name_of(line),
+                                            .value = std::to_string(line.words.size()) + " columns",
+                                            .bound = "X Y POINT3D_ID of each"});
+  std::vector<ColmapObservation> observations;
+  observations.reserve(line.words.size() / 3);
+  for (std::size_t word = 0; word < line.words.size(); word += 3) {
+    const std::vector<double> pixel = numbers_of(line, word, 2, file);
+    observations.push_back({{pixel[0], pixel[1]}, large_integer_of(line, word + 2, file)});
+  }
+  return observations;
+}
+
+std::string numbers_to_text(std::initializer_list<double> numbers) {
+  std::string text;
+  for (const double number : numbers) text += " " + to_text(number);
+  return text;
+}
+
+std::string pose_to_text(const Pose& pose) {
+  Eigen::Quaterniond q(pose.linear());
+  q.normalize();
+  if (q.w() < 0.0) q.coeffs() *= -1.0;
+  const Eigen::Vector3d t = pose.translation();
+  return numbers_to_text({q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()});
+}
+
+bool is_model(const fs::path& folder, const char* ending) {
+  std::error_code ignored;
+  return fs::is_regular_file(folder / (std::string("images") + ending), ignored);
+}
+
+}  // namespace
+
+Camera to_camera(const ColmapCamera& given) {
+  const CameraModel& model = model_named(given.model);
+  const std::size_t wanted = model.focal_lengths + 2 + model.terms;
+  if (given.parameters.size() != wanted)
+    throw Error("another number of parameters than its model has",
+                {.field = "camera " + given.model,
+                 .value = std::to_string(given.parameters.size()),
+                 .bound = std::to_string(wanted)});
+  const auto* parameter = given.parameters.data();
+  Camera camera;
+  camera.width = given.width;
+  camera.height = given.height;
+  camera.fx = *parameter;
+  camera.fy = model.focal_lengths == 2 ? *++parameter : camera.fx;
+  camera.cx = *++parameter - pixel_offset;
+  camera.cy = *++parameter - pixel_offset;
+  camera.distortion_model = model.distortion;
+  camera.distortion.assign(model.full_terms, 0.0);
+  std::copy_n(++parameter, model.terms, camera.distortion.begin());
+  camera.check();
+  return camera;
+}
+
+ColmapCamera to_colmap(const Camera& camera) {
+  camera.check();
+  ColmapCamera result{.model = "PINHOLE", .width = camera.width, .height = camera.height};
+  result.parameters = {camera.fx, camera.fy, camera.cx + pixel_offset, camera.cy + pixel_offset};
+  if (!camera.is_distorted()) return result;
+  std::vector<double> terms = camera.distortion;
+  if (camera.distortion_model == equidistant) {
+    result.model = "OPENCV_FISHEYE";
+  } else {
+    while (!terms.empty() && terms.back() == 0.0) terms.pop_back();
+    if (terms.size() > 8)
+      throw Error(
+          "COLMAP has no such camera",
+          {.field = "distortion by thin prisms", .value = to_text(terms.back()), .bound = "none"});
+    result.model = terms.size() > 4 ? "FULL_OPENCV" : "OPENCV";
+    terms.resize(terms.size() > 4 ? 8 : 4, 0.0);
+  }
+  result.parameters.insert(result.parameters.end(), terms.begin(), terms.end());
+  return result;
+}
+
+std::map<int, ColmapCamera> parse_colmap_cameras(std::string_view text, const std::string& file) {
+  std::map<int, ColmapCamera> cameras;
+  for (const TextLine& line : split_lines(text)) {
+    if (is_comment(line)) continue;
+    const int id = integer_of(line, 0, file);
+    ColmapCamera camera;
+    camera.width = positive_integer_of(line, 2, file);
+    camera.height = positive_integer_of(line, 3, file);
+    camera.model = std::string(line.words[1]);
+    camera.parameters = numbers_of(line, 4, line.words.size() - 4, file);
+    if (!cameras.emplace(id, std::move(camera)).second)
+      throw stands_twice(line, "camera " + std::to_string(id), file);
+  }
+  return cameras;
+}
+
+std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file) {
+  constexpr std::size_t columns = 10;
+  std::map<int, ColmapImage> images;
+  const std::vector<TextLine> lines = split_lines(text);
+  for (std::size_t i = 0; i < lines.size(); ++i) {
+    const TextLine& line = lines[i];
+    if (is_comment(line)) continue;
+    if (line.words.size() < columns)
+      throw Error("no image", {.file = file,
+                               .field = name_of(line),
+                               .value = std::to_string(line.words.size()) + " columns",
+                               .bound = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"});
+    const int id = integer_of(line, 0, file);
+    const std::vector<double> n = numbers_of(line, 1, 7, file);
+    ColmapImage image;
+    image.camera_from_world = pose_of(line, Eigen::Vector3d(n[4], n[5], n[6]),
+                                      Eigen::Quaterniond(n[0], n[1], n[2], n[3]), file);
+    image.camera = integer_of(line, 8, file);
+    image.name = rest_of(line, 9);
+    // The line that follows is of the features; it is empty where there are none.
+    if (i + 1 < lines.size() && lines[i + 1].number == line.number + 1)
+      image.observations = observations_of(lines[++i], file);
+    if (!images.emplace(id, std::move(image)).second)
+      throw stands_twice(line, "image " + std::to_string(id), file);
+  }
+  return images;
+}
+
+std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
+                                                        const std::string& file) {
+  constexpr std::size_t columns = 8;
+  std::map<std::int64_t, ColmapPoint> points;
+  for (const TextLine& line : split_lines(text)) {
+    if (is_comment(line)) continue;
+    const std::int64_t id = large_integer_of(line, 0, file);
+    const std::vector<double> position = numbers_of(line, 1, 3, file);
+    ColmapPoint point;
+    point.position = {position[0], position[1], position[2]};
+    for (std::size_t c = 0; c < point.color.size(); ++c) {
+      const int value = integer_of(line, 4 + c, file);
+      if (value < 0 || value > 255)
+        throw Error("no colour", {.file = file,
+                                  .field = name_of(line),
+                                  .value = std::to_string(value),
+                                  .bound = "0 to 255"});
+      point.color[c] = static_cast<std::uint8_t>(value);
+    }
+    point.error_px = numbers_of(line, 7, 1, file).front();
+    for (std::size_t word = columns; word < line.words.size(); word += 2) {
+      const std::int64_t observation = large_integer_of(line, word + 1, file);
+      if (observation < 0)
+        throw Error("no feature of an image", {.file = file,
+                                               .field = name_of(line),
+                                               .value = std::to_string(observation),
+                                               .bound = ">= 0"});
+      point.track.push_back({integer_of(line, word, file), static_cast<std::size_t>(observation)});
+    }
+    if (!points.emplace(id, std::move(point)).second)
+      throw stands_twice(line, "point " + std::to_string(id), file);
+  }
+  return points;
+}
+
+std::string to_colmap_cameras(const ColmapModel& model) {
+  std::string text = "# CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]\n# Number of cameras: " +
+                     std::to_string(model.cameras.size()) + "\n";
+  for (const auto& [id, camera] : model.cameras) {
+    text += std::to_string(id) + " " + camera.model + " " + std::to_string(camera.width) + " " +
+            std::to_string(camera.height);
+    for (const double parameter : camera.parameters) text += " " + to_text(parameter);
+    text += "\n";
+  }
+  return text;
+}
+
+std::string to_colmap_images(const ColmapModel& model) {
+  std::string text =
+      "# IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME\n# POINTS2D[] as X Y POINT3D_ID\n"
+      "# Number of images: " +
+      std::to_string(model.images.size()) + "\n";
+  for (const auto& [id, image] : model.images) {
+    text += std::to_string(id) + pose_to_text(image.camera_from_world) + " " +
+            std::to_string(image.camera) + " " + image.name + "\n";
+    bool first = true;
+    for (const ColmapObservation& feature : image.observations) {
+      text += (first ? "" : " ") + to_text(feature.pixel.x()) + " " + to_text(feature.pixel.y()) +
+              " " + std::to_string(feature.point);
+      first = false;
+    }
+    text += "\n";
+  }
+  return text;
+}
+
+std::string to_colmap_points(const ColmapModel& model) {
+  std::string text =
+      "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n# Number of points: " +
+      std::to_string(model.points.size()) + "\n";
+  for (const auto& [id, point] : model.points) {
+    text += std::to_string(id) +
+            numbers_to_text({point.position.x(), point.position.y(), point.position.z()});
+    for (const std::uint8_t channel : point.color) text += " " + std::to_string(channel);
+    text += " " + to_text(point.error_px);
+    for (const ColmapTrackElement& element : point.track)
+      text += " " + std::to_string(element.image) + " " + std::to_string(element.observation);
+    text += "\n";
+  }
+  return text;
+}
+
+fs::path find_colmap_model(const fs::path& path) {
+  const std::array<fs::path, 3> places = {path, path / "sparse", path / "sparse" / "0"};
+  for (const fs::path& place : places)
+    if (is_model(place, ".txt")) return place;
+  for (const fs::path& place : places)
+    if (is_model(place, ".bin"))
+      throw Error(
+          "a binary model of COLMAP: 'colmap model_converter --output_type TXT' makes a text of it",
+          {.file = place.string()});
+  throw Error("holds no model of COLMAP: neither images.txt nor sparse/images.txt is there",
+              {.file = path.string()});
+}
+
+ColmapModel read_colmap_model(const fs::path& path) {
+  const fs::path folder = find_colmap_model(path);
+  const auto text_of = [&](const char* name) { return read_whole_file(folder / name); };
+  const auto name_of_file = [&](const char* name) { return (folder / name).string(); };
+  ColmapModel model;
+  model.cameras = parse_colmap_cameras(text_of(cameras_file), name_of_file(cameras_file));
+  model.images = parse_colmap_images(text_of(images_file), name_of_file(images_file));
+  for (const auto& [id, image] : model.images)
+    if (!model.cameras.contains(image.camera))
+      throw Error("names a camera that is not there", {.file = name_of_file(images_file),
+                                                       .field = "image " + std::to_string(id),
+                                                       .value = std::to_string(image.camera)});
+  if (fs::exists(folder / points_file))
+    model.points = parse_colmap_points(text_of(points_file), name_of_file(points_file));
+  return model;
+}
+
+void write_colmap_model(const fs::path& folder, const ColmapModel& model) {
+  write_text(folder / cameras_file, to_colmap_cameras(model));
+  write_text(folder / images_file, to_colmap_images(model));
+  write_text(folder / points_file, to_colmap_points(model));
+}
+
+}  // namespace libmap

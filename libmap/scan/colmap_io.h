@@ -1,0 +1,90 @@
+// Sparse models of COLMAP (Schoenberger and Frahm 2016) in its text format: a folder with
+// cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html). Numbers are
+// written with as many digits as bring the same number back.
+//
+// COLMAP's pixel centres lie at halves (u = 0.5 for the first column), ours at whole numbers. Its
+// world has the scale and the axes that its reconstruction happened to take.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+// A line of cameras.txt: "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]".
+struct ColmapCamera {
+  std::string model{};  // "PINHOLE", "OPENCV", ...
+  int width = 0;        // pixels
+  int height = 0;
+  std::vector<double> parameters{};  // of the model, in COLMAP's own order and pixels
+};
+
+// Throws Error for a model that Camera has no distortion for: SIMPLE_PINHOLE, PINHOLE,
+// SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE and
+// RADIAL_FISHEYE are known.
+Camera to_camera(const ColmapCamera& camera);
+// PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE. Throws Error for distortion by thin prisms.
+ColmapCamera to_colmap(const Camera& camera);
+
+// A feature of an image.
+struct ColmapObservation {
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centres at halves
+  std::int64_t point = -1;                          // its POINT3D_ID; -1: of no point
+};
+
+// Two lines of images.txt: "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME" and its features.
+struct ColmapImage {
+  int camera = 0;                             // CAMERA_ID
+  std::string name{};                         // relative to the folder of the images
+  Pose camera_from_world = Pose::Identity();  // optical frame: z forward, x right, y down
+  std::vector<ColmapObservation> observations{};
+};
+
+struct ColmapTrackElement {
+  int image = 0;                // IMAGE_ID
+  std::size_t observation = 0;  // index among the image's features
+};
+
+// A line of points3D.txt: "POINT3D_ID X Y Z R G B ERROR TRACK[]".
+struct ColmapPoint {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Color color{};
+  double error_px = -1.0;  // -1: not known
+  std::vector<ColmapTrackElement> track{};
+};
+
+struct ColmapModel {
+  std::map<int, ColmapCamera> cameras{};         // by CAMERA_ID
+  std::map<int, ColmapImage> images{};           // by IMAGE_ID
+  std::map<std::int64_t, ColmapPoint> points{};  // by POINT3D_ID
+};
+
+// The three files' texts. The parsers throw Error naming `file` and the line: columns that are
+// missing, no finite number, a quaternion that is none, an id that stands twice.
+std::map<int, ColmapCamera> parse_colmap_cameras(std::string_view text, const std::string& file);
+std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file);
+std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
+                                                        const std::string& file);
+std::string to_colmap_cameras(const ColmapModel& model);
+std::string to_colmap_images(const ColmapModel& model);
+std::string to_colmap_points(const ColmapModel& model);
+
+// The folder that holds images.txt: `path` itself, or `path`/sparse or `path`/sparse/0, where
+// COLMAP's tools put it. Throws Error if there is none; says so if the model is a binary one.
+std::filesystem::path find_colmap_model(const std::filesystem::path& path);
+
+// Reads the folder that find_colmap_model finds. points3D.txt may be missing. Throws Error, also
+// if an image names a camera that is not there.
+ColmapModel read_colmap_model(const std::filesystem::path& path);
+
+// Writes the three files into `folder`, which is there.
+void write_colmap_model(const std::filesystem::path& folder, const ColmapModel& model);
+
+}  // namespace libmap

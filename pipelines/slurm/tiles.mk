@@ -1,0 +1,66 @@
+# A large terrain's map by a Slurm cluster: an array of tasks scores shares of its tiles into one
+# store, then the tiles are merged.
+#
+#   make -f pipelines/slurm/tiles.mk TERRAIN=terrain OUT=folder SHARES=100 [SCENARIO=NAME|FILE]
+#        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
+#
+# TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
+# render, info and merge read; `map` merges it to $(OUT)/map.pcd as well. TERRAIN, OUT and graspmap
+# itself must be reached by the same path on all nodes. SBATCH holds further flags of sbatch, among
+# them --cpus-per-task and --array=1-100%10 to run ten at a time. A second run does nothing; after a
+# run that failed, the next scores what is missing. Logs: $(OUT)/logs.
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../../build/release/graspmap) graspmap)
+SCENARIO ?= artificial_rocks_prescan
+SHARES ?= 16
+SCORE ?=
+SBATCH ?=
+TRIES ?= 3
+
+one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+$(foreach name,TERRAIN OUT SCENARIO SHARES,$(call one_word,$(name)))
+ifeq ($(wildcard $(TERRAIN)),)
+  $(error TERRAIN is '$(TERRAIN)': it must be a cloud or a folder of clouds)
+endif
+ifeq ($(OUT),)
+  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+endif
+ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
+  $(error SHARES is '$(SHARES)': it must be a whole number >= 1)
+endif
+
+# Tasks run in the folder of their submission; paths are made whole all the same.
+program := $(shell command -v $(GRASPMAP))
+terrain := $(abspath $(TERRAIN))
+store := $(abspath $(OUT))/map.tiles
+logs := $(abspath $(OUT))/logs
+score_flags := --config $(SCENARIO) $(SCORE)
+
+.PHONY: tiles map FORCE
+tiles: $(store)/index.json
+map: $(OUT)/map.pcd
+
+$(OUT) $(logs):
+	@mkdir -p $@
+
+# A stamp of what the tiles depend on: written anew only if it changes, and then tiles of another
+# terrain or other parameters go.
+export scored_with := $(TERRAIN) $(score_flags)
+$(OUT)/scored_with: FORCE | $(OUT)
+	@printf '%s\n' "$$scored_with" | cmp -s - $@ || \
+	  { rm -rf $(store) $(store).json && printf '%s\n' "$$scored_with" > $@; }
+
+# sbatch --wait ends when the last task has, with the largest of their exit codes. A task that has
+# been put back into the queue is not at its end.
+$(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
+	@GRASPMAP=$(program) TRIES=$(TRIES) sbatch --wait --export=ALL --array=1-$(SHARES) \
+	  --output=$(logs)/%a.log $(SBATCH) \
+	  $(here)score_tiles.sbatch $(SHARES) $(terrain) $(store) $(score_flags) --quiet || \
+	  { echo "tiles.mk: tasks failed; $(logs) says why, and make again scores what is missing" >&2; \
+	    exit 1; }
+	@test -e $@ || $(program) info $(store) >$(logs)/info.log
+	@touch -c $@
+
+$(OUT)/map.pcd: $(store)/index.json
+	@$(program) merge $(store) -o $@

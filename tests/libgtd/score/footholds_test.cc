@@ -1,0 +1,189 @@
+#include "libgtd/score/footholds.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+
+#include "libmap/core/parallel.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using graspmap_test::error_of;
+using graspmap_test::uniform;
+using libgtd::Foothold;
+using libgtd::FootholdOptions;
+using libgtd::FootholdResult;
+using libmap::PointCloud;
+using libmap::ScalarType;
+
+// A map of 1 cm voxels over 1 x 1 m; `score_of` and `height_of` at (x, y). Graspable from 0.8 on.
+PointCloud map_of(
+    const std::function<double(double, double)>& score_of,
+    const std::function<double(double, double)>& height_of = [](double, double) { return 0.0; }) {
+  PointCloud map;
+  std::vector<double> scores;
+  for (int i = 0; i < 100; ++i)
+    for (int j = 0; j < 100; ++j) {
+      const double x = 0.01 * i + 0.005;
+      const double y = 0.01 * j + 0.005;
+      map.positions.emplace_back(x, y, height_of(x, y));
+      scores.push_back(score_of(x, y));
+    }
+  map.add_field("score", ScalarType::float32).values = scores;
+  std::vector<double>& graspable = map.add_field("graspable", ScalarType::uint8).values;
+  for (std::size_t n = 0; n < scores.size(); ++n) graspable[n] = scores[n] >= 0.8 ? 1.0 : 0.0;
+  map.add_field("edge", ScalarType::uint8);
+  return map;
+}
+
+PointCloud random_map() {
+  return map_of([](double, double) { return std::round(uniform(0, 10)) / 10.0; },
+                [](double, double) { return uniform(0, 0.05); });
+}
+
+TEST(Footholds, TheMiddleOfAPlateauComesFirst) {
+  const PointCloud map = map_of([](double x, double y) {
+    return std::hypot(x - 0.305, y - 0.605) < 0.1 || std::hypot(x - 0.755, y - 0.255) < 0.06 ? 0.9
+                                                                                             : 0.1;
+  });
+  const FootholdResult result = libgtd::find_footholds(map, {.separation_m = 0.2});
+  ASSERT_GE(result.footholds.size(), 2U);
+  EXPECT_LT(
+      (map.positions[result.footholds[0].map_point] - Eigen::Vector3d(0.305, 0.605, 0)).norm(),
+      0.011);
+  bool second = false;
+  for (const Foothold& one : result.footholds)
+    second =
+        second || (map.positions[one.map_point] - Eigen::Vector3d(0.755, 0.255, 0)).norm() < 0.011;
+  EXPECT_TRUE(second);
+}
+
+// The definition, point by point.
+std::vector<std::size_t> slow_footholds(const PointCloud& map, double separation_m) {
+  const std::vector<double>& scores = map.find_field("score")->values;
+  const std::vector<double>& graspable = map.find_field("graspable")->values;
+  const auto mean_of = [&](std::size_t n) {
+    double sum = 0.0;
+    double weights = 0.0;
+    for (std::size_t m = 0; m < map.size(); ++m) {
+      const double share = (map.positions[m] - map.positions[n]).norm() / (0.5 * separation_m);
+      if (share > 1.0) continue;
+      sum += (1.0 - share * share) * scores[m];
+      weights += 1.0 - share * share;
+    }
+    return sum / weights;
+  };
+  std::vector<double> means(map.size());
+  std::vector<std::size_t> left;
+  for (std::size_t n = 0; n < map.size(); ++n)
+    if (graspable[n] != 0.0) {
+      means[n] = mean_of(n);
+      left.push_back(n);
+    }
+  std::vector<std::size_t> found;
+  while (!left.empty()) {
+    std::size_t best = left.front();
+    for (const std::size_t n : left)
+      if (scores[n] > scores[best] || (scores[n] == scores[best] && means[n] > means[best] + 1e-12))
+        best = n;
+    found.push_back(best);
+    std::erase_if(left, [&](std::size_t n) {
+      return (map.positions[n] - map.positions[best]).norm() <= separation_m;
+    });
+  }
+  return found;
+}
+
+TEST(Footholds, AreThoseOfTheDefinition) {
+  const PointCloud map = random_map();
+  const FootholdResult result = libgtd::find_footholds(map, {.separation_m = 0.13});
+  std::vector<std::size_t> found;
+  for (const Foothold& one : result.footholds) found.push_back(one.map_point);
+  EXPECT_EQ(found, slow_footholds(map, 0.13));
+  EXPECT_GT(found.size(), 20U);
+}
+
+TEST(Footholds, OptionsLeaveOut) {
+  PointCloud map = random_map();
+  for (std::size_t n = 0; n < map.size() / 2; ++n) map.find_field("edge")->values[n] = 1.0;
+  const auto all = libgtd::find_footholds(map, {.graspable_only = false, .edges = true});
+  EXPECT_EQ(all.candidates, map.size());
+  for (const Foothold& one : libgtd::find_footholds(map).footholds)
+    EXPECT_GE(one.map_point, map.size() / 2);
+  for (const Foothold& one : libgtd::find_footholds(map, {.min_score = 0.95}).footholds)
+    EXPECT_EQ(one.score, 1.0);
+  const auto three = libgtd::find_footholds(map, {.max_count = 3});
+  const auto free = libgtd::find_footholds(map);
+  ASSERT_EQ(three.footholds.size(), 3U);
+  for (std::size_t n = 0; n < 3; ++n)
+    EXPECT_EQ(three.footholds[n].map_point, free.footholds[n].map_point);
+  // What has no place or no score is nobody's foothold.
+  map.positions[9000].x() = NAN;
+  map.find_field("score")->values[9001] = NAN;
+  for (const Foothold& one : libgtd::find_footholds(map, {.separation_m = 0.001}).footholds) {
+    EXPECT_NE(one.map_point, 9000U);
+    EXPECT_NE(one.map_point, 9001U);
+  }
+}
+
+TEST(Footholds, NormalSlopeAndApproachOfAnInclinedPlane) {
+  const double slope = 25.0 * M_PI / 180.0;
+  const PointCloud map = map_of([](double, double) { return 1.0; },
+                                [&](double x, double) { return std::tan(slope) * x; });
+  const FootholdResult result = libgtd::find_footholds(map);
+  const Eigen::Vector3f normal(static_cast<float>(-std::sin(slope)), 0.0F,
+                               static_cast<float>(std::cos(slope)));
+  ASSERT_FALSE(result.footholds.empty());
+  for (const Foothold& one : result.footholds) {
+    EXPECT_LT((one.normal - normal).norm(), 1e-3F);
+    EXPECT_NEAR(one.slope_deg, 25.0, 0.1);
+    EXPECT_NEAR(one.k1, 0.0F, 1e-2F);
+    EXPECT_EQ(one.approach, Eigen::Vector3d(0, 0, -1));
+  }
+  // In another frame all turns with it.
+  const libmap::Pose turn(Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, 2, -1).normalized()));
+  const FootholdResult turned = libgtd::find_footholds(
+      libmap::transform_cloud(map, turn), {}, {.up = 3.0 * (turn * Eigen::Vector3d::UnitZ())});
+  ASSERT_FALSE(turned.footholds.empty());
+  for (const Foothold& one : turned.footholds) {
+    EXPECT_NEAR(one.slope_deg, 25.0, 0.1);
+    EXPECT_LT((one.approach + turn * Eigen::Vector3d::UnitZ()).norm(), 1e-12);
+  }
+}
+
+TEST(Footholds, SameForAnyNumberOfThreads) {
+  const PointCloud map = random_map();
+  const auto cloud_with = [&](unsigned threads) {
+    const libmap::ThreadLimit limit(threads);
+    return libgtd::to_cloud(libgtd::find_footholds(map), map);
+  };
+  const PointCloud one = cloud_with(1);
+  const PointCloud two = cloud_with(2);
+  EXPECT_EQ(one.positions, two.positions);
+  for (const char* name : {"mean_score", "slope_deg", "k1", "k2", "approach_z"})
+    for (std::size_t n = 0; n < one.size(); ++n) {
+      const double a = one.find_field(name)->values[n];
+      const double b = two.find_field(name)->values[n];
+      EXPECT_TRUE(a == b || (std::isnan(a) && std::isnan(b))) << name << ' ' << n;
+    }
+  EXPECT_EQ(one.find_field("score")->values.size(), one.size());
+}
+
+TEST(Footholds, ErrorsNameTheField) {
+  PointCloud map = random_map();
+  EXPECT_EQ(error_of([&] { libgtd::find_footholds(map, {.separation_m = 0.0}); }).context().field,
+            "separation_m");
+  EXPECT_EQ(error_of([&] { libgtd::find_footholds(map, {}, {.up = Eigen::Vector3d::Zero()}); })
+                .context()
+                .field,
+            "up");
+  std::erase_if(map.fields, [](const auto& field) { return field.name == "edge"; });
+  EXPECT_EQ(error_of([&] { libgtd::find_footholds(map); }).context().field, "edge");
+  EXPECT_NO_THROW(libgtd::find_footholds(map, {.edges = true}));
+  EXPECT_THROW(libgtd::find_footholds(PointCloud{}), libmap::Error);
+}
+
+}  // namespace

@@ -1,0 +1,166 @@
+#include "libgtd/score/tile_store.h"
+
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "libgtd/score/tile_progress_io.h"
+#include "libgtd/score/tile_store_io.h"
+#include "libmap/core/error.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using graspmap_test::error_of;
+using graspmap_test::read_text;
+using graspmap_test::scratch_folder;
+using graspmap_test::write_text;
+using libgtd::StoredTile;
+using libgtd::TileNumber;
+using libgtd::TilePlan;
+using libgtd::TileProgress;
+using libgtd::TileStoreIndex;
+
+TEST(TileStore, TilesOfVoxels) {
+  EXPECT_EQ(libgtd::tile_of({-1, 0, 5}, 10), (TileNumber{-1, 0}));
+  EXPECT_EQ(libgtd::tile_of({-10, 9, 5}, 10), (TileNumber{-1, 0}));
+  EXPECT_EQ(libgtd::tile_of({-11, 10, 5}, 10), (TileNumber{-2, 1}));
+  EXPECT_EQ(libgtd::tile_file_of({-2, 13}), "tiles/-2_13.pcd");
+  const libgtd::TileBounds columns = libgtd::columns_of({-2, 1}, 10);
+  EXPECT_EQ(columns.i_begin, -20);
+  EXPECT_EQ(columns.i_end, -10);
+  EXPECT_EQ(columns.j_end, 20);
+}
+
+TEST(TileStore, Names) {
+  EXPECT_TRUE(libgtd::is_tile_store_name("a b.tiles"));
+  EXPECT_TRUE(libgtd::is_tile_store_name("x/map.tiles/"));
+  EXPECT_FALSE(libgtd::is_tile_store_name("map.pcd"));
+  EXPECT_FALSE(libgtd::is_tile_store_name("tiles"));
+}
+
+StoredTile tile(int i, int j, std::uint64_t voxels) {
+  StoredTile one;
+  one.number = {i, j};
+  one.voxels = one.occupied_voxels = voxels;
+  if (voxels == 0) return one;
+  one.min = {10 * i + 1, 10 * j + 2, -3};
+  one.max = {10 * i + 8, 10 * j + 9, 4};
+  one.graspable_voxels = 2;
+  one.file = libgtd::tile_file_of(one.number);
+  one.bytes = 99;
+  one.sha256 = "abc";
+  return one;
+}
+
+// Tiles (-1, 0), (-1, 1), (0, 0), (0, 1).
+TilePlan small_plan() {
+  TilePlan plan;
+  plan.key = "key";
+  plan.index.tile_voxels = 10;
+  plan.index.min = {-9, 2, -3};
+  plan.index.max = {9, 19, 4};
+  plan.index.manifest.frame = "input";
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.translation() = Eigen::Vector3d(0.1, 1.0 / 3.0, 7);
+  plan.index.manifest.transforms.emplace_back("terrain_from_input", pose);
+  plan.has_plane = true;
+  plan.centroid = Eigen::Vector3d(1.0 / 7.0, 2, 3);
+  libgtd::TerrainPiece piece;
+  piece.input = {"a b.pcd", "0123", 12};
+  piece.modified_ns = 1234567890123456789;
+  piece.box.max = Eigen::Vector3d(1, 1.0 / 9.0, 0);
+  plan.pieces.push_back(piece);
+  return plan;
+}
+
+TEST(TileProgress, PlanAndIndexComeBackToTheBit) {
+  const fs::path store = scratch_folder() / "m.tiles";
+  const TileProgress progress(store / "");
+  progress.open();
+  EXPECT_FALSE(progress.plan());
+  const TilePlan plan = small_plan();
+  progress.set_plan(plan);
+  const TilePlan read = *progress.plan();
+  EXPECT_EQ(read.key, "key");
+  EXPECT_TRUE(read.has_plane);
+  EXPECT_EQ(read.centroid, plan.centroid);
+  EXPECT_EQ(read.index.terrain_from_input().matrix(), plan.index.terrain_from_input().matrix());
+  EXPECT_EQ(read.index.max, plan.index.max);
+  ASSERT_EQ(read.pieces.size(), 1u);
+  EXPECT_EQ(read.pieces[0].modified_ns, 1234567890123456789);
+  EXPECT_EQ(read.pieces[0].box.max, plan.pieces[0].box.max);
+
+  libgtd::TileJournal one(store, {1, 2}, "key");
+  EXPECT_THROW(libgtd::TileJournal(store, {1, 2}, "key"), libmap::Error);
+  libgtd::TileJournal other(store, {2, 2}, "key");
+  one.add({tile(0, 1, 5), tile(-1, 1, 0)});
+  other.add({tile(-1, 0, 3)});
+  EXPECT_EQ(progress.complete(read).done, 3u);
+  EXPECT_EQ(progress.complete(read).tiles, 4u);
+  EXPECT_FALSE(progress.complete(read).index);
+  // Lines of another key do not count.
+  libgtd::TileJournal(store, {1, 1}, "other key").add({tile(0, 0, 1)});
+  EXPECT_FALSE(progress.complete(read).index);
+  other.add({tile(0, 0, 7)});
+  const TileStoreIndex index = libgtd::finish_tile_store(store);
+  ASSERT_EQ(index.tiles.size(), 3u);
+  EXPECT_EQ(index.tiles[0].number, (TileNumber{-1, 0}));
+  EXPECT_EQ(index.find({0, 1})->voxels, 5u);
+  EXPECT_EQ(index.find({-1, 1}), nullptr);
+  EXPECT_EQ(index.voxels(), 15u);
+  EXPECT_EQ(index.frame, libgtd::MapFrame::input);
+  EXPECT_EQ(std::get<std::int64_t>(*index.manifest.find_result("graspable_voxels")), 6);
+}
+
+TEST(TileStore, RestoredPositionsAreTheVoxelsCentres) {
+  TileStoreIndex index;
+  index.lattice.voxel_size_m = 0.01;
+  libmap::PointCloud cloud;
+  cloud.positions.assign(2, Eigen::Vector3d(9, 9, 9));
+  EXPECT_THROW(libgtd::restore_positions(index, cloud), libmap::Error);
+  for (const char* name : {"i", "j", "k"})
+    cloud.add_field(name, libmap::ScalarType::int32).values = {-3, 40000};
+  libgtd::restore_positions(index, cloud);
+  EXPECT_EQ(cloud.positions[0], index.lattice.center_of({-3, -3, -3}));
+  EXPECT_EQ(cloud.positions[1], index.lattice.center_of({40000, 40000, 40000}));
+}
+
+// Each change of a good index is refused in one line that names the file and what is wrong.
+TEST(TileStore, HostileIndex) {
+  const fs::path store = scratch_folder() / "m.tiles";
+  const TileProgress progress(store);
+  progress.open();
+  TileStoreIndex good = small_plan().index;
+  good.tiles = {tile(-1, 0, 3), tile(0, 0, 7)};
+  progress.write_index(good, good.manifest);
+  const std::string text = read_text(store / "index.json");
+  EXPECT_NO_THROW(libgtd::read_tile_store(store));
+  const auto expect_error = [&](const std::string& from, const std::string& to,
+                                const std::string& part) {
+    std::string changed = text;
+    const std::size_t at = changed.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write_text(store / "index.json", changed.replace(at, from.size(), to));
+    const std::string what = error_of([&] { libgtd::read_tile_store(store); }).what();
+    EXPECT_NE(what.find("index.json"), std::string::npos) << what;
+    EXPECT_NE(what.find(part), std::string::npos) << what;
+  };
+  expect_error("\"graspmap tile store\"", "\"other\"", "format");
+  expect_error("\"version\": 1", "\"version\": 2", "version");
+  expect_error("\"tile_voxels\": 10", "\"tile_voxels\": 0", "tile_voxels");
+  expect_error("\"voxel_size_m\": 0.01", "\"voxel_size_m\": -1", "voxel_size_m");
+  expect_error("\"key\"", "\"kee\"", "key");
+  expect_error("tiles/-1_0.pcd", "../../../etc/passwd", "file of tile -1, 0");
+  expect_error("\"i\": -1", "\"i\": 3000000000", "tile");
+  expect_error("\"i\": -1", "\"i\": \"x\"", "index of a tile store");
+  expect_error("\"i\": 0", "\"i\": -1", "tile");
+  for (std::size_t size = 0; size < text.size() - 2; size += 37) {
+    write_text(store / "index.json", text.substr(0, size));
+    error_of([&] { libgtd::read_tile_store(store); });
+  }
+}
+
+}  // namespace

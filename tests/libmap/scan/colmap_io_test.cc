@@ -1,0 +1,444 @@
+// Models of COLMAP: the texts, the cameras, and the points that a scan's depth gives.
+#include "libmap/scan/colmap_io.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "libmap/core/parallel.h"
+#include "libmap/scan/colmap_builder.h"
+#include "tests/support/test_support.h"
+
+namespace libmap {
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_test::error_of;
+using graspmap_test::scratch_folder;
+using graspmap_test::uniform;
+using graspmap_test::write_text;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+
+Pose random_pose() {
+  return make_pose_from_rpy({uniform(-2, 2), uniform(-2, 2), uniform(-2, 2)},
+                            {uniform(-180, 180), uniform(-80, 80), uniform(-180, 180)});
+}
+
+const char* const cameras_text =
+    "\xEF\xBB\xBF# Camera list\r\n"
+    "1 SIMPLE_PINHOLE 640 480 500 320 240\r\n"
+    "7 OPENCV 100 80 90.5 91.5 50 40 0.1 -0.05 0.001 -0.002\r\n";
+
+// The first image has no feature, the last one no line for them.
+const char* const images_text =
+    "# Image list with two lines of data per image:\n"
+    "3 1 0 0 0 1 2 3 7 left/a picture, of rocks.jpg\n"
+    "\n"
+    "# between images\n"
+    "1 0.7071067811865476 0 0 0.7071067811865476 0 0 0 1 b.png\n"
+    "10.5 20.25 5 30 40 -1\n"
+    "9 -1 0 0 0 0 0 -2.5 1 c.png\n";
+
+const char* const points_text =
+    "# POINT3D_ID X Y Z R G B ERROR TRACK\n"
+    "5 1.5 -2 0.25 255 0 128 0.75 1 0\n"
+    "9000000000 0 0 1 1 2 3 -1\n";
+
+TEST(ColmapText, ReadsWhatIsWrittenByHand) {
+  const auto cameras = parse_colmap_cameras(cameras_text, "cameras.txt");
+  ASSERT_EQ(cameras.size(), 2U);
+  EXPECT_EQ(cameras.at(1).model, "SIMPLE_PINHOLE");
+  EXPECT_EQ(cameras.at(7).width, 100);
+  EXPECT_EQ(cameras.at(7).height, 80);
+  EXPECT_THAT(cameras.at(7).parameters, ElementsAre(90.5, 91.5, 50, 40, 0.1, -0.05, 0.001, -0.002));
+
+  const auto images = parse_colmap_images(images_text, "images.txt");
+  ASSERT_EQ(images.size(), 3U);
+  EXPECT_EQ(images.at(3).name, "left/a picture, of rocks.jpg");
+  EXPECT_EQ(images.at(3).camera, 7);
+  EXPECT_TRUE(images.at(3).observations.empty());
+  EXPECT_EQ(images.at(3).camera_from_world.translation(), Eigen::Vector3d(1, 2, 3));
+  // A quarter turn about z: x of the world is y of the camera.
+  EXPECT_TRUE((images.at(1).camera_from_world * Eigen::Vector3d::UnitX())
+                  .isApprox(Eigen::Vector3d::UnitY(), 1e-15));
+  ASSERT_EQ(images.at(1).observations.size(), 2U);
+  EXPECT_EQ(images.at(1).observations[0].pixel, Eigen::Vector2d(10.5, 20.25));
+  EXPECT_EQ(images.at(1).observations[0].point, 5);
+  EXPECT_EQ(images.at(1).observations[1].point, -1);
+  EXPECT_TRUE(images.at(9).camera_from_world.linear().isIdentity());
+  EXPECT_EQ(images.at(9).camera_from_world.inverse().translation().z(), 2.5);
+
+  const auto points = parse_colmap_points(points_text, "points3D.txt");
+  ASSERT_EQ(points.size(), 2U);
+  EXPECT_EQ(points.at(5).position, Eigen::Vector3d(1.5, -2, 0.25));
+  EXPECT_THAT(points.at(5).color, ElementsAre(255, 0, 128));
+  EXPECT_EQ(points.at(5).error_px, 0.75);
+  ASSERT_EQ(points.at(5).track.size(), 1U);
+  EXPECT_EQ(points.at(5).track[0].image, 1);
+  EXPECT_TRUE(points.at(9000000000).track.empty());
+}
+
+ColmapModel random_model() {
+  ColmapModel model;
+  model.cameras[4] = {"PINHOLE", 640, 480, {500.0 / 3.0, 501.0 / 7.0, 320.1, 240.7}};
+  model.cameras[2] = {"FOV", 64, 48, {1.0 / 3.0, 2, 3, 4, 0.1}};
+  for (int id = 1; id <= 5; ++id) {
+    ColmapImage image{.camera = id % 2 == 0 ? 4 : 2, .name = std::to_string(id) + ".jpg"};
+    image.camera_from_world = random_pose();
+    for (int n = 0; n < id - 1; ++n)
+      image.observations.push_back({{uniform(0, 640), uniform(0, 480)}, n == 1 ? -1 : n + 10});
+    model.images.emplace(id, image);
+  }
+  for (int id = 10; id < 14; ++id)
+    model.points[id] = {{uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)},
+                        {1, 2, 255},
+                        uniform(0, 1),
+                        {{2, 0}, {5, 3}}};
+  return model;
+}
+
+TEST(ColmapText, KeepsEveryDigitThroughFiles) {
+  const ColmapModel written = random_model();
+  write_colmap_model(scratch_folder(), written);
+  const ColmapModel read = read_colmap_model(scratch_folder());
+  EXPECT_EQ(to_colmap_cameras(read), to_colmap_cameras(written));
+  EXPECT_EQ(to_colmap_points(read), to_colmap_points(written));
+  ASSERT_EQ(read.images.size(), written.images.size());
+  for (const auto& [id, image] : written.images) {
+    const ColmapImage& other = read.images.at(id);
+    EXPECT_EQ(other.name, image.name);
+    EXPECT_EQ(other.camera, image.camera);
+    EXPECT_EQ(other.camera_from_world.translation(), image.camera_from_world.translation());
+    EXPECT_LT((other.camera_from_world.matrix() - image.camera_from_world.matrix()).norm(), 1e-14);
+    ASSERT_EQ(other.observations.size(), image.observations.size());
+    for (std::size_t n = 0; n < image.observations.size(); ++n) {
+      EXPECT_EQ(other.observations[n].pixel, image.observations[n].pixel);
+      EXPECT_EQ(other.observations[n].point, image.observations[n].point);
+    }
+  }
+}
+
+TEST(ColmapText, NamesTheLineThatIsBroken) {
+  struct Case {
+    const char* kind;
+    const char* text;
+    const char* field;
+    const char* part;
+  };
+  const Case cases[] = {
+      {"cameras", "\n1 PINHOLE 640\n", "line 2", "ends too early"},
+      {"cameras", "1 PINHOLE 0 480 1 1 1 1\n", "line 1", "> 0"},
+      {"cameras", "1 PINHOLE 640 480 1 nan 1 1\n", "line 1", "not a number"},
+      {"cameras", "1 PINHOLE 6 4 1 1 1 1\n1 PINHOLE 6 4 1 1 1 1\n", "line 2", "stands twice"},
+      {"images", "1 1 0 0 0 0 0 0 1\n", "line 1", "no image"},
+      {"images", "1 0.5 0 0 0 0 0 0 1 a.jpg\n", "line 1", "length 1"},
+      {"images", "1 1 0 0 0 0 1e300 0 1 a.jpg\n", "line 1", "1e8"},
+      {"images", "1 1 0 0 0 0 inf 0 1 a.jpg\n", "line 1", "finite"},
+      {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n1 2\n", "line 2", "POINT3D_ID"},
+      {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n1 2 x\n", "line 2", "whole number"},
+      // The empty line of the features is missing.
+      {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n2 1 0 0 0 0 0 0 1 b.jpg\n", "line 2", "features"},
+      {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n\n1 1 0 0 0 0 0 0 1 b.jpg\n", "line 3", "twice"},
+      {"images", "99999999999 1 0 0 0 0 0 0 1 a.jpg\n", "line 1", "32 bits"},
+      {"points", "1 0 0 0 256 0 0 1\n", "line 1", "0 to 255"},
+      {"points", "1 0 0 0 25 0 0 1 3\n", "line 1", "ends too early"},
+      {"points", "1 0 0 0 25 0 0 1 3 -1\n", "line 1", ">= 0"},
+      {"points", "1 0 0 0 2 0 0 1\n1 0 0 0 2 0 0 1\n", "line 2", "twice"},
+  };
+  for (const Case& one : cases) {
+    SCOPED_TRACE(one.text);
+    const Error error = error_of([&] {
+      const std::string kind = one.kind;
+      if (kind == "cameras") parse_colmap_cameras(one.text, "model.txt");
+      if (kind == "images") parse_colmap_images(one.text, "model.txt");
+      if (kind == "points") parse_colmap_points(one.text, "model.txt");
+    });
+    EXPECT_EQ(error.context().file, "model.txt");
+    EXPECT_EQ(error.context().field, one.field);
+    EXPECT_THAT(error.what(), HasSubstr(one.part));
+  }
+}
+
+TEST(ColmapModel, IsFoundWhereColmapsToolsPutIt) {
+  for (const char* place : {"", "sparse", "sparse/0"}) {
+    const fs::path top = scratch_folder() / ("scene" + std::to_string(std::string(place).size()));
+    fs::create_directories(top / place);
+    write_text(top / place / "cameras.txt", cameras_text);
+    write_text(top / place / "images.txt", images_text);
+    EXPECT_EQ(read_colmap_model(top).images.size(), 3U) << place;
+  }
+}
+
+TEST(ColmapModel, SaysWhyThereIsNone) {
+  const fs::path folder = scratch_folder();
+  EXPECT_THAT(error_of([&] { read_colmap_model(folder); }).what(), HasSubstr("images.txt"));
+  write_text(folder / "images.bin", "x");
+  EXPECT_THAT(error_of([&] { read_colmap_model(folder); }).what(), HasSubstr("model_converter"));
+  write_text(folder / "cameras.txt", "1 PINHOLE 640 480 1 1 1 1\n");
+  write_text(folder / "images.txt", images_text);
+  const Error error = error_of([&] { read_colmap_model(folder); });
+  EXPECT_EQ(error.context().field, "image 3");
+  EXPECT_EQ(error.context().value, "7");
+}
+
+// COLMAP's own projections, as its documentation of camera models defines them.
+Eigen::Vector2d project_as_colmap(const ColmapCamera& camera, const Eigen::Vector3d& point) {
+  const std::vector<double>& p = camera.parameters;
+  const double u = point.x() / point.z();
+  const double v = point.y() / point.z();
+  const double r2 = u * u + v * v;
+  const auto radial = [&](double f, double cx, double cy, double factor) {
+    return Eigen::Vector2d(f * u * factor + cx, f * v * factor + cy);
+  };
+  const auto fisheye = [&](double k1, double k2, double k3, double k4) {
+    const double r = std::sqrt(r2);
+    const double t = std::atan(r);
+    const double t2 = t * t;
+    return t * (1 + t2 * (k1 + t2 * (k2 + t2 * (k3 + t2 * k4)))) / r;
+  };
+  const auto opencv = [&](double factor) {
+    const double x = u * factor + 2 * p[6] * u * v + p[7] * (r2 + 2 * u * u);
+    const double y = v * factor + 2 * p[7] * u * v + p[6] * (r2 + 2 * v * v);
+    return Eigen::Vector2d(p[0] * x + p[2], p[1] * y + p[3]);
+  };
+  if (camera.model == "SIMPLE_PINHOLE") return radial(p[0], p[1], p[2], 1);
+  if (camera.model == "PINHOLE") return {p[0] * u + p[2], p[1] * v + p[3]};
+  if (camera.model == "SIMPLE_RADIAL") return radial(p[0], p[1], p[2], 1 + p[3] * r2);
+  if (camera.model == "RADIAL") return radial(p[0], p[1], p[2], 1 + p[3] * r2 + p[4] * r2 * r2);
+  if (camera.model == "OPENCV") return opencv(1 + p[4] * r2 + p[5] * r2 * r2);
+  if (camera.model == "FULL_OPENCV")
+    return opencv((1 + r2 * (p[4] + r2 * (p[5] + r2 * p[8]))) /
+                  (1 + r2 * (p[9] + r2 * (p[10] + r2 * p[11]))));
+  if (camera.model == "OPENCV_FISHEYE") {
+    const double s = fisheye(p[4], p[5], p[6], p[7]);
+    return {p[0] * s * u + p[2], p[1] * s * v + p[3]};
+  }
+  if (camera.model == "SIMPLE_RADIAL_FISHEYE")
+    return radial(p[0], p[1], p[2], fisheye(p[3], 0, 0, 0));
+  EXPECT_EQ(camera.model, "RADIAL_FISHEYE");
+  return radial(p[0], p[1], p[2], fisheye(p[3], p[4], 0, 0));
+}
+
+const std::vector<ColmapCamera>& cameras_of_every_model() {
+  static const std::vector<ColmapCamera> cameras = {
+      {"SIMPLE_PINHOLE", 640, 480, {500, 321, 241}},
+      {"PINHOLE", 640, 480, {500, 510, 321, 241}},
+      {"SIMPLE_RADIAL", 640, 480, {500, 321, 241, -0.1}},
+      {"RADIAL", 640, 480, {500, 321, 241, -0.1, 0.02}},
+      {"OPENCV", 640, 480, {500, 510, 321, 241, -0.1, 0.02, 0.003, -0.004}},
+      {"FULL_OPENCV",
+       640,
+       480,
+       {500, 510, 321, 241, -0.1, 0.02, 0.003, -0.004, 0.01, 0.05, -0.02, 0.003}},
+      {"OPENCV_FISHEYE", 640, 480, {500, 510, 321, 241, -0.1, 0.02, 0.01, -0.004}},
+      {"SIMPLE_RADIAL_FISHEYE", 640, 480, {500, 321, 241, -0.1}},
+      {"RADIAL_FISHEYE", 640, 480, {500, 321, 241, -0.1, 0.02}}};
+  return cameras;
+}
+
+TEST(ColmapCamera, ProjectsAsColmapDoesHalfAPixelAside) {
+  for (const ColmapCamera& camera : cameras_of_every_model()) {
+    SCOPED_TRACE(camera.model);
+    const Camera ours = to_camera(camera);
+    EXPECT_EQ(ours.width, 640);
+    for (int i = 0; i < 20; ++i) {
+      const Eigen::Vector3d point(uniform(-0.5, 0.5), uniform(-0.5, 0.5), uniform(0.9, 1.1));
+      const Eigen::Vector2d expected = project_as_colmap(camera, point);
+      const auto pixel = project_point(ours, point);
+      ASSERT_TRUE(pixel);
+      EXPECT_LT((*pixel + Eigen::Vector2d(0.5, 0.5) - expected).norm(), 1e-10);
+      // And back, in whichever model.
+      EXPECT_LT((project_as_colmap(to_colmap(ours), point) - expected).norm(), 1e-10);
+    }
+  }
+}
+
+TEST(ColmapCamera, TakesTheSimplestModelThatHoldsTheLens) {
+  Camera camera = to_camera(cameras_of_every_model()[1]);
+  EXPECT_EQ(to_colmap(camera).model, "PINHOLE");
+  camera.distortion_model = DistortionModel::radial_tangential;
+  camera.distortion = {0, 0, 0, 0, 0};
+  EXPECT_EQ(to_colmap(camera).model, "PINHOLE");
+  camera.distortion = {0.1, 0, 0, 0, 0};
+  EXPECT_EQ(to_colmap(camera).model, "OPENCV");
+  camera.distortion = {0.1, 0, 0, 0, 0.2};
+  EXPECT_EQ(to_colmap(camera).model, "FULL_OPENCV");
+  EXPECT_EQ(to_colmap(camera).parameters.size(), 12U);
+  camera.distortion = {0.1, 0, 0, 0, 0.2, 0, 0, 0, 0, 0, 0, 0};
+  EXPECT_EQ(to_colmap(camera).model, "FULL_OPENCV");
+  camera.distortion.back() = 0.01;
+  EXPECT_THAT(error_of([&] { to_colmap(camera); }).what(), HasSubstr("thin prisms"));
+  camera.distortion_model = DistortionModel::equidistant;
+  camera.distortion = {0, 0, 0, 0};
+  EXPECT_EQ(to_colmap(camera).model, "OPENCV_FISHEYE");
+}
+
+TEST(ColmapCamera, RefusesModelsThatItDoesNotKnow) {
+  const Error unknown = error_of([] { to_camera({"FOV", 64, 48, {1, 2, 3, 4, 5}}); });
+  EXPECT_EQ(unknown.context().value, "FOV");
+  const Error wrong = error_of([] { to_camera({"PINHOLE", 64, 48, {1, 2, 3}}); });
+  EXPECT_EQ(wrong.context().value, "3");
+  EXPECT_EQ(wrong.context().bound, "4");
+}
+
+// A camera 2 m above the ground z = 0 that looks down; a box of 0.5 m height fills x > 0.3.
+Pose above(double x) {
+  return make_pose({x, 0, 2},
+                   Eigen::Quaterniond(Eigen::AngleAxisd(M_PI, Eigen::Vector3d::UnitX())));
+}
+
+bool is_on_surface(const Eigen::Vector3d& point) {
+  const double height = point.x() > 0.3 ? 0.5 : 0.0;
+  const bool on_side = std::abs(point.x() - 0.3) < 1e-6 && point.z() > 0.0 && point.z() < 0.5;
+  return on_side || std::abs(point.z() - height) < 1e-6;
+}
+
+// Along a ray from 2 m above, to the box's top, its side or the ground.
+double depth_of_box(double camera_x, double ray_x) {
+  const double to_side = (0.3 - camera_x) / ray_x;
+  const bool starts_above_box = camera_x > 0.3;
+  const bool is_above_box_at_top =
+      starts_above_box ? !(to_side > 0.0 && to_side < 1.5) : to_side > 0.0 && to_side < 1.5;
+  if (is_above_box_at_top) return 1.5;
+  return !starts_above_box && to_side > 0.0 ? std::min(2.0, to_side) : 2.0;
+}
+
+CameraView view_from(const Pose& world_from_camera, int depth_factor = 1) {
+  CameraView view;
+  Camera& camera = view.color_camera;
+  camera.width = 120;
+  camera.height = 90;
+  camera.fx = camera.fy = 80;
+  camera.cx = 60.25;
+  camera.cy = 44.5;
+  view.color = ColorImage(120, 90);
+  for (int y = 0; y < 90; ++y)
+    for (int x = 0; x < 120; ++x)
+      view.color.at(x, y) = {static_cast<std::uint8_t>(x), static_cast<std::uint8_t>(y), 7};
+  view.depth_camera = camera;
+  view.depth_camera.width /= depth_factor;
+  view.depth_camera.height /= depth_factor;
+  view.depth_camera.fx /= depth_factor;
+  view.depth_camera.fy /= depth_factor;
+  view.depth_camera.cx /= depth_factor;
+  view.depth_camera.cy /= depth_factor;
+  view.depth = DepthImage(view.depth_camera.width, view.depth_camera.height);
+  for (int y = 0; y < view.depth.height; ++y) {
+    for (int x = 0; x < view.depth.width; ++x) {
+      const Eigen::Vector3d ray = pixel_to_ray(view.depth_camera, {x, y})->homogeneous();
+      view.depth.at(x, y) = static_cast<float>(depth_of_box(
+          world_from_camera.translation().x(), (world_from_camera.linear() * ray).x()));
+    }
+  }
+  return view;
+}
+
+ColmapModel model_of_box(int depth_factor = 1) {
+  ColmapBuilder builder({.point_spacing_px = 8});
+  for (const double x : {0.0, 0.2, 0.5})
+    builder.add_image(std::to_string(x) + ".jpg", view_from(above(x), depth_factor), above(x));
+  return builder.model();
+}
+
+void expect_consistent(const ColmapModel& model) {
+  ASSERT_EQ(model.cameras.size(), 1U);
+  std::size_t observed = 0;
+  for (const auto& [id, image] : model.images) {
+    for (std::size_t n = 0; n < image.observations.size(); ++n) {
+      const ColmapObservation& feature = image.observations[n];
+      const ColmapPoint& point = model.points.at(feature.point);
+      const Eigen::Vector2d pixel = project_as_colmap(model.cameras.at(image.camera),
+                                                      image.camera_from_world * point.position);
+      EXPECT_LT((pixel - feature.pixel).norm(), 1e-9);
+      std::size_t in_track = 0;
+      for (const ColmapTrackElement& element : point.track)
+        in_track += element.image == id && element.observation == n ? 1 : 0;
+      EXPECT_EQ(in_track, 1U);
+    }
+    observed += image.observations.size();
+  }
+  std::size_t tracked = 0;
+  for (const auto& [id, point] : model.points) tracked += point.track.size();
+  EXPECT_EQ(tracked, observed);
+}
+
+TEST(ColmapBuilder, PointsLieOnTheSurfaceAndProjectToTheirPixels) {
+  const ColmapModel model = model_of_box();
+  ASSERT_EQ(model.images.size(), 3U);
+  EXPECT_GT(model.points.size(), 100U);
+  expect_consistent(model);
+  std::size_t seen_thrice = 0;
+  for (const auto& [id, point] : model.points) {
+    EXPECT_TRUE(is_on_surface(point.position)) << point.position.transpose();
+    seen_thrice += point.track.size() == 3 ? 1 : 0;
+    // Coloured by the pixel in the middle of its square.
+    const Eigen::Vector2d pixel =
+        model.images.at(point.track[0].image).observations[point.track[0].observation].pixel;
+    EXPECT_EQ(point.color[0], static_cast<int>(pixel.x()));
+    EXPECT_EQ(point.color[1], static_cast<int>(pixel.y()));
+    EXPECT_EQ(static_cast<int>(pixel.x()) % 8, 4);
+  }
+  EXPECT_GT(seen_thrice, 50U);
+}
+
+TEST(ColmapBuilder, HiddenPointsAreNotObserved) {
+  ColmapBuilder builder({.point_spacing_px = 4});
+  const Pose ahead = above(0.0);
+  builder.add_image("a.jpg", view_from(ahead), ahead);
+  CameraView wall = view_from(ahead);
+  for (float& depth : wall.depth.pixels) depth = 1.0F;
+  builder.add_image("wall.jpg", wall, ahead);
+  for (const auto& [id, point] : builder.model().points) EXPECT_EQ(point.track.size(), 1U);
+  expect_consistent(builder.model());
+}
+
+TEST(ColmapBuilder, SquaresThatHoldAPointGetNoOther) {
+  const Pose pose = above(0.0);
+  ColmapBuilder builder({.point_spacing_px = 8});
+  builder.add_image("a.jpg", view_from(pose), pose);
+  const std::size_t points = builder.model().points.size();
+  builder.add_image("b.jpg", view_from(pose), pose);
+  EXPECT_EQ(builder.model().points.size(), points);
+  EXPECT_EQ(builder.model().images.at(2).observations.size(), points);
+}
+
+TEST(ColmapBuilder, DepthOfAnotherSizeServesToo) {
+  const ColmapModel model = model_of_box(2);
+  EXPECT_GT(model.points.size(), 100U);
+  expect_consistent(model);
+  // A nearest pixel is half a pixel off, which matters on the box's side alone.
+  for (const auto& [id, point] : model.points)
+    EXPECT_TRUE(is_on_surface(point.position) || std::abs(point.position.x() - 0.3) < 0.03)
+        << point.position.transpose();
+}
+
+TEST(ColmapBuilder, WithoutDepthThereAreCamerasAlone) {
+  ColmapBuilder builder;
+  CameraView view = view_from(above(0.0));
+  view.depth = {};
+  builder.add_image("a.jpg", view, above(0.0));
+  view.color_camera.fx += 1;
+  builder.add_image("b.jpg", view, above(0.1));
+  EXPECT_EQ(builder.model().images.size(), 2U);
+  EXPECT_EQ(builder.model().cameras.size(), 2U);
+  EXPECT_TRUE(builder.model().points.empty());
+  view.color_camera.distortion_model = DistortionModel::radial_tangential;
+  view.color_camera.distortion = std::vector<double>(12, 0.01);
+  EXPECT_THROW(builder.add_image("c.jpg", view, above(0.1)), Error);
+  EXPECT_EQ(builder.model().images.size(), 2U);
+}
+
+TEST(ColmapBuilder, SameForAnyNumberOfThreads) {
+  const auto text = [](unsigned threads) {
+    const ThreadLimit limit(threads);
+    return to_colmap_images(model_of_box());
+  };
+  EXPECT_EQ(text(1), text(4));
+}
+
+}  // namespace
+}  // namespace libmap

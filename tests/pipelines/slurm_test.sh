@@ -1,0 +1,94 @@
+#!/bin/sh
+# A terrain's tiles as a job array of a real Slurm with two nodes on this machine: one task is killed
+# while it works, Slurm does it again, and the merged map is the one that a single process makes.
+. "$(dirname "$0")/check.sh"
+for program in slurmctld slurmd sbatch munged; do
+  PATH=$PATH:/usr/sbin command -v $program >/dev/null || {
+    echo "skipped: $program is not installed"
+    exit 77
+  }
+done
+out=$scratch/out
+site=$scratch/terrain
+if [ -n "${GRASPMAP_DATA:-}" ]; then
+  site=$GRASPMAP_DATA/clouds/artificial_rocks.pcd
+else
+  "$graspmap" simulate terrain --size 3 --piece 1 -o "$site" --quiet
+fi
+SLURM_LOCAL=$scratch/slurm
+export SLURM_LOCAL
+slurm_local=$source/scripts/slurm-local
+
+# The first try of share 2 is killed while it works, if it has not ended by then; the task sees the
+# exit code of SIGKILL in any case.
+cat >"$scratch/graspmap" <<END
+#!/bin/sh
+if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ]; then
+  timeout -s KILL 0.15 "$graspmap" "\$@" || true
+  exit 137
+fi
+exec "$graspmap" "\$@"
+END
+chmod +x "$scratch/graspmap"
+
+stop() {
+  [ $? -eq 0 ] || tail -n 5 "$out"/logs/*.log "$SLURM_LOCAL/slurmctld.log" >&2 || true
+  [ -z "${hurry:-}" ] || kill "$hurry" 2>/dev/null || true
+  "$slurm_local" stop
+  rm -rf "$scratch"
+}
+trap stop EXIT
+eval "$("$slurm_local" start)"
+[ "$(sinfo --noheader --Node --format=%N%t | tr '\n' ' ')" = "node1idle node2idle " ] ||
+  fail "not two idle nodes: $(sinfo --Node)"
+
+# Slurm leaves a task that was put back alone for two minutes; a few seconds are enough for its nodes
+# to tell the new try from the old one.
+pending_again() {
+  squeue --noheader --states=PENDING --array --format='%A %r' 2>/dev/null | sed -n 's/ BeginTime//p'
+}
+while sleep 0.5; do
+  jobs=$(pending_again)
+  [ -n "$jobs" ] || continue
+  sleep 4
+  for job in $jobs; do scontrol update "JobId=$job" StartTime=now 2>/dev/null || true; done
+done &
+hurry=$!
+
+run() {
+  timeout 300 make --no-print-directory -f "$source/pipelines/slurm/tiles.mk" OUT="$out" \
+    GRASPMAP="$scratch/graspmap" SCORE="--method corrected --tile-size 0.4" "$@"
+}
+run map TERRAIN="$site" SHARES=4
+"$graspmap" score "$site" --config artificial_rocks_prescan --method corrected --tile-size 0.4 \
+  -o "$scratch/local.pcd" --quiet
+cmp "$scratch/local.pcd" "$out/map.pcd" || fail "the map by Slurm differs from the local one"
+"$graspmap" info --verify "$out/map.tiles" >/dev/null || fail "the store is not sound"
+
+[ "$(cat "$out"/logs/*.log | grep -c ', try 1, ')" -eq 4 ] || fail "not four tasks were run"
+grep -q 'graspmap ended with 137' "$out/logs/2.log" || fail "task 2 was not killed"
+grep -q 'share 2 of 4, try 2,' "$out/logs/2.log" || fail "task 2 was not done again"
+scontrol --oneliner show jobs | grep 'ArrayTaskId=2 ' | grep -q 'JobState=COMPLETED .*Restarts=1 ' ||
+  fail "Slurm does not know of the restart of task 2"
+for node in node1 node2; do
+  grep -q "on $node\$" "$out"/logs/*.log || fail "$node did nothing"
+done
+
+jobs=$(scontrol --oneliner show jobs | wc -l)
+before=$(listing "$out")
+run map TERRAIN="$site" SHARES=4
+[ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
+[ "$jobs" = "$(scontrol --oneliner show jobs | wc -l)" ] || fail "the second run submitted jobs"
+
+# A terrain that cannot be used fails at once and is not tried again.
+echo "no cloud" >"$scratch/bad.pcd"
+if run TERRAIN="$scratch/bad.pcd" OUT="$scratch/bad" SHARES=1 2>"$scratch/errors"; then
+  fail "a broken terrain was taken"
+fi
+grep -q 'tasks failed' "$scratch/errors" || fail "no clear error for a broken terrain"
+grep -q 'bad.pcd' "$scratch/bad/logs/1.log" || fail "the log does not name the broken terrain"
+grep -q 'try 2' "$scratch/bad/logs/1.log" && fail "bad input was tried again"
+
+"$slurm_local" stop
+[ ! -e "$SLURM_LOCAL" ] || fail "slurm-local stop left its folder"
+echo "passed"

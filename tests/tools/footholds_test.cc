@@ -1,0 +1,48 @@
+#include <gtest/gtest.h>
+
+#include "libmap/cloud/cloud_io.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_terrain;
+using libmap::PointCloud;
+
+TEST(Footholds, OfAMapInEitherFrame) {
+  write_terrain();
+  for (const char* frame : {"terrain", "input"}) {
+    const std::string map = std::string(frame) + ".pcd";
+    ASSERT_TRUE(succeeded(graspmap(
+        {"score", "terrain.pcd", "-o", map, "--frame", frame, "--solid-voxel-threshold", "1"})));
+    ASSERT_TRUE(succeeded(graspmap(
+        {"footholds", map, "-o", std::string(frame) + ".vtp", "--no-graspable-only", "--edges"})));
+  }
+  const PointCloud terrain = libmap::read_cloud(scratch("terrain.vtp")).cloud;
+  const PointCloud input = libmap::read_cloud(scratch("input.vtp")).cloud;
+  ASSERT_GT(terrain.size(), 5U);
+  ASSERT_EQ(terrain.size(), input.size());
+  // The same places, turned: slopes are against the same plane.
+  for (std::size_t n = 0; n < terrain.size(); ++n)
+    EXPECT_NEAR(terrain.find_field("slope_deg")->values[n],
+                input.find_field("slope_deg")->values[n], 0.1);
+  const auto json = json_of("input.vtp.json");
+  EXPECT_EQ(json.at("frame"), "input");
+  EXPECT_EQ(json.at("results").at("footholds"), input.size());
+}
+
+TEST(Footholds, WhatIsNoMapIsSaid) {
+  write_terrain();
+  EXPECT_TRUE(bad_input(graspmap({"footholds", "terrain.pcd", "-o", "f.csv"}),
+                        {"terrain.pcd", "score", "no such field"}));
+  EXPECT_TRUE(bad_input(graspmap({"footholds", "none.pcd", "-o", "f.csv"}), {"none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"footholds", "terrain.pcd", "-o", "f.csv", "--separation", "0"}),
+                        {"separation_m", "> 0"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("f.csv")));
+}
+
+}  // namespace

@@ -1,0 +1,190 @@
+// The commands that read a tile store say of it what they say of the map in one file.
+#include <gtest/gtest.h>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/table.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::uniform;
+using graspmap_test::write_text;
+using Words = std::vector<std::string>;
+
+Words with(Words words, const Words& more) {
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+// map.pcd and map.tiles of one terrain, 9 tiles.
+void score_both(const Words& more = {}) {
+  graspmap_test::write_terrain();
+  const Words score =
+      with({"score", "terrain.pcd", "--zero-plane", "-0.01", "--tile-size", "0.2"}, more);
+  ASSERT_TRUE(succeeded(graspmap(with(score, {"-o", "map.pcd"}))));
+  ASSERT_TRUE(succeeded(graspmap(with(score, {"--force", "-o", "map.tiles"}))));
+}
+
+void write_points(int count) {
+  std::string text = "name,x,y,z\n";
+  for (int n = 0; n < count; ++n)
+    text += "p" + std::to_string(n) + "," + std::to_string(uniform(-0.4, 0.4)) + "," +
+            std::to_string(uniform(-0.4, 0.4)) + "," + std::to_string(uniform(-0.1, 0.1)) + "\n";
+  write_text(scratch("points.csv"), text);
+}
+
+std::string first_tile() {
+  std::string first;
+  for (const auto& entry : fs::directory_iterator(scratch("map.tiles/tiles")))
+    if (first.empty() || entry.path().filename().string() < first)
+      first = entry.path().filename().string();
+  return "map.tiles/tiles/" + first;
+}
+
+// `info --verify` lists the tile and ends as for any bad input.
+bool verified_as_broken(const std::string& tile) {
+  const auto result = graspmap({"info", "map.tiles", "--verify"});
+  return result.exit_code == 3 &&
+         result.standard_error == "graspmap info: error: map.tiles: 1 tile is broken\n" &&
+         result.standard_output.find(tile) != std::string::npos;
+}
+
+TEST(MapTiles, MergedIsTheMap) {
+  for (const char* frame : {"terrain", "input"}) {
+    score_both({"--frame", frame});
+    ASSERT_TRUE(succeeded(graspmap({"merge", "map.tiles", "-o", "merged.pcd"})));
+    EXPECT_TRUE(content("merged.pcd") == content("map.pcd"));
+    const auto merged = json_of("merged.pcd.json");
+    const auto map = json_of("map.pcd.json");
+    EXPECT_EQ(merged.at("transforms"), map.at("transforms"));
+    EXPECT_EQ(merged.at("frame"), map.at("frame"));
+    for (const char* count : {"scored_voxels", "edge_voxels", "graspable_voxels"})
+      EXPECT_EQ(merged.at("results").at(count), map.at("results").at(count)) << count;
+    ASSERT_TRUE(succeeded(graspmap({"merge", "map.tiles/", "-o", "merged.csv"})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "map.csv"})));
+    EXPECT_TRUE(content("merged.csv") == content("map.csv"));
+  }
+}
+
+TEST(MapTiles, FarFromTheOriginToo) {
+  libmap::write_cloud(
+      scratch("terrain.pcd"),
+      libmap::transform_cloud(graspmap_test::bumpy_terrain(),
+                              libmap::make_pose_from_rpy({5000, -300, 0}, {0, 0, 0})));
+  const Words score = {"score", "terrain.pcd", "--plane", "none", "--tile-size", "0.2"};
+  ASSERT_TRUE(succeeded(graspmap(with(score, {"-o", "map.pcd"}))));
+  ASSERT_TRUE(succeeded(graspmap(with(score, {"-o", "map.tiles"}))));
+  ASSERT_TRUE(succeeded(graspmap({"merge", "map.tiles", "-o", "merged.pcd"})));
+  EXPECT_TRUE(content("merged.pcd") == content("map.pcd"));
+  write_text(scratch("points.csv"), "x,y,z\n5000,-300,0\n5000.11,-299.9,0.01\n0,0,0\n");
+  ASSERT_TRUE(succeeded(graspmap({"lookup", "map.pcd", "points.csv", "-o", "one.csv"})));
+  ASSERT_TRUE(succeeded(graspmap({"lookup", "map.tiles", "points.csv", "-o", "tiles.csv"})));
+  EXPECT_TRUE(content("one.csv") == content("tiles.csv"));
+}
+
+TEST(MapTiles, LookupsAreThoseOfTheMap) {
+  for (const char* frame : {"terrain", "input"}) {
+    score_both({"--frame", frame});
+    write_points(500);
+    for (const char* mode : {"nearest", "maximum", "mean"}) {
+      for (const std::string map : {"map.pcd", "map.tiles"})
+        ASSERT_TRUE(succeeded(graspmap({"lookup", map, "points.csv", "--mode", mode, "--radius",
+                                        "0.025", "-o", map + ".csv"})));
+      EXPECT_TRUE(content("map.pcd.csv") == content("map.tiles.csv")) << mode;
+    }
+    const auto manifest = json_of("map.tiles.csv.json");
+    EXPECT_EQ(manifest.at("inputs").at(0).at("path"), "map.tiles/index.json");
+    EXPECT_EQ(manifest.at("results").at("points"), 500);
+  }
+}
+
+TEST(MapTiles, InfoCountsWhatTheMapHolds) {
+  score_both();
+  const auto result = graspmap({"info", "map.tiles/", "--json", "--verify"});
+  ASSERT_TRUE(succeeded(result));
+  const auto info = nlohmann::json::parse(result.standard_output);
+  const auto results = json_of("map.pcd.json").at("results");
+  EXPECT_EQ(info.at("points"), results.at("scored_voxels"));
+  EXPECT_EQ(info.at("edge_voxels"), results.at("edge_voxels"));
+  EXPECT_EQ(info.at("graspable_voxels"), results.at("graspable_voxels"));
+  EXPECT_GE(info.at("tiles").at("count"), 9);
+  EXPECT_TRUE(info.at("broken_tiles").empty());
+  const libmap::Bounds3d bounds =
+      libmap::bounds_of(libmap::read_cloud(scratch("map.pcd")).cloud.positions);
+  for (int axis = 0; axis < 3; ++axis) {
+    const auto index = static_cast<std::size_t>(axis);
+    EXPECT_NEAR(info.at("bounds_m").at("min").at(index), bounds.min[axis], 1e-6);
+    EXPECT_NEAR(info.at("bounds_m").at("max").at(index), bounds.max[axis], 1e-6);
+  }
+}
+
+TEST(MapTiles, PicturesAreThoseOfTheMap) {
+  score_both();
+  const Words small = {"--width", "300", "--height", "200", "--quiet"};
+  for (const Words& box : {Words{}, Words{"--box", "-0.11,-0.2,0.13,0.15"}}) {
+    for (const std::string map : {"map.pcd", "map.tiles"})
+      ASSERT_TRUE(succeeded(graspmap(with(with({"render", map, "-o", map + ".png"}, small), box))));
+    EXPECT_TRUE(content("map.pcd.png") == content("map.tiles.png")) << box.size();
+  }
+  ASSERT_TRUE(succeeded(
+      graspmap(with({"render", "map.tiles", "-o", "thin.png", "--max-points", "1000"}, small))));
+  EXPECT_EQ(json_of("map.tiles.png.json").at("results").at("columns_a_point"), 1);
+  EXPECT_GT(json_of("thin.png.json").at("results").at("columns_a_point"), 1);
+  EXPECT_TRUE(bad_input(graspmap({"render", "map.tiles", "-o", "a.png", "--box", "5,5,6,6"}),
+                        {"map.tiles", "--box"}));
+  for (const char* box : {"1,2,3", "1,2,3,4,5", "1,2,1,4", "a,b,c,d", "1,2,3,4,", ",,,"})
+    EXPECT_TRUE(
+        bad_input(graspmap({"render", "map.tiles", "-o", "a.png", "--box", box}), {"--box", box}));
+}
+
+TEST(MapTiles, DamageIsNamed) {
+  score_both();
+  write_points(100);
+  const std::string tile = first_tile();
+  const std::string whole = content(tile);
+  const auto commands = {Words{"merge", "map.tiles", "-o", "merged.pcd"},
+                         Words{"lookup", "map.tiles", "points.csv", "-o", "answers.csv"},
+                         Words{"render", "map.tiles", "-o", "map.png"}};
+  const auto all_refuse = [&](const std::string& what) {
+    for (const Words& words : commands) EXPECT_TRUE(bad_input(graspmap(words), {tile})) << what;
+    EXPECT_TRUE(verified_as_broken(tile)) << what;
+  };
+  write_text(scratch(tile), whole.substr(0, whole.size() - 10));
+  all_refuse("cut off");
+  fs::remove(scratch(tile));
+  all_refuse("missing");
+  // One byte of a score: the hash tells.
+  std::string changed = whole;
+  changed[changed.size() - 30] = static_cast<char>(changed[changed.size() - 30] ^ 1);
+  write_text(scratch(tile), changed);
+  EXPECT_TRUE(bad_input(graspmap({"merge", "map.tiles", "-o", "merged.pcd"}), {tile}));
+  EXPECT_TRUE(verified_as_broken(tile));
+  write_text(scratch(tile), whole);
+  EXPECT_TRUE(succeeded(graspmap({"info", "map.tiles", "--verify"})));
+  write_text(scratch("map.tiles/index.json"), "{");
+  EXPECT_TRUE(bad_input(graspmap({"info", "map.tiles"}), {"index.json"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "none.tiles"}), {"none.tiles"}));
+  EXPECT_TRUE(bad_input(graspmap({"merge", "map.tiles", "map.pcd", "-o", "merged.pcd"}),
+                        {"map.tiles", "by itself"}));
+}
+
+TEST(MapTiles, AnUnfinishedStoreIsNamed) {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(succeeded(graspmap(
+      {"score", "terrain.pcd", "--tile-size", "0.2", "--tile", "1/2", "-o", "map.tiles"})));
+  write_points(3);
+  for (const Words& words :
+       {Words{"merge", "map.tiles", "-o", "merged.pcd"},
+        Words{"lookup", "map.tiles", "points.csv", "-o", "answers.csv"},
+        Words{"render", "map.tiles", "-o", "map.png"}, Words{"info", "map.tiles"}})
+    EXPECT_TRUE(bad_input(graspmap(words), {"map.tiles", "not complete"})) << words[0];
+}
+
+}  // namespace

@@ -1,0 +1,72 @@
+// graspmap footholds: the best places of a map, for a planner of steps.
+#include <fmt/format.h>
+
+#include <string>
+
+#include "libgtd/score/footholds.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "tools/command_line.h"
+#include "tools/map_frame.h"
+
+namespace {
+
+using graspmap_tools::Run;
+
+struct FootholdsCommandOptions {
+  std::string map;
+  std::string output;
+  libgtd::FootholdOptions footholds;
+};
+
+// The outside of the regression plane in the frame of the map's points.
+libgtd::FootholdFrame frame_of(const std::string& map, Run& run) {
+  const auto manifest = libmap::read_manifest_of(map);
+  if (!manifest) {
+    run.warn(map + ": no manifest beside it: the z axis is taken as up");
+    return {};
+  }
+  run.manifest().frame = manifest->frame;
+  run.manifest().transforms = manifest->transforms;
+  const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
+  if (manifest->frame == "terrain" || terrain_from_input == nullptr) return {};
+  return {.up = terrain_from_input->linear().transpose() * Eigen::Vector3d::UnitZ()};
+}
+
+void find_footholds(const FootholdsCommandOptions& options, Run& run) {
+  libmap::require_cloud_format(options.output);
+  run.claim_output(options.output, {options.map});
+  const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
+  const libgtd::FootholdFrame frame = frame_of(options.map, run);
+  libgtd::FootholdResult result;
+  try {
+    result = run.timed("footholds",
+                       [&] { return libgtd::find_footholds(map, options.footholds, frame); });
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.map);
+  }
+  run.add_input(options.map);
+  run.manifest().results.emplace_back("candidates", static_cast<std::int64_t>(result.candidates));
+  run.manifest().results.emplace_back("footholds",
+                                      static_cast<std::int64_t>(result.footholds.size()));
+  run.say(fmt::format("{} footholds among {} voxels that may be one", result.footholds.size(),
+                      result.candidates));
+  if (result.footholds.empty()) run.warn("no voxel of the map may be a foothold");
+  const libmap::PointCloud cloud = libgtd::to_cloud(result, map);
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  FootholdsCommandOptions options;
+  graspmap_tools::Command command("footholds", "The best places of a map, for a planner of steps.");
+  command.input("MAP", options.map, "graspability map");
+  command.output(options.output,
+                 "the footholds, best first, with normals and directions of approach (.csv, .vtp, "
+                 ".pcd, .ply)");
+  bind(command.parameters(), options.footholds);
+  return command.run(argc, argv, [&](Run& run) { find_footholds(options, run); });
+}

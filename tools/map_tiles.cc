@@ -1,0 +1,75 @@
+#include "tools/map_tiles.h"
+
+#include <algorithm>
+#include <utility>
+
+#include "libgtd/score/tile_store_io.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+
+namespace graspmap_tools {
+
+bool is_tile_store(const std::string& path) { return libgtd::is_tile_store_name(path); }
+
+std::filesystem::path store_index_path(const std::string& store) {
+  return std::filesystem::path(store) / "index.json";
+}
+
+std::string without_trailing_slash(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
+MapTiles::MapTiles(const std::string& store)
+    : store_(without_trailing_slash(store)), index_(libgtd::finish_tile_store(store_)) {
+  if (index_.tiles.empty()) throw libmap::Error("the map has no points", {.file = store});
+  float64_positions_ = need_float64();
+}
+
+Eigen::AlignedBox3d MapTiles::box(std::size_t tile) const {
+  const Eigen::AlignedBox3d box(index_.lattice.center_of(index_.tiles[tile].min),
+                                index_.lattice.center_of(index_.tiles[tile].max));
+  return index_.frame == libgtd::MapFrame::input
+             ? box.transformed(index_.terrain_from_input().inverse())
+             : box;
+}
+
+// Files hold single precision where that moves no coordinate by more than 1e-5 m. Below 256 m it
+// moves none by more than 7.7e-6 m; beyond, the whole map needs double precision if any tile does.
+bool MapTiles::need_float64() const {
+  Eigen::AlignedBox3d whole;
+  for (std::size_t n = 0; n < index_.tiles.size(); ++n) whole.extend(box(n));
+  if (std::max(whole.min().cwiseAbs().maxCoeff(), whole.max().cwiseAbs().maxCoeff()) < 256.0)
+    return false;
+  return std::any_of(index_.tiles.begin(), index_.tiles.end(), [&](const auto& tile) {
+    const auto info = libmap::read_cloud_info(libgtd::tile_path(store_, tile));
+    return !info.fields.empty() && info.fields.front().type == libmap::ScalarType::float64;
+  });
+}
+
+libmap::PointCloud MapTiles::read(const std::filesystem::path& file,
+                                  const libgtd::StoredTile& tile) const {
+  libmap::PointCloud cloud = libmap::read_cloud(file).cloud;
+  if (cloud.size() != tile.voxels)
+    throw libmap::Error("holds other points than the store's index says",
+                        {.file = file.string(),
+                         .field = "points",
+                         .value = std::to_string(cloud.size()),
+                         .bound = std::to_string(tile.voxels)});
+  try {
+    if (float64_positions_) libgtd::restore_positions(index_, cloud);
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file.string());
+  }
+  return cloud;
+}
+
+libmap::PointCloud MapTiles::load(std::size_t tile) const {
+  return read(libgtd::tile_path(store_, index_.tiles[tile]), index_.tiles[tile]);
+}
+
+libmap::PointCloud MapTiles::load_checked(std::size_t tile) const {
+  return read(libgtd::checked_tile_path(store_, index_.tiles[tile]), index_.tiles[tile]);
+}
+
+}  // namespace graspmap_tools

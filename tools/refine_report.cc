@@ -1,0 +1,251 @@
+#include "tools/refine_report.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <utility>
+#include <vector>
+
+namespace graspmap_tools {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr double degrees = 180.0 / M_PI;
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+// Why pairs of frames gave no link, by its name in both kinds of report.
+std::vector<std::pair<const char*, std::size_t>> rejections_of(
+    const libmap::RejectionCounts& counts) {
+  return {{"too_few_matches", counts.too_few_matches},
+          {"too_few_inliers", counts.too_few_inliers},
+          {"narrow", counts.narrow},
+          {"not_converged", counts.not_converged},
+          {"against_graph", counts.against_graph},
+          {"unconfirmed", counts.unconfirmed}};
+}
+
+Json rejections_json(const libmap::RejectionCounts& counts) {
+  Json json = {{"candidates", counts.candidates}, {"accepted", counts.accepted}};
+  for (const auto& [reason, count] : rejections_of(counts)) json[reason] = count;
+  return json;
+}
+
+Json groups_json(const std::map<std::string, libmap::LinkGroupResult>& groups) {
+  Json json = Json::object();
+  for (const auto& [name, group] : groups)
+    json[name] = {{"links", group.links},
+                  {"rejected", group.rejected},
+                  {"translation_deviation_scale", group.translation_scale},
+                  {"rotation_deviation_scale", group.rotation_scale},
+                  {"redundancy", group.redundancy},
+                  {"translation_rms_before_m", group.translation_rms_before_m},
+                  {"rotation_rms_before_deg", group.rotation_rms_before_deg},
+                  {"translation_rms_m", group.translation_rms_m},
+                  {"rotation_rms_deg", group.rotation_rms_deg}};
+  return json;
+}
+
+Json error_json(const libmap::TrajectoryError& error) {
+  return {{"poses", error.poses},
+          {"rmse_m", error.rmse_m},
+          {"median_m", error.median_m},
+          {"max_m", error.max_m},
+          {"mean_rotation_deg", error.mean_rotation_deg},
+          {"max_rotation_deg", error.max_rotation_deg}};
+}
+
+Json held_out_json(const libmap::HeldOutJudgement& held_out) {
+  const auto part = [](const libmap::HeldOutChange& change) -> Json {
+    return {{"count", change.count},
+            {"cost_before", change.before},
+            {"cost_after", change.after},
+            {"deviation_of_change", change.deviation}};
+  };
+  return {{"matches", part(held_out.matches)},
+          {"surfaces", part(held_out.surfaces)},
+          {"change", held_out.change()},
+          {"deviation_of_change", held_out.deviation()}};
+}
+
+Json stage_json(const libmap::StageReport& stage) {
+  Json json = {{"stage", stage.name}, {"undone", stage.undone}};
+  if (stage.closures.candidates > 0) json["closures"] = rejections_json(stage.closures);
+  if (stage.held_out.any()) json["held_out"] = held_out_json(stage.held_out);
+  if (!stage.groups.empty()) json["links"] = groups_json(stage.groups);
+  for (const auto& [name, value] : stage.figures) json[name] = number(value);
+  if (stage.error) {
+    json["absolute_error"] = error_json(stage.error->absolute);
+    json["relative_error"] = error_json(stage.error->relative);
+  }
+  if (stage.undone_error)
+    json["absolute_error_given_up"] = error_json(stage.undone_error->absolute);
+  return json;
+}
+
+Json link_json(const libmap::PoseLink& link) {
+  return {{"from", link.from}, {"to", link.to}, {"type", to_text(link.type)}};
+}
+
+double deviation_m(const libmap::Matrix6d& covariance) {
+  return std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0);
+}
+
+double deviation_deg(const libmap::Matrix6d& covariance) {
+  return std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3.0) * degrees;
+}
+
+// Standard deviations of each node against its part's gauge node.
+Json nodes_json(const libmap::RefinementResult& result) {
+  Json json = Json::array();
+  for (const auto& [node, covariance] : result.covariance) {
+    Json rows = Json::array();
+    for (int row = 0; row < 6; ++row) {
+      Json values = Json::array();
+      for (int column = 0; column < 6; ++column) values.push_back(covariance(row, column));
+      rows.push_back(values);
+    }
+    json.push_back({{"node", node},
+                    {"deviation_m", deviation_m(covariance)},
+                    {"deviation_deg", deviation_deg(covariance)},
+                    {"covariance", rows}});
+  }
+  return json;
+}
+
+std::string numbers_text(const std::vector<int>& numbers) {
+  std::string text;
+  for (const int number : numbers) text += fmt::format(" {}", number);
+  return text.empty() ? " none" : text;
+}
+
+void add_held_out(const libmap::StageReport& stage, std::string& text) {
+  const auto out = std::back_inserter(text);
+  const auto line = [&](const char* what, const libmap::HeldOutChange& change) {
+    if (change.count > 0)
+      fmt::format_to(out, "  held-out {}: cost {:.5f} -> {:.5f}, +- {:.5f}, of {}\n", what,
+                     change.before, change.after, change.deviation, change.count);
+  };
+  line("matches", stage.held_out.matches);
+  line("surfaces", stage.held_out.surfaces);
+  if (stage.held_out.any())
+    fmt::format_to(out, "  together: {:+.6f}, +- {:.6f}\n", stage.held_out.change(),
+                   stage.held_out.deviation());
+}
+
+void add_errors(const libmap::StageReport& stage, std::string& text) {
+  const auto out = std::back_inserter(text);
+  const auto line = [&](const char* what, const libmap::TrajectoryError& error) {
+    fmt::format_to(out,
+                   "  {} error: rmse {:.3f} mm, median {:.3f}, max {:.3f}; "
+                   "rotation mean {:.4f} "
+                   "deg, max {:.4f}\n",
+                   what, 1e3 * error.rmse_m, 1e3 * error.median_m, 1e3 * error.max_m,
+                   error.mean_rotation_deg, error.max_rotation_deg);
+  };
+  if (stage.error) {
+    line("absolute", stage.error->absolute);
+    line("relative", stage.error->relative);
+  }
+  if (stage.undone_error) line("given up: absolute", stage.undone_error->absolute);
+}
+
+void add_stage(const libmap::StageReport& stage, std::string& text) {
+  const auto out = std::back_inserter(text);
+  fmt::format_to(out, "{}{}\n", stage.name, stage.undone ? ": undone" : "");
+  if (stage.closures.candidates > 0) {
+    fmt::format_to(out, "  pairs: {} tried, {} linked", stage.closures.candidates,
+                   stage.closures.accepted);
+    for (const auto& [reason, count] : rejections_of(stage.closures))
+      if (count > 0) fmt::format_to(out, ", {} {}", count, reason);
+    text += "\n";
+  }
+  for (const auto& [name, group] : stage.groups)
+    fmt::format_to(out,
+                   "  links of {}: {}, {} rejected; residuals {:.2f} mm {:.3f} deg -> "
+                   "{:.2f} mm "
+                   "{:.3f} deg; stated deviations x {:.3g} and x {:.3g}\n",
+                   name, group.links, group.rejected, 1e3 * group.translation_rms_before_m,
+                   group.rotation_rms_before_deg, 1e3 * group.translation_rms_m,
+                   group.rotation_rms_deg, group.translation_scale, group.rotation_scale);
+  for (const auto& [name, value] : stage.figures)
+    fmt::format_to(out, "  {}: {:.6g}\n", name, value);
+  add_held_out(stage, text);
+  add_errors(stage, text);
+}
+
+}  // namespace
+
+std::string refinement_json(const std::string& scan, const libmap::RefinementResult& result) {
+  Json stages = Json::array();
+  for (const libmap::StageReport& stage : result.stages) stages.push_back(stage_json(stage));
+  Json parts = Json::array();
+  for (const libmap::GraphComponent& part : result.components)
+    parts.push_back({{"nodes", part.nodes.size()}, {"gauge_node", part.gauge_node}});
+  Json rejected = Json::array();
+  for (const libmap::PoseLink& link : result.rejected_links) rejected.push_back(link_json(link));
+  Json skipped = Json::array();
+  for (const auto& [node, reason] : result.skipped)
+    skipped.push_back({{"node", node}, {"reason", reason}});
+  Json losses = Json::array();
+  for (const libmap::TrackingLoss& loss : result.losses)
+    losses.push_back({{"node", loss.node},
+                      {"key_frame", loss.key_frame},
+                      {"reason", loss.reason},
+                      {"found_node", loss.found_node},
+                      {"found_at", loss.found_at}});
+  const Json json = {{"scan", scan},
+                     {"poses", result.poses.size()},
+                     {"links", result.links.size()},
+                     {"closures_found", result.closures.size()},
+                     {"stages", stages},
+                     {"parts", parts},
+                     {"nodes_without_links", result.without_links},
+                     {"nodes_without_pose", result.without_pose},
+                     {"nodes_lost_by_odometry", losses},
+                     {"frames_skipped", skipped},
+                     {"stored_links_rejected", rejected},
+                     {"warnings", result.warnings},
+                     {"nodes", nodes_json(result)}};
+  return json.dump(2) + "\n";
+}
+
+std::string refinement_text(const std::string& scan, const libmap::RefinementResult& result) {
+  std::string text = fmt::format("{}: {} poses, {} links, of which {} were found\n\n", scan,
+                                 result.poses.size(), result.links.size(), result.closures.size());
+  const auto out = std::back_inserter(text);
+  for (const libmap::StageReport& stage : result.stages) add_stage(stage, text);
+  text += "\n";
+  for (const libmap::GraphComponent& part : result.components)
+    fmt::format_to(out, "part of {} nodes, of which {} stays where it was\n", part.nodes.size(),
+                   part.gauge_node);
+  fmt::format_to(out, "nodes without links:{}\nnodes without pose:{}\n",
+                 numbers_text(result.without_links), numbers_text(result.without_pose));
+  for (const auto& [node, reason] : result.skipped)
+    fmt::format_to(out, "node {} skipped: {}\n", node, reason);
+  for (const libmap::TrackingLoss& loss : result.losses)
+    fmt::format_to(out, "odometry lost at node {}: {}\n", loss.node, loss.reason);
+  for (const libmap::PoseLink& link : result.rejected_links)
+    fmt::format_to(out, "stored link {} -> {} rejected: {}\n", link.from, link.to,
+                   to_text(link.type));
+  for (const std::string& warning : result.warnings) fmt::format_to(out, "warning: {}\n", warning);
+  text +=
+      "\nstandard deviations of each pose against its part's fixed node, "
+      "in its own axes\n"
+      "  node     x mm     y mm     z mm    x deg    y deg    z deg\n";
+  for (const auto& [node, covariance] : result.covariance) {
+    fmt::format_to(out, "{:6}", node);
+    for (int n = 0; n < 6; ++n)
+      fmt::format_to(out, " {:8.4f}", std::sqrt(covariance(n, n)) * (n < 3 ? 1e3 : degrees));
+    text += "\n";
+  }
+  return text;
+}
+
+}  // namespace graspmap_tools

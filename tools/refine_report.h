@@ -1,0 +1,13 @@
+// What `graspmap refine` did, stage by stage, as JSON for programs and as text for people.
+#pragma once
+
+#include <string>
+
+#include "libmap/poses/refinement.h"
+
+namespace graspmap_tools {
+
+std::string refinement_json(const std::string& scan, const libmap::RefinementResult& result);
+std::string refinement_text(const std::string& scan, const libmap::RefinementResult& result);
+
+}  // namespace graspmap_tools

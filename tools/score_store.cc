@@ -1,0 +1,444 @@
+#include "tools/score_store.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "libgtd/score/tile_progress_io.h"
+#include "libgtd/score/tile_store_io.h"
+#include "libgtd/streamed_detection.h"
+#include "libgtd/tile_detection.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/cloud_pieces.h"
+#include "libmap/cloud/point_spool.h"
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/parallel.h"
+#include "tools/map_frame.h"
+
+namespace graspmap_tools {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+using libgtd::StoredTile;
+using libgtd::TerrainPiece;
+using libgtd::TileNumber;
+using libgtd::TilePlan;
+
+std::int64_t modified_ns(const fs::path& path) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             fs::last_write_time(path).time_since_epoch())
+      .count();
+}
+
+// What is known of each file from an earlier run, if it is the same by name, size and time; else
+// it is read.
+std::vector<TerrainPiece> survey(const std::vector<fs::path>& files,
+                                 const std::vector<TerrainPiece>& known) {
+  std::vector<TerrainPiece> pieces(files.size());
+  libmap::parallel_for(files.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      TerrainPiece& piece = pieces[n];
+      piece.input.path = files[n].string();
+      piece.input.bytes = fs::file_size(files[n]);
+      piece.modified_ns = modified_ns(files[n]);
+      const auto same = std::find_if(known.begin(), known.end(), [&](const TerrainPiece& one) {
+        return one.input.path == piece.input.path && one.input.bytes == piece.input.bytes &&
+               one.modified_ns == piece.modified_ns;
+      });
+      if (same != known.end()) {
+        piece = *same;
+        continue;
+      }
+      piece.input.sha256 = libmap::sha256_of_file(files[n]);
+      const libmap::PieceFacts facts = libmap::survey_piece(files[n]);
+      piece.points = facts.points;
+      piece.dropped_points = facts.dropped_points;
+      piece.box = facts.box;
+    }
+  });
+  return pieces;
+}
+
+// The spool as the detection asks for it.
+class SpooledPoints : public libgtd::NearbyPoints {
+ public:
+  explicit SpooledPoints(const libmap::PointSpool& spool) : spool_(spool) {}
+  libmap::PointCloud points_in(const Eigen::Vector2d& low,
+                               const Eigen::Vector2d& high) const override {
+    return spool_.points_in(low, high);
+  }
+  std::size_t count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const override {
+    return spool_.count_in(low, high);
+  }
+
+ private:
+  const libmap::PointSpool& spool_;
+};
+
+class StoreScoring {
+ public:
+  StoreScoring(const ScoreStoreOptions& options, Run& run)
+      : options_(options),
+        scenario_(options.detection.scenario),
+        run_(run),
+        progress_(options.store),
+        files_(libmap::cloud_pieces(options.terrain)),
+        tile_voxels_(libgtd::tile_voxels(scenario_)),
+        mask_(libgtd::make_gripper_mask(
+            options.detection.gripper,
+            {scenario_.method, scenario_.voxel_size_m, scenario_.extra_void_layers})),
+        halo_(libgtd::halo_voxels(mask_, scenario_)) {
+    if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
+        fs::equivalent(options.store, options.terrain))
+      throw libmap::Error("is the input: the output needs another name", {.file = options.store});
+  }
+
+  void score() {
+    const libmap::PieceStream stream(files_);
+    if (run_.options().dry_run) return;
+    progress_.open();
+    run_.timed("plan", [&] { agree_on_plan(stream); });
+    libgtd::TileJournal journal(progress_.store(), options_.detection.share, plan_.key);
+    const std::vector<TileNumber> wanted = run_.timed("check", [&] { return missing_tiles(); });
+    if (!wanted.empty()) {
+      libmap::PointSpool spool(progress_.store() / "progress",
+                               {.square_m = square_m(), .has_normals = stream.has_normals()});
+      run_.timed("sort points", [&] { fill(spool, wanted); });
+      run_.timed("tiles", [&] {
+        libgtd::detect_streamed(
+            frame_, SpooledPoints(spool), wanted, options_.detection,
+            [&](std::vector<libgtd::StreamedTile> tiles) { journal.add(write(tiles)); },
+            run_.progress(), {.max_points = options_.points_at_once});
+      });
+    }
+    finish(wanted.size());
+  }
+
+ private:
+  // The plan that is there, if it is of the same parameters and inputs; else a new one.
+  void agree_on_plan(const libmap::PieceStream& stream) {
+    const libmap::FileLock lock = progress_.lock();
+    const auto earlier = run_.options().force ? std::nullopt : progress_.plan();
+    if (!earlier && !run_.options().force && fs::exists(progress_.store() / "index.json"))
+      throw libmap::Error(
+          "is complete, but its folder `progress` is not there: --force begins anew",
+          {.file = options_.store});
+    std::vector<TerrainPiece> pieces =
+        survey(files_, earlier ? earlier->pieces : std::vector<TerrainPiece>{});
+    TilePlan plan;
+    plan.index.manifest = manifest_of(pieces);
+    plan.key = libgtd::key_of(plan.index.manifest);
+    plan.pieces = std::move(pieces);
+    if (earlier && earlier->key == plan.key) {
+      // The same files may lie elsewhere by now, or have another time.
+      plan_ = *earlier;
+      plan_.pieces = std::move(plan.pieces);
+      restore_frame();
+    } else {
+      if (earlier) require_appendable(*earlier, plan);
+      make_frame(stream, plan);
+      if (earlier)
+        keep_tiles(*earlier, plan);
+      else
+        progress_.clear();
+      progress_.set_plan(plan);
+      plan_ = std::move(plan);
+    }
+    remove_stale_index();
+  }
+
+  // Parameters and inputs, and what `score` says beside any map.
+  libmap::Manifest manifest_of(const std::vector<TerrainPiece>& pieces) {
+    libmap::Manifest& manifest = run_.manifest();
+    carry_site_transform(options_.terrain, run_);
+    for (const TerrainPiece& piece : pieces) manifest.inputs.push_back(piece.input);
+    run_.add_input(options_.gripper_file);
+    manifest.frame = options_.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
+    libmap::Manifest copy = manifest;
+    copy.timings_s.clear();
+    copy.threads = 0;
+    return copy;
+  }
+
+  void make_frame(const libmap::PieceStream& stream, TilePlan& plan) {
+    std::size_t points = 0, dropped = 0;
+    for (const TerrainPiece& piece : plan.pieces) {
+      points += piece.points;
+      dropped += piece.dropped_points;
+    }
+    if (points == 0)
+      throw libmap::Error(dropped == 0
+                              ? "the cloud has no points"
+                              : fmt::format("none of its {} points has a position", dropped),
+                          {.file = options_.terrain});
+    if (dropped > 0)
+      run_.warn(
+          fmt::format("{}: {} points without a position were dropped", options_.terrain, dropped));
+    try {
+      frame_ = libgtd::frame_terrain(stream, options_.detection);
+    } catch (const libmap::Error& error) {
+      throw error.in_file(options_.terrain);
+    }
+    plan.has_plane = frame_.plane.has_value();
+    libgtd::TileStoreIndex& index = plan.index;
+    index.lattice = frame_.lattice;
+    index.tile_voxels = tile_voxels_;
+    index.min = frame_.min;
+    index.max = frame_.max;
+    libmap::Manifest& manifest = index.manifest;
+    const Eigen::Vector3d& origin = frame_.lattice.origin_m;
+    libmap::Pose terrain_from_input = libmap::Pose::Identity();
+    if (frame_.plane) {
+      plan.centroid = frame_.plane->centroid;
+      terrain_from_input = frame_.plane->terrain_from_input;
+    }
+    manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
+    manifest.results.emplace_back("lattice_origin_m",
+                                  std::vector<double>{origin.x(), origin.y(), origin.z()});
+    manifest.results.emplace_back("input_points", static_cast<std::int64_t>(points));
+    if (frame_.plane) {
+      manifest.results.emplace_back("plane_rmse_m", frame_.plane->rmse_m);
+      manifest.results.emplace_back("up_source", std::string(to_text(frame_.plane->up_source)));
+    }
+    manifest.results.emplace_back("mask_side_voxels", std::int64_t{mask_.side});
+    manifest.results.emplace_back("mask_layers", std::int64_t{mask_.layers});
+  }
+
+  void restore_frame() {
+    frame_.lattice = plan_.index.lattice;
+    frame_.min = plan_.index.min;
+    frame_.max = plan_.index.max;
+    if (!plan_.has_plane) return;
+    frame_.plane = libgtd::RegressionPlane{};
+    frame_.plane->centroid = plan_.centroid;
+    frame_.plane->terrain_from_input = plan_.index.terrain_from_input();
+  }
+
+  // Throws unless `plan` is `earlier` with more pieces, and tiles far from these stay as they are.
+  void require_appendable(const TilePlan& earlier, const TilePlan& plan) const {
+    const auto refuse = [&](const std::string& reason) {
+      throw libmap::Error(reason, {.file = options_.store});
+    };
+    if (earlier.index.manifest.parameters != plan.index.manifest.parameters ||
+        earlier.index.manifest.version != plan.index.manifest.version)
+      refuse("holds tiles of other parameters: --force begins anew");
+    const auto same = [](const TerrainPiece& a, const TerrainPiece& b) {
+      return a.input.sha256 == b.input.sha256;
+    };
+    auto at = plan.pieces.begin();
+    for (const TerrainPiece& piece : earlier.pieces) {
+      at = std::find_if(at, plan.pieces.end(), [&](const auto& one) { return same(one, piece); });
+      if (at == plan.pieces.end())
+        refuse("holds tiles of another terrain or gripper: --force begins anew");
+      ++at;
+    }
+    if (earlier.pieces.size() == plan.pieces.size())
+      refuse("holds tiles of another gripper file: --force begins anew");
+    if (!options_.append)
+      refuse(
+          fmt::format("holds tiles of {} of these {} pieces: --append adds the others, --force "
+                      "begins anew",
+                      earlier.pieces.size(), plan.pieces.size()));
+    if (options_.detection.plane != libgtd::PlaneSource::none)
+      refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
+    if (scenario_.method != libgtd::Method::corrected)
+      refuse("--append needs --method corrected: others leave out the terrain's border");
+  }
+
+  // Those that no point of a new piece can change.
+  void keep_tiles(const TilePlan& earlier, TilePlan& plan) const {
+    std::vector<libmap::Bounds3d> added;
+    auto known = earlier.pieces.begin();
+    for (const TerrainPiece& piece : plan.pieces)
+      if (known != earlier.pieces.end() && piece.input.sha256 == known->input.sha256)
+        ++known;
+      else if (piece.points > 0)
+        added.push_back(piece.box);
+    for (const auto& [number, tile] : progress_.done(earlier)) {
+      const libgtd::PointsRectangle places =
+          libgtd::points_for(libgtd::columns_of(number, tile_voxels_), frame_, halo_);
+      const bool is_touched =
+          std::any_of(added.begin(), added.end(), [&](const libmap::Bounds3d& box) {
+            return (box.min.head<2>().array() <= places.high.array()).all() &&
+                   (box.max.head<2>().array() >= places.low.array()).all();
+          });
+      if (!is_touched) plan.kept.push_back(tile);
+    }
+  }
+
+  void remove_stale_index() const {
+    if (!fs::exists(progress_.store() / "index.json")) return;
+    try {
+      if (libgtd::read_tile_store(progress_.store()).key == plan_.key) return;
+    } catch (const libmap::Error&) {
+      // Broken: it is written again.
+    }
+    progress_.remove_index();
+  }
+
+  // Of the share, those without a file that is as it was written.
+  std::vector<TileNumber> missing_tiles() const {
+    const auto done = progress_.done(plan_);
+    const std::vector<TileNumber> share =
+        libgtd::tiles_of(frame_, tile_voxels_, options_.detection.share);
+    std::vector<std::uint8_t> is_there(share.size(), 0);
+    libmap::parallel_for(share.size(), 16, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) {
+        const auto found = done.find(share[n]);
+        if (found == done.end()) continue;
+        try {
+          if (found->second.voxels > 0) libgtd::checked_tile_path(progress_.store(), found->second);
+          is_there[n] = 1;
+        } catch (const libmap::Error&) {
+          continue;
+        }
+      }
+    });
+    std::vector<TileNumber> missing;
+    for (std::size_t n = 0; n < share.size(); ++n)
+      if (is_there[n] == 0) missing.push_back(share[n]);
+    return missing;
+  }
+
+  // Small against the tiles that are worked on at once, not small against their halo.
+  double square_m() const {
+    return std::max(1.0 + halo_, std::min<double>(tile_voxels_, 4.0 * halo_)) *
+           scenario_.voxel_size_m;
+  }
+
+  // The points on which the wanted tiles depend.
+  void fill(libmap::PointSpool& spool, const std::vector<TileNumber>& wanted) const {
+    const int reach = (halo_ + 1) / tile_voxels_ + 1;
+    std::set<TileNumber> needed;
+    for (const TileNumber& tile : wanted)
+      for (int i = -reach; i <= reach; ++i)
+        for (int j = -reach; j <= reach; ++j) needed.insert({tile.i + i, tile.j + j});
+    std::vector<fs::path> files;
+    for (const TerrainPiece& piece : plan_.pieces)
+      if (touches(piece, needed)) files.emplace_back(piece.input.path);
+    std::optional<TileNumber> last;
+    bool is_needed = false;
+    const auto all = libmap::PointStream::Need::positions_and_normals;
+    libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
+      const libmap::PointCloud terrain = libgtd::to_terrain(block, frame_);
+      std::vector<std::size_t> near;
+      for (std::size_t n = 0; n < terrain.size(); ++n) {
+        const TileNumber tile =
+            libgtd::tile_of(frame_.lattice.voxel_of(terrain.positions[n]), tile_voxels_);
+        if (tile != last) is_needed = needed.contains(tile);
+        last = tile;
+        if (is_needed) near.push_back(n);
+      }
+      spool.add(near.size() == terrain.size() ? terrain : libmap::select_points(terrain, near));
+    });
+    spool.finish();
+  }
+
+  bool touches(const TerrainPiece& piece, const std::set<TileNumber>& needed) const {
+    if (piece.points == 0) return false;
+    libmap::PointCloud corners;
+    for (int n = 0; n < 8; ++n)
+      corners.positions.emplace_back((n & 1) == 0 ? piece.box.min.x() : piece.box.max.x(),
+                                     (n & 2) == 0 ? piece.box.min.y() : piece.box.max.y(),
+                                     (n & 4) == 0 ? piece.box.min.z() : piece.box.max.z());
+    const libmap::Bounds3d box = libmap::bounds_of(libgtd::to_terrain(corners, frame_).positions);
+    // A voxel more, against rounding.
+    const Eigen::Vector3d margin = Eigen::Vector3d::Constant(scenario_.voxel_size_m);
+    const TileNumber low = libgtd::tile_of(frame_.lattice.voxel_of(box.min - margin), tile_voxels_);
+    const TileNumber high =
+        libgtd::tile_of(frame_.lattice.voxel_of(box.max + margin), tile_voxels_);
+    for (auto at = needed.lower_bound(low); at != needed.end() && at->i <= high.i; ++at)
+      if (at->j >= low.j && at->j <= high.j) return true;
+    return false;
+  }
+
+  std::vector<StoredTile> write(std::vector<libgtd::StreamedTile>& tiles) const {
+    std::vector<StoredTile> stored(tiles.size());
+    libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) stored[n] = write(tiles[n]);
+    });
+    return stored;
+  }
+
+  StoredTile write(libgtd::StreamedTile& tile) const {
+    StoredTile stored;
+    stored.number = tile.number;
+    stored.occupied_voxels = tile.occupied_voxels;
+    stored.voxels = tile.voxels.size();
+    if (tile.voxels.empty()) return stored;
+    stored.min = stored.max = tile.voxels.front().voxel;
+    for (const libgtd::MapVoxel& one : tile.voxels) {
+      const libgtd::Voxel& voxel = one.voxel;
+      stored.min = {std::min(stored.min.i, voxel.i), std::min(stored.min.j, voxel.j),
+                    std::min(stored.min.k, voxel.k)};
+      stored.max = {std::max(stored.max.i, voxel.i), std::max(stored.max.j, voxel.j),
+                    std::max(stored.max.k, voxel.k)};
+      stored.edge_voxels += one.edge ? 1 : 0;
+      stored.graspable_voxels += one.graspable ? 1 : 0;
+    }
+    libgtd::GraspabilityMap map;
+    map.lattice = frame_.lattice;
+    if (frame_.plane) map.terrain_from_input = frame_.plane->terrain_from_input;
+    map.zero_plane_m = scenario_.zero_plane_m;
+    map.voxels = std::move(tile.voxels);
+    stored.file = libgtd::tile_file_of(tile.number);
+    libmap::OutputFile file(progress_.store() / stored.file);
+    libmap::write_cloud(file.temporary_path(), libgtd::to_cloud(map, options_.frame));
+    stored.bytes = fs::file_size(file.temporary_path());
+    stored.sha256 = libmap::sha256_of_file(file.temporary_path());
+    file.commit();
+    return stored;
+  }
+
+  // Whoever comes last writes the index.
+  void finish(std::size_t scored) {
+    const libmap::FileLock lock = progress_.lock();
+    const libgtd::TileProgress::Completion completion = progress_.complete(plan_);
+    if (!completion.index) {
+      run_.say(fmt::format("{} tiles scored; {} of {} are there", scored, completion.done,
+                           completion.tiles));
+      return;
+    }
+    const libgtd::TileStoreIndex& index = *completion.index;
+    if (!fs::exists(progress_.store() / "index.json")) {
+      libmap::Manifest manifest = index.manifest;
+      manifest.timings_s = run_.manifest().timings_s;
+      manifest.threads = run_.manifest().threads;
+      progress_.write_index(index, manifest);
+    }
+    run_.say(fmt::format("{} tiles scored; all {} are there: {} voxels", scored, completion.tiles,
+                         index.voxels()));
+    if (index.voxels() == 0)
+      run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
+  }
+
+  const ScoreStoreOptions& options_;
+  const libgtd::Scenario& scenario_;
+  Run& run_;
+  libgtd::TileProgress progress_;
+  std::vector<fs::path> files_;
+  int tile_voxels_;
+  libgtd::GripperMask mask_;
+  int halo_;
+  TilePlan plan_;
+  libgtd::TerrainFrame frame_;
+};
+
+}  // namespace
+
+void score_into_store(const ScoreStoreOptions& options, Run& run) {
+  libgtd::require_streamable(options.detection);
+  if (run.options().force && options.detection.share.count > 1)
+    throw libmap::Error("removes the tiles of all shares: use it without --tile",
+                        {.field = "--force"});
+  StoreScoring(options, run).score();
+}
+
+}  // namespace graspmap_tools
