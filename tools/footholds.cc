@@ -1,6 +1,7 @@
 // graspmap footholds: the best places of a map, for a planner of steps.
 #include <fmt/format.h>
 
+#include <optional>
 #include <string>
 
 #include "libgtd/score/footholds.h"
@@ -21,14 +22,8 @@ struct FootholdsCommandOptions {
 };
 
 // The outside of the regression plane in the frame of the map's points.
-libgtd::FootholdFrame frame_of(const std::string& map, Run& run) {
-  const auto manifest = libmap::read_manifest_of(map);
-  if (!manifest) {
-    run.warn(map + ": no manifest beside it: the z axis is taken as up");
-    return {};
-  }
-  run.manifest().frame = manifest->frame;
-  run.manifest().transforms = manifest->transforms;
+libgtd::FootholdFrame frame_of(const std::optional<libmap::Manifest>& manifest) {
+  if (!manifest) return {};
   const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
   if (manifest->frame == "terrain" || terrain_from_input == nullptr) return {};
   return {.up = terrain_from_input->linear().transpose() * Eigen::Vector3d::UnitZ()};
@@ -38,13 +33,20 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.map});
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
-  const libgtd::FootholdFrame frame = frame_of(options.map, run);
+  const std::optional<libmap::Manifest> manifest = libmap::read_manifest_of(options.map);
   libgtd::FootholdResult result;
   try {
-    result = run.timed("footholds",
-                       [&] { return libgtd::find_footholds(map, options.footholds, frame); });
+    result = run.timed("footholds", [&] {
+      return libgtd::find_footholds(map, options.footholds, frame_of(manifest));
+    });
   } catch (const libmap::Error& error) {
     throw error.in_file(options.map);
+  }
+  if (manifest) {
+    run.manifest().frame = manifest->frame;
+    run.manifest().transforms = manifest->transforms;
+  } else {
+    run.warn(options.map + ": no manifest beside it: the z axis is taken as up");
   }
   run.add_input(options.map);
   run.manifest().results.emplace_back("candidates", static_cast<std::int64_t>(result.candidates));

@@ -323,11 +323,13 @@ class StoreScoring {
     std::vector<fs::path> files;
     for (const TerrainPiece& piece : plan_.pieces)
       if (touches(piece, needed)) files.emplace_back(piece.input.path);
+    const bool are_all = wanted.size() == libgtd::tiles_of(frame_, tile_voxels_).size();
     std::optional<TileNumber> last;
     bool is_needed = false;
     const auto all = libmap::PointStream::Need::positions_and_normals;
     libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
       const libmap::PointCloud terrain = libgtd::to_terrain(block, frame_);
+      if (are_all) return spool.add(terrain);
       std::vector<std::size_t> near;
       for (std::size_t n = 0; n < terrain.size(); ++n) {
         const TileNumber tile =
@@ -336,7 +338,7 @@ class StoreScoring {
         last = tile;
         if (is_needed) near.push_back(n);
       }
-      spool.add(near.size() == terrain.size() ? terrain : libmap::select_points(terrain, near));
+      spool.add(libmap::select_points(terrain, near));
     });
     spool.finish();
   }

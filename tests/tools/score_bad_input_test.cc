@@ -54,7 +54,7 @@ TEST_F(ScoreBadInput, EmptyFileAndFolder) {
   write_text(scratch("empty.pcd"), "");
   EXPECT_TRUE(bad_input(score({"empty.pcd"}), {"empty.pcd: is empty"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {"folder.pcd: is a folder"}));
+  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {"folder.pcd: the folder holds no cloud"}));
 }
 
 TEST_F(ScoreBadInput, EmptyCloud) {
@@ -225,7 +225,7 @@ TEST_F(ScoreBadInput, OutputsThatCannotBe) {
   EXPECT_TRUE(bad_input(to("out.xyz"), {"out.xyz", ".pcd"}));
   EXPECT_TRUE(bad_input(to("out"), {"out", "extension"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: is a folder"}));
+  EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: the folder holds no cloud"}));
 }
 
 }  // namespace

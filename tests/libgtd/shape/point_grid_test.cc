@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <limits>
 #include <set>
 
@@ -96,6 +97,29 @@ TEST(PointGrid, SortsCellsFarApart) {
   ASSERT_EQ(runs.size(), 1u);
   EXPECT_EQ(grid.order()[runs[0].first], 7u);
   EXPECT_EQ(grid.order()[runs[0].last - 1], 200u);
+}
+
+TEST(PointGrid, NearPointsComeInTheSameOrderWithoutFarOnes) {
+  std::vector<Eigen::Vector3d> all;
+  for (int n = 0; n < 3000; ++n)
+    all.emplace_back(uniform(-1, 1), uniform(-1, 1), uniform(-0.1, 0.1));
+  std::vector<Eigen::Vector3d> part;
+  for (const Eigen::Vector3d& point : all)
+    if (std::abs(point.x() - 0.3) < 0.35 && std::abs(point.y() + 0.2) < 0.35) part.push_back(point);
+  const auto near = [](const std::vector<Eigen::Vector3d>& points, const Eigen::Vector3d& place) {
+    const PointGrid grid(points, 0.1);
+    std::vector<PointGrid::Range> runs;
+    grid.find_near(grid.cell_of(place), 2, runs);
+    std::vector<Eigen::Vector3d> found;
+    for (const PointGrid::Range& run : runs)
+      for (std::uint32_t k = run.first; k < run.last; ++k) found.push_back(points[grid.order()[k]]);
+    return found;
+  };
+  for (int n = 0; n < 30; ++n) {
+    const Eigen::Vector3d place(0.3 + uniform(-0.04, 0.04), -0.2 + uniform(-0.04, 0.04), 0);
+    EXPECT_GT(near(all, place).size(), 50u);
+    EXPECT_EQ(near(part, place), near(all, place));
+  }
 }
 
 TEST(PointGrid, AnEmptyOneReachesNothing) {
