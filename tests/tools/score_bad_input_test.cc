@@ -225,7 +225,7 @@ TEST_F(ScoreBadInput, OutputsThatCannotBe) {
   EXPECT_TRUE(bad_input(to("out.xyz"), {"out.xyz", ".pcd"}));
   EXPECT_TRUE(bad_input(to("out"), {"out", "extension"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: the folder holds no cloud"}));
+  EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: is a folder"}));
 }
 
 }  // namespace
