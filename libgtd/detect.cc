@@ -1,27 +1,17 @@
 #include "libgtd/detect.h"
 
-#include <chrono>
 #include <utility>
 
 #include "libgtd/terrain/interpolation.h"
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
+#include "libmap/core/stage_timer.h"
 
 namespace libgtd {
 
 namespace {
 
 using libmap::PointCloud;
-
-// Runs `step` and keeps its wall time under `name`.
-template <typename Step>
-auto timed(DetectionResult& result, const char* name, const Step& step) {
-  const auto start = std::chrono::steady_clock::now();
-  auto value = step();
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  result.timings_s.emplace_back(name, taken.count());
-  return value;
-}
 
 std::vector<Eigen::Vector3f> to_float(const std::vector<Eigen::Vector3d>& points) {
   std::vector<Eigen::Vector3f> floats;
@@ -50,12 +40,12 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& opti
   const bool thesis = follows_thesis(options.scenario.method);
   PointCloud cloud = input;
   if (thesis) {
-    cloud =
-        timed(result, "thinning", [&] { return thinned(input, options.scenario.voxel_size_m); });
+    cloud = libmap::timed(result.timings_s, "thinning",
+                          [&] { return thinned(input, options.scenario.voxel_size_m); });
     result.thinned_points = cloud.size();
   }
   const PlaneMethod method = thesis ? PlaneMethod::thesis : PlaneMethod::corrected;
-  return timed(result, "regression plane", [&] {
+  return libmap::timed(result.timings_s, "regression plane", [&] {
     result.plane = fit_regression_plane(cloud, {.method = method, .up = options.up});
     result.map.terrain_from_input = result.plane->terrain_from_input;
     return transform_to_terrain(cloud, *result.plane, method);
@@ -65,7 +55,7 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& opti
 std::vector<Eigen::Vector3d> surface_points(const PointCloud& terrain, const Scenario& scenario,
                                             DetectionResult& result) {
   if (!scenario.interpolation) return terrain.positions;
-  return timed(result, "interpolation", [&] {
+  return libmap::timed(result.timings_s, "interpolation", [&] {
     InterpolationOptions options;
     options.method = follows_thesis(scenario.method) ? InterpolationMethod::thesis
                                                      : InterpolationMethod::corrected;
@@ -85,7 +75,7 @@ std::vector<Eigen::Vector3d> surface_points(const PointCloud& terrain, const Sce
 
 VoxelGrid make_grid(const std::vector<Eigen::Vector3d>& points, const Scenario& scenario,
                     DetectionResult& result) {
-  return timed(result, "voxelization", [&] {
+  return libmap::timed(result.timings_s, "voxelization", [&] {
     return follows_thesis(scenario.method)
                ? voxelize_thesis(to_float(points), scenario.voxel_size_m)
                : voxelize(points, scenario.voxel_size_m);

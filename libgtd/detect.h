@@ -13,6 +13,7 @@
 #include "libgtd/terrain/regression_plane.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 
 namespace libgtd {
 
@@ -45,7 +46,7 @@ struct DetectionResult {
   std::size_t convex_points = 0;
   std::size_t graspable_voxels = 0;
   std::size_t edge_voxels = 0;
-  std::vector<std::pair<std::string, double>> timings_s;  // wall time of each step
+  libmap::StageTimings timings_s;  // wall time of each step
 };
 
 // Throws Error for an empty cloud, options out of their bounds, and what the steps throw.

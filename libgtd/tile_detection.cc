@@ -1,7 +1,6 @@
 #include "libgtd/tile_detection.h"
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <numeric>
 
@@ -9,6 +8,7 @@
 #include "libgtd/shape/convexity.h"
 #include "libgtd/shape/curvature.h"
 #include "libmap/core/error.h"
+#include "libmap/core/stage_timer.h"
 #include "libmap/core/text.h"
 
 namespace libgtd {
@@ -16,15 +16,6 @@ namespace libgtd {
 namespace {
 
 using libmap::PointCloud;
-
-template <typename Step>
-auto timed(TileDetectionResult& result, const char* name, const Step& step) {
-  const auto start = std::chrono::steady_clock::now();
-  auto value = step();
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-  result.timings_s.emplace_back(name, taken.count());
-  return value;
-}
 
 CurvatureMethod curvature_method(const Scenario& scenario) {
   return follows_thesis(scenario.method) ? CurvatureMethod::thesis : CurvatureMethod::corrected;
@@ -179,13 +170,13 @@ TileDetectionResult detect_tiles(const PointCloud& terrain, const VoxelGrid& gri
                                  CurvatureAt curvature_at, const Scenario& scenario,
                                  libmap::Progress& progress) {
   TileDetectionResult result;
-  const std::vector<ScoredVoxel> scored = timed(result, "voxel matching", [&] {
+  const std::vector<ScoredVoxel> scored = libmap::timed(result.timings_s, "voxel matching", [&] {
     return score_tiles(grid, mask, tiles, {.solid_voxel_threshold = scenario.solid_voxel_threshold},
                        progress);
   });
   std::vector<std::uint8_t> convex(scored.size(), 0);
   if (scenario.curvature_radius_m > 0.0 && !scored.empty()) {
-    convex = timed(result, "convexity", [&] {
+    convex = libmap::timed(result.timings_s, "convexity", [&] {
       const std::vector<Eigen::Vector3d> convex_points =
           find_convex_points(terrain, grid.lattice, tiles, curvature_at, scenario, result);
       std::vector<Eigen::Vector3d> centers;

@@ -12,6 +12,7 @@
 #include "libgtd/score/scenario.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/stage_timer.h"
 
 namespace libgtd {
 
@@ -30,7 +31,7 @@ struct TileDetectionResult {
   std::vector<MapVoxel> voxels;      // ascending
   std::size_t curvature_points = 0;  // whose curvature was measured
   std::size_t convex_points = 0;
-  std::vector<std::pair<std::string, double>> timings_s;  // wall time of each step
+  libmap::StageTimings timings_s;  // wall time of each step
 };
 
 // Which points' curvature is measured: those near the tiles, or all, which is the same where the

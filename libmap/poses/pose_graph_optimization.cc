@@ -29,10 +29,6 @@ constexpr int max_rejections = 20;
 constexpr std::size_t simplicial_below = 120;              // poses
 constexpr double unknown_landmark_information = 1.001e-4;  // RTAB-Map: variance >= 9999
 
-bool is_absolute(const PoseLink& link) {
-  return link.type == LinkType::pose_prior || link.type == LinkType::gravity;
-}
-
 // Rotation of a landmark that is only a point.
 Matrix6d usable_information(const PoseLink& link) {
   Matrix6d information = link.information;
@@ -422,16 +418,6 @@ void bind(ParameterTable& table, PoseGraphOptions& options) {
             "of a closure's residuals; closures with more are rejected");
   table.add("gauge_node", options.gauge_node, not_negative,
             "node that stays where it is; 0: the first");
-}
-
-std::vector<GraphLink> stored_links(const PoseGraph& graph) {
-  std::vector<GraphLink> links;
-  for (const PoseLink& link : graph.links) {
-    const bool odometry = link.type == LinkType::neighbor || link.type == LinkType::neighbor_merged;
-    const bool closure = !odometry && !is_absolute(link) && link.type != LinkType::landmark;
-    links.push_back({link, to_text(link.type), closure});
-  }
-  return links;
 }
 
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,

@@ -9,6 +9,7 @@
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
+#include "libmap/poses/graph_links.h"
 #include "libmap/poses/rigid_motion.h"
 
 namespace libmap {
@@ -23,14 +24,6 @@ struct PoseGraphOptions {
   int gauge_node = 0;            // stays where it is; 0: the first of each component
 };
 void bind(ParameterTable& table, PoseGraphOptions& options);
-
-// Links of one group share the scales of their covariances. The links as stored go by their type.
-struct GraphLink {
-  PoseLink link{};
-  std::string group{};
-  bool may_be_rejected = false;  // a closure; odometry is down-weighted only
-};
-std::vector<GraphLink> stored_links(const PoseGraph& graph);
 
 struct LinkGroupResult {
   std::size_t links = 0;

@@ -16,36 +16,9 @@ namespace libmap {
 
 namespace {
 
-constexpr int invalid_weight = -9;
 constexpr const char* feature_group = "features";
 constexpr double settled_share = 0.01;  // new links of those before: with less, rounds end
 constexpr const char* odometry_group = "visual odometry";
-
-// Of a scan that has poses and no links, such as a folder of images: links from pose to pose within
-// each session, with deviations that recalibration is to find.
-std::vector<GraphLink> links_of_odometry(const PoseGraph& graph) {
-  std::vector<GraphLink> links;
-  const GraphNode* last = nullptr;
-  for (const GraphNode& node : graph.nodes) {
-    if (!node.odometry_from_base || node.weight == invalid_weight) continue;
-    if (last != nullptr && last->session == node.session) {
-      PoseLink link{last->id,
-                    node.id,
-                    LinkType::neighbor,
-                    last->odometry_from_base->inverse() * *node.odometry_from_base,
-                    {}};
-      const double shift = 0.002 + 0.02 * link.from_from_to.translation().norm();
-      const double turn = 0.01;
-      Vector6d weights;
-      weights << Eigen::Vector3d::Constant(1.0 / (shift * shift)),
-          Eigen::Vector3d::Constant(1.0 / (turn * turn));
-      link.information = weights.asDiagonal();
-      links.push_back({link, "odometry", false});
-    }
-    last = &node;
-  }
-  return links;
-}
 
 // Says how two nodes lie to each other.
 bool is_motion(const PoseLink& link) {
@@ -55,23 +28,6 @@ bool is_motion(const PoseLink& link) {
 std::string join_numbers(const std::vector<int>& numbers) {
   std::string text;
   for (const int number : numbers) text += (text.empty() ? "" : ", ") + std::to_string(number);
-  return text;
-}
-
-std::string describe(const std::vector<TrackingLoss>& losses) {
-  constexpr std::size_t most = 5;
-  std::string text;
-  for (std::size_t n = 0; n < losses.size() && n < most; ++n) {
-    const TrackingLoss& loss = losses[n];
-    text +=
-        (n > 0 ? "; " : "") + std::string("node ") + std::to_string(loss.node) + ", " + loss.reason;
-    if (loss.found_node == loss.node)
-      text += ", found again at node " + std::to_string(loss.found_at);
-    else if (loss.found_node > 0)
-      text += ", found again by node " + std::to_string(loss.found_node) + " at node " +
-              std::to_string(loss.found_at);
-  }
-  if (losses.size() > most) text += "; and " + std::to_string(losses.size() - most) + " more";
   return text;
 }
 
@@ -182,7 +138,7 @@ void Refinement::start() {
   if (options_.start == StartPoses::visual)
     std::erase_if(stored_, [](const GraphLink& link) { return is_motion(link.link); });
   else if (stored_.empty())
-    stored_ = links_of_odometry(scan_.graph());
+    stored_ = odometry_links(scan_.graph());
   if (may_be_visual()) {
     tracked_.insert(result_.without_pose.begin(), result_.without_pose.end());
     result_.without_pose.clear();

@@ -449,4 +449,21 @@ LinkConsistency link_consistency(const std::vector<FeatureLink>& links, const Tr
   return result;
 }
 
+std::string describe(const std::vector<TrackingLoss>& losses) {
+  constexpr std::size_t most = 5;
+  std::string text;
+  for (std::size_t n = 0; n < losses.size() && n < most; ++n) {
+    const TrackingLoss& loss = losses[n];
+    text +=
+        (n > 0 ? "; " : "") + std::string("node ") + std::to_string(loss.node) + ", " + loss.reason;
+    if (loss.found_node == loss.node)
+      text += ", found again at node " + std::to_string(loss.found_at);
+    else if (loss.found_node > 0)
+      text += ", found again by node " + std::to_string(loss.found_node) + " at node " +
+              std::to_string(loss.found_at);
+  }
+  if (losses.size() > most) text += "; and " + std::to_string(losses.size() - most) + " more";
+  return text;
+}
+
 }  // namespace libmap

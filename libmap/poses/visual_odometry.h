@@ -44,6 +44,9 @@ struct TrackingLoss {
   int found_at = 0;    // the earlier node that this one was found at
 };
 
+// The first of them in words: node, reason, where it was found again.
+std::string describe(const std::vector<TrackingLoss>& losses);
+
 struct VisualOdometryResult {
   std::map<int, Pose> map_from_base;    // of each frame, and those known before
   std::vector<std::vector<int>> parts;  // nodes in one frame; a frame bound to none is its own part

@@ -1,0 +1,51 @@
+#include "libmap/poses/graph_links.h"
+
+#include "libmap/poses/rigid_motion.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr int invalid_weight = -9;
+
+}  // namespace
+
+bool is_absolute(const PoseLink& link) {
+  return link.type == LinkType::pose_prior || link.type == LinkType::gravity;
+}
+
+std::vector<GraphLink> stored_links(const PoseGraph& graph) {
+  std::vector<GraphLink> links;
+  for (const PoseLink& link : graph.links) {
+    const bool odometry = link.type == LinkType::neighbor || link.type == LinkType::neighbor_merged;
+    const bool closure = !odometry && !is_absolute(link) && link.type != LinkType::landmark;
+    links.push_back({link, to_text(link.type), closure});
+  }
+  return links;
+}
+
+std::vector<GraphLink> odometry_links(const PoseGraph& graph) {
+  std::vector<GraphLink> links;
+  const GraphNode* last = nullptr;
+  for (const GraphNode& node : graph.nodes) {
+    if (!node.odometry_from_base || node.weight == invalid_weight) continue;
+    if (last != nullptr && last->session == node.session) {
+      PoseLink link{last->id,
+                    node.id,
+                    LinkType::neighbor,
+                    last->odometry_from_base->inverse() * *node.odometry_from_base,
+                    {}};
+      const double shift = 0.002 + 0.02 * link.from_from_to.translation().norm();
+      const double turn = 0.01;
+      Vector6d weights;
+      weights << Eigen::Vector3d::Constant(1.0 / (shift * shift)),
+          Eigen::Vector3d::Constant(1.0 / (turn * turn));
+      link.information = weights.asDiagonal();
+      links.push_back({link, "odometry", false});
+    }
+    last = &node;
+  }
+  return links;
+}
+
+}  // namespace libmap
