@@ -16,7 +16,8 @@ using libmap::PointCloud;
 PointCloud map_of(const std::vector<Voxel>& voxels) {
   GraspabilityMap map;
   map.lattice.voxel_size_m = 0.1;
-  for (const Voxel& voxel : voxels) map.voxels.push_back({.voxel = voxel, .counts = {200, 100}, .score = 0.5});
+  for (const Voxel& voxel : voxels)
+    map.voxels.push_back({.voxel = voxel, .counts = {200, 100}, .score = 0.5});
   return libgtd::to_cloud(map, libgtd::MapFrame::terrain);
 }
 
