@@ -103,8 +103,14 @@ class StoreScoring {
   void score() {
     const libmap::PieceStream stream(files_);
     if (run_.options().dry_run) return;
+    const bool is_new = !fs::exists(options_.store);
     progress_.open();
-    run_.timed("plan", [&] { agree_on_plan(stream); });
+    try {
+      run_.timed("plan", [&] { agree_on_plan(stream); });
+    } catch (...) {
+      if (is_new) progress_.remove_if_bare();
+      throw;
+    }
     libgtd::TileJournal journal(progress_.store(), options_.detection.share, plan_.key);
     const std::vector<TileNumber> wanted = run_.timed("check", [&] { return missing_tiles(); });
     if (!wanted.empty()) {
@@ -415,8 +421,10 @@ class StoreScoring {
       manifest.threads = run_.manifest().threads;
       progress_.write_index(index, manifest);
     }
-    run_.say(fmt::format("{} tiles scored; all {} are there: {} voxels", scored, completion.tiles,
-                         index.voxels()));
+    std::uint64_t graspable = 0;
+    for (const StoredTile& tile : index.tiles) graspable += tile.graspable_voxels;
+    run_.say(fmt::format("{} of {} tiles scored, all are there: {} voxels, {} graspable", scored,
+                         completion.tiles, index.voxels(), graspable));
     if (index.voxels() == 0)
       run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
   }

@@ -58,8 +58,8 @@ class FootholdSearch {
         grid_(map.positions, options.separation_m) {}
 
   FootholdResult run() {
-    std::vector<Foothold> candidates = find_candidates();
     FootholdResult result;
+    std::vector<Foothold> candidates = find_candidates(result.at_edges);
     result.candidates = candidates.size();
     std::sort(candidates.begin(), candidates.end(), [](const Foothold& a, const Foothold& b) {
       if (a.score != b.score) return a.score > b.score;
@@ -83,7 +83,7 @@ class FootholdSearch {
   }
 
  private:
-  std::vector<Foothold> find_candidates() const {
+  std::vector<Foothold> find_candidates(std::size_t& at_edges) const {
     const std::vector<double>* graspable =
         map_.find_field("graspable") != nullptr || options_.graspable_only
             ? &values_of(map_, "graspable")
@@ -93,7 +93,10 @@ class FootholdSearch {
     for (std::size_t n = 0; n < map_.size(); ++n) {
       if (!map_.positions[n].allFinite() || !(scores_[n] >= options_.min_score)) continue;
       if (options_.graspable_only && (*graspable)[n] == 0.0) continue;
-      if (edge != nullptr && (*edge)[n] != 0.0) continue;
+      if (edge != nullptr && (*edge)[n] != 0.0) {
+        ++at_edges;
+        continue;
+      }
       Foothold& candidate = candidates.emplace_back();
       candidate.map_point = n;
       candidate.score = scores_[n];

@@ -46,6 +46,7 @@ struct Foothold {
 struct FootholdResult {
   std::vector<Foothold> footholds;  // best first
   std::size_t candidates = 0;       // map points that may be one
+  std::size_t at_edges = 0;         // would be candidates, but for the option `edges`
 };
 
 // Local maxima of the score by non-maximum suppression: the best candidate is a foothold, those

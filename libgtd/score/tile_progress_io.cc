@@ -172,6 +172,15 @@ void TileProgress::set_plan(const TilePlan& plan) const {
   libmap::write_whole_file(plan_path(store_), json.dump(1) + "\n");
 }
 
+void TileProgress::remove_if_bare() const {
+  if (fs::exists(plan_path(store_))) return;
+  // Each only if it is empty by then.
+  std::error_code ignored;
+  fs::remove(store_ / "progress" / "lock", ignored);
+  for (const fs::path& folder : {store_ / "progress", store_ / "tiles", store_})
+    fs::remove(folder, ignored);
+}
+
 void TileProgress::clear() const {
   // What says that tiles are done goes first.
   fs::remove(store_ / "index.json");

@@ -53,6 +53,9 @@ class TileProgress {
   // there.
   void open() const;
 
+  // Removes the folder if it holds nothing but what open() and lock() made.
+  void remove_if_bare() const;
+
   // Nothing if none was made yet. Throws Error naming the file if it is broken.
   std::optional<TilePlan> plan() const;
   void set_plan(const TilePlan& plan) const;

@@ -35,6 +35,16 @@ TEST(Footholds, OfAMapInEitherFrame) {
   EXPECT_EQ(json.at("results").at("footholds"), input.size());
 }
 
+TEST(Footholds, EdgesThatAreLeftOutAreSaid) {
+  graspmap_test::write_text(scratch("map.csv"),
+                            "x,y,z,score,graspable,edge\n0,0,0,0.9,1,1\n0.01,0,0,0.9,1,1\n");
+  const auto result = graspmap({"footholds", "map.csv", "-o", "f.csv"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("2 at the scan's edges are left out"), std::string::npos);
+  ASSERT_TRUE(succeeded(graspmap({"footholds", "map.csv", "-o", "e.csv", "--edges"})));
+  EXPECT_EQ(libmap::read_cloud(scratch("e.csv")).cloud.size(), 1U);
+}
+
 TEST(Footholds, WhatIsNoMapIsSaid) {
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"footholds", "terrain.pcd", "-o", "f.csv"}),

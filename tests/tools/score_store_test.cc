@@ -275,7 +275,7 @@ TEST_F(ScoreStoreAgain, SecondRunScoresNothing) {
   EXPECT_EQ(lines, 49u);
   const ProgramResult again = score("in", "m.tiles");
   ASSERT_TRUE(succeeded(again));
-  EXPECT_NE(again.standard_error.find("0 tiles scored"), std::string::npos);
+  EXPECT_NE(again.standard_error.find("0 of "), std::string::npos);
   EXPECT_EQ(map_files("m.tiles"), files);
   EXPECT_EQ(journal_lines("m.tiles"), lines);
   // Nothing else is left in it.
@@ -475,6 +475,15 @@ TEST(ScoreStoreAppend, OnlyWhereOldTilesStayAsTheyAre) {
   EXPECT_TRUE(
       bad_input(score("in", "n.tiles", {"--append", "--plane", "none", "--method", "climblab"}),
                 {"--method corrected"}));
+}
+
+TEST(ScoreStoreBadInput, LeavesNoFolderBehind) {
+  graspmap_test::write_text(scratch("empty.csv"), "x,y,z\n");
+  graspmap_test::write_text(scratch("bad.pcd"), "no cloud");
+  const Words before = graspmap_test::names_in_scratch();
+  EXPECT_TRUE(graspmap_test::bad_input(score("empty.csv", "m.tiles"), {"empty.csv", "no points"}));
+  EXPECT_TRUE(graspmap_test::bad_input(score("bad.pcd", "m.tiles"), {"bad.pcd"}));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
 }  // namespace
