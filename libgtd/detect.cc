@@ -52,9 +52,9 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& opti
   });
 }
 
-std::vector<Eigen::Vector3d> surface_points(const PointCloud& terrain, const Scenario& scenario,
-                                            DetectionResult& result) {
-  if (!scenario.interpolation) return terrain.positions;
+// The terrain with its gaps filled.
+PointCloud interpolated_surface(const PointCloud& terrain, const Scenario& scenario,
+                                DetectionResult& result) {
   return libmap::timed(result.timings_s, "interpolation", [&] {
     InterpolationOptions options;
     options.method = follows_thesis(scenario.method) ? InterpolationMethod::thesis
@@ -65,11 +65,17 @@ std::vector<Eigen::Vector3d> surface_points(const PointCloud& terrain, const Sce
     InterpolationResult filled = interpolate(terrain, options);
     result.grid_spacing_m = filled.grid_spacing_m;
     result.interpolated_points = filled.cloud.size();
+    PointCloud surface;
+    surface.positions = std::move(filled.cloud.positions);
     // The author's program goes on with the grid alone; measured points are worth keeping.
-    if (!follows_thesis(scenario.method))
-      filled.cloud.positions.insert(filled.cloud.positions.end(), terrain.positions.begin(),
-                                    terrain.positions.end());
-    return std::move(filled.cloud.positions);
+    if (follows_thesis(scenario.method)) return surface;
+    if (terrain.has_normals()) {
+      surface.normals.assign(surface.size(), Eigen::Vector3f::Zero());
+      surface.normals.insert(surface.normals.end(), terrain.normals.begin(), terrain.normals.end());
+    }
+    surface.positions.insert(surface.positions.end(), terrain.positions.begin(),
+                             terrain.positions.end());
+    return surface;
   });
 }
 
@@ -80,6 +86,25 @@ VoxelGrid make_grid(const std::vector<Eigen::Vector3d>& points, const Scenario& 
                ? voxelize_thesis(to_float(points), scenario.voxel_size_m)
                : voxelize(points, scenario.voxel_size_m);
   });
+}
+
+void judge_obstacles(const Scenario& scenario, DetectionResult& result) {
+  std::vector<Voxel> voxels;
+  std::vector<float> slopes_deg;
+  for (const MapVoxel& one : result.map.voxels) {
+    voxels.push_back(one.voxel);
+    slopes_deg.push_back(one.slope_deg);
+  }
+  const std::vector<Obstacle> obstacles =
+      find_obstacles(voxels, slopes_deg, scenario.voxel_size_m,
+                     {.slope_deg = scenario.obstacle_slope_deg,
+                      .height_m = scenario.obstacle_height_m,
+                      .normal_radius_m = normal_radius_m(result.mask, scenario)});
+  for (std::size_t n = 0; n < obstacles.size(); ++n) {
+    result.map.voxels[n].obstacle = obstacles[n];
+    result.obstacle_voxels += obstacles[n] == Obstacle::none ? 0 : 1;
+  }
+  result.map.content.obstacles = true;
 }
 
 }  // namespace
@@ -102,7 +127,10 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
       options.gripper, {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
   const int voxels_a_tile = tile_voxels(scenario);
   const PointCloud in_frame = prepare_terrain(terrain, options, result);
-  const VoxelGrid grid = make_grid(surface_points(in_frame, scenario, result), scenario, result);
+  const PointCloud filled =
+      scenario.interpolation ? interpolated_surface(in_frame, scenario, result) : PointCloud{};
+  const PointCloud& surface = scenario.interpolation ? filled : in_frame;
+  const VoxelGrid grid = make_grid(surface.positions, scenario, result);
   result.occupied_voxels = grid.voxels.size();
   result.grid_min = grid.min;
   result.grid_max = grid.max;
@@ -111,7 +139,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   const std::vector<TileBounds> tiles = share_of(make_tiles(grid, voxels_a_tile), options.share);
   result.tiles = tiles.size();
   TileDetectionResult detected = detect_tiles(
-      in_frame, grid, result.mask, tiles,
+      {in_frame, surface, grid}, result.mask, tiles,
       options.share.count == 1 ? CurvatureAt::all_points : CurvatureAt::points_near_tiles, scenario,
       progress);
   result.curvature_points = detected.curvature_points;
@@ -119,6 +147,10 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.timings_s.insert(result.timings_s.end(), detected.timings_s.begin(),
                           detected.timings_s.end());
   result.map.voxels = std::move(detected.voxels);
+  result.unoriented_voxels = detected.unoriented_voxels;
+  result.map.content = content_of(scenario);
+  if (scenario.judges_obstacles() && options.share.count == 1)
+    libmap::timed(result.timings_s, "obstacles", [&] { judge_obstacles(scenario, result); });
   for (const MapVoxel& voxel : result.map.voxels) {
     result.graspable_voxels += voxel.graspable ? 1 : 0;
     result.edge_voxels += voxel.edge ? 1 : 0;

@@ -46,7 +46,9 @@ struct DetectionResult {
   std::size_t convex_points = 0;
   std::size_t graspable_voxels = 0;
   std::size_t edge_voxels = 0;
-  libmap::StageTimings timings_s;  // wall time of each step
+  std::size_t unoriented_voxels = 0;  // orientation surface: without a normal, so judged upright
+  std::size_t obstacle_voxels = 0;    // of the whole map alone, not of a share
+  libmap::StageTimings timings_s;     // wall time of each step
 };
 
 // Throws Error for an empty cloud, options out of their bounds, and what the steps throw.

@@ -6,6 +6,7 @@
 
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
+#include "libmap/core/text.h"
 
 namespace libgtd {
 
@@ -140,7 +141,7 @@ class StreamedDetection {
     grid.min = frame_.min;
     grid.max = frame_.max;
     const TileDetectionResult found =
-        detect_tiles(cloud, grid, mask_, parts, CurvatureAt::points_near_tiles, scenario_);
+        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureAt::points_near_tiles, scenario_);
     for (const MapVoxel& voxel : found.voxels)
       results.at(tile_of(voxel.voxel, tile_voxels_)).voxels.push_back(voxel);
     for (const TileBounds& part : parts)
@@ -168,6 +169,10 @@ void require_streamable(const DetectionOptions& options) {
   if (options.scenario.interpolation)
     throw libmap::Error("needs the whole cloud in memory: write a map in one file, MAP.pcd",
                         {.field = "interpolation", .value = "true"});
+  if (options.scenario.judges_obstacles())
+    throw libmap::Error("needs the whole map in memory: write a map in one file, MAP.pcd",
+                        {.field = "obstacle_height_m",
+                         .value = libmap::to_text(options.scenario.obstacle_height_m)});
 }
 
 TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options) {

@@ -5,6 +5,8 @@
 #include <numeric>
 
 #include "libgtd/score/scoring.h"
+#include "libgtd/score/surface_scoring.h"
+#include "libgtd/score/tilted_matching.h"
 #include "libgtd/shape/convexity.h"
 #include "libgtd/shape/curvature.h"
 #include "libmap/core/error.h"
@@ -113,7 +115,9 @@ std::vector<Eigen::Vector3d> find_convex_points(const PointCloud& terrain,
   return convex_among(nearby, points_within(nearby, lattice, tiles, margin_m), scenario, result);
 }
 
+// `surface` is empty if no normals were fitted.
 std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
+                                 const std::vector<SurfaceNormal>& surface,
                                  const std::vector<std::uint8_t>& convex,
                                  const VoxelLattice& lattice, const Scenario& scenario) {
   const bool judge_convexity = scenario.curvature_radius_m > 0.0;
@@ -126,6 +130,9 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .convex = convex[n] != 0,
                    .graspable = false,
                    .edge = scored[n].edge};
+    if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
+    if (scenario.orientation == Orientation::surface && surface[n].normal.allFinite())
+      voxel.normal = surface[n].normal;
     const double height = lattice.center_of(voxel.voxel).z();
     voxel.graspable =
         meets_threshold(voxel.counts, voxel.score, scenario.method, scenario.solid_voxel_threshold,
@@ -134,6 +141,25 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
     voxels.push_back(voxel);
   }
   return voxels;
+}
+
+// Of each pivot of the tiles, if the scenario needs them.
+std::vector<SurfaceNormal> surface_normals(const TileSurroundings& surroundings,
+                                           const GripperMask& mask,
+                                           const std::vector<TileBounds>& tiles,
+                                           const Scenario& scenario, TileDetectionResult& result) {
+  if (!scenario.fits_normals()) return {};
+  return libmap::timed(result.timings_s, "surface normals", [&] {
+    const VoxelGrid& grid = surroundings.grid;
+    std::vector<SurfaceNormal> normals =
+        normals_at(pivots_of(grid, mask, tiles), surroundings.surface, grid.lattice,
+                   normal_radius_m(mask, scenario));
+    if (scenario.orientation == Orientation::surface)
+      result.unoriented_voxels = static_cast<std::size_t>(
+          std::count_if(normals.begin(), normals.end(),
+                        [](const SurfaceNormal& one) { return !one.normal.allFinite(); }));
+    return normals;
+  });
 }
 
 }  // namespace
@@ -158,34 +184,57 @@ int halo_voxels(const GripperMask& mask, const Scenario& scenario) {
     convexity =
         (scenario.intersection_distance_m + curvature_reach_m(scenario)) / scenario.voxel_size_m +
         1.0;
-  if (convexity > 0x1p28)
-    throw libmap::Error(
-        "too large for voxels of this size",
-        {.field = "curvature_radius_m", .value = libmap::to_text(scenario.curvature_radius_m)});
-  return std::max(window + edges, static_cast<int>(std::ceil(convexity)));
+  const auto require_moderate = [](double voxels, const char* field, double value) {
+    if (voxels > 0x1p28)
+      throw libmap::Error("too large for voxels of this size",
+                          {.field = field, .value = libmap::to_text(value)});
+  };
+  require_moderate(convexity, "curvature_radius_m", scenario.curvature_radius_m);
+  int halo = std::max(window + edges, static_cast<int>(std::ceil(convexity)));
+  if (!scenario.fits_normals()) return halo;
+  const double radius_m = normal_radius_m(mask, scenario);
+  const double normals = radius_m / scenario.voxel_size_m + 1.0;
+  require_moderate(normals, "normal_radius_m", radius_m);
+  halo = std::max(halo, static_cast<int>(std::ceil(normals)));
+  return scenario.orientation == Orientation::surface ? std::max(halo, tilted_reach_voxels(mask))
+                                                      : halo;
 }
 
-TileDetectionResult detect_tiles(const PointCloud& terrain, const VoxelGrid& grid,
-                                 const GripperMask& mask, const std::vector<TileBounds>& tiles,
-                                 CurvatureAt curvature_at, const Scenario& scenario,
-                                 libmap::Progress& progress) {
+double normal_radius_m(const GripperMask& mask, const Scenario& scenario) {
+  return scenario.normal_radius_m > 0.0 ? scenario.normal_radius_m : mask.palm_diameter_m;
+}
+
+MapContent content_of(const Scenario& scenario) {
+  return {.normals = scenario.orientation == Orientation::surface,
+          .slopes = scenario.judges_obstacles()};
+}
+
+TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
+                                 const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
+                                 const Scenario& scenario, libmap::Progress& progress) {
   TileDetectionResult result;
+  const VoxelGrid& grid = surroundings.grid;
+  const std::vector<SurfaceNormal> surface =
+      surface_normals(surroundings, mask, tiles, scenario, result);
   const std::vector<ScoredVoxel> scored = libmap::timed(result.timings_s, "voxel matching", [&] {
-    return score_tiles(grid, mask, tiles, {.solid_voxel_threshold = scenario.solid_voxel_threshold},
-                       progress);
+    const ScoringOptions options{.solid_voxel_threshold = scenario.solid_voxel_threshold};
+    return scenario.orientation == Orientation::surface
+               ? score_on_surface(pivots_of(grid, mask, tiles), surface, surroundings.surface, grid,
+                                  mask, tiles, options, progress)
+               : score_tiles(grid, mask, tiles, options, progress);
   });
   std::vector<std::uint8_t> convex(scored.size(), 0);
   if (scenario.curvature_radius_m > 0.0 && !scored.empty()) {
     convex = libmap::timed(result.timings_s, "convexity", [&] {
-      const std::vector<Eigen::Vector3d> convex_points =
-          find_convex_points(terrain, grid.lattice, tiles, curvature_at, scenario, result);
+      const std::vector<Eigen::Vector3d> convex_points = find_convex_points(
+          surroundings.terrain, grid.lattice, tiles, curvature_at, scenario, result);
       std::vector<Eigen::Vector3d> centers;
       centers.reserve(scored.size());
       for (const ScoredVoxel& one : scored) centers.push_back(grid.lattice.center_of(one.voxel));
       return mark_near_convex(centers, convex_points, scenario.intersection_distance_m);
     });
   }
-  result.voxels = map_voxels(scored, convex, grid.lattice, scenario);
+  result.voxels = map_voxels(scored, surface, convex, grid.lattice, scenario);
   return result;
 }
 

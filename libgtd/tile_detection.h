@@ -23,13 +23,27 @@ bool follows_thesis(Method method);
 int tile_voxels(const Scenario& scenario);
 
 // How many columns around a tile its voxels depend on: the mask's window, the closing of the
-// scanned area, and the points that decide on convexity with all their neighbours. Not of
-// interpolation, which looks at the whole cloud.
+// scanned area, the points that decide on convexity with all their neighbours, and those on the
+// surface's normal. Not of interpolation or obstacles, which look at the whole terrain.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 
+// Radius of the surface's normals that the scenario asks for.
+double normal_radius_m(const GripperMask& mask, const Scenario& scenario);
+
+// What a detection with these parameters says beside its scores, but for obstacles.
+MapContent content_of(const Scenario& scenario);
+
+// What is known around the tiles: at least what lies in them and their halo.
+struct TileSurroundings {
+  const libmap::PointCloud& terrain;  // measured points, whose curvature is looked at
+  const libmap::PointCloud& surface;  // the points that made the voxels
+  const VoxelGrid& grid;              // with min and max of the whole terrain
+};
+
 struct TileDetectionResult {
-  std::vector<MapVoxel> voxels;      // ascending
-  std::size_t curvature_points = 0;  // whose curvature was measured
+  std::vector<MapVoxel> voxels;       // ascending
+  std::size_t unoriented_voxels = 0;  // with a tilted mask: without a normal, so that it is upright
+  std::size_t curvature_points = 0;   // whose curvature was measured
   std::size_t convex_points = 0;
   libmap::StageTimings timings_s;  // wall time of each step
 };
@@ -38,11 +52,10 @@ struct TileDetectionResult {
 // tiles are all there are.
 enum class CurvatureAt { points_near_tiles, all_points };
 
-// `terrain` and `grid` hold at least the points and voxels in the tiles and their halo; grid.min
-// and grid.max are those of the whole terrain. Throws what the steps throw.
-TileDetectionResult detect_tiles(const libmap::PointCloud& terrain, const VoxelGrid& grid,
-                                 const GripperMask& mask, const std::vector<TileBounds>& tiles,
-                                 CurvatureAt curvature_at, const Scenario& scenario,
+// Throws what the steps throw.
+TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
+                                 const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
+                                 const Scenario& scenario,
                                  libmap::Progress& progress = libmap::no_progress());
 
 }  // namespace libgtd

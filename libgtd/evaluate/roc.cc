@@ -36,8 +36,6 @@ Sample group_by_score(std::vector<std::pair<double, bool>> locations) {
   return sample;
 }
 
-double lowest_score_at(double cutoff) { return cutoff - std::abs(cutoff) * 0x1.0p-24; }
-
 Confusion counts_from(const Sample& sample, std::uint64_t positives_below,
                       std::uint64_t negatives_below) {
   Confusion counts;
@@ -49,10 +47,9 @@ Confusion counts_from(const Sample& sample, std::uint64_t positives_below,
 }
 
 RocPoint point_at(const Sample& sample, double cutoff) {
-  const double lowest = lowest_score_at(cutoff);
   std::uint64_t positives_below = 0, negatives_below = 0;
   for (const ScoreGroup& group : sample.groups) {
-    if (group.score >= lowest) break;
+    if (reaches_cutoff(group.score, cutoff)) break;
     positives_below += group.positives;
     negatives_below += group.negatives;
   }
@@ -191,6 +188,10 @@ std::string why_no_area(const Sample& sample) {
 }
 
 }  // namespace
+
+bool reaches_cutoff(double score, double cutoff) {
+  return score >= cutoff - std::abs(cutoff) * 0x1.0p-24;
+}
 
 void RocOptions::check() const {
   if (cutoffs.empty()) throw libmap::Error("no cutoffs", {.field = "cutoffs"});

@@ -26,6 +26,9 @@ struct RocOptions {
   void check() const;  // throws libmap::Error naming field, value and bound
 };
 
+// Whether a score counts as having reached a cutoff, as said above.
+bool reaches_cutoff(double score, double cutoff);
+
 struct Interval {
   double low = 0.0;
   double high = 0.0;

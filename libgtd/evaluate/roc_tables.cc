@@ -305,6 +305,22 @@ Table rates_table(const TableEvaluation& evaluation) {
   return table;
 }
 
+Table accuracy_table(const TableEvaluation& evaluation) {
+  Table table;
+  table.columns = {"case", "locations", "cutoff", "tpr", "tnr", "fpr", "fnr", "ppv", "acc"};
+  for (const ColumnEvaluation& column : evaluation.columns) {
+    const RocPoint& point = column.result.at_rate_cutoff;
+    std::vector<std::string> row = {column.name, number_text(point.counts.size()),
+                                    libmap::to_text(point.cutoff)};
+    for (const NamedRate& named : named_rates(point.counts)) {
+      const std::optional<double> value = named.rate.value();
+      row.push_back(value ? to_fixed_text(*value, 4) : std::string());
+    }
+    table.rows.push_back(std::move(row));
+  }
+  return table;
+}
+
 std::string to_json(const TableEvaluation& evaluation) {
   const TableEvaluationOptions& options = evaluation.options;
   Json json;

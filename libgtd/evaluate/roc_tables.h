@@ -51,6 +51,10 @@ libmap::Table roc_table(const TableEvaluation& evaluation);
 // One row a column of scores and rate: count, total, value, and the Wilson 95 % interval.
 libmap::Table rates_table(const TableEvaluation& evaluation);
 
+// One row a column of scores: case, locations, cutoff, and the same rates with four decimals, as
+// the thesis's tables 5-4 and 5-5.
+libmap::Table accuracy_table(const TableEvaluation& evaluation);
+
 // Everything but the ROC points. Undefined values are null.
 std::string to_json(const TableEvaluation& evaluation);
 

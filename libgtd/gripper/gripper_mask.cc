@@ -213,6 +213,24 @@ std::string name_of(Method method) {
   return {};
 }
 
+namespace {
+
+GripperMask make_mask(const Gripper& gripper, const GripperMaskOptions& options) {
+  switch (options.method) {
+    case Method::thesis:
+      return make_thesis(gripper, options);
+    case Method::envelope:
+      return make_envelope(gripper, options);
+    case Method::climblab:
+      return make_climblab(gripper, options);
+    case Method::corrected:
+      break;
+  }
+  return make_corrected(gripper, options);
+}
+
+}  // namespace
+
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options) {
   gripper.check();
   if (!(options.voxel_size_m > 0.0) || !std::isfinite(options.voxel_size_m))
@@ -231,17 +249,9 @@ GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& 
   const double layers = gripper.closing_height_mm / 1000.0 / options.voxel_size_m;
   if (side * side * layers > 4.0 * max_mask_voxels)
     throw too_small(options.voxel_size_m, side * side * layers);
-  switch (options.method) {
-    case Method::thesis:
-      return make_thesis(gripper, options);
-    case Method::envelope:
-      return make_envelope(gripper, options);
-    case Method::climblab:
-      return make_climblab(gripper, options);
-    case Method::corrected:
-      break;
-  }
-  return make_corrected(gripper, options);
+  GripperMask mask = make_mask(gripper, options);
+  mask.palm_diameter_m = gripper.palm_diameter_mm / 1000.0;
+  return mask;
 }
 
 std::string to_text(const GripperMask& mask) {

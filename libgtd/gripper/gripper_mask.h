@@ -33,6 +33,7 @@ struct GripperMaskOptions {
 struct GripperMask {
   Method method = Method::corrected;
   double voxel_size_m = 0.01;
+  double palm_diameter_m = 0.0;  // of the gripper
   int side = 0;
   int layers = 0;
   int solid_layers = 0;

@@ -100,13 +100,20 @@ class FootholdSearch {
       Foothold& candidate = candidates.emplace_back();
       candidate.map_point = n;
       candidate.score = scores_[n];
-      candidate.approach = -up_;
+      candidate.approach = approach_at(n);
     }
     libmap::parallel_for(candidates.size(), 256, [&](std::size_t begin, std::size_t end) {
       std::vector<PointGrid::Range> runs;
       for (std::size_t c = begin; c < end; ++c) look_around(candidates[c], graspable, runs);
     });
     return candidates;
+  }
+
+  // Against the axis of the mask that was matched.
+  Eigen::Vector3d approach_at(std::size_t point) const {
+    if (!map_.has_normals()) return -up_;
+    const Eigen::Vector3d axis = map_.normals[point].cast<double>();
+    return axis.allFinite() && axis.norm() > 0.0 ? -axis.normalized() : -up_;
   }
 
   void look_around(Foothold& foothold, const std::vector<double>* graspable,
@@ -131,6 +138,7 @@ class FootholdSearch {
     for (const Foothold& foothold : footholds) places.push_back(foothold.map_point);
     PointCloud surface;  // without what the map may hold else
     surface.positions = map_.positions;
+    surface.normals = map_.normals;
     const CurvatureResult shape = estimate_curvature(
         surface,
         {.method = CurvatureMethod::corrected, .radius_m = options_.surface_radius_m, .up = up_},

@@ -33,13 +33,15 @@ struct Foothold {
   // its border.
   double mean_score = 0.0;
   std::size_t graspable_points = 0;  // within half of the separation
-  // Of the surface: unit normal outward, principal curvatures in 1/m as in curvature.h, angle
-  // between normal and up. NaN where they could not be fitted.
+  // Of the surface: unit normal outward (where the map's normals face, else up), principal
+  // curvatures in 1/m as in curvature.h, angle between normal and up. NaN where they could not be
+  // fitted.
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float k1 = 0.0F;
   float k2 = 0.0F;
   double slope_deg = 0.0;
-  // Unit vector along which the gripper comes: the axis of the mask that was matched, -up.
+  // Unit vector along which the gripper comes, against the axis of the mask that was matched: the
+  // map's normal if it has normals, else up.
   Eigen::Vector3d approach = Eigen::Vector3d::Zero();
 };
 

@@ -14,6 +14,8 @@ using libmap::PointCloud;
 using libmap::ScalarField;
 using libmap::ScalarType;
 
+constexpr const char* obstacle_field = "obstacle";
+
 template <typename Value>
 void add_values(PointCloud& cloud, const char* name, ScalarType type,
                 const std::vector<MapVoxel>& voxels, const Value& value) {
@@ -43,8 +45,11 @@ void append(PointCloud& whole, const PointCloud& part) {
   }
   if (whole.has_colors() != part.has_colors() && !whole.empty() && !part.empty())
     throw libmap::Error("only some parts have colours");
+  if (whole.has_normals() != part.has_normals() && !whole.empty() && !part.empty())
+    throw libmap::Error("only some parts have normals");
   add(whole.positions, part.positions);
   add(whole.colors, part.colors);
+  add(whole.normals, part.normals);
 }
 
 }  // namespace
@@ -76,7 +81,34 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("i", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.i; });
   add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
+  if (map.content.slopes)
+    add("slope_deg", ScalarType::float32, [](const MapVoxel& one) { return one.slope_deg; });
+  if (map.content.obstacles)
+    add(obstacle_field, ScalarType::uint8, [](const MapVoxel& one) { return one.obstacle; });
+  if (!map.content.normals) return cloud;
+  const Eigen::Matrix3f rotation = frame == MapFrame::input
+                                       ? input_from_terrain.linear().cast<float>().eval()
+                                       : Eigen::Matrix3f::Identity();
+  for (const MapVoxel& one : map.voxels) cloud.normals.push_back(rotation * one.normal);
   return cloud;
+}
+
+std::size_t add_obstacles(PointCloud& map, double voxel_size_m, const ObstacleOptions& options) {
+  const auto index = [&](const char* name) { return index_values(map, name); };
+  const std::vector<double> i = index("i"), j = index("j"), k = index("k");
+  const std::vector<double> slopes = index("slope_deg");
+  std::vector<Voxel> voxels;
+  for (std::size_t n = 0; n < map.size(); ++n)
+    voxels.push_back({static_cast<int>(i[n]), static_cast<int>(j[n]), static_cast<int>(k[n])});
+  const std::vector<Obstacle> obstacles = find_obstacles(
+      voxels, std::vector<float>(slopes.begin(), slopes.end()), voxel_size_m, options);
+  ScalarField& field = map.add_field(obstacle_field, ScalarType::uint8);
+  std::size_t count = 0;
+  for (std::size_t n = 0; n < map.size(); ++n) {
+    field.values[n] = static_cast<double>(obstacles[n]);
+    count += obstacles[n] == Obstacle::none ? 0 : 1;
+  }
+  return count;
 }
 
 PointCloud merge_map_clouds(const std::vector<PointCloud>& parts) {

@@ -3,6 +3,7 @@
 
 #include <vector>
 
+#include "libgtd/score/obstacles.h"
 #include "libgtd/score/tiling.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
@@ -16,12 +17,23 @@ struct MapVoxel {
   bool convex = false;     // a convex point lies close to its centre
   bool graspable = false;  // score, zero plane and, if it was judged, convexity say yes
   bool edge = false;       // the mask's window leaves the scanned area
+  Obstacle obstacle = Obstacle::none;
+  float slope_deg = 0.0F;                             // of the surface, as SurfaceNormal
+  Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // in the terrain frame: the mask's axis
+};
+
+// What a map says beside its scores.
+struct MapContent {
+  bool normals = false;    // the mask was tilted
+  bool slopes = false;     // obstacles are judged
+  bool obstacles = false;  // and the whole map is there to judge them
 };
 
 struct GraspabilityMap {
   VoxelLattice lattice;  // in the terrain frame
   libmap::Pose terrain_from_input = libmap::Pose::Identity();
-  double zero_plane_m = 0.0;     // in the terrain frame
+  double zero_plane_m = 0.0;  // in the terrain frame
+  MapContent content;
   std::vector<MapVoxel> voxels;  // ascending
 };
 
@@ -30,8 +42,15 @@ enum class MapFrame { terrain, input };
 const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 
 // A point for each voxel, at its centre, coloured by score and white below the zero plane, with the
-// fields score, ssv, gsv, convex, graspable, edge and the voxel's i, j, k on the lattice.
+// fields score, ssv, gsv, convex, graspable, edge and the voxel's i, j, k on the lattice. As the
+// content says: the mask's axis as the point's normal, from which the gripper comes; the fields
+// slope_deg and obstacle (the number of an Obstacle).
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
+
+// Judges the obstacles of a map that has slopes, once all of it is there: sets each point's field
+// obstacle. Throws Error: a map without the fields i, j, k, slope_deg, or not ascending by them.
+std::size_t add_obstacles(libmap::PointCloud& map, double voxel_size_m,
+                          const ObstacleOptions& options);
 
 // The points of several clouds made by to_cloud of one map, ascending by i, j, k, as to_cloud of
 // the whole map orders them. Throws Error: a cloud without the fields i, j, k, clouds of different

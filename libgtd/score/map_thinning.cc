@@ -29,12 +29,12 @@ int off_middle(int column, int square, int width) {
   return std::abs(2 * (column - square * width) - (width - 1));
 }
 
-}  // namespace
-
-libmap::PointCloud thin_map(const libmap::PointCloud& map, int width) {
+// The point nearest the middle of each square of columns, or of each cube, the highest of equals.
+libmap::PointCloud thin(const libmap::PointCloud& map, int width, bool by_layers) {
   const auto [i, j, k] = voxels_of(map);
   struct Candidate {
     TileNumber square;
+    int layer = 0;
     int off_middle = 0;
     int below_top = 0;
     std::size_t point = 0;
@@ -45,16 +45,29 @@ libmap::PointCloud thin_map(const libmap::PointCloud& map, int width) {
     const Voxel voxel{static_cast<int>((*i)[n]), static_cast<int>((*j)[n]),
                       static_cast<int>((*k)[n])};
     const TileNumber square = tile_of(voxel, width);
+    const int layer = by_layers ? tile_of({voxel.k, 0, 0}, width).i : 0;
     const int x = off_middle(voxel.i, square.i, width);
     const int y = off_middle(voxel.j, square.j, width);
-    candidates[n] = {square, x * x + y * y, -voxel.k, n};
+    const int z = by_layers ? off_middle(voxel.k, layer, width) : 0;
+    candidates[n] = {square, layer, x * x + y * y + z * z, -voxel.k, n};
   }
   std::sort(candidates.begin(), candidates.end());
   std::vector<std::size_t> kept;
   for (std::size_t n = 0; n < candidates.size(); ++n)
-    if (n == 0 || candidates[n].square != candidates[n - 1].square)
+    if (n == 0 || candidates[n].square != candidates[n - 1].square ||
+        candidates[n].layer != candidates[n - 1].layer)
       kept.push_back(candidates[n].point);
   return libmap::select_points(map, kept);
+}
+
+}  // namespace
+
+libmap::PointCloud thin_map(const libmap::PointCloud& map, int width) {
+  return thin(map, width, false);
+}
+
+libmap::PointCloud thin_map_in_cubes(const libmap::PointCloud& map, int width) {
+  return thin(map, width, true);
 }
 
 void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map) {

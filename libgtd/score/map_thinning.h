@@ -12,6 +12,11 @@ namespace libgtd {
 // union gives what thinning the union at once gives. `map` is made by to_cloud.
 libmap::PointCloud thin_map(const libmap::PointCloud& map, int width);
 
+// One point for each cube of `width`^3 voxels of the lattice that holds any: that of the voxel
+// nearest to the cube's middle, of several as near the uppermost. Steep faces keep their points.
+// Ascending by cube. `map` is made by to_cloud.
+libmap::PointCloud thin_map_in_cubes(const libmap::PointCloud& map, int width);
+
 // Moves each point, level, to the middle of its square: to a lattice again.
 void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map);
 

@@ -1,6 +1,14 @@
 #include "libgtd/score/scenario.h"
 
+#include "libmap/core/error.h"
+
 namespace libgtd {
+
+const std::vector<std::pair<std::string, Orientation>>& orientation_names() {
+  static const std::vector<std::pair<std::string, Orientation>> names = {
+      {"plane", Orientation::plane}, {"surface", Orientation::surface}};
+  return names;
+}
 
 void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
@@ -24,6 +32,14 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
             "radius in which curvature is measured, m; 0: convexity is not judged");
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
             "a voxel this close to a convex point counts as convex, m");
+  table.add("orientation", scenario.orientation, orientation_names(),
+            "plane: the mask stands upright; surface: along the surface's normal at each voxel");
+  table.add("normal_radius_m", scenario.normal_radius_m, not_negative,
+            "radius in which the surface's normal is fitted, m; 0: the gripper's palm diameter");
+  table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,
+            "steep faces that rise more than this are obstacles, m; 0: not judged");
+  table.add("obstacle_slope_deg", scenario.obstacle_slope_deg, {0.0, 180.0},
+            "slope beyond which a face is steep, degrees; 0: not judged");
   table.add("tile_size_m", scenario.tile_size_m, positive, "edge of a tile, m");
   table.add_overrides("gripper", scenario.gripper_overrides);
 }
@@ -34,6 +50,12 @@ void Scenario::check() const {
   bind(table, copy);
   // Setting each field to its own value checks it against its own bound.
   for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  if (orientation == Orientation::surface &&
+      (method == Method::thesis || method == Method::envelope))
+    throw libmap::Error("not with method " + name_of(method) + ", which knows no tilted mask",
+                        {.field = "orientation",
+                         .value = "surface",
+                         .bound = "plane, or method corrected or climblab"});
 }
 
 }  // namespace libgtd

@@ -10,6 +10,11 @@
 
 namespace libgtd {
 
+// Which way the gripper mask stands: along the terrain frame's z axis everywhere, or along the
+// normal of the surface at each voxel (thesis, 6.2), so that walls are judged as walls.
+enum class Orientation { plane, surface };
+const std::vector<std::pair<std::string, Orientation>>& orientation_names();
+
 struct Scenario {
   Method method = Method::corrected;
   std::string gripper = "scar-e";  // name of a gripper of the toolkit, or a file
@@ -23,9 +28,19 @@ struct Scenario {
   double graspability_threshold = 0.8;
   double curvature_radius_m = 0.09;  // 0: convexity is not judged
   double intersection_distance_m = 0.01;
+  Orientation orientation = Orientation::plane;
+  double normal_radius_m = 0.0;  // of the surface's normals; 0: the gripper's palm diameter
+  // A steep face that rises more than this, and what stands on it out of reach, is an obstacle; 0:
+  // not judged.
+  double obstacle_height_m = 0.0;
+  double obstacle_slope_deg = 60.0;  // steeper than this is steep; 0: not judged
   double tile_size_m = 1.0;
 
-  // Throws Error naming the field, its value and its bound.
+  bool judges_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
+  bool fits_normals() const { return orientation == Orientation::surface || judges_obstacles(); }
+
+  // Throws Error naming the field, its value and its bound; `orientation` surface with a method
+  // that prepares the cloud as the author's program does, on a lattice of its own.
   void check() const;
 };
 

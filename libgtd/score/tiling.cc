@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "libgtd/score/scanned_area.h"
 #include "libgtd/score/scoring.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -12,85 +13,6 @@ namespace libgtd {
 namespace {
 
 constexpr std::size_t grain = 4096;
-
-// Columns of voxels as a summed-area table (Crow 1984): how many columns of a rectangle are set.
-class ColumnSums {
- public:
-  explicit ColumnSums(const TileBounds& bounds)
-      : bounds_(bounds),
-        width_(static_cast<std::size_t>(bounds.j_end - bounds.j_begin) + 1),
-        sums_((static_cast<std::size_t>(bounds.i_end - bounds.i_begin) + 1) * width_) {}
-
-  const TileBounds& bounds() const { return bounds_; }
-  void set(int i, int j) { sums_[at(i + 1, j + 1)] = 1; }
-
-  void accumulate() {
-    for (int i = bounds_.i_begin + 1; i <= bounds_.i_end; ++i)
-      for (int j = bounds_.j_begin + 1; j <= bounds_.j_end; ++j)
-        sums_[at(i, j)] += sums_[at(i - 1, j)] + sums_[at(i, j - 1)] - sums_[at(i - 1, j - 1)];
-  }
-
-  // Of [i_begin, i_end) x [j_begin, j_end), cut to the table.
-  std::uint32_t count(TileBounds part) const {
-    part.i_begin = std::max(part.i_begin, bounds_.i_begin);
-    part.j_begin = std::max(part.j_begin, bounds_.j_begin);
-    part.i_end = std::min(part.i_end, bounds_.i_end);
-    part.j_end = std::min(part.j_end, bounds_.j_end);
-    if (part.i_begin >= part.i_end || part.j_begin >= part.j_end) return 0;
-    return sums_[at(part.i_end, part.j_end)] - sums_[at(part.i_begin, part.j_end)] -
-           sums_[at(part.i_end, part.j_begin)] + sums_[at(part.i_begin, part.j_begin)];
-  }
-
- private:
-  std::size_t at(int i, int j) const {
-    return static_cast<std::size_t>(i - bounds_.i_begin) * width_ +
-           static_cast<std::size_t>(j - bounds_.j_begin);
-  }
-
-  TileBounds bounds_;
-  std::size_t width_;
-  std::vector<std::uint32_t> sums_;
-};
-
-TileBounds grown(const TileBounds& bounds, int below, int above) {
-  return {bounds.i_begin - below, bounds.i_end + above, bounds.j_begin - below,
-          bounds.j_end + above};
-}
-
-TileBounds around(int i, int j, int below, int above) {
-  return {i - below, i + above + 1, j - below, j + above + 1};
-}
-
-template <typename Visit>
-void for_each_column(const TileBounds& bounds, const Visit& visit) {
-  for (int i = bounds.i_begin; i < bounds.i_end; ++i)
-    for (int j = bounds.j_begin; j < bounds.j_end; ++j) visit(i, j);
-}
-
-ColumnSums occupied_columns(const VoxelGrid& grid, const TileBounds& bounds) {
-  ColumnSums columns(bounds);
-  visit_columns(grid, bounds,
-                [&](std::size_t at) { columns.set(grid.voxels[at].i, grid.voxels[at].j); });
-  columns.accumulate();
-  return columns;
-}
-
-// The columns of `bounds` that are not in the closing of the occupied ones.
-ColumnSums unscanned_columns(const VoxelGrid& grid, const TileBounds& bounds) {
-  const int gap = scan_gap_voxels;
-  const ColumnSums occupied = occupied_columns(grid, grown(bounds, 2 * gap, 2 * gap));
-  ColumnSums far(grown(bounds, gap, gap));
-  for_each_column(far.bounds(), [&](int i, int j) {
-    if (occupied.count(around(i, j, gap, gap)) == 0) far.set(i, j);
-  });
-  far.accumulate();
-  ColumnSums unscanned(bounds);
-  for_each_column(bounds, [&](int i, int j) {
-    if (far.count(around(i, j, gap, gap)) != 0) unscanned.set(i, j);
-  });
-  unscanned.accumulate();
-  return unscanned;
-}
 
 constexpr std::uint8_t is_pivot = 1;
 constexpr std::uint8_t is_edge = 2;
@@ -161,7 +83,9 @@ std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& m
   edges.reserve(pivots.size());
   for (const std::size_t at : pivots)
     edges.push_back(
-        unscanned.count(around(grid.voxels[at].i, grid.voxels[at].j, below, above)) != 0 ? 1 : 0);
+        unscanned.count(columns_around(grid.voxels[at].i, grid.voxels[at].j, below, above)) != 0
+            ? 1
+            : 0);
   return edges;
 }
 

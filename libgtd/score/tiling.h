@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "libgtd/score/scanned_area.h"
 #include "libgtd/score/voxel_matching.h"
 #include "libmap/core/progress.h"
 
@@ -42,12 +43,9 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
                                      const ScoringOptions& options,
                                      libmap::Progress& progress = libmap::no_progress());
 
-// For each pivot whether the window of the mask holds a column outside the scanned area: the
-// columns with voxels, closed over gaps of up to 2 * scan_gap_voxels (morphological closing by a
-// square), since a cloud has empty columns between its points.
+// For each pivot whether the window of the mask holds a column outside the scanned area.
 std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
                                      const TileBounds& tile,
                                      const std::vector<std::size_t>& pivots);
-inline constexpr int scan_gap_voxels = 3;
 
 }  // namespace libgtd

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 
+#include "libgtd/shape/cell_surroundings.h"
 #include "libgtd/shape/neighbor_loops.h"
 #include "libgtd/shape/point_grid.h"
 #include "libgtd/shape/thesis_curvature.h"
@@ -24,7 +24,6 @@ using Eigen::Vector3d;
 using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
-constexpr std::size_t lanes = NeighborLoops::lanes;
 constexpr std::size_t min_neighbors = 6;  // a quadric has six coefficients
 // Squares of widths relative to each other: below the first a neighbourhood is a line, above the
 // second it is a lump in which no plane is tangent.
@@ -34,35 +33,6 @@ constexpr double max_lump_ratio = 0.8;
 constexpr double min_pivot = 1e-6;
 // A surface this near to being along `up` (0.06 deg) has no known outside.
 constexpr double min_side_cosine = 1e-3;
-
-// Coordinates one after the other, with room for a full set of lanes beyond the last.
-class Coordinates {
- public:
-  // Keeps no values.
-  void make_room(std::size_t count) {
-    if (stride_ >= count + lanes) return;
-    stride_ = 2 * (count + lanes);
-    values_.resize(3 * stride_);
-  }
-  NeighborLoops::Places places() {
-    return {values_.data(), values_.data() + stride_, values_.data() + 2 * stride_};
-  }
-
- private:
-  std::size_t stride_ = 0;
-  std::vector<double> values_;
-};
-
-Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
-                       std::size_t count) {
-  std::array<double, NeighborLoops::moments> m;
-  loops.sum_moments(neighbors, count, m.data());
-  for (double& sum : m) sum /= static_cast<double>(count);
-  const Vector3d mean(m[0], m[1], m[2]);
-  Matrix3d second;
-  second << m[3], m[4], m[5], m[4], m[6], m[7], m[5], m[7], m[8];
-  return second - mean * mean.transpose();
-}
 
 // Columns u, v, w: the neighbourhood's widest, second and thinnest direction. False if it is a line
 // or a lump.
@@ -147,32 +117,18 @@ class QuadricFitter {
   // `in_order` are the cloud's points in the order of the grid.
   QuadricFitter(const libmap::PointCloud& cloud, const PointGrid& grid,
                 const std::vector<Vector3d>& in_order, double radius, const Vector3d& up)
-      : cloud_(cloud), grid_(grid), in_order_(in_order), radius_(radius), up_(up.normalized()) {}
+      : cloud_(cloud), candidates_(grid, in_order), radius_(radius), up_(up.normalized()) {}
 
-  // Gathers the points of all cells that can hold a neighbour of a point in `cell`.
+  // For the points of a cell, which are fitted after it.
   void enter(const PointGrid::Cell& cell) {
-    grid_.find_near(cell, 2, runs_);
-    candidate_count_ = 0;
-    for (const PointGrid::Range& run : runs_) candidate_count_ += run.last - run.first;
-    candidates_.make_room(candidate_count_);
-    neighbors_.make_room(candidate_count_);
-    const NeighborLoops::Places to = candidates_.places();
-    std::size_t n = 0;
-    const auto put = [&](const Vector3d& p) {
-      to.x[n] = p.x();
-      to.y[n] = p.y();
-      to.z[n++] = p.z();
-    };
-    for (const PointGrid::Range& run : runs_)
-      for (std::uint32_t k = run.first; k < run.last; ++k) put(in_order_[k]);
-    for (std::size_t k = 0; k < lanes; ++k)
-      put(Vector3d::Constant(std::numeric_limits<double>::infinity()));
+    candidates_.enter(cell, 2);
+    neighbors_.make_room(candidates_.count());
   }
 
   // At a point of the cell that was entered last.
   Curvature fit(std::size_t point) {
     const NeighborLoops::Places neighbors = neighbors_.places();
-    const std::size_t count = loops_.select(candidates_.places(), candidate_count_,
+    const std::size_t count = loops_.select(candidates_.places(), candidates_.count(),
                                             cloud_.positions[point].data(), radius_, neighbors);
     Matrix3d frame;
     Matrix6d matrix;
@@ -195,15 +151,11 @@ class QuadricFitter {
 
  private:
   const libmap::PointCloud& cloud_;
-  const PointGrid& grid_;
-  const std::vector<Vector3d>& in_order_;
+  CellSurroundings candidates_;
   double radius_;
   Vector3d up_;
   const NeighborLoops& loops_ = neighbor_loops_of(best_path());
-  std::vector<PointGrid::Range> runs_;
-  Coordinates candidates_;
-  std::size_t candidate_count_ = 0;
-  Coordinates neighbors_;
+  CoordinateRows neighbors_;
 };
 
 // The queries of each cell of the grid, so that a cell's surroundings are gathered once.
@@ -235,9 +187,7 @@ std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
                                     const std::vector<std::size_t>& queries) {
   // Half the radius, a little more against rounding at the cells' borders.
   const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-6));
-  std::vector<Vector3d> in_order;
-  in_order.reserve(grid.order().size());
-  for (const std::uint32_t i : grid.order()) in_order.push_back(cloud.positions[i]);
+  const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
   const QueriesByCell groups = queries_by_cell(grid, cloud.size(), queries);
   std::vector<Curvature> results(queries.size());
   libmap::parallel_for(grid.cells().size(), 16, [&](std::size_t begin, std::size_t end) {

@@ -73,4 +73,18 @@ TEST(MapThinning, PointsComeToTheMiddleOfTheirSquares) {
       (terrain_from_input * map.positions[0]).isApprox(Eigen::Vector3d(0.8, 2.6, 3.25), 1e-12));
 }
 
+TEST(MapThinning, InCubesSteepFacesStay) {
+  // A wall: one column, nine voxels high, and a voxel beside it.
+  std::vector<Voxel> wall;
+  for (int k = -3; k < 6; ++k) wall.push_back({1, 1, k});
+  wall.push_back({2, 1, 4});
+  const PointCloud map = map_of(wall);
+  EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 3)),
+            (std::vector<Voxel>{{1, 1, -2}, {1, 1, 1}, {1, 1, 4}}));
+  // Of two as near to the middle the upper one.
+  EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map_of({{1, 1, 0}, {1, 1, 2}}), 3)),
+            (std::vector<Voxel>{{1, 1, 2}}));
+  EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 1)), voxels_in(map));
+}
+
 }  // namespace

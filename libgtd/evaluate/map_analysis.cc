@@ -1,0 +1,189 @@
+#include "libgtd/evaluate/map_analysis.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "libgtd/evaluate/value_bins.h"
+#include "libmap/core/error.h"
+#include "libmap/core/score_color.h"
+
+namespace libgtd {
+
+namespace {
+
+constexpr double score_tolerance = 1e-6;  // as in score_color.h
+constexpr int largest_gap = 6;            // of empty columns inside the ground
+
+void check(const MapAnalysisOptions& options) {
+  MapAnalysisOptions copy = options;
+  libmap::ParameterTable table;
+  bind(table, copy);
+  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+}
+
+class MapCounter {
+ public:
+  MapCounter(const VoxelMap& map, const MapSurface& surface, const MapAnalysisOptions& options)
+      : map_(map), surface_(surface), options_(options) {}
+
+  MapAnalysis run() {
+    make_score_bins();
+    make_ground_bins();
+    for (std::size_t n = 0; n < map_.size(); ++n) count_voxel(n);
+    count_columns();
+    return std::move(result_);
+  }
+
+ private:
+  void make_score_bins() {
+    double low = 0.0;
+    double high = 1.0;
+    for (const float score : map_.scores) {
+      if (std::isnan(score)) continue;
+      low = std::min(low, static_cast<double>(score));
+      high = std::max(high, static_cast<double>(score));
+    }
+    scores_ = bins_over(low, high, options_.score_bin, "score_bin");
+    for (std::size_t b = 0; b < scores_.count; ++b)
+      result_.score_bins.push_back({.low = scores_.low(b), .high = scores_.high(b)});
+    double upper = std::numeric_limits<double>::infinity();
+    for (const libmap::ScoreClass& one : libmap::score_classes) {
+      result_.classes.push_back({.low = one.min_score, .high = upper});
+      upper = one.min_score;
+    }
+  }
+
+  void make_ground_bins() {
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (std::size_t n = 0; n < map_.size(); ++n) {
+      if (!map_.judged(n, options_.edges)) continue;
+      const double height = map_.center_in_terrain(n).z();
+      low = std::min(low, height);
+      high = std::max(high, height);
+    }
+    slopes_ = bins_over(0.0, 90.0, options_.slope_bin_deg, "slope_bin_deg");
+    for (std::size_t b = 0; b < slopes_.count; ++b)
+      result_.by_slope.push_back({.low = slopes_.low(b), .high = slopes_.high(b)});
+    if (!(low <= high)) return;
+    result_.ground.low = low;
+    result_.ground.high = high;
+    heights_ = bins_over(low, high, options_.height_bin_m, "height_bin_m");
+    for (std::size_t b = 0; b < heights_.count; ++b)
+      result_.by_height.push_back({.low = heights_.low(b), .high = heights_.high(b)});
+  }
+
+  void count_voxel(std::size_t n) {
+    const bool scored = !std::isnan(map_.scores[n]);
+    const bool above = map_.above_zero_plane(n);
+    ++result_.voxels;
+    result_.without_score += scored ? 0 : 1;
+    result_.below_zero_plane += above ? 0 : 1;
+    result_.at_edges += map_.edge[n] != 0 ? 1 : 0;
+    result_.obstacles += map_.obstacle[n] != 0 ? 1 : 0;
+    result_.graspable += map_.graspable[n] != 0 ? 1 : 0;
+    if (!scored) return;
+    const double score = static_cast<double>(map_.scores[n]);
+    add_to(result_.score_bins[scores_.bin_of(score + score_tolerance)], n);
+    for (ScoreBin& one : result_.classes)
+      if (score >= one.low - score_tolerance) {
+        add_to(one, n);
+        break;
+      }
+    if (!map_.judged(n, options_.edges)) return;
+    add_to(result_.ground, n);
+    const double plan_area_m2 = surface_.plan_area_m2(n);
+    result_.plan_area_m2 += plan_area_m2;
+    result_.graspable_plan_area_m2 += map_.graspable[n] != 0 ? plan_area_m2 : 0.0;
+    add_to(result_.by_height[heights_.bin_of(map_.center_in_terrain(n).z())], n);
+    const auto slope_deg = static_cast<double>(surface_.slope_deg[n]);
+    add_to(
+        std::isnan(slope_deg) ? result_.unknown_slope : result_.by_slope[slopes_.bin_of(slope_deg)],
+        n);
+  }
+
+  void add_to(ScoreBin& bin, std::size_t n) const {
+    ++bin.all;
+    bin.above_zero_plane += map_.above_zero_plane(n) ? 1 : 0;
+    if (!map_.judged(n, options_.edges)) return;
+    ++bin.judged;
+    bin.graspable += map_.graspable[n];
+    bin.area_m2 += static_cast<double>(surface_.area_m2[n]);
+  }
+
+  void add_to(GroundBin& bin, std::size_t n) const {
+    const auto area_m2 = static_cast<double>(surface_.area_m2[n]);
+    ++bin.voxels;
+    bin.area_m2 += area_m2;
+    bin.score_sum += static_cast<double>(map_.scores[n]);
+    if (map_.graspable[n] == 0) return;
+    ++bin.graspable_voxels;
+    bin.graspable_area_m2 += area_m2;
+  }
+
+  // Voxels of one column follow each other, and columns along y.
+  void count_columns() {
+    std::size_t columns = 0;
+    std::size_t gaps = 0;
+    for (std::size_t n = 0; n < map_.size();) {
+      const Voxel& here = map_.voxels[n];
+      bool judged = false;
+      bool graspable = false;
+      std::size_t next = n;
+      for (; next < map_.size() && map_.voxels[next].i == here.i && map_.voxels[next].j == here.j;
+           ++next) {
+        if (!map_.judged(next, options_.edges)) continue;
+        judged = true;
+        graspable = graspable || map_.graspable[next] != 0;
+      }
+      ++columns;
+      result_.columns += judged ? 1 : 0;
+      result_.graspable_columns += graspable ? 1 : 0;
+      if (next < map_.size() && map_.voxels[next].i == here.i &&
+          map_.voxels[next].j - here.j - 1 <= largest_gap)
+        gaps += static_cast<std::size_t>(map_.voxels[next].j - here.j - 1);
+      n = next;
+    }
+    if (columns > 0)
+      result_.column_coverage = static_cast<double>(columns) / static_cast<double>(columns + gaps);
+  }
+
+  const VoxelMap& map_;
+  const MapSurface& surface_;
+  const MapAnalysisOptions& options_;
+  ValueBins scores_;
+  ValueBins heights_;
+  ValueBins slopes_;
+  MapAnalysis result_;
+};
+
+}  // namespace
+
+void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
+  table.add("score_bin", options.score_bin, libmap::Range{0.0, 1.0, true, false},
+            "width of the histogram's bins of score");
+  table.add("height_bin_m", options.height_bin_m, libmap::positive, "width of bins of height, m");
+  table.add("slope_bin_deg", options.slope_bin_deg, libmap::Range{0.0, 90.0, true, false},
+            "width of bins of slope, degrees");
+  table.add("edges", options.edges,
+            "also count voxels whose mask's window leaves the scanned area");
+}
+
+std::optional<double> GroundBin::graspable_share() const {
+  return area_m2 > 0.0 ? std::optional(graspable_area_m2 / area_m2) : std::nullopt;
+}
+
+std::optional<double> GroundBin::mean_score() const {
+  return voxels > 0 ? std::optional(score_sum / static_cast<double>(voxels)) : std::nullopt;
+}
+
+MapAnalysis analyze_map(const VoxelMap& map, const MapSurface& surface,
+                        const MapAnalysisOptions& options) {
+  check(options);
+  if (surface.slope_deg.size() != map.size() || surface.area_m2.size() != map.size())
+    throw libmap::Error("the surface is of another map", {.field = "slope_deg"});
+  return MapCounter(map, surface, options).run();
+}
+
+}  // namespace libgtd

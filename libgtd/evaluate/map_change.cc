@@ -1,0 +1,327 @@
+#include "libgtd/evaluate/map_change.h"
+
+#include <algorithm>
+#include <boost/math/statistics/bivariate_statistics.hpp>
+#include <cmath>
+#include <limits>
+
+#include "libgtd/evaluate/lookup.h"
+#include "libgtd/evaluate/value_bins.h"
+#include "libgtd/shape/point_grid.h"
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+
+namespace libgtd {
+
+namespace {
+
+constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+constexpr double lattice_tolerance_voxels = 0.01;
+constexpr std::size_t grain = 1 << 14;
+
+void check(const MapChangeOptions& options) {
+  MapChangeOptions copy = options;
+  libmap::ParameterTable table;
+  bind(table, copy);
+  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+}
+
+// What is added to the indices of OTHER's voxels to get those of MAP's, where the lattices are one.
+std::optional<Voxel> lattice_offset(const VoxelMap& map, const VoxelMap& other,
+                                    const libmap::Pose& map_from_other) {
+  Eigen::Vector3d low = other.center_in_terrain(0);
+  Eigen::Vector3d high = low;
+  for (std::size_t n = 0; n < other.size(); ++n) {
+    low = low.cwiseMin(other.center_in_terrain(n));
+    high = high.cwiseMax(other.center_in_terrain(n));
+  }
+  std::optional<Voxel> offset;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3d point((corner & 1) != 0 ? high.x() : low.x(),
+                                (corner & 2) != 0 ? high.y() : low.y(),
+                                (corner & 4) != 0 ? high.z() : low.z());
+    const Eigen::Vector3d cell = map.lattice.cell_of(map_from_other * point);
+    if (!(cell.cwiseAbs().maxCoeff() < 0x1p30)) return std::nullopt;
+    const Voxel here = map.lattice.voxel_of(map_from_other * point);
+    const Voxel there = other.lattice.voxel_of(point);
+    const Eigen::Vector3d off_center =
+        cell - Eigen::Vector3d(here.i + 0.5, here.j + 0.5, here.k + 0.5);
+    if (off_center.cwiseAbs().maxCoeff() > lattice_tolerance_voxels) return std::nullopt;
+    const Voxel step{here.i - there.i, here.j - there.j, here.k - there.k};
+    if (offset && *offset != step) return std::nullopt;
+    offset = step;
+  }
+  return offset;
+}
+
+std::vector<VoxelPair> pairs_by_index(const VoxelMap& map, const VoxelMap& other,
+                                      const Voxel& offset) {
+  std::vector<VoxelPair> pairs;
+  std::uint32_t b = 0;
+  for (std::uint32_t a = 0; a < map.size(); ++a) {
+    const Voxel& voxel = map.voxels[a];
+    const Voxel there{voxel.i - offset.i, voxel.j - offset.j, voxel.k - offset.k};
+    while (b < other.size() && other.voxels[b] < there) ++b;
+    if (b < other.size() && other.voxels[b] == there) pairs.push_back({a, b});
+  }
+  return pairs;
+}
+
+// For each of `places` the nearest of `points` at most `reach_m` away, of equals the first.
+std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& points,
+                                          const std::vector<Eigen::Vector3d>& places,
+                                          double reach_m) {
+  const PointGrid grid(points, reach_m);
+  std::vector<std::uint32_t> nearest(places.size(), none);
+  libmap::parallel_for(places.size(), grain, [&](std::size_t begin, std::size_t end) {
+    std::vector<PointGrid::Range> runs;
+    for (std::size_t n = begin; n < end; ++n) {
+      if (!grid.reaches(places[n])) continue;
+      double least = reach_m * reach_m;
+      grid.find_near(grid.cell_of(places[n]), 1, runs);
+      for (const PointGrid::Range& run : runs)
+        for (std::uint32_t r = run.first; r < run.last; ++r) {
+          const std::uint32_t point = grid.order()[r];
+          const double squared = squared_distance(points[point], places[n]);
+          if (squared > least || (squared == least && point > nearest[n])) continue;
+          least = squared;
+          nearest[n] = point;
+        }
+    }
+  });
+  return nearest;
+}
+
+std::vector<VoxelPair> pairs_by_distance(const VoxelMap& map, const VoxelMap& other,
+                                         const libmap::Pose& map_from_other, double reach_m) {
+  std::vector<Eigen::Vector3d> places;
+  std::vector<Eigen::Vector3d> other_places;
+  for (std::size_t n = 0; n < map.size(); ++n) places.push_back(map.center_in_terrain(n));
+  for (std::size_t n = 0; n < other.size(); ++n)
+    other_places.push_back(map_from_other * other.center_in_terrain(n));
+  const std::vector<std::uint32_t> there = nearest_points(other_places, places, reach_m);
+  const std::vector<std::uint32_t> here = nearest_points(places, other_places, reach_m);
+  std::vector<VoxelPair> pairs;
+  for (std::uint32_t a = 0; a < map.size(); ++a)
+    if (there[a] != none && here[there[a]] == a) pairs.push_back({a, there[a]});
+  return pairs;
+}
+
+double by_rank(std::vector<double>& values, double share) {
+  const auto rank =
+      static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
+  std::nth_element(values.begin(), values.begin() + rank, values.end());
+  return values[static_cast<std::size_t>(rank)];
+}
+
+ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
+                              const std::vector<VoxelPair>& pairs) {
+  ScoreDifference result;
+  std::vector<double> differences;
+  std::vector<double> first, second;
+  for (const VoxelPair& pair : pairs) {
+    const double a = static_cast<double>(map.scores[pair.map]);
+    const double b = static_cast<double>(other.scores[pair.other]);
+    if (std::isnan(a) || std::isnan(b)) continue;
+    differences.push_back(b - a);
+    result.mean += b - a;
+    result.mean_absolute += std::abs(b - a);
+    result.rms += (b - a) * (b - a);
+    first.push_back(a);
+    second.push_back(b);
+  }
+  result.count = differences.size();
+  if (differences.empty()) return result;
+  const double n = static_cast<double>(differences.size());
+  result.mean /= n;
+  result.mean_absolute /= n;
+  result.rms = std::sqrt(result.rms / n);
+  result.low_5 = by_rank(differences, 0.05);
+  result.median = by_rank(differences, 0.5);
+  result.high_95 = by_rank(differences, 0.95);
+  const auto [least, most] = std::minmax_element(differences.begin(), differences.end());
+  result.min = *least;
+  result.max = *most;
+  const auto varies = [](const std::vector<double>& scores) {
+    return std::any_of(scores.begin(), scores.end(),
+                       [&](double score) { return score != scores.front(); });
+  };
+  if (varies(first) && varies(second))
+    result.correlation = boost::math::statistics::correlation_coefficient(first, second);
+  return result;
+}
+
+ChangeSummary summarize(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
+                        const std::vector<VoxelPair>& pairs) {
+  ChangeSummary summary;
+  std::vector<std::uint8_t> judged;
+  std::vector<std::uint8_t> reference;
+  for (const VoxelPair& pair : pairs) {
+    judged.push_back(map.graspable[pair.map]);
+    reference.push_back(other.graspable[pair.other]);
+    const auto area_m2 = static_cast<double>(surface.area_m2[pair.map]);
+    const ChangeClass change = class_of(map, other, pair);
+    summary.both_area_m2 += change == ChangeClass::both ? area_m2 : 0.0;
+    summary.gained_area_m2 += change == ChangeClass::gained ? area_m2 : 0.0;
+    summary.lost_area_m2 += change == ChangeClass::lost ? area_m2 : 0.0;
+  }
+  summary.graspable = confusion_of(judged, reference);
+  summary.kappa = cohens_kappa(summary.graspable);
+  summary.difference = difference_of(map, other, pairs);
+  return summary;
+}
+
+// The pairs in bins of `value` of MAP's voxel; those where it is NaN are left out.
+template <typename Value>
+std::vector<ChangeSummary> summarize_bins(const VoxelMap& map, const MapSurface& surface,
+                                          const VoxelMap& other,
+                                          const std::vector<VoxelPair>& pairs,
+                                          const ValueBins& bins, const Value& value) {
+  std::vector<std::vector<VoxelPair>> members(bins.count);
+  for (const VoxelPair& pair : pairs)
+    if (const double here = value(pair.map); !std::isnan(here))
+      members[bins.bin_of(here)].push_back(pair);
+  std::vector<ChangeSummary> summaries;
+  for (std::size_t b = 0; b < bins.count; ++b) {
+    ChangeSummary& summary = summaries.emplace_back(summarize(map, surface, other, members[b]));
+    summary.low = bins.low(b);
+    summary.high = bins.high(b);
+  }
+  return summaries;
+}
+
+void summarize_judged(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
+                      const MapChangeOptions& options, MapChange& change) {
+  std::vector<VoxelPair> pairs;
+  double low = std::numeric_limits<double>::infinity();
+  double high = -low;
+  for (const VoxelPair& pair : change.pairs) {
+    if (!map.judged(pair.map, options.edges) || !other.judged(pair.other, options.edges)) continue;
+    pairs.push_back(pair);
+    low = std::min(low, map.center_in_terrain(pair.map).z());
+    high = std::max(high, map.center_in_terrain(pair.map).z());
+  }
+  change.judged = summarize(map, surface, other, pairs);
+  if (pairs.empty()) return;
+  change.by_height = summarize_bins(map, surface, other, pairs,
+                                    bins_over(low, high, options.height_bin_m, "height_bin_m"),
+                                    [&](std::uint32_t n) { return map.center_in_terrain(n).z(); });
+  change.by_slope = summarize_bins(
+      map, surface, other, pairs, bins_over(0.0, 90.0, options.slope_bin_deg, "slope_bin_deg"),
+      [&](std::uint32_t n) { return static_cast<double>(surface.slope_deg[n]); });
+}
+
+void find_unpaired(const VoxelMap& map, const VoxelMap& other, MapChange& change) {
+  std::vector<std::uint8_t> in_map(map.size(), 0);
+  std::vector<std::uint8_t> in_other(other.size(), 0);
+  for (const VoxelPair& pair : change.pairs) in_map[pair.map] = in_other[pair.other] = 1;
+  for (std::uint32_t n = 0; n < map.size(); ++n)
+    if (in_map[n] == 0) {
+      change.only_map.push_back(n);
+      change.only_map_graspable += map.graspable[n];
+    }
+  for (std::uint32_t n = 0; n < other.size(); ++n)
+    if (in_other[n] == 0) {
+      change.only_other.push_back(n);
+      change.only_other_graspable += other.graspable[n];
+    }
+}
+
+}  // namespace
+
+void bind(libmap::ParameterTable& table, MapChangeOptions& options) {
+  table.add("match_distance_voxels", options.match_distance_voxels,
+            libmap::Range{0.0, 10.0, true, false},
+            "of OTHER on another lattice: voxels match at most so many voxel edges apart");
+}
+
+std::string_view to_text(VoxelMatching matching) {
+  return matching == VoxelMatching::lattice ? "lattice" : "nearest";
+}
+
+std::string_view to_text(ChangeClass change) {
+  switch (change) {
+    case ChangeClass::neither:
+      return "neither";
+    case ChangeClass::both:
+      return "both";
+    case ChangeClass::gained:
+      return "gained";
+    case ChangeClass::lost:
+      return "lost";
+    case ChangeClass::only_map:
+      return "only in MAP";
+    case ChangeClass::only_other:
+      return "only in OTHER";
+  }
+  return {};
+}
+
+ChangeClass class_of(const VoxelMap& map, const VoxelMap& other, const VoxelPair& pair) {
+  const bool in_other = other.graspable[pair.other] != 0;
+  if (map.graspable[pair.map] != 0) return in_other ? ChangeClass::both : ChangeClass::lost;
+  return in_other ? ChangeClass::gained : ChangeClass::neither;
+}
+
+MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
+                       const libmap::Pose& map_terrain_from_other_terrain,
+                       const MapChangeOptions& options) {
+  check(options);
+  if (surface.area_m2.size() != map.size())
+    throw libmap::Error("the surface is of another map", {.field = "area_m2"});
+  MapChange change;
+  const double size_m = std::max(map.lattice.voxel_size_m, other.lattice.voxel_size_m);
+  if (const auto offset = lattice_offset(map, other, map_terrain_from_other_terrain)) {
+    change.matching = VoxelMatching::lattice;
+    change.pairs = pairs_by_index(map, other, *offset);
+  } else {
+    change.matching = VoxelMatching::nearest;
+    change.pairs = pairs_by_distance(map, other, map_terrain_from_other_terrain,
+                                     options.match_distance_voxels * size_m);
+  }
+  if (change.pairs.empty())
+    throw libmap::Error("the maps have no voxel in common: they lie apart, or in other frames");
+  find_unpaired(map, other, change);
+  change.common = summarize(map, surface, other, change.pairs);
+  summarize_judged(map, surface, other, options, change);
+  return change;
+}
+
+libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
+                            const libmap::Pose& map_terrain_from_other_terrain, bool edges) {
+  constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+  const libmap::Pose map_from_terrain = map.terrain_from_map.inverse();
+  const std::size_t count = change.pairs.size() + change.only_map.size() + change.only_other.size();
+  libmap::PointCloud cloud;
+  cloud.positions.reserve(count);
+  std::vector<double> score_map, score_other, graspable_map, graspable_other, judged, classes;
+  const auto add = [&](std::uint32_t a, std::uint32_t b, ChangeClass one) {
+    cloud.positions.push_back(map_from_terrain * (a != none ? map.center_in_terrain(a)
+                                                            : map_terrain_from_other_terrain *
+                                                                  other.center_in_terrain(b)));
+    score_map.push_back(a != none ? static_cast<double>(map.scores[a]) : nan);
+    score_other.push_back(b != none ? static_cast<double>(other.scores[b]) : nan);
+    graspable_map.push_back(a != none ? map.graspable[a] : 0.0);
+    graspable_other.push_back(b != none ? other.graspable[b] : 0.0);
+    judged.push_back((a == none || map.judged(a, edges)) && (b == none || other.judged(b, edges)));
+    classes.push_back(static_cast<double>(one));
+  };
+  for (const VoxelPair& pair : change.pairs) add(pair.map, pair.other, class_of(map, other, pair));
+  for (const std::uint32_t a : change.only_map) add(a, none, ChangeClass::only_map);
+  for (const std::uint32_t b : change.only_other) add(none, b, ChangeClass::only_other);
+  std::vector<double> difference(count);
+  for (std::size_t n = 0; n < count; ++n) difference[n] = score_other[n] - score_map[n];
+  const auto field = [&](const char* name, libmap::ScalarType type, std::vector<double>& values) {
+    cloud.fields.push_back({name, type, std::move(values)});
+  };
+  field("score_map", libmap::ScalarType::float32, score_map);
+  field("score_other", libmap::ScalarType::float32, score_other);
+  field("difference", libmap::ScalarType::float32, difference);
+  field("graspable_map", libmap::ScalarType::uint8, graspable_map);
+  field("graspable_other", libmap::ScalarType::uint8, graspable_other);
+  field("judged", libmap::ScalarType::uint8, judged);
+  field("change", libmap::ScalarType::uint8, classes);
+  return cloud;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,279 @@
+#include "libgtd/evaluate/map_summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+#include <variant>
+
+#include "libmap/core/text.h"
+
+namespace libgtd {
+namespace {
+
+using Cells = std::vector<std::string>;
+
+// Columns and, for each of them, a row's cell; both from one function, so that they fit.
+struct Row {
+  Cells names;
+  Cells cells;
+
+  void add(std::string name, std::string cell) {
+    names.push_back(std::move(name));
+    cells.push_back(std::move(cell));
+  }
+  void add(std::string name, std::size_t count) {
+    add(std::move(name), libmap::to_text(static_cast<std::int64_t>(count)));
+  }
+  // Six decimals: no map has more voxels than they tell apart.
+  void add(std::string name, std::optional<double> value) {
+    add(std::move(name), value ? libmap::to_fixed_text(*value, 6) : std::string());
+  }
+};
+
+std::string text_of(const libmap::ManifestValue* value) {
+  if (value == nullptr) return {};
+  return std::visit(
+      [](const auto& held) -> std::string {
+        using Held = std::decay_t<decltype(held)>;
+        if constexpr (std::is_same_v<Held, std::string>)
+          return held;
+        else if constexpr (std::is_same_v<Held, bool>)
+          return held ? "1" : "0";
+        else if constexpr (std::is_same_v<Held, std::vector<double>>)
+          return {};
+        else
+          return libmap::to_text(held);
+      },
+      *value);
+}
+
+std::optional<double> number_of(const libmap::ManifestValue* value) {
+  if (value == nullptr) return std::nullopt;
+  if (const auto* real = std::get_if<double>(value)) return *real;
+  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
+  return std::nullopt;
+}
+
+std::vector<double> quantiles_of(std::vector<double> values) {
+  std::vector<double> result;
+  if (values.empty()) return result;
+  std::sort(values.begin(), values.end());
+  for (const double level : summary_quantiles) {
+    const auto rank =
+        static_cast<std::size_t>(std::ceil(level * static_cast<double>(values.size()) - 1e-9));
+    result.push_back(values[std::clamp<std::size_t>(rank, 1, values.size()) - 1]);
+  }
+  return result;
+}
+
+void add_quantiles(const std::string& prefix, const std::vector<double>& values, Row& row) {
+  for (std::size_t q = 0; q < summary_quantiles.size(); ++q) {
+    const std::string percent = libmap::to_fixed_text(100.0 * summary_quantiles[q], 0);
+    row.add(prefix + "_p" + (percent.size() < 2 ? "0" : "") + percent,
+            values.empty() ? std::nullopt : std::optional(values[q]));
+  }
+}
+
+void add_rate(const std::string& name, const Rate& rate, Row& row) {
+  const std::optional<Interval> interval = rate.wilson_95();
+  row.add(name, rate.value());
+  row.add(name + "_low_95", interval ? std::optional(interval->low) : std::nullopt);
+  row.add(name + "_high_95", interval ? std::optional(interval->high) : std::nullopt);
+}
+
+void add_confusion(const std::string& prefix, const Confusion& counts, Row& row) {
+  row.add(prefix + "_positives", counts.positives());
+  row.add(prefix + "_negatives", counts.negatives());
+  add_rate(prefix + "_sensitivity", counts.true_positive_rate(), row);
+  add_rate(prefix + "_specificity", counts.true_negative_rate(), row);
+  row.add(prefix + "_youden", youden_index(counts));
+}
+
+void add_expected(const ExpectedMapResult& expected, Row& row) {
+  add_confusion("voxel", expected.voxels_by_score, row);
+  row.add("voxel_auc", expected.area ? std::optional(expected.area->trapezoid) : std::nullopt);
+  // Without the map's flag, no rates.
+  add_confusion("flag", expected.voxels_by_flag.value_or(Confusion{}), row);
+  add_confusion("place", expected.places, row);
+}
+
+std::optional<double> share(std::size_t part, std::size_t whole) {
+  return Rate{part, whole}.value();
+}
+
+Row row_of(const SummarizedMap& map, bool with_expected) {
+  static constexpr std::array<const char*, 7> parameters = {
+      "method",        "gripper",    "voxel_size_m", "solid_voxel_threshold", "extra_void_layers",
+      "interpolation", "orientation"};
+  Row row;
+  row.add("map", map.name);
+  for (const char* name : parameters) row.add(name, text_of(map.manifest.find_parameter(name)));
+  row.add("cutoff", libmap::to_text(map.cutoff));
+  const MapSummary& summary = map.summary;
+  row.add("voxels", summary.voxels);
+  row.add("judged", summary.judged);
+  row.add("reached_share", share(summary.reached, summary.judged));
+  row.add("graspable_share", share(summary.graspable, summary.judged));
+  row.add("few_solid_share",
+          summary.few_solid ? share(*summary.few_solid, summary.judged) : std::nullopt);
+  add_quantiles("score", summary.scores, row);
+  add_quantiles("ssv", summary.solid_voxels, row);
+  if (with_expected) add_expected(map.expected.value_or(ExpectedMapResult{}), row);
+  return row;
+}
+
+std::string yes_no(std::optional<bool> value) {
+  if (!value) return {};
+  return *value ? "1" : "0";
+}
+
+libmap::Table table_of(const std::vector<Row>& rows) {
+  libmap::Table table;
+  for (const Row& row : rows) {
+    table.columns = row.names;
+    table.rows.push_back(row.cells);
+  }
+  return table;
+}
+
+// For counts that need neither slopes nor areas.
+MapSurface unmeasured(const VoxelMap& map) {
+  MapSurface surface;
+  surface.slope_deg.assign(map.size(), std::numeric_limits<float>::quiet_NaN());
+  surface.area_m2.assign(map.size(), 0.0F);
+  return surface;
+}
+
+}  // namespace
+
+MapSummary summarize_map(const libmap::PointCloud& map, const VoxelMap& voxels,
+                         const MapSummaryOptions& options) {
+  MapSummary summary;
+  summary.voxels = voxels.size();
+  const libmap::ScalarField* ssv = map.find_field("ssv");
+  if (ssv != nullptr && options.solid_voxel_threshold) summary.few_solid = 0;
+  std::vector<double> scores;
+  std::vector<double> solid_voxels;
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    if (!voxels.judged(n, false)) continue;
+    ++summary.judged;
+    const double score = static_cast<double>(voxels.scores[n]);
+    summary.reached += reaches_cutoff(score, options.graspability_threshold) ? 1 : 0;
+    summary.graspable += voxels.graspable[n] != 0 ? 1 : 0;
+    scores.push_back(score);
+    if (ssv == nullptr) continue;
+    solid_voxels.push_back(ssv->values[voxels.map_points[n]]);
+    if (summary.few_solid && solid_voxels.back() < *options.solid_voxel_threshold)
+      ++*summary.few_solid;
+  }
+  summary.score_bins = analyze_map(voxels, unmeasured(voxels)).score_bins;
+  summary.scores = quantiles_of(std::move(scores));
+  summary.solid_voxels = quantiles_of(std::move(solid_voxels));
+  return summary;
+}
+
+MapSummaryOptions summary_options(const libmap::Manifest& manifest) {
+  MapSummaryOptions options;
+  options.graspability_threshold = number_of(manifest.find_parameter("graspability_threshold"))
+                                       .value_or(options.graspability_threshold);
+  options.solid_voxel_threshold = number_of(manifest.find_parameter("solid_voxel_threshold"));
+  return options;
+}
+
+libmap::Table summary_table(const std::vector<SummarizedMap>& maps) {
+  const bool with_expected = std::any_of(
+      maps.begin(), maps.end(), [](const SummarizedMap& map) { return map.expected.has_value(); });
+  std::vector<Row> rows;
+  for (const SummarizedMap& map : maps) rows.push_back(row_of(map, with_expected));
+  return table_of(rows);
+}
+
+libmap::Table region_table(const std::vector<SummarizedMap>& maps, const ExpectedMap& expected) {
+  std::vector<Row> rows;
+  for (const SummarizedMap& map : maps) {
+    if (!map.expected) continue;
+    for (std::size_t r = 0; r < expected.regions.size(); ++r) {
+      const ExpectedRegion& region = expected.regions[r];
+      const RegionResult& result = map.expected->regions[r];
+      const std::optional<bool> predicted = result.predicted();
+      const bool judged = region.graspable && predicted;
+      Row row;
+      row.add("map", map.name);
+      row.add("region", region.name);
+      row.add("expected", yes_no(region.graspable));
+      row.add("voxels", result.voxels);
+      row.add("reached_share", share(result.reached, result.voxels));
+      row.add("graspable_share", share(result.graspable, result.voxels));
+      row.add("mean_score", result.mean_score);
+      row.add("median_score", result.median_score);
+      row.add("predicted", yes_no(predicted));
+      row.add("agrees",
+              yes_no(judged ? std::optional(*predicted == *region.graspable) : std::nullopt));
+      row.add("why", region.why);
+      rows.push_back(std::move(row));
+    }
+  }
+  return table_of(rows);
+}
+
+libmap::Table histogram_table(const std::vector<SummarizedMap>& maps) {
+  std::vector<Row> rows;
+  for (const SummarizedMap& map : maps) {
+    for (const ScoreBin& bin : map.summary.score_bins) {
+      Row row;
+      row.add("map", map.name);
+      row.add("score", std::optional((bin.low + bin.high) / 2.0));
+      row.add("voxels", bin.judged);
+      row.add("share", share(bin.judged, map.summary.judged));
+      rows.push_back(std::move(row));
+    }
+  }
+  return table_of(rows);
+}
+
+MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
+                     const libmap::Pose& first_terrain_from_second_terrain) {
+  const MapChange change =
+      compare_maps(first, unmeasured(first), second, first_terrain_from_second_terrain);
+  MapPair pair;
+  pair.matching = change.matching;
+  pair.common = change.pairs.size();
+  pair.judged = change.judged;
+  return pair;
+}
+
+libmap::Table pair_table(const std::vector<SummarizedMap>& maps,
+                         const std::vector<MapPair>& pairs) {
+  std::vector<Row> rows;
+  for (const MapPair& pair : pairs) {
+    const Confusion& counts = pair.judged.graspable;
+    const std::optional<Kappa>& kappa = pair.judged.kappa;
+    const ScoreDifference& difference = pair.judged.difference;
+    const auto where = [](bool there, double value) {
+      return there ? std::optional(value) : std::nullopt;
+    };
+    Row row;
+    row.add("first", maps[pair.first].name);
+    row.add("second", maps[pair.second].name);
+    row.add("matching", std::string(to_text(pair.matching)));
+    row.add("common_voxels", pair.common);
+    row.add("judged_voxels", counts.size());
+    row.add("both", counts.true_positives);
+    row.add("first_alone", counts.false_positives);
+    row.add("second_alone", counts.false_negatives);
+    row.add("neither", counts.true_negatives);
+    row.add("accuracy", counts.accuracy().value());
+    row.add("kappa", where(kappa.has_value(), kappa ? kappa->value : 0.0));
+    row.add("kappa_low_95", where(kappa.has_value(), kappa ? kappa->normal_95.low : 0.0));
+    row.add("kappa_high_95", where(kappa.has_value(), kappa ? kappa->normal_95.high : 0.0));
+    row.add("score_difference_mean", where(difference.count > 0, difference.mean));
+    row.add("score_difference_rms", where(difference.count > 0, difference.rms));
+    row.add("score_correlation", difference.correlation);
+    rows.push_back(std::move(row));
+  }
+  return table_of(rows);
+}
+
+}  // namespace libgtd

@@ -1,0 +1,215 @@
+#include "libgtd/evaluate/voxel_map.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+
+namespace libgtd {
+
+namespace {
+
+using libmap::PointCloud;
+using libmap::ScalarField;
+
+constexpr double index_bound = 0x1p29;
+// Of a voxel's edge: positions in files are rounded to single precision.
+constexpr double max_offset = 0.25;
+constexpr std::size_t grain = 1 << 16;
+
+const std::vector<double>& values_of(const PointCloud& map, const char* name) {
+  if (const ScalarField* field = map.find_field(name)) return field->values;
+  throw libmap::Error("the map has no such field", {.field = name});
+}
+
+const std::vector<double>* optional_values(const PointCloud& map, const char* name) {
+  const ScalarField* field = map.find_field(name);
+  return field == nullptr ? nullptr : &field->values;
+}
+
+int index_of(double value, const char* name) {
+  if (!(std::abs(value) <= index_bound) || value != std::floor(value))
+    throw libmap::Error(
+        "no index of a voxel",
+        {.field = name, .value = libmap::to_text(value), .bound = "a whole number within +-2^29"});
+  return static_cast<int>(value);
+}
+
+// Of the points `kept`, by the fields i, j and k.
+std::vector<Voxel> voxels_of_fields(const PointCloud& map, const std::vector<std::uint32_t>& kept) {
+  const std::vector<double>& i = values_of(map, "i");
+  const std::vector<double>& j = values_of(map, "j");
+  const std::vector<double>& k = values_of(map, "k");
+  std::vector<Voxel> voxels;
+  voxels.reserve(kept.size());
+  for (const std::uint32_t n : kept)
+    voxels.push_back({index_of(i[n], "i"), index_of(j[n], "j"), index_of(k[n], "k")});
+  return voxels;
+}
+
+Eigen::Vector3d vector_of(const Voxel& voxel) {
+  return {static_cast<double>(voxel.i), static_cast<double>(voxel.j), static_cast<double>(voxel.k)};
+}
+
+// The lattice in the terrain frame on which the voxels come nearest to their points, by least
+// squares.
+VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_from_map,
+                            const std::vector<std::uint32_t>& kept,
+                            const std::vector<Voxel>& voxels) {
+  Eigen::Vector3d mean_voxel = Eigen::Vector3d::Zero();
+  Eigen::Vector3d mean_point = Eigen::Vector3d::Zero();
+  for (std::size_t n = 0; n < kept.size(); ++n) {
+    mean_voxel += vector_of(voxels[n]);
+    mean_point += terrain_from_map * map.positions[kept[n]];
+  }
+  mean_voxel /= static_cast<double>(kept.size());
+  mean_point /= static_cast<double>(kept.size());
+  double products = 0.0;
+  double squares = 0.0;
+  for (std::size_t n = 0; n < kept.size(); ++n) {
+    const Eigen::Vector3d offset = vector_of(voxels[n]) - mean_voxel;
+    products += offset.dot(terrain_from_map * map.positions[kept[n]] - mean_point);
+    squares += offset.squaredNorm();
+  }
+  if (!(products > 0.0))
+    throw libmap::Error(
+        "neither a manifest nor the fields i, j and k say how large the map's voxels are",
+        {.field = "voxel_size_m"});
+  const double size_m = products / squares;
+  return {mean_point - size_m * (mean_voxel.array() + 0.5).matrix(), size_m};
+}
+
+void require_on_lattice(const PointCloud& map, const VoxelMap& result,
+                        const std::vector<std::uint32_t>& kept, const std::vector<Voxel>& voxels) {
+  const double bound_m = max_offset * result.lattice.voxel_size_m;
+  for (std::size_t n = 0; n < kept.size(); ++n) {
+    const Eigen::Vector3d center = result.lattice.center_of(voxels[n]);
+    const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
+    if (!((point - center).cwiseAbs().maxCoeff() <= bound_m))
+      throw libmap::Error(
+          "points do not lie at the centres of the map's voxels",
+          {.field = "point " + std::to_string(kept[n] + 1),
+           .value = libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) +
+                    " m off",
+           .bound = "<= " + libmap::to_text(static_cast<float>(bound_m)) + " m"});
+  }
+}
+
+void sort_by_voxel(std::vector<Voxel>& voxels, std::vector<std::uint32_t>& kept) {
+  if (!std::is_sorted(voxels.begin(), voxels.end())) {
+    std::vector<std::uint32_t> order(voxels.size());
+    std::iota(order.begin(), order.end(), 0U);
+    std::sort(order.begin(), order.end(),
+              [&](std::uint32_t a, std::uint32_t b) { return voxels[a] < voxels[b]; });
+    std::vector<Voxel> sorted_voxels(order.size());
+    std::vector<std::uint32_t> sorted_points(order.size());
+    for (std::size_t n = 0; n < order.size(); ++n) {
+      sorted_voxels[n] = voxels[order[n]];
+      sorted_points[n] = kept[order[n]];
+    }
+    voxels = std::move(sorted_voxels);
+    kept = std::move(sorted_points);
+  }
+  const auto twice = std::adjacent_find(voxels.begin(), voxels.end());
+  if (twice != voxels.end())
+    throw libmap::Error("two points of one voxel",
+                        {.field = "i, j, k",
+                         .value = std::to_string(twice->i) + ", " + std::to_string(twice->j) +
+                                  ", " + std::to_string(twice->k)});
+}
+
+void fill_values(const PointCloud& map, VoxelMap& result) {
+  const std::vector<double>& score = values_of(map, "score");
+  const std::vector<double>& graspable = values_of(map, "graspable");
+  const std::vector<double>* edge = optional_values(map, "edge");
+  const std::vector<double>* obstacle = optional_values(map, "obstacle");
+  const std::size_t count = result.voxels.size();
+  result.scores.resize(count);
+  result.graspable.resize(count);
+  result.edge.resize(count);
+  result.obstacle.resize(count);
+  libmap::parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const std::uint32_t point = result.map_points[n];
+      const bool scored = std::isfinite(score[point]);
+      const bool blocked = obstacle != nullptr && (*obstacle)[point] > 0.0;
+      result.scores[n] =
+          scored ? static_cast<float>(score[point]) : std::numeric_limits<float>::quiet_NaN();
+      result.graspable[n] = scored && !blocked && graspable[point] > 0.0 ? 1 : 0;
+      result.edge[n] = edge != nullptr && (*edge)[point] > 0.0 ? 1 : 0;
+      result.obstacle[n] = blocked ? 1 : 0;
+    }
+  });
+}
+
+std::optional<double> number_of(const libmap::ManifestValue* value) {
+  if (value == nullptr) return std::nullopt;
+  if (const auto* number = std::get_if<double>(value)) return *number;
+  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
+  return std::nullopt;
+}
+
+}  // namespace
+
+MapFacts facts_of(const libmap::Manifest& manifest) {
+  MapFacts facts;
+  facts.zero_plane_m =
+      number_of(manifest.find_parameter("zero_plane_m")).value_or(facts.zero_plane_m);
+  const std::optional<double> size_m = number_of(manifest.find_parameter("voxel_size_m"));
+  const libmap::ManifestValue* value = manifest.find_result("lattice_origin_m");
+  const auto* origin = value == nullptr ? nullptr : std::get_if<std::vector<double>>(value);
+  if (size_m && *size_m > 0.0 && origin != nullptr && origin->size() == 3)
+    facts.lattice = VoxelLattice{{(*origin)[0], (*origin)[1], (*origin)[2]}, *size_m};
+  if (const libmap::Pose* pose = manifest.find_transform("terrain_from_input");
+      pose != nullptr && manifest.frame == "input")
+    facts.terrain_from_map = *pose;
+  return facts;
+}
+
+std::size_t VoxelMap::find(const Voxel& voxel) const {
+  const auto place = std::lower_bound(voxels.begin(), voxels.end(), voxel);
+  return place == voxels.end() || *place != voxel
+             ? size()
+             : static_cast<std::size_t>(place - voxels.begin());
+}
+
+VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {
+  map.check();
+  if (map.size() > std::numeric_limits<std::uint32_t>::max())
+    throw libmap::Error("the map has too many points",
+                        {.value = std::to_string(map.size()), .bound = "< 2^32"});
+  values_of(map, "score");
+  values_of(map, "graspable");
+  VoxelMap result;
+  result.terrain_from_map = facts.terrain_from_map;
+  result.zero_plane_m = facts.zero_plane_m;
+  std::vector<std::uint32_t> kept;
+  kept.reserve(map.size());
+  for (std::uint32_t n = 0; n < map.size(); ++n)
+    if (map.positions[n].allFinite()) kept.push_back(n);
+  if (kept.empty()) throw libmap::Error("the map has no points");
+  std::vector<Voxel> voxels;
+  if (!facts.lattice || map.find_field("i") != nullptr) voxels = voxels_of_fields(map, kept);
+  result.lattice =
+      facts.lattice ? *facts.lattice : fitted_lattice(map, result.terrain_from_map, kept, voxels);
+  if (voxels.empty())
+    for (const std::uint32_t n : kept) {
+      const Eigen::Vector3d cell =
+          result.lattice.cell_of(result.terrain_from_map * map.positions[n]);
+      if (!(cell.cwiseAbs().maxCoeff() <= index_bound))
+        throw libmap::Error("a point lies too far off for voxels of this size",
+                            {.field = "point " + std::to_string(n + 1)});
+      voxels.push_back(result.lattice.voxel_of(result.terrain_from_map * map.positions[n]));
+    }
+  require_on_lattice(map, result, kept, voxels);
+  sort_by_voxel(voxels, kept);
+  result.voxels = std::move(voxels);
+  result.map_points = std::move(kept);
+  fill_values(map, result);
+  return result;
+}
+
+}  // namespace libgtd

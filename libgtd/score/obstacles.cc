@@ -1,0 +1,155 @@
+#include "libgtd/score/obstacles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <string>
+
+#include "libgtd/terrain/voxel_grid.h"
+#include "libmap/core/error.h"
+
+namespace libgtd {
+
+namespace {
+
+// Calls visit(n, m) for each two voxels n < m at most `reach` apart along each axis.
+template <typename Visit>
+void for_each_pair(const std::vector<Voxel>& voxels, int reach, const Visit& visit) {
+  // In each of the rows i .. i + reach the first voxel of the columns j - reach .. j + reach: it
+  // moves on as the voxels do.
+  std::vector<std::vector<Voxel>::const_iterator> firsts(static_cast<std::size_t>(reach) + 1,
+                                                         voxels.begin());
+  constexpr int lowest = std::numeric_limits<int>::min();
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    const Voxel& voxel = voxels[n];
+    for (int di = 0; di <= reach; ++di) {
+      auto& first = firsts[static_cast<std::size_t>(di)];
+      first = first_not_below(first, voxels.end(), {voxel.i + di, voxel.j - reach, lowest});
+      for (auto at = first; at != voxels.end() && at->i == voxel.i + di && at->j <= voxel.j + reach;
+           ++at) {
+        const auto m = static_cast<std::size_t>(at - voxels.begin());
+        if (m > n && std::abs(at->k - voxel.k) <= reach) visit(n, m);
+      }
+    }
+  }
+}
+
+// Disjoint sets of voxels (Galler and Fischer 1964); each goes by its first voxel.
+class VoxelSets {
+ public:
+  explicit VoxelSets(std::size_t count) : parents_(count) {
+    std::iota(parents_.begin(), parents_.end(), std::size_t{0});
+  }
+  std::size_t find(std::size_t n) {
+    while (parents_[n] != n) n = parents_[n] = parents_[parents_[n]];
+    return n;
+  }
+  void join(std::size_t a, std::size_t b) {
+    a = find(a);
+    b = find(b);
+    parents_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<std::size_t> parents_;
+};
+
+struct Rise {
+  int foot = std::numeric_limits<int>::max();
+  int top = std::numeric_limits<int>::min();
+  void hold(int k) {
+    foot = std::min(foot, k);
+    top = std::max(top, k);
+  }
+};
+
+void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_deg) {
+  if (voxels.size() != slopes_deg.size())
+    throw libmap::Error("not as many as there are voxels",
+                        {.field = "slopes_deg",
+                         .value = std::to_string(slopes_deg.size()),
+                         .bound = std::to_string(voxels.size())});
+  for (std::size_t n = 1; n < voxels.size(); ++n)
+    if (!(voxels[n - 1] < voxels[n]))
+      throw libmap::Error("the voxels do not ascend", {.field = "i, j, k"});
+}
+
+// The foot and top of each face, at its first voxel.
+std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
+                                const std::vector<std::uint8_t>& is_steep, VoxelSets& faces,
+                                double radius_voxels) {
+  std::vector<Rise> rises(voxels.size());
+  for (std::size_t n = 0; n < voxels.size(); ++n)
+    if (is_steep[n] != 0) rises[faces.find(n)].hold(voxels[n].k);
+  const double square = radius_voxels * radius_voxels;
+  for_each_pair(voxels, static_cast<int>(radius_voxels), [&](std::size_t n, std::size_t m) {
+    if (is_steep[n] == 0 && is_steep[m] == 0) return;
+    const double di = voxels[m].i - voxels[n].i, dj = voxels[m].j - voxels[n].j,
+                 dk = voxels[m].k - voxels[n].k;
+    if (di * di + dj * dj + dk * dk > square) return;
+    if (is_steep[n] != 0) rises[faces.find(n)].hold(voxels[m].k);
+    if (is_steep[m] != 0) rises[faces.find(m)].hold(voxels[n].k);
+  });
+  return rises;
+}
+
+// The region with the most voxels, by its first one; voxels.size() if there is none.
+std::size_t find_ground(const std::vector<Obstacle>& obstacles, VoxelSets& regions) {
+  std::vector<std::size_t> counts(obstacles.size(), 0);
+  std::size_t ground = obstacles.size();
+  for (std::size_t n = 0; n < obstacles.size(); ++n)
+    if (obstacles[n] == Obstacle::none) ++counts[regions.find(n)];
+  for (std::size_t n = 0; n < obstacles.size(); ++n)
+    if (counts[n] > 0 && (ground == obstacles.size() || counts[n] > counts[ground])) ground = n;
+  return ground;
+}
+
+}  // namespace
+
+std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
+                                     const std::vector<float>& slopes_deg, double voxel_size_m,
+                                     const ObstacleOptions& options) {
+  check(voxels, slopes_deg);
+  // A hair less, so that a rise of exactly the limit does not depend on the last bit.
+  const double limit = options.height_m / voxel_size_m * (1.0 + 1e-9);
+  std::vector<std::uint8_t> is_steep(voxels.size(), 0);
+  for (std::size_t n = 0; n < voxels.size(); ++n)
+    is_steep[n] = static_cast<double>(slopes_deg[n]) > options.slope_deg ? 1 : 0;
+  VoxelSets faces(voxels.size());
+  for_each_pair(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
+    if (is_steep[n] != 0 && is_steep[m] != 0) faces.join(n, m);
+  });
+  const std::vector<Rise> rises =
+      measure_faces(voxels, is_steep, faces, options.normal_radius_m / voxel_size_m);
+  std::vector<Obstacle> obstacles(voxels.size(), Obstacle::none);
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    if (is_steep[n] == 0) continue;
+    const Rise& rise = rises[faces.find(n)];
+    if (static_cast<double>(rise.top) - rise.foot > limit) obstacles[n] = Obstacle::face;
+  }
+  VoxelSets regions(voxels.size());
+  for_each_pair(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
+    if (obstacles[n] == Obstacle::none && obstacles[m] == Obstacle::none) regions.join(n, m);
+  });
+  const std::size_t ground = find_ground(obstacles, regions);
+  std::vector<std::uint8_t> is_on_top(voxels.size(), 0);
+  const auto meet = [&](std::size_t place, std::size_t face) {
+    if (obstacles[place] != Obstacle::none || obstacles[face] != Obstacle::face) return;
+    const Rise& rise = rises[faces.find(face)];
+    const double above_foot = static_cast<double>(voxels[place].k) - rise.foot;
+    const double below_top = static_cast<double>(rise.top) - voxels[place].k;
+    if (above_foot > limit || above_foot > below_top) is_on_top[regions.find(place)] = 1;
+  };
+  for_each_pair(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
+    meet(n, m);
+    meet(m, n);
+  });
+  for (std::size_t n = 0; n < voxels.size(); ++n)
+    if (obstacles[n] == Obstacle::none && is_on_top[regions.find(n)] != 0 &&
+        regions.find(n) != ground)
+      obstacles[n] = Obstacle::unreachable;
+  return obstacles;
+}
+
+}  // namespace libgtd

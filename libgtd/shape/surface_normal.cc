@@ -1,0 +1,115 @@
+#include "libgtd/shape/surface_normal.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <string>
+
+#include "libgtd/shape/cell_surroundings.h"
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+using Eigen::Vector3d;
+
+// Squares of widths relative to each other: below the first the points are a line, above the second
+// they are a lump that no plane fits better than another.
+constexpr double min_width_ratio = 1e-6;
+constexpr double max_lump_ratio = 0.8;
+// A surface this near to being along a direction (0.06 deg) does not face it.
+constexpr double min_side_cosine = 1e-3;
+
+double side_of(const Vector3d& normal, const Vector3d& outside) {
+  if (!outside.allFinite() || !(outside.norm() > 0)) return 0;
+  const double cosine = normal.dot(outside.normalized());
+  return std::abs(cosine) < min_side_cosine ? 0 : cosine;
+}
+
+SurfaceNormal facing(const Vector3d& fitted, const Vector3d& outside, const Vector3d& up) {
+  double side = side_of(fitted, outside);
+  if (side == 0) side = side_of(fitted, up);
+  const Vector3d normal = side < 0 ? Vector3d(-fitted) : fitted;
+  SurfaceNormal result;
+  result.slope_deg = static_cast<float>(std::acos(std::clamp(normal.dot(up), -1.0, 1.0)) *
+                                        (180.0 / std::numbers::pi));
+  if (side != 0) result.normal = normal.cast<float>();
+  return result;
+}
+
+class PlaneFitter {
+ public:
+  PlaneFitter(const PointGrid& grid, const std::vector<Vector3d>& in_order, double radius,
+              const Vector3d& up)
+      : candidates_(grid, in_order), radius_(radius), up_(up.normalized()) {}
+
+  void enter(const PointGrid::Cell& cell) {
+    candidates_.enter(cell, 2);
+    neighbors_.make_room(candidates_.count());
+  }
+
+  // At a place in the cell that was entered last.
+  SurfaceNormal fit(const Vector3d& place, const Vector3d& outside) {
+    const NeighborLoops::Places neighbors = neighbors_.places();
+    const std::size_t count =
+        loops_.select(candidates_.places(), candidates_.count(), place.data(), radius_, neighbors);
+    if (count < 3) return {};
+    Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
+    solver.computeDirect(covariance_of(loops_, neighbors, count));
+    const Vector3d& widths = solver.eigenvalues();
+    if (!(widths[1] > min_width_ratio * widths[2]) || widths[0] > max_lump_ratio * widths[1])
+      return {};
+    const Vector3d normal = solver.eigenvectors().col(0).normalized();
+    return normal.allFinite() ? facing(normal, outside, up_) : SurfaceNormal{};
+  }
+
+ private:
+  CellSurroundings candidates_;
+  double radius_;
+  Vector3d up_;
+  const NeighborLoops& loops_ = neighbor_loops_of(best_path());
+  CoordinateRows neighbors_;
+};
+
+}  // namespace
+
+std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
+                                               const std::vector<Vector3d>& places,
+                                               const std::vector<Eigen::Vector3f>& outsides,
+                                               const SurfaceNormalOptions& options) {
+  if (!(options.radius_m > 0) || std::isinf(options.radius_m))
+    throw libmap::Error("not a radius", {.field = "radius_m",
+                                         .value = libmap::to_text(options.radius_m),
+                                         .bound = "> 0 and finite"});
+  if (!options.up.allFinite() || !(options.up.norm() > 0))
+    throw libmap::Error("not a direction", {.field = "up"});
+  if (!outsides.empty() && outsides.size() != places.size())
+    throw libmap::Error("not as many as there are places",
+                        {.field = "outsides",
+                         .value = std::to_string(outsides.size()),
+                         .bound = std::to_string(places.size())});
+  // Half the radius, a little more against rounding at the cells' borders.
+  const double cell_m = options.radius_m * (0.5 + 1e-6);
+  const PointGrid grid(cloud.positions, cell_m);
+  const PointGrid groups(places, cell_m);
+  const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
+  std::vector<SurfaceNormal> normals(places.size());
+  libmap::parallel_for(groups.cells().size(), 16, [&](std::size_t begin, std::size_t end) {
+    PlaneFitter fitter(grid, in_order, options.radius_m, options.up);
+    for (std::size_t c = begin; c < end; ++c) {
+      fitter.enter(groups.cells()[c]);
+      for (std::uint32_t n = groups.ranges()[c].first; n < groups.ranges()[c].last; ++n) {
+        const std::uint32_t at = groups.order()[n];
+        normals[at] = fitter.fit(
+            places[at], outsides.empty() ? Vector3d::Zero().eval() : outsides[at].cast<double>());
+      }
+    }
+  });
+  return normals;
+}
+
+}  // namespace libgtd

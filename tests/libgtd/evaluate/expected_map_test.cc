@@ -1,0 +1,255 @@
+#include "libgtd/evaluate/expected_map.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+#include <numbers>
+
+#include "libgtd/evaluate/map_summary.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using graspmap_test::error_of;
+using graspmap_test::uniform;
+using libgtd::evaluate_expected_map;
+using libgtd::ExpectedMap;
+using libgtd::ExpectedMapResult;
+using libgtd::ExpectedRegion;
+using ::testing::HasSubstr;
+
+const std::string header = "region,x,y,z,to_x,to_y,to_z,radius,graspable,why\n";
+
+ExpectedMap parse(const std::string& rows) {
+  return libgtd::parse_expected_map(libmap::parse_csv(header + rows, "e.csv"));
+}
+
+std::string parse_error(const std::string& rows) {
+  return error_of([&] { parse(rows); }).what();
+}
+
+// One point a voxel, `score` at each; all are graspable where `flags` are not given.
+libmap::PointCloud map_of(const std::vector<Eigen::Vector3d>& positions,
+                          const std::vector<double>& scores, const std::vector<double>& flags) {
+  libmap::PointCloud map;
+  map.positions = positions;
+  map.add_field("score", libmap::ScalarType::float32).values = scores;
+  if (!flags.empty()) map.add_field("graspable", libmap::ScalarType::uint8).values = flags;
+  return map;
+}
+
+TEST(ExpectedMap, CountsByHand) {
+  const ExpectedMap expected =
+      parse("yes,0,0,0,,,,0.1,1,\nno,1,0,0,1,1,0,0.1,0,\nopen,0.05,0,0,,,,0.02,,\n");
+  const ExpectedMapResult result = evaluate_expected_map(
+      map_of({{0, 0, 0},       // yes, reaches
+              {0, 0.09, 0},    // yes, does not
+              {0, 0, 0.1},     // yes, on the border, reaches
+              {0.05, 0, 0},    // undecided, though within yes
+              {1.05, 0.5, 0},  // no, beside the segment's middle, does not
+              {1, 1.09, 0},    // no, beyond its end, reaches
+              {1, 1.11, 0},    // nowhere
+              {1, 0, 0}},      // no, without a score
+             {0.9, 0.79, 0.8, 1.0, 0.1, 0.85, 1.0, std::nan("")}, {0, 0, 1, 1, 0, 1, 1, 1}),
+      expected, 0.8);
+  EXPECT_EQ(result.voxels_by_score.true_positives, 2U);
+  EXPECT_EQ(result.voxels_by_score.false_negatives, 1U);
+  EXPECT_EQ(result.voxels_by_score.true_negatives, 1U);
+  EXPECT_EQ(result.voxels_by_score.false_positives, 1U);
+  EXPECT_EQ(result.voxels_by_flag->true_positives, 1U);
+  EXPECT_EQ(result.voxels_by_flag->false_negatives, 2U);
+  EXPECT_EQ(result.voxels_by_flag->false_positives, 1U);
+  EXPECT_EQ(result.undecided_voxels, 1U);
+  EXPECT_EQ(result.unlisted_voxels, 2U);
+  EXPECT_DOUBLE_EQ(*libgtd::youden_index(result.voxels_by_score), 2.0 / 3.0 + 0.5 - 1.0);
+  // Pairs of a positive and a negative: 0.9, 0.79, 0.8 against 0.1, 0.85.
+  EXPECT_DOUBLE_EQ(result.area->trapezoid, 4.0 / 6.0);
+  ASSERT_EQ(result.regions.size(), 3U);
+  EXPECT_EQ(result.regions[0].voxels, 3U);
+  EXPECT_EQ(result.regions[0].reached, 2U);
+  EXPECT_EQ(result.regions[0].graspable, 1U);
+  EXPECT_DOUBLE_EQ(*result.regions[0].median_score, 0.8);
+  EXPECT_DOUBLE_EQ(*result.regions[1].mean_score, 0.475);
+  EXPECT_EQ(result.regions[2].voxels, 1U);
+  // "no" is predicted graspable: one of its two voxels reaches the cutoff.
+  EXPECT_EQ(result.places.true_positives, 1U);
+  EXPECT_EQ(result.places.false_positives, 1U);
+  EXPECT_EQ(result.places.size(), 2U);
+}
+
+// An independent look: the nearest of a thousand places along each segment.
+bool holds(const ExpectedRegion& region, const Eigen::Vector3d& point) {
+  constexpr int steps = 1000;
+  double nearest = 1e9;
+  for (int k = 0; k <= steps; ++k)
+    nearest =
+        std::min(nearest, (region.from + (region.to - region.from) * k / steps - point).norm());
+  return nearest <= region.radius_m;
+}
+
+TEST(ExpectedMap, AgreesWithASlowOracle) {
+  const ExpectedMap expected = parse(
+      "a,0,0,0,0.4,0.1,0.2,0.11,1,\nb,0.2,0.2,0.1,0.3,0.2,0.1,0.2,1,\n"
+      "c,-0.4,-0.4,0,-0.4,-0.1,0,0.15,0,\nd,0.1,0,0,,,,0.07,,\n");
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<double> scores, flags;
+  for (int n = 0; n < 3000; ++n) {
+    positions.emplace_back(uniform(-0.6, 0.6), uniform(-0.6, 0.6), uniform(-0.2, 0.4));
+    scores.push_back(uniform(0.0, 1.0));
+    flags.push_back(uniform(0.0, 1.0) < 0.5 ? 1.0 : 0.0);
+  }
+  libgtd::Confusion counts;
+  std::size_t undecided = 0;
+  for (std::size_t n = 0; n < positions.size(); ++n) {
+    const auto in = [&](std::size_t r) { return holds(expected.regions[r], positions[n]); };
+    if (in(3)) {
+      ++undecided;
+      continue;
+    }
+    const bool reached = scores[n] >= 0.6;
+    if (in(0) || in(1)) ++(reached ? counts.true_positives : counts.false_negatives);
+    if (in(2)) ++(reached ? counts.false_positives : counts.true_negatives);
+  }
+  const ExpectedMapResult result =
+      evaluate_expected_map(map_of(positions, scores, flags), expected, 0.6);
+  EXPECT_GT(counts.positives(), 100U);
+  EXPECT_GT(counts.negatives(), 30U);
+  // The oracle's steps are 0.4 mm: no point of these lies so near a border.
+  EXPECT_EQ(result.voxels_by_score.true_positives, counts.true_positives);
+  EXPECT_EQ(result.voxels_by_score.false_negatives, counts.false_negatives);
+  EXPECT_EQ(result.voxels_by_score.false_positives, counts.false_positives);
+  EXPECT_EQ(result.voxels_by_score.true_negatives, counts.true_negatives);
+  EXPECT_EQ(result.undecided_voxels, undecided);
+}
+
+TEST(ExpectedMap, DoesNotDependOnFrameOrOrder) {
+  const ExpectedMap expected = parse("a,0,0,0,0.4,0.1,0.2,0.11,1,\nc,-0.4,-0.4,0,,,,0.15,0,\n");
+  std::vector<Eigen::Vector3d> positions;
+  std::vector<double> scores;
+  for (int n = 0; n < 500; ++n) {
+    positions.emplace_back(uniform(-0.6, 0.6), uniform(-0.6, 0.6), uniform(-0.2, 0.4));
+    scores.push_back(uniform(0.0, 1.0));
+  }
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.rotate(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
+  pose.pretranslate(Eigen::Vector3d(5, -3, 1));
+  libmap::PointCloud moved = map_of(positions, scores, {});
+  for (Eigen::Vector3d& position : moved.positions) position = pose * position;
+  std::reverse(moved.positions.begin(), moved.positions.end());
+  std::vector<double>& values = moved.find_field("score")->values;
+  std::reverse(values.begin(), values.end());
+  const auto here = evaluate_expected_map(map_of(positions, scores, {}), expected, 0.5);
+  const auto there = evaluate_expected_map(moved, libgtd::transformed(expected, pose), 0.5);
+  EXPECT_GT(here.voxels_by_score.size(), 10U);
+  EXPECT_EQ(here.voxels_by_score.true_positives, there.voxels_by_score.true_positives);
+  EXPECT_EQ(here.voxels_by_score.false_positives, there.voxels_by_score.false_positives);
+  EXPECT_EQ(here.regions[0].mean_score, there.regions[0].mean_score);
+  EXPECT_FALSE(here.voxels_by_flag.has_value());
+}
+
+TEST(ExpectedMap, HostileTables) {
+  EXPECT_THAT(parse_error("a,0,0,0,,,,-0.1,1,\n"), HasSubstr("radius"));
+  EXPECT_THAT(parse_error("a,0,0,0,,,,0,1,\n"), HasSubstr("> 0"));
+  EXPECT_THAT(parse_error("a,0,nan,0,,,,0.1,1,\n"), HasSubstr("e.csv"));
+  EXPECT_THAT(parse_error("a,0,0,0,1,,,0.1,1,\n"), HasSubstr("to_x"));
+  EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,maybe,\n"), HasSubstr("'maybe'"));
+  EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,1,\na,1,0,0,,,,0.1,1,\n"), HasSubstr("twice"));
+  EXPECT_THAT(parse_error(",0,0,0,,,,0.1,1,\n"), HasSubstr("name"));
+  EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,,\n"), HasSubstr("no region with a verdict"));
+  EXPECT_THAT(parse_error(""), HasSubstr("no region with a verdict"));
+  const auto of_text = [](const std::string& text) {
+    return std::string(
+        error_of([&] { libgtd::parse_expected_map(libmap::parse_csv(text, "e.csv")); }).what());
+  };
+  EXPECT_THAT(of_text("region,x,y,z,to_x,to_y,to_z,radius,graspable,why,raduis\n"),
+              HasSubstr("radius"));
+  EXPECT_THAT(of_text("region,x,y,z,radius,graspable,why\na,0,0,0,1,1,\n"), HasSubstr("to_x"));
+}
+
+// Two verdicts on one place: balls, a ball on a segment, crossing and passing segments.
+TEST(ExpectedMap, ContradictionsAreErrors) {
+  EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,1,\nb,0.19,0,0,,,,0.1,0,\n"), HasSubstr("'a' and 'b'"));
+  EXPECT_THAT(parse_error("a,0,0,0,2,0,0,0.1,1,\nb,1,0.15,0,,,,0.1,0,\n"), HasSubstr("overlap"));
+  EXPECT_THAT(parse_error("a,-1,-1,0,1,1,0,0.1,1,\nb,-1,1,0.15,1,-1,0.15,0.1,0,\n"),
+              HasSubstr("overlap"));
+  EXPECT_NO_THROW(parse("a,0,0,0,,,,0.1,1,\nb,0.21,0,0,,,,0.1,0,\n"));
+  EXPECT_NO_THROW(parse("a,-1,-1,0,1,1,0,0.1,1,\nb,-1,1,0.25,1,-1,0.25,0.1,0,\n"));
+  EXPECT_NO_THROW(parse("a,0,0,0,,,,0.1,1,\nb,0.1,0,0,,,,0.1,1,\nc,0,0,0,,,,0.1,,\n"));
+}
+
+TEST(ExpectedMap, NoMap) {
+  const ExpectedMap expected = parse("a,0,0,0,,,,0.1,1,\n");
+  EXPECT_THAT(error_of([&] { evaluate_expected_map({}, expected, 0.8); }).what(),
+              HasSubstr("no points"));
+  libmap::PointCloud cloud;
+  cloud.positions.emplace_back(0, 0, 0);
+  EXPECT_THAT(error_of([&] { evaluate_expected_map(cloud, expected, 0.8); }).what(),
+              HasSubstr("score"));
+}
+
+// The regions of scenario 1 lie on its shapes, and say what its list of places says.
+TEST(ExpectedMap, OfPrimitiveShapes) {
+  const auto data = graspmap_test::source_folder() / "data";
+  const ExpectedMap expected =
+      libgtd::parse_expected_map(libmap::read_csv(data / "expected/primitive_shapes.csv"));
+  const libmap::Table places = libmap::read_csv(data / "field_test/primitive_shapes.csv");
+  for (std::size_t row = 0; row < places.rows.size(); ++row) {
+    const std::string& name = places.rows[row][0];
+    const Eigen::Vector3d place(places.number(row, 1), places.number(row, 2),
+                                places.number(row, 3));
+    if (name == "G") continue;
+    std::size_t found = 0;
+    for (const ExpectedRegion& region : expected.regions) {
+      if (!region.graspable || !region.contains(place)) continue;
+      ++found;
+      EXPECT_EQ(*region.graspable, places.rows[row][4] == "1") << name;
+    }
+    EXPECT_EQ(found, 1U) << name;
+  }
+}
+
+TEST(MapSummary, CountsByHand) {
+  libmap::PointCloud map;
+  const std::vector<double> scores = {0.1, 0.85, 0.95, 0.5, 0.9};
+  for (int n = 0; n < 5; ++n) map.positions.emplace_back(0.01 * n + 0.005, 0.005, 0.005);
+  map.positions[4].z() = -0.095;
+  map.add_field("score", libmap::ScalarType::float32).values = scores;
+  map.add_field("graspable", libmap::ScalarType::uint8).values = {0, 1, 0, 0, 1};
+  map.add_field("edge", libmap::ScalarType::uint8).values = {0, 0, 0, 1, 0};
+  map.add_field("ssv", libmap::ScalarType::uint32).values = {10, 200, 119, 120, 5};
+  map.add_field("i", libmap::ScalarType::int32).values = {0, 1, 2, 3, 4};
+  map.add_field("j", libmap::ScalarType::int32).values = {0, 0, 0, 0, 0};
+  map.add_field("k", libmap::ScalarType::int32).values = {0, 0, 0, 0, -10};
+  libgtd::MapFacts facts;
+  facts.zero_plane_m = 0.0;
+  const auto summary =
+      libgtd::summarize_map(map, libgtd::voxel_map_of(map, facts),
+                            {.graspability_threshold = 0.8, .solid_voxel_threshold = 120.0});
+  EXPECT_EQ(summary.voxels, 5U);
+  EXPECT_EQ(summary.judged, 3U);  // one at the edge, one below the zero plane
+  EXPECT_EQ(summary.reached, 2U);
+  EXPECT_EQ(summary.graspable, 1U);
+  EXPECT_EQ(*summary.few_solid, 2U);
+  ASSERT_EQ(summary.scores.size(), libgtd::summary_quantiles.size());
+  EXPECT_NEAR(summary.scores[0], 0.1, 1e-6);
+  EXPECT_NEAR(summary.scores[2], 0.85, 1e-6);
+  EXPECT_NEAR(summary.scores[4], 0.95, 1e-6);
+  EXPECT_EQ(summary.solid_voxels[2], 119.0);
+
+  std::vector<libgtd::SummarizedMap> maps(2);
+  maps[0].name = "a";
+  maps[0].summary = summary;
+  maps[1].name = "b";
+  const libmap::Table table = libgtd::summary_table(maps);
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_EQ(table.rows[0][table.column("reached_share")], "0.666667");
+  EXPECT_EQ(table.rows[1][table.column("reached_share")], "");
+  EXPECT_FALSE(table.find_column("voxel_youden"));
+  std::size_t counted = 0;
+  const libmap::Table bins = libgtd::histogram_table(maps);
+  for (std::size_t row = 0; row < bins.rows.size(); ++row)
+    counted += static_cast<std::size_t>(bins.number(row, bins.column("voxels")));
+  EXPECT_EQ(counted, 3U);
+}
+
+}  // namespace
