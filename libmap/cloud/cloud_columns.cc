@@ -241,6 +241,37 @@ void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set) {
   require_readable_back(set, fields);
 }
 
+void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
+                              ColumnSet& set) {
+  for (std::size_t channel = 0; channel < 3; ++channel)
+    set.columns.push_back({std::string(color_names[0][channel]), ScalarType::uint8,
+                           StoredType::uint8, first + (big_endian ? channel + 1 : 2 - channel),
+                           stride, false});
+}
+
+ColumnSet with_packed_color(const ColumnSet& columns) {
+  ColumnSet set;
+  set.rows = columns.rows;
+  const Column* const channels[] = {columns.find("red"), columns.find("green"),
+                                    columns.find("blue")};
+  const bool colored = channels[0] != nullptr && channels[1] != nullptr && channels[2] != nullptr;
+  for (const Column& column : columns.columns) {
+    if (!colored || (&column != channels[0] && &column != channels[1] && &column != channels[2])) {
+      set.columns.push_back(column);
+    } else if (&column == channels[0]) {
+      auto packed = std::make_shared<std::vector<std::uint32_t>>(set.rows, 0xFF000000U);
+      for (std::size_t c = 0; c < 3; ++c)
+        for_each_value(*channels[c], set.rows, [&](std::size_t row, double value) {
+          (*packed)[row] |= static_cast<std::uint32_t>(value) << (16 - 8 * c);
+        });
+      set.columns.push_back({"rgb", ScalarType::uint32, StoredType::uint32,
+                             reinterpret_cast<const std::byte*>(packed->data()), 4, false});
+      set.storage.push_back(packed);
+    }
+  }
+  return set;
+}
+
 ColumnSet columns_of_cloud(const PointCloud& cloud, NormalNames names) {
   cloud.check();
   ColumnSet set;

@@ -47,6 +47,12 @@ void add_field_columns(const std::vector<ScalarField>& fields, ColumnSet& set);
 // The columns as scalar fields, all rows. Throws Error: two of one name.
 std::vector<ScalarField> fields_of_columns(const ColumnSet& columns);
 
+// red, green, blue out of PCL's one number 0xAARRGGBB, whose bytes begin at `first`; and into one
+// column `rgb` of such numbers, where the three are there.
+void add_packed_color_columns(const std::byte* first, std::size_t stride, bool big_endian,
+                              ColumnSet& set);
+ColumnSet with_packed_color(const ColumnSet& columns);
+
 // Whether some coordinate is off by more than 1e-5 m as float32.
 bool need_float64(const std::vector<Eigen::Vector3d>& positions);
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/cloud/cloud_columns.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -235,12 +236,7 @@ void add_columns(const PcdField& field, const std::byte* first, std::size_t stri
                  ColumnSet& set) {
   if (field.is_padding()) return;
   if (field.is_packed_color() && set.find("red") == nullptr) {
-    // 0xAARRGGBB, little-endian.
-    set.columns.push_back({"red", ScalarType::uint8, StoredType::uint8, first + 2, stride, false});
-    set.columns.push_back(
-        {"green", ScalarType::uint8, StoredType::uint8, first + 1, stride, false});
-    set.columns.push_back({"blue", ScalarType::uint8, StoredType::uint8, first, stride, false});
-    return;
+    return add_packed_color_columns(first, stride, false, set);
   }
   for (std::size_t i = 0; i < field.count; ++i)
     set.columns.push_back({field.count == 1 ? field.name : field.name + "_" + std::to_string(i),
@@ -350,30 +346,6 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
   }
 }
 
-// The columns with red, green, blue packed into one.
-ColumnSet packed_for_pcd(const ColumnSet& columns) {
-  ColumnSet set;
-  set.rows = columns.rows;
-  const Column* const channels[] = {columns.find("red"), columns.find("green"),
-                                    columns.find("blue")};
-  const bool colored = channels[0] != nullptr && channels[1] != nullptr && channels[2] != nullptr;
-  for (const Column& column : columns.columns) {
-    if (!colored || (&column != channels[0] && &column != channels[1] && &column != channels[2])) {
-      set.columns.push_back(column);
-    } else if (&column == channels[0]) {
-      auto packed = std::make_shared<std::vector<std::uint32_t>>(set.rows, 0xFF000000U);
-      for (std::size_t c = 0; c < 3; ++c)
-        for_each_value(*channels[c], set.rows, [&](std::size_t row, double value) {
-          (*packed)[row] |= static_cast<std::uint32_t>(value) << (16 - 8 * c);
-        });
-      set.columns.push_back({"rgb", ScalarType::uint32, StoredType::uint32,
-                             reinterpret_cast<const std::byte*>(packed->data()), 4, false});
-      set.storage.push_back(packed);
-    }
-  }
-  return set;
-}
-
 void require_name(const Column& column, bool is_color) {
   const bool reserved = column.name == "_" || column.name == "rgb" || column.name == "rgba";
   if ((reserved && !is_color) || column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
@@ -475,7 +447,7 @@ GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const v
 void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding encoding,
                 std::ostream& out) {
   for (const Column& column : columns.columns) require_name(column, false);
-  const ColumnSet set = packed_for_pcd(columns);
+  const ColumnSet set = with_packed_color(columns);
   out << header_text(set, viewpoint, encoding);
   if (encoding == FileEncoding::binary_compressed) return write_compressed(set, out);
   constexpr std::size_t rows_at_once = 65536;

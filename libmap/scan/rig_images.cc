@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 
 #include "libmap/core/error.h"
@@ -70,6 +71,39 @@ std::vector<RigImage> images_of_table(const fs::path& folder, const CameraRig& r
   return images;
 }
 
+double sum_of_offsets(const RigMoment& moment) {
+  double sum = 0.0;
+  for (const RigMoment::Camera& camera : moment.cameras)
+    if (camera.state == State::seen) sum += std::abs(camera.offset_s);
+  return sum;
+}
+
+bool is_fuller(const RigMoment& moment, const RigMoment& best) {
+  if (best.cameras.empty() || moment.seen() != best.seen())
+    return best.cameras.empty() || moment.seen() > best.seen();
+  return sum_of_offsets(moment) < sum_of_offsets(best);
+}
+
+// Of each camera the image nearest to `stamp_s` among `candidates`, ascending in time; but the
+// first candidate comes before any other of its camera.
+RigMoment moment_of(const std::vector<RigImage>& images, const std::vector<std::size_t>& candidates,
+                    std::size_t camera_count, double stamp_s, double reach_s) {
+  RigMoment moment;
+  moment.stamp_s = stamp_s;
+  moment.cameras.resize(camera_count);
+  const std::size_t first_camera = images[candidates.front()].camera;
+  for (const std::size_t n : candidates) {
+    RigMoment::Camera& camera = moment.cameras.at(images[n].camera);
+    const double offset = images[n].stamp_s - stamp_s;
+    const bool seen = camera.state == State::seen;
+    if (std::abs(offset) > reach_s || (seen && images[n].camera == first_camera) ||
+        (seen && std::abs(offset) >= std::abs(camera.offset_s)))
+      continue;
+    camera = {State::seen, n, offset};
+  }
+  return moment;
+}
+
 }  // namespace
 
 std::string rig_image_name(const std::string& camera, double stamp_s) {
@@ -97,7 +131,7 @@ std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& r
   return images;
 }
 
-DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera) {
+Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera) {
   Image<std::uint16_t> units;
   try {
     units = decode_gray16(read_whole_file(image.file));
@@ -114,6 +148,11 @@ DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera) {
                  .field = "image size",
                  .value = size(units.width, units.height),
                  .bound = size(calibrated.width, calibrated.height)});
+  return units;
+}
+
+DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera) {
+  const Image<std::uint16_t> units = read_rig_units(image, camera);
   DepthImage depth(units.width, units.height);
   for (std::size_t n = 0; n < units.pixels.size(); ++n) {
     if (units.pixels[n] == saturated) continue;
@@ -148,28 +187,48 @@ RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_
 RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t camera_count,
                              double tolerance_s) {
   if (images.empty()) throw Error("there are no images to choose a moment from");
-  const auto sum_of_offsets = [](const RigMoment& moment) {
-    double sum = 0.0;
-    for (const RigMoment::Camera& camera : moment.cameras)
-      if (camera.state == State::seen) sum += std::abs(camera.offset_s);
-    return sum;
-  };
   std::vector<double> stamps;
   for (const RigImage& image : images) stamps.push_back(image.stamp_s);
   std::sort(stamps.begin(), stamps.end());
   stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
   RigMoment best;
-  double best_sum = 0.0;
   for (const double stamp : stamps) {
     RigMoment moment = rig_moment_at(images, camera_count, stamp, tolerance_s);
-    const double sum = sum_of_offsets(moment);
-    const bool better = best.cameras.empty() || moment.seen() > best.seen() ||
-                        (moment.seen() == best.seen() && sum < best_sum);
-    if (!better) continue;
-    best = std::move(moment);
-    best_sum = sum;
+    if (is_fuller(moment, best)) best = std::move(moment);
   }
   return best;
+}
+
+std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::size_t camera_count,
+                                   double tolerance_s) {
+  std::vector<std::size_t> waiting(images.size());  // by stamp
+  std::iota(waiting.begin(), waiting.end(), std::size_t{0});
+  std::stable_sort(waiting.begin(), waiting.end(), [&](std::size_t a, std::size_t b) {
+    return images[a].stamp_s < images[b].stamp_s;
+  });
+  std::vector<bool> taken(images.size(), false);
+  std::vector<RigMoment> moments;
+  for (std::size_t first = 0; first < waiting.size(); ++first) {
+    if (taken[waiting[first]]) continue;
+    const double start = images[waiting[first]].stamp_s;
+    const double reach = tolerance_s + stamp_rounding_s;
+    std::vector<std::size_t> near;
+    for (std::size_t n = first; n < waiting.size(); ++n) {
+      if (images[waiting[n]].stamp_s > start + 2 * reach) break;
+      if (!taken[waiting[n]]) near.push_back(waiting[n]);
+    }
+    RigMoment best;
+    for (const std::size_t middle : near) {
+      const double stamp = images[middle].stamp_s;
+      if (stamp > start + reach) break;
+      RigMoment moment = moment_of(images, near, camera_count, stamp, reach);
+      if (is_fuller(moment, best)) best = std::move(moment);
+    }
+    for (const RigMoment::Camera& camera : best.cameras)
+      if (camera.state == State::seen) taken[camera.image] = true;
+    moments.push_back(std::move(best));
+  }
+  return moments;
 }
 
 }  // namespace libmap

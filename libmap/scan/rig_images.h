@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <vector>
@@ -33,9 +34,12 @@ std::string rig_image_name(const std::string& camera, double stamp_s);
 // name is no stamp, a row of images.csv with an unknown camera.
 std::vector<RigImage> list_rig_images(const std::filesystem::path& folder, const CameraRig& rig);
 
+// The file as it is: units of the camera's depth scale. Throws Error naming the file: not a 16-bit
+// grey PNG, or of another size than the camera's calibration.
+Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera);
+
 // Its depth: units of the file times the camera's depth scale; 0 and 65535, where the sensor was
-// saturated, are 0. Throws Error naming the file: not a 16-bit grey PNG, or of another size than
-// the camera's calibration.
+// saturated, are 0. Throws as read_rig_units.
 DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 
 // What each camera saw at one moment.
@@ -62,5 +66,12 @@ RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_
 // of offsets, then the earliest. `images` may not be empty.
 RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t camera_count,
                              double tolerance_s);
+
+// All moments of a recording, ascending; each image is in one of them. The earliest image that is
+// in none yet begins one; its stamp is that of an image at most `tolerance_s` later at which most
+// cameras saw something (of several the one with the smallest sum of offsets, then the earliest),
+// counting images that are in no moment yet. A camera without an image in a moment is `missing`.
+std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::size_t camera_count,
+                                   double tolerance_s);
 
 }  // namespace libmap

@@ -1,0 +1,58 @@
+# ROS 1's bag library and the messages that graspmap knows, as Debian packages them. Their own CMake
+# and pkg-config files cannot be used: they ask for ament's Python package and for a pluginlib.pc
+# that Debian does not have.
+#
+# Ros1Bag::Ros1Bag; Ros1Bag_MISSING, the packages without which it cannot be built.
+set(Ros1Bag_MISSING "")
+set(Ros1Bag_INCLUDE_DIRS "")
+function(_ros1bag_header variable header package)
+  find_path(Ros1Bag_${variable}_INCLUDE_DIR ${header} ${ARGN})
+  mark_as_advanced(Ros1Bag_${variable}_INCLUDE_DIR)
+  if(Ros1Bag_${variable}_INCLUDE_DIR)
+    set(Ros1Bag_INCLUDE_DIRS ${Ros1Bag_INCLUDE_DIRS} ${Ros1Bag_${variable}_INCLUDE_DIR} PARENT_SCOPE)
+  else()
+    set(Ros1Bag_MISSING ${Ros1Bag_MISSING} ${package} PARENT_SCOPE)
+  endif()
+endfunction()
+function(_ros1bag_library variable name package)
+  find_library(Ros1Bag_${variable}_LIBRARY ${name})
+  mark_as_advanced(Ros1Bag_${variable}_LIBRARY)
+  if(Ros1Bag_${variable}_LIBRARY)
+    set(Ros1Bag_LIBRARIES ${Ros1Bag_LIBRARIES} ${Ros1Bag_${variable}_LIBRARY} PARENT_SCOPE)
+  else()
+    set(Ros1Bag_MISSING ${Ros1Bag_MISSING} ${package} PARENT_SCOPE)
+  endif()
+endfunction()
+
+_ros1bag_header(ROSBAG rosbag/bag.h librosbag-storage-dev)
+_ros1bag_header(PLUGINLIB pluginlib/class_loader.hpp pluginlib-dev PATH_SUFFIXES pluginlib)
+_ros1bag_header(CLASS_LOADER class_loader/class_loader.hpp libclass-loader-dev
+  PATH_SUFFIXES class_loader)
+_ros1bag_header(RCPPUTILS rcpputils/shared_library.hpp librcpputils-dev PATH_SUFFIXES rcpputils)
+_ros1bag_header(RCUTILS rcutils/shared_library.h librcutils-dev PATH_SUFFIXES rcutils)
+_ros1bag_header(AMENT_INDEX ament_index_cpp/get_package_prefix.hpp libament-index-cpp-dev
+  PATH_SUFFIXES ament_index_cpp)
+_ros1bag_header(SENSOR_MSGS sensor_msgs/PointCloud2.h libsensor-msgs-dev)
+_ros1bag_header(GEOMETRY_MSGS geometry_msgs/PoseArray.h libgeometry-msgs-dev)
+_ros1bag_header(VISUALIZATION_MSGS visualization_msgs/MarkerArray.h libvisualization-msgs-dev)
+_ros1bag_header(TF2_MSGS tf2_msgs/TFMessage.h libtf2-msgs-dev)
+_ros1bag_library(ROSBAG rosbag_storage librosbag-storage-dev)
+_ros1bag_library(SERIALIZATION roscpp_serialization libroscpp-core-dev)
+_ros1bag_library(TIME rostime libroscpp-core-dev)
+_ros1bag_library(CPP_COMMON cpp_common libroscpp-core-dev)
+_ros1bag_library(CONSOLE console_bridge libconsole-bridge-dev)
+list(REMOVE_DUPLICATES Ros1Bag_MISSING)
+list(REMOVE_DUPLICATES Ros1Bag_INCLUDE_DIRS)
+
+if(Ros1Bag_MISSING)
+  set(Ros1Bag_FOUND FALSE)
+else()
+  set(Ros1Bag_FOUND TRUE)
+  if(NOT TARGET Ros1Bag::Ros1Bag)
+    add_library(Ros1Bag::Ros1Bag INTERFACE IMPORTED)
+    # Directories of the compiler's own must not come before its other ones.
+    list(REMOVE_ITEM Ros1Bag_INCLUDE_DIRS /usr/include)
+    target_include_directories(Ros1Bag::Ros1Bag SYSTEM INTERFACE ${Ros1Bag_INCLUDE_DIRS})
+    target_link_libraries(Ros1Bag::Ros1Bag INTERFACE ${Ros1Bag_LIBRARIES})
+  endif()
+endif()

@@ -1,0 +1,364 @@
+#include "libmap/ros/bag_reader.h"
+
+#include <fcntl.h>
+#include <rosbag/bag.h>
+#include <rosbag/view.h>
+#include <sys/prctl.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+#include <fstream>
+#include <map>
+#include <memory>
+#include <optional>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
+#include "libmap/ros/ros_messages.h"
+
+namespace libmap {
+
+namespace {
+
+namespace fs = std::filesystem;
+using ros_message::printable;
+
+constexpr rlim_t max_data_bytes = rlim_t{3} << 30;
+
+// What comes through the pipe: one head, then `bytes` of text or message.
+struct Parcel {
+  enum class Kind : std::uint32_t { topic, message, error, end };
+  Kind kind = Kind::end;
+  std::uint32_t topic = 0;     // index
+  std::uint64_t bytes = 0;     // that follow
+  std::uint64_t size = 0;      // of the whole message; of a topic: how many messages
+  std::int64_t stamp_ns = 0;   // of a message; of a topic: of its first one
+  std::int64_t last_ns = 0;    // of a topic's last message
+  std::uint32_t latching = 0;  // of a topic
+};
+
+// The end of the pipe at which librosbag works.
+class Sender {
+ public:
+  explicit Sender(int pipe) : pipe_(pipe) {}
+
+  void send(Parcel parcel, std::string_view bytes) {
+    parcel.bytes = bytes.size();
+    write_all(reinterpret_cast<const char*>(&parcel), sizeof parcel);
+    write_all(bytes.data(), bytes.size());
+  }
+  void send_error(const std::string& text) { send({.kind = Parcel::Kind::error}, text); }
+
+ private:
+  void write_all(const char* bytes, std::size_t count) {
+    while (count > 0) {
+      const ssize_t written = write(pipe_, bytes, count);
+      if (written < 0 && errno == EINTR) continue;
+      if (written <= 0) _exit(0);  // Nobody listens any more.
+      bytes += written;
+      count -= static_cast<std::size_t>(written);
+    }
+  }
+
+  int pipe_;
+};
+
+using Work = std::function<void(const rosbag::Bag&, Sender&)>;
+
+// librosbag and its plugin loader write to the terminal; the Error says it all.
+void be_silent() {
+  const int null = open("/dev/null", O_WRONLY);
+  if (null < 0) return;
+  dup2(null, STDOUT_FILENO);
+  dup2(null, STDERR_FILENO);
+}
+
+void bound_memory() {
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+  const rlimit limit{max_data_bytes, max_data_bytes};
+  setrlimit(RLIMIT_DATA, &limit);
+  const rlimit no_core{0, 0};
+  setrlimit(RLIMIT_CORE, &no_core);
+#endif
+}
+
+[[noreturn]] void serve(const fs::path& path, int pipe, const Work& work) {
+  prctl(PR_SET_PDEATHSIG, SIGKILL);
+  for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE}) std::signal(signal, SIG_DFL);
+  be_silent();
+  bound_memory();
+  Sender sender(pipe);
+  try {
+    rosbag::Bag bag;
+    bag.open(path.string(), rosbag::bagmode::Read);
+    work(bag, sender);
+    sender.send({.kind = Parcel::Kind::end}, {});
+  } catch (const rosbag::BagUnindexedException&) {
+    sender.send_error("has no index: its recording was not ended (`rosbag reindex` makes one)");
+  } catch (const rosbag::BagException& error) {
+    sender.send_error("is broken or cut off: " + printable(std::string(error.what())));
+  } catch (const std::bad_alloc&) {
+    sender.send_error("is broken, or holds messages of more than 1 GiB");
+  } catch (const std::exception& error) {
+    // The loader of encryption plugins, for one.
+    sender.send_error("cannot be read: " + printable(std::string(error.what())));
+  }
+  _exit(0);
+}
+
+// The process in which librosbag reads, and this end of its pipe.
+class GuardedBag {
+ public:
+  GuardedBag(const fs::path& path, const Work& work) : path_(path) {
+    int ends[2];
+    if (pipe2(ends, O_CLOEXEC) != 0) fail("no pipe");
+    process_ = fork();
+    if (process_ == 0) {
+      close(ends[0]);
+      serve(path, ends[1], work);
+    }
+    close(ends[1]);
+    pipe_.reset(fdopen(ends[0], "rb"));
+    if (process_ < 0 || !pipe_) fail("no process");
+  }
+  ~GuardedBag() {
+    pipe_.reset();  // A process that still writes ends by it.
+    wait();
+  }
+  GuardedBag(const GuardedBag&) = delete;
+  GuardedBag& operator=(const GuardedBag&) = delete;
+
+  // The next topic or message and its bytes; nothing after the last.
+  std::optional<Parcel> receive(std::string& bytes) {
+    Parcel parcel;
+    if (std::fread(&parcel, sizeof parcel, 1, pipe_.get()) != 1) throw_fallen();
+    bytes.resize(parcel.bytes);
+    if (parcel.bytes > 0 && std::fread(bytes.data(), bytes.size(), 1, pipe_.get()) != 1)
+      throw_fallen();
+    if (parcel.kind == Parcel::Kind::error) throw Error(bytes, {.file = path_.string()});
+    if (parcel.kind == Parcel::Kind::end) return std::nullopt;
+    return parcel;
+  }
+
+ private:
+  struct CloseFile {
+    void operator()(std::FILE* file) const { std::fclose(file); }
+  };
+
+  [[noreturn]] void fail(const std::string& what) {
+    throw Error(what + " to read it in: " + std::strerror(errno), {.file = path_.string()},
+                ErrorKind::failed);
+  }
+  int wait() {
+    int status = 0;
+    if (process_ > 0)
+      while (waitpid(process_, &status, 0) < 0 && errno == EINTR) continue;
+    process_ = -1;
+    return status;
+  }
+  [[noreturn]] void throw_fallen() {
+    const int status = wait();
+    const std::string how =
+        WIFSIGNALED(status) ? " (signal " + std::to_string(WTERMSIG(status)) + ")" : "";
+    throw Error("is broken: ROS's bag library fell over it" + how, {.file = path_.string()});
+  }
+
+  fs::path path_;
+  pid_t process_ = -1;
+  std::unique_ptr<std::FILE, CloseFile> pipe_;
+};
+
+void require_bag(const fs::path& path) {
+  require_readable_file(path);
+  std::string head(16, '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  if (head.starts_with("#ROSBAG V2.0\n") || head.starts_with("#ROSBAG V1.")) return;
+  const bool ros2 = head.starts_with("SQLite format 3") || head.starts_with("\x89MCAP");
+  throw Error(ros2 ? "is a bag of ROS 2, of which only ROS 1's are read" : "is no ROS 1 bag",
+              {.file = path.string(),
+               .field = "first line",
+               .value = printable(head.substr(0, head.find('\n'))),
+               .bound = "#ROSBAG V2.0 or V1.x"});
+}
+
+// The topics of a view, in the order of recording, and the one of each connection, by its header.
+struct Topics {
+  std::vector<BagTopic> topics;
+  std::map<const ros::M_string*, std::uint32_t> of_header;
+
+  std::uint32_t of(const rosbag::MessageInstance& message) const {
+    const auto found = of_header.find(message.getConnectionHeader().get());
+    if (found == of_header.end())
+      throw rosbag::BagFormatException("a message of a connection that it does not list");
+    return found->second;
+  }
+};
+
+std::string header_field(const rosbag::ConnectionInfo& connection, const std::string& name) {
+  if (!connection.header) return {};
+  const auto found = connection.header->find(name);
+  return found == connection.header->end() ? std::string() : found->second;
+}
+
+Topics topics_of(rosbag::View& view) {
+  std::vector<const rosbag::ConnectionInfo*> connections = view.getConnections();
+  std::sort(connections.begin(), connections.end(),
+            [](const auto* a, const auto* b) { return a->id < b->id; });
+  Topics result;
+  for (const rosbag::ConnectionInfo* connection : connections) {
+    const auto found =
+        std::find_if(result.topics.begin(), result.topics.end(), [&](const BagTopic& topic) {
+          return topic.name == connection->topic && topic.type == connection->datatype &&
+                 topic.md5sum == connection->md5sum;
+        });
+    result.of_header[connection->header.get()] =
+        static_cast<std::uint32_t>(found - result.topics.begin());
+    const bool latching = header_field(*connection, "latching") == "1";
+    if (found == result.topics.end())
+      result.topics.push_back(
+          {connection->topic, connection->datatype, connection->md5sum, latching});
+    else
+      found->latching = found->latching || latching;
+  }
+  return result;
+}
+
+void send_topics(const Topics& topics, const std::vector<Parcel>& parcels, Sender& sender) {
+  for (std::size_t n = 0; n < topics.topics.size(); ++n) {
+    const BagTopic& topic = topics.topics[n];
+    sender.send(parcels[n], printable(topic.name) + '\n' + printable(topic.type) + '\n' +
+                                printable(topic.md5sum));
+  }
+}
+
+std::vector<Parcel> parcels_of(const Topics& topics) {
+  std::vector<Parcel> parcels(topics.topics.size());
+  for (std::size_t n = 0; n < parcels.size(); ++n) {
+    parcels[n].kind = Parcel::Kind::topic;
+    parcels[n].topic = static_cast<std::uint32_t>(n);
+    parcels[n].latching = topics.topics[n].latching ? 1 : 0;
+  }
+  return parcels;
+}
+
+void send_listing(const rosbag::Bag& bag, Sender& sender) {
+  rosbag::View view(bag);
+  const Topics topics = topics_of(view);
+  std::vector<Parcel> parcels = parcels_of(topics);
+  for (const rosbag::MessageInstance& message : view) {
+    Parcel& parcel = parcels[topics.of(message)];
+    const std::int64_t stamp = ros_message::nanoseconds_of(message.getTime());
+    if (parcel.size++ == 0) parcel.stamp_ns = parcel.last_ns = stamp;
+    parcel.stamp_ns = std::min(parcel.stamp_ns, stamp);
+    parcel.last_ns = std::max(parcel.last_ns, stamp);
+  }
+  send_topics(topics, parcels, sender);
+}
+
+void send_messages(const rosbag::Bag& bag, const std::vector<BagRequest>& requests,
+                   Sender& sender) {
+  std::vector<std::string> names;
+  for (const BagRequest& request : requests) names.push_back(request.topic);
+  rosbag::View view(bag, rosbag::TopicQuery(names));
+  const Topics topics = topics_of(view);
+  send_topics(topics, parcels_of(topics), sender);
+  std::vector<std::size_t> wanted;
+  for (const BagTopic& topic : topics.topics)
+    wanted.push_back(
+        requests[static_cast<std::size_t>(std::find(names.begin(), names.end(), topic.name) -
+                                          names.begin())]
+            .max_bytes);
+  std::string bytes;
+  for (const rosbag::MessageInstance& message : view) {
+    const std::uint32_t size = message.size();
+    bytes.resize(size);
+    ros::serialization::OStream stream(reinterpret_cast<std::uint8_t*>(bytes.data()), size);
+    message.write(stream);
+    const std::uint32_t topic = topics.of(message);
+    sender.send({.kind = Parcel::Kind::message,
+                 .topic = topic,
+                 .size = size,
+                 .stamp_ns = ros_message::nanoseconds_of(message.getTime())},
+                std::string_view(bytes).substr(0, wanted[topic]));
+  }
+}
+
+BagTopic topic_from(const Parcel& parcel, const std::string& text) {
+  const std::size_t first = text.find('\n');
+  const std::size_t second = text.find('\n', first + 1);
+  return {text.substr(0, first), text.substr(first + 1, second - first - 1),
+          text.substr(second + 1), parcel.latching != 0, parcel.size};
+}
+
+}  // namespace
+
+void require_ros() {}
+
+BagListing list_bag(const fs::path& path) {
+  require_bag(path);
+  GuardedBag bag(path, send_listing);
+  BagListing listing;
+  std::int64_t start = std::numeric_limits<std::int64_t>::max();
+  std::int64_t end = 0;
+  std::string bytes;
+  while (const std::optional<Parcel> parcel = bag.receive(bytes)) {
+    listing.topics.push_back(topic_from(*parcel, bytes));
+    listing.messages += parcel->size;
+    start = std::min(start, parcel->stamp_ns);
+    end = std::max(end, parcel->last_ns);
+  }
+  if (listing.messages > 0) {
+    listing.start_s = ros_message::seconds_of(start);
+    listing.end_s = ros_message::seconds_of(end);
+  }
+  return listing;
+}
+
+void read_bag(const fs::path& path, const std::vector<BagRequest>& requests,
+              const std::function<bool(const BagMessage&)>& take) {
+  require_bag(path);
+  if (requests.empty()) return;
+  GuardedBag bag(path, [&](const rosbag::Bag& opened, Sender& sender) {
+    send_messages(opened, requests, sender);
+  });
+  std::vector<BagTopic> topics;
+  std::string bytes;
+  while (const std::optional<Parcel> parcel = bag.receive(bytes)) {
+    if (parcel->kind == Parcel::Kind::topic)
+      topics.push_back(topic_from(*parcel, bytes));
+    else if (!take({topics.at(parcel->topic), parcel->stamp_ns, parcel->size, bytes}))
+      return;
+  }
+}
+
+const BagTopic& require_topic(const BagListing& listing, const std::string& name,
+                              const std::string& type, const std::string& md5sum) {
+  std::vector<std::string> names;
+  for (const BagTopic& topic : listing.topics) {
+    if (topic.name == name && topic.type == type && topic.md5sum == md5sum) return topic;
+    if (topic.name == name && topic.type == type)
+      throw Error(
+          "is another definition of " + type,
+          {.file = {}, .field = "md5sum of " + name, .value = topic.md5sum, .bound = md5sum});
+    if (topic.name == name)
+      throw Error("is of another type",
+                  {.file = {}, .field = "type of " + name, .value = topic.type, .bound = type});
+    names.push_back(topic.name);
+  }
+  std::string known;
+  for (const BagTopic& topic : listing.topics)
+    if (topic.type == type) known += (known.empty() ? "one of " : ", ") + topic.name;
+  throw Error("no such topic with messages" + did_you_mean(name, names),
+              {.file = {}, .field = "topic", .value = name, .bound = known});
+}
+
+}  // namespace libmap

@@ -1,0 +1,162 @@
+#include "libmap/ros/message_encoding.h"
+
+#include <cmath>
+#include <cstring>
+
+namespace libmap {
+
+namespace {
+
+using ros_message::Marker;
+
+geometry_msgs::Quaternion_<ros_message::Allocator> to_ros_rotation(
+    const Eigen::Matrix3d& rotation) {
+  Eigen::Quaterniond q(rotation);
+  q.normalize();
+  geometry_msgs::Quaternion_<ros_message::Allocator> result;
+  result.x = q.x();
+  result.y = q.y();
+  result.z = q.z();
+  result.w = q.w();
+  return result;
+}
+
+geometry_msgs::Point_<ros_message::Allocator> to_ros_point(const Eigen::Vector3d& point) {
+  geometry_msgs::Point_<ros_message::Allocator> result;
+  result.x = point.x();
+  result.y = point.y();
+  result.z = point.z();
+  return result;
+}
+
+std_msgs::ColorRGBA_<ros_message::Allocator> to_ros_color(const Color& color) {
+  std_msgs::ColorRGBA_<ros_message::Allocator> result;
+  result.r = static_cast<float>(color[0]) / 255.0F;
+  result.g = static_cast<float>(color[1]) / 255.0F;
+  result.b = static_cast<float>(color[2]) / 255.0F;
+  result.a = 1.0F;
+  return result;
+}
+
+// Columns x, y, z, of which x is the direction.
+Eigen::Matrix3d axes_along(const Eigen::Vector3d& direction) {
+  const Eigen::Vector3d x = direction.normalized();
+  const Eigen::Vector3d guide =
+      std::abs(x.y()) < 0.999 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitZ();
+  const Eigen::Vector3d y = (guide - guide.dot(x) * x).normalized();
+  Eigen::Matrix3d axes;
+  axes << x, y, x.cross(y);
+  return axes;
+}
+
+Marker marker_of(const char* name, std::int32_t id, std::int32_t type,
+                 const ros_message::Header& header) {
+  Marker marker;
+  marker.header = header;
+  marker.ns = ros_message::to_ros(name);
+  marker.id = id;
+  marker.type = type;
+  marker.action = Marker::ADD;
+  marker.pose.orientation.w = 1.0;
+  return marker;
+}
+
+void set_scale(Marker& marker, double x, double y, double z) {
+  marker.scale.x = x;
+  marker.scale.y = y;
+  marker.scale.z = z;
+}
+
+}  // namespace
+
+ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m) {
+  const bool millimetres = image_unit_m == 0.001;
+  ros_message::Image message;
+  message.width = static_cast<std::uint32_t>(image.width);
+  message.height = static_cast<std::uint32_t>(image.height);
+  message.encoding = ros_message::to_ros(millimetres ? "16UC1" : "32FC1");
+  const std::size_t bytes = millimetres ? 2 : 4;
+  message.step = static_cast<std::uint32_t>(bytes) * message.width;
+  message.data.resize(image.pixels.size() * bytes);
+  for (std::size_t n = 0; n < image.pixels.size(); ++n) {
+    const std::uint16_t units = image.pixels[n];
+    const float depth = units == 65535 ? 0.0F : static_cast<float>(units * image_unit_m);
+    if (millimetres)
+      std::memcpy(message.data.data() + 2 * n, &units, 2);
+    else
+      std::memcpy(message.data.data() + 4 * n, &depth, 4);
+  }
+  return message;
+}
+
+ros_message::CameraInfo encode_camera_info(const Camera& camera) {
+  ros_message::CameraInfo info;
+  info.width = static_cast<std::uint32_t>(camera.width);
+  info.height = static_cast<std::uint32_t>(camera.height);
+  const bool few = camera.distortion.size() <= 5;
+  info.distortion_model =
+      ros_message::to_ros(camera.distortion_model == DistortionModel::equidistant ? "equidistant"
+                          : few                                                   ? "plumb_bob"
+                                : "rational_polynomial");
+  info.D.assign(camera.distortion.begin(), camera.distortion.end());
+  if (info.D.size() < 5 && camera.distortion_model != DistortionModel::equidistant)
+    info.D.resize(5, 0.0);
+  info.K = {camera.fx, 0, camera.cx, 0, camera.fy, camera.cy, 0, 0, 1};
+  info.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
+  info.P = {camera.fx, 0, camera.cx, 0, 0, camera.fy, camera.cy, 0, 0, 0, 1, 0};
+  return info;
+}
+
+ros_message::TransformStamped encode_transform(const BagTransform& transform) {
+  ros_message::TransformStamped message;
+  message.header.frame_id = ros_message::to_ros(transform.parent);
+  message.child_frame_id = ros_message::to_ros(transform.child);
+  const Eigen::Vector3d translation = transform.parent_from_child.translation();
+  message.transform.translation.x = translation.x();
+  message.transform.translation.y = translation.y();
+  message.transform.translation.z = translation.z();
+  message.transform.rotation = to_ros_rotation(transform.parent_from_child.linear());
+  return message;
+}
+
+ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places) {
+  ros_message::PoseArray message;
+  for (const BagPlace& place : places) {
+    geometry_msgs::Pose_<ros_message::Allocator> pose;
+    pose.position = to_ros_point(place.place);
+    pose.orientation = to_ros_rotation(axes_along(place.direction));
+    message.poses.push_back(pose);
+  }
+  return message;
+}
+
+ros_message::MarkerArray encode_markers(const BagPlaces& places,
+                                        const ros_message::Header& header) {
+  ros_message::MarkerArray message;
+  const double length = places.arrow_m;
+  Marker balls = marker_of("place", 0, Marker::SPHERE_LIST, header);
+  set_scale(balls, length / 4, length / 4, length / 4);
+  balls.color.a = 1.0F;
+  std::int32_t id = 0;
+  for (const BagPlace& place : places.places) {
+    balls.points.push_back(to_ros_point(place.place));
+    balls.colors.push_back(to_ros_color(place.color));
+    Marker arrow = marker_of("approach", id, Marker::ARROW, header);
+    const Eigen::Vector3d start = place.place - length * place.direction.normalized();
+    arrow.points = {to_ros_point(start), to_ros_point(place.place)};
+    set_scale(arrow, length / 10, length / 5, length / 4);  // shaft, head, head's length
+    arrow.color = to_ros_color(place.color);
+    Marker text = marker_of("text", id, Marker::TEXT_VIEW_FACING, header);
+    text.pose.position = to_ros_point(start);
+    text.text = ros_message::to_ros(place.text);
+    text.scale.z = length / 4;  // height of a letter
+    text.color = to_ros_color({255, 255, 255});
+    message.markers.push_back(arrow);
+    message.markers.push_back(text);
+    ++id;
+  }
+  if (!places.places.empty()) message.markers.insert(message.markers.begin(), balls);
+  return message;
+}
+
+}  // namespace libmap

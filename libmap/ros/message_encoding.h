@@ -1,0 +1,35 @@
+// Plain data as ROS 1 messages, without their headers. Inside libmap/ros alone.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/ros/bag_content.h"
+#include "libmap/ros/ros_messages.h"
+
+namespace libmap {
+
+// As RViz and PCL take it: float32 x, y, z, then normal_x, normal_y, normal_z, rgb (PCL's packing,
+// as float32) and the cloud's fields in their own types; little-endian, no padding. Throws Error
+// for more than 4 GiB.
+ros_message::PointCloud2 encode_cloud(const PointCloud& cloud);
+
+// In metres (REP-118's 32FC1, 0: not measured) or in millimetres (16UC1), whichever keeps the
+// image's units exactly.
+ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m);
+
+ros_message::CameraInfo encode_camera_info(const Camera& camera);
+
+ros_message::TransformStamped encode_transform(const BagTransform& transform);
+
+// Poses whose x axis is the direction.
+ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places);
+
+// For each place an arrow that ends there, and its text; and one list of balls for all.
+ros_message::MarkerArray encode_markers(const BagPlaces& places, const ros_message::Header& header);
+
+}  // namespace libmap

@@ -1,0 +1,67 @@
+# A robot's bag (ROS 1) to maps: its depth images, and of each moment a panorama, a graspability map,
+# footholds, a picture, and a bag that RViz shows.
+#
+#   make -f pipelines/bag.mk BAG=robot.bag SCENARIO=artificial_rocks_realtime OUT=folder \
+#        [EVERY=10] [BAG_FLAGS="--near 0.28 --far 1.5"] [METHOD=corrected] [SCORE="..."] -j2
+#
+# EVERY takes every n-th moment of the bag. BAG_FLAGS are further flags of `graspmap bag`, such as
+# topics, a rig, a range; FOOTHOLDS of `graspmap footholds`. A second run does nothing; other variables make again
+# what depends on them. Names must not hold spaces.
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+SCENARIO ?= artificial_rocks_realtime
+EVERY ?= 1
+METHOD ?=
+BAG_FLAGS ?=
+SCORE ?=
+FOOTHOLDS ?=
+
+one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+$(foreach name,BAG OUT SCENARIO,$(call one_word,$(name)))
+ifeq ($(BAG),)
+  $(error BAG is not set: the robot's bag, e.g. BAG=robot.bag)
+endif
+ifeq ($(OUT),)
+  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+endif
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: all moments FORCE
+all: $(OUT)/images.json
+	@$(MAKE) --no-print-directory -f $(lastword $(MAKEFILE_LIST)) moments
+
+$(OUT):
+	@mkdir -p $@
+
+# Stamps of the variables that a result depends on: written anew only if they change.
+export read_with := $(BAG) $(EVERY) $(BAG_FLAGS)
+export scored_with := $(SCENARIO) $(METHOD) $(SCORE) $(FOOTHOLDS)
+$(OUT)/read_with $(OUT)/scored_with: FORCE | $(OUT)
+	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
+
+# The folder's manifest stands for the folder.
+$(OUT)/images.json: $(BAG) $(OUT)/read_with
+	@rm -rf $(OUT)/images
+	@$(GRASPMAP) bag $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
+
+# Known once the images are there.
+stamps := $(shell test -f $(OUT)/images/moments.csv && tail -n +2 $(OUT)/images/moments.csv | cut -d, -f1)
+moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/map.bag $(OUT)/$(stamp)/top.png)
+
+$(OUT)/%/panorama.pcd: $(OUT)/images.json
+	@mkdir -p $(@D)
+	@$(GRASPMAP) panorama $(OUT)/images --stamp $* -o $@
+
+$(OUT)/%/map.pcd: $(OUT)/%/panorama.pcd $(OUT)/scored_with
+	@$(GRASPMAP) score $< -o $@ --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
+
+$(OUT)/%/footholds.csv: $(OUT)/%/map.pcd
+	@$(GRASPMAP) footholds $< -o $@ $(FOOTHOLDS)
+
+$(OUT)/%/map.bag: $(OUT)/%/map.pcd $(OUT)/%/footholds.csv
+	@$(GRASPMAP) bag $< -o $@ --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
+
+$(OUT)/%/top.png: $(OUT)/%/map.pcd
+	@$(GRASPMAP) render $< -o $@ --view top --color score --title "$* s" --quiet

@@ -1,0 +1,244 @@
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/mesh/mesh_io.h"
+#include "tests/libmap/mesh/mesh_samples.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::ProgramResult;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_text;
+
+// Builds without ROS's packages have the command too.
+bool has_ros() {
+  const ProgramResult result = graspmap({"bag", "none.bag", "--list"});
+  if (result.exit_code != 1) return true;
+  EXPECT_NE(result.standard_error.find("built without ROS 1; missing: "), std::string::npos);
+  EXPECT_EQ(std::count(result.standard_error.begin(), result.standard_error.end(), '\n'), 1);
+  return false;
+}
+
+#define REQUIRE_ROS() \
+  if (!has_ros()) GTEST_SKIP() << "built without ROS 1"
+
+// python3-rosbag, which shares no code with librosbag; empty where it is not installed.
+std::string python() {
+  const std::string debians = "/usr/bin/python3";
+  if (!fs::exists(debians)) return {};
+  return graspmap_test::run_program({debians, "-c", "import rosbag"}).exit_code == 0 ? debians : "";
+}
+
+ProgramResult check(const std::vector<std::string>& words) {
+  std::vector<std::string> line = {
+      python(), (graspmap_test::source_folder() / "tests/tools/rosbag_check.py").string()};
+  line.insert(line.end(), words.begin(), words.end());
+  return graspmap_test::run_program(line, {.folder = scratch("")});
+}
+
+const char* const camera_names[] = {"front", "front_left", "rear_left",
+                                    "rear",  "rear_right", "front_right"};
+
+// What six small cameras around a robot see of a ball on the ground, as a folder `run`.
+void write_run(const std::string& stamp = "5", const std::string& scale = "0") {
+  std::string rig = "near_m: 0.28\nfar_m: 1.5\ncameras:\n";
+  for (int n = 0; n < 6; ++n)
+    rig += "  - name: " + std::string(camera_names[n]) +
+           "\n    image_width: 96\n    image_height: 54\n"
+           "    camera_matrix: [50.6, 0, 47.5, 0, 48.7, 26.5, 0, 0, 1]\n"
+           "    position_m: [" +
+           std::to_string(0.2 * std::cos(n * M_PI / 3)) + ", " +
+           std::to_string(0.2 * std::sin(n * M_PI / 3)) + ", 0]\n    roll_pitch_yaw_deg: [0, 10, " +
+           std::to_string(60 * n) + "]\n";
+  write_text(scratch("rig.yaml"), rig);
+  libmap::write_mesh(scratch("ground.ply"),
+                     libmap::join_meshes(graspmap_test::square_mesh(0.1, 3.0),
+                                         graspmap_test::ball_mesh(20, 40, {0.8, 0, 0.2}, 0.3)));
+  ASSERT_TRUE(
+      succeeded(graspmap({"simulate", "cameras", "ground.ply", "--rig", "rig.yaml", "-o", "run",
+                          "--stamp", stamp, "--z", "0.4", "--roll", "3", "--depth-scale", scale})));
+}
+
+void expect_same_panorama(const std::string& folder) {
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "direct.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"panorama", folder, "-o", "back.pcd", "--strict"})));
+  EXPECT_GT(libmap::read_cloud(scratch("direct.pcd")).cloud.size(), 5000U);
+  EXPECT_TRUE(content("direct.pcd") == content("back.pcd"));
+}
+
+TEST(BagCommand, ImagesIntoABagAndBackGiveTheSamePanorama) {
+  REQUIRE_ROS();
+  write_run();
+  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag", "--compression", "lz4"})));
+  ASSERT_TRUE(succeeded(
+      graspmap({"bag", "run.bag", "-o", "back", "--near", "0.28", "--far", "1.5", "--strict"})));
+  expect_same_panorama("back");
+  const nlohmann::json manifest = json_of("back.json");
+  EXPECT_EQ(manifest["results"]["moments"], 1);
+  EXPECT_EQ(manifest["results"]["cameras_of_fullest_moment"], 6);
+  EXPECT_EQ(manifest["results"]["rear.topic"], "/rear/depth/image_raw");
+  EXPECT_EQ(manifest["frame"], "robot");
+  // The way on: a map.
+  ASSERT_TRUE(succeeded(graspmap({"score", "back.pcd", "-o", "map.pcd", "--up", "0,0,1"})));
+  EXPECT_GT(libmap::read_cloud(scratch("map.pcd")).cloud.size(), 1000U);
+}
+
+TEST(BagCommand, FineDepthsComeBackWithARigOfOnesOwn) {
+  REQUIRE_ROS();
+  write_run("1600000000.25", "0.0001");
+  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag"})));
+  ASSERT_TRUE(succeeded(
+      graspmap({"bag", "run.bag", "-o", "back", "--rig", "rig.yaml", "--depth-scale", "0.0001"})));
+  expect_same_panorama("back");
+}
+
+TEST(BagCommand, PythonsBagsAreReadAlike) {
+  REQUIRE_ROS();
+  if (python().empty()) GTEST_SKIP() << "python3-rosbag is not installed";
+  write_run();
+  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag"})));
+  ASSERT_TRUE(succeeded(check({"copy", "run.bag", "copy.bag"})));
+  ASSERT_FALSE(content("run.bag") == content("copy.bag"));
+  // The copy's topics are in the order of their stamps.
+  std::vector<std::string> words = {"bag",    "copy.bag", "-o",    "back",
+                                    "--near", "0.28",     "--far", "1.5"};
+  for (const char* name : camera_names)
+    words.insert(words.end(), {"--topic", "/" + std::string(name) + "/depth/image_raw"});
+  ASSERT_TRUE(succeeded(graspmap(words)));
+  expect_same_panorama("back");
+}
+
+// A small map with curvature, its terrain and its footholds.
+void write_map_parts() {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(succeeded(
+      graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--solid-voxel-threshold", "1"})));
+  ASSERT_TRUE(succeeded(
+      graspmap({"footholds", "map.pcd", "-o", "f.csv", "--no-graspable-only", "--edges"})));
+}
+
+std::vector<std::string> map_bag(const std::string& output) {
+  return {"bag",         "map.pcd",     "-o",    output,    "--terrain",
+          "terrain.pcd", "--footholds", "f.csv", "--stamp", "1600000000.5"};
+}
+
+TEST(BagCommand, AMapsBagAsPythonReadsIt) {
+  REQUIRE_ROS();
+  if (python().empty()) GTEST_SKIP() << "python3-rosbag is not installed";
+  write_map_parts();
+  ASSERT_TRUE(succeeded(graspmap(map_bag("map.bag"))));
+  const ProgramResult shown = check({"show", "map.bag"});
+  ASSERT_EQ(shown.exit_code, 0) << shown.standard_error;
+  const nlohmann::json topics = nlohmann::json::parse(shown.standard_output);
+  ASSERT_EQ(topics.size(), 6U);
+  for (const auto& [name, topic] : topics.items()) {
+    EXPECT_EQ(topic["latching"], 1) << name;
+    EXPECT_EQ(topic["stamp"], 1600000000.5) << name;
+  }
+  // Of ROS Noetic's message definitions.
+  EXPECT_EQ(topics["/graspability_map"]["md5sum"], "1158d486dd51d683ce2f1be655c3c181");
+  EXPECT_EQ(topics["/footholds"]["md5sum"], "d155b9ce5188fbaf89745847fd5882d7");
+  EXPECT_EQ(topics["/foothold_poses"]["md5sum"], "916c28c5764443f268b296bb671b9d97");
+  EXPECT_EQ(topics["/tf_static"]["md5sum"], "94810edda583a504dfda3829e70d7eec");
+  const libmap::PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
+  const nlohmann::json& written = topics["/graspability_map"];
+  EXPECT_EQ(written["frame"], "terrain");
+  EXPECT_EQ(written["points"], map.size());
+  EXPECT_EQ(written["fields"][3], nlohmann::json({"rgb", 12, 7, 1}));
+  EXPECT_FLOAT_EQ(written["first"]["x"], static_cast<float>(map.positions[0].x()));
+  EXPECT_FLOAT_EQ(written["first"]["score"],
+                  static_cast<float>(map.find_field("score")->values[0]));
+  EXPECT_TRUE(topics["/curvature_map"]["first"].contains("k2"));
+  EXPECT_EQ(topics["/merged_pcd"]["frame"], "map");
+  const libmap::PointCloud footholds = libmap::read_cloud(scratch("f.csv")).cloud;
+  ASSERT_GT(footholds.size(), 3U);
+  const nlohmann::json& poses = topics["/foothold_poses"]["poses"];
+  ASSERT_EQ(poses.size(), footholds.size());
+  EXPECT_NEAR(poses[2][0].get<double>(), footholds.positions[2].x(), 1e-12);
+  const Eigen::Quaterniond turn(poses[2][6], poses[2][3], poses[2][4], poses[2][5]);
+  // The approach is straight down onto the terrain's plane.
+  EXPECT_TRUE((turn * Eigen::Vector3d::UnitX()).isApprox(-Eigen::Vector3d::UnitZ(), 1e-12));
+  EXPECT_EQ(topics["/footholds"]["markers"].size(), 2 * footholds.size() + 1);
+}
+
+TEST(BagCommand, SameBytesOnEveryRunAndMapsComeBack) {
+  REQUIRE_ROS();
+  write_map_parts();
+  ASSERT_TRUE(succeeded(graspmap(map_bag("a.bag"))));
+  std::vector<std::string> again = map_bag("b.bag");
+  again.insert(again.end(), {"--threads", "1"});
+  ASSERT_TRUE(succeeded(graspmap(again)));
+  EXPECT_TRUE(content("a.bag") == content("b.bag"));
+  ASSERT_TRUE(succeeded(graspmap({"bag", "a.bag", "-o", "m.pcd", "--topic", "/graspability_map"})));
+  EXPECT_TRUE(content("m.pcd") == content("map.pcd"));
+  EXPECT_EQ(json_of("m.pcd.json")["results"]["stamp_s"], 1600000000.5);
+  const ProgramResult list = graspmap({"bag", "a.bag", "--list", "--json"});
+  ASSERT_TRUE(succeeded(list));
+  const nlohmann::json listing = nlohmann::json::parse(list.standard_output);
+  EXPECT_EQ(listing["messages"], 6);
+  EXPECT_EQ(listing["topics"][1]["name"], "/merged_pcd");
+  EXPECT_EQ(listing["topics"][1]["type"], "sensor_msgs/PointCloud2");
+}
+
+// A map in the terrain's frame and the panorama in the robot's: RViz needs to know how they lie.
+TEST(BagCommand, FramesAreTiedTogether) {
+  REQUIRE_ROS();
+  write_run();
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "p.pcd", "--stride", "1"})));
+  for (const char* frame : {"terrain", "input"}) {
+    ASSERT_TRUE(succeeded(
+        graspmap({"score", "p.pcd", "-o", "map.pcd", "--up", "0,0,1", "--frame", frame})));
+    ASSERT_TRUE(succeeded(graspmap({"bag", "map.pcd", "-o", "map.bag", "--terrain", "p.pcd"})));
+    const auto listing = graspmap({"bag", "map.bag", "--list"}).standard_output;
+    EXPECT_EQ(listing.find("/tf_static") != std::string::npos, std::string(frame) == "terrain");
+    // The panorama's own stamp.
+    EXPECT_EQ(json_of("map.bag.json")["results"]["stamp_s"],
+              json_of("p.pcd.json")["results"]["stamp_s"]);
+    EXPECT_EQ(json_of("map.bag.json")["frame"],
+              std::string(frame) == "terrain" ? "terrain" : "base_link");
+  }
+}
+
+TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
+  REQUIRE_ROS();
+  graspmap_test::write_terrain();
+  write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
+  write_text(scratch("f.csv"), "x,y,z,score,approach_x,approach_y,approach_z\n0,0,0,0.9,0,0,0\n");
+  ASSERT_TRUE(succeeded(graspmap({"bag", "map.csv", "-o", "good.bag"})));
+  const std::vector<std::string> before = graspmap_test::names_in_scratch();
+  const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
+    words.insert(words.begin(), "bag");
+    EXPECT_TRUE(bad_input(graspmap(words), parts));
+  };
+  says({"none.bag", "--list"}, {"none.bag: no such file"});
+  says({"good.bag"}, {"--output", "is missing"});
+  says({"good.bag", "-o", "out"}, {"good.bag: topics of images is none"});
+  says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "--topic"});
+  says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
+       {"did you mean '/graspability_map'"});
+  says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
+  says({"good.bag", "-o", "out.bag"}, {"something else than a bag"});
+  says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});
+  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd", "no ROS 1 bag"});
+  says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
+  says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
+  says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
+  says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"ROS has no such time"});
+  says({"map.csv", "-o", "out.bag", "--compression", "zip"}, {"zip", "lz4"});
+  write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
+  says({"cut.bag", "--list"}, {"cut.bag: is broken or cut off"});
+  fs::remove(scratch("cut.bag"));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), before);
+}
+
+}  // namespace

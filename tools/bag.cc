@@ -1,0 +1,103 @@
+// graspmap bag: ROS 1 bags in and out, offline.
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/ros/bag_reader.h"
+#include "libmap/scan/rig_io.h"
+#include "tools/bag_commands.h"
+#include "tools/command_line.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::BagCommandOptions;
+using graspmap_tools::Run;
+
+void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
+  table.add("stamp_s", options.stamp,
+            "out of a bag: the moment, or the cloud, nearest to it alone (auto: all moments; the "
+            "cloud of most points); into a bag: of all messages (auto: the inputs' own)");
+  table.add("strict", options.strict, "end with an error if an image cannot be used");
+  bind(table, options.depth);
+  table.add("frame", options.frame,
+            "frame_id of the map's points in the bag; auto: as their manifest says");
+  table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
+            "added to the stamps of a rig's images, s");
+  table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
+  table.add("compression", options.compression, libmap::bag_compression_names(),
+            "of the bag written");
+}
+
+bool is_bag(const std::string& path) { return libmap::format_of(path) == ".bag"; }
+
+void require_output(const BagCommandOptions& options) {
+  if (options.output.empty())
+    throw libmap::Error("is missing (or --list)", {.file = {}, .field = "--output"});
+}
+
+void run_bag(const BagCommandOptions& options, Run& run) {
+  libmap::require_ros();
+  if (options.list) return graspmap_tools::list_bag_topics(options);
+  require_output(options);
+  if (is_bag(options.output)) {
+    if (is_bag(options.input))
+      throw libmap::Error("one of the two must be something else than a bag",
+                          {.file = options.input});
+    return fs::is_directory(options.input) ? graspmap_tools::write_rig_folder_bag(options, run)
+                                           : graspmap_tools::write_map_bag(options, run);
+  }
+  if (fs::path(options.output).has_extension()) {
+    libmap::require_cloud_format(options.output);
+    return graspmap_tools::read_bag_into_cloud(options, run);
+  }
+  graspmap_tools::read_bag_into_folder(options, run);
+}
+
+}  // namespace
+
+std::optional<double> graspmap_tools::bag_stamp(const BagCommandOptions& options) {
+  if (options.stamp == "auto") return std::nullopt;
+  const std::optional<double> stamp = libmap::parse_double(options.stamp);
+  if (!stamp || !std::isfinite(*stamp))
+    throw libmap::Error("no such moment", {.file = {},
+                                           .field = "--stamp",
+                                           .value = options.stamp,
+                                           .bound = "a number of seconds, or auto"});
+  return stamp;
+}
+
+libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& run) {
+  const fs::path file = fs::exists(name) ? fs::path(name) : find_data_file("rigs", name);
+  run.add_input(file);
+  return libmap::read_rig(file);
+}
+
+int main(int argc, char** argv) {
+  BagCommandOptions options;
+  graspmap_tools::Command command("bag", "ROS 1 bags in and out, offline.");
+  command.input("IN", options.input,
+                "out of a bag: IN.bag; into one: a map (.pcd, .ply, .vtp, .csv), or a rig's folder "
+                "as `panorama` reads it");
+  command.output(options.output,
+                 "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
+                 "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag",
+                 false);
+  command.flag("--list", options.list, "print what the bag holds and do nothing else");
+  command.flag("--json", options.json, "print it as JSON");
+  command.option("--topic", "[NAME=]TOPIC", options.topics,
+                 "topics of depth images, or of the cloud (repeatable); else all that are found");
+  command.option("--rig", "FILE|NAME", options.rig,
+                 "the rig, instead of the bag's camera infos and transforms, or of DIR/rig.yaml");
+  command.option("--terrain", "CLOUD", options.terrain, "cloud for /merged_pcd");
+  command.option("--curvature", "CLOUD", options.curvature,
+                 "cloud for /curvature_map, instead of the map with its own curvatures");
+  command.option("--footholds", "FOOTHOLDS", options.footholds,
+                 "footholds of the map for /footholds and /foothold_poses");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { run_bag(options, run); });
+}

@@ -1,0 +1,140 @@
+// graspmap bag IN.bag: what a bag holds, its depth images as a rig's folder, one of its clouds.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iostream>
+#include <nlohmann/json.hpp>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/ros/bag_cloud.h"
+#include "libmap/ros/bag_reader.h"
+#include "tools/bag_commands.h"
+
+namespace graspmap_tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void print_json(const libmap::BagListing& listing) {
+  nlohmann::ordered_json json;
+  json["messages"] = listing.messages;
+  json["start_s"] = listing.start_s;
+  json["end_s"] = listing.end_s;
+  json["topics"] = nlohmann::ordered_json::array();
+  for (const libmap::BagTopic& topic : listing.topics)
+    json["topics"].push_back({{"name", topic.name},
+                              {"type", topic.type},
+                              {"md5sum", topic.md5sum},
+                              {"messages", topic.messages},
+                              {"latching", topic.latching}});
+  std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+}
+
+void print_text(const libmap::BagListing& listing) {
+  std::size_t name = 5;
+  std::size_t type = 4;
+  for (const libmap::BagTopic& topic : listing.topics) {
+    name = std::max(name, topic.name.size());
+    type = std::max(type, topic.type.size());
+  }
+  std::cout << fmt::format("{:<{}}  {:<{}}  {:>8}\n", "topic", name, "type", type, "messages");
+  for (const libmap::BagTopic& topic : listing.topics)
+    std::cout << fmt::format("{:<{}}  {:<{}}  {:>8}{}\n", topic.name, name, topic.type, type,
+                             topic.messages, topic.latching ? "  latched" : "");
+  std::cout << fmt::format("{} messages from {} to {} s ({:.3f} s)\n", listing.messages,
+                           libmap::to_fixed_text(listing.start_s, 6),
+                           libmap::to_fixed_text(listing.end_s, 6),
+                           listing.end_s - listing.start_s);
+}
+
+void add_count(Run& run, const std::string& name, std::size_t value) {
+  run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
+}
+
+void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
+            const BagCommandOptions& options, Run& run) {
+  for (const std::string& warning : result.warnings) {
+    if (options.strict) throw libmap::Error(warning, {.file = options.input});
+    run.warn(options.input + ": " + warning);
+  }
+  if (result.pixels_beyond > 0)
+    run.warn(
+        fmt::format("{}: {} pixels are deeper than 16 bits hold and are left out "
+                    "(--depth-scale)",
+                    options.input, result.pixels_beyond));
+  std::size_t fullest = 0;
+  for (const libmap::RigMoment& moment : plan.moments) fullest = std::max(fullest, moment.seen());
+  add_count(run, "cameras", plan.rig.cameras.size());
+  add_count(run, "images", result.images);
+  add_count(run, "images_broken", result.broken);
+  add_count(run, "moments", plan.moments.size());
+  add_count(run, "moments_in_bag", plan.all_moments);
+  add_count(run, "cameras_of_fullest_moment", fullest);
+  add_count(run, "pixels_beyond", result.pixels_beyond);
+  for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
+    const libmap::RigCamera& camera = plan.rig.cameras[n];
+    run.manifest().results.emplace_back(camera.name + ".topic", plan.topics[n]);
+    run.manifest().transforms.emplace_back("robot_from_" + camera.name,
+                                           camera.camera.base_from_camera);
+    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic of its images");
+  }
+  run.say(fmt::format("{} images of {} cameras, {} of {} moments, {} cameras at the fullest",
+                      result.images, plan.rig.cameras.size(), plan.moments.size(), plan.all_moments,
+                      fullest));
+}
+
+}  // namespace
+
+void list_bag_topics(const BagCommandOptions& options) {
+  const libmap::BagListing listing = libmap::list_bag(options.input);
+  if (options.json)
+    print_json(listing);
+  else
+    print_text(listing);
+}
+
+void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
+  libmap::BagRigOptions depth = options.depth;
+  depth.topics = options.topics;
+  if (!options.rig.empty()) depth.rig = read_named_rig(options.rig, run);
+  const libmap::BagRigPlan plan = run.timed(
+      "survey", [&] { return libmap::plan_bag_rig(options.input, depth, bag_stamp(options)); });
+  const std::vector<std::string> names = libmap::names_in_rig_folder(plan);
+  run.claim_output_tree(options.output, names, {options.input});
+  for (const std::string& warning : plan.warnings) run.warn(options.input + ": " + warning);
+  run.add_input(options.input);
+  run.manifest().frame = "robot";
+  run.write_output_tree(options.output, names, [&](const fs::path& temporary) {
+    report(plan, libmap::export_bag_rig(options.input, plan, temporary), options, run);
+  });
+}
+
+void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
+  if (options.topics.size() > 1)
+    throw libmap::Error("a cloud comes from one topic", {.file = {}, .field = "--topic"});
+  run.claim_output(options.output, {options.input});
+  const libmap::BagCloudResult result = run.timed("read", [&] {
+    return libmap::read_bag_cloud(options.input,
+                                  options.topics.empty() ? std::string() : options.topics.front(),
+                                  bag_stamp(options));
+  });
+  run.add_input(options.input);
+  run.manifest().frame = result.frame;
+  run.manifest().results.emplace_back("topic", result.topic);
+  run.manifest().results.emplace_back("stamp_s", result.stamp_s);
+  add_count(run, "messages", result.messages);
+  add_count(run, "points", result.cloud.size());
+  add_count(run, "dropped_points", result.dropped_points);
+  if (result.cloud.empty()) run.warn(options.input + ": " + result.topic + ": no finite points");
+  run.say(fmt::format("{} points of {} at {} s, one of {} messages; {} not finite",
+                      result.cloud.size(), result.topic, libmap::to_fixed_text(result.stamp_s, 6),
+                      result.messages, result.dropped_points));
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::write_cloud(temporary, result.cloud);
+  });
+}
+
+}  // namespace graspmap_tools

@@ -1,0 +1,210 @@
+// graspmap bag ... -o OUT.bag: a map and what belongs to it, or a rig's images, as a bag.
+#include <fmt/format.h>
+
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "libgtd/shape/convexity.h"
+#include "libgtd/shape/curvature.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/score_color.h"
+#include "libmap/core/text.h"
+#include "libmap/view/color_map.h"
+#include "tools/bag_commands.h"
+#include "tools/map_frame.h"
+
+namespace graspmap_tools {
+
+namespace {
+
+namespace fs = std::filesystem;
+using libmap::Manifest;
+using libmap::PointCloud;
+
+// A cloud's file and what its manifest says.
+struct CloudFile {
+  std::string path;
+  PointCloud cloud;
+  std::optional<Manifest> manifest;
+
+  std::string frame() const { return manifest ? manifest->frame : std::string(); }
+};
+
+CloudFile read(const std::string& path, Run& run) {
+  CloudFile file{path, libmap::read_cloud(path).cloud, libmap::read_manifest_of(path)};
+  run.add_input(path);
+  return file;
+}
+
+// ROS's name (REP-105) of a frame; `input` for those of the cloud that was scored.
+std::string frame_id(const std::string& frame, const std::string& input) {
+  if (frame == "robot") return "base_link";
+  if (frame == "input") return input;
+  return frame.empty() ? "map" : frame;
+}
+
+double radius_of(const std::optional<Manifest>& manifest) {
+  const libgtd::CurvatureOptions defaults;
+  if (!manifest) return defaults.radius_m;
+  const libmap::ManifestValue* value = manifest->find_parameter("curvature_radius_m");
+  const double* radius = value ? std::get_if<double>(value) : nullptr;
+  return radius && *radius > 0 ? *radius : defaults.radius_m;
+}
+
+// The map with the curvatures at its voxels, coloured by convexity as `render --color flags`.
+PointCloud curvature_map(const CloudFile& map) {
+  const libgtd::CurvatureOptions options{.radius_m = radius_of(map.manifest),
+                                         .up = up_of_map(map.manifest)};
+  const libgtd::CurvatureResult curvature = libgtd::estimate_curvature(map.cloud, options);
+  PointCloud cloud = map.cloud;
+  std::vector<double> k1;
+  std::vector<double> k2;
+  for (const libgtd::Curvature& point : curvature.points) {
+    k1.push_back(static_cast<double>(point.k1));
+    k2.push_back(static_cast<double>(point.k2));
+  }
+  cloud.add_field("k1", libmap::ScalarType::float32).values = k1;
+  cloud.add_field("k2", libmap::ScalarType::float32).values = k2;
+  if (!cloud.find_field("convex")) {
+    const std::vector<std::uint8_t> convex = libgtd::find_convex(curvature, cloud.positions);
+    cloud.add_field("convex", libmap::ScalarType::uint8)
+        .values.assign(convex.begin(), convex.end());
+  }
+  const std::vector<double>& convex = cloud.find_field("convex")->values;
+  cloud.colors.clear();
+  for (const double one : convex)
+    cloud.colors.push_back(one > 0 ? libmap::convex_color : libmap::rest_color);
+  return cloud;
+}
+
+libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
+  const auto field = [&](const char* name) -> const std::vector<double>& {
+    const libmap::ScalarField* found = footholds.cloud.find_field(name);
+    if (found) return found->values;
+    throw libmap::Error("no such field: are these footholds?",
+                        {.file = footholds.path, .field = name});
+  };
+  const std::vector<double>& x = field("approach_x");
+  const std::vector<double>& y = field("approach_y");
+  const std::vector<double>& z = field("approach_z");
+  const std::vector<double>& score = field("score");
+  libmap::BagPlaces places;
+  places.marker_topic = "/footholds";
+  places.pose_topic = "/foothold_poses";
+  places.arrow_m = arrow_m;
+  for (std::size_t n = 0; n < footholds.cloud.size(); ++n) {
+    const Eigen::Vector3d approach(x[n], y[n], z[n]);
+    if (!approach.allFinite() || approach.norm() < 1e-9)
+      throw libmap::Error(
+          "is no direction",
+          {.file = footholds.path, .field = fmt::format("approach of foothold {}", n + 1)});
+    places.places.push_back({footholds.cloud.positions[n], approach, libmap::score_color(score[n]),
+                             fmt::format("{}: {:.2f}", n + 1, score[n])});
+  }
+  return places;
+}
+
+// The inputs' own stamp: that of the panorama.
+double stamp_of(const BagCommandOptions& options, const std::vector<const CloudFile*>& files) {
+  if (const std::optional<double> stamp = bag_stamp(options)) return *stamp;
+  for (const CloudFile* file : files) {
+    if (!file->manifest) continue;
+    const libmap::ManifestValue* value = file->manifest->find_result("stamp_s");
+    const double* stamp = value ? std::get_if<double>(value) : nullptr;
+    if (stamp && *stamp >= 1e-9) return *stamp;
+  }
+  return libmap::BagContent{}.stamp_s;
+}
+
+// RViz shows clouds of several frames together only if it is told how they lie.
+void add_transform(const CloudFile& map, const std::string& map_frame,
+                   const std::string& terrain_frame, libmap::BagContent& content, Run& run) {
+  if (map_frame == terrain_frame) return;
+  const libmap::Pose* pose =
+      map.manifest ? map.manifest->find_transform("terrain_from_input") : nullptr;
+  if (pose && map.frame() == "terrain")
+    content.transforms.push_back({map_frame, terrain_frame, *pose});
+  else
+    run.warn(fmt::format("no transform from {} to {} is known", terrain_frame, map_frame));
+}
+
+void add_results(const libmap::BagContent& content, Run& run) {
+  for (const libmap::BagCloud& cloud : content.clouds)
+    run.manifest().results.emplace_back(cloud.topic + ".points",
+                                        static_cast<std::int64_t>(cloud.cloud.size()));
+  for (const libmap::BagPlaces& places : content.places)
+    run.manifest().results.emplace_back("footholds",
+                                        static_cast<std::int64_t>(places.places.size()));
+  run.manifest().results.emplace_back("stamp_s", content.stamp_s);
+}
+
+}  // namespace
+
+void write_map_bag(const BagCommandOptions& options, Run& run) {
+  std::vector<std::string> inputs = {options.input};
+  for (const std::string& path : {options.terrain, options.curvature, options.footholds})
+    if (!path.empty()) inputs.push_back(path);
+  run.claim_output(options.output, inputs);
+  const CloudFile map = read(options.input, run);
+  if (!map.cloud.find_field("score"))
+    throw libmap::Error("no such field: is this a map?", {.file = options.input, .field = "score"});
+  std::optional<CloudFile> terrain;
+  if (!options.terrain.empty()) terrain = read(options.terrain, run);
+  std::optional<CloudFile> footholds;
+  if (!options.footholds.empty()) footholds = read(options.footholds, run);
+
+  libmap::BagContent content;
+  std::vector<const CloudFile*> stamped = {&map};
+  if (terrain) stamped.push_back(&*terrain);
+  content.stamp_s = stamp_of(options, stamped);
+  const std::string terrain_frame = terrain ? frame_id(terrain->frame(), "map") : "map";
+  const std::string map_frame =
+      options.frame == "auto" ? frame_id(map.frame(), terrain_frame) : options.frame;
+  if (terrain) {
+    add_transform(map, map_frame, terrain_frame, content, run);
+    content.clouds.push_back({"/merged_pcd", terrain_frame, terrain->cloud});
+  }
+  content.clouds.push_back({"/graspability_map", map_frame, map.cloud});
+  content.clouds.push_back({"/curvature_map", map_frame,
+                            options.curvature.empty()
+                                ? run.timed("curvature", [&] { return curvature_map(map); })
+                                : read(options.curvature, run).cloud});
+  if (footholds) {
+    content.places.push_back(places_of(*footholds, options.arrow_m));
+    content.places.back().frame = frame_id(footholds->frame(), terrain_frame);
+  }
+  run.manifest().frame = map_frame;
+  add_results(content, run);
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::write_bag(temporary, content, options.compression);
+  });
+  run.say(fmt::format("{} clouds and {} footholds at {} s", content.clouds.size(),
+                      footholds ? footholds->cloud.size() : 0,
+                      libmap::to_fixed_text(content.stamp_s, 6)));
+}
+
+void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
+  run.claim_output(options.output);
+  const fs::path own = fs::path(options.input) / libmap::rig_file_name;
+  const libmap::CameraRig rig =
+      read_named_rig(options.rig.empty() ? own.string() : options.rig, run);
+  const std::vector<libmap::RigImage> images = libmap::list_rig_images(options.input, rig);
+  for (const libmap::RigImage& image : images) run.add_input(image.file);
+  const libmap::RigBagOptions bag{.base_frame = options.depth.base_frame == "auto"
+                                                    ? libmap::RigBagOptions{}.base_frame
+                                                    : options.depth.base_frame,
+                                  .stamp_offset_s = options.stamp_offset_s,
+                                  .compression = options.compression};
+  run.manifest().frame = bag.base_frame;
+  run.manifest().results.emplace_back("cameras", static_cast<std::int64_t>(rig.cameras.size()));
+  run.manifest().results.emplace_back("images", static_cast<std::int64_t>(images.size()));
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::write_rig_bag(temporary, rig, images, bag);
+  });
+  run.say(fmt::format("{} images of {} cameras", images.size(), rig.cameras.size()));
+}
+
+}  // namespace graspmap_tools
