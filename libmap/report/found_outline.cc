@@ -1,0 +1,255 @@
+#include "libmap/report/found_outline.h"
+
+#include <algorithm>
+#include <array>
+#include <optional>
+#include <set>
+#include <string>
+#include <system_error>
+
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "libmap/report/run_folder.h"
+#include "libmap/report/table_reader.h"
+
+namespace libmap {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+constexpr int max_depth = 12;
+
+std::optional<Manifest> manifest_of(const fs::path& output) {
+  try {
+    return read_manifest_of(output);
+  } catch (const Error&) {
+    return std::nullopt;
+  }
+}
+
+bool is_picture(const fs::path& file) {
+  constexpr std::array<const char*, 4> extensions = {".png", ".jpg", ".jpeg", ".svg"};
+  return std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end();
+}
+
+// Maps are told by the command that made them, other clouds by nothing.
+bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
+  constexpr std::array<const char*, 5> extensions = {".pcd", ".ply", ".vtp", ".csv", ".tiles"};
+  return manifest &&
+         std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end() &&
+         (manifest->command == "score" || manifest->command == "merge");
+}
+
+// "2_slopes_and_bumps" -> "2 Slopes and bumps".
+std::string heading_of(const fs::path& folder) {
+  std::string heading = folder.filename().string();
+  if (heading == "roc") return "ROC";
+  std::replace(heading.begin(), heading.end(), '_', ' ');
+  const std::size_t first = heading.find_first_not_of("0123456789 .-");
+  if (first != std::string::npos && heading[first] >= 'a' && heading[first] <= 'z')
+    heading[first] = static_cast<char>(heading[first] - 'a' + 'A');
+  return heading;
+}
+
+class Finder {
+ public:
+  explicit Finder(const fs::path& folder) : root_(folder) {}
+
+  OutlineSection section_of(const fs::path& folder, int depth) {
+    OutlineSection section;
+    section.heading = heading_of(folder);
+    section.folder = folder.filename().string();
+    const FolderListing listing = list_folder(folder);
+    add_maps(listing, section);
+    add_pictures(listing, section);
+    add_tables(listing, section);
+    add_texts(listing, section);
+    if (depth == max_depth) return section;
+    for (const fs::path& inner : listing.folders) {
+      if (is_folder_of_tiles(inner)) continue;
+      OutlineSection part = section_of(inner, depth + 1);
+      if (!part.items.empty() || !part.sections.empty())
+        section.sections.push_back(std::move(part));
+    }
+    return section;
+  }
+
+  // The parameters of all maps side by side.
+  std::vector<OutlineItem> overview() const {
+    if (maps_.empty()) return {};
+    OutlineItem parameters{.kind = ItemKind::parameters};
+    for (const fs::path& map : maps_) {
+      parameters.files.push_back(map.lexically_relative(root_).string());
+      parameters.labels.push_back(place_of(map));
+    }
+    parameters.caption = maps_.size() == 1 ? "The map of this run." : "The maps of this run.";
+    return {std::move(parameters)};
+  }
+
+  // A case for each folder with a map.
+  std::vector<OutlineSection> running_times() const {
+    OutlineItem timings{.kind = ItemKind::timings};
+    for (const fs::path& map : maps_) {
+      const fs::path folder = map.parent_path().lexically_relative(root_);
+      const bool known =
+          std::any_of(timings.cases.begin(), timings.cases.end(),
+                      [&](const OutlineCase& one) { return one.folder == folder.string(); });
+      if (!known) timings.cases.push_back({.name = place_of(map), .folder = folder.string()});
+    }
+    if (timings.cases.empty()) return {};
+    timings.commands = {"simulate scene", "simulate site", "simulate cameras", "panorama", "fuse",
+                        "mesh",           "crop",          "resample",         "score",    "merge",
+                        "lookup",         "evaluate",      "footholds",        "analyze"};
+    timings.caption = "Running times.";
+    return {{.heading = "Running times", .items = {std::move(timings)}}};
+  }
+
+ private:
+  // A map by its folder, in the run's own by its name.
+  std::string place_of(const fs::path& map) const {
+    const fs::path name = map.lexically_relative(root_);
+    return (name.has_parent_path() ? name.parent_path() : name).string();
+  }
+
+  void add_maps(const FolderListing& listing, OutlineSection& section) {
+    std::vector<fs::path> candidates = listing.files;
+    candidates.insert(candidates.end(), listing.folders.begin(), listing.folders.end());
+    std::set<std::string> stems;
+    for (const fs::path& file : candidates) {
+      if (!is_map(file, manifest_of(file)) || !stems.insert(file.stem().string()).second) continue;
+      maps_.push_back(file);
+      OutlineItem item{.kind = ItemKind::map, .files = {file.filename().string()}};
+      item.lookup = lookup_of(file, listing);
+      if (!item.lookup.empty()) item.columns = columns_of(file.parent_path() / item.lookup);
+      item.picture = still_of(file, listing);
+      section.items.push_back(std::move(item));
+    }
+  }
+
+  // The looked-up points whose manifest names this map.
+  static std::string lookup_of(const fs::path& map, const FolderListing& listing) {
+    for (const fs::path& file : listing.files) {
+      if (file.extension() != ".csv") continue;
+      const auto manifest = manifest_of(file);
+      if (manifest && manifest->command == "lookup" && !manifest->inputs.empty() &&
+          fs::path(manifest->inputs.front().path).filename() == map.filename())
+        return file.filename().string();
+    }
+    return "";
+  }
+
+  // What a reader asks of a place first; the rest stands in the file.
+  static std::vector<OutlineColumn> columns_of(const fs::path& lookup) {
+    try {
+      const Table table = read_report_table(lookup, {}, 1, 1).table;
+      // Where the points brought verdicts of their own, the map's is `map_graspable`.
+      const bool verdicts = table.find_column("map_graspable").has_value();
+      const std::vector<OutlineColumn> wanted = {
+          {"graspable", verdicts ? "verdict" : "graspable on the map"},
+          {"score", "score"},
+          {"convex", "convex"},
+          {"map_graspable", "graspable on the map"}};
+      std::vector<OutlineColumn> columns = {{table.columns.front(), table.columns.front()}};
+      for (const OutlineColumn& column : wanted)
+        if (table.find_column(column.name).value_or(0) > 0) columns.push_back(column);
+      return columns.size() > 1 ? columns : std::vector<OutlineColumn>{};
+    } catch (const Error&) {
+      return {};
+    }
+  }
+
+  static std::string still_of(const fs::path& map, const FolderListing& listing) {
+    for (const std::string& name :
+         {map.stem().string() + ".png", std::string("oblique.png"), std::string("top.png")})
+      for (const fs::path& file : listing.files)
+        if (file.filename() == name) return name;
+    return "";
+  }
+
+  // One figure of all pictures and one a chart. A picture that is there as a drawing too is left
+  // out.
+  static void add_pictures(const FolderListing& listing, OutlineSection& section) {
+    OutlineItem pictures{.kind = ItemKind::picture};
+    std::vector<OutlineItem> charts;
+    const auto drawn = [&](const fs::path& file) {
+      const fs::path drawing = fs::path(file).replace_extension(".svg");
+      return drawing != file &&
+             std::find(listing.files.begin(), listing.files.end(), drawing) != listing.files.end();
+    };
+    const auto drawn_below = [&](const fs::path& file) {
+      std::error_code code;
+      const std::string drawing = file.stem().string() + ".svg";
+      return fs::exists(file.parent_path() / "evaluation" / drawing, code);
+    };
+    for (const fs::path& file : listing.files) {
+      if (!is_picture(file) || drawn(file) || drawn_below(file)) continue;
+      if (file.extension() == ".svg") {
+        charts.push_back({.kind = ItemKind::picture,
+                          .files = {file.filename().string()},
+                          .caption = heading_of(file.stem()) + "."});
+        continue;
+      }
+      pictures.files.push_back(file.filename().string());
+      pictures.labels.push_back(heading_of(file.stem()));
+    }
+    // The names of several stand below each.
+    for (const std::string& label : pictures.labels)
+      pictures.caption += (pictures.caption.empty() ? "" : ", ") + label;
+    if (!pictures.caption.empty()) pictures.caption += '.';
+    if (pictures.files.size() == 1) pictures.labels.clear();
+    if (!pictures.files.empty()) section.items.push_back(std::move(pictures));
+    for (OutlineItem& chart : charts) section.items.push_back(std::move(chart));
+  }
+
+  // Without the look-ups that stand beside a map, and clouds.
+  static void add_tables(const FolderListing& listing, OutlineSection& section) {
+    for (const fs::path& file : listing.files) {
+      const std::string name = file.filename().string();
+      const bool beside_map =
+          std::any_of(section.items.begin(), section.items.end(), [&](const OutlineItem& item) {
+            return item.lookup == name ||
+                   (item.kind == ItemKind::map && item.files.front() == name);
+          });
+      if (file.extension() == ".csv" && !beside_map)
+        section.items.push_back(
+            {.kind = ItemKind::table, .files = {name}, .caption = heading_of(file.stem()) + "."});
+    }
+  }
+
+  static void add_texts(const FolderListing& listing, OutlineSection& section) {
+    for (const fs::path& file : listing.files)
+      if (file.extension() == ".txt")
+        section.items.push_back({.kind = ItemKind::listing,
+                                 .files = {file.filename().string()},
+                                 .caption = heading_of(file.stem()) + "."});
+  }
+
+  fs::path root_;
+  std::vector<fs::path> maps_;
+};
+
+}  // namespace
+
+Outline outline_of_folder(const fs::path& folder) {
+  std::error_code code;
+  if (!fs::is_directory(folder, code))
+    throw Error(fs::exists(folder, code) ? "is no folder" : "no such folder",
+                {.file = folder.string()});
+  const fs::path root = (fs::absolute(folder) / "").lexically_normal().parent_path();
+  Finder finder(root);
+  OutlineSection found = finder.section_of(root, 0);
+  if (found.items.empty() && found.sections.empty())
+    throw Error("holds nothing that a report could show: no map, picture, table or text",
+                {.file = folder.string()});
+  Outline outline;
+  outline.title = found.heading.empty() ? "Report" : found.heading;
+  outline.items = finder.overview();
+  for (OutlineItem& item : found.items) outline.items.push_back(std::move(item));
+  outline.sections = std::move(found.sections);
+  for (OutlineSection& section : finder.running_times())
+    outline.sections.push_back(std::move(section));
+  return outline;
+}
+
+}  // namespace libmap

@@ -1,0 +1,118 @@
+#include "libmap/report/html.h"
+
+#include <openssl/evp.h>
+
+#include <limits>
+
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+namespace {
+
+void replace_all(std::string& text, std::string_view what, std::string_view by) {
+  for (std::size_t at = text.find(what); at != std::string::npos;
+       at = text.find(what, at + by.size()))
+    text.replace(at, what.size(), by);
+}
+
+unsigned digit_value(char digit) {
+  return static_cast<unsigned>(digit <= '9' ? digit - '0' : digit - 'a' + 10);
+}
+
+}  // namespace
+
+std::string escape_html(std::string_view text) {
+  std::string escaped;
+  escaped.reserve(text.size() + text.size() / 8);
+  for (const char c : text) {
+    if (c == '&')
+      escaped += "&amp;";
+    else if (c == '<')
+      escaped += "&lt;";
+    else if (c == '>')
+      escaped += "&gt;";
+    else if (c == '"')
+      escaped += "&quot;";
+    else if (c == '\'')
+      escaped += "&#39;";
+    else if ((static_cast<unsigned char>(c) < 0x20 && c != '\n' && c != '\t') || c == 0x7f)
+      escaped += "\xEF\xBF\xBD";
+    else
+      escaped += c;
+  }
+  return escaped;
+}
+
+std::string breakable_html(std::string_view name) {
+  std::string html;
+  for (const char c : escape_html(name)) {
+    html += c;
+    if (c == '_' || c == '/' || c == '.') html += "<wbr>";
+  }
+  return html;
+}
+
+std::string escape_json_in_script(std::string json) {
+  replace_all(json, "<", "\\u003c");
+  return json;
+}
+
+std::string escape_code(std::string_view code) {
+  std::string text(code);
+  std::erase(text, '\r');
+  replace_all(text, "</script", "<\\/script");
+  replace_all(text, "</style", "<\\/style");
+  replace_all(text, "<!--", "<\\!--");
+  return text;
+}
+
+std::string to_base64(std::string_view bytes) {
+  if (bytes.size() > static_cast<std::size_t>(std::numeric_limits<int>::max()) / 2)
+    throw Error("too large to be put into a page", {.value = std::to_string(bytes.size())});
+  std::string text((bytes.size() + 2) / 3 * 4 + 1, '\0');
+  const int length = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
+                                     reinterpret_cast<const unsigned char*>(bytes.data()),
+                                     static_cast<int>(bytes.size()));
+  text.resize(static_cast<std::size_t>(length));
+  return text;
+}
+
+std::string csp_hash(std::string_view code) {
+  const std::string digits = sha256_of(code);
+  std::string bytes;
+  for (std::size_t n = 0; n + 1 < digits.size(); n += 2)
+    bytes += static_cast<char>(digit_value(digits[n]) * 16 + digit_value(digits[n + 1]));
+  return "'sha256-" + to_base64(bytes) + "'";
+}
+
+std::string paragraphs(std::string_view text) {
+  std::string html;
+  std::string paragraph;
+  const auto end_paragraph = [&] {
+    if (!paragraph.empty()) html += "<p>" + escape_html(paragraph) + "</p>\n";
+    paragraph.clear();
+  };
+  while (!text.empty()) {
+    const std::size_t end = text.find('\n');
+    const std::string_view line = trim(text.substr(0, end));
+    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+    if (line.empty()) {
+      end_paragraph();
+      continue;
+    }
+    if (!paragraph.empty()) paragraph += '\n';
+    paragraph += line;
+  }
+  end_paragraph();
+  return html;
+}
+
+std::string attribute(std::string_view name, std::string_view value) {
+  if (value.empty()) return "";
+  return " " + std::string(name) + "=\"" + escape_html(value) + "\"";
+}
+
+}  // namespace libmap

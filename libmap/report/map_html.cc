@@ -1,0 +1,196 @@
+#include "libmap/report/map_html.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <vector>
+
+#include "libmap/core/score_color.h"
+#include "libmap/core/text.h"
+#include "libmap/report/html.h"
+#include "libmap/report/table_html.h"
+#include "libmap/view/color_map.h"
+
+namespace libmap {
+
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// Of obstacles; no other colour of the legends is violet.
+constexpr Color obstacle_color{122, 40, 140};
+
+struct Swatch {
+  std::string name;
+  Color color;
+  std::string text;
+};
+
+std::vector<Swatch> swatches() {
+  std::vector<Swatch> all;
+  for (std::size_t n = 0; n < score_classes.size(); ++n)
+    all.push_back({"c" + std::to_string(n), score_classes[n].color, score_classes[n].text});
+  all.push_back({"c7", no_value_color, "no value"});
+  all.push_back({"c8", below_plane_color, "below the zero plane"});
+  all.push_back({"convex", convex_color, "convex"});
+  all.push_back({"graspable", intersection_color, "graspable"});
+  all.push_back({"obstacle", obstacle_color, "obstacle"});
+  all.push_back({"rest", rest_color, "other"});
+  return all;
+}
+
+// Three 16-bit numbers a cell, little-endian, then a byte a cell.
+std::string cell_bytes(const MapView& view) {
+  std::string bytes;
+  bytes.reserve(view.cells.size() * 7);
+  for (const MapCell& cell : view.cells)
+    for (const unsigned place : cell.place) {
+      bytes += static_cast<char>(place & 255U);
+      bytes += static_cast<char>(place >> 8U);
+    }
+  for (const MapCell& cell : view.cells) bytes += static_cast<char>(cell.colors_and_flags);
+  return bytes;
+}
+
+Json markers_json(const MapView& view) {
+  Json markers = Json::array();
+  for (const MapMarker& marker : view.markers) {
+    Json one;
+    one["label"] = marker.label;
+    // To a tenth of a millimetre, from the lowest corner of the cells.
+    one["at"] = Json::array();
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      one["at"].push_back(
+          std::round((marker.point_in_terrain[axis] - view.corner_in_terrain[axis]) * 1e4) / 1e4);
+    one["verdict"] = marker.verdict ? Json(*marker.verdict ? 1 : 0) : Json();
+    markers.push_back(std::move(one));
+  }
+  return markers;
+}
+
+std::string view_json(const MapView& view) {
+  Json json;
+  json["cell_size_m"] = view.cell_size_m;
+  json["cells"] = to_base64(cell_bytes(view));
+  json["convex"] = view.has_convex;
+  json["graspable"] = view.has_graspable;
+  json["obstacle"] = view.has_obstacle;
+  json["markers"] = markers_json(view);
+  return escape_json_in_script(json.dump(-1, ' ', true, Json::error_handler_t::replace));
+}
+
+std::string legend_html(const MapView& view) {
+  std::array<bool, 9> used{};
+  for (const MapCell& cell : view.cells)
+    used[std::min<std::size_t>(cell.colors_and_flags & 15U, 8)] = true;
+  const auto group = [](const std::string& mode, const std::string& title, bool hidden) {
+    return fmt::format("<ul class=\"legend\" data-mode=\"{}\" aria-label=\"{}\"{}>", mode, title,
+                       hidden ? " hidden" : "");
+  };
+  const auto entry = [](const Swatch& swatch) {
+    return "<li><span class=\"swatch " + swatch.name + "\"></span>" + escape_html(swatch.text) +
+           "</li>";
+  };
+  const std::vector<Swatch> all = swatches();
+  std::string html = group("score", "Score", false);
+  for (std::size_t n = 0; n < 9; ++n)
+    if (n < score_classes.size() || used[n]) html += entry(all[n]);
+  html += "</ul>\n";
+  const auto flags = [&](const std::string& mode, std::vector<std::size_t> shown) {
+    html += group(mode, mode, true);
+    for (const std::size_t n : shown) html += entry(all[n]);
+    html += entry(all[12]) + (used[8] ? entry(all[8]) : "") + "</ul>\n";
+  };
+  if (view.has_convex) flags("convex", {9});
+  if (view.has_graspable)
+    flags("graspable",
+          view.has_convex ? std::vector<std::size_t>{10, 9} : std::vector<std::size_t>{10});
+  if (view.has_obstacle) flags("obstacle", {11});
+  return html;
+}
+
+std::string tools_html(const MapView& view) {
+  const auto button = [](const std::string& mode, const std::string& text) {
+    return "<button type=\"button\" data-mode=\"" + mode + "\" aria-pressed=\"" +
+           (mode == "score" ? "true" : "false") + "\">" + text + "</button>";
+  };
+  std::string html = "<div class=\"tools\" hidden><div role=\"group\" aria-label=\"Colours\">" +
+                     button("score", "Score");
+  if (view.has_convex) html += button("convex", "Convex");
+  if (view.has_graspable) html += button("graspable", "Graspable");
+  if (view.has_obstacle) html += button("obstacle", "Obstacles");
+  html +=
+      "</div><div role=\"group\" aria-label=\"View\">"
+      "<button type=\"button\" data-camera=\"oblique\">Oblique</button>"
+      "<button type=\"button\" data-camera=\"top\">Top</button>";
+  if (!view.markers.empty())
+    html += "<button type=\"button\" data-labels aria-pressed=\"true\">Labels</button>";
+  return html + "</div></div>\n";
+}
+
+std::string description(const MapView& view) {
+  std::string text =
+      fmt::format("{} cells of {} mm", view.cells.size(), short_number(view.cell_size_m * 1e3));
+  if (view.cells.size() < view.voxels || view.voxels_a_cell > 1)
+    text += fmt::format(", one voxel shown for each cube of {0} x {0} x {0} of the map's {1}",
+                        view.voxels_a_cell, view.voxels);
+  return text + ".";
+}
+
+bool has_verdicts(const MapView& view) {
+  for (const MapMarker& marker : view.markers)
+    if (marker.verdict) return true;
+  return false;
+}
+
+}  // namespace
+
+std::string map_html(const ReportMap& map, const std::string& still, bool with_view) {
+  std::string html = "<div class=\"viewer\"><div class=\"stage\">\n";
+  if (with_view) html += tools_html(map.view);
+  html += "<div class=\"viewport\">" + still;
+  if (with_view)
+    html +=
+        "<noscript><p>The 3-D view needs JavaScript.</p></noscript>"
+        "<canvas tabindex=\"0\" role=\"img\" hidden aria-label=\"Graspability map, 3-D view: "
+        "arrow keys turn it, plus and minus zoom\"></canvas>";
+  html += "</div>\n" + legend_html(map.view);
+  if (has_verdicts(map.view))
+    html +=
+        "<ul class=\"legend\" aria-label=\"Locations\"><li><span class=\"mark pass\"></span>"
+        "listed as graspable</li><li><span class=\"mark fail\"></span>listed as not "
+        "graspable</li></ul>\n";
+  if (with_view)
+    html +=
+        "<p class=\"hint\" hidden>Drag to turn, two fingers or the right button to move, the "
+        "wheel to zoom after a click. " +
+        description(map.view) + "</p>\n";
+  html += "</div>\n";
+  if (map.locations)
+    html += "<div class=\"locations\">" +
+            scroll_box(table_html(*map.locations, "data-place"), "Locations") + "</div>\n";
+  html += "</div>\n";
+  if (with_view)
+    html += "<script type=\"application/json\" class=\"map-data\">" + view_json(map.view) +
+            "</script>\n";
+  return html;
+}
+
+std::string palette_json() {
+  Json json;
+  for (const Swatch& swatch : swatches()) json[swatch.name] = swatch.color;
+  return escape_json_in_script(json.dump());
+}
+
+std::string palette_style() {
+  std::string style;
+  for (const Swatch& swatch : swatches())
+    style += fmt::format(".swatch.{}{{background:#{:02x}{:02x}{:02x}}}\n", swatch.name,
+                         swatch.color[0], swatch.color[1], swatch.color[2]);
+  return style;
+}
+
+}  // namespace libmap

@@ -1,0 +1,123 @@
+#include "libmap/report/map_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+
+#include "libmap/core/error.h"
+#include "libmap/core/score_color.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+namespace {
+
+using Field = const std::vector<double>*;
+
+Field field_of(const PointCloud& map, const char* name) {
+  const ScalarField* field = map.find_field(name);
+  if (field == nullptr)
+    throw Error("not a graspability map: it has no such field", {.field = name});
+  return &field->values;
+}
+
+Field optional_field(const PointCloud& map, const char* name) {
+  const ScalarField* field = map.find_field(name);
+  return field == nullptr ? nullptr : &field->values;
+}
+
+std::array<Field, 3> voxel_fields(const PointCloud& map) {
+  return {field_of(map, "i"), field_of(map, "j"), field_of(map, "k")};
+}
+
+std::uint8_t class_of(double score, bool below_plane) {
+  if (below_plane) return below_plane_class;
+  const Color color = score_color(score);
+  for (std::size_t n = 0; n < score_classes.size(); ++n)
+    if (score_classes[n].color == color) return static_cast<std::uint8_t>(n);
+  return no_value_class;
+}
+
+bool is_set(Field field, std::size_t n) { return field != nullptr && (*field)[n] > 0.0; }
+
+}  // namespace
+
+MapLattice lattice_of(const PointCloud& map) {
+  const std::array<Field, 3> voxels = voxel_fields(map);
+  MapLattice lattice;
+  double widest = 0.0;
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto [low, high] = std::minmax_element(voxels[axis]->begin(), voxels[axis]->end());
+    if (low == high || !(*high - *low > widest)) continue;
+    widest = *high - *low;
+    const auto at = [&](auto place) {
+      return map.positions[static_cast<std::size_t>(place - voxels[axis]->begin())]
+                          [static_cast<Eigen::Index>(axis)];
+    };
+    lattice.voxel_size_m = (at(high) - at(low)) / widest;
+  }
+  if (map.size() == 1) lattice.voxel_size_m = 0.01;
+  if (!(lattice.voxel_size_m > 0.0))
+    throw Error("its points lie on no lattice along the axes of its terrain",
+                {.field = "voxel size", .value = to_text(lattice.voxel_size_m), .bound = "> 0"});
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const auto a = static_cast<Eigen::Index>(axis);
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    for (std::size_t n = 0; n < map.size(); ++n) {
+      const double origin = map.positions[n][a] - lattice.voxel_size_m * ((*voxels[axis])[n] + 0.5);
+      low = std::min(low, origin);
+      high = std::max(high, origin);
+    }
+    if (high - low > 0.2 * lattice.voxel_size_m)
+      throw Error("its points lie on no lattice along the axes of its terrain",
+                  {.field = "distance from the lattice", .value = to_text(high - low) + " m"});
+    lattice.origin_in_terrain[a] = 0.5 * (low + high);
+  }
+  return lattice;
+}
+
+MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
+  MapView view;
+  view.voxels = map.size();
+  view.voxels_a_cell = options.voxels_a_cell;
+  if (map.empty()) return view;
+  const MapLattice lattice = options.lattice ? *options.lattice : lattice_of(map);
+  view.cell_size_m = lattice.voxel_size_m * options.voxels_a_cell;
+  const std::array<Field, 3> voxels = voxel_fields(map);
+  const auto cell_of = [&](std::size_t axis, std::size_t n) {
+    return std::floor((*voxels[axis])[n] / options.voxels_a_cell);
+  };
+  view.cells.resize(map.size());
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    double lowest = std::numeric_limits<double>::infinity();
+    for (std::size_t n = 0; n < map.size(); ++n) lowest = std::min(lowest, cell_of(axis, n));
+    view.corner_in_terrain[static_cast<Eigen::Index>(axis)] =
+        lattice.origin_in_terrain[static_cast<Eigen::Index>(axis)] + view.cell_size_m * lowest;
+    for (std::size_t n = 0; n < map.size(); ++n) {
+      const double place = cell_of(axis, n) - lowest;
+      if (!(place <= std::numeric_limits<std::uint16_t>::max()))
+        throw Error("is too wide for one view",
+                    {.field = "cells along an axis", .value = to_text(place), .bound = "<= 65535"});
+      view.cells[n].place[axis] = static_cast<std::uint16_t>(place);
+    }
+  }
+  const Field score = field_of(map, "score");
+  const Field convex = optional_field(map, "convex");
+  const Field graspable = optional_field(map, "graspable");
+  const Field obstacle = optional_field(map, "obstacle");
+  view.has_convex = convex != nullptr;
+  view.has_graspable = graspable != nullptr;
+  view.has_obstacle = obstacle != nullptr;
+  for (std::size_t n = 0; n < map.size(); ++n) {
+    const bool below = options.has_zero_plane && map.positions[n].z() < options.zero_plane_m;
+    unsigned value = class_of((*score)[n], below);
+    if (is_set(convex, n)) value |= convex_flag;
+    if (is_set(graspable, n)) value |= graspable_flag;
+    if (is_set(obstacle, n)) value |= obstacle_flag;
+    view.cells[n].colors_and_flags = static_cast<std::uint8_t>(value);
+  }
+  return view;
+}
+
+}  // namespace libmap

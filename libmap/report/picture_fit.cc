@@ -1,0 +1,105 @@
+#include "libmap/report/picture_fit.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgproc.hpp>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/scan/image_codec.h"
+
+namespace libmap {
+
+namespace {
+
+struct PictureLevel {
+  int max_side;
+  int quality;
+};
+constexpr std::array<PictureLevel, max_picture_level + 1> levels{
+    {{0, 0}, {100'000, 92}, {1400, 90}, {1100, 88}, {900, 85}, {700, 82}, {520, 80}, {360, 75}}};
+
+constexpr std::size_t max_svg_bytes = std::size_t{4} << 20;
+
+bool is_svg(std::string_view bytes) {
+  const std::string_view head = trim(bytes.substr(0, 4096));
+  return (head.starts_with("<") || head.starts_with("\xEF\xBB\xBF<")) &&
+         head.find("<svg") != std::string_view::npos &&
+         bytes.find("</svg>") != std::string_view::npos;
+}
+
+// Transparent pixels lie on white.
+ColorImage decode_on_white(const std::string& bytes) {
+  const auto info = read_image_info(bytes);
+  if (!info || info->channels != 4 || info->bits != 8) return decode_color(bytes);
+  const RgbaImage image = decode_rgba(bytes);
+  ColorImage flat(image.width, image.height);
+  for (std::size_t n = 0; n < image.pixels.size(); ++n)
+    for (std::size_t c = 0; c < 3; ++c) {
+      const unsigned alpha = image.pixels[n][3];
+      flat.pixels[n][c] = static_cast<std::uint8_t>(
+          (image.pixels[n][c] * alpha + 255U * (255U - alpha) + 127U) / 255U);
+    }
+  return flat;
+}
+
+}  // namespace
+
+ReportPicture read_picture_bytes(std::string bytes) {
+  ReportPicture picture;
+  if (is_svg(bytes)) {
+    if (bytes.size() > max_svg_bytes)
+      throw Error("is too large for a page", {.value = std::to_string(bytes.size()) + " bytes",
+                                              .bound = "<= " + std::to_string(max_svg_bytes)});
+    picture.media_type = "image/svg+xml";
+    picture.bytes = std::move(bytes);
+    return picture;
+  }
+  const auto format = image_format(bytes);
+  if (!format) throw Error("is neither PNG nor JPEG nor SVG");
+  const ColorImage image = decode_color(bytes);
+  picture.media_type = *format == ImageFormat::png ? "image/png" : "image/jpeg";
+  picture.width = image.width;
+  picture.height = image.height;
+  picture.bytes = std::move(bytes);
+  return picture;
+}
+
+ColorImage shrink_image(const ColorImage& image, int width, int height) {
+  ColorImage small(width, height);
+  // OpenCV only reads what it is given as the source.
+  const cv::Mat from(image.height, image.width, CV_8UC3,
+                     const_cast<Color*>(image.pixels.data()));  // NOLINT
+  cv::Mat to(height, width, CV_8UC3, small.pixels.data());
+  cv::resize(from, to, to.size(), 0.0, 0.0, cv::INTER_AREA);
+  return small;
+}
+
+ReportPicture fit_picture(const ReportPicture& picture, int level) {
+  if (level <= 0 || picture.media_type == "image/svg+xml") return picture;
+  const PictureLevel& bound = levels[static_cast<std::size_t>(std::min(level, max_picture_level))];
+  ColorImage image = decode_on_white(picture.bytes);
+  const int side = std::max(image.width, image.height);
+  const bool scaled = side > bound.max_side;
+  if (scaled) {
+    const double share = static_cast<double>(bound.max_side) / side;
+    const auto shrunk = [&](int length) {
+      return std::max(1, static_cast<int>(std::lround(length * share)));
+    };
+    image = shrink_image(image, shrunk(image.width), shrunk(image.height));
+  }
+  ReportPicture fitted = picture;
+  fitted.bytes = encode_jpeg(image, bound.quality);
+  if (fitted.bytes.size() >= picture.bytes.size()) return picture;
+  fitted.media_type = "image/jpeg";
+  fitted.change = "JPEG, quality " + std::to_string(bound.quality);
+  if (scaled)
+    fitted.change += ", " + std::to_string(image.width) + " instead of " +
+                     std::to_string(picture.width) + " pixels wide";
+  fitted.width = image.width;
+  fitted.height = image.height;
+  return fitted;
+}
+
+}  // namespace libmap

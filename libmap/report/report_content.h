@@ -1,0 +1,109 @@
+// What stands in a report, read and ready to be shown.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <utility>
+#include <variant>
+#include <vector>
+
+#include "libmap/core/manifest.h"
+#include "libmap/core/table.h"
+#include "libmap/report/map_view.h"
+#include "libmap/report/outline.h"
+#include "libmap/report/timing_table.h"
+
+namespace libmap {
+
+// PNG, JPEG or SVG as they are put into the page.
+struct ReportPicture {
+  std::string file{};  // as it is named in the report
+  std::string label{};
+  std::string bytes{};
+  std::string media_type{};
+  int width = 0;  // as shown at full size; 0: not known
+  int height = 0;
+  std::string change{};  // how it differs from the file: "JPEG, 1000 px wide"; empty: not at all
+};
+
+struct ReportTable {
+  Table table{};                         // the columns and at most the rows that are shown
+  std::vector<std::string> headings{};   // one a column
+  std::size_t open_rows = 40;            // the rest is folded away
+  std::optional<std::uint64_t> lines{};  // of the whole file, if not all of it was read
+};
+
+struct ReportMap {
+  MapView view{};
+  std::optional<ReportTable> locations{};  // row n belongs to the marker n
+  std::optional<ReportPicture> still{};
+};
+
+struct ReportParameters {
+  std::vector<std::pair<std::string, Manifest>> outputs{};  // by the head of their column
+};
+
+struct ReportValue {
+  std::string label{};
+  std::string value{};
+  std::string unit{};
+  std::string published{};
+};
+
+struct ReportListing {
+  std::string text{};
+  std::size_t left_out_lines = 0;
+};
+
+struct ReportNote {
+  std::string text{};
+};
+
+// A file that is not there (no reason) or cannot be shown.
+struct ReportGap {
+  std::string file{};
+  std::string reason{};
+};
+
+using ReportPictures = std::vector<ReportPicture>;
+using ReportValues = std::vector<ReportValue>;
+using ReportBody =
+    std::variant<std::monostate, ReportPictures, ReportTable, ReportMap, ReportParameters,
+                 ReportValues, TimingTable, ReportListing, ReportNote>;
+
+struct ReportItem {
+  std::string caption{};
+  std::string source{};  // file that it shows, if that is one
+  std::vector<ReportGap> gaps{};
+  ReportBody body{};
+};
+
+struct ReportSection {
+  std::string heading{};
+  std::string folder{};  // relative to the run's
+  std::string text{};
+  std::vector<ReportGap> gaps{};
+  std::vector<ReportItem> items{};
+  std::vector<ReportSection> sections{};
+};
+
+// An output of the run and what its manifest says, or why that cannot be read.
+struct ReportSource {
+  std::string output{};
+  Manifest manifest{};
+  std::string error{};
+};
+
+struct ReportContent {
+  std::string title{};
+  std::string text{};
+  std::vector<ReportItem> items{};
+  std::vector<ReportSection> sections{};
+  std::vector<ReportSource> sources{};
+  std::size_t more_sources = 0;  // that are not listed
+};
+
+}  // namespace libmap

@@ -1,0 +1,36 @@
+// The files that an outline names, read.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "libmap/report/outline.h"
+#include "libmap/report/report_content.h"
+
+namespace libmap {
+
+struct ReportReadOptions {
+  std::filesystem::path folder{};    // of the run
+  std::filesystem::path left_out{};  // the report itself
+  std::size_t max_rows = 1000;       // of a table
+  std::size_t max_lines = 200;       // of a listing
+  std::size_t max_sources = 400;     // in the list of all outputs
+};
+
+// Maps are read by the caller: with a marker for each row of the looked-up points, if there are
+// any, its position set. Throws Error if the map cannot be shown.
+using MapLoader = std::function<MapView(const std::filesystem::path& map,
+                                        const std::optional<std::filesystem::path>& lookup)>;
+
+struct ReportReadResult {
+  ReportContent content;
+  std::vector<std::filesystem::path> files;  // that were shown, in their order, each once
+};
+
+// What is missing or broken stands in the content as a gap. Throws Error: no such folder.
+ReportReadResult read_report_content(const Outline& outline, const ReportReadOptions& options,
+                                     const MapLoader& load_map);
+
+}  // namespace libmap

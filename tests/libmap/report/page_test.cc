@@ -1,0 +1,153 @@
+#include "libmap/report/report_page.h"
+
+#include <gtest/gtest.h>
+
+#include "libmap/report/html.h"
+#include "libmap/report/picture_fit.h"
+#include "libmap/scan/image_codec.h"
+#include "tests/support/test_support.h"
+
+namespace {
+
+using graspmap_test::error_of;
+using graspmap_test::random_engine;
+using libmap::ColorImage;
+using libmap::PageAssets;
+using libmap::ReportContent;
+using libmap::ReportPicture;
+using libmap::ReportPictures;
+
+// No coder makes noise small.
+ColorImage noise(int width, int height) {
+  ColorImage image(width, height);
+  for (libmap::Color& pixel : image.pixels)
+    for (std::uint8_t& value : pixel) value = static_cast<std::uint8_t>(random_engine()() & 255U);
+  return image;
+}
+
+ReportPicture picture_of(const ColorImage& image) {
+  ReportPicture picture = libmap::read_picture_bytes(libmap::encode_png(image));
+  picture.file = "a.png";
+  return picture;
+}
+
+const PageAssets assets{.style = "p { color: red }",
+                        .script = "start();",
+                        .libraries = {},
+                        .library_notice = "",
+                        .version = "1.2.3"};
+
+TEST(ReportPage, NothingFromTheRunCanRun) {
+  const std::string attack = "\"'><script>alert(1)</script><img src=x onerror=alert(2)>";
+  ReportContent content;
+  content.title = content.text = attack;
+  libmap::ReportSection section;
+  section.heading = section.text = section.folder = attack;
+  section.gaps.push_back({attack, attack});
+  libmap::ReportItem item;
+  item.caption = item.source = attack;
+  item.gaps.push_back({attack, ""});
+  libmap::ReportTable table;
+  table.table.columns = table.headings = {attack, attack};
+  table.table.rows = {{attack, attack}};
+  libmap::ReportParameters parameters;
+  libmap::Manifest manifest;
+  manifest.command = manifest.version = manifest.frame = attack;
+  manifest.parameters = {{attack, attack}};
+  manifest.inputs = {{attack, attack, 1}};
+  manifest.timings_s = {{attack, 1.0}};
+  parameters.outputs = {{attack, manifest}};
+  for (const libmap::ReportBody& body :
+       {libmap::ReportBody(table), libmap::ReportBody(parameters),
+        libmap::ReportBody(libmap::ReportValues{{attack, attack, attack, attack}}),
+        libmap::ReportBody(libmap::timing_table({{attack, {manifest}}})),
+        libmap::ReportBody(libmap::ReportListing{attack, 3}),
+        libmap::ReportBody(libmap::ReportNote{attack})}) {
+    item.body = body;
+    section.items.push_back(item);
+  }
+  parameters.outputs.emplace_back(attack + "2", libmap::Manifest{});
+  item.body = parameters;
+  section.items.push_back(item);
+  content.sections.push_back(section);
+  content.sources.push_back({attack, manifest, ""});
+  content.sources.push_back({attack, {}, attack});
+  const std::string html = libmap::report_page(content, assets);
+  EXPECT_EQ(html.find("<script>alert"), std::string::npos);
+  EXPECT_EQ(html.find("<img"), std::string::npos);
+  // Only our own script, by its hash, and the palette, which is data.
+  EXPECT_NE(html.find("script-src " + libmap::csp_hash("start();") + ";"), std::string::npos);
+  EXPECT_EQ(html.find("unsafe"), std::string::npos);
+  EXPECT_EQ(html, libmap::report_page(content, assets));
+}
+
+TEST(ReportPage, LibrariesComeOnlyWithViews) {
+  PageAssets with_library = assets;
+  with_library.libraries = {"library();"};
+  with_library.library_notice = "whose it is";
+  ReportContent content;
+  content.title = "a";
+  EXPECT_EQ(libmap::report_page(content, with_library).find("library();"), std::string::npos);
+  libmap::ReportMap map;
+  map.view.cell_size_m = 0.01;
+  map.view.cells.resize(1);
+  content.items.push_back({.body = map});
+  const std::string html = libmap::report_page(content, with_library);
+  EXPECT_NE(html.find("<script>library();</script>"), std::string::npos);
+  EXPECT_NE(html.find("whose it is"), std::string::npos);
+  EXPECT_EQ(libmap::report_page(content, assets).find("<canvas"), std::string::npos);
+}
+
+TEST(ReportPage, PicturesAreMadeSmallerUntilThePageFits) {
+  ReportContent content;
+  content.title = "a";
+  content.items.push_back({.body = ReportPictures{picture_of(noise(1600, 700))}});
+  const libmap::FittedPage whole = libmap::fit_report_page(content, assets, 10'000'000);
+  EXPECT_EQ(whole.picture_level, 0);
+  EXPECT_NE(whole.html.find("data:image/png;base64,"), std::string::npos);
+  EXPECT_EQ(whole.html.find("Made smaller"), std::string::npos);
+  const libmap::FittedPage fitted = libmap::fit_report_page(content, assets, 900'000);
+  EXPECT_GE(fitted.picture_level, 2);
+  EXPECT_LE(fitted.html.size(), 900'000U);
+  EXPECT_EQ(fitted.changed_pictures, 1U);
+  EXPECT_NE(fitted.html.find("Made smaller for this page. a.png: JPEG, quality 90, 1400 instead of "
+                             "1600 pixels wide."),
+            std::string::npos);
+  EXPECT_NE(std::string(error_of([&] { libmap::fit_report_page(content, assets, 10'000); }).what())
+                .find("too large"),
+            std::string::npos);
+}
+
+TEST(Picture, ShrinkingTakesMeans) {
+  ColorImage image(4, 2);
+  for (int x = 0; x < 4; ++x)
+    for (int y = 0; y < 2; ++y)
+      image.at(x, y) = {static_cast<std::uint8_t>(x < 2 ? 40 * y : 200), 10, 0};
+  const ColorImage small = libmap::shrink_image(image, 2, 1);
+  EXPECT_EQ(small.at(0, 0), (libmap::Color{20, 10, 0}));
+  EXPECT_EQ(small.at(1, 0), (libmap::Color{200, 10, 0}));
+}
+
+TEST(Picture, TransparencyLiesOnWhite) {
+  libmap::RgbaImage image(64, 64, {0, 0, 0, 0});
+  for (std::size_t n = 0; n < image.pixels.size(); n += 2)
+    image.pixels[n] = {static_cast<std::uint8_t>(n % 251), 0, 0, 0};
+  const ReportPicture fitted =
+      libmap::fit_picture(libmap::read_picture_bytes(libmap::encode_png(image)), 1);
+  ASSERT_EQ(fitted.media_type, "image/jpeg");
+  EXPECT_EQ(libmap::decode_color(fitted.bytes).at(5, 5), (libmap::Color{255, 255, 255}));
+}
+
+TEST(Picture, BrokenOnesAreErrors) {
+  const std::string whole = libmap::encode_png(noise(40, 30));
+  EXPECT_EQ(libmap::read_picture_bytes(whole).height, 30);
+  EXPECT_THROW(libmap::read_picture_bytes(whole.substr(0, whole.size() / 2)), libmap::Error);
+  EXPECT_THROW(libmap::read_picture_bytes("no picture"), libmap::Error);
+  EXPECT_THROW(libmap::read_picture_bytes(""), libmap::Error);
+  EXPECT_THROW(libmap::read_picture_bytes("<svg><rect>"), libmap::Error);
+  const ReportPicture drawing = libmap::read_picture_bytes("<?xml version='1.0'?><svg></svg>");
+  EXPECT_EQ(drawing.media_type, "image/svg+xml");
+  EXPECT_EQ(libmap::fit_picture(drawing, libmap::max_picture_level).bytes, drawing.bytes);
+}
+
+}  // namespace

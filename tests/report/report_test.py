@@ -1,0 +1,211 @@
+"""The report of a small run in a headless Chromium: it opens without errors, its views turn, places
+are chosen in table and view, it fits a telephone, and its text is there without JavaScript.
+
+    report_test.py GRASPMAP SOURCE_FOLDER
+
+Ends with 77 where Chromium, chromedriver or three.js are not installed."""
+
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+
+from webdriver import Browser
+
+ATTACK = '<img src=x onerror=hacked()>'
+FIGURE = 'document.querySelector("figure.map")'
+OUTLINE = f'''
+title: "A study {ATTACK}"
+text: The first words.
+sections:
+  - heading: Map
+    items:
+      - map: map.pcd
+        lookup: lookup.csv
+        caption: "A map {ATTACK}"
+      - picture: [top.png, none.png]
+      - table: lookup.csv
+      - parameters: map.pcd
+      - timings: [{{name: one, folder: .}}]
+  - heading: Wide
+    items:
+      - table: wide.csv
+'''
+
+
+def check(condition, what):
+    if not condition:
+        raise AssertionError(what)
+
+
+def wait_for(what, condition):
+    end = time.monotonic() + 60
+    while not condition():
+        check(time.monotonic() < end, f'waited in vain: {what}')
+        time.sleep(0.05)
+
+
+def make_run(graspmap, folder):
+    run = folder / 'run'
+    run.mkdir()
+
+    def call(*words):
+        subprocess.run([graspmap, *map(str, words), '--quiet'], check=True)
+
+    (folder / 'points.csv').write_text(
+        'place,x,y,z,graspable\n'
+        f'{ATTACK},0.5,-1,0.10,1\nH25,-1,-1,0.25,0\nG,0.25,-0.5,0,\n')
+    (run / 'wide.csv').write_text(
+        ','.join(f'column_{n}' for n in range(30)) + '\n' + ','.join(['0.123456'] * 30) + '\n')
+    call('simulate', 'scene', '--spacing', '0.02', '-o', folder / 'terrain.pcd')
+    call('score', folder / 'terrain.pcd', '--config', 'primitive_shapes_prescan', '--voxel-size',
+         '0.02', '-o', run / 'map.pcd')
+    call('lookup', run / 'map.pcd', folder / 'points.csv', '-o', run / 'lookup.csv')
+    # Any picture will do.
+    shutil.copy(pathlib.Path(sys.argv[2]) / 'pipelines/primitive_shapes.png', run / 'top.png')
+    (folder / 'outline.yaml').write_text(OUTLINE)
+    call('report', run, '--outline', folder / 'outline.yaml', '-o', folder / 'report.html',
+         '--max-cells', 3000)
+    return folder / 'report.html'
+
+
+class Page:
+    def __init__(self, browser, report):
+        self.browser = browser
+        browser.open(report)
+
+    def show_view(self):
+        self.browser.run(f'{FIGURE}.scrollIntoView()')
+        wait_for('the view is drawn', lambda: self.drawn() > 0)
+        self.settle()
+
+    def drawn(self):
+        return int(self.browser.run(f'return {FIGURE}.dataset.drawn || "0"'))
+
+    def settle(self):
+        """Until all that was asked for is drawn."""
+        wait_for('the view is at rest',
+                 lambda: self.browser.run(f'return {FIGURE}.dataset.busy === undefined'))
+
+    def picture(self):
+        return self.browser.run('return document.querySelector("figure.map canvas").toDataURL()')
+
+    def middle(self):
+        box = self.browser.run(
+            'const b = document.querySelector("figure.map canvas").getBoundingClientRect();'
+            'return [b.left + b.width / 2, b.top + b.height / 2]')
+        return box
+
+    def selected(self):
+        return self.browser.run(f'return {FIGURE}.dataset.selected || null')
+
+    def selected_row(self):
+        return self.browser.run(
+            'const row = document.querySelector("figure.map tr.selected");'
+            'return row && row.querySelector("th").textContent')
+
+    def check_no_errors(self):
+        messages = [one['message'] for one in self.browser.console()]
+        check(not messages, f'the console says: {messages}')
+        check(self.browser.run('return document.querySelectorAll("[onerror]").length') == 0,
+              'something of the data became a tag')
+        check(self.browser.run('return performance.getEntriesByType("resource")'
+                               '.filter(e => !e.name.startsWith("data:")).length') == 0,
+              'something was loaded')
+
+
+def on_a_desk(report):
+    with Browser(1280, 900) as browser:
+        page = Page(browser, report)
+        check('<img' in browser.text('h1'), 'the title is not shown as it stands')
+        page.show_view()
+        first = page.picture()
+
+        browser.drag(page.middle(), (120, 40))
+        page.settle()
+        turned = page.picture()
+        check(turned != first, 'turning the map did not change the picture')
+
+        # A place chosen in the table comes into the middle of the view.
+        browser.run('document.querySelector("figure.map tr[data-place=\\"1\\"] button").click()')
+        wait_for('the row is chosen', lambda: page.selected() == 'H25')
+        page.settle()
+        check(page.selected_row() == 'H25', 'the row is not marked')
+        chosen = page.picture()
+        check(chosen != turned, 'choosing a place did not change the picture')
+
+        # Whichever was chosen, the place in the middle is found again by a click.
+        browser.run('document.querySelector("figure.map tr[data-place=\\"0\\"] button").click()')
+        wait_for('the other row is chosen', lambda: page.selected() == ATTACK)
+        page.settle()
+        browser.run('document.querySelector("figure.map tr[data-place=\\"1\\"] button").click()')
+        page.settle()
+        browser.run(f'{FIGURE}.dataset.selected = ""')
+        browser.drag(page.middle(), (0, 0))
+        wait_for('the click finds the place', lambda: page.selected() == 'H25')
+
+        for mode in ('convex', 'score'):
+            before = page.picture()
+            browser.run(f'{FIGURE}.querySelector("button[data-mode={mode}]").click()')
+            page.settle()
+            check(page.picture() != before, f'{mode} shows the same picture')
+            check(browser.run(f'return {FIGURE}.querySelector(".legend[data-mode={mode}]").hidden')
+                  is False, f'the legend of {mode} is not shown')
+        before = page.picture()
+        browser.run('document.querySelector("figure.map canvas").dispatchEvent('
+                    'new KeyboardEvent("keydown", {key: "ArrowLeft"}))')
+        page.settle()
+        check(page.picture() != before, 'the arrow key did not turn the map')
+
+        browser.run('document.querySelector(".picture img").click()')
+        check(browser.run('return document.querySelector("dialog").open'), 'no large picture')
+        page.check_no_errors()
+
+
+def on_a_telephone(report):
+    with Browser(700, 800) as browser:
+        browser.resize(360, 740)
+        page = Page(browser, report)
+        page.show_view()
+        width = browser.run('return [document.scrollingElement.scrollWidth, innerWidth]')
+        check(width[0] <= width[1], f'the page is {width[0]} wide in a window of {width[1]}')
+        page.check_no_errors()
+
+
+def without_javascript(report):
+    off = {'profile.managed_default_content_settings.javascript': 2}
+    with Browser(1280, 900, preferences=off) as browser:
+        browser.open(report)
+        text = browser.text('body')
+        for words in ('The first words.', 'H25', 'Not made in this run: none.png', 'voxel matching',
+                      'needs JavaScript'):
+            check(words in text, f'not readable without JavaScript: {words}')
+        for button in ('Oblique', 'Drag to turn'):
+            check(button not in text, f'shown without JavaScript: {button}')
+
+
+def without_webgl(report):
+    with Browser(1280, 900, arguments=['--disable-3d-apis']) as browser:
+        browser.open(report)
+        check('needs WebGL' in browser.text('figure.map'), 'no word on WebGL')
+
+
+def main():
+    if not (shutil.which('chromedriver') and shutil.which('chromium')
+            and os.path.exists('/usr/share/javascript/three/three.min.js')):
+        print('skipped: chromium, chromium-driver or libjs-three is not installed')
+        return 77
+    with tempfile.TemporaryDirectory() as folder:
+        report = make_run(sys.argv[1], pathlib.Path(folder))
+        for part in (on_a_desk, on_a_telephone, without_javascript, without_webgl):
+            begin = time.monotonic()
+            part(report)
+            print(f'{part.__name__}: passed in {time.monotonic() - begin:.1f} s')
+    return 0
+
+
+if __name__ == '__main__':
+    sys.exit(main())

@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_terrain;
+
+// run/map.pcd with two looked-up points.
+void make_run() {
+  write_terrain();
+  std::filesystem::create_directories(scratch("run/inner"));
+  graspmap_test::write_text(scratch("points.csv"),
+                            "place,x,y,z,graspable\nP<1>,0,0,0,1\nP2,0.1,0,0,0\n");
+  ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", "run/map.pcd", "--frame", "input",
+                                  "--solid-voxel-threshold", "1"})));
+  ASSERT_TRUE(succeeded(graspmap({"lookup", "run/map.pcd", "points.csv", "-o", "run/lookup.csv"})));
+}
+
+TEST(Report, OfARun) {
+  make_run();
+  ASSERT_TRUE(succeeded(graspmap({"report", "run", "--title", "A & B"})));
+  const std::string html = content("run/report.html");
+  EXPECT_NE(html.find("<h1>A &amp; B</h1>"), std::string::npos);
+  EXPECT_NE(html.find("P&lt;1&gt;"), std::string::npos);
+  EXPECT_NE(html.find("OrbitControls"), std::string::npos);
+  EXPECT_NE(html.find("Permission is hereby granted"), std::string::npos);
+  EXPECT_EQ(html.find("src=\"http"), std::string::npos);
+  EXPECT_EQ(json_of("run/report.html.json").at("results").at("bytes"), html.size());
+  // The same bytes, and the first report is no part of the second.
+  ASSERT_TRUE(succeeded(graspmap({"report", "run", "--title", "A & B", "--threads", "1"})));
+  EXPECT_EQ(content("run/report.html"), html);
+}
+
+TEST(Report, LargeMapsAreThinned) {
+  make_run();
+  ASSERT_TRUE(succeeded(
+      graspmap({"report", "run", "-o", "r.html", "--max-cells", "500", "--max-size-mb", "1.5"})));
+  const std::string html = content("r.html");
+  EXPECT_NE(html.find("one voxel shown for each cube of"), std::string::npos);
+  EXPECT_LE(html.size(), 1'500'000U);
+}
+
+TEST(Report, AnOutlineSaysWhatIsMissing) {
+  make_run();
+  graspmap_test::write_text(
+      scratch("o.yaml"),
+      "title: T\nsections:\n  - heading: H\n    items:\n      - picture: no.png\n"
+      "      - {map: map.pcd, lookup: lookup.csv}\n");
+  ASSERT_TRUE(succeeded(graspmap({"report", "run", "--outline", "o.yaml", "-o", "r.html"})));
+  EXPECT_NE(content("r.html").find("Not made in this run: <code>no.png</code>"), std::string::npos);
+  EXPECT_TRUE(
+      bad_input(graspmap({"report", "run", "--outline", "no.yaml", "-o", "r.html"}), {"no.yaml"}));
+  graspmap_test::write_text(scratch("o.yaml"), "title: T\nsection: []\n");
+  EXPECT_TRUE(bad_input(graspmap({"report", "run", "--outline", "o.yaml", "-o", "r.html"}),
+                        {"o.yaml", "line 2", "did you mean 'sections'?"}));
+}
+
+TEST(Report, WithoutThreeJs) {
+  make_run();
+  EXPECT_TRUE(bad_input(graspmap({"report", "run", "-o", "r.html", "--three", "none"}),
+                        {"none/three.min.js", "libjs-three", "--no-3d"}));
+  ASSERT_TRUE(succeeded(graspmap({"report", "run", "-o", "r.html", "--three", "none", "--no-3d"})));
+  EXPECT_EQ(content("r.html").find("<canvas"), std::string::npos);
+  EXPECT_NE(content("r.html").find("P&lt;1&gt;"), std::string::npos);
+}
+
+TEST(Report, BadInputIsSaid) {
+  EXPECT_TRUE(bad_input(graspmap({"report", "none", "-o", "r.html"}), {"none", "no such folder"}));
+  std::filesystem::create_directory(scratch("empty"));
+  EXPECT_TRUE(bad_input(graspmap({"report", "empty"}), {"empty", "nothing that a report could"}));
+  graspmap_test::write_text(scratch("empty/a.txt"), "text");
+  EXPECT_TRUE(bad_input(graspmap({"report", "empty", "-o", "r.pdf"}), {"r.pdf", ".html"}));
+  EXPECT_TRUE(bad_input(graspmap({"report", "empty", "--max-size-mb", "0.1"}), {"--max-size-mb"}));
+  EXPECT_TRUE(succeeded(graspmap({"report", "empty"})));
+}
+
+}  // namespace

@@ -1,0 +1,168 @@
+// graspmap report: one HTML file of a whole run.
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <string>
+#include <system_error>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/report/found_outline.h"
+#include "libmap/report/outline_io.h"
+#include "libmap/report/report_page.h"
+#include "libmap/report/report_reader.h"
+#include "tools/command_line.h"
+#include "tools/map_tiles.h"
+#include "tools/report_map.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+
+struct ReportCommandOptions {
+  std::string folder;
+  std::string output;
+  std::string outline;
+  bool no_views = false;
+  std::string three = "/usr/share/javascript/three";
+  double max_size_mb = 15.0;
+  std::uint64_t max_cells = 80'000;
+  std::string title;
+};
+
+void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
+  table.add("title", options.title, "heading of the report; empty: the outline's");
+  table.add("max_size_mb", options.max_size_mb, libmap::Range{1.0, 1000.0},
+            "size of the file, million bytes: pictures and maps are made smaller until they fit");
+  table.add("max_cells", options.max_cells, libmap::Range{100.0, 10'000'000.0},
+            "cells of a map's 3-D view: of larger maps cubes of voxels become one");
+}
+
+// Bytes of a cell in the page: seven, in base64.
+constexpr double bytes_a_cell = 28.0 / 3.0;
+// The share of the page that maps may take.
+constexpr double maps_share = 0.4;
+
+std::size_t count_maps(const std::vector<libmap::OutlineItem>& items) {
+  return static_cast<std::size_t>(std::count_if(
+      items.begin(), items.end(),
+      [](const libmap::OutlineItem& item) { return item.kind == libmap::ItemKind::map; }));
+}
+
+std::size_t count_maps(const std::vector<libmap::OutlineSection>& sections) {
+  std::size_t count = 0;
+  for (const libmap::OutlineSection& section : sections)
+    count += count_maps(section.items) + count_maps(section.sections);
+  return count;
+}
+
+std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::Outline& outline) {
+  const std::size_t maps = count_maps(outline.items) + count_maps(outline.sections);
+  const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
+                            static_cast<double>(std::max<std::size_t>(maps, 1));
+  return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
+}
+
+std::string read_asset(const std::string& name, Run& run) {
+  const fs::path path = graspmap_tools::toolkit_data_folder() / "report" / name;
+  run.add_input(path);
+  return libmap::read_whole_file(path);
+}
+
+libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_views, Run& run) {
+  libmap::PageAssets assets;
+  assets.version = run.manifest().version;
+  assets.style = read_asset("report.css", run);
+  assets.script = read_asset("report.js", run);
+  if (!with_views) return assets;
+  for (const char* name : {"three.min.js", "examples/js/controls/OrbitControls.js"}) {
+    const fs::path path = fs::path(options.three) / name;
+    std::error_code code;
+    if (!fs::is_regular_file(path, code))
+      throw libmap::Error(
+          "no such file: install the Debian package libjs-three, or leave the 3-D "
+          "views out with --no-3d",
+          {.file = path.string()});
+    run.add_input(path);
+    assets.libraries.push_back(libmap::read_whole_file(path));
+  }
+  assets.library_notice = read_asset("three_license.txt", run);
+  return assets;
+}
+
+libmap::Outline find_outline(const ReportCommandOptions& options, Run& run) {
+  libmap::Outline outline;
+  if (options.outline.empty()) {
+    outline = libmap::outline_of_folder(options.folder);
+  } else {
+    const fs::path file = graspmap_tools::find_data_file("reports", options.outline);
+    run.add_input(file);
+    outline = libmap::read_outline(file);
+  }
+  if (!options.title.empty()) outline.title = options.title;
+  return outline;
+}
+
+void make_report(ReportCommandOptions& options, Run& run) {
+  std::error_code code;
+  if (!fs::is_directory(options.folder, code))
+    throw libmap::Error(fs::exists(options.folder, code) ? "is no folder" : "no such folder",
+                        {.file = options.folder});
+  if (options.output.empty()) options.output = (fs::path(options.folder) / "report.html").string();
+  const std::string extension = fs::path(options.output).extension().string();
+  if (extension != ".html" && extension != ".htm")
+    throw libmap::Error("reports are written as .html", {.file = options.output});
+  run.claim_output(options.output);
+  const libmap::Outline outline = find_outline(options, run);
+  const std::size_t max_cells = cells_a_map(options, outline);
+  const bool with_views = !options.no_views && max_cells > 0 &&
+                          count_maps(outline.items) + count_maps(outline.sections) > 0;
+  const libmap::PageAssets assets = read_assets(options, with_views, run);
+  const libmap::ReportReadResult read = run.timed("read", [&] {
+    return libmap::read_report_content(
+        outline, {.folder = options.folder, .left_out = options.output},
+        [&](const fs::path& map, const auto& lookup) {
+          return graspmap_tools::load_map_view(map, lookup, max_cells, run);
+        });
+  });
+  const libmap::FittedPage page = run.timed("write page", [&] {
+    return libmap::fit_report_page(read.content, assets,
+                                   static_cast<std::size_t>(options.max_size_mb * 1e6));
+  });
+  for (const fs::path& file : read.files)
+    run.add_input(graspmap_tools::is_tile_store(file.string())
+                      ? graspmap_tools::store_index_path(file.string())
+                      : file);
+  const auto result = [&](const char* name, std::size_t value) {
+    run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  result("files", read.files.size());
+  result("bytes", page.html.size());
+  result("pictures_made_smaller", page.changed_pictures);
+  run.say(fmt::format("{} files, {:.1f} MB{}", read.files.size(),
+                      static_cast<double>(page.html.size()) / 1e6,
+                      page.changed_pictures == 0
+                          ? ""
+                          : fmt::format(", {} pictures made smaller", page.changed_pictures)));
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_text(temporary, page.html); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  ReportCommandOptions options;
+  graspmap_tools::Command command(
+      "report", "One HTML file of a whole run: tables, pictures, times, provenance, 3-D views.");
+  command.input("DIR", options.folder, "folder of the run");
+  command.output(options.output, "report (.html); default: report.html in DIR", false);
+  command.option("--outline", "OUTLINE", options.outline,
+                 "what it shows: a YAML file or a name in data/reports; default: all in DIR");
+  command.flag("--no-3d", options.no_views, "leave the 3-D views out");
+  command.option("--three", "FOLDER", options.three, "where three.js lies");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { make_report(options, run); });
+}
