@@ -85,7 +85,7 @@ $(OUT)/lookup.csv: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
 $(OUT)/roc.png: $(OUT)/lookup.csv
 	@$(GRASPMAP) evaluate $< -o $(OUT)/evaluation --label graspable --score score --quiet \
 	  --title "$$TITLE"
-	@cp $(OUT)/evaluation/roc.png $@
+	@cp $(OUT)/evaluation/roc.png $@.partial && mv $@.partial $@
 
 $(OUT)/top.png: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
 	@$(GRASPMAP) render $< -o $@ --view top --color score $(markers) --title "$$TITLE" --quiet

@@ -1,0 +1,129 @@
+# The gripper masks side by side: each method's mask in three sections, its map of each site, the
+# scores of all in one chart, and how far each two agree (Cohen's kappa).
+#
+#   make -f pipelines/masks.mk OUT=folder [SITES="name:cloud.pcd cloud.pcd ..."] \
+#        [METHODS="thesis envelope climblab corrected"] [GRIPPERS="scar-e hubrobo"] -j2
+#
+# SITES are clouds, with a name before a colon if their files' names are not to serve; without any,
+# the embedded scene and simulated rocks. SCAR-E takes the thesis's 10 mm, H_add 1 and TSV 120.
+# HubRobo's 1 mm are finer than a site's cloud is dense and would make 9 million voxels of 3 x 3 m:
+# 5 mm are five to its palm's radius and three layers of its mask. Its published H_add 3 and TSV 100
+# are turned into these voxels: 1 layer, and 4 of the 324 voxels under its window as 100 of 7744;
+# gaps between the points are interpolated. The zero plane is off: all ground counts. A second run
+# does nothing; other variables or changed files make again what depends on them.
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+SITES ?=
+METHODS ?= thesis envelope climblab corrected
+GRIPPERS ?= scar-e hubrobo
+SCENARIO ?= artificial_rocks_prescan
+SCORE ?=
+COUNT ?= 73000
+EDGE ?= 0.008
+SPACING ?= 0.0068
+CELL ?= 360
+scar-e_mask ?= --voxel-size 0.01 --extra-void-layers 1
+hubrobo_mask ?= --voxel-size 0.005 --extra-void-layers 1
+scar-e_score ?= --solid-voxel-threshold 120
+hubrobo_score ?= --solid-voxel-threshold 4 --curvature-radius 0.03 --set interpolation=yes
+
+# make splits names at spaces; better an error than half a name.
+one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+$(foreach name,OUT SCENARIO,$(call one_word,$(name)))
+ifeq ($(OUT),)
+  $(error OUT is not set: the folder of the results, e.g. OUT=masks)
+endif
+$(foreach name,METHODS GRIPPERS,$(if $(strip $($(name))),,$(error $(name) is empty)))
+
+simulated := primitive_shapes:$(OUT)/sites/primitive_shapes.pcd rocks:$(OUT)/sites/rocks.pcd
+sites := $(or $(strip $(SITES)),$(simulated))
+# A site's name and its cloud.
+name_of = $(if $(findstring :,$(1)),$(firstword $(subst :, ,$(1))),$(basename $(notdir $(1))))
+cloud_of = $(lastword $(subst :, ,$(1)))
+names := $(foreach site,$(sites),$(call name_of,$(site)))
+ifneq ($(words $(names)),$(words $(sort $(names))))
+  $(error SITES holds a name twice: $(names): name:cloud.pcd gives another)
+endif
+
+maps_of = $(foreach method,$(METHODS),$(OUT)/$(1)/$(2)/$(method).pcd)
+empty :=
+space := $(empty) $(empty)
+barred = $(subst $(space),|,$(strip $(1)))
+no_captions := $(subst $(space),,$(foreach site,$(sites),$(foreach method,$(METHODS),|)))
+
+folders := $(foreach name,$(names),$(foreach gripper,$(GRIPPERS),$(OUT)/$(name)/$(gripper)))
+sections := $(foreach gripper,$(GRIPPERS),$(foreach method,$(METHODS),\
+  $(OUT)/sections/$(gripper)_$(method).png))
+results := $(sections) $(foreach gripper,$(GRIPPERS),$(OUT)/$(gripper).png) $(OUT)/pairs.csv \
+  $(OUT)/maps.csv $(foreach folder,$(folders),$(folder)/scores.png $(folder)/scores.svg)
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: all FORCE
+all: $(results)
+
+$(OUT) $(OUT)/sections $(OUT)/sites $(folders):
+	@mkdir -p $@
+
+# Stamps of the variables that a result depends on: written anew only if they change.
+export scored_with := $(SCENARIO) $(SCORE) $(foreach gripper,$(GRIPPERS),$($(gripper)_mask) $($(gripper)_score))
+export shown_with := $(sites) $(METHODS) $(GRIPPERS) $(CELL)
+export simulated_with := $(COUNT) $(EDGE) $(SPACING)
+$(foreach stamp,scored_with shown_with simulated_with,$(OUT)/$(stamp)): FORCE | $(OUT)
+	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
+
+$(OUT)/sites/primitive_shapes.pcd: $(OUT)/simulated_with | $(OUT)/sites
+	@$(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
+
+$(OUT)/sites/rocks/mesh.ply: $(OUT)/simulated_with | $(OUT)/sites
+	@$(GRASPMAP) simulate site --edge-length $(EDGE) -o $(@D) --quiet
+
+$(OUT)/sites/rocks.pcd: $(OUT)/sites/rocks/mesh.ply
+	@$(GRASPMAP) resample $< --count $(COUNT) -o $@ --quiet
+
+# Gripper, method.
+define sections_of
+$(OUT)/sections/$(1)_$(2).png: $(OUT)/scored_with | $(OUT)/sections
+	@$(GRASPMAP) mask --gripper $(1) --method $(2) $($(1)_mask) --sections -o $$@ \
+	  --quiet
+endef
+$(foreach gripper,$(GRIPPERS),$(foreach method,$(METHODS),$(eval \
+  $(call sections_of,$(gripper),$(method)))))
+
+# Site's name, its cloud, gripper. make runs the maps side by side: each process takes one thread.
+define maps_and_tables
+$(OUT)/$(1)/$(3)/%.pcd: $(2) $(OUT)/scored_with | $(OUT)/$(1)/$(3)
+	@$(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --gripper $(3) --method $$* --zero-plane -10 \
+	  $($(3)_mask) $($(3)_score) $(SCORE) --threads 1 --quiet
+
+$(OUT)/$(1)/$(3)/summary/pairs.csv $(OUT)/$(1)/$(3)/summary/maps.csv \
+$(OUT)/$(1)/$(3)/summary/histograms.csv &: $(call maps_of,$(1),$(3)) $(OUT)/shown_with
+	@$(GRASPMAP) summarize $(call maps_of,$(1),$(3)) -o $(OUT)/$(1)/$(3)/summary --pairs \
+	  --names "$(call barred,$(METHODS))" --quiet
+
+$(OUT)/$(1)/$(3)/scores.png $(OUT)/$(1)/$(3)/scores.svg: $(OUT)/$(1)/$(3)/summary/histograms.csv
+	@$(GRASPMAP) chart $$< -o $$@ --x score --y share --series map --title '$(1), $(3)' \
+	  --y-title 'share of the judged voxels' --x-min 0 --x-max 1 --quiet
+endef
+$(foreach site,$(sites),$(foreach gripper,$(GRIPPERS),$(eval \
+  $(call maps_and_tables,$(call name_of,$(site)),$(call cloud_of,$(site)),$(gripper)))))
+
+define sheet
+$(OUT)/$(1).png: $(foreach name,$(names),$(call maps_of,$(name),$(1))) $(OUT)/shown_with
+	@$(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(METHODS)) --quiet \
+	  --cell-width $(CELL) --shared-view row --title '$(1)' \
+	  --column-titles "$(call barred,$(METHODS))" --row-titles "$(call barred,$(names))" \
+	  --captions "$(patsubst |%,%,$(no_captions))"
+endef
+$(foreach gripper,$(GRIPPERS),$(eval $(call sheet,$(gripper))))
+
+# One table of all sites and grippers: these two before the columns of each.
+joined = @rm -f $@; for name in $(names); do for gripper in $(GRIPPERS); do \
+  sed "1s/^/site,of_gripper,/; 2,\$$s/^/$$name,$$gripper,/" \
+    $(OUT)/$$name/$$gripper/summary/$(@F) | { if [ -s $@ ]; then tail -n +2; else cat; fi; } \
+    >> $@ || exit 1; done; done
+$(OUT)/pairs.csv: $(foreach folder,$(folders),$(folder)/summary/pairs.csv)
+	$(joined)
+$(OUT)/maps.csv: $(foreach folder,$(folders),$(folder)/summary/maps.csv)
+	$(joined)

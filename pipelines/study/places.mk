@@ -1,0 +1,57 @@
+# The places of the field tests in every map of scenarios 2 to 4; included by study.mk.
+#
+# OUT/N_name/METHOD/table.csv has a row a place and a column a case, as the thesis's tables B 2-3
+# (the score at the place, and 1 or 0 by the combined criterion) and, of the wall, B 2-4 (whether a
+# hold is graspable). In situ a place has a value only where the robot measured a point near it. The
+# wall's cases are evaluated against its pre-scanned map: METHOD/evaluation/.
+
+# How a place is looked up, and what of the map stands in its column: for the score, and for the
+# combined criterion. A hold is graspable if the best place on it is, or if any of it is convex and
+# reaches the threshold: a share of its voxels that is not nothing.
+by_score_2 := score
+by_score_3 := score>=0.9
+by_score_4 := score
+by_both_2 := graspable
+by_both_3 := graspable>=0.0001
+by_both_4 := graspable
+look_by_score_2 := $(LOOKUP)
+look_by_both_2 := $(LOOKUP)
+look_by_score_3 := --mode maximum --radius $(HOLD_RADIUS)
+look_by_both_3 := --mode mean --radius $(HOLD_RADIUS)
+look_by_score_4 := $(LOOKUP)
+look_by_both_4 := $(LOOKUP)
+
+# One column: scenario's number, method, column, case, by_score or by_both, flags, the table before.
+define column
+$(folder_$(1))/$(2)/places/$(3).csv: $(folder_$(1))/$(2)/$(4)/map.pcd $(7) \
+    $(folder_$(1))/$(2)/looked_up_with
+	@mkdir -p $$(@D)
+	@$$(GRASPMAP) lookup $$(wordlist 1,2,$$^) -o $$@ --points-frame map $(look_$(5)_$(1)) \
+	  $(6) --column '$(3)=$($(5)_$(1))' --quiet
+endef
+
+# Scenario's number, method.
+define places
+$(call stamp,$(folder_$(1))/$(2)/looked_up_with,$(look_by_score_$(1)) $(by_score_$(1)))
+$(call column,$(1),$(2),prescan,prescan,by_score,,$(folder_$(1))/site/field_points.csv)
+$(call column,$(1),$(2),prescan_combined,prescan,by_both,,$(folder_$(1))/$(2)/places/prescan.csv)
+$(call column,$(1),$(2),realtime_raw,insitu_raw,by_score,--visible $(folder_$(1))/panorama.pcd,\
+$(folder_$(1))/$(2)/places/prescan_combined.csv)
+$(call column,$(1),$(2),realtime_interpolated,insitu_interpolated,by_score,\
+--visible $(folder_$(1))/panorama.pcd,$(folder_$(1))/$(2)/places/realtime_raw.csv)
+$(call column,$(1),$(2),realtime_combined,insitu_interpolated,by_both,\
+--visible $(folder_$(1))/panorama.pcd,$(folder_$(1))/$(2)/places/realtime_interpolated.csv)
+$(folder_$(1))/$(2)/table.csv: $(folder_$(1))/$(2)/places/realtime_combined.csv
+	@cp $$< $$@.partial && mv $$@.partial $$@
+results += $(folder_$(1))/$(2)/table.csv
+endef
+$(foreach n,$(sites),$(foreach method,$(METHODS),$(eval $(call places,$(n),$(method)))))
+
+# Method.
+define wall_evaluation
+$(folder_3)/$(1)/evaluation/accuracy.csv: $(folder_3)/$(1)/table.csv
+	@$$(GRASPMAP) evaluate $$< -o $$(@D) --label prescan --title 'against the pre-scanned map' \
+	  --score prescan_combined,realtime_raw,realtime_interpolated,realtime_combined --quiet
+results += $(folder_3)/$(1)/evaluation/accuracy.csv
+endef
+$(if $(filter 3,$(SCENARIOS)),$(foreach method,$(METHODS),$(eval $(call wall_evaluation,$(method)))))

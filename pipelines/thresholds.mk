@@ -1,0 +1,98 @@
+# The thesis's threshold study (its table 5-6): the solid-voxel threshold TSV times the extra void
+# layers H_add, each a map; all maps side by side, and one table of them. On scenario 1 also the
+# measure that its chapter 5.2.4 asks for: sensitivity and specificity against places whose
+# graspability is expected, and Youden's index over the two thresholds.
+#
+#   make -f pipelines/thresholds.mk OUT=folder [TSV="120 300 700 2500"] [HADD="1 3 5"] \
+#        [METHODS="thesis corrected"] [SITE=cloud.pcd [EXPECTED=regions.csv]] [SCENARIO=...] -j2
+#
+# The thesis's own twelve pairs are not known here: this grid is ours. H_add takes the values of the
+# published parameter sets (tab. B 2-1 and the gripper HubRobo's: 1, 3, 5). A TSV matters where
+# windows hold fewer solid voxels (SSV): 120 is the thesis's; 300, 700 and 2500 are about the 5th
+# percentile and the median of SSV that `thesis` finds on the embedded scene, and the median that
+# `corrected` does. SITE: another cloud, without expectations unless EXPECTED names some. A second
+# run does nothing; other variables or changed files make again what depends on them.
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+TSV ?= 120 300 700 2500
+HADD ?= 1 3 5
+METHODS ?= thesis corrected
+SCENARIO ?= primitive_shapes_prescan
+SPACING ?= 0.0068
+SITE ?=
+SCORE ?=
+CELL ?= 360
+export TITLE ?= $(if $(SITE),$(basename $(notdir $(SITE))),primitive shapes)
+data := $(firstword $(wildcard $(here)../data) $(here)..)
+EXPECTED ?= $(if $(SITE),,$(data)/expected/primitive_shapes.csv)
+
+# make splits names at spaces; better an error than half a name.
+one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
+$(foreach name,SITE OUT SCENARIO EXPECTED,$(call one_word,$(name)))
+ifeq ($(OUT),)
+  $(error OUT is not set: the folder of the results, e.g. OUT=thresholds)
+endif
+$(foreach name,TSV HADD METHODS,$(if $(strip $($(name))),,$(error $(name) is empty)))
+
+terrain := $(or $(SITE),$(OUT)/terrain.pcd)
+scenario_file := $(firstword $(wildcard $(SCENARIO) $(data)/scenarios/$(SCENARIO).yaml))
+pairs := $(foreach h,$(HADD),$(foreach t,$(TSV),$(t)_$(h)))
+maps_of = $(foreach pair,$(pairs),$(OUT)/$(1)/$(pair).pcd)
+maps := $(foreach method,$(METHODS),$(call maps_of,$(method)))
+tsv_of = $(firstword $(subst _, ,$(1)))
+hadd_of = $(lastword $(subst _, ,$(1)))
+# "TSV 120, H_add 1|TSV 300, H_add 1|...".
+empty :=
+space := $(empty) $(empty)
+captions := $(subst $(space),|,$(foreach pair,$(pairs),TSV~$(call tsv_of,$(pair)),~H_add~$(call \
+  hadd_of,$(pair))))
+captions := $(subst ~, ,$(captions))
+
+charts := $(foreach kind,graspable_share $(if $(EXPECTED),voxel_youden place_youden),\
+  $(OUT)/$(kind).png $(OUT)/$(kind).svg)
+results := $(foreach method,$(METHODS),$(OUT)/$(method).png) $(OUT)/thresholds.csv $(charts)
+
+.DELETE_ON_ERROR:
+.SECONDARY:
+.PHONY: all FORCE
+all: $(results)
+
+$(OUT) $(foreach method,$(METHODS),$(OUT)/$(method)):
+	@mkdir -p $@
+
+# Stamps of the variables that a result depends on: written anew only if they change.
+export scored_with := $(SITE) $(SCENARIO) $(SCORE) $(if $(SITE),,$(SPACING))
+export shown_with := $(TSV); $(HADD); $(METHODS); $(EXPECTED) $(TITLE) $(CELL)
+$(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
+	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
+
+$(OUT)/terrain.pcd: $(OUT)/scored_with | $(OUT)
+	@$(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
+
+# make runs the maps side by side: each process takes one thread.
+define score
+$(OUT)/$(1)/%.pcd: $(terrain) $(OUT)/scored_with $(scenario_file) | $(OUT)/$(1)
+	@$(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --method $(1) $(SCORE) --threads 1 --quiet \
+	  --solid-voxel-threshold $$(call tsv_of,$$*) --extra-void-layers $$(call hadd_of,$$*)
+
+$(OUT)/$(1).png: $(call maps_of,$(1)) $(OUT)/shown_with $(EXPECTED)
+	@$(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(TSV)) --quiet \
+	  --cell-width $(CELL) --captions "$(captions)" --title "$$$$TITLE: $(1)" \
+	  $(if $(EXPECTED),--points $(EXPECTED) --verdict graspable --label none)
+endef
+$(foreach method,$(METHODS),$(eval $(call score,$(method))))
+
+$(OUT)/thresholds.csv: $(maps) $(OUT)/shown_with $(EXPECTED)
+	@$(GRASPMAP) summarize $(maps) -o $(OUT)/summary $(if $(EXPECTED),--expected $(EXPECTED))
+	@cp $(OUT)/summary/maps.csv $@.partial && mv $@.partial $@
+
+chart = @$(GRASPMAP) chart $< -o $@ --x solid_voxel_threshold --y $(1) --series \
+  method,extra_void_layers --x-title 'solid-voxel threshold TSV' --y-title '$(2)' --title "$$TITLE" \
+  $(3) --quiet
+$(OUT)/graspable_share.%: $(OUT)/thresholds.csv
+	$(call chart,graspable_share,share of the judged voxels that can be held,)
+$(OUT)/voxel_youden.%: $(OUT)/thresholds.csv
+	$(call chart,voxel_youden,sensitivity + specificity - 1: voxels,--y-min 0 --y-max 1)
+$(OUT)/place_youden.%: $(OUT)/thresholds.csv
+	$(call chart,place_youden,sensitivity + specificity - 1: places,--y-min 0 --y-max 1)

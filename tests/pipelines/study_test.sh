@@ -1,0 +1,88 @@
+#!/bin/sh
+# The study of a wall and of rocks, coarse: tables of places like the thesis's B 2-3 and B 2-4, in
+# situ only what was measured, the body inclined, the published tables where they are, a report; a
+# second run does nothing, another variable is seen.
+. "$(dirname "$0")/check.sh"
+out=$scratch/study
+
+run() {
+  make --no-print-directory -f "$source/pipelines/study.mk" OUT="$out" GRASPMAP="$graspmap" \
+    SCENARIOS="3 4" METHODS=thesis STAGES="published report" INCLINATIONS=25 EDGE=0.03 COUNT=20000 \
+    PANORAMA="--stride 3" "$@"
+}
+# Column $2 of a table by its name, without the head.
+column() {
+  awk -F, -v name="$2" '/^#/ { next }
+    !head { for (n = 1; n <= NF; ++n) if ($n == name) column = n; head = 1; next }
+    { print $column }' "$1"
+}
+
+run -j2 >"$scratch/log"
+for scenario in 3_bouldering_wall 4_artificial_rocks; do
+  folder=$out/$scenario
+  require_files "$folder/site.png" "$folder/panorama.png" "$folder/terrain.pcd" "$folder/panorama.pcd"
+  for case in prescan insitu_raw insitu_interpolated; do
+    require_files "$folder/thesis/$case/map.pcd" "$folder/thesis/$case/top.png" \
+      "$folder/thesis/$case/lookup.csv"
+  done
+done
+require_files "$out/report.html"
+
+# Every place has its row; pre-scanned each has a value, in situ some have, and none has where the
+# robot measured nothing, interpolated or not.
+rocks=$out/4_artificial_rocks/thesis/table.csv
+wall=$out/3_bouldering_wall/thesis/table.csv
+for count in "$rocks 30" "$wall 58"; do
+  table=${count% *}
+  places=${count#* }
+  for name in prescan prescan_combined; do
+    [ "$(column "$table" $name | grep -c .)" -eq "$places" ] || fail "$table: $name has gaps"
+  done
+  visible=$(sed -n 's/.*"visible": \([0-9]*\).*/\1/p' "${table%table.csv}places/realtime_combined.csv.json")
+  [ "$visible" -gt 3 ] && [ "$visible" -lt "$places" ] || fail "$table: $visible places are visible"
+  for name in realtime_raw realtime_interpolated realtime_combined; do
+    seen=$(column "$table" $name | grep -c .)
+    [ "$seen" -gt 0 ] && [ "$seen" -le "$visible" ] || fail "$table: $name has $seen values"
+  done
+done
+if column "$wall" prescan | grep -qv '^[01]$'; then fail "the wall's verdicts are not 1 or 0"; fi
+column "$rocks" prescan | grep -q '^0\.[0-9]' || fail "the rocks have no scores"
+# Combined is never more than the score alone.
+[ "$(column "$wall" prescan_combined | grep -c 1)" -le "$(column "$wall" prescan | grep -c 1)" ] ||
+  fail "the combined criterion holds where the score does not"
+[ "$(cut -d, -f1 "$out/3_bouldering_wall/thesis/evaluation/accuracy.csv" | tr '\n' ' ')" = \
+  "case prescan_combined realtime_raw realtime_interpolated realtime_combined " ] ||
+  fail "the wall's cases are not evaluated"
+
+# The plane of a level robot is the ground; inclined it still is, roughly.
+planes=$out/4_artificial_rocks/poses/planes.csv
+[ "$(cut -d, -f1,2 "$planes" | tr '\n' ' ')" = "direction,inclination_deg level,0 forward,25 \
+backward,25 left,25 right,25 " ] || fail "other poses: $(cat "$planes")"
+awk -F, 'NR == 2 && !($5 < 2) { exit 1 } NR > 2 && !($5 < 10) { exit 1 }' "$planes" ||
+  fail "the plane is not the ground: $(cat "$planes")"
+[ "$(head -n 1 "$out/4_artificial_rocks/poses/places_thesis.csv" | tr ',' '\n' | tail -n 5 |
+  tr '\n' ' ')" = "level forward_25 backward_25 left_25 right_25 " ] || fail "no column a pose"
+
+if [ -n "${GRASPMAP_DATA:-}" ]; then
+  for rate in "artificial_rocks prescan 0.7333" "artificial_rocks realtime_raw 0.6875" \
+    "artificial_rocks_interpolated realtime_interpolated 0.6875" \
+    "bouldering_wall realtime_raw 0.7000"; do
+    set -- $rate
+    grep -q "^$2,.*,$3\$" "$out/published/$1/accuracy.csv" || fail "published: not $rate"
+  done
+  require_files "$out/4_artificial_rocks/real/thesis/prescan/map.pcd"
+fi
+
+before=$(listing "$out")
+run -j2 >"$scratch/log"
+[ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
+map=$(sha256sum <"$out/4_artificial_rocks/thesis/prescan/map.pcd")
+run -j2 LOOKUP="--mode maximum --radius 0.05" >"$scratch/log"
+[ "$before" != "$(listing "$out")" ] || fail "another way of looking up was not seen"
+[ "$map" = "$(sha256sum <"$out/4_artificial_rocks/thesis/prescan/map.pcd")" ] ||
+  fail "the look-up changed the map"
+for wrong in SCENARIOS=5 METHODS=theses STAGES=all OUT= 'OUT=two words'; do
+  if run "$wrong" >/dev/null 2>"$scratch/errors"; then fail "$wrong was taken"; fi
+  grep -q 'none of\|not set\|holds a space' "$scratch/errors" || fail "no clear error for $wrong"
+done
+echo "passed"
