@@ -10,11 +10,21 @@ install(TARGETS ${graspmap_commands}
   RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/graspmap)
 install(TARGETS ${graspmap_libraries} EXPORT graspmap_targets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+# But for inner headers: of the .cc files beside them alone, and not whole or not free of other
+# libraries by themselves.
 install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
-  FILES_MATCHING PATTERN "*.h")
-install(DIRECTORY data/grippers data/rigs data/scenarios data/scenes data/sites data/field_test
+  FILES_MATCHING PATTERN "*.h"
+  PATTERN *_body.h EXCLUDE
+  PATTERN ros_messages.h EXCLUDE
+  PATTERN tile_store_json.h EXCLUDE)
+install(DIRECTORY data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
+install(FILES tools/completion/graspmap.bash
+  DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions RENAME graspmap)
+# Made by scripts/package.
+install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 OPTIONAL)
+install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 set(graspmap_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/graspmap)
 install(EXPORT graspmap_targets NAMESPACE graspmap:: DESTINATION ${graspmap_cmake_folder})

@@ -30,7 +30,8 @@ function(graspmap_set_flags target)
     POSITION_INDEPENDENT_CODE ON)
   # -Wno-restrict: GCC 12 sees overlaps in std::string's operator+ (GCC bug 105651).
   # No contraction into fused multiply-adds: results must not depend on the machine.
-  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow -Wno-restrict -ffp-contract=off
+  target_compile_options(${target} PRIVATE -Wall -Wextra -Wconversion -Wshadow
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> -ffp-contract=off
     $<$<BOOL:${GRASPMAP_WARNINGS_AS_ERRORS}>:-Werror> ${graspmap_sanitizer_flags})
   target_compile_definitions(${target} PRIVATE ${graspmap_sanitizer_definitions})
   target_link_options(${target} PRIVATE ${graspmap_sanitizer_flags})

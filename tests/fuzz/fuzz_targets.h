@@ -1,0 +1,30 @@
+// The readers that take bytes from outside, each as a function that swallows any bytes.
+#pragma once
+
+#include <filesystem>
+#include <ostream>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace graspmap_fuzz {
+
+// Reads `bytes` as the target's format and says whether they were accepted. A libmap::Error is the
+// right answer to broken bytes; any other exception, a crash, a hang or a sanitizer's report is a
+// finding.
+struct FuzzTarget {
+  const char* name;
+  const char* reads;
+  bool (*run)(std::string_view bytes);
+};
+
+inline void PrintTo(const FuzzTarget& target, std::ostream* out) { *out << target.name; }
+
+const std::vector<FuzzTarget>& fuzz_targets();
+// Throws std::out_of_range if there is none of that name.
+const FuzzTarget& fuzz_target(std::string_view name);
+
+// Files of well-formed content for `target`, written into `folder`: a fuzzer begins from them.
+void write_seeds(const FuzzTarget& target, const std::filesystem::path& folder);
+
+}  // namespace graspmap_fuzz

@@ -1,0 +1,38 @@
+// A small scan database, any blob of which can be replaced.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "tests/fuzz/scratch_file.h"
+
+namespace graspmap_fuzz {
+
+class StoredBlobs {
+ public:
+  StoredBlobs();
+
+  // Blobs in it.
+  std::size_t places() const { return places_.size(); }
+  const std::string& blob(std::size_t place) const { return places_[place].bytes; }
+
+  // The database with `bytes` in place of one of them; the file is the same for every call.
+  const std::filesystem::path& database_with(std::size_t place, std::string_view bytes) const;
+
+ private:
+  struct Place {
+    std::string table;
+    std::string column;
+    std::int64_t row = 0;
+    std::string bytes;
+  };
+
+  ScratchFile file_{"blob.db"};
+  std::string sample_;  // the whole file
+  std::vector<Place> places_;
+};
+
+}  // namespace graspmap_fuzz
