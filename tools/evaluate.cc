@@ -43,17 +43,6 @@ void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
   parameters.add("title", options.title, "title of the plot and of the summary");
 }
 
-std::vector<std::string> split_names(std::string_view text) {
-  std::vector<std::string> names;
-  while (!text.empty()) {
-    const std::size_t comma = text.find(',');
-    const std::string_view name = libmap::trim(text.substr(0, comma));
-    if (!name.empty()) names.emplace_back(name);
-    text = comma == std::string_view::npos ? std::string_view() : text.substr(comma + 1);
-  }
-  return names;
-}
-
 libmap::Chart chart_of(const TableEvaluation& evaluation, const std::string& title) {
   std::vector<libmap::RocCurve> curves;
   for (const ColumnEvaluation& column : evaluation.columns) {
@@ -105,21 +94,22 @@ void write_results(const EvaluateOptions& options, const TableEvaluation& evalua
       libmap::write_text(temporary, content);
     };
   };
-  run.write_output_folder(options.folder,
-                          {{"roc.csv", text(libmap::to_csv(libgtd::roc_table(evaluation)))},
-                           {"rates.csv", text(libmap::to_csv(libgtd::rates_table(evaluation)))},
-                           {"summary.json", text(libgtd::to_json(evaluation))},
-                           {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
-                           {"roc.svg",
-                            [&](const fs::path& temporary) {
-                              libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
-                            }},
-                           {"roc.png", text(libmap::to_png(picture))}});
+  run.write_output_folder(
+      options.folder, {{"roc.csv", text(libmap::to_csv(libgtd::roc_table(evaluation)))},
+                       {"rates.csv", text(libmap::to_csv(libgtd::rates_table(evaluation)))},
+                       {"accuracy.csv", text(libmap::to_csv(libgtd::accuracy_table(evaluation)))},
+                       {"summary.json", text(libgtd::to_json(evaluation))},
+                       {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
+                       {"roc.svg",
+                        [&](const fs::path& temporary) {
+                          libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
+                        }},
+                       {"roc.png", text(libmap::to_png(picture))}});
 }
 
 void evaluate(EvaluateOptions& options, Run& run) {
   run.claim_output_folder(options.folder);
-  options.evaluation.score_columns = split_names(options.scores);
+  options.evaluation.score_columns = libmap::split_list(options.scores);
   const libmap::Table table = libmap::read_csv(options.table);
   run.add_input(options.table);
   const TableEvaluation evaluation =
@@ -135,8 +125,9 @@ int main(int argc, char** argv) {
   graspmap_tools::Command command(
       "evaluate", "ROC curve, area under it and accuracy of scores against a field test");
   command.input("TABLE.csv", options.table, "labels and scores, one row a location");
-  command.output(options.folder,
-                 "folder of roc.csv, rates.csv, summary.json, summary.md, roc.png and roc.svg");
+  command.output(
+      options.folder,
+      "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { evaluate(options, run); });
 }

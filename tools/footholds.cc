@@ -21,14 +21,6 @@ struct FootholdsCommandOptions {
   libgtd::FootholdOptions footholds;
 };
 
-// The outside of the regression plane in the frame of the map's points.
-libgtd::FootholdFrame frame_of(const std::optional<libmap::Manifest>& manifest) {
-  if (!manifest) return {};
-  const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
-  if (manifest->frame == "terrain" || terrain_from_input == nullptr) return {};
-  return {.up = terrain_from_input->linear().transpose() * Eigen::Vector3d::UnitZ()};
-}
-
 void find_footholds(const FootholdsCommandOptions& options, Run& run) {
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.map});
@@ -37,7 +29,8 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
   libgtd::FootholdResult result;
   try {
     result = run.timed("footholds", [&] {
-      return libgtd::find_footholds(map, options.footholds, frame_of(manifest));
+      return libgtd::find_footholds(map, options.footholds,
+                                    {.up = graspmap_tools::up_of_map(manifest)});
     });
   } catch (const libmap::Error& error) {
     throw error.in_file(options.map);

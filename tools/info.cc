@@ -16,6 +16,7 @@
 #include "tools/command_line.h"
 #include "tools/info_scan.h"
 #include "tools/info_tiles.h"
+#include "tools/map_frame.h"
 #include "tools/map_tiles.h"
 
 namespace {
@@ -187,6 +188,23 @@ void print_plainly(const Json& json, const std::string& indent) {
   }
 }
 
+// How far the terrain frame of a scored map leans, by its manifest: against the cloud that was
+// scored and, where it is known, against the map before it was cropped or a simulated robot stood
+// in it. For clouds whose z is up, the second is how far the regression plane misses the ground.
+Json plane_json(const libmap::Manifest& manifest) {
+  const libmap::Pose* terrain_from_input = manifest.find_transform("terrain_from_input");
+  if (terrain_from_input == nullptr) return nullptr;
+  const auto tilt_deg = [](const libmap::Pose& terrain_from_other) {
+    const Eigen::Vector3d up = terrain_from_other.linear().transpose() * Eigen::Vector3d::UnitZ();
+    return std::atan2(up.head<2>().norm(), up.z()) * 180.0 / M_PI;
+  };
+  Json json = {{"tilt_from_input_z_deg", tilt_deg(*terrain_from_input)}};
+  if (const libmap::Pose* input_from_map =
+          manifest.find_transform(graspmap_tools::site_from_map_name))
+    json["tilt_from_map_z_deg"] = tilt_deg(*terrain_from_input * *input_from_map);
+  return json;
+}
+
 // What --verify finds.
 struct Faults {
   std::vector<libmap::ScanFault> scan;
@@ -243,6 +261,7 @@ void info(InfoOptions& options, Run& run) {
     for (const auto& [name, value] : manifest->results)
       results[name] = std::visit([](const auto& held) { return Json(held); }, value);
     json["results"] = results;
+    if (Json plane = plane_json(*manifest); !plane.is_null()) json["plane"] = std::move(plane);
   }
   if (options.json)
     std::cout << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";

@@ -1,16 +1,20 @@
 // graspmap lookup: the map's values at listed locations.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <optional>
 #include <ostream>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "libgtd/evaluate/lookup.h"
+#include "libgtd/evaluate/roc.h"
 #include "libgtd/evaluate/tile_lookup.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/table.h"
+#include "libmap/core/text.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
 #include "tools/map_tiles.h"
@@ -25,7 +29,22 @@ struct LookupCommandOptions {
   std::string output;
   graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
   libgtd::LookupOptions lookup;
+  std::string columns;  // empty: found, distance_m and every field
+  std::string visible;  // a cloud, if not empty
+  double visible_radius_m = 0.02;
 };
+
+void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
+  bind(table, options.lookup);
+  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
+            "frame of the points: of the cloud that was scored, the terrain's, or the map's before "
+            "it was cropped or a simulated robot stood in it");
+  table.add("column", options.columns,
+            "what is added, with commas between: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
+            "none: found, distance_m and every field of the map");
+  table.add("visible_radius_m", options.visible_radius_m, libmap::positive,
+            "with --visible: how near a measured point must be, m");
+}
 
 // Appends a column; one that the points already have (a verdict named "graspable") keeps its name.
 void add_column(libmap::Table& table, std::string name) {
@@ -33,8 +52,40 @@ void add_column(libmap::Table& table, std::string name) {
   table.columns.push_back(std::move(name));
 }
 
+// One that is added to the table of points.
+struct AddedColumn {
+  std::string name;
+  std::string field;             // of the map, or found, or distance_m
+  std::optional<double> cutoff;  // 1 where the field reaches it, 0 where not
+};
+
+// NAME=FIELD or NAME=FIELD>=VALUE, with commas between.
+std::vector<AddedColumn> parse_columns(const std::string& text) {
+  std::vector<AddedColumn> columns;
+  for (const std::string& part : libmap::split_list(text)) {
+    const std::size_t equals = part.find('=');
+    const std::string_view rest =
+        equals == std::string::npos ? "" : std::string_view(part).substr(equals + 1);
+    const std::size_t comparison = rest.find(">=");
+    AddedColumn column;
+    column.name = libmap::trim(std::string_view(part).substr(0, equals));
+    column.field = libmap::trim(rest.substr(0, comparison));
+    if (comparison != std::string_view::npos)
+      column.cutoff = libmap::parse_double(rest.substr(comparison + 2));
+    if (column.name.empty() || column.field.empty() ||
+        (comparison != std::string_view::npos && !column.cutoff))
+      throw libmap::Error("names no column", {.file = {},
+                                              .field = "--column",
+                                              .value = part,
+                                              .bound = "NAME=FIELD or NAME=FIELD>=VALUE"});
+    columns.push_back(std::move(column));
+  }
+  return columns;
+}
+
 struct MapAnswers {
-  std::vector<std::string> fields;  // of the map
+  std::vector<std::string> fields;         // of the map
+  std::vector<Eigen::Vector3d> positions;  // of the points, in the frame of the map's points
   std::vector<libgtd::LookupAnswer> answers;
 };
 
@@ -45,10 +96,12 @@ std::vector<std::string> field_names(const libmap::PointCloud& map) {
 }
 
 // To the frame of the map's points.
-void carry(const LookupCommandOptions& options, std::vector<Eigen::Vector3d>& positions, Run& run) {
+std::vector<Eigen::Vector3d> carried(const LookupCommandOptions& options,
+                                     std::vector<Eigen::Vector3d> positions, Run& run) {
   const libmap::Pose transform =
       graspmap_tools::map_from_points(options.map, options.points_frame, run);
   for (Eigen::Vector3d& position : positions) position = transform * position;
+  return positions;
 }
 
 MapAnswers ask_map(const LookupCommandOptions& options, std::vector<Eigen::Vector3d> positions,
@@ -56,55 +109,116 @@ MapAnswers ask_map(const LookupCommandOptions& options, std::vector<Eigen::Vecto
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
   if (map.empty()) throw libmap::Error("the map has no points", {.file = options.map});
   run.add_input(options.map);
-  carry(options, positions, run);
-  return {field_names(map),
-          run.timed("look-up", [&] { return libgtd::look_up(map, positions, options.lookup); })};
+  positions = carried(options, std::move(positions), run);
+  MapAnswers asked = {field_names(map), std::move(positions), {}};
+  asked.answers =
+      run.timed("look-up", [&] { return libgtd::look_up(map, asked.positions, options.lookup); });
+  return asked;
 }
 
 MapAnswers ask_tiles(const LookupCommandOptions& options, std::vector<Eigen::Vector3d> positions,
                      Run& run) {
   const graspmap_tools::MapTiles tiles(options.map);
-  carry(options, positions, run);
+  positions = carried(options, std::move(positions), run);
   run.add_input(graspmap_tools::store_index_path(options.map));
   const auto load = [&](std::size_t tile) { return tiles.load(tile); };
   try {
-    return {field_names(tiles.load(0)), run.timed("look-up", [&] {
-              return libgtd::look_up_tiles(tiles.index(), load, positions, options.lookup,
-                                           run.progress());
-            })};
+    MapAnswers asked = {field_names(tiles.load(0)), std::move(positions), {}};
+    asked.answers = run.timed("look-up", [&] {
+      return libgtd::look_up_tiles(tiles.index(), load, asked.positions, options.lookup,
+                                   run.progress());
+    });
+    return asked;
   } catch (const libmap::Error& error) {
     throw error.in_file(options.map);
   }
 }
 
+// Places with no point of the cloud near them were not seen: the map has no answer for them, what
+// interpolation may have put there notwithstanding.
+std::int64_t hide_unseen(const LookupCommandOptions& options, MapAnswers& map, Run& run) {
+  const libmap::PointCloud seen = libmap::read_cloud(options.visible).cloud;
+  if (seen.empty()) throw libmap::Error("the cloud has no points", {.file = options.visible});
+  run.add_input(options.visible);
+  const libmap::Pose input_from_map = graspmap_tools::input_from_map(options.map);
+  std::vector<Eigen::Vector3d> positions = map.positions;
+  for (Eigen::Vector3d& position : positions) position = input_from_map * position;
+  const libgtd::LookupOptions near_by = {.max_distance_m = options.visible_radius_m};
+  const std::vector<libgtd::LookupAnswer> sights =
+      run.timed("visibility", [&] { return libgtd::look_up(seen, positions, near_by); });
+  std::int64_t visible = 0;
+  for (std::size_t n = 0; n < sights.size(); ++n) {
+    visible += sights[n].found ? 1 : 0;
+    map.answers[n].found = map.answers[n].found && sights[n].found;
+  }
+  return visible;
+}
+
+// What a row of the output takes of an answer; fields by their number, after found and distance_m.
+struct Cell {
+  std::size_t field;
+  std::optional<double> cutoff;
+};
+
+std::vector<Cell> add_columns(libmap::Table& table, const std::vector<AddedColumn>& columns,
+                              const MapAnswers& map, const std::string& map_file) {
+  std::vector<std::string> fields = {"found", "distance_m"};
+  fields.insert(fields.end(), map.fields.begin(), map.fields.end());
+  std::vector<Cell> cells;
+  if (columns.empty())
+    for (const std::string& field : fields) {
+      cells.push_back({cells.size(), std::nullopt});
+      add_column(table, field);
+    }
+  for (const AddedColumn& column : columns) {
+    const auto field = std::find(fields.begin(), fields.end(), column.field);
+    if (field == fields.end())
+      throw libmap::Error("the map has no such field" + libmap::did_you_mean(column.field, fields),
+                          {.file = map_file, .field = "--column", .value = column.field});
+    if (table.find_column(column.name))
+      throw libmap::Error("the points have this column already",
+                          {.file = table.file, .field = "--column", .value = column.name});
+    cells.push_back({static_cast<std::size_t>(field - fields.begin()), column.cutoff});
+    table.columns.push_back(column.name);
+  }
+  return cells;
+}
+
+std::string text_of(const libgtd::LookupAnswer& answer, const Cell& cell) {
+  if (!answer.found && cell.field > 1) return "";
+  const double value = cell.field == 0   ? (answer.found ? 1.0 : 0.0)
+                       : cell.field == 1 ? answer.distance_m
+                                         : answer.values[cell.field - 2];
+  if (cell.cutoff) return libgtd::reaches_cutoff(value, *cell.cutoff) ? "1" : "0";
+  // Shortest text of single precision: the map's files hold no more.
+  return libmap::to_text(static_cast<float>(value));
+}
+
 // The points, each with its answer; row by row, so that a million of them are never text at once.
-void write_answers(std::ostream& out, libmap::Table table, const MapAnswers& map) {
-  add_column(table, "found");
-  add_column(table, "distance_m");
-  for (const std::string& field : map.fields) add_column(table, field);
+void write_answers(std::ostream& out, libmap::Table& table, const std::vector<Cell>& cells,
+                   const MapAnswers& map) {
   out << libmap::csv_line(table.columns);
   for (std::size_t row = 0; row < map.answers.size(); ++row) {
-    const libgtd::LookupAnswer& answer = map.answers[row];
-    std::vector<std::string> cells = std::move(table.rows[row]);
-    cells.push_back(answer.found ? "1" : "0");
-    cells.push_back(libmap::to_text(static_cast<float>(answer.distance_m)));
-    // Shortest text of single precision: the map's files hold no more.
-    for (std::size_t f = 0; f < map.fields.size(); ++f)
-      cells.push_back(answer.found ? libmap::to_text(static_cast<float>(answer.values[f])) : "");
-    out << libmap::csv_line(cells);
+    std::vector<std::string> line = std::move(table.rows[row]);
+    for (const Cell& cell : cells) line.push_back(text_of(map.answers[row], cell));
+    out << libmap::csv_line(line);
   }
 }
 
 void lookup(LookupCommandOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("look-ups are written as .csv", {.file = options.output});
+  const std::vector<AddedColumn> columns = parse_columns(options.columns);
   options.map = graspmap_tools::without_trailing_slash(options.map);
-  run.claim_output(options.output, {options.map, options.points});
+  run.claim_output(options.output, {options.map, options.points, options.visible});
   libmap::Table table = libmap::read_csv(options.points);
   std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
-  const MapAnswers map = graspmap_tools::is_tile_store(options.map)
-                             ? ask_tiles(options, std::move(positions), run)
-                             : ask_map(options, std::move(positions), run);
+  MapAnswers map = graspmap_tools::is_tile_store(options.map)
+                       ? ask_tiles(options, std::move(positions), run)
+                       : ask_map(options, std::move(positions), run);
+  const std::vector<Cell> cells = add_columns(table, columns, map, options.map);
+  if (!options.visible.empty())
+    run.manifest().results.emplace_back("visible", hide_unseen(options, map, run));
   std::int64_t found = 0;
   for (const libgtd::LookupAnswer& answer : map.answers) found += answer.found ? 1 : 0;
   run.add_input(options.points);
@@ -112,8 +226,8 @@ void lookup(LookupCommandOptions& options, Run& run) {
   run.manifest().results.emplace_back("found", found);
   run.say(fmt::format("{} of {} points lie on the map", found, map.answers.size()));
   run.write_output(options.output, [&](const auto& temporary) {
-    libmap::write_geometry_file(
-        temporary, [&](std::ostream& out) { write_answers(out, std::move(table), map); });
+    libmap::write_geometry_file(temporary,
+                                [&](std::ostream& out) { write_answers(out, table, cells, map); });
   });
 }
 
@@ -125,10 +239,9 @@ int main(int argc, char** argv) {
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
   command.input("POINTS", options.points, "CSV with the columns x, y, z in metres, and any others");
   command.output(options.output, "CSV: the points, each with the map's values there");
-  bind(command.parameters(), options.lookup);
-  command.parameters().add(
-      "points_frame", options.points_frame, graspmap_tools::point_frame_names(),
-      "frame of the points: of the cloud that was scored, the terrain's, or the map's "
-      "before it was cropped");
+  command.option("--visible", "CLOUD", options.visible,
+                 "what was measured, in the frame of the cloud that was scored (usually that "
+                 "cloud): places with none of its points near them get no values");
+  bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { lookup(options, run); });
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libmap/core/text.h"
+#include "tools/version_text.h"
 
 namespace {
 
@@ -34,11 +35,17 @@ constexpr CommandEntry commands[] = {
     {"merge", "tiles of a map into one map"},
     {"lookup", "the map's values at listed locations"},
     {"evaluate", "ROC, AUC and accuracy of looked-up scores against a field test"},
+    {"analyze", "how much of a map can be held, where; what differs from another map"},
     {"footholds", "the best places of a map, for a planner of steps"},
     {"render", "a picture of a cloud, a mesh or a map"},
+    {"summarize", "several maps in one table, also against an expected map"},
+    {"chart", "columns of a table as curves"},
+    {"sheet", "several maps or pictures side by side, with one legend"},
     {"mask", "a gripper's mask as text, cloud or picture data"},
+    {"bag", "ROS 1 bags in and out, offline"},
     {"spot-check", "height errors at places along the edges of a site"},
     {"compare", "how far one cloud or mesh lies from another, and how much of it it covers"},
+    {"report", "one HTML file of a whole run"},
     {"info", "what a scan, a cloud, a mesh or a map holds"},
     {"convert", "any format to any other"},
 };
@@ -86,7 +93,7 @@ fs::path find_program(const std::string& command) {
 int main(int argc, char** argv) {
   const std::string first = argc > 1 ? argv[1] : "";
   if (first == "--version") {
-    std::cout << "graspmap " GRASPMAP_VERSION "\n";
+    std::cout << graspmap_tools::version_text();
     return 0;
   }
   if (first == "--help" || first == "-h" || first == "help") {

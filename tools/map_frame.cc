@@ -26,7 +26,9 @@ std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
 }
 
 std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
-  const auto manifest = libmap::read_manifest_of(file);
+  // A folder's manifest stands beside it, with or without '/' at the end of its name.
+  const std::filesystem::path path(file);
+  const auto manifest = libmap::read_manifest_of(path.has_filename() ? path : path.parent_path());
   if (!manifest) return std::nullopt;
   const libmap::Pose* site_from_map = manifest->find_transform(site_from_map_name);
   const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
@@ -45,8 +47,8 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
   if (points_frame == PointFrame::map) {
     if (!manifest || manifest->find_transform(site_from_map_name) == nullptr)
       throw libmap::Error(
-          manifest ? "was not made from what `graspmap crop` wrote: it does not know of the map "
-                     "before it"
+          manifest ? "was made neither from what `graspmap crop` nor from what `graspmap simulate "
+                     "cameras` wrote: it does not know of the map before it"
                    : "no manifest beside it says how it lies in the map",
           {.file = map, .field = "--points-frame", .value = "map", .bound = "input or terrain"});
     return *site_from_map_of(map);
@@ -62,6 +64,22 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
   if (terrain_from_input == nullptr || map_in_terrain == points_in_terrain)
     return libmap::Pose::Identity();
   return map_in_terrain ? *terrain_from_input : terrain_from_input->inverse();
+}
+
+libmap::Pose input_from_map(const std::string& map) {
+  const auto manifest = libmap::read_manifest_of(map);
+  const libmap::Pose* terrain_from_input =
+      manifest ? manifest->find_transform("terrain_from_input") : nullptr;
+  if (terrain_from_input == nullptr || manifest->frame != "terrain")
+    return libmap::Pose::Identity();
+  return terrain_from_input->inverse();
+}
+
+Eigen::Vector3d up_of_map(const std::optional<libmap::Manifest>& manifest) {
+  const libmap::Pose* terrain_from_input =
+      manifest ? manifest->find_transform("terrain_from_input") : nullptr;
+  if (!terrain_from_input || manifest->frame == "terrain") return Eigen::Vector3d::UnitZ();
+  return terrain_from_input->linear().transpose() * Eigen::Vector3d::UnitZ();
 }
 
 Eigen::Vector3d parse_vector(const std::string& text, const std::string& field) {

@@ -14,19 +14,19 @@
 namespace graspmap_tools {
 
 // Which frame listed points are in: that of the cloud that was scored, the terrain frame, or that
-// of the map that `graspmap crop` made the site from.
+// of the map that `graspmap crop` made the site from or in which a simulated robot stood.
 enum class PointFrame { input, terrain, map };
 const std::vector<std::pair<std::string, PointFrame>>& point_frame_names();
 
 // The columns x, y, z, in metres. Throws Error naming the file, the row and the column.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
-// The name of the transform that `crop` makes and that others carry on. It always leads from the
-// map as it was before the first crop.
+// The name of the transform that `crop` and `simulate cameras` make and that others carry on. It
+// always leads from the map as it was before the first of them.
 inline constexpr const char* site_from_map_name = "site_from_map";
 
-// From the map before it was cropped to the points in `file`, as the file's manifest says; nothing
-// if it was not cropped.
+// From the map before it was cropped, or in which a simulated robot stood, to the points in `file`,
+// as the file's manifest says; nothing if it says nothing.
 std::optional<libmap::Pose> site_from_map_of(const std::string& file);
 
 // For an output in the frame of `input`: its manifest gets the input's site_from_map, if it has
@@ -37,6 +37,14 @@ void carry_site_transform(const std::string& input, Run& run);
 // identity, with a warning, if it has none. Throws Error if points are in the frame of a map that
 // was not cropped.
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run);
+
+// From the points in `map` to the cloud that was scored, as the map's manifest says; the identity
+// if it says nothing.
+libmap::Pose input_from_map(const std::string& map);
+
+// The outside of the regression plane in the frame of a map's points, as the map's manifest says;
+// the z axis if it says nothing.
+Eigen::Vector3d up_of_map(const std::optional<libmap::Manifest>& manifest);
 
 // "X,Y,Z". Throws Error naming `field`.
 Eigen::Vector3d parse_vector(const std::string& text, const std::string& field);

@@ -6,9 +6,12 @@
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/view/picture_sheet.h"
 #include "libmap/view/scene_view.h"
 #include "tools/command_line.h"
+#include "tools/mask_sections.h"
 
 namespace {
 
@@ -21,6 +24,9 @@ struct MaskOptions {
   std::vector<std::pair<std::string, std::string>> overrides;
   libgtd::GripperMaskOptions mask;
   libmap::Viewpoint view = libmap::Viewpoint::oblique;
+  bool sections = false;
+  int section_layer = 0;
+  int cell_width_px = 640;  // of a section
 };
 
 void bind(libmap::ParameterTable& table, MaskOptions& options) {
@@ -31,9 +37,31 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("extra_void_layers", options.mask.extra_void_layers, {0, 10000},
             "void layers on top (H_add), voxels");
   table.add("view", options.view, libmap::viewpoint_names(), "from where a picture is taken");
+  table.add("sections", options.sections, "three sections of the mask in place of a view of it");
+  table.add("section_layer", options.section_layer, {0, 1e6},
+            "layer of the lower horizontal section; 0 is the lowest");
+  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "width of a section, pixels");
+}
+
+std::string title_of(const GripperMask& mask, const MaskOptions& options) {
+  return fmt::format("{} mask, {}, {} mm", options.gripper, name_of(mask.method),
+                     libmap::to_text(static_cast<float>(mask.voxel_size_m * 1000.0)));
+}
+
+std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
+  libmap::PictureSheetOptions sheet;
+  sheet.columns = 3;
+  sheet.cell_width_px = options.cell_width_px;
+  sheet.title = fmt::format("{}: {} x {} x {} voxels", title_of(mask, options), mask.side,
+                            mask.side, mask.layers);
+  sheet.background = "white";
+  sheet.legends = {graspmap_tools::mask_legend(mask)};
+  return libmap::to_png(
+      libmap::draw_sheet(graspmap_tools::mask_sections(mask, options.section_layer), sheet));
 }
 
 std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
+  if (options.sections) return to_sections(mask, options);
   libmap::SceneLayer layer;
   layer.shape = to_cloud(mask);
   layer.coloring.mode = libmap::ColorMode::field;
@@ -42,8 +70,7 @@ std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
   layer.point_size_m = mask.voxel_size_m;
   libmap::SceneViewOptions view;
   view.view = options.view;
-  view.title = fmt::format("{} mask, {}, {} mm", options.gripper, name_of(mask.method),
-                           libmap::to_text(static_cast<float>(mask.voxel_size_m * 1000.0)));
+  view.title = title_of(mask, options);
   libmap::Scene scene;
   scene.layers.push_back(layer);
   return libmap::to_png(libmap::render_scene(scene, view));
@@ -52,6 +79,8 @@ std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
 void mask(const MaskOptions& options, Run& run) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
+  if (options.sections && extension != ".png")
+    throw libmap::Error("sections are drawn as .png", {.file = options.output});
   run.claim_output(options.output);
   const auto file = graspmap_tools::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
@@ -60,7 +89,6 @@ void mask(const MaskOptions& options, Run& run) {
   run.manifest().frame = "mask";
   run.manifest().results.emplace_back("side_voxels", static_cast<std::int64_t>(made.side));
   run.manifest().results.emplace_back("layers", static_cast<std::int64_t>(made.layers));
-  run.say(fmt::format("{} x {} x {} voxels", made.side, made.side, made.layers));
   run.write_output(options.output, [&](const auto& temporary) {
     if (extension == ".txt")
       libmap::write_text(temporary, to_text(made));
@@ -69,6 +97,7 @@ void mask(const MaskOptions& options, Run& run) {
     else
       libmap::write_cloud(temporary, to_cloud(made));
   });
+  run.say(fmt::format("{} x {} x {} voxels", made.side, made.side, made.layers));
 }
 
 }  // namespace

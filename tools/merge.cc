@@ -90,7 +90,7 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
   whole.frame = part.frame;
   whole.transforms = part.transforms;
   for (const char* name : {"lattice_origin_m", "plane_rmse_m", "up_source", "input_points",
-                           "occupied_voxels", "mask_side_voxels", "mask_layers"})
+                           "occupied_voxels", "mask_side_voxels", "mask_layers", "normal_radius_m"})
     if (const libmap::ManifestValue* value = part.find_result(name))
       whole.results.emplace_back(name, *value);
 }
@@ -99,6 +99,26 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
 std::int64_t count_of(const libmap::PointCloud& map, const char* flag) {
   const libmap::ScalarField* field = map.find_field(flag);
   return field == nullptr ? 0 : std::count(field->values.begin(), field->values.end(), 1.0);
+}
+
+double number_of(const libmap::ManifestValue* value) {
+  if (value != nullptr && std::holds_alternative<double>(*value)) return std::get<double>(*value);
+  if (value != nullptr && std::holds_alternative<std::int64_t>(*value))
+    return static_cast<double>(std::get<std::int64_t>(*value));
+  return 0.0;
+}
+
+// A share has slopes alone: obstacles are judged by the whole map.
+void judge_obstacles(const libmap::Manifest& part, libmap::PointCloud& whole, Run& run) {
+  if (whole.find_field("slope_deg") == nullptr) return;
+  const auto parameter = [&](const char* name) { return number_of(part.find_parameter(name)); };
+  const std::size_t count =
+      libgtd::add_obstacles(whole, parameter("voxel_size_m"),
+                            {.slope_deg = parameter("obstacle_slope_deg"),
+                             .height_m = parameter("obstacle_height_m"),
+                             .normal_radius_m = number_of(part.find_result("normal_radius_m"))});
+  run.manifest().results.emplace_back("obstacle_voxels", static_cast<std::int64_t>(count));
+  run.say(fmt::format("{} voxels are obstacles", count));
 }
 
 // The tiles of a store that share their i, one after the other: consecutive in the map's order.
@@ -183,7 +203,7 @@ void merge(const MergeOptions& options, Run& run) {
   require_all_shares(manifests, options.tiles);
   std::vector<libmap::PointCloud> parts;
   for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
-  const libmap::PointCloud whole = libgtd::merge_map_clouds(parts);
+  libmap::PointCloud whole = libgtd::merge_map_clouds(parts);
   copy_common_facts(manifests.front(), run.manifest());
   // The terrain and the gripper that the parts were made from, then the parts.
   run.manifest().inputs = manifests.front().inputs;
@@ -192,6 +212,7 @@ void merge(const MergeOptions& options, Run& run) {
   run.manifest().results.emplace_back("edge_voxels", count_of(whole, "edge"));
   run.manifest().results.emplace_back("graspable_voxels", count_of(whole, "graspable"));
   run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
+  judge_obstacles(manifests.front(), whole, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
 }

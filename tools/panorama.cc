@@ -13,6 +13,7 @@
 #include "libmap/core/text.h"
 #include "libmap/scan/rig_images.h"
 #include "tools/command_line.h"
+#include "tools/map_frame.h"
 
 namespace {
 
@@ -160,6 +161,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
     throw libmap::Error("no image of the moment can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
   add_results(rig, moment, result, views, run.manifest());
+  graspmap_tools::carry_site_transform(options.folder, run);
   run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(),
                       cameras, libmap::to_text(moment.stamp_s)));
   run.write_output(options.output, [&](const fs::path& temporary) {

@@ -6,6 +6,7 @@
 #include "libgtd/detect.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/score/tile_store_io.h"
+#include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/cloud_pieces.h"
 #include "libmap/core/error.h"
@@ -91,6 +92,13 @@ void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& resu
   count("curvature_points", result.curvature_points);
   count("convex_points", result.convex_points);
   count("graspable_voxels", result.graspable_voxels);
+  const libgtd::Scenario& scenario = options.detection.scenario;
+  if (scenario.fits_normals())
+    manifest.results.emplace_back("normal_radius_m",
+                                  libgtd::normal_radius_m(result.mask, scenario));
+  if (scenario.orientation == libgtd::Orientation::surface)
+    count("unoriented_voxels", result.unoriented_voxels);
+  if (result.map.content.obstacles) count("obstacle_voxels", result.obstacle_voxels);
   manifest.timings_s.insert(manifest.timings_s.end(), result.timings_s.begin(),
                             result.timings_s.end());
 }
@@ -103,6 +111,14 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
   run.say(fmt::format("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable",
                       result.points, result.occupied_voxels, result.map.voxels.size(), result.tiles,
                       result.graspable_voxels));
+  if (result.map.content.normals)
+    run.say(fmt::format("mask tilted to the surface's normal within {:g} m, {} voxels without one",
+                        libgtd::normal_radius_m(result.mask, options.detection.scenario),
+                        result.unoriented_voxels));
+  if (result.map.content.obstacles)
+    run.say(fmt::format("{} voxels are obstacles", result.obstacle_voxels));
+  else if (result.map.content.slopes)
+    run.say("obstacles are judged when `graspmap merge` joins the shares");
   if (result.map.voxels.empty() && options.detection.share.count == 1)
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }
@@ -152,6 +168,11 @@ void score(ScoreOptions& options, Run& run) {
   if (read.dropped_points > 0)
     run.warn(fmt::format("{}: {} points without a position were dropped", options.terrain,
                          read.dropped_points));
+  if (scenario.orientation == libgtd::Orientation::surface && !read.cloud.has_normals())
+    run.warn(
+        fmt::format("{}: has no normals: the outside is where the terrain's z points, and the "
+                    "sides of walls are guessed",
+                    options.terrain));
   libgtd::DetectionResult result;
   try {
     result = libgtd::detect(read.cloud, options.detection, run.progress());

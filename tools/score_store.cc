@@ -395,6 +395,7 @@ class StoreScoring {
     map.lattice = frame_.lattice;
     if (frame_.plane) map.terrain_from_input = frame_.plane->terrain_from_input;
     map.zero_plane_m = scenario_.zero_plane_m;
+    map.content = libgtd::content_of(scenario_);
     map.voxels = std::move(tile.voxels);
     stored.file = libgtd::tile_file_of(tile.number);
     libmap::OutputFile file(progress_.store() / stored.file);

@@ -14,6 +14,7 @@
 #include "libmap/scan/rig_io.h"
 #include "libmap/simulate/robot_cameras.h"
 #include "tools/command_line.h"
+#include "tools/map_frame.h"
 #include "tools/simulate_commands.h"
 
 namespace {
@@ -134,6 +135,12 @@ void simulate(const SimulateCamerasOptions& options, Run& run) {
   try {
     const libmap::Pose mesh_from_robot = body_pose(mesh, options);
     run.manifest().transforms.emplace_back("mesh_from_robot", mesh_from_robot);
+    // So that places listed in the mesh's frame, or in that of the map before it was cropped, are
+    // found on maps of these images.
+    const libmap::Pose mesh_from_map =
+        graspmap_tools::site_from_map_of(options.mesh).value_or(libmap::Pose::Identity());
+    run.manifest().transforms.emplace_back(graspmap_tools::site_from_map_name,
+                                           mesh_from_robot.inverse() * mesh_from_map);
     const std::vector<libmap::RobotCameraImage> images = run.timed("cameras", [&] {
       return libmap::simulate_robot_cameras(mesh, rig, mesh_from_robot, options.cameras);
     });

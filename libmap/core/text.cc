@@ -58,6 +58,17 @@ std::string_view trim(std::string_view text) {
   return text;
 }
 
+std::vector<std::string> split_list(std::string_view text) {
+  std::vector<std::string> parts;
+  while (!text.empty()) {
+    const std::size_t comma = text.find(',');
+    const std::string_view part = trim(text.substr(0, comma));
+    if (!part.empty()) parts.emplace_back(part);
+    text = comma == std::string_view::npos ? std::string_view() : text.substr(comma + 1);
+  }
+  return parts;
+}
+
 std::string to_fixed_text(double value, int decimals) {
   // 309 digits of the largest double, a sign, a point and the decimals.
   std::string text(312 + static_cast<std::size_t>(std::max(decimals, 0)), ' ');

@@ -24,6 +24,9 @@ std::optional<bool> parse_bool(std::string_view text);
 
 std::string_view trim(std::string_view text);
 
+// "a, b,,c" -> a, b, c.
+std::vector<std::string> split_list(std::string_view text);
+
 // The candidate with the smallest Levenshtein distance to `name`, or the first that begins with
 // it; nothing if none is near (more than half of the name would have to change).
 std::optional<std::string> nearest_name(std::string_view name,

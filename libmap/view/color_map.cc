@@ -176,12 +176,21 @@ void color_by_flags(const ColorSource& source, const Coloring& coloring, Colored
       has_convex ? values_of(source, "convex") : std::vector<double>(count, 0.0);
   const std::vector<double> graspable =
       has_graspable ? values_of(source, "graspable") : std::vector<double>(count, 0.0);
+  const bool has_obstacles = find(source, "obstacle") != nullptr;
+  const std::vector<double> obstacle =
+      has_obstacles ? values_of(source, "obstacle") : std::vector<double>(count, 0.0);
   for (std::size_t i = 0; i < count; ++i)
-    result.colors.push_back(graspable[i] > 0.0 ? intersection_color
-                            : convex[i] > 0.0  ? convex_color
-                                               : rest_color);
+    result.colors.push_back(graspable[i] > 0.0  ? intersection_color
+                            : obstacle[i] > 1.0 ? unreachable_color
+                            : obstacle[i] > 0.0 ? obstacle_color
+                            : convex[i] > 0.0   ? convex_color
+                                                : rest_color);
   result.legend.title = "graspable areas";
   if (has_graspable) result.legend.entries.push_back({intersection_color, "intersection"});
+  if (has_obstacles) {
+    result.legend.entries.push_back({obstacle_color, "steep face"});
+    result.legend.entries.push_back({unreachable_color, "out of reach"});
+  }
   if (has_convex) result.legend.entries.push_back({convex_color, "convex"});
   result.legend.entries.push_back({rest_color, "other"});
   finish(source, coloring, result);
@@ -208,6 +217,11 @@ std::pair<std::size_t, double> place_in(std::size_t count, double t) {
 
 }  // namespace
 
+void add_legend(const Legend& legend, std::vector<Legend>& legends) {
+  if (!legend.empty() && std::find(legends.begin(), legends.end(), legend) == legends.end())
+    legends.push_back(legend);
+}
+
 std::vector<std::pair<std::string, ColorMode>> color_mode_names() {
   return {{"automatic", ColorMode::automatic}, {"own", ColorMode::own},
           {"score", ColorMode::score},         {"field", ColorMode::field},
@@ -229,6 +243,7 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
         throw Error("the data bring no colours of their own",
                     {.file = {}, .field = "color mode", .value = "own", .bound = {}});
       result.colors = source.own_colors;
+      result.legend = coloring.own_legend;
       break;
     case ColorMode::score:
       color_by_score(source, coloring, result);

@@ -18,7 +18,8 @@ namespace libmap {
 // own:    the colours that the data bring.
 // score:  the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a colour scale.
-// flags:  convex points blue, intersection ("graspable") dark green, the rest light grey.
+// flags:  convex points blue, intersection ("graspable") dark green, obstacles (1 steep face, 2 out
+//   of reach) brown and ochre where there is such a field, the rest light grey.
 // height: z of the terrain frame on a colour scale.
 // single: one colour.
 // texture: the pictures that a textured mesh brings; `automatic` where there are any.
@@ -30,23 +31,12 @@ std::vector<std::pair<std::string, ColorMode>> color_mode_names();
 enum class ColorScale { viridis, diverging };
 std::vector<std::pair<std::string, ColorScale>> color_scale_names();
 
-struct Coloring {
-  ColorMode mode = ColorMode::automatic;
-  std::string field;  // of mode `field`; another field than "score" in mode `score`
-  ColorScale scale = ColorScale::viridis;  // of the modes field and height
-  // Values at the ends of the scale. Both equal: the data's 2nd and 98th percentile; of a diverging
-  // scale plus and minus the 98th percentile of their sizes.
-  double range_min = 0.0;
-  double range_max = 0.0;
-  // Points with z below it are white in the modes score, field, flags and height.
-  double zero_plane_m = -std::numeric_limits<double>::infinity();
-  std::string color = "#b0a89c";  // of mode `single`: "#rrggbb" or a name
-};
-
 // One box of a legend, or the colour at one value of a scalar bar.
 struct LegendEntry {
   Color color{};
   std::string text;
+
+  bool operator==(const LegendEntry&) const = default;
 };
 
 // Discrete classes from the best to the worst; before them a scalar bar from `min` to `max` if
@@ -60,7 +50,25 @@ struct Legend {
   std::vector<LegendEntry> entries;
 
   bool empty() const { return !continuous && entries.empty(); }
+  bool operator==(const Legend&) const = default;
 };
+
+struct Coloring {
+  ColorMode mode = ColorMode::automatic;
+  std::string field;  // of mode `field`; another field than "score" in mode `score`
+  ColorScale scale = ColorScale::viridis;  // of the modes field and height
+  // Values at the ends of the scale. Both equal: the data's 2nd and 98th percentile; of a diverging
+  // scale plus and minus the 98th percentile of their sizes.
+  double range_min = 0.0;
+  double range_max = 0.0;
+  // Points with z below it are white in the modes score, field, flags and height.
+  double zero_plane_m = -std::numeric_limits<double>::infinity();
+  std::string color = "#b0a89c";  // of mode `single`: "#rrggbb" or a name
+  Legend own_legend{};            // of mode `own`: what the colours mean
+};
+
+// Appends it, unless it is empty or among them already.
+void add_legend(const Legend& legend, std::vector<Legend>& legends);
 
 // What is to be coloured: points (or the centres of triangles) in the terrain frame, metres.
 struct ColorSource {
@@ -95,6 +103,8 @@ Color parse_color(std::string_view text, const std::string& field);
 
 inline constexpr Color convex_color{40, 90, 220};
 inline constexpr Color intersection_color{0, 100, 0};
+inline constexpr Color obstacle_color{178, 60, 40};
+inline constexpr Color unreachable_color{235, 170, 90};
 inline constexpr Color rest_color{211, 211, 211};
 
 }  // namespace libmap

@@ -38,23 +38,6 @@ std::vector<std::string> texts_of(const Legend& legend) {
   return texts;
 }
 
-Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px) {
-  const TextStyle style{.size_px = font_px};
-  const TextStyle title_style{.size_px = font_px, .bold = true};
-  double width = 0.0;
-  double height = 0.0;
-  for (const Legend& legend : legends) {
-    if (height > 0.0) height += legend_gap * font_px;
-    height += title_row_height * font_px;
-    width = std::max(width, text_size(legend.title, title_style).x());
-    for (const std::string& text : texts_of(legend))
-      width = std::max(width, (bar_width + 0.6) * font_px + text_size(text, style).x());
-    if (legend.continuous) height += (bar_height + 0.9) * font_px;
-    height += row_height * font_px * static_cast<double>(legend.entries.size());
-  }
-  return {width, height};
-}
-
 // Sets the legend's column if there is a font size at which it fits.
 void plan_legend(const SceneViewOptions& options, const std::vector<Legend>& legends,
                  double title_height, ScenePage& page) {
@@ -81,7 +64,9 @@ struct Bands {
 ScenePage plan_with(const SceneViewOptions& options, const std::vector<Legend>& legends,
                     const Bands& bands) {
   ScenePage page;
-  page.font_px = std::clamp(std::min(options.width, options.height) / 48, least_font_px, 160);
+  page.font_px = options.font_px > 0
+                     ? options.font_px
+                     : std::clamp(std::min(options.width, options.height) / 48, least_font_px, 160);
   const double f = page.font_px;
   const double title_height = bands.title ? std::round(2.4 * f) : 0.0;
   const double bottom_height = bands.axes        ? std::round(4.8 * f)
@@ -147,6 +132,23 @@ Color verdict_color(Verdict verdict) {
 }
 
 }  // namespace
+
+Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px) {
+  const TextStyle style{.size_px = font_px};
+  const TextStyle title_style{.size_px = font_px, .bold = true};
+  double width = 0.0;
+  double height = 0.0;
+  for (const Legend& legend : legends) {
+    if (height > 0.0) height += legend_gap * font_px;
+    height += title_row_height * font_px;
+    width = std::max(width, text_size(legend.title, title_style).x());
+    for (const std::string& text : texts_of(legend))
+      width = std::max(width, (bar_width + 0.6) * font_px + text_size(text, style).x());
+    if (legend.continuous) height += (bar_height + 0.9) * font_px;
+    height += row_height * font_px * static_cast<double>(legend.entries.size());
+  }
+  return {width, height};
+}
 
 ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& legends) {
   Bands bands{!options.title.empty(), options.legend, options.axes, options.scale_bar};
@@ -342,6 +344,29 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
         paper);
     overlay.text({box.left + box.width / 2.0, box.top + box.height / 2.0}, visible[i]->label,
                  style);
+  }
+}
+
+void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
+                          const std::vector<DimensionLine>& lines, Overlay& overlay) {
+  const double f = page.font_px;
+  const double width = std::max(1.0, std::round(0.09 * f));
+  for (const DimensionLine& line : lines) {
+    if (!(camera.depth_of(line.from) > 0.0) || !(camera.depth_of(line.to) > 0.0)) continue;
+    const Eigen::Vector2d from = camera.pixel_of(line.from);
+    const Eigen::Vector2d to = camera.pixel_of(line.to);
+    const Eigen::Vector2d middle = (from + to) / 2.0;
+    if ((to - from).norm() < 1.0) continue;
+    draw_arrow(middle, from, width, ink, overlay);
+    draw_arrow(middle, to, width, ink, overlay);
+    const Eigen::Vector2d along = (to - from).normalized();
+    TextStyle style{.size_px = page.font_px, .align = TextAlign::center};
+    Eigen::Vector2d place = middle - Eigen::Vector2d(0.0, 0.8 * f);
+    if (std::abs(along.y()) > std::abs(along.x())) {
+      style.align = TextAlign::left;
+      place = middle + Eigen::Vector2d(0.6 * f, 0.0);
+    }
+    overlay.text(place, line.text, style);
   }
 }
 

@@ -35,14 +35,22 @@ double round_length_m(double longest_m);
 // "50 m", "2 cm", "5 mm".
 std::string length_text(double length_m);
 
+// Pixels that legends one below the other take, wide and high.
+Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
+
 void draw_title(const ScenePage& page, const std::string& title, Overlay& overlay);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Overlay& overlay);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overlay);
 // In perspective the bar is true at `reference`, and says so.
 void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
                     const Eigen::Vector3d& reference, Overlay& overlay);
-// Markers in the terrain frame.
+// Markers and dimension lines in the terrain frame.
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Overlay& overlay);
+
+// Their texts keep off the ends of the lines: above a line that lies, to the right of one that
+// stands.
+void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
+                          const std::vector<DimensionLine>& lines, Overlay& overlay);
 
 }  // namespace libmap

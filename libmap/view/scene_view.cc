@@ -6,8 +6,6 @@
 #include <vtkFloatArray.h>
 #include <vtkImageData.h>
 #include <vtkNew.h>
-#include <vtkObjectFactory.h>
-#include <vtkOutputWindow.h>
 #include <vtkPointData.h>
 #include <vtkPoints.h>
 #include <vtkPolyData.h>
@@ -23,23 +21,19 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
-#include <mutex>
 #include <numbers>
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/view/offscreen.h"
 #include "libmap/view/overlay.h"
 #include "libmap/view/scene_geometry.h"
 #include "libmap/view/scene_page.h"
-#include "libmap/view/virtual_display.h"
 
 namespace libmap {
 namespace {
 
 constexpr int largest_side_px = 16384;
-// Above it the multisampled buffers would take gigabytes.
-constexpr double most_multisampled_pixels = 1.7e7;
-constexpr int multisamples = 4;
 
 void check(const SceneViewOptions& options) {
   const auto check_side = [](const char* name, int value) {
@@ -53,36 +47,26 @@ void check(const SceneViewOptions& options) {
   check_side("width", options.width);
   check_side("height", options.height);
   parse_color(options.background, "background");
+  if (options.extent && !((options.extent->max - options.extent->min).minCoeff() >= 0.0))
+    throw Error("an empty box cannot be shown", {.field = "extent"});
 }
 
 // A scene ready to be drawn, in the terrain frame.
 struct Setup {
   std::vector<PreparedLayer> layers;
   std::vector<Marker> markers;
+  std::vector<DimensionLine> dimension_lines;
   std::vector<Legend> legends;
+  std::vector<Eigen::Vector3d> in_view;  // all finite
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius_m = 0.0;  // of the largest point
   ScenePage page;
   SceneCamera camera;
 };
 
-void add_legend(const Legend& legend, std::vector<Legend>& legends) {
-  if (legend.empty()) return;
-  const auto same = [&legend](const Legend& other) {
-    return other.title == legend.title && other.continuous == legend.continuous &&
-           other.min == legend.min && other.max == legend.max &&
-           std::equal(other.entries.begin(), other.entries.end(), legend.entries.begin(),
-                      legend.entries.end(), [](const LegendEntry& a, const LegendEntry& b) {
-                        return a.text == b.text && a.color == b.color;
-                      });
-  };
-  if (std::none_of(legends.begin(), legends.end(), same)) legends.push_back(legend);
-}
-
-Setup set_up(const Scene& scene, const SceneViewOptions& options) {
-  check(options);
+Setup gather(const Scene& scene) {
   Setup setup;
-  std::vector<Eigen::Vector3d> positions;
+  std::vector<Eigen::Vector3d>& positions = setup.in_view;
   for (const SceneLayer& layer : scene.layers) {
     for (PreparedLayer& prepared : prepare_layers(layer, scene.terrain_from_scene)) {
       positions.insert(positions.end(), prepared.positions.begin(), prepared.positions.end());
@@ -98,50 +82,48 @@ Setup set_up(const Scene& scene, const SceneViewOptions& options) {
     setup.markers.push_back(marker);
     if (marker.position.allFinite()) positions.push_back(marker.position);
   }
+  for (DimensionLine line : scene.dimension_lines) {
+    line.from = scene.terrain_from_scene * line.from;
+    line.to = scene.terrain_from_scene * line.to;
+    if (!line.from.allFinite() || !line.to.allFinite()) continue;
+    positions.insert(positions.end(), {line.from, line.to});
+    setup.dimension_lines.push_back(line);
+  }
   const Bounds3d bounds = bounds_of(positions);
   setup.center = bounds.min + (bounds.max - bounds.min) / 2.0;
-  const bool lone = (bounds.max - bounds.min).norm() < 4.0 * setup.radius_m;
-  setup.page = plan_page(options, setup.legends);
-  CameraPlacement placement = options.camera;
-  placement.position = scene.terrain_from_scene * placement.position;
-  placement.focal_point = scene.terrain_from_scene * placement.focal_point;
-  placement.up = scene.terrain_from_scene.linear() * placement.up;
-  setup.camera = fit_camera(options.view, placement, positions,
-                            lone ? 5.0 * setup.radius_m : setup.radius_m, setup.page.plot);
   return setup;
 }
 
-// Takes VTK's messages off the console while it lives; the first error is kept.
-class QuietOutput : public vtkOutputWindow {
- public:
-  static QuietOutput* New();
-  vtkTypeMacro(QuietOutput, vtkOutputWindow);
-  void DisplayText(const char*) override {}
-  void DisplayErrorText(const char* text) override {
-    if (first_error_.empty() && text != nullptr) first_error_ = text;
-  }
-  void DisplayWarningText(const char*) override {}
-  void DisplayGenericWarningText(const char*) override {}
-  void DisplayDebugText(const char*) override {}
-  const std::string& first_error() const { return first_error_; }
+std::vector<Eigen::Vector3d> corners_of(const Bounds3d& box) {
+  std::vector<Eigen::Vector3d> corners;
+  for (int corner = 0; corner < 8; ++corner)
+    corners.emplace_back((corner & 1) != 0 ? box.max.x() : box.min.x(),
+                         (corner & 2) != 0 ? box.max.y() : box.min.y(),
+                         (corner & 4) != 0 ? box.max.z() : box.min.z());
+  return corners;
+}
 
- private:
-  std::string first_error_;
-};
-vtkStandardNewMacro(QuietOutput);
+SceneCamera camera_for(const Setup& setup, const SceneViewOptions& options,
+                       const Pose& terrain_from_scene) {
+  CameraPlacement placement = options.camera;
+  placement.position = terrain_from_scene * placement.position;
+  placement.focal_point = terrain_from_scene * placement.focal_point;
+  placement.up = terrain_from_scene.linear() * placement.up;
+  if (options.extent)
+    return fit_camera(options.view, placement, corners_of(*options.extent), 0.0, setup.page.plot);
+  const Bounds3d bounds = bounds_of(setup.in_view);
+  const bool lone = (bounds.max - bounds.min).norm() < 4.0 * setup.radius_m;
+  return fit_camera(options.view, placement, setup.in_view,
+                    lone ? 5.0 * setup.radius_m : setup.radius_m, setup.page.plot);
+}
 
-class QuietScope {
- public:
-  QuietScope() : former_(vtkOutputWindow::GetInstance()) { vtkOutputWindow::SetInstance(quiet_); }
-  ~QuietScope() { vtkOutputWindow::SetInstance(former_); }
-  QuietScope(const QuietScope&) = delete;
-  QuietScope& operator=(const QuietScope&) = delete;
-  const std::string& first_error() const { return quiet_->first_error(); }
-
- private:
-  vtkSmartPointer<vtkOutputWindow> former_;
-  vtkNew<QuietOutput> quiet_;
-};
+Setup set_up(const Scene& scene, const SceneViewOptions& options) {
+  check(options);
+  Setup setup = gather(scene);
+  setup.page = plan_page(options, setup.legends);
+  setup.camera = camera_for(setup, options, scene.terrain_from_scene);
+  return setup;
+}
 
 // VTK counts rows and coordinates from the bottom: given from the top, both fit together.
 vtkSmartPointer<vtkFloatArray> coordinates_of(const ColoredTriangles& triangles) {
@@ -250,39 +232,17 @@ Overlay overlay_of(const Setup& setup, const SceneViewOptions& options) {
   draw_legends(setup.page, setup.legends, overlay);
   draw_axes(setup.page, setup.camera, overlay);
   draw_scale_bar(setup.page, setup.camera, setup.center, overlay);
+  draw_dimension_lines(setup.page, setup.camera, setup.dimension_lines, overlay);
   draw_markers(setup.page, setup.camera, setup.markers, overlay);
   return overlay;
 }
 
-ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
-  ColorImage image(width, height);
-  vtkNew<vtkUnsignedCharArray> pixels;
-  window.GetPixelData(0, 0, width - 1, height - 1, 0, pixels);
-  const std::size_t row_bytes = 3 * static_cast<std::size_t>(width);
-  const std::size_t bytes = row_bytes * static_cast<std::size_t>(height);
-  if (static_cast<std::size_t>(pixels->GetNumberOfValues()) != bytes)
-    throw Error("the picture could not be read back from OpenGL", {}, ErrorKind::failed);
-  // OpenGL's rows begin at the bottom.
-  for (std::size_t row = 0; row < static_cast<std::size_t>(height); ++row)
-    std::memcpy(image.pixels.data() + row * static_cast<std::size_t>(width),
-                pixels->GetPointer(0) + (static_cast<std::size_t>(height) - 1 - row) * row_bytes,
-                row_bytes);
-  return image;
-}
-
-ColorImage draw(const Setup& setup, const SceneViewOptions& options) {
-  vtkNew<vtkRenderWindow> window;
-  window->OffScreenRenderingOn();
-  window->ShowWindowOff();
-  window->SetSize(options.width, options.height);
-  window->SetDPI(72);
-  const bool small = double{1} * options.width * options.height <= most_multisampled_pixels;
-  window->SetMultiSamples(small ? multisamples : 0);
-  window->SetNumberOfLayers(3);
+void fill(vtkRenderWindow& window, const Setup& setup, const SceneViewOptions& options) {
+  window.SetNumberOfLayers(3);
 
   vtkNew<vtkRenderer> page;
   page->SetBackground(1.0, 1.0, 1.0);
-  window->AddRenderer(page);
+  window.AddRenderer(page);
 
   vtkNew<vtkRenderer> plot;
   const PixelRect& rect = setup.page.plot;
@@ -292,20 +252,17 @@ ColorImage draw(const Setup& setup, const SceneViewOptions& options) {
   for (const PreparedLayer& layer : setup.layers)
     plot->AddActor(actor_of(triangles_of(layer, setup.camera, setup.center)));
   aim(setup, *plot->GetActiveCamera());
-  window->AddRenderer(plot);
+  window.AddRenderer(plot);
 
   vtkNew<vtkRenderer> front;
   front->SetLayer(2);
   overlay_of(setup, options).add_to(*front, options.height);
-  window->AddRenderer(front);
+  window.AddRenderer(front);
 
   // Behind the scene, on the page.
   Overlay behind;
   behind.rectangle(rect, parse_color(options.background, "background"));
   behind.add_to(*page, options.height);
-
-  window->Render();
-  return pixels_of(*window, options.width, options.height);
 }
 
 }  // namespace
@@ -322,19 +279,16 @@ std::vector<std::pair<std::string, Shading>> shading_names() {
 
 ColorImage render_scene(const Scene& scene, const SceneViewOptions& options) {
   const Setup setup = set_up(scene, options);
-  // VTK's rendering and the environment are for one thread at a time.
-  static std::mutex one_at_a_time;
-  const std::scoped_lock lock(one_at_a_time);
-  const VirtualDisplay display;
-  const QuietScope quiet;
-  ColorImage image = draw(setup, options);
-  if (!quiet.first_error().empty()) {
-    std::string reason = quiet.first_error();
-    std::replace(reason.begin(), reason.end(), '\n', ' ');
-    throw Error("VTK could not draw the picture: " + std::string(trim(reason)), {},
-                ErrorKind::failed);
-  }
-  return image;
+  return draw_offscreen(options.width, options.height,
+                        [&](vtkRenderWindow& window) { fill(window, setup, options); });
+}
+
+SceneContents contents_of(const Scene& scene) {
+  const Setup setup = gather(scene);
+  Bounds3d extent = bounds_of(setup.in_view);
+  extent.min.array() -= setup.radius_m;
+  extent.max.array() += setup.radius_m;
+  return {extent, setup.legends};
 }
 
 SceneCamera camera_of(const Scene& scene, const SceneViewOptions& options) {

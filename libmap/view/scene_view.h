@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <optional>
 #include <string>
 #include <utility>
 #include <variant>
@@ -50,9 +51,18 @@ struct Marker {
   Verdict verdict = Verdict::none;
 };
 
+// A measure as technical drawings give it: a line with an arrow head at both ends and its text
+// beside its middle, drawn over everything.
+struct DimensionLine {
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // scene frame, metres
+  Eigen::Vector3d to = Eigen::Vector3d::Zero();
+  std::string text{};
+};
+
 struct Scene {
   std::vector<SceneLayer> layers;  // all in the scene's frame, metres
   std::vector<Marker> markers;
+  std::vector<DimensionLine> dimension_lines{};
   // Views, axes, heights, the zero plane and cubes refer to the terrain frame.
   Pose terrain_from_scene = Pose::Identity();
 };
@@ -66,7 +76,11 @@ struct SceneViewOptions {
   bool axes = true;
   bool scale_bar = true;
   bool legend = true;
+  int font_px = 0;                     // of the texts, pixels; 0: from the size of the picture
   std::string background = "#5f6b7a";  // behind the scene: "#rrggbb" or a name
+  // What the view is fitted to, metres in the terrain frame, so that several scenes are shown
+  // alike; default: all that is drawn.
+  std::optional<Bounds3d> extent{};
   // On the page around the scene lie title, legend, axes and scale bar; parts for which a small
   // picture has no room are left out.
 };
@@ -77,6 +91,14 @@ struct SceneViewOptions {
 // Throws Error: no point to draw, a size or colour or camera that cannot be, a layer whose arrays
 // do not fit each other, and what color_points throws; (failed) if no picture can be drawn here.
 ColorImage render_scene(const Scene& scene, const SceneViewOptions& options);
+
+// Of a scene, before it is drawn: the box in the terrain frame that its view is fitted to, with the
+// widths of its points, and the legends of its layers, each once. Throws as render_scene does.
+struct SceneContents {
+  Bounds3d extent;
+  std::vector<Legend> legends;
+};
+SceneContents contents_of(const Scene& scene);
 
 // The part of the picture that shows the scene, and the camera that does: where a point falls is
 // camera.pixel_of(terrain_from_scene * point). Needs no display.

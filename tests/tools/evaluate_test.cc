@@ -15,7 +15,8 @@ using graspmap_test::succeeded;
 using graspmap_test::write_text;
 using Words = std::vector<std::string>;
 
-const Words files = {"rates.csv", "roc.csv", "roc.png", "roc.svg", "summary.json", "summary.md"};
+const Words files = {"accuracy.csv", "rates.csv",    "roc.csv",   "roc.png",
+                     "roc.svg",      "summary.json", "summary.md"};
 
 Words names_in(const std::string& folder) {
   Words names;
@@ -43,6 +44,36 @@ TEST(Evaluate, PerfectAndReversedScores) {
   EXPECT_NE(content("out/roc.svg").find("<svg"), std::string::npos);
   EXPECT_FALSE(libmap::read_csv(scratch("out/roc.csv")).rows.empty());
   EXPECT_TRUE(nlohmann::json::parse(content("out/summary.json")).is_object());
+}
+
+TEST(Evaluate, AccuracyHasARowACase) {
+  write_table();
+  ASSERT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "out", "--cutoff", "0.3"})));
+  const libmap::Table table = libmap::read_csv(scratch("out/accuracy.csv"));
+  EXPECT_EQ(table.columns,
+            (Words{"case", "locations", "cutoff", "tpr", "tnr", "fpr", "fnr", "ppv", "acc"}));
+  ASSERT_EQ(table.rows.size(), 2U);
+  EXPECT_EQ(table.rows[0], (Words{"good", "4", "0.3", "1.0000", "0.5000", "0.5000", "0.0000",
+                                  "0.6667", "0.7500"}));
+  EXPECT_EQ(table.rows[1],
+            (Words{"bad", "4", "0.3", "0.0000", "0.0000", "1.0000", "1.0000", "0.0000", "0.0000"}));
+}
+
+TEST(Evaluate, AccuracyIsThatOfTheThesis) {
+  GRASPMAP_REQUIRE_DATA();
+  const auto thesis = graspmap_test::data_folder() / "thesis";
+  ASSERT_TRUE(succeeded(
+      graspmap({"evaluate", (thesis / "bouldering_wall_scenario3.csv").string(), "-o", "wall",
+                "--label", "prescan", "--score", "prescan_combined,realtime_interpolated"})));
+  const libmap::Table ours = libmap::read_csv(scratch("wall/accuracy.csv"));
+  const libmap::Table published = libmap::read_csv(thesis / "accuracy.csv");
+  for (std::size_t row = 0; row < 2; ++row) {
+    ASSERT_EQ(published.rows[row][0], "bouldering_wall");
+    EXPECT_EQ(published.rows[row][1], ours.rows[row][0]);
+    for (const std::string rate : {"tpr", "tnr", "fpr", "fnr", "ppv", "acc"})
+      EXPECT_EQ(ours.rows[row][ours.column(rate)], published.rows[row][published.column(rate)])
+          << ours.rows[row][0] << " " << rate;
+  }
 }
 
 TEST(Evaluate, SameSeedSameBytes) {

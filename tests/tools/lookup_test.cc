@@ -150,6 +150,70 @@ TEST(Lookup, ConvertedMapStillKnowsItsFrame) {
   EXPECT_EQ(cell(answers, 1, "found"), "0");
 }
 
+TEST(Lookup, NamedColumnsAlone) {
+  write_small_map();
+  write_text(scratch("points.csv"),
+             "name,x,y,z\na,0.015,0.005,0.005\nb,0.025,0.005,0.005\nc,1,2,3\n");
+  const Table answers = looked_up(
+      {"--column", "first=score, held=graspable,good=score >= 0.9,seen=found,off=distance_m"});
+  EXPECT_EQ(answers.columns,
+            (Words{"name", "x", "y", "z", "first", "held", "good", "seen", "off"}));
+  ASSERT_EQ(answers.rows.size(), 3U);
+  EXPECT_EQ(answers.rows[0], (Words{"a", "0.015", "0.005", "0.005", "0.9", "1", "1", "1", "0"}));
+  EXPECT_EQ(answers.rows[1], (Words{"b", "0.025", "0.005", "0.005", "0.25", "0", "0", "1", "0"}));
+  EXPECT_EQ(cell(answers, 2, "first"), "");
+  EXPECT_EQ(cell(answers, 2, "good"), "") << "no answer is no refusal";
+  EXPECT_EQ(cell(answers, 2, "seen"), "0");
+  EXPECT_GT(answers.number(2, answers.column("off")), 3);
+}
+
+TEST(Lookup, ScoreInSinglePrecisionReachesItsCutoff) {
+  write_small_map();
+  write_text(scratch("points.csv"), "x,y,z\n0.015,0.005,0.005\n");
+  libmap::PointCloud map = libmap::read_cloud(scratch("map.csv")).cloud;
+  for (libmap::ScalarField& field : map.fields) field.type = libmap::ScalarType::float32;
+  libmap::write_cloud(scratch("map.pcd"), map);
+  ASSERT_TRUE(succeeded(graspmap({"lookup", "map.pcd", "points.csv", "-o", "answers.csv",
+                                  "--column", "good=score>=0.9,better=score>=0.9001"})));
+  EXPECT_EQ(libmap::read_csv(scratch("answers.csv")).rows[0],
+            (Words{"0.015", "0.005", "0.005", "1", "0"}));
+}
+
+TEST(Lookup, OnlyWhatWasMeasuredIsVisible) {
+  write_small_map();
+  write_text(scratch("points.csv"), "name,x,y,z\na,0.015,0.005,0.005\nb,0.025,0.005,0.005\n");
+  // The map has voxels at both, measured is 3 mm beside the first.
+  write_text(scratch("seen.csv"), "x,y,z\n0.015,0.008,0.005\n0.9,0.9,0.9\n");
+  const Table near_by =
+      looked_up({"--visible", "seen.csv", "--visible-radius", "0.004", "--column", "s=score"});
+  EXPECT_EQ(cell(near_by, 0, "s"), "0.9");
+  EXPECT_EQ(cell(near_by, 1, "s"), "");
+  EXPECT_EQ(graspmap_test::json_of("answers.csv.json").at("results").at("visible"), 1);
+  EXPECT_EQ(graspmap_test::json_of("answers.csv.json").at("results").at("found"), 1);
+  EXPECT_EQ(graspmap_test::json_of("answers.csv.json").at("inputs").size(), 3U);
+  EXPECT_EQ(cell(looked_up({"--visible", "seen.csv", "--visible-radius", "0.002"}), 0, "score"),
+            "");
+  const Table farther = looked_up({"--visible", "seen.csv", "--visible-radius", "0.011"});
+  EXPECT_EQ(cell(farther, 1, "score"), "0.25");
+  EXPECT_EQ(cell(farther, 1, "found"), "1");
+}
+
+TEST(Lookup, VisibleIsInTheFrameOfTheScoredCloud) {
+  const libmap::PointCloud terrain = libmap::transform_cloud(
+      graspmap_test::bumpy_terrain(), libmap::make_pose_from_rpy({4, -7, 2}, {12, -20, 35}));
+  libmap::write_cloud(scratch("tilted.pcd"), terrain);
+  for (const std::string frame : {"terrain", "input"})
+    ASSERT_TRUE(succeeded(graspmap({"score", "tilted.pcd", "--curvature-radius", "0", "--up",
+                                    "0,0,1", "--frame", frame, "-o", frame + ".csv"})));
+  for (const std::string map : {"terrain.csv", "input.csv"})
+    for (const std::string points : {"terrain", "input"}) {
+      ASSERT_TRUE(succeeded(graspmap({"lookup", map, points + ".csv", "--points-frame", points,
+                                      "--visible", "tilted.pcd", "-o", "answers.csv"})));
+      const nlohmann::json results = graspmap_test::json_of("answers.csv.json").at("results");
+      EXPECT_EQ(results.at("visible"), results.at("points")) << map << " in the frame " << points;
+    }
+}
+
 class LookupBadInput : public testing::Test {
  protected:
   LookupBadInput() { write_small_map(); }
@@ -194,6 +258,40 @@ TEST_F(LookupBadInput, MapsThatCannotBe) {
   write_text(scratch("map.csv.json"), "{broken");
   EXPECT_TRUE(
       bad_input(graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv"}), {"map.csv.json"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
+}
+
+TEST_F(LookupBadInput, ColumnsThatCannotBe) {
+  write_text(scratch("points.csv"), "name,x,y,z\na,0.015,0.005,0.005\n");
+  const auto column = [](const std::string& text) {
+    return graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv", "--column", text});
+  };
+  for (const std::string text : {"score", "=score", "a=", "a=score>=much", "a=>=0.5", "a=score>="})
+    EXPECT_TRUE(bad_input(column(text), {"--column", text, "NAME=FIELD"}));
+  // After a word on the manifest that the map has not.
+  const auto fails_with = [&](const std::string& text, const std::string& message) {
+    const ProgramResult result = column(text);
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_NE(result.standard_error.find(message), std::string::npos) << result.standard_error;
+  };
+  fails_with("a=scor",
+             "map.csv: --column is scor: the map has no such field (did you mean 'score'");
+  fails_with("name=score", "points.csv: --column is name: the points have this column already");
+  fails_with("a=score,a=ssv", "points.csv: --column is a: the points have this column already");
+  EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
+}
+
+TEST_F(LookupBadInput, CloudsThatCannotHaveBeenMeasured) {
+  write_text(scratch("points.csv"), "x,y,z\n1,2,3\n");
+  write_text(scratch("empty.csv"), "x,y,z\n");
+  const auto visible = [](const std::string& cloud) {
+    return graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv", "--visible", cloud});
+  };
+  for (const std::string cloud : {"none.pcd", "empty.csv"}) {
+    const ProgramResult result = visible(cloud);
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_NE(result.standard_error.find(cloud), std::string::npos);
+  }
   EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
 }
 

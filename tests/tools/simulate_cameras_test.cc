@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/rig_images.h"
 #include "tests/libmap/mesh/mesh_samples.h"
@@ -55,6 +56,8 @@ TEST(SimulateCamerasCommand, PanoramaPutsTheImagesBackOnTheMesh) {
     EXPECT_EQ(manifest["frame"], "robot");
     EXPECT_EQ(manifest["results"]["measured_pixels"], cloud.size());
     EXPECT_NEAR(manifest["transforms"]["mesh_from_robot"][11], 0.4, 1e-6);
+    EXPECT_EQ(json_of("cloud.ply.json")["transforms"]["site_from_map"],
+              manifest["transforms"]["site_from_map"]);
   }
   const libmap::CameraRig rig = libmap::read_rig(scratch("rig") / "rig.yaml");
   EXPECT_EQ(rig.cameras[0].depth_scale_m, 0.0001);
@@ -64,6 +67,37 @@ TEST(SimulateCamerasCommand, PanoramaPutsTheImagesBackOnTheMesh) {
     EXPECT_GE(image.stamp_s, 5.0);
     EXPECT_LE(image.stamp_s, 5.004);
   }
+}
+
+// The body inclined, on a mesh that was cut out of another: places listed in the first one's frame
+// are found on the map of what the robot sees, and its plane is the ground.
+TEST(SimulateCamerasCommand, PlacesOfTheMeshAreFoundOnTheRobotsMap) {
+  write_ground();
+  ASSERT_TRUE(succeeded(graspmap({"crop", "ground.ply", "--box=-1.2,-1.3,1.4,1.3", "--center",
+                                  "--level", "none", "-o", "site.ply"})));
+  ASSERT_TRUE(succeeded(graspmap({"simulate", "cameras", "site.ply", "-o", "rig", "--x", "-0.2",
+                                  "--z", "0.3", "--pitch", "25", "--yaw", "40"})));
+  ASSERT_TRUE(succeeded(graspmap({"panorama", "rig/", "-o", "cloud.pcd"})));
+  ASSERT_TRUE(succeeded(
+      graspmap({"score", "cloud.pcd", "--curvature-radius", "0", "-o", "map.pcd", "--quiet"})));
+  // On the ball, towards the robot, which stands about (-0.1, 0, 0.4); the ground; out of sight.
+  const Eigen::Vector3d seen = ball_centre + 0.3 * Eigen::Vector3d(-0.9, -0.3, 0.2).normalized();
+  write_text(scratch("places.csv"), "place,x,y,z\nball," + std::to_string(seen.x()) + "," +
+                                        std::to_string(seen.y()) + "," + std::to_string(seen.z()) +
+                                        "\nground,0.6,-0.5,0.1\nbehind,1.25,0.5,0.1\n");
+  ASSERT_TRUE(succeeded(graspmap({"lookup", "map.pcd", "places.csv", "-o", "found.csv",
+                                  "--points-frame", "map", "--visible", "cloud.pcd"})));
+  const libmap::Table found = libmap::read_csv(scratch("found.csv"));
+  for (const std::size_t row : {0U, 1U}) {
+    EXPECT_EQ(found.rows[row][found.column("found")], "1") << row;
+    EXPECT_LT(found.number(row, found.column("distance_m")), 0.01) << row;
+  }
+  EXPECT_EQ(found.rows[2][found.column("found")], "0");
+  const auto info = graspmap({"info", "map.pcd", "--json"});
+  ASSERT_TRUE(succeeded(info));
+  const auto plane = nlohmann::json::parse(info.standard_output).at("plane");
+  EXPECT_NEAR(plane.at("tilt_from_input_z_deg"), 25, 6);
+  EXPECT_LT(plane.at("tilt_from_map_z_deg"), 8);
 }
 
 TEST(SimulateCamerasCommand, AnotherRunLeavesNothingOfTheFirst) {

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
 
@@ -147,6 +149,38 @@ TEST(RigDepth, UnitsBecomeMetres) {
   EXPECT_THAT(error_of([&] { read_rig_depth({0, 1.0, file}, camera); }).what(), HasSubstr("1.png"));
   write_text(file, "");
   EXPECT_THAT(error_of([&] { read_rig_depth({0, 1.0, file}, camera); }).what(), HasSubstr("1.png"));
+}
+
+TEST(RigMoments, EachImageIsInOneMoment) {
+  std::vector<RigImage> images;
+  for (std::size_t camera = 0; camera < 4; ++camera)
+    for (int n = 0; n < 60; ++n)
+      images.push_back({camera, 0.1 * n + graspmap_test::uniform(0, 0.05), {}});
+  // In any order, and some of them missing.
+  std::shuffle(images.begin(), images.end(), graspmap_test::random_engine());
+  images.resize(200);
+  for (const double tolerance : {0.0, 0.02, 0.05, 1.0}) {
+    std::vector<int> times(images.size(), 0);
+    double last = -1.0;
+    for (const RigMoment& moment : libmap::rig_moments(images, 4, tolerance)) {
+      double first = 1e9;
+      for (std::size_t camera = 0; camera < 4; ++camera) {
+        const RigMoment::Camera& one = moment.cameras[camera];
+        if (one.state != State::seen) continue;
+        const RigImage& image = images[one.image];
+        EXPECT_EQ(image.camera, camera);
+        EXPECT_NEAR(image.stamp_s, moment.stamp_s, tolerance + 1e-5);
+        EXPECT_EQ(one.offset_s, image.stamp_s - moment.stamp_s);
+        first = std::min(first, image.stamp_s);
+        ++times[one.image];
+      }
+      EXPECT_GE(first, last);
+      last = first;
+    }
+    EXPECT_THAT(times, testing::Each(1));
+  }
+  EXPECT_EQ(libmap::rig_moments(images, 4, 0.05).size(), 60U);
+  EXPECT_TRUE(libmap::rig_moments({}, 4, 0.05).empty());
 }
 
 }  // namespace

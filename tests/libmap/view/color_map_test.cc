@@ -127,6 +127,18 @@ TEST(ColorPoints, FlagsGraspableBeforeConvex) {
             (std::vector<Color>{convex_color, intersection_color, intersection_color, rest_color}));
 }
 
+TEST(ColorPoints, FlagsTellObstaclesFromTheRest) {
+  PointCloud cloud = row_of_points(4);
+  cloud.add_field("graspable", ScalarType::uint8).values = {1, 0, 0, 0};
+  cloud.add_field("obstacle", ScalarType::uint8).values = {1, 1, 2, 0};
+  Coloring coloring;
+  coloring.mode = ColorMode::flags;
+  const auto result = color(cloud, coloring);
+  EXPECT_EQ(result.colors, (std::vector<Color>{intersection_color, obstacle_color,
+                                               unreachable_color, rest_color}));
+  EXPECT_EQ(result.legend.entries.size(), 4U);
+}
+
 TEST(ColorPoints, RangeGivenOrFromThePercentiles) {
   PointCloud cloud = row_of_points(101);
   cloud.add_field("curvature", ScalarType::float64);

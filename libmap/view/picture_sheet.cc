@@ -1,0 +1,393 @@
+#include "libmap/view/picture_sheet.h"
+
+#include <vtkImageData.h>
+#include <vtkImageResize.h>
+#include <vtkImageSincInterpolator.h>
+#include <vtkNew.h>
+#include <vtkRenderWindow.h>
+#include <vtkRenderer.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+#include "libmap/core/error.h"
+#include "libmap/view/offscreen.h"
+#include "libmap/view/overlay.h"
+#include "libmap/view/scene_page.h"
+#include "libmap/view/virtual_display.h"
+
+namespace libmap {
+namespace {
+
+constexpr int largest_side_px = 16384;
+constexpr int least_font_px = 10;
+constexpr double pixels_a_font = 30.0;  // of a cell's width
+constexpr double caption_height = 2.0;  // in font sizes, as all below
+constexpr double title_height = 2.6;
+constexpr double gap = 0.8;  // between cells
+
+void check_whole(const char* field, int value, int low, int high) {
+  if (value < low || value > high)
+    throw Error("out of range",
+                {.field = field,
+                 .value = std::to_string(value),
+                 .bound = ">= " + std::to_string(low) + " and <= " + std::to_string(high)});
+}
+
+void check(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
+  if (cells.empty()) throw Error("a sheet without pictures cannot be drawn");
+  check_whole("columns", options.columns, 0, 1000);
+  check_whole("cell_width_px", options.cell_width_px, 16, largest_side_px);
+  if (options.cell_height_px != 0)
+    check_whole("cell_height_px", options.cell_height_px, 16, largest_side_px);
+  parse_color(options.background, "background");
+}
+
+void check_titles(const char* field, std::size_t titles, int bands) {
+  if (titles > static_cast<std::size_t>(bands))
+    throw Error(
+        "more titles than there are of them",
+        {.field = field, .value = std::to_string(titles), .bound = "<= " + std::to_string(bands)});
+}
+
+int rows_of(std::size_t cells, int columns) {
+  return (static_cast<int>(cells) + columns - 1) / columns;
+}
+
+int columns_of(const PictureSheetOptions& options, std::size_t cells, int height) {
+  const int count = static_cast<int>(cells);
+  if (options.columns > 0) return std::min(options.columns, count);
+  int columns = 1;
+  while (columns < count && columns * options.cell_width_px < rows_of(cells, columns) * height)
+    ++columns;
+  return columns;
+}
+
+double widest(const std::vector<std::string>& texts, const TextStyle& style) {
+  double width = 0.0;
+  for (const std::string& text : texts) width = std::max(width, text_size(text, style).x());
+  return width;
+}
+
+bool any_scene(const std::vector<SheetCell>& cells) {
+  return std::any_of(cells.begin(), cells.end(),
+                     [](const SheetCell& cell) { return bool(cell.scene); });
+}
+
+// The rows of cells from `top` on, with what stands before and below them. Returns where they end.
+double plan_rows(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
+                 double left, double top, int cell_height, SheetLayout& layout) {
+  const double f = layout.font_px;
+  const double step_x = options.cell_width_px + std::round(gap * f);
+  const bool captions = std::any_of(cells.begin(), cells.end(),
+                                    [](const SheetCell& cell) { return !cell.caption.empty(); });
+  const double caption = captions ? std::round(caption_height * f) : 0.0;
+  const bool bars = options.scale_bar && any_scene(cells);
+  const int rows = rows_of(cells.size(), layout.columns);
+  double y = top;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < layout.columns; ++column) {
+      if (layout.cells.size() == cells.size()) break;
+      const PixelRect cell{left + column * step_x, y, double(options.cell_width_px),
+                           double(cell_height)};
+      layout.cells.push_back(cell);
+      if (captions) layout.captions.push_back({cell.left, cell.bottom(), cell.width, caption});
+    }
+    if (static_cast<std::size_t>(row) < options.row_titles.size())
+      layout.row_titles.push_back({0.0, y, left, double(cell_height)});
+    y += cell_height + caption;
+    if (bars && (options.shared_view == SharedView::row || row + 1 == rows)) {
+      layout.scale_bars.push_back(
+          {left, y, double(options.cell_width_px), std::round(caption_height * f)});
+      y += std::round(caption_height * f);
+    }
+    y += std::round(gap * f);
+  }
+  return y;
+}
+
+// Beside the cells, in the font of the sheet or a smaller one.
+void plan_legend(const std::vector<Legend>& legends, double left, double top, double bottom,
+                 SheetLayout& layout) {
+  if (legends.empty()) {
+    layout.width = static_cast<int>(left);
+    return;
+  }
+  const Eigen::Vector2d size = legends_size(legends, layout.font_px);
+  const double column = std::ceil(size.x() + 1.8 * layout.font_px);
+  layout.legend = PixelRect{left, top, column, std::max(size.y() + layout.font_px, bottom - top)};
+  layout.width = static_cast<int>(left + column);
+  layout.height = std::max(layout.height, static_cast<int>(std::ceil(layout.legend->bottom())));
+}
+
+// --- what the cells show ----------------------------------------------------------------------
+
+struct Contents {
+  std::vector<std::optional<Bounds3d>> extents;  // one a cell
+  std::vector<Legend> legends;
+};
+
+void widen(Bounds3d& box, const Bounds3d& other) {
+  box.min = box.min.cwiseMin(other.min);
+  box.max = box.max.cwiseMax(other.max);
+}
+
+bool same_scale(const Legend& a, const Legend& b) {
+  return a.continuous && b.continuous && a.title == b.title && a.scale == b.scale;
+}
+
+// A legend that differs from one of them in its range alone widens that range.
+void join_legend(const Legend& legend, std::vector<Legend>& legends) {
+  for (Legend& known : legends) {
+    if (!same_scale(legend, known)) continue;
+    known.min = std::min(known.min, legend.min);
+    known.max = std::max(known.max, legend.max);
+    return;
+  }
+  add_legend(legend, legends);
+}
+
+Contents look_at(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
+  Contents contents;
+  contents.legends = options.legends;
+  for (const SheetCell& cell : cells) {
+    if (!cell.scene) {
+      contents.extents.emplace_back();
+      continue;
+    }
+    const SceneContents shown = contents_of(cell.scene());
+    contents.extents.emplace_back(shown.extent);
+    for (const Legend& legend : shown.legends) join_legend(legend, contents.legends);
+  }
+  return contents;
+}
+
+// Of a cell's content in its view, height over width; nothing in perspective.
+std::optional<double> aspect_of(const SheetCell& cell, const std::optional<Bounds3d>& extent) {
+  if (!extent)
+    return cell.picture.width > 0 ? std::optional(1.0 * cell.picture.height / cell.picture.width)
+                                  : std::nullopt;
+  const Eigen::Vector3d size = extent->max - extent->min;
+  switch (cell.view) {
+    case Viewpoint::top:
+      return size.y() / size.x();
+    case Viewpoint::front:
+      return size.z() / size.x();
+    case Viewpoint::side:
+      return size.z() / size.y();
+    case Viewpoint::oblique:
+    case Viewpoint::camera:
+      break;
+  }
+  return std::nullopt;
+}
+
+double common_aspect(const std::vector<SheetCell>& cells, const Contents& contents) {
+  double aspect = 0.0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const std::optional<double> one = aspect_of(cells[i], contents.extents[i]);
+    if (one && std::isfinite(*one)) aspect = std::max(aspect, *one);
+  }
+  return aspect > 0.0 ? std::clamp(aspect, 0.25, 2.0) : 0.75;
+}
+
+// The boxes that the cells' views are fitted to: those that share a view hold all of it.
+std::vector<std::optional<Bounds3d>> shared_extents(const Contents& contents, int columns,
+                                                    SharedView shared) {
+  std::vector<std::optional<Bounds3d>> result = contents.extents;
+  const auto group_of = [&](std::size_t cell) {
+    return shared == SharedView::sheet ? std::size_t{0} : cell / static_cast<std::size_t>(columns);
+  };
+  for (std::size_t i = 0; i < result.size(); ++i)
+    for (std::size_t j = 0; j < result.size(); ++j)
+      if (result[i] && contents.extents[j] && group_of(i) == group_of(j))
+        widen(*result[i], *contents.extents[j]);
+  return result;
+}
+
+void share_ranges(const std::vector<Legend>& legends, Scene& scene) {
+  for (const Legend& own : contents_of(scene).legends) {
+    for (const Legend& legend : legends) {
+      if (!same_scale(own, legend)) continue;
+      for (SceneLayer& layer : scene.layers) {
+        layer.coloring.range_min = legend.min;
+        layer.coloring.range_max = legend.max;
+      }
+    }
+  }
+}
+
+// --- pixels ------------------------------------------------------------------------------------
+
+// Fitted into `width` x `height`, never larger than it is.
+ColorImage fitted(const ColorImage& image, int width, int height) {
+  if (image.width <= width && image.height <= height) return image;
+  const double scale = std::min(1.0 * width / image.width, 1.0 * height / image.height);
+  const int new_width = std::clamp(static_cast<int>(std::lround(scale * image.width)), 1, width);
+  const int new_height = std::clamp(static_cast<int>(std::lround(scale * image.height)), 1, height);
+  vtkNew<vtkImageData> data;
+  data->SetDimensions(image.width, image.height, 1);
+  data->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
+  std::memcpy(data->GetScalarPointer(), image.pixels.data(), image.pixels.size() * sizeof(Color));
+  vtkNew<vtkImageSincInterpolator> filter;
+  filter->AntialiasingOn();
+  vtkNew<vtkImageResize> resize;
+  resize->SetInputData(data);
+  resize->SetInterpolator(filter);
+  resize->SetOutputDimensions(new_width, new_height, 1);
+  resize->Update();
+  ColorImage result(new_width, new_height);
+  std::memcpy(result.pixels.data(), resize->GetOutput()->GetScalarPointer(),
+              result.pixels.size() * sizeof(Color));
+  return result;
+}
+
+// In the middle of `cell`.
+void paste(const ColorImage& image, const PixelRect& cell, ColorImage& page) {
+  const int left = static_cast<int>(cell.left + std::floor((cell.width - image.width) / 2.0));
+  const int top = static_cast<int>(cell.top + std::floor((cell.height - image.height) / 2.0));
+  for (int row = 0; row < image.height; ++row)
+    std::copy_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(image.index(0, row)),
+                image.width,
+                page.pixels.begin() + static_cast<std::ptrdiff_t>(page.index(left, top + row)));
+}
+
+ScenePage page_around(const PixelRect& cell, const SheetLayout& layout) {
+  ScenePage page;
+  page.plot = cell;
+  page.font_px = page.legend_font_px = layout.font_px;
+  return page;
+}
+
+void draw_text(const PixelRect& rect, const std::string& text, TextStyle style, Overlay& overlay) {
+  const double x = style.align == TextAlign::center ? rect.left + rect.width / 2.0
+                                                    : rect.left + 0.4 * style.size_px;
+  overlay.text({x, rect.top + rect.height / 2.0},
+               shortened_text(text, style, rect.width - 0.4 * style.size_px), style);
+}
+
+void draw_page(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
+               const std::vector<Legend>& legends, const SheetLayout& layout, Overlay& overlay) {
+  const TextStyle plain{.size_px = layout.font_px};
+  TextStyle head = plain;
+  head.bold = true;
+  ScenePage page = page_around({}, layout);
+  page.title = layout.title;
+  draw_title(page, options.title, overlay);
+  page.legend = layout.legend;
+  draw_legends(page, legends, overlay);
+  for (std::size_t i = 0; i < layout.captions.size(); ++i)
+    draw_text(layout.captions[i], cells[i].caption, plain, overlay);
+  for (std::size_t i = 0; i < layout.row_titles.size(); ++i)
+    draw_text(layout.row_titles[i], options.row_titles[i], head, overlay);
+  head.align = TextAlign::center;
+  for (std::size_t i = 0; i < layout.column_titles.size(); ++i)
+    draw_text(layout.column_titles[i], options.column_titles[i], head, overlay);
+}
+
+struct DrawnCell {
+  ColorImage image;
+  std::optional<SceneCamera> camera;  // of an orthographic view
+};
+
+DrawnCell draw_cell(const SheetCell& cell, const PixelRect& rect,
+                    const std::optional<Bounds3d>& extent, const std::vector<Legend>& legends,
+                    const PictureSheetOptions& options, int font_px) {
+  const int width = static_cast<int>(rect.width);
+  const int height = static_cast<int>(rect.height);
+  if (!cell.scene) return {fitted(cell.picture, width, height), {}};
+  Scene scene = cell.scene();
+  share_ranges(legends, scene);
+  SceneViewOptions view;
+  view.width = width;
+  view.height = height;
+  view.view = cell.view;
+  view.axes = view.scale_bar = view.legend = false;
+  view.background = options.background;
+  view.extent = extent;
+  view.font_px = font_px;
+  DrawnCell drawn{render_scene(scene, view), camera_of(scene, view)};
+  if (drawn.camera->perspective) drawn.camera.reset();
+  return drawn;
+}
+
+}  // namespace
+
+std::vector<std::pair<std::string, SharedView>> shared_view_names() {
+  return {{"sheet", SharedView::sheet}, {"row", SharedView::row}};
+}
+
+SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
+                       const std::vector<Legend>& legends, double aspect) {
+  check(cells, options);
+  SheetLayout layout;
+  const int height =
+      options.cell_height_px > 0
+          ? options.cell_height_px
+          : std::max(16, static_cast<int>(std::lround(options.cell_width_px * aspect)));
+  layout.columns = columns_of(options, cells.size(), height);
+  check_titles("column_titles", options.column_titles.size(), layout.columns);
+  check_titles("row_titles", options.row_titles.size(), rows_of(cells.size(), layout.columns));
+  layout.font_px =
+      std::clamp(static_cast<int>(options.cell_width_px / pixels_a_font), least_font_px, 40);
+  const double f = layout.font_px;
+  double top = options.title.empty() ? std::round(gap * f) : std::round(title_height * f);
+  const TextStyle head{.size_px = layout.font_px, .bold = true};
+  const double left = options.row_titles.empty()
+                          ? std::round(gap * f)
+                          : std::ceil(widest(options.row_titles, head) + 1.2 * f);
+  const double step = options.cell_width_px + std::round(gap * f);
+  for (std::size_t i = 0; i < options.column_titles.size(); ++i)
+    layout.column_titles.push_back({left + static_cast<double>(i) * step, top,
+                                    double(options.cell_width_px), std::round(caption_height * f)});
+  if (!options.column_titles.empty()) top += std::round(caption_height * f);
+  const double bottom = plan_rows(cells, options, left, top, height, layout);
+  layout.height = static_cast<int>(bottom);
+  plan_legend(legends, left + layout.columns * step, top, bottom, layout);
+  if (!options.title.empty())
+    layout.title = PixelRect{0.0, 0.0, double(layout.width), std::round(title_height * f)};
+  if (layout.width > largest_side_px || layout.height > largest_side_px)
+    throw Error("the sheet would have " + std::to_string(layout.width) + " x " +
+                    std::to_string(layout.height) + " pixels, more than " +
+                    std::to_string(largest_side_px) + " a side",
+                {.field = "cell_width_px", .value = std::to_string(options.cell_width_px)});
+  return layout;
+}
+
+ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
+  check(cells, options);
+  const Contents contents = look_at(cells, options);
+  const SheetLayout layout =
+      plan_sheet(cells, options, contents.legends, common_aspect(cells, contents));
+  const auto extents = shared_extents(contents, layout.columns, options.shared_view);
+  const VirtualDisplay display;
+  Overlay overlay;
+  draw_page(cells, options, contents.legends, layout, overlay);
+  std::vector<ColorImage> images;
+  std::size_t bars = 0;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    DrawnCell drawn =
+        draw_cell(cells[i], layout.cells[i], extents[i], contents.legends, options, layout.font_px);
+    images.push_back(std::move(drawn.image));
+    // The bar of a row stands below its first scene that has one.
+    const std::size_t row = i / static_cast<std::size_t>(layout.columns);
+    const bool wanted = options.shared_view == SharedView::sheet ? bars == 0 : bars <= row;
+    if (!drawn.camera || layout.scale_bars.empty() || !wanted) continue;
+    ScenePage page = page_around(layout.cells[i], layout);
+    page.scale_bar = layout.scale_bars[options.shared_view == SharedView::sheet ? 0 : row];
+    const Bounds3d& box = *extents[i];
+    draw_scale_bar(page, *drawn.camera, (box.min + box.max) / 2.0, overlay);
+    bars = row + 1;
+  }
+  ColorImage page = draw_offscreen(layout.width, layout.height, [&](vtkRenderWindow& window) {
+    vtkNew<vtkRenderer> renderer;
+    renderer->SetBackground(1.0, 1.0, 1.0);
+    overlay.add_to(*renderer, layout.height);
+    window.AddRenderer(renderer);
+  });
+  for (std::size_t i = 0; i < cells.size(); ++i) paste(images[i], layout.cells[i], page);
+  return page;
+}
+
+}  // namespace libmap

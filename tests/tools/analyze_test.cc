@@ -1,0 +1,133 @@
+#include <gtest/gtest.h>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/table.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::write_terrain;
+using libmap::PointCloud;
+
+const std::vector<std::string> score_options = {"--solid-voxel-threshold",
+                                                "1",
+                                                "--graspability-threshold",
+                                                "0.5",
+                                                "--curvature-radius",
+                                                "0",
+                                                "--zero-plane",
+                                                "-1"};
+
+void score(const std::string& map, std::vector<std::string> options = {}) {
+  std::vector<std::string> words = {"score", "terrain.pcd", "-o", map};
+  words.insert(words.end(), score_options.begin(), score_options.end());
+  words.insert(words.end(), options.begin(), options.end());
+  ASSERT_TRUE(succeeded(graspmap(words)));
+}
+
+TEST(Analyze, WritesAFolderAndItsManifest) {
+  write_terrain();
+  score("map.pcd");
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.pcd", "-o", "out", "--edges"})));
+  for (const char* name : {"histogram.svg", "histogram.png", "by_height.png", "by_slope.svg",
+                           "regions.png", "region_links.csv"})
+    EXPECT_TRUE(std::filesystem::file_size(scratch("out") / name) > 0) << name;
+  EXPECT_FALSE(std::filesystem::exists(scratch("out/change.csv")));
+  const PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
+  const PointCloud regions = libmap::read_cloud(scratch("out/regions.pcd")).cloud;
+  ASSERT_EQ(regions.size(), map.size());
+  EXPECT_EQ(regions.positions, map.positions);
+  const auto summary = json_of("out/summary.json");
+  EXPECT_EQ(summary.at("voxels").at("all"), map.size());
+  // Bumpy ground of 0.6 x 0.6 m.
+  EXPECT_NEAR(summary.at("judged").at("plan_area_m2").get<double>(), 0.36, 0.02);
+  const libmap::Table table = libmap::read_csv(scratch("out/regions.csv"));
+  EXPECT_EQ(table.rows.size(), summary.at("regions").at("count"));
+  double most = 0.0;
+  for (const double region : regions.find_field("region")->values) most = std::max(most, region);
+  EXPECT_EQ(most, static_cast<double>(table.rows.size()));
+  EXPECT_EQ(json_of("out.json").at("results").at("voxels"), map.size());
+}
+
+TEST(Analyze, AgainstItselfInAnotherFrameNothingChanges) {
+  write_terrain();
+  score("map.pcd");
+  score("input.pcd", {"--frame", "input"});
+  ASSERT_TRUE(succeeded(
+      graspmap({"analyze", "map.pcd", "input.pcd", "-o", "out", "--edges", "--no-pictures"})));
+  const auto change = json_of("out/summary.json").at("change");
+  EXPECT_EQ(change.at("matching"), "lattice");
+  EXPECT_EQ(change.at("judged").at("kappa").at("value"), 1.0);
+  EXPECT_EQ(change.at("only_in_map").at("voxels"), 0);
+  EXPECT_EQ(change.at("judged").at("score_difference").at("max"), 0.0);
+  EXPECT_FALSE(std::filesystem::exists(scratch("out/change.png")));
+  EXPECT_EQ(libmap::read_csv(scratch("out/change.csv")).rows[0][0], "common");
+}
+
+TEST(Analyze, SameBytesForAnyNumberOfThreadsAndAnyOrderOfPoints) {
+  write_terrain();
+  score("map.pcd");
+  PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
+  std::vector<std::size_t> order;
+  for (std::size_t n = 0; n < map.size(); ++n) order.push_back((n * 7919) % map.size());
+  ASSERT_NE(map.size() % 7919, 0U);
+  libmap::write_cloud(scratch("turned.pcd"), libmap::select_points(map, order));
+  std::filesystem::copy_file(scratch("map.pcd.json"), scratch("turned.pcd.json"));
+  for (const auto& [file, threads] : {std::pair("map.pcd", "1"), std::pair("turned.pcd", "2")})
+    ASSERT_TRUE(succeeded(graspmap({"analyze", file, "map.pcd", "-o", "by_" + std::string(threads),
+                                    "--threads", threads, "--no-pictures", "--edges"})));
+  for (const char* name : {"summary.json", "histogram.csv", "by_height.csv", "by_slope.csv",
+                           "regions.csv", "region_links.csv", "change.csv", "change.pcd"})
+    EXPECT_EQ(content("by_1/" + std::string(name)), content("by_2/" + std::string(name))) << name;
+}
+
+TEST(Analyze, MapsWithoutAManifestAndStarts) {
+  std::string text = "x,y,z,score,graspable,i,j,k\n";
+  for (int i = 0; i < 30; ++i)
+    for (int j = 0; j < 10; ++j) {
+      const bool good = i < 3 || (i >= 13 && i < 16);
+      text += std::to_string(0.01 * i) + "," + std::to_string(0.01 * j) + ",0," +
+              (good ? "0.9,1," : "0.2,0,") + std::to_string(i) + "," + std::to_string(j) + ",0\n";
+    }
+  graspmap_test::write_text(scratch("map.csv"), text);
+  const auto result =
+      graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures", "--stride", "0.11"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("no manifest beside it"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("2 regions"), std::string::npos);
+  auto regions = json_of("out/summary.json").at("regions");
+  EXPECT_EQ(regions.at("groups"), 1);
+  EXPECT_NEAR(regions.at("joining_stride_m").get<double>(), 0.11, 1e-6);
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures", "--stride",
+                                  "0.05", "--start", "0.18,0.05,0"})));
+  regions = json_of("out/summary.json").at("regions");
+  EXPECT_EQ(regions.at("start_region"), 2);
+  EXPECT_EQ(regions.at("reachable_regions"), 1);
+}
+
+TEST(Analyze, BadInputIsSaidInOneLine) {
+  write_terrain();
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "out"}),
+                        {"terrain.pcd", "score", "no such field"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "none.pcd", "-o", "out"}), {"none.pcd"}));
+  score("map.pcd");
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "terrain.pcd", "-o", "out"}),
+                        {"terrain.pcd", "score"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--stride", "0"}),
+                        {"--stride is 0", "> 0"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--start", "1,2"}),
+                        {"--start", "X,Y,Z"}));
+  EXPECT_TRUE(bad_input(
+      graspmap({"analyze", "map.pcd", "map.pcd", "-o", "out", "--transform", "50,0,0,0,0,0"}),
+      {"map.pcd", "no voxel in common"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.tiles", "-o", "out"}), {"merge"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("out")));
+}
+
+}  // namespace

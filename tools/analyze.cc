@@ -1,0 +1,369 @@
+// graspmap analyze: how much of a map can be held, where, what joins it; what differs from another.
+#include <fmt/format.h>
+
+#include <cmath>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libgtd/evaluate/analysis_tables.h"
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
+#include "libmap/view/virtual_display.h"
+#include "tools/analysis_pictures.h"
+#include "tools/command_line.h"
+#include "tools/map_frame.h"
+#include "tools/map_tiles.h"
+#include "tools/placement.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using graspmap_tools::Run;
+
+constexpr const char* no_start = "largest";
+
+struct AnalyzeOptions {
+  std::string map;
+  std::string other;
+  std::string folder;
+  std::string start = no_start;
+  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
+  std::string transform = "auto";
+  bool pictures = true;
+  libgtd::MapSurfaceOptions surface;
+  libgtd::MapAnalysisOptions analysis;
+  libgtd::MapRegionOptions regions;
+  libgtd::RegionReachOptions reach;
+  libgtd::MapChangeOptions change;
+};
+
+void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
+  bind(table, options.analysis);
+  bind(table, options.surface);
+  bind(table, options.regions);
+  bind(table, options.reach);
+  table.add("start", options.start,
+            "where the robot stands: X,Y,Z in the frame of --points-frame; largest: on the largest "
+            "region");
+  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
+            "frame of the start: of the cloud that was scored, the terrain's, or the map's before "
+            "it was cropped");
+  bind(table, options.change);
+  table.add("transform", options.transform,
+            "carries OTHER's points to MAP's: auto: both were scored from clouds in one frame, or "
+            "cropped from one map; X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file of it");
+  table.add("pictures", options.pictures, "draw pictures and charts");
+}
+
+// A map as it was read, and on its lattice.
+struct ReadMap {
+  libmap::PointCloud cloud;
+  std::optional<libmap::Manifest> manifest;
+  libgtd::VoxelMap voxels;
+};
+
+ReadMap read_map(const std::string& file, Run& run) {
+  if (graspmap_tools::is_tile_store(file))
+    throw libmap::Error("is a tile store: `graspmap merge` makes one map of it first",
+                        {.file = file});
+  ReadMap map;
+  map.cloud = libmap::read_cloud(file).cloud;
+  map.manifest = libmap::read_manifest_of(file);
+  try {
+    map.voxels = libgtd::voxel_map_of(
+        map.cloud, map.manifest ? libgtd::facts_of(*map.manifest) : libgtd::MapFacts{});
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file);
+  }
+  if (!map.manifest)
+    run.warn(file +
+             ": no manifest beside it: its points are taken in the terrain frame, all above "
+             "the zero plane");
+  run.add_input(file);
+  return map;
+}
+
+// From the frame of the cloud that was scored to that of the map's points.
+libmap::Pose map_from_input(const ReadMap& map) {
+  if (!map.manifest || map.manifest->frame != "terrain") return libmap::Pose::Identity();
+  const libmap::Pose* pose = map.manifest->find_transform("terrain_from_input");
+  return pose == nullptr ? libmap::Pose::Identity() : *pose;
+}
+
+// Carries OTHER's points to the frame of MAP's.
+libmap::Pose map_from_other(const AnalyzeOptions& options, const ReadMap& map, const ReadMap& other,
+                            Run& run) {
+  if (options.transform != "auto")
+    return graspmap_tools::parse_transform(options.transform, "--transform");
+  const auto has_crop = [](const ReadMap& one) {
+    return one.manifest &&
+           one.manifest->find_transform(graspmap_tools::site_from_map_name) != nullptr;
+  };
+  if (has_crop(map) && has_crop(other))
+    return *graspmap_tools::site_from_map_of(options.map) *
+           graspmap_tools::site_from_map_of(options.other)->inverse();
+  if (has_crop(map) != has_crop(other))
+    run.warn("only " + (has_crop(map) ? options.map : options.other) +
+             " was cropped: the frames of the clouds that were scored are taken for one "
+             "(--transform says otherwise)");
+  return map_from_input(map) * map_from_input(other).inverse();
+}
+
+struct Analysis {
+  libgtd::MapSurface surface;
+  libgtd::MapAnalysis ground;
+  libgtd::MapRegionResult regions;
+  libgtd::RegionReach reach;
+};
+
+Analysis analyze_map(AnalyzeOptions& options, const ReadMap& map, Run& run) {
+  if (options.start != no_start) {
+    const libmap::Pose map_from_points =
+        graspmap_tools::map_from_points(options.map, options.points_frame, run);
+    options.reach.start =
+        map.voxels.terrain_from_map *
+        (map_from_points * graspmap_tools::parse_vector(options.start, "--start"));
+  }
+  Analysis analysis;
+  try {
+    analysis.surface =
+        run.timed("surface", [&] { return measure_surface(map.voxels, options.surface); });
+    analysis.ground = run.timed("ground", [&] {
+      return libgtd::analyze_map(map.voxels, analysis.surface, options.analysis);
+    });
+    analysis.regions = run.timed(
+        "regions", [&] { return find_regions(map.voxels, analysis.surface, options.regions); });
+    analysis.reach =
+        run.timed("reach", [&] { return find_reach(map.voxels, analysis.regions, options.reach); });
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.map);
+  }
+  return analysis;
+}
+
+struct Comparison {
+  ReadMap other;
+  libmap::Pose map_terrain_from_other_terrain = libmap::Pose::Identity();
+  libgtd::MapChange change;
+};
+
+Comparison compare(const AnalyzeOptions& options, const ReadMap& map, const Analysis& analysis,
+                   Run& run) {
+  Comparison comparison;
+  comparison.other = run.timed("read", [&] { return read_map(options.other, run); });
+  const libmap::Pose map_from_points = map_from_other(options, map, comparison.other, run);
+  comparison.map_terrain_from_other_terrain = map.voxels.terrain_from_map * map_from_points *
+                                              comparison.other.voxels.terrain_from_map.inverse();
+  try {
+    comparison.change = run.timed("change", [&] {
+      return compare_maps(map.voxels, analysis.surface, comparison.other.voxels,
+                          comparison.map_terrain_from_other_terrain, options.change);
+    });
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.other);
+  }
+  return comparison;
+}
+
+std::string percent_text(const std::optional<double>& share) {
+  return share ? fmt::format("{:.2f} %", 100.0 * *share) : "none";
+}
+
+void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
+  const libgtd::MapAnalysis& ground = analysis.ground;
+  run.say(fmt::format("{} of {} voxels judged: {:.3f} m2 of ground, {:.4f} m2 ({}) can be held",
+                      ground.ground.voxels, ground.voxels, ground.ground.area_m2,
+                      ground.ground.graspable_area_m2,
+                      percent_text(ground.ground.graspable_share())));
+  if (ground.column_coverage < 0.95)
+    run.warn(fmt::format(
+        "{}: {:.0f} % of the columns inside the ground have a voxel: regions fall apart "
+        "(--adjacency-voxels 2 joins them across one empty voxel)",
+        options.map, 100.0 * ground.column_coverage));
+  const libgtd::RegionReach& reach = analysis.reach;
+  if (analysis.regions.regions.empty()) {
+    run.say("no graspable region");
+    return;
+  }
+  run.say(fmt::format(
+      "{} regions, the largest {:.4f} m2; strides of {:g} m make {} groups of them, {:.3f} m one",
+      analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
+      options.reach.stride_m, reach.groups, *reach.joining_stride_m));
+  run.say(fmt::format("{} regions ({:.4f} m2) can be reached from {}", reach.reachable_regions,
+                      reach.reachable_area_m2,
+                      options.start == no_start ? "region 1" : options.start));
+  if (reach.reachable_regions == 0)
+    run.warn(fmt::format("the nearest region, {}, is {:.3f} m from the start",
+                         *reach.start_region + 1, reach.start_distance_m));
+}
+
+void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, Run& run) {
+  const libgtd::ChangeSummary& judged = change.judged;
+  run.say(fmt::format(
+      "{} voxels in common ({}), {} in MAP alone, {} in OTHER alone", change.pairs.size(),
+      change.matching == libgtd::VoxelMatching::lattice
+          ? std::string("same lattice")
+          : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
+      change.only_map.size(), change.only_other.size()));
+  run.say(fmt::format(
+      "of {} judged in both: kappa {}, accuracy {}; can be held in both {}, in MAP alone {}, in "
+      "OTHER alone {}",
+      judged.graspable.size(),
+      judged.kappa ? fmt::format("{:.3f} (standard error {:.3f})", judged.kappa->value,
+                                 judged.kappa->standard_error)
+                   : "not defined",
+      percent_text(judged.graspable.accuracy().value()), judged.graspable.true_positives,
+      judged.lost(), judged.gained()));
+  if (judged.difference.count > 0)
+    run.say(fmt::format("score, OTHER less MAP: mean {:+.3f}, mean size {:.3f}, rms {:.3f}",
+                        judged.difference.mean, judged.difference.mean_absolute,
+                        judged.difference.rms));
+}
+
+void note_results(const Analysis& analysis, const Comparison* comparison, Run& run) {
+  auto& results = run.manifest().results;
+  const auto count = [&](const char* name, std::size_t value) {
+    results.emplace_back(name, static_cast<std::int64_t>(value));
+  };
+  const libgtd::MapAnalysis& ground = analysis.ground;
+  count("voxels", ground.voxels);
+  count("judged_voxels", ground.ground.voxels);
+  results.emplace_back("surface_area_m2", ground.ground.area_m2);
+  results.emplace_back("graspable_surface_area_m2", ground.ground.graspable_area_m2);
+  results.emplace_back("column_coverage", ground.column_coverage);
+  count("regions", analysis.regions.regions.size());
+  count("groups", analysis.reach.groups);
+  count("reachable_regions", analysis.reach.reachable_regions);
+  if (analysis.reach.joining_stride_m)
+    results.emplace_back("joining_stride_m", *analysis.reach.joining_stride_m);
+  if (comparison == nullptr) return;
+  const libgtd::MapChange& change = comparison->change;
+  results.emplace_back("matching", std::string(to_text(change.matching)));
+  count("voxels_in_common", change.pairs.size());
+  count("judged_in_both", change.judged.graspable.size());
+  if (change.judged.kappa) results.emplace_back("kappa", change.judged.kappa->value);
+  run.manifest().transforms.emplace_back("map_terrain_from_other_terrain",
+                                         comparison->map_terrain_from_other_terrain);
+}
+
+using Names = std::vector<std::string>;
+const Names& output_names() {
+  static const Names names = {
+      "summary.json",  "histogram.csv",    "histogram.svg",   "histogram.png", "by_height.csv",
+      "by_height.svg", "by_height.png",    "by_slope.csv",    "by_slope.svg",  "by_slope.png",
+      "regions.csv",   "region_links.csv", "regions.pcd",     "regions.png",   "change.csv",
+      "change.pcd",    "change.png",       "change_score.png"};
+  return names;
+}
+
+// With the folder: pipelines name every map alike.
+std::string short_name(const std::string& file) {
+  const fs::path path = fs::path(file).lexically_normal();
+  return (path.parent_path().filename() / path.filename()).string();
+}
+
+void write_chart(const fs::path& folder, const std::string& name, const libmap::Chart& chart) {
+  libmap::write_chart_svg(folder / (name + ".svg"), chart);
+  libmap::write_text(folder / (name + ".png"), libmap::to_png(libmap::draw_chart(chart)));
+}
+
+void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
+                    const Analysis& analysis, const Comparison* comparison) {
+  const libmap::VirtualDisplay display;
+  const std::string name = short_name(options.map);
+  const libgtd::MapAnalysis& ground = analysis.ground;
+  write_chart(folder, "histogram", graspmap_tools::histogram_chart(ground, "Scores of " + name));
+  write_chart(folder, "by_height",
+              graspmap_tools::ground_chart(ground.by_height, "height [m]",
+                                           "Graspable ground by height, " + name));
+  write_chart(folder, "by_slope",
+              graspmap_tools::ground_chart(ground.by_slope, "slope [deg]",
+                                           "Graspable ground by slope, " + name));
+  graspmap_tools::MapPicture picture{map.voxels, analysis.surface, ""};
+  const auto write = [&](const char* file, const libmap::ColorImage& image) {
+    libmap::write_text(folder / file, libmap::to_png(image));
+  };
+  picture.title = fmt::format("{}: {} regions, stride {:g} m", name,
+                              analysis.regions.regions.size(), options.reach.stride_m);
+  write("regions.png", graspmap_tools::draw_regions(picture, analysis.regions, analysis.reach));
+  if (comparison == nullptr) return;
+  const libgtd::MapChange& change = comparison->change;
+  picture.title = fmt::format(
+      "MAP {}, OTHER {}{}", name, short_name(options.other),
+      change.judged.kappa ? fmt::format(": kappa {:.2f}", change.judged.kappa->value) : "");
+  write("change.png", graspmap_tools::draw_change(picture, change, comparison->other.voxels,
+                                                  comparison->map_terrain_from_other_terrain));
+  write("change_score.png",
+        graspmap_tools::draw_score_change(picture, change, comparison->other.voxels));
+}
+
+void write_tables(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
+                  const Analysis& analysis, const Comparison* comparison) {
+  const auto table = [&](const char* name, const libmap::Table& rows) {
+    libmap::write_text(folder / name, libmap::to_csv(rows));
+  };
+  libmap::write_text(
+      folder / "summary.json",
+      libgtd::analysis_json(analysis.ground, analysis.surface, analysis.regions, options.reach,
+                            analysis.reach, comparison ? &comparison->change : nullptr));
+  table("histogram.csv", libgtd::histogram_table(analysis.ground));
+  table("by_height.csv", libgtd::ground_table(analysis.ground.by_height, "m"));
+  table("by_slope.csv", libgtd::ground_table(analysis.ground.by_slope, "deg"));
+  table("regions.csv", libgtd::regions_table(map.voxels, analysis.regions, analysis.reach));
+  table("region_links.csv", libgtd::region_links_table(map.voxels, analysis.reach));
+  libmap::write_cloud(folder / "regions.pcd",
+                      libgtd::regions_cloud(map.cloud, map.voxels, analysis.surface,
+                                            analysis.regions, analysis.reach));
+  if (comparison == nullptr) return;
+  table("change.csv", libgtd::change_table(comparison->change));
+  libmap::write_cloud(
+      folder / "change.pcd",
+      libgtd::to_cloud(comparison->change, map.voxels, comparison->other.voxels,
+                       comparison->map_terrain_from_other_terrain, options.change.edges));
+}
+
+void analyze(AnalyzeOptions& options, Run& run) {
+  run.claim_output_tree(options.folder, output_names(), {options.map, options.other});
+  options.regions.edges = options.change.edges = options.analysis.edges;
+  options.change.height_bin_m = options.analysis.height_bin_m;
+  options.change.slope_bin_deg = options.analysis.slope_bin_deg;
+  const ReadMap map = run.timed("read", [&] { return read_map(options.map, run); });
+  const Analysis analysis = analyze_map(options, map, run);
+  std::optional<Comparison> comparison;
+  if (!options.other.empty()) comparison = compare(options, map, analysis, run);
+  say_ground(analysis, options, run);
+  if (comparison) say_change(comparison->change, options, run);
+  const Comparison* against = comparison ? &*comparison : nullptr;
+  note_results(analysis, against, run);
+  if (map.manifest) {
+    run.manifest().frame = map.manifest->frame;
+    const auto& transforms = map.manifest->transforms;
+    run.manifest().transforms.insert(run.manifest().transforms.begin(), transforms.begin(),
+                                     transforms.end());
+  }
+  run.write_output_tree(options.folder, output_names(), [&](const fs::path& folder) {
+    if (folder.empty()) return;
+    write_tables(folder, options, map, analysis, against);
+    if (options.pictures) write_pictures(folder, options, map, analysis, against);
+  });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  AnalyzeOptions options;
+  graspmap_tools::Command command(
+      "analyze", "How much of a map can be held, and where; what differs from another map.");
+  command.input("MAP", options.map, "graspability map");
+  command.optional_input("OTHER", options.other,
+                         "map of the same ground, against which MAP is compared");
+  command.output(options.folder,
+                 "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
+                 "and, with OTHER, change");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { analyze(options, run); });
+}

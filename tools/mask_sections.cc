@@ -1,0 +1,169 @@
+#include "tools/mask_sections.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <functional>
+#include <utility>
+
+#include "libmap/core/error.h"
+
+namespace graspmap_tools {
+namespace {
+
+using libgtd::GripperMask;
+
+struct KindLook {
+  MaskVoxel kind;
+  libmap::Color color;
+  const char* text;
+};
+
+constexpr std::array<KindLook, 5> looks{
+    {{MaskVoxel::solid, {0, 114, 178}, "solid"},
+     {MaskVoxel::void_space, {205, 211, 218}, "void"},
+     {MaskVoxel::solid_not_counted, {150, 200, 226}, "solid, not counted"},
+     {MaskVoxel::void_not_counted, {252, 240, 214}, "void, not counted"},
+     {MaskVoxel::pivot, {213, 94, 0}, "pivot"}}};
+
+constexpr double square_share = 0.94;  // of a voxel's side: lines show between them
+constexpr double offset_share = 0.1;   // of the mask's side: measures lie as far outside
+
+// A place in the mask by the two directions of a section.
+using PlaceInMask = std::function<Eigen::Vector3i(int, int)>;
+
+Eigen::Vector3d center_of(const GripperMask& mask, const Eigen::Vector3i& voxel) {
+  return mask.voxel_size_m *
+         (voxel - Eigen::Vector3i(mask.pivot_xy, mask.pivot_xy, mask.pivot_z)).cast<double>();
+}
+
+libmap::Scene scene_of(const GripperMask& mask, const PlaceInMask& place, int width, int height) {
+  libmap::Scene scene;
+  for (const KindLook& look : looks) {
+    libmap::PointCloud cloud;
+    for (int u = 0; u < width; ++u)
+      for (int v = 0; v < height; ++v) {
+        const Eigen::Vector3i at = place(u, v);
+        if (kind_of(mask, at.x(), at.y(), at.z()) == look.kind)
+          cloud.positions.push_back(center_of(mask, at));
+      }
+    if (cloud.empty()) continue;
+    libmap::SceneLayer layer;
+    layer.coloring.mode = libmap::ColorMode::single;
+    layer.coloring.color =
+        fmt::format("#{:02x}{:02x}{:02x}", look.color[0], look.color[1], look.color[2]);
+    layer.shape = std::move(cloud);
+    layer.point_shape = libmap::PointShape::square;
+    layer.shading = libmap::Shading::none;
+    layer.point_size_m = square_share * mask.voxel_size_m;
+    scene.layers.push_back(std::move(layer));
+  }
+  return scene;
+}
+
+// A measure along a direction of the section, over `count` voxels from `first` on, moved aside.
+libmap::DimensionLine measure(const GripperMask& mask, const Eigen::Vector3i& first,
+                              const Eigen::Vector3i& along, int count, const Eigen::Vector3d& aside,
+                              const std::string& name) {
+  const Eigen::Vector3d start =
+      center_of(mask, first) - 0.5 * mask.voxel_size_m * along.cast<double>() + aside;
+  const double length_m = count * mask.voxel_size_m;
+  return {start, start + length_m * along.cast<double>(),
+          fmt::format("{}{}{:.4g} mm", name, name.empty() ? "" : " ", 1000.0 * length_m)};
+}
+
+// The voxels with the pivot's column among them, along x through the axis, that are all solid or
+// all void: first and number.
+std::pair<int, int> run_through_axis(const GripperMask& mask, int z) {
+  const int y = mask.pivot_xy;
+  const bool solid = mask.is_solid(mask.pivot_xy, y, z);
+  int first = mask.pivot_xy;
+  int last = mask.pivot_xy;
+  while (first > 0 && mask.is_solid(first - 1, y, z) == solid) --first;
+  while (last + 1 < mask.side && mask.is_solid(last + 1, y, z) == solid) ++last;
+  return {first, last - first + 1};
+}
+
+libmap::SheetCell cell_of(std::string caption, libmap::Scene scene, libmap::Viewpoint view) {
+  libmap::SheetCell cell;
+  cell.caption = std::move(caption);
+  cell.scene = [scene = std::move(scene)] { return scene; };
+  cell.view = view;
+  return cell;
+}
+
+libmap::SheetCell vertical(const GripperMask& mask) {
+  const int y = mask.pivot_xy;
+  libmap::Scene scene = scene_of(
+      mask, [y](int x, int z) { return Eigen::Vector3i(x, y, z); }, mask.side, mask.layers);
+  const double aside = (offset_share * mask.side + 0.5) * mask.voxel_size_m;
+  const Eigen::Vector3i x_axis = Eigen::Vector3i::UnitX();
+  const Eigen::Vector3i z_axis = Eigen::Vector3i::UnitZ();
+  scene.dimension_lines.push_back(
+      measure(mask, {0, y, 0}, x_axis, mask.side, -aside * Eigen::Vector3d::UnitZ(), ""));
+  const Eigen::Vector3d right = aside * Eigen::Vector3d::UnitX();
+  scene.dimension_lines.push_back(
+      measure(mask, {mask.side - 1, y, 0}, z_axis, mask.solid_layers, right, ""));
+  if (mask.layers > mask.solid_layers)
+    scene.dimension_lines.push_back(measure(mask, {mask.side - 1, y, mask.solid_layers}, z_axis,
+                                            mask.layers - mask.solid_layers, right, "+"));
+  // Room for the texts beside the lines that stand: nothing is drawn of a line without length.
+  const Eigen::Vector3d corner = center_of(mask, {mask.side - 1, y, 0}) + 3.0 * right;
+  scene.dimension_lines.push_back({corner, corner, ""});
+  return cell_of("x-z through the pivot", std::move(scene), libmap::Viewpoint::front);
+}
+
+libmap::SheetCell horizontal(const GripperMask& mask, int z, const std::string& name) {
+  libmap::Scene scene = scene_of(
+      mask, [z](int x, int y) { return Eigen::Vector3i(x, y, z); }, mask.side, mask.side);
+  const double aside = (offset_share * mask.side + 0.5) * mask.voxel_size_m;
+  const Eigen::Vector3i x_axis = Eigen::Vector3i::UnitX();
+  const auto [first, count] = run_through_axis(mask, z);
+  scene.dimension_lines.push_back(
+      measure(mask, {first, 0, z}, x_axis, count, -aside * Eigen::Vector3d::UnitY(),
+              mask.is_solid(mask.pivot_xy, mask.pivot_xy, z) ? "solid" : "void"));
+  return cell_of(fmt::format("x-y, {} (z = {:+.4g} mm)", name,
+                             1000.0 * mask.voxel_size_m * (z - mask.pivot_z)),
+                 std::move(scene), libmap::Viewpoint::top);
+}
+
+}  // namespace
+
+MaskVoxel kind_of(const GripperMask& mask, int x, int y, int z) {
+  if (x == mask.pivot_xy && y == mask.pivot_xy && z == mask.pivot_z) return MaskVoxel::pivot;
+  if (mask.is_counted(x, y, z))
+    return mask.is_solid(x, y, z) ? MaskVoxel::solid : MaskVoxel::void_space;
+  return mask.is_solid(x, y, z) ? MaskVoxel::solid_not_counted : MaskVoxel::void_not_counted;
+}
+
+libmap::Color color_of(MaskVoxel kind) {
+  for (const KindLook& look : looks)
+    if (look.kind == kind) return look.color;
+  return {};
+}
+
+std::vector<libmap::SheetCell> mask_sections(const GripperMask& mask, int lower_layer) {
+  if (lower_layer < 0 || lower_layer >= mask.layers)
+    throw libmap::Error("the mask has no such layer",
+                        {.field = "section_layer",
+                         .value = std::to_string(lower_layer),
+                         .bound = ">= 0 and <= " + std::to_string(mask.layers - 1)});
+  return {vertical(mask), horizontal(mask, mask.solid_layers - 1, "top solid layer"),
+          horizontal(mask, lower_layer,
+                     lower_layer == 0 ? "lowest layer" : fmt::format("layer {}", lower_layer))};
+}
+
+libmap::Legend mask_legend(const GripperMask& mask) {
+  libmap::Legend legend;
+  legend.title = "voxels";
+  for (const KindLook& look : looks) {
+    bool found = false;
+    for (int x = 0; x < mask.side && !found; ++x)
+      for (int y = 0; y < mask.side && !found; ++y)
+        for (int z = 0; z < mask.layers && !found; ++z) found = kind_of(mask, x, y, z) == look.kind;
+    if (found) legend.entries.push_back({look.color, look.text});
+  }
+  return legend;
+}
+
+}  // namespace graspmap_tools

@@ -1,0 +1,172 @@
+#include "tools/scene_file.h"
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <limits>
+#include <utility>
+#include <variant>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/table.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/textured_mesh_io.h"
+#include "tools/map_tiles.h"
+#include "tools/map_window.h"
+
+namespace graspmap_tools {
+namespace {
+
+libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::size_t column) {
+  const std::string& cell = table.rows[row][column];
+  if (libmap::trim(cell).empty()) return libmap::Verdict::none;
+  const auto verdict = libmap::parse_bool(cell);
+  if (!verdict)
+    throw libmap::Error("not a verdict", {.file = table.file,
+                                          .field = "row " + std::to_string(row + 1) + ", column '" +
+                                                   table.columns[column] + "'",
+                                          .value = "'" + cell + "'",
+                                          .bound = "1, 0 or empty"});
+  return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
+}
+
+// In the frame in which they are listed.
+std::vector<libmap::Marker> read_markers(const SceneFileOptions& options) {
+  const libmap::Table table = libmap::read_csv(options.points);
+  const std::vector<Eigen::Vector3d> positions = positions_of(table);
+  const bool labelled = options.label != "none";
+  const std::size_t label = options.label == "auto" || !labelled ? 0 : table.column(options.label);
+  std::vector<libmap::Marker> markers;
+  for (std::size_t row = 0; row < positions.size(); ++row) {
+    libmap::Marker& marker = markers.emplace_back();
+    marker.position = positions[row];
+    if (labelled) marker.label = table.rows[row][label];
+    if (!options.verdict.empty())
+      marker.verdict = verdict_of(table, row, table.column(options.verdict));
+  }
+  return markers;
+}
+
+double zero_plane_of(const SceneFileOptions& options, const libmap::Manifest* manifest) {
+  constexpr double none = -std::numeric_limits<double>::infinity();
+  if (options.zero_plane == "none") return none;
+  if (options.zero_plane != "auto") {
+    const auto height = libmap::parse_double(options.zero_plane);
+    if (height) return *height;
+    throw libmap::Error(
+        "not a height",
+        {.field = "--zero-plane", .value = options.zero_plane, .bound = "auto, none or a number"});
+  }
+  const libmap::ManifestValue* value =
+      manifest == nullptr ? nullptr : manifest->find_parameter("zero_plane_m");
+  if (value == nullptr) return none;
+  if (const auto* number = std::get_if<double>(value)) return *number;
+  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
+  return none;
+}
+
+// About z and along x and y alone: the input's x axis comes to lie above x, its origin above 0.
+libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
+  const Eigen::Vector3d x_axis = terrain_from_input.linear().col(0);
+  const Eigen::Vector3d origin = terrain_from_input.translation();
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.rotate(Eigen::AngleAxisd(-std::atan2(x_axis.y(), x_axis.x()), Eigen::Vector3d::UnitZ()));
+  pose.translate(Eigen::Vector3d(-origin.x(), -origin.y(), 0.0));
+  return pose;
+}
+
+SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run& run) {
+  SceneFile read;
+  libmap::Scene& scene = read.scene;
+  libmap::SceneLayer layer;
+  const auto box = parse_box(options.box);
+  if (is_tile_store(file)) {
+    MapWindow window = read_window(MapTiles(file), box, options.max_points);
+    read.columns_a_point = static_cast<std::int64_t>(window.columns_a_point);
+    layer.shape = std::move(window.cloud);
+  } else if (libmap::is_textured_format(file)) {
+    layer.shape = libmap::read_textured_mesh(file);
+  } else if (libmap::file_kind(file) == libmap::FileKind::mesh) {
+    layer.shape = libmap::read_mesh(file).mesh;
+  } else {
+    layer.shape = libmap::read_cloud(file).cloud;
+  }
+  if (auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape); box && cloud != nullptr)
+    *cloud = points_in_box(*cloud, *box);
+  else if (box)
+    throw libmap::Error("only clouds and maps are cut", {.file = file, .field = "--box"});
+  const auto manifest = libmap::read_manifest_of(file);
+  layer.coloring = options.coloring;
+  layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
+  layer.point_shape = options.point_shape;
+  layer.shading = options.shading;
+  layer.point_size_m = options.point_size_m;
+  scene.layers.push_back(std::move(layer));
+  const libmap::Pose* terrain_from_input =
+      manifest ? manifest->find_transform("terrain_from_input") : nullptr;
+  if (terrain_from_input != nullptr) {
+    if (manifest->frame == "input") scene.terrain_from_scene = *terrain_from_input;
+    if (options.heading == MapHeading::input)
+      scene.terrain_from_scene = turned_back(*terrain_from_input) * scene.terrain_from_scene;
+  }
+  if (!options.points.empty()) {
+    scene.markers = read_markers(options);
+    const libmap::Pose scene_from_points = map_from_points(file, options.points_frame, run);
+    for (libmap::Marker& marker : scene.markers)
+      marker.position = scene_from_points * marker.position;
+  }
+  return read;
+}
+
+}  // namespace
+
+const std::vector<std::pair<std::string, MapHeading>>& map_heading_names() {
+  static const std::vector<std::pair<std::string, MapHeading>> names = {
+      {"terrain", MapHeading::terrain}, {"input", MapHeading::input}};
+  return names;
+}
+
+void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
+  table.add("color", options.coloring.mode, libmap::color_mode_names(), "what colours show");
+  table.add("field", options.coloring.field, "field that is shown with color: field");
+  table.add("color_scale", options.coloring.scale, libmap::color_scale_names(),
+            "colours of continuous values; diverging: blue below and red above 0");
+  table.add("range_min", options.coloring.range_min, libmap::any_number,
+            "value at the lower end of the colours");
+  table.add("range_max", options.coloring.range_max, libmap::any_number,
+            "value at their upper end; equal to range_min: from the data");
+  table.add("single_color", options.coloring.color, "colour with color: single, #rrggbb");
+  table.add(
+      "zero_plane", options.zero_plane,
+      "height in the terrain frame below which ground is white, m; auto: the map's own, none");
+  table.add("point_shape", options.point_shape, libmap::point_shape_names(), "shape of a point");
+  table.add("point_size_m", options.point_size_m, libmap::not_negative,
+            "edge of a point, m; 0: from their spacing");
+  table.add("box", options.box,
+            "show this rectangle of a cloud or map alone: X0,Y0,X1,Y1 in its frame, m");
+  table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
+            "of a tile store: larger parts are thinned to about so many points");
+  table.add("shading", options.shading, libmap::shading_names(), "where light falls");
+  table.add("label", options.label,
+            "column of the marked points' names; auto: the first column; none: no names");
+  table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
+  table.add("points_frame", options.points_frame, point_frame_names(),
+            "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
+            "before it was cropped");
+  table.add("heading", options.heading, map_heading_names(),
+            "which way a map lies: as in its terrain frame, or with the x and y of its input");
+}
+
+SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
+  try {
+    return scene_of(file, options, run);
+  } catch (const libmap::Error& error) {
+    throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(file) : error;
+  }
+}
+
+std::filesystem::path scene_input(const std::string& file) {
+  return is_tile_store(file) ? store_index_path(file) : std::filesystem::path(file);
+}
+
+}  // namespace graspmap_tools

@@ -1,0 +1,52 @@
+// What `render` and `sheet` show of a file, as the user asks for it.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/parameters.h"
+#include "libmap/view/scene_view.h"
+#include "tools/map_frame.h"
+#include "tools/run.h"
+
+namespace graspmap_tools {
+
+// How a map lies in the picture. terrain: as in its terrain frame. input: turned about z and moved
+// level, so that x and y are those of the cloud that was scored; heights stay the terrain's.
+enum class MapHeading { terrain, input };
+const std::vector<std::pair<std::string, MapHeading>>& map_heading_names();
+
+// One file as a scene, with listed places on it.
+struct SceneFileOptions {
+  std::string points;  // CSV of marked places; empty: none
+  std::string label = "auto";
+  std::string verdict;
+  std::string zero_plane = "auto";
+  PointFrame points_frame = PointFrame::input;
+  double point_size_m = 0.0;
+  std::string box;  // of the plan that is shown
+  std::uint64_t max_points = 1'000'000;
+  libmap::Coloring coloring;
+  libmap::PointShape point_shape = libmap::PointShape::automatic;
+  libmap::Shading shading = libmap::Shading::automatic;
+  MapHeading heading = MapHeading::terrain;
+};
+
+// All but `points`, which is an option of its own.
+void bind(libmap::ParameterTable& table, SceneFileOptions& options);
+
+struct SceneFile {
+  libmap::Scene scene;
+  std::int64_t columns_a_point = 0;  // side of the thinned columns of a tile store; 0: no store
+};
+
+// A cloud, a mesh, a graspability map or a tile store. Throws Error naming the file.
+SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run);
+
+// The file that stands for it in a manifest: of a tile store its index.
+std::filesystem::path scene_input(const std::string& file);
+
+}  // namespace graspmap_tools
