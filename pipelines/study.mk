@@ -5,7 +5,7 @@
 # beside the simulated ones and his tables are evaluated.
 #
 #   make -f pipelines/study.mk OUT=folder [SCENARIOS="1 2 3 4"] [METHODS="thesis corrected"] \
-#        [STAGES="published thresholds masks report"] [INCLINATIONS="10 25"] [SEED=1] -j2
+#        [STAGES="walls published thresholds masks report"] [INCLINATIONS="10 25"] [SEED=1] -j2
 #
 # A map is made by site.mk. Pre-scanned: Poisson-disk samples of the site's true mesh, COUNT of them.
 # In situ: the six depth images of the robot at one pose on the site, with the noise of a real sensor
@@ -19,8 +19,9 @@ here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
 SCENARIOS ?= 1 2 3 4
 METHODS ?= thesis corrected
-STAGES ?= published thresholds masks report
+STAGES ?= walls published thresholds masks report
 INCLINATIONS ?= 10 25
+OBSTACLE_HEIGHT ?= 0.3
 SEED ?= 1
 EDGE ?= 0.008
 SPACING ?= 0.0068
@@ -44,7 +45,7 @@ known = $(foreach word,$($(1)),$(if $(filter $(word),$(2)),,\
   $(error $(1) holds '$(word)', which is none of: $(2))))
 $(call known,SCENARIOS,1 2 3 4)
 $(call known,METHODS,thesis envelope climblab corrected)
-$(call known,STAGES,published thresholds masks report)
+$(call known,STAGES,walls published thresholds masks report)
 
 name_1 := primitive_shapes
 name_2 := slopes_and_bumps
@@ -75,6 +76,7 @@ results :=
 include $(here)study/scenarios.mk
 include $(here)study/places.mk
 include $(here)study/poses.mk
+include $(here)study/walls.mk
 include $(here)study/stages.mk
 
 all: $(results)
