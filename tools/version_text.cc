@@ -4,17 +4,17 @@
 #include <assimp/version.h>
 #include <ceres/version.h>
 #include <embree3/rtcore_config.h>
-#include <nlohmann/json.hpp>
 #include <oneapi/tbb/version.h>
-#include <opencv2/core/version.hpp>
 #include <pcl/pcl_config.h>
 #include <spdlog/version.h>
 #include <sqlite3.h>
 #include <vtkVersionMacros.h>
+#include <nlohmann/json.hpp>
+#include <opencv2/core/version.hpp>
 
+#include <OpenMesh/Core/System/config.h>
 #include <CLI/Version.hpp>
 #include <Eigen/Core>
-#include <OpenMesh/Core/System/config.h>
 
 #include "commit.h"  // of the build folder
 
