@@ -8,13 +8,14 @@ export eigen=$3
 shift 3
 export compiler="$*"
 scratch=$(mktemp -d)
-export scratch
 trap 'rm -rf "$scratch"' EXIT
 cmake --install "$build" --prefix "$scratch" >"$scratch/install.log"
 (cd "$scratch/include/graspmap" && find . -name '*.h' | sort) >"$scratch/headers"
 [ "$(wc -l <"$scratch/headers")" -ge 100 ]
 
-# In the source folder, so that a compiler cache knows them again.
+# In the same places each time, so that a compiler cache knows them again.
+export units="$build/header_units"
+mkdir -p "$units"
 cd "$source"
 # shellcheck disable=SC2046 # names without spaces
 foreign=$(grep -nE '^ *# *include *(<[^>]*[/.]|"[^"]*")' $(cat "$scratch/headers") |
@@ -28,7 +29,7 @@ fi
 # A Debian 12 compiler takes a second for Eigen alone.
 # shellcheck disable=SC2016 # the inner shell expands
 xargs -P 2 -I {} sh -c '
-  unit=$scratch/$(echo {} | tr / _).cc
+  unit=$units/$(echo {} | tr / _).cc
   echo "#include \"{}\"" >"$unit"
   $compiler -std=c++20 -O0 -Wall -Wextra -Werror -I . -isystem "$eigen" -c "$unit" -o "$unit.o" || {
     echo "{} does not compile alone" >&2
