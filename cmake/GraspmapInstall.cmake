@@ -18,7 +18,7 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN message_encoding.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
-install(DIRECTORY data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sites data/field_test
+install(DIRECTORY data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(FILES tools/completion/graspmap.bash
