@@ -72,7 +72,7 @@ std::vector<AddedColumn> parse_columns(const std::string& text) {
     column.field = libmap::trim(rest.substr(0, comparison));
     if (comparison != std::string_view::npos)
       column.cutoff = libmap::parse_double(rest.substr(comparison + 2));
-    if (column.name.empty() || column.field.empty() ||
+    if (column.name.empty() || column.name.ends_with('>') || column.field.empty() ||
         (comparison != std::string_view::npos && !column.cutoff))
       throw libmap::Error("names no column", {.file = {},
                                               .field = "--column",

@@ -95,6 +95,10 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
     *cloud = points_in_box(*cloud, *box);
   else if (box)
     throw libmap::Error("only clouds and maps are cut", {.file = file, .field = "--box"});
+  if (const auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape);
+      cloud != nullptr && cloud->empty())
+    throw libmap::Error("there is nothing to draw: no point with finite coordinates",
+                        {.file = file});
   const auto manifest = libmap::read_manifest_of(file);
   layer.coloring = options.coloring;
   layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);

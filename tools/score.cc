@@ -13,6 +13,7 @@
 #include "libmap/core/text.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
+#include "tools/plane_report.h"
 #include "tools/score_store.h"
 
 namespace {
@@ -104,8 +105,7 @@ void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& resu
 }
 
 void say_result(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
-  if (result.plane && options.detection.up == std::nullopt)
-    run.say(fmt::format("up from the {}", to_text(result.plane->up_source)));
+  if (result.plane) graspmap_tools::report_plane(*result.plane, options.terrain, run);
   for (const auto& [name, seconds] : result.timings_s)
     run.detail(fmt::format("{}: {:.3f} s", name, seconds));
   run.say(fmt::format("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable",

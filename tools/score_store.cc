@@ -19,6 +19,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
 #include "tools/map_frame.h"
+#include "tools/plane_report.h"
 
 namespace graspmap_tools {
 
@@ -212,6 +213,7 @@ class StoreScoring {
     if (frame_.plane) {
       manifest.results.emplace_back("plane_rmse_m", frame_.plane->rmse_m);
       manifest.results.emplace_back("up_source", std::string(to_text(frame_.plane->up_source)));
+      report_plane(*frame_.plane, options_.terrain, run_);
     }
     manifest.results.emplace_back("mask_side_voxels", std::int64_t{mask_.side});
     manifest.results.emplace_back("mask_layers", std::int64_t{mask_.layers});

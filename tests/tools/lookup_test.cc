@@ -266,7 +266,8 @@ TEST_F(LookupBadInput, ColumnsThatCannotBe) {
   const auto column = [](const std::string& text) {
     return graspmap({"lookup", "map.csv", "points.csv", "-o", "out.csv", "--column", text});
   };
-  for (const std::string text : {"score", "=score", "a=", "a=score>=much", "a=>=0.5", "a=score>="})
+  for (const std::string text :
+       {"score", "=score", "a=", "a=score>=much", "a=>=0.5", "a=score>=", "score>=0.5"})
     EXPECT_TRUE(bad_input(column(text), {"--column", text, "NAME=FIELD"}));
   // After a word on the manifest that the map has not.
   const auto fails_with = [&](const std::string& text, const std::string& message) {

@@ -1,4 +1,5 @@
 // The data in the maps that `graspmap score` writes.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <array>
@@ -181,6 +182,34 @@ TEST(Score, TerrainSmallerThanTheMaskGivesAnEmptyMapAndSaysSo) {
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("smaller than the gripper mask"), std::string::npos);
   EXPECT_TRUE(libmap::read_cloud(scratch("map.pcd")).cloud.empty());
+}
+
+// Domes on a plane, in the frame of a camera that looks at them along z.
+TEST(Score, ReliefBelowThePlaneIsSaid) {
+  PointCloud terrain;
+  for (int i = -40; i <= 40; ++i)
+    for (int j = -40; j <= 40; ++j) {
+      const double x = 0.01 * i;
+      const double y = 0.01 * j;
+      const double height = std::max(0.0, 0.1 - 8.0 * (x * x + y * y));
+      terrain.positions.emplace_back(x, y, 1.0 - height);
+    }
+  libmap::write_cloud(scratch("camera.pcd"), terrain);
+  const auto said = [](Words more) {
+    Words words = {"score", "camera.pcd", "--curvature-radius", "0"};
+    words.insert(words.end(), more.begin(), more.end());
+    const ProgramResult result = graspmap(words);
+    EXPECT_TRUE(succeeded(result));
+    return result.standard_error;
+  };
+  const std::string warning = "camera.pcd: its relief hangs below the plane";
+  EXPECT_THAT(said({"-o", "a.pcd"}), testing::HasSubstr(warning));
+  EXPECT_THAT(said({"-o", "a.tiles"}), testing::HasSubstr(warning));
+  EXPECT_THAT(said({"-o", "b.pcd", "--up=0,0,-1"}), testing::Not(testing::HasSubstr("relief")));
+  // The right way up nothing is said.
+  for (Eigen::Vector3d& position : terrain.positions) position.z() = 1.0 - position.z();
+  libmap::write_cloud(scratch("camera.pcd"), terrain);
+  EXPECT_THAT(said({"-o", "c.pcd"}), testing::Not(testing::HasSubstr("relief")));
 }
 
 }  // namespace

@@ -41,6 +41,8 @@ TEST(Sheet, BadInputIsOneLine) {
   graspmap_test::write_text(scratch("broken.png"), "\x89PNG and no more");
   EXPECT_TRUE(bad_input(graspmap({"sheet", "none.pcd", "-o", "s.png"}), {"none.pcd"}));
   EXPECT_TRUE(bad_input(graspmap({"sheet", "broken.png", "-o", "s.png"}), {"broken.png"}));
+  graspmap_test::write_text(scratch("empty.csv"), "x,y,z\n");
+  EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "empty.csv", "-o", "s.png"}), {"empty.csv"}));
   EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "-o", "s.jpg"}), {"s.jpg", ".png"}));
   EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "-o", "s.png", "--captions", "a|b"}),
                         {"--captions", "<= 1"}));
