@@ -35,9 +35,11 @@ class TilesWithMargin {
  public:
   TilesWithMargin(const VoxelLattice& lattice, const std::vector<TileBounds>& tiles,
                   double margin_m)
-      : lattice_(lattice), tiles_(tiles), margin_(margin_m / lattice.voxel_size_m + 1.0) {
+      : lattice_(lattice),
+        tiles_(tiles),
+        margin_(margin_m / lattice.voxel_size_m + 1.0),
+        box_(tiles.empty() ? TileBounds{} : tiles.front()) {
     double cells = 0.0;
-    box_ = tiles.empty() ? TileBounds{} : tiles.front();
     for (const TileBounds& tile : tiles) {
       cells += static_cast<double>(tile.i_end - tile.i_begin) * (tile.j_end - tile.j_begin);
       box_ = {std::min(box_.i_begin, tile.i_begin), std::max(box_.i_end, tile.i_end),

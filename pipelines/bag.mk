@@ -26,11 +26,14 @@ ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 
+include $(here)one_run.mk
+ifdef is_alone
+
 .DELETE_ON_ERROR:
 .SECONDARY:
 .PHONY: all moments FORCE
 all: $(OUT)/images.json
-	@$(MAKE) --no-print-directory -f $(lastword $(MAKEFILE_LIST)) moments
+	@exec $(MAKE) --no-print-directory -f $(here)bag.mk moments
 
 $(OUT):
 	@mkdir -p $@
@@ -44,7 +47,7 @@ $(OUT)/read_with $(OUT)/scored_with: FORCE | $(OUT)
 # The folder's manifest stands for the folder.
 $(OUT)/images.json: $(BAG) $(OUT)/read_with
 	@rm -rf $(OUT)/images
-	@$(GRASPMAP) bag $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
+	@exec $(GRASPMAP) bag $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
 
 # Known once the images are there.
 stamps := $(shell test -f $(OUT)/images/moments.csv && tail -n +2 $(OUT)/images/moments.csv | cut -d, -f1)
@@ -52,16 +55,17 @@ moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/map.bag $(OUT)/$(stamp)/top.p
 
 $(OUT)/%/panorama.pcd: $(OUT)/images.json
 	@mkdir -p $(@D)
-	@$(GRASPMAP) panorama $(OUT)/images --stamp $* -o $@
+	@exec $(GRASPMAP) panorama $(OUT)/images --stamp $* -o $@
 
 $(OUT)/%/map.pcd: $(OUT)/%/panorama.pcd $(OUT)/scored_with
-	@$(GRASPMAP) score $< -o $@ --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
+	@exec $(GRASPMAP) score $< -o $@ --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
 
 $(OUT)/%/footholds.csv: $(OUT)/%/map.pcd
-	@$(GRASPMAP) footholds $< -o $@ $(FOOTHOLDS)
+	@exec $(GRASPMAP) footholds $< -o $@ $(FOOTHOLDS)
 
 $(OUT)/%/map.bag: $(OUT)/%/map.pcd $(OUT)/%/footholds.csv
-	@$(GRASPMAP) bag $< -o $@ --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
+	@exec $(GRASPMAP) bag $< -o $@ --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
 
 $(OUT)/%/top.png: $(OUT)/%/map.pcd
-	@$(GRASPMAP) render $< -o $@ --view top --color score --title "$* s" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view top --color score --title "$* s" --quiet
+endif

@@ -36,6 +36,9 @@ ifeq ($(OUT),)
 endif
 $(foreach name,METHODS GRIPPERS,$(if $(strip $($(name))),,$(error $(name) is empty)))
 
+include $(here)one_run.mk
+ifdef is_alone
+
 simulated := primitive_shapes:$(OUT)/sites/primitive_shapes.pcd rocks:$(OUT)/sites/rocks.pcd
 sites := $(or $(strip $(SITES)),$(simulated))
 # A site's name and its cloud.
@@ -74,18 +77,18 @@ $(foreach stamp,scored_with shown_with simulated_with,$(OUT)/$(stamp)): FORCE | 
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
 $(OUT)/sites/primitive_shapes.pcd: $(OUT)/simulated_with | $(OUT)/sites
-	@$(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
+	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
 
 $(OUT)/sites/rocks/mesh.ply: $(OUT)/simulated_with | $(OUT)/sites
-	@$(GRASPMAP) simulate site --edge-length $(EDGE) -o $(@D) --quiet
+	@exec $(GRASPMAP) simulate site --edge-length $(EDGE) -o $(@D) --quiet
 
 $(OUT)/sites/rocks.pcd: $(OUT)/sites/rocks/mesh.ply
-	@$(GRASPMAP) resample $< --count $(COUNT) -o $@ --quiet
+	@exec $(GRASPMAP) resample $< --count $(COUNT) -o $@ --quiet
 
 # Gripper, method.
 define sections_of
 $(OUT)/sections/$(1)_$(2).png: $(OUT)/scored_with | $(OUT)/sections
-	@$(GRASPMAP) mask --gripper $(1) --method $(2) $($(1)_mask) --sections -o $$@ \
+	@exec $(GRASPMAP) mask --gripper $(1) --method $(2) $($(1)_mask) --sections -o $$@ \
 	  --quiet
 endef
 $(foreach gripper,$(GRIPPERS),$(foreach method,$(METHODS),$(eval \
@@ -94,16 +97,16 @@ $(foreach gripper,$(GRIPPERS),$(foreach method,$(METHODS),$(eval \
 # Site's name, its cloud, gripper. make runs the maps side by side: each process takes one thread.
 define maps_and_tables
 $(OUT)/$(1)/$(3)/%.pcd: $(2) $(OUT)/scored_with | $(OUT)/$(1)/$(3)
-	@$(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --gripper $(3) --method $$* --zero-plane -10 \
+	@exec $(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --gripper $(3) --method $$* --zero-plane -10 \
 	  $($(3)_mask) $($(3)_score) $(SCORE) --threads 1 --quiet
 
 $(OUT)/$(1)/$(3)/summary/pairs.csv $(OUT)/$(1)/$(3)/summary/maps.csv \
 $(OUT)/$(1)/$(3)/summary/histograms.csv &: $(call maps_of,$(1),$(3)) $(OUT)/shown_with
-	@$(GRASPMAP) summarize $(call maps_of,$(1),$(3)) -o $(OUT)/$(1)/$(3)/summary --pairs \
+	@exec $(GRASPMAP) summarize $(call maps_of,$(1),$(3)) -o $(OUT)/$(1)/$(3)/summary --pairs \
 	  --names "$(call barred,$(METHODS))" --quiet
 
 $(OUT)/$(1)/$(3)/scores.png $(OUT)/$(1)/$(3)/scores.svg: $(OUT)/$(1)/$(3)/summary/histograms.csv
-	@$(GRASPMAP) chart $$< -o $$@ --x score --y share --series map --title '$(1), $(3)' \
+	@exec $(GRASPMAP) chart $$< -o $$@ --x score --y share --series map --title '$(1), $(3)' \
 	  --y-title 'share of the judged voxels' --x-min 0 --x-max 1 --quiet
 endef
 $(foreach site,$(sites),$(foreach gripper,$(GRIPPERS),$(eval \
@@ -111,7 +114,7 @@ $(foreach site,$(sites),$(foreach gripper,$(GRIPPERS),$(eval \
 
 define sheet
 $(OUT)/$(1).png: $(foreach name,$(names),$(call maps_of,$(name),$(1))) $(OUT)/shown_with
-	@$(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(METHODS)) --quiet \
+	@exec $(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(METHODS)) --quiet \
 	  --cell-width $(CELL) --shared-view row --title '$(1)' \
 	  --column-titles "$(call barred,$(METHODS))" --row-titles "$(call barred,$(names))" \
 	  --captions "$(patsubst |%,%,$(no_captions))"
@@ -119,11 +122,12 @@ endef
 $(foreach gripper,$(GRIPPERS),$(eval $(call sheet,$(gripper))))
 
 # One table of all sites and grippers: these two before the columns of each.
-joined = @rm -f $@; for name in $(names); do for gripper in $(GRIPPERS); do \
+joined = @rm -f $@.partial; for name in $(names); do for gripper in $(GRIPPERS); do \
   sed "1s/^/site,of_gripper,/; 2,\$$s/^/$$name,$$gripper,/" \
-    $(OUT)/$$name/$$gripper/summary/$(@F) | { if [ -s $@ ]; then tail -n +2; else cat; fi; } \
-    >> $@ || exit 1; done; done
+    $(OUT)/$$name/$$gripper/summary/$(@F) | { if [ -s $@.partial ]; then tail -n +2; else cat; fi; } \
+    >> $@.partial || exit 1; done; done; mv $@.partial $@
 $(OUT)/pairs.csv: $(foreach folder,$(folders),$(folder)/summary/pairs.csv)
 	$(joined)
 $(OUT)/maps.csv: $(foreach folder,$(folders),$(folder)/summary/maps.csv)
 	$(joined)
+endif

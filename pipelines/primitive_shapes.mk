@@ -15,6 +15,9 @@ ifeq ($(wildcard $(points)),)
 endif
 methods := thesis corrected
 
+include $(here)one_run.mk
+ifdef is_alone
+
 .DELETE_ON_ERROR:
 .PHONY: all $(methods)
 all: $(OUT)/scene.png $(methods)
@@ -24,15 +27,16 @@ $(OUT):
 
 # About as many points as the thesis's scan of this scene.
 $(OUT)/terrain.pcd: | $(OUT)
-	@$(GRASPMAP) simulate scene --spacing $(SPACING) -o $@
+	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) -o $@
 
 $(OUT)/scene.ply: | $(OUT)
-	@$(GRASPMAP) simulate scene --mesh -o $@
+	@exec $(GRASPMAP) simulate scene --mesh -o $@
 
 $(OUT)/scene.png: $(OUT)/scene.ply
-	@$(GRASPMAP) render $< -o $@ --view oblique --color single --title 'primitive shapes' --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --color single --title 'primitive shapes' --quiet
 
 $(methods): $(OUT)/terrain.pcd
-	@$(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(points) \
+	@exec $(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(points) \
 	  SCENARIO=primitive_shapes_prescan METHOD=$@ OUT=$(OUT)/$@ SHARES=$(SHARES) \
 	  GRASPMAP=$(GRASPMAP) TITLE='primitive shapes, $@'
+endif

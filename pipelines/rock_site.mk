@@ -17,6 +17,9 @@ SCENARIO ?= artificial_rocks_prescan
 METHOD ?= corrected
 SHARES ?= 4
 
+include $(here)one_run.mk
+ifdef is_alone
+
 site_flags := --site $(SITE) --seed $(SEED) --edge-length $(EDGE)
 scan_flags := --seed $(SEED) --frames $(FRAMES)
 
@@ -32,17 +35,18 @@ export simulated_with := $(site_flags) $(scan_flags)
 $(OUT)/simulated_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
-$(OUT)/site/mesh.ply $(OUT)/site/field_points.csv &: $(OUT)/simulated_with
-	@$(GRASPMAP) simulate site $(site_flags) -o $(OUT)/site
+$(OUT)/site/mesh.ply $(OUT)/site/field_points.csv $(OUT)/site/site.yaml &: $(OUT)/simulated_with
+	@exec $(GRASPMAP) simulate site $(site_flags) -o $(OUT)/site
 
 $(OUT)/site.png: $(OUT)/site/mesh.ply
-	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title 'simulated site' --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title 'simulated site' --quiet
 
 $(OUT)/scan.db: $(OUT)/site/mesh.ply
-	@$(GRASPMAP) simulate scan $< $(scan_flags) -o $@
+	@exec $(GRASPMAP) simulate scan $< $(scan_flags) -o $@
 
 map: $(OUT)/scan.db $(OUT)/site/field_points.csv
-	@$(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$< OUT=$(OUT)/scan POSES=$(POSES) \
+	@exec $(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$< OUT=$(OUT)/scan POSES=$(POSES) \
 	  CROP="$(CROP)" \
 	  TRUTH=$(OUT)/site/mesh.ply POINTS=$(OUT)/site/field_points.csv SCENARIO=$(SCENARIO) \
 	  METHOD=$(METHOD) SHARES=$(SHARES) GRASPMAP=$(GRASPMAP) TITLE='simulated scan'
+endif

@@ -40,10 +40,14 @@ ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
 endif
 
+include $(here)one_run.mk
+ifdef is_alone
+
 refined := $(if $(filter refined,$(POSES)),$(OUT)/poses.tum)
 poses := $(or $(refined),$(POSES))
 poses_flags := --poses $(poses) $(if $(TRUTH),--frame ground-truth)
-results := $(OUT)/scan.txt $(OUT)/cloud.png $(OUT)/site.png $(OUT)/spot_check.txt \
+# A site that is not cropped has no straight edges to check.
+results := $(OUT)/scan.txt $(OUT)/cloud.png $(OUT)/site.png $(if $(CROP),$(OUT)/spot_check.txt) \
   $(if $(TRUTH),$(OUT)/accuracy.txt) $(if $(TEXTURE),$(OUT)/texture.png)
 
 .DELETE_ON_ERROR:
@@ -63,48 +67,55 @@ $(stamps): FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
 $(OUT)/scan.txt: $(SCAN) | $(OUT)
-	@$(GRASPMAP) info $< > $@
+	@exec $(GRASPMAP) info $< > $@.partial
+	@mv $@.partial $@
 
 $(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) | $(OUT)
-	@$(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json
+	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json
 
 $(OUT)/cloud.ply: $(SCAN) $(or $(refined),$(wildcard $(POSES))) $(OUT)/fused_with
-	@$(GRASPMAP) fuse $(SCAN) -o $@ $(poses_flags) $(FUSE)
+	@exec $(GRASPMAP) fuse $(SCAN) -o $@ $(poses_flags) $(FUSE)
 
 $(OUT)/mesh.ply $(OUT)/mesh.txt &: $(OUT)/cloud.ply $(OUT)/meshed_with
-	@$(GRASPMAP) mesh $< -o $(OUT)/mesh.ply --report $(MESH) > $(OUT)/mesh.txt
+	@exec $(GRASPMAP) mesh $< -o $(OUT)/mesh.ply --report $(MESH) > $(OUT)/mesh.txt.partial
+	@mv $(OUT)/mesh.txt.partial $(OUT)/mesh.txt
 
 $(OUT)/site.ply: $(OUT)/mesh.ply $(OUT)/cropped_with
-	@$(GRASPMAP) crop $< -o $@ $(CROP)
+	@exec $(GRASPMAP) crop $< -o $@ $(CROP)
 
 $(OUT)/terrain.pcd: $(OUT)/site.ply $(OUT)/resampled_with
-	@$(GRASPMAP) resample $< -o $@ $(RESAMPLE)
+	@exec $(GRASPMAP) resample $< -o $@ $(RESAMPLE)
 
 $(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(or $(refined),$(wildcard $(POSES)))
-	@$(GRASPMAP) texture $< --scan $(SCAN) $(poses_flags) -o $@
+	@exec $(GRASPMAP) texture $< --scan $(SCAN) $(poses_flags) -o $@
 
 $(OUT)/cloud.png: $(OUT)/cloud.ply
-	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: cloud" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: cloud" --quiet
 
 $(OUT)/site.png: $(OUT)/site.ply
-	@$(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: site" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: site" --quiet
 
 $(OUT)/texture.png: $(OUT)/$(TEXTURE)
-	@$(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
 
 # Without a true mesh the ground is the plane that was found.
 $(OUT)/spot_check.txt: $(OUT)/site.ply $(TRUTH)
-	@$(GRASPMAP) spot-check $< -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
-	  --truth-frame map) > $@
+	@exec $(GRASPMAP) spot-check $< -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
+	  --truth-frame map) > $@.partial
+	@mv $@.partial $@
 
 $(OUT)/accuracy.txt: $(OUT)/cloud.ply $(OUT)/site.ply $(TRUTH)
-	@echo 'cloud:' > $@
-	@$(GRASPMAP) compare $(OUT)/cloud.ply $(TRUTH) >> $@
-	@echo 'surface of the site:' >> $@
-	@$(GRASPMAP) compare $(OUT)/site.ply $(TRUTH) --transform crop | sed '/^surface within/d' >> $@
-	@cat $@
+	@echo 'cloud:' > $@.partial
+	@exec $(GRASPMAP) compare $(OUT)/cloud.ply $(TRUTH) >> $@.partial
+	@echo 'surface of the site:' >> $@.partial
+	@exec $(GRASPMAP) compare $(OUT)/site.ply $(TRUTH) --transform crop > $@.site
+	@sed '/^surface within/d' $@.site >> $@.partial
+	@cat $@.partial
+	@rm $@.site
+	@mv $@.partial $@
 
 map: $(OUT)/terrain.pcd
-	@$(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(POINTS) POINTS_FRAME=map \
+	@exec $(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(POINTS) POINTS_FRAME=map \
 	  SCENARIO=$(SCENARIO) METHOD=$(METHOD) OUT=$(OUT)/map SHARES=$(SHARES) SCORE="$(SCORE)" \
 	  GRASPMAP=$(GRASPMAP)
+endif

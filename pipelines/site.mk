@@ -34,6 +34,9 @@ ifneq ($(POINTS)$(wildcard $(POINTS)),$(POINTS)$(POINTS))
   $(error POINTS is '$(POINTS)': no such file)
 endif
 
+include $(here)one_run.mk
+ifdef is_alone
+
 # The scenario's file and its gripper's: named ones lie in data/ (beside this folder, installed too).
 data := $(firstword $(wildcard $(here)../data) $(here)..)
 scenario_file := $(firstword $(wildcard $(SCENARIO) $(data)/scenarios/$(SCENARIO).yaml))
@@ -71,27 +74,28 @@ $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
 # make runs the shares side by side: each process takes one thread.
 $(OUT)/tiles/%-of-$(SHARES).pcd: $(SITE) $(OUT)/scored_with $(scenario_file) $(gripper_file) \
     | $(OUT)/tiles
-	@$(GRASPMAP) score $(SITE) -o $@ $(score_flags) --tile $*/$(SHARES) --threads 1 --quiet
+	@exec $(GRASPMAP) score $(SITE) -o $@ $(score_flags) --tile $*/$(SHARES) --threads 1 --quiet
 
 $(OUT)/map.pcd: $(tiles)
-	@$(GRASPMAP) merge $(tiles) -o $@
+	@exec $(GRASPMAP) merge $(tiles) -o $@
 
 $(OUT)/map.vtp: $(OUT)/map.pcd
-	@$(GRASPMAP) convert $< $@ --quiet
+	@exec $(GRASPMAP) convert $< $@ --quiet
 
 $(OUT)/lookup.csv: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
-	@$(GRASPMAP) lookup $< $(POINTS) --points-frame $(POINTS_FRAME) -o $@
+	@exec $(GRASPMAP) lookup $< $(POINTS) --points-frame $(POINTS_FRAME) -o $@
 
 $(OUT)/roc.png: $(OUT)/lookup.csv
-	@$(GRASPMAP) evaluate $< -o $(OUT)/evaluation --label graspable --score score --quiet \
+	@exec $(GRASPMAP) evaluate $< -o $(OUT)/evaluation --label graspable --score score --quiet \
 	  --title "$$TITLE"
 	@cp $(OUT)/evaluation/roc.png $@.partial && mv $@.partial $@
 
 $(OUT)/top.png: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
-	@$(GRASPMAP) render $< -o $@ --view top --color score $(markers) --title "$$TITLE" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view top --color score $(markers) --title "$$TITLE" --quiet
 
 $(OUT)/oblique.png: $(OUT)/map.pcd $(OUT)/shown_with
-	@$(GRASPMAP) render $< -o $@ --view oblique --color score --title "$$TITLE" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --color score --title "$$TITLE" --quiet
 
 $(OUT)/curvature.png: $(OUT)/map.pcd $(OUT)/shown_with
-	@$(GRASPMAP) render $< -o $@ --view top --color flags --title "$$TITLE: convex areas" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view top --color flags --title "$$TITLE: convex areas" --quiet
+endif

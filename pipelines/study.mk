@@ -47,6 +47,9 @@ $(call known,SCENARIOS,1 2 3 4)
 $(call known,METHODS,thesis envelope climblab corrected)
 $(call known,STAGES,walls published thresholds masks report)
 
+include $(here)one_run.mk
+ifdef is_alone
+
 name_1 := primitive_shapes
 name_2 := slopes_and_bumps
 name_3 := bouldering_wall
@@ -80,3 +83,4 @@ include $(here)study/walls.mk
 include $(here)study/stages.mk
 
 all: $(results)
+endif

@@ -35,6 +35,9 @@ ifeq ($(OUT),)
 endif
 $(foreach name,TSV HADD METHODS,$(if $(strip $($(name))),,$(error $(name) is empty)))
 
+include $(here)one_run.mk
+ifdef is_alone
+
 terrain := $(or $(SITE),$(OUT)/terrain.pcd)
 scenario_file := $(firstword $(wildcard $(SCENARIO) $(data)/scenarios/$(SCENARIO).yaml))
 pairs := $(foreach h,$(HADD),$(foreach t,$(TSV),$(t)_$(h)))
@@ -68,26 +71,26 @@ $(OUT)/scored_with $(OUT)/shown_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
 $(OUT)/terrain.pcd: $(OUT)/scored_with | $(OUT)
-	@$(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
+	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) -o $@ --quiet
 
 # make runs the maps side by side: each process takes one thread.
 define score
 $(OUT)/$(1)/%.pcd: $(terrain) $(OUT)/scored_with $(scenario_file) | $(OUT)/$(1)
-	@$(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --method $(1) $(SCORE) --threads 1 --quiet \
+	@exec $(GRASPMAP) score $$< -o $$@ --config $(SCENARIO) --method $(1) $(SCORE) --threads 1 --quiet \
 	  --solid-voxel-threshold $$(call tsv_of,$$*) --extra-void-layers $$(call hadd_of,$$*)
 
 $(OUT)/$(1).png: $(call maps_of,$(1)) $(OUT)/shown_with $(EXPECTED)
-	@$(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(TSV)) --quiet \
+	@exec $(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(TSV)) --quiet \
 	  --cell-width $(CELL) --captions "$(captions)" --title "$$$$TITLE: $(1)" \
 	  $(if $(EXPECTED),--points $(EXPECTED) --verdict graspable --label none)
 endef
 $(foreach method,$(METHODS),$(eval $(call score,$(method))))
 
 $(OUT)/thresholds.csv: $(maps) $(OUT)/shown_with $(EXPECTED)
-	@$(GRASPMAP) summarize $(maps) -o $(OUT)/summary $(if $(EXPECTED),--expected $(EXPECTED))
+	@exec $(GRASPMAP) summarize $(maps) -o $(OUT)/summary $(if $(EXPECTED),--expected $(EXPECTED))
 	@cp $(OUT)/summary/maps.csv $@.partial && mv $@.partial $@
 
-chart = @$(GRASPMAP) chart $< -o $@ --x solid_voxel_threshold --y $(1) --series \
+chart = @exec $(GRASPMAP) chart $< -o $@ --x solid_voxel_threshold --y $(1) --series \
   method,extra_void_layers --x-title 'solid-voxel threshold TSV' --y-title '$(2)' --title "$$TITLE" \
   $(3) --quiet
 $(OUT)/graspable_share.%: $(OUT)/thresholds.csv
@@ -96,3 +99,4 @@ $(OUT)/voxel_youden.%: $(OUT)/thresholds.csv
 	$(call chart,voxel_youden,sensitivity + specificity - 1: voxels,--y-min 0 --y-max 1)
 $(OUT)/place_youden.%: $(OUT)/thresholds.csv
 	$(call chart,place_youden,sensitivity + specificity - 1: places,--y-min 0 --y-max 1)
+endif

@@ -18,6 +18,7 @@
 #include "tools/map_frame.h"
 #include "tools/map_tiles.h"
 #include "tools/placement.h"
+#include "tools/result_counts.h"
 
 namespace {
 
@@ -226,9 +227,7 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
 
 void note_results(const Analysis& analysis, const Comparison* comparison, Run& run) {
   auto& results = run.manifest().results;
-  const auto count = [&](const char* name, std::size_t value) {
-    results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(run.manifest());
   const libgtd::MapAnalysis& ground = analysis.ground;
   count("voxels", ground.voxels);
   count("judged_voxels", ground.ground.voxels);

@@ -48,8 +48,12 @@ void run_bag(const BagCommandOptions& options, Run& run) {
     if (is_bag(options.input))
       throw libmap::Error("one of the two must be something else than a bag",
                           {.file = options.input});
-    return fs::is_directory(options.input) ? graspmap_tools::write_rig_folder_bag(options, run)
-                                           : graspmap_tools::write_map_bag(options, run);
+    try {
+      return fs::is_directory(options.input) ? graspmap_tools::write_rig_folder_bag(options, run)
+                                             : graspmap_tools::write_map_bag(options, run);
+    } catch (const libmap::Error& error) {
+      throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
+    }
   }
   if (fs::path(options.output).has_extension()) {
     libmap::require_cloud_format(options.output);
@@ -73,8 +77,9 @@ std::optional<double> graspmap_tools::bag_stamp(const BagCommandOptions& options
 
 libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& run) {
   const fs::path file = fs::exists(name) ? fs::path(name) : find_data_file("rigs", name);
+  libmap::CameraRig rig = libmap::read_rig(file);
   run.add_input(file);
-  return libmap::read_rig(file);
+  return rig;
 }
 
 int main(int argc, char** argv) {

@@ -11,6 +11,7 @@
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
 #include "tools/bag_commands.h"
+#include "tools/result_counts.h"
 
 namespace graspmap_tools {
 
@@ -50,10 +51,6 @@ void print_text(const libmap::BagListing& listing) {
                            listing.end_s - listing.start_s);
 }
 
-void add_count(Run& run, const std::string& name, std::size_t value) {
-  run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
-}
-
 void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
             const BagCommandOptions& options, Run& run) {
   for (const std::string& warning : result.warnings) {
@@ -67,13 +64,14 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                     options.input, result.pixels_beyond));
   std::size_t fullest = 0;
   for (const libmap::RigMoment& moment : plan.moments) fullest = std::max(fullest, moment.seen());
-  add_count(run, "cameras", plan.rig.cameras.size());
-  add_count(run, "images", result.images);
-  add_count(run, "images_broken", result.broken);
-  add_count(run, "moments", plan.moments.size());
-  add_count(run, "moments_in_bag", plan.all_moments);
-  add_count(run, "cameras_of_fullest_moment", fullest);
-  add_count(run, "pixels_beyond", result.pixels_beyond);
+  const ResultCounts count(run.manifest());
+  count("cameras", plan.rig.cameras.size());
+  count("images", result.images);
+  count("images_broken", result.broken);
+  count("moments", plan.moments.size());
+  count("moments_in_bag", plan.all_moments);
+  count("cameras_of_fullest_moment", fullest);
+  count("pixels_beyond", result.pixels_beyond);
   for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
     const libmap::RigCamera& camera = plan.rig.cameras[n];
     run.manifest().results.emplace_back(camera.name + ".topic", plan.topics[n]);
@@ -125,9 +123,10 @@ void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   run.manifest().frame = result.frame;
   run.manifest().results.emplace_back("topic", result.topic);
   run.manifest().results.emplace_back("stamp_s", result.stamp_s);
-  add_count(run, "messages", result.messages);
-  add_count(run, "points", result.cloud.size());
-  add_count(run, "dropped_points", result.dropped_points);
+  const ResultCounts count(run.manifest());
+  count("messages", result.messages);
+  count("points", result.cloud.size());
+  count("dropped_points", result.dropped_points);
   if (result.cloud.empty()) run.warn(options.input + ": " + result.topic + ": no finite points");
   run.say(fmt::format("{} points of {} at {} s, one of {} messages; {} not finite",
                       result.cloud.size(), result.topic, libmap::to_fixed_text(result.stamp_s, 6),

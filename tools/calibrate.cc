@@ -15,6 +15,7 @@
 #include "libmap/scan/image_codec.h"
 #include "tools/calibration_charts.h"
 #include "tools/command_line.h"
+#include "tools/result_counts.h"
 
 namespace {
 
@@ -81,10 +82,18 @@ std::vector<std::string> image_files(const std::vector<std::string>& given) {
   return files;
 }
 
+// The search takes some 30 bytes a pixel.
+constexpr std::int64_t max_pixels = std::int64_t{1} << 24;
+
 Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
   try {
     const std::string bytes = libmap::read_whole_file(file);
     const auto info = libmap::read_image_info(bytes);
+    if (info && std::int64_t{info->width} * info->height > max_pixels)
+      throw libmap::Error("too large for the search of its board",
+                          {.field = "image size",
+                           .value = fmt::format("{} x {}", info->width, info->height),
+                           .bound = fmt::format("<= {} pixels", max_pixels)});
     const bool is_deep = info && info->bits == 16 && info->channels == 1;
     const libmap::GrayImage image = is_deep ? libmap::stretch_contrast(libmap::decode_gray16(bytes))
                                             : libmap::decode_gray(bytes);
@@ -228,9 +237,7 @@ libmap::Table residual_table(const CameraCalibrationResult& result,
 
 void note_results(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
                   libmap::Manifest& manifest) {
-  const auto count = [&](const std::string& name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   count("images", pictures.size());
   const auto count_if = [&](const std::string& name, const auto& is) {
     count(name, static_cast<std::size_t>(std::count_if(pictures.begin(), pictures.end(), is)));

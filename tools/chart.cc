@@ -1,5 +1,6 @@
 // graspmap chart: columns of a table as curves.
 #include <algorithm>
+#include <map>
 #include <string>
 #include <utility>
 #include <vector>
@@ -26,6 +27,8 @@ const std::vector<std::pair<std::string, libmap::LegendCorner>>& legend_names() 
       {"bottom-right", libmap::LegendCorner::bottom_right}};
   return names;
 }
+
+constexpr std::size_t most_curves = 500;
 
 struct ChartOptions {
   std::string table;
@@ -84,19 +87,24 @@ void add_curves(const libmap::Table& table, const ChartOptions& options, const s
   for (const std::string& name : libmap::split_list(options.series))
     series.push_back(table.column(name));
   std::vector<std::string> names;
+  std::map<std::string, std::size_t> places;  // in `names`
   std::vector<std::vector<std::pair<double, double>>> points;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     const auto x = table.optional_number(row, x_column);
     const auto value = table.optional_number(row, y_column);
     if (!x || !value) continue;
-    const std::string name = series_of(table, row, series);
-    const auto at = std::find(names.begin(), names.end(), name);
-    if (at == names.end()) {
-      names.push_back(name);
-      points.push_back({{*x, *value}});
-    } else {
-      points[static_cast<std::size_t>(at - names.begin())].emplace_back(*x, *value);
+    const auto [at, is_new] = places.emplace(series_of(table, row, series), names.size());
+    if (is_new) {
+      if (names.size() == most_curves)
+        throw libmap::Error("makes more curves than a chart can show",
+                            {.file = table.file,
+                             .field = "--series",
+                             .value = options.series,
+                             .bound = "<= " + std::to_string(most_curves)});
+      names.push_back(at->first);
+      points.emplace_back();
     }
+    points[at->second].emplace_back(*x, *value);
   }
   for (std::size_t c = 0; c < names.size(); ++c) {
     std::stable_sort(points[c].begin(), points[c].end(),
@@ -131,7 +139,11 @@ libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) 
   if (chart.curves.empty())
     throw libmap::Error("no row with numbers in both columns",
                         {.file = table.file, .field = options.x + ", " + options.y});
-  chart.check();
+  try {
+    chart.check();
+  } catch (const libmap::Error& error) {
+    throw error.in_file(table.file);
+  }
   return chart;
 }
 

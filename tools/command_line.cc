@@ -13,7 +13,10 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
+#include "tools/end_signals.h"
+#include "tools/message_text.h"
 #include "tools/progress_output.h"
+#include "tools/standard_output.h"
 
 namespace graspmap_tools {
 
@@ -34,14 +37,9 @@ void start_log(const std::string& command, const RunOptions& options) {
   spdlog::set_default_logger(logger);
 }
 
-// A line break in a message would break the promise of one line.
-std::string one_line(std::string text) {
-  std::replace(text.begin(), text.end(), '\n', ' ');
-  return text;
-}
-
 int report(const std::string& command, const std::string& message, int exit_code) {
-  std::cerr << "graspmap " << command << ": error: " << one_line(message) << "\n";
+  end_if_told();
+  std::cerr << "graspmap " << command << ": error: " << message_text(message) << "\n";
   return exit_code;
 }
 
@@ -78,6 +76,7 @@ struct Command::Parts {
   CLI::Option* output_option = nullptr;
   std::vector<std::string> overrides;                            // --set
   std::vector<std::pair<std::string, std::string>> flag_values;  // key, text
+  std::vector<std::pair<std::string, std::string>> configured;   // the same, by --config
 
   fs::path config_file() const {
     return config_resolver ? config_resolver(config) : fs::path(config);
@@ -85,6 +84,10 @@ struct Command::Parts {
   void add_common_options();
   void add_parameter_flags();
   void apply_parameters();
+  libmap::Error placed(const libmap::Error& error) const;
+  // An exit code if there is nothing more to do.
+  std::optional<int> parse(int argc, char** argv);
+  void work(const std::function<void(Run&)>& body);
   std::optional<std::string> unknown_flag(int argc, char** argv) const;
   int usage_error(const std::string& message) const;
 };
@@ -174,7 +177,11 @@ void Command::Parts::add_parameter_flags() {
 void Command::Parts::apply_parameters() {
   if (!config.empty()) {
     const fs::path path = config_file();
+    const auto before = table.values();
     libmap::set_from_yaml(table, libmap::read_whole_file(path, 1U << 24U), path.string());
+    for (const auto& value : table.values())
+      if (std::find(before.begin(), before.end(), value) == before.end())
+        configured.push_back(value);
   }
   for (const auto& [key, text] : flag_values) {
     try {
@@ -191,6 +198,16 @@ void Command::Parts::apply_parameters() {
       throw libmap::Error("no '='", {.field = "--set", .value = override, .bound = "KEY=VALUE"});
     table.set(override.substr(0, equals), override.substr(equals + 1));
   }
+}
+
+// The same error naming the file of --config if what it finds fault with came from there.
+libmap::Error Command::Parts::placed(const libmap::Error& error) const {
+  const libmap::Parameter* parameter = table.find(error.context().field);
+  if (parameter == nullptr) return error;
+  const bool is_configured =
+      std::find(configured.begin(), configured.end(),
+                std::pair(parameter->key, parameter->get())) != configured.end();
+  return is_configured ? error.in_file(config_file().string()) : error;
 }
 
 // Long flags that the command does not have, wherever they stand: CLI11 would first ask for
@@ -213,60 +230,79 @@ int Command::Parts::usage_error(const std::string& message) const {
   return report(name, message + "; graspmap " + name + " --help shows what it takes", exit_usage);
 }
 
-int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
-  Parts& parts = *parts_;
-  parts.add_parameter_flags();
-  parts.add_common_options();
+std::optional<int> Command::Parts::parse(int argc, char** argv) {
+  add_parameter_flags();
+  add_common_options();
   // --print-config needs no inputs: only the parameters are asked for.
   const auto asks_for_config = [&] {
     return std::any_of(argv, argv + argc,
                        [](const char* word) { return std::string(word) == "--print-config"; });
   };
-  if (!parts.table.parameters().empty() && asks_for_config())
-    for (CLI::Option* option : parts.app.get_options()) option->required(false);
-  if (const auto message = parts.unknown_flag(argc, argv)) return parts.usage_error(*message);
+  if (!table.parameters().empty() && asks_for_config())
+    for (CLI::Option* option : app.get_options()) option->required(false);
+  if (const auto message = unknown_flag(argc, argv)) return usage_error(*message);
   try {
-    parts.app.parse(argc, argv);
+    app.parse(argc, argv);
   } catch (const CLI::CallForHelp&) {
-    std::cout << parts.app.help();
+    std::cout << app.help();
+    require_printed();
     return 0;
   } catch (const CLI::ParseError& error) {
     // CLI11's own text does not fit this case.
-    const std::vector<std::string> surplus = parts.app.remaining();
+    const std::vector<std::string> surplus = app.remaining();
     const bool too_many = dynamic_cast<const CLI::ExtrasError*>(&error) != nullptr;
-    return parts.usage_error(
-        too_many && !surplus.empty() ? "one argument too many: " + surplus.front() : error.what());
+    return usage_error(too_many && !surplus.empty() ? "one argument too many: " + surplus.front()
+                                                    : error.what());
   }
+  apply_parameters();
+  if (!print_config) return std::nullopt;
+  std::cout << libmap::to_yaml(table);
+  require_printed();
+  return 0;
+}
+
+void Command::Parts::work(const std::function<void(Run&)>& body) {
+  const auto given = libmap::parse_integer(threads);
+  if (!given || *given < 0 || *given > 4096)
+    throw libmap::Error("not a number of threads",
+                        {.field = "--threads", .value = threads, .bound = ">= 0 and <= 4096"});
+  run_options.threads =
+      *given == 0 ? std::thread::hardware_concurrency() : static_cast<unsigned>(*given);
+  const libmap::ThreadLimit limit(run_options.threads);
+  end_cleanly_on_signals();
+  start_log(name, run_options);
+  const std::unique_ptr<libmap::Progress> bar =
+      make_progress(run_options.quiet ? "none" : progress);
+  Run run(name, run_options, *bar);
+  run.manifest().add_parameters(table);
+  if (!config.empty()) run.add_input(config_file());
+  body(run);
+  bar->end();
+  require_printed();
+  end_if_told();
+}
+
+int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
+  const std::string& name = parts_->name;
   try {
-    parts.apply_parameters();
-    if (parts.print_config) {
-      std::cout << libmap::to_yaml(parts.table);
-      return 0;
-    }
-    const auto threads = libmap::parse_integer(parts.threads);
-    if (!threads || *threads < 0 || *threads > 4096)
-      throw libmap::Error(
-          "not a number of threads",
-          {.field = "--threads", .value = parts.threads, .bound = ">= 0 and <= 4096"});
-    parts.run_options.threads =
-        *threads == 0 ? std::thread::hardware_concurrency() : static_cast<unsigned>(*threads);
-    const libmap::ThreadLimit limit(parts.run_options.threads);
-    start_log(parts.name, parts.run_options);
-    const std::unique_ptr<libmap::Progress> progress =
-        make_progress(parts.run_options.quiet ? "none" : parts.progress);
-    Run run(parts.name, parts.run_options, *progress);
-    run.manifest().add_parameters(parts.table);
-    if (!parts.config.empty()) run.add_input(parts.config_file());
-    body(run);
-    progress->end();
+    if (const auto exit_code = parts_->parse(argc, argv)) return *exit_code;
+    parts_->work(body);
     return 0;
   } catch (const libmap::Error& error) {
-    return report(parts.name, error.what(),
+    return report(name, parts_->placed(error).what(),
                   error.kind() == libmap::ErrorKind::bad_input ? exit_bad_input : exit_failed);
+  } catch (const fs::filesystem_error& error) {
+    // A path that leads nowhere, such as a link to itself, or the machine's own trouble.
+    const bool is_path = error.code() == std::errc::too_many_symbolic_link_levels ||
+                         error.code() == std::errc::filename_too_long ||
+                         error.code() == std::errc::permission_denied ||
+                         error.code() == std::errc::not_a_directory;
+    return report(name, error.path1().string() + ": " + error.code().message(),
+                  is_path ? exit_bad_input : exit_failed);
   } catch (const std::bad_alloc&) {
-    return report(parts.name, "out of memory", exit_failed);
+    return report(name, "out of memory", exit_failed);
   } catch (const std::exception& error) {
-    return report(parts.name, error.what(), exit_failed);
+    return report(name, error.what(), exit_failed);
   }
 }
 

@@ -49,8 +49,19 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
   return cloud;
 }
 
+// The manifest of a converted map still says in which frame it is. Once it is read: what cannot be
+// read need not be hashed.
+void add_input(const ConvertOptions& options, Run& run) {
+  run.add_input(options.input);
+  if (const auto source = libmap::read_manifest_of(options.input)) {
+    run.manifest().frame = source->frame;
+    run.manifest().transforms = source->transforms;
+  }
+}
+
 void convert_cloud(const ConvertOptions& options, Run& run) {
   const libmap::CloudReadResult read = libmap::read_cloud(options.input);
+  add_input(options, run);
   if (read.dropped_points > 0)
     run.warn(fmt::format("{} points without a position were dropped", read.dropped_points));
   if (holds_meshes_alone(options.output))
@@ -64,6 +75,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
 
 void convert_mesh(const ConvertOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
+  add_input(options, run);
   const bool to_cloud = holds_clouds_alone(options.output);
   if (to_cloud) run.say("the output holds the mesh's vertices alone");
   run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
@@ -81,6 +93,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   const bool named = options.output_poses_format != TrajectoryFormat::automatic;
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
+  add_input(options, run);
   if (!read.images.empty())
     throw libmap::Error("poses of photographs: only those of the scan know its base (fuse --poses)",
                         {.file = options.input});
@@ -95,26 +108,13 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   });
 }
 
-// The manifest of a converted map still says in which frame it is.
-void keep_frame(const ConvertOptions& options, Run& run) {
-  run.add_input(options.input);
-  if (const auto source = libmap::read_manifest_of(options.input)) {
-    run.manifest().frame = source->frame;
-    run.manifest().transforms = source->transforms;
-  }
-}
-
 void convert(const ConvertOptions& options, Run& run) {
   const bool poses = holds_poses(options);
   if (!poses) libmap::format_of(options.output);
   run.claim_output(options.output, {options.input});
-  if (poses) {
-    keep_frame(options, run);
-    return convert_poses(options, run);
-  }
-  const libmap::FileKind kind = libmap::file_kind(options.input);
-  keep_frame(options, run);
-  if (kind == libmap::FileKind::mesh)
+  if (poses)
+    convert_poses(options, run);
+  else if (libmap::file_kind(options.input) == libmap::FileKind::mesh)
     convert_mesh(options, run);
   else
     convert_cloud(options, run);

@@ -199,6 +199,7 @@ void add_transform(const CropCommandOptions& options, const libmap::CropReport& 
       graspmap_tools::site_from_map_of(options.input).value_or(libmap::Pose::Identity());
   run.manifest().transforms.emplace_back(graspmap_tools::site_from_map_name,
                                          report.site_from_map * before);
+  graspmap_tools::carry_truth_transform(options.input, run);
   run.manifest().frame = "site";
 }
 
@@ -206,14 +207,19 @@ template <typename Write>
 void write_site(const CropCommandOptions& options, Run& run, const Write& write) {
   const std::string matrix =
       matrix_text(*run.manifest().find_transform(graspmap_tools::site_from_map_name));
-  run.write_outputs(options.output, {{options.output, write},
-                                     {transform_path(options.output), [&](const fs::path& to) {
-                                        libmap::write_text(to, matrix);
-                                      }}});
+  run.write_outputs(options.output, {{transform_path(options.output),
+                                      [&](const fs::path& to) { libmap::write_text(to, matrix); }},
+                                     {options.output, write}});
+}
+
+void add_inputs(const CropCommandOptions& options, Run& run) {
+  run.add_input(options.input);
+  if (!options.polygon.empty()) run.add_input(options.polygon);
 }
 
 void crop_cloud(const CropCommandOptions& options, Run& run) {
   const libmap::CloudReadResult read = libmap::read_cloud(options.input);
+  add_inputs(options, run);
   if (read.dropped_points > 0)
     run.warn(fmt::format("{} points without a position were dropped", read.dropped_points));
   const libmap::CropCloudResult result =
@@ -228,6 +234,7 @@ void crop_cloud(const CropCommandOptions& options, Run& run) {
 
 void crop_mesh(const CropCommandOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
+  add_inputs(options, run);
   const libmap::CropMeshResult result =
       run.timed("crop", [&] { return libmap::crop_mesh(mesh, options.crop); });
   add_transform(options, result.report, run);
@@ -254,8 +261,6 @@ void crop(CropCommandOptions& options, Run& run) {
   if (!options.polygon.empty()) inputs.push_back(options.polygon);
   run.claim_output(options.output, inputs);
   run.require_own_companions(options.output, {transform_path(options.output)});
-  run.add_input(options.input);
-  if (!options.polygon.empty()) run.add_input(options.polygon);
   run.manifest().parameters.emplace_back("box", options.box);
   run.manifest().parameters.emplace_back("size", options.size);
   run.manifest().parameters.emplace_back("border", options.border);

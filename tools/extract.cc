@@ -16,6 +16,7 @@
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
 #include "tools/extract_pictures.h"
+#include "tools/result_counts.h"
 #include "tools/scan_poses.h"
 
 namespace {
@@ -100,9 +101,7 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
 
 void add_results(libmap::Manifest& manifest, const libmap::PoseGraph& graph, const Counts& counts,
                  const libmap::FrameFolderCounts& written) {
-  const auto count = [&](const char* name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   manifest.frame = "base";
   count("nodes", graph.nodes.size());
   count("links", graph.links.size());
@@ -153,9 +152,10 @@ void extract(ExtractOptions& options, Run& run) {
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   // Each folder's manifest holds what was done for it alone.
   const libmap::Manifest start = run.manifest();
-  if (!options.output.empty()) write_folder(options, *scan, run);
-  run.manifest() = start;
+  // First: whether there are poses for them shows before anything is written.
   if (pictures) graspmap_tools::write_picture_folders(options.pictures, *scan, options.strict, run);
+  run.manifest() = start;
+  if (!options.output.empty()) write_folder(options, *scan, run);
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "tools/extract_pictures.h"
+#include "tools/result_counts.h"
 
 #include <fmt/format.h>
 
@@ -178,9 +179,7 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
     run.say(fmt::format("{} pictures of {} cameras, {} points, {} times observed",
                         model.images.size(), model.cameras.size(), model.points.size(),
                         observations));
-    const auto count = [&](const char* name, std::size_t value) {
-      run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
-    };
+    const graspmap_tools::ResultCounts count(run.manifest());
     count("cameras", model.cameras.size());
     count("points", model.points.size());
     count("observations", observations);
@@ -229,9 +228,10 @@ void write_picture_folders(PictureOptions& options, const libmap::ScanSource& sc
   manifest.transforms.emplace_back("world_from_map", world_from_map);
   manifest.results.emplace_back("pictures", static_cast<std::int64_t>(pictures.size()));
   const libmap::Manifest start = manifest;
-  if (!options.bundler.empty()) write_bundler(options, pictures, scan, run);
-  manifest = start;
+  // First: it needs the depth as well, so that what is broken shows before anything is written.
   if (!options.colmap.empty()) write_colmap(options, pictures, scan, run);
+  manifest = start;
+  if (!options.bundler.empty()) write_bundler(options, pictures, scan, run);
 }
 
 }  // namespace graspmap_tools

@@ -13,6 +13,7 @@
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
+#include "tools/result_counts.h"
 #include "tools/scan_poses.h"
 
 namespace {
@@ -33,9 +34,7 @@ struct FuseOptions {
 };
 
 void add_results(const libmap::DepthFusionResult& result, libmap::Manifest& manifest) {
-  const auto count = [&](const char* name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   count("frames", result.frames);
   count("skipped_frames", result.skipped.size());
   count("pixels", result.pixels.pixels);

@@ -212,10 +212,9 @@ void lookup(LookupCommandOptions& options, Run& run) {
   options.map = graspmap_tools::without_trailing_slash(options.map);
   run.claim_output(options.output, {options.map, options.points, options.visible});
   libmap::Table table = libmap::read_csv(options.points);
-  std::vector<Eigen::Vector3d> positions = graspmap_tools::positions_of(table);
   MapAnswers map = graspmap_tools::is_tile_store(options.map)
-                       ? ask_tiles(options, std::move(positions), run)
-                       : ask_map(options, std::move(positions), run);
+                       ? ask_tiles(options, graspmap_tools::positions_of(table), run)
+                       : ask_map(options, graspmap_tools::positions_of(table), run);
   const std::vector<Cell> cells = add_columns(table, columns, map, options.map);
   if (!options.visible.empty())
     run.manifest().results.emplace_back("visible", hide_unseen(options, map, run));

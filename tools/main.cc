@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libmap/core/text.h"
+#include "tools/standard_output.h"
 #include "tools/version_text.h"
 
 namespace {
@@ -94,11 +95,11 @@ int main(int argc, char** argv) {
   const std::string first = argc > 1 ? argv[1] : "";
   if (first == "--version") {
     std::cout << graspmap_tools::version_text();
-    return 0;
+    return graspmap_tools::exit_code_of_printing("graspmap");
   }
   if (first == "--help" || first == "-h" || first == "help") {
     print_help();
-    return 0;
+    return graspmap_tools::exit_code_of_printing("graspmap");
   }
   if (first.empty()) {
     std::cerr << "graspmap: error: no command: graspmap --help lists them\n";

@@ -25,10 +25,17 @@ std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
   return positions;
 }
 
+namespace {
+
+// A folder's manifest stands beside it, with or without '/' at the end of its name.
+std::optional<libmap::Manifest> manifest_of(const std::filesystem::path& path) {
+  return libmap::read_manifest_of(path.has_filename() ? path : path.parent_path());
+}
+
+}  // namespace
+
 std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
-  // A folder's manifest stands beside it, with or without '/' at the end of its name.
-  const std::filesystem::path path(file);
-  const auto manifest = libmap::read_manifest_of(path.has_filename() ? path : path.parent_path());
+  const auto manifest = manifest_of(file);
   if (!manifest) return std::nullopt;
   const libmap::Pose* site_from_map = manifest->find_transform(site_from_map_name);
   const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
@@ -37,9 +44,24 @@ std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
   return site_from_map == nullptr ? *terrain_from_input : *terrain_from_input * *site_from_map;
 }
 
-void carry_site_transform(const std::string& input, Run& run) {
+bool is_from_true_frame(const std::string& file) {
+  const auto manifest = manifest_of(file);
+  return manifest && (manifest->frame == "ground truth" ||
+                      manifest->find_transform(truth_from_poses_name) != nullptr);
+}
+
+void carry_truth_transform(const std::string& input, Run& run) {
+  const auto manifest = manifest_of(input);
+  const libmap::Pose* truth_from_poses =
+      manifest ? manifest->find_transform(truth_from_poses_name) : nullptr;
+  if (truth_from_poses != nullptr)
+    run.manifest().transforms.emplace_back(truth_from_poses_name, *truth_from_poses);
+}
+
+void carry_transforms(const std::string& input, Run& run) {
   if (const auto site_from_map = site_from_map_of(input))
     run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
+  carry_truth_transform(input, run);
 }
 
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run) {

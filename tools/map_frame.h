@@ -29,9 +29,18 @@ inline constexpr const char* site_from_map_name = "site_from_map";
 // as the file's manifest says; nothing if it says nothing.
 std::optional<libmap::Pose> site_from_map_of(const std::string& file);
 
-// For an output in the frame of `input`: its manifest gets the input's site_from_map, if it has
-// one.
-void carry_site_transform(const std::string& input, Run& run);
+// The name of the transform of what lies in the frame of a scan's true poses, or was made from
+// that.
+inline constexpr const char* truth_from_poses_name = "ground_truth_from_poses";
+
+// Whether `file`, or what it was made from, lies in the frame of true poses, as its manifest says.
+bool is_from_true_frame(const std::string& file);
+
+// For an output in the frame of `input`: its manifest gets the input's site_from_map and
+// ground_truth_from_poses, those that it has.
+void carry_transforms(const std::string& input, Run& run);
+// The latter alone.
+void carry_truth_transform(const std::string& input, Run& run);
 
 // From the frame of listed points to that of the points in `map`, as its manifest says; the
 // identity, with a warning, if it has none. Throws Error if points are in the frame of a map that

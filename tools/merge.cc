@@ -14,6 +14,7 @@
 #include "libmap/core/parallel.h"
 #include "tools/command_line.h"
 #include "tools/map_tiles.h"
+#include "tools/result_counts.h"
 
 namespace {
 
@@ -135,29 +136,38 @@ std::vector<TileRow> rows_of(const libgtd::TileStoreIndex& index) {
   return rows;
 }
 
-libmap::PointCloud load_row(const graspmap_tools::MapTiles& tiles, const TileRow& row) {
+libmap::PointCloud joined(const std::vector<libmap::PointCloud>& parts, const std::string& name) {
+  try {
+    return libgtd::merge_map_clouds(parts);
+  } catch (const libmap::Error& error) {
+    throw error.in_file(name);
+  }
+}
+
+libmap::PointCloud load_row(const graspmap_tools::MapTiles& tiles, const std::string& store,
+                            const TileRow& row) {
   std::vector<libmap::PointCloud> parts(row.end - row.begin);
   libmap::parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) parts[n] = tiles.load_checked(row.begin + n);
   });
-  return libgtd::merge_map_clouds(parts);
+  return joined(parts, store);
 }
 
 // A PCD row by row; other formats need the whole map in memory.
-void write_store(const graspmap_tools::MapTiles& tiles, const std::filesystem::path& file,
-                 Run& run) {
+void write_store(const graspmap_tools::MapTiles& tiles, const std::string& store,
+                 const std::filesystem::path& file, Run& run) {
   const std::vector<TileRow> rows = rows_of(tiles.index());
   run.progress().begin("merge", rows.size());
   if (libmap::format_of(file) == ".pcd") {
     libmap::PcdPartsWriter writer(
         file, {.points = tiles.index().voxels(), .float64_positions = tiles.float64_positions()});
     for (const TileRow& row : rows) {
-      writer.append(load_row(tiles, row));
+      writer.append(load_row(tiles, store, row));
       run.progress().advance(1);
     }
     writer.finish();
   } else {
-    libmap::write_cloud(file, load_row(tiles, {0, tiles.index().tiles.size()}));
+    libmap::write_cloud(file, load_row(tiles, store, {0, tiles.index().tiles.size()}));
   }
   run.progress().end();
 }
@@ -174,14 +184,13 @@ void merge_store(const MergeOptions& options, Run& run) {
   copy_common_facts(index.manifest, run.manifest());
   run.manifest().inputs = index.manifest.inputs;
   run.add_input(graspmap_tools::store_index_path(options.tiles.front()));
-  const auto count = [&](const char* name, std::uint64_t value) {
-    run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(run.manifest());
   count("scored_voxels", index.voxels());
   count("edge_voxels", edge);
   count("graspable_voxels", graspable);
-  run.write_output(options.output,
-                   [&](const auto& temporary) { write_store(tiles, temporary, run); });
+  run.write_output(options.output, [&](const auto& temporary) {
+    write_store(tiles, options.tiles.front(), temporary, run);
+  });
   run.say(fmt::format("{} scored voxels from {} tiles", index.voxels(), index.tiles.size()));
 }
 
@@ -203,7 +212,7 @@ void merge(const MergeOptions& options, Run& run) {
   require_all_shares(manifests, options.tiles);
   std::vector<libmap::PointCloud> parts;
   for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
-  libmap::PointCloud whole = libgtd::merge_map_clouds(parts);
+  libmap::PointCloud whole = joined(parts, options.tiles.front());
   copy_common_facts(manifests.front(), run.manifest());
   // The terrain and the gripper that the parts were made from, then the parts.
   run.manifest().inputs = manifests.front().inputs;

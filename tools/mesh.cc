@@ -236,7 +236,7 @@ void mesh(const MeshOptions& options, Run& run) {
   }
   if (options.report || options.json) report(options, cloud, surface, run);
   run.add_input(options.cloud);
-  graspmap_tools::carry_site_transform(options.cloud, run);
+  graspmap_tools::carry_transforms(options.cloud, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }

@@ -14,6 +14,7 @@
 #include "libmap/scan/rig_images.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
+#include "tools/result_counts.h"
 
 namespace {
 
@@ -80,9 +81,7 @@ void add_results(const libmap::CameraRig& rig, const RigMoment& moment,
                  const libmap::PanoramaResult& result,
                  const std::vector<libmap::PanoramaView>& views, libmap::Manifest& manifest) {
   manifest.frame = "robot";
-  const auto count = [&](const std::string& name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   manifest.results.emplace_back("stamp_s", moment.stamp_s);
   count("cameras", rig.cameras.size());
   count("cameras_seen", views.size());
@@ -161,7 +160,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
     throw libmap::Error("no image of the moment can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
   add_results(rig, moment, result, views, run.manifest());
-  graspmap_tools::carry_site_transform(options.folder, run);
+  graspmap_tools::carry_transforms(options.folder, run);
   run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(),
                       cameras, libmap::to_text(moment.stamp_s)));
   run.write_output(options.output, [&](const fs::path& temporary) {

@@ -16,6 +16,7 @@
 #include "tools/command_line.h"
 #include "tools/poses_output.h"
 #include "tools/refine_report.h"
+#include "tools/result_counts.h"
 #include "tools/scan_poses.h"
 
 namespace {
@@ -68,9 +69,7 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
 }
 
 void add_results(const libmap::RefinementResult& result, libmap::Manifest& manifest) {
-  const auto count = [&](const char* name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   count("poses", result.poses.size());
   count("links", result.links.size());
   count("closures_found", result.closures.size());
@@ -95,6 +94,14 @@ void add_results(const libmap::RefinementResult& result, libmap::Manifest& manif
 
 void write_outputs(const RefineOptions& options, const libmap::RefinementResult& result,
                    const libmap::ScanSource& scan, Run& run) {
+  // First: a database whose rest is broken cannot be copied.
+  if (!options.database.empty())
+    run.write_output(options.database, [&](const auto& temporary) {
+      std::map<int, libmap::Pose> poses;
+      for (const libmap::TrajectoryPose& pose : result.poses)
+        poses.emplace(pose.node, pose.world_from_base);
+      libmap::copy_with_optimized_poses(options.scan, temporary, poses, result.closures);
+    });
   for (const std::string& report : options.reports)
     run.write_output(report, [&](const auto& temporary) {
       libmap::write_text(temporary, fs::path(report).extension() == ".txt"
@@ -104,13 +111,6 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
   if (!options.links.empty())
     run.write_output(options.links, [&](const auto& temporary) {
       libmap::write_trajectory(temporary, {result.poses, result.links});
-    });
-  if (!options.database.empty())
-    run.write_output(options.database, [&](const auto& temporary) {
-      std::map<int, libmap::Pose> poses;
-      for (const libmap::TrajectoryPose& pose : result.poses)
-        poses.emplace(pose.node, pose.world_from_base);
-      libmap::copy_with_optimized_poses(options.scan, temporary, poses, result.closures);
     });
   graspmap_tools::write_poses_output(options.output, {result.poses, result.links}, scan,
                                      options.nodes, run);

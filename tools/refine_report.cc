@@ -164,7 +164,7 @@ void add_stage(const libmap::StageReport& stage, std::string& text) {
                    stage.closures.accepted);
     for (const auto& [reason, count] : rejections_of(stage.closures))
       if (count > 0) fmt::format_to(out, ", {} {}", count, reason);
-    text += "\n";
+    fmt::format_to(out, "\n");
   }
   for (const auto& [name, group] : stage.groups)
     fmt::format_to(out,
@@ -221,7 +221,7 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
                                  result.poses.size(), result.links.size(), result.closures.size());
   const auto out = std::back_inserter(text);
   for (const libmap::StageReport& stage : result.stages) add_stage(stage, text);
-  text += "\n";
+  fmt::format_to(out, "\n");
   for (const libmap::GraphComponent& part : result.components)
     fmt::format_to(out, "part of {} nodes, of which {} stays where it was\n", part.nodes.size(),
                    part.gauge_node);
@@ -235,15 +235,15 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
     fmt::format_to(out, "stored link {} -> {} rejected: {}\n", link.from, link.to,
                    to_text(link.type));
   for (const std::string& warning : result.warnings) fmt::format_to(out, "warning: {}\n", warning);
-  text +=
-      "\nstandard deviations of each pose against its part's fixed node, "
-      "in its own axes\n"
-      "  node     x mm     y mm     z mm    x deg    y deg    z deg\n";
+  fmt::format_to(out,
+                 "\nstandard deviations of each pose against its part's fixed node, "
+                 "in its own axes\n"
+                 "  node     x mm     y mm     z mm    x deg    y deg    z deg\n");
   for (const auto& [node, covariance] : result.covariance) {
     fmt::format_to(out, "{:6}", node);
     for (int n = 0; n < 6; ++n)
       fmt::format_to(out, " {:8.4f}", std::sqrt(covariance(n, n)) * (n < 3 ? 1e3 : degrees));
-    text += "\n";
+    fmt::format_to(out, "\n");
   }
   return text;
 }

@@ -16,6 +16,7 @@
 #include "tools/command_line.h"
 #include "tools/map_tiles.h"
 #include "tools/report_map.h"
+#include "tools/result_counts.h"
 
 namespace {
 
@@ -76,7 +77,8 @@ libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_vi
   libmap::PageAssets assets;
   assets.version = run.manifest().version;
   assets.style = read_asset("report.css", run);
-  assets.script = read_asset("report.js", run);
+  for (const char* name : {"map_cells.js", "map_marks.js", "map_view.js", "report.js"})
+    assets.scripts.push_back(read_asset(name, run));
   if (!with_views) return assets;
   for (const char* name : {"three.min.js", "examples/js/controls/OrbitControls.js"}) {
     const fs::path path = fs::path(options.three) / name;
@@ -136,9 +138,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
     run.add_input(graspmap_tools::is_tile_store(file.string())
                       ? graspmap_tools::store_index_path(file.string())
                       : file);
-  const auto result = [&](const char* name, std::size_t value) {
-    run.manifest().results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts result(run.manifest());
   result("files", read.files.size());
   result("bytes", page.html.size());
   result("pictures_made_smaller", page.changed_pictures);

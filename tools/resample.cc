@@ -65,7 +65,7 @@ void resample(const ResampleOptions& options, Run& run) {
   }
   if (const auto source = libmap::read_manifest_of(options.mesh))
     run.manifest().frame = source->frame;
-  graspmap_tools::carry_site_transform(options.mesh, run);
+  graspmap_tools::carry_transforms(options.mesh, run);
   add_results(result, run.manifest());
   say_result(result, sampling.count, run);
   run.write_output(options.output,

@@ -4,11 +4,14 @@
 #include <spdlog/spdlog.h>
 
 #include <optional>
+#include <sstream>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/folder_output.h"
+#include "libmap/core/unfinished_outputs.h"
+#include "tools/message_text.h"
 
 namespace graspmap_tools {
 
@@ -45,17 +48,46 @@ void require_other_than_inputs(const fs::path& output, const std::vector<std::st
       throw libmap::Error("is the input: the output needs another name", {.file = output.string()});
 }
 
-// The user knows the output by its own name.
-void write_named(const libmap::OutputFile& output,
+libmap::Error naming(const libmap::Error& error, const std::string& file) {
+  libmap::ErrorContext context = error.context();
+  context.file = file;
+  return libmap::Error(error.reason(), context, error.kind());
+}
+
+// The user knows an output, or a file in it, by its own name.
+void write_named(const fs::path& temporary, const fs::path& output,
                  const std::function<void(const fs::path&)>& writer) {
   try {
-    writer(output.temporary_path());
+    writer(temporary);
   } catch (const libmap::Error& error) {
-    if (error.context().file != output.temporary_path().string()) throw;
-    libmap::ErrorContext context = error.context();
-    context.file = output.final_path().string();
-    throw libmap::Error(error.reason(), context, error.kind());
+    const std::string& file = error.context().file;
+    const std::string within = temporary.string() + "/";
+    if (file == temporary.string()) throw naming(error, output.string());
+    if (file.starts_with(within))
+      throw naming(error, (output / file.substr(within.size())).string());
+    throw;
   }
+}
+
+void write_named(const libmap::OutputFile& output,
+                 const std::function<void(const fs::path&)>& writer) {
+  write_named(output.temporary_path(), output.final_path(), writer);
+}
+
+// What a killed run has left is none.
+bool holds_outputs(const fs::path& folder) {
+  const fs::directory_iterator entries(folder);
+  return std::any_of(begin(entries), end(entries), [](const fs::directory_entry& entry) {
+    return !libmap::is_named_unfinished(entry.path());
+  });
+}
+
+void make_folder(const fs::path& folder) {
+  std::error_code code;
+  fs::create_directories(folder, code);
+  if (code)
+    throw libmap::Error("cannot be made: " + code.message(), {.file = folder.string()},
+                        libmap::ErrorKind::failed);
 }
 
 }  // namespace
@@ -82,9 +114,12 @@ void Run::add_input(const fs::path& path) {
   if (!place.empty() && *place.begin() != "..") manifest_.inputs.back().path = place.string();
 }
 
-void Run::say(const std::string& text) { spdlog::info("{}", text); }
-void Run::warn(const std::string& text) { spdlog::warn("{}", text); }
-void Run::detail(const std::string& text) { spdlog::debug("{}", text); }
+void Run::say(const std::string& text) {
+  std::istringstream lines(text);
+  for (std::string line; std::getline(lines, line);) spdlog::info("{}", message_text(line));
+}
+void Run::warn(const std::string& text) { spdlog::warn("{}", message_text(text)); }
+void Run::detail(const std::string& text) { spdlog::debug("{}", message_text(text)); }
 
 Run::Timing::~Timing() {
   const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
@@ -102,10 +137,28 @@ void Run::claim_output(const fs::path& path, const std::vector<std::string>& inp
   if (!options_.force) require_no_foreign_manifest(path);
   // Made and dropped at once: a folder that is missing or read-only is found before the work.
   const libmap::OutputFile probe(path);
+  claim_manifest(path);
 }
 
-void Run::write_manifest(const fs::path& output) {
-  libmap::write_whole_file(libmap::manifest_path(output), libmap::to_json(manifest_));
+void Run::claim_manifest(const fs::path& output) {
+  if (claimed_manifests_.contains(output.string())) return;
+  try {
+    claimed_manifests_.try_emplace(output.string(), libmap::manifest_path(output));
+  } catch (const libmap::Error& error) {
+    if (error.kind() != libmap::ErrorKind::failed) throw;
+    throw naming(error, output.string());
+  }
+}
+
+Run::Writer Run::manifest_writer() const {
+  return [this](const fs::path& temporary) {
+    libmap::write_text(temporary, libmap::to_json(manifest_));
+  };
+}
+
+libmap::OutputFile Run::begin_manifest(const fs::path& output) {
+  claim_manifest(output);
+  return std::move(claimed_manifests_.extract(output.string()).mapped());
 }
 
 void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
@@ -127,28 +180,34 @@ void Run::write_outputs(const fs::path& path, const Files& files) {
   std::vector<fs::path> paths;
   for (const auto& [file, writer] : files) paths.push_back(file);
   require_own_companions(path, paths);
+  // The manifest goes first: an output without one would not be recognised as ours, and `make`
+  // judges by the output, which is then still the old one.
   std::vector<libmap::OutputFile> outputs;
+  outputs.push_back(begin_manifest(path));
   timed("write", [&] {
     for (const auto& [file, writer] : files) {
       outputs.emplace_back(file);
       write_named(outputs.back(), writer);
     }
   });
-  // The manifest goes first: an output without one would not be recognised as ours, and `make`
-  // judges by the output, which is then still the old one.
-  write_manifest(path);
-  for (libmap::OutputFile& output : outputs) output.commit();
+  write_named(outputs.front(), manifest_writer());
+  libmap::commit_together(outputs);
 }
 
 void Run::claim_output_folder(const fs::path& given) {
   require_own_folder(given, ": --force writes into it");
+  const fs::path folder = without_trailing_slash(given);
+  const fs::path place = folder.has_parent_path() ? folder.parent_path() : ".";
+  if (options_.dry_run && !fs::exists(place)) return;
+  make_folder(place);
+  claim_manifest(folder);
 }
 
 void Run::require_own_folder(const fs::path& given, const std::string& remedy) {
   const fs::path folder = without_trailing_slash(given);
   if (fs::exists(folder) && !fs::is_directory(folder))
     throw libmap::Error("is a file, not a folder", {.file = folder.string()});
-  if (fs::exists(folder) && !fs::is_empty(folder) && !options_.force) {
+  if (fs::exists(folder) && holds_outputs(folder) && !options_.force) {
     const auto manifest = own_manifest_of(folder);
     if (!manifest)
       throw libmap::Error("is not empty and was not written by graspmap" + remedy,
@@ -164,18 +223,22 @@ void Run::write_output_folder(const fs::path& given,
                               const std::vector<std::pair<std::string, Writer>>& files) {
   if (options_.dry_run) return;
   const fs::path folder = without_trailing_slash(given);
-  std::error_code code;
-  fs::create_directories(folder, code);
-  if (code)
-    throw libmap::Error("cannot be made: " + code.message(), {.file = folder.string()},
-                        libmap::ErrorKind::failed);
-  std::vector<libmap::OutputFile> outputs;
-  for (const auto& [name, writer] : files) {
-    outputs.emplace_back(folder / name);
-    writer(outputs.back().temporary_path());
+  const bool is_new = !fs::exists(folder);
+  make_folder(folder);
+  try {
+    std::vector<libmap::OutputFile> outputs;
+    outputs.push_back(begin_manifest(folder));
+    for (const auto& [name, writer] : files) {
+      outputs.emplace_back(folder / name);
+      write_named(outputs.back(), writer);
+    }
+    write_named(outputs.front(), manifest_writer());
+    libmap::commit_together(outputs);
+  } catch (...) {
+    std::error_code ignored;
+    if (is_new) fs::remove(folder, ignored);
+    throw;
   }
-  write_manifest(folder);
-  for (libmap::OutputFile& output : outputs) output.commit();
 }
 
 void Run::claim_output_tree(const fs::path& given, const std::vector<std::string>& names,
@@ -184,15 +247,19 @@ void Run::claim_output_tree(const fs::path& given, const std::vector<std::string
   require_own_folder(given, "");
   // Made and dropped at once: what cannot be written or replaced is found before the work.
   const libmap::OutputFolder probe(given, names);
+  claim_manifest(without_trailing_slash(given));
 }
 
 void Run::write_output_tree(const fs::path& given, const std::vector<std::string>& names,
                             const Writer& writer) {
   if (options_.dry_run) return writer({});
   const fs::path folder = without_trailing_slash(given);
+  libmap::OutputFile manifest = begin_manifest(folder);
   libmap::OutputFolder output(folder, names);
-  timed("write", [&] { writer(output.temporary_path()); });
-  write_manifest(folder);
+  timed("write", [&] { write_named(output.temporary_path(), folder, writer); });
+  write_named(manifest, manifest_writer());
+  const libmap::OutputsInStep step;
+  manifest.commit();
   output.commit();
 }
 

@@ -4,10 +4,12 @@
 #include <chrono>
 #include <filesystem>
 #include <functional>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
+#include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/progress.h"
 
@@ -49,7 +51,8 @@ class Run {
   }
 
   // Throws Error if `path` is one of the inputs, if it exists and this toolkit did not write it,
-  // unless --force, or if it cannot be written. Call it before the work.
+  // unless --force, if it cannot be written, or if another process has claimed it. Call it before
+  // the work: from here to the end of this run the output is this process's alone.
   void claim_output(const std::filesystem::path& path, const std::vector<std::string>& inputs = {});
 
   // writer(temporary) writes the file; it is put in place whole, with its manifest beside it. With
@@ -57,18 +60,19 @@ class Run {
   void write_output(const std::filesystem::path& path,
                     const std::function<void(const std::filesystem::path& temporary)>& writer);
 
-  // The same of an output in several files, `path` among them: all are written before the first is
-  // put in place, in their order. The others must not stand there already unless an earlier run of
-  // this command wrote `path`, or --force: require_own_companions throws Error if one does, and may
-  // be called before the work.
+  // The same of an output in several files, `path` the last of them: all are written before the
+  // first is put in place, in their order, so that where `path` is the others are. These must not
+  // stand there already unless an earlier run of this command wrote `path`, or --force:
+  // require_own_companions throws Error if one does, and may be called before the work.
   void require_own_companions(const std::filesystem::path& path,
                               const std::vector<std::filesystem::path>& others);
   using Files = std::vector<std::pair<std::filesystem::path,
                                       std::function<void(const std::filesystem::path& temporary)>>>;
   void write_outputs(const std::filesystem::path& path, const Files& files);
 
-  // A folder of outputs, made if it is missing. All files are written before the first is put in
-  // place; the manifest FOLDER.json stands beside the folder. With --dry-run nothing is written.
+  // A folder of outputs, made if it is missing, claimed as a file is. All files are written before
+  // the first is put in place; the manifest FOLDER.json stands beside the folder. With --dry-run
+  // nothing is written.
   using Writer = std::function<void(const std::filesystem::path& temporary)>;
   void claim_output_folder(const std::filesystem::path& folder);
   void write_output_folder(const std::filesystem::path& folder,
@@ -100,12 +104,17 @@ class Run {
 
   // What stands in a folder must be of an earlier run of this command; `remedy` ends the message.
   void require_own_folder(const std::filesystem::path& folder, const std::string& remedy);
-  void write_manifest(const std::filesystem::path& output);
+  // An output is claimed by its manifest, which is in the making from the claim on; begin_manifest
+  // takes it to write it, and makes it where nothing was claimed.
+  void claim_manifest(const std::filesystem::path& output);
+  libmap::OutputFile begin_manifest(const std::filesystem::path& output);
+  Writer manifest_writer() const;
 
   std::string command_;
   RunOptions options_;
   libmap::Progress& progress_;
   libmap::Manifest manifest_;
+  std::map<std::string, libmap::OutputFile> claimed_manifests_;  // by the output's path
 };
 
 }  // namespace graspmap_tools

@@ -11,6 +11,7 @@
 #include "libmap/poses/pose_import.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
+#include "tools/map_frame.h"
 
 namespace graspmap_tools {
 
@@ -144,7 +145,10 @@ libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Traj
   if (truth.empty())
     throw libmap::Error("the scan has no ground truth",
                         {.file = path, .field = "--frame", .value = "ground-truth", .bound = {}});
-  if (taken.source == to_text(PoseSource::ground_truth)) return libmap::Pose::Identity();
+  if (taken.source == to_text(PoseSource::ground_truth)) {
+    run.manifest().transforms.emplace_back(truth_from_poses_name, libmap::Pose::Identity());
+    return libmap::Pose::Identity();
+  }
   libmap::AbsoluteTrajectoryError error;
   try {
     error = libmap::absolute_trajectory_error(poses, truth);
@@ -154,7 +158,7 @@ libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Traj
   run.say(
       fmt::format("aligned with {} true poses: RMSE {:.1f} mm", error.poses, 1e3 * error.rmse_m));
   run.manifest().results.emplace_back("trajectory_rmse_m", error.rmse_m);
-  run.manifest().transforms.emplace_back("ground_truth_from_poses", error.truth_from_estimate);
+  run.manifest().transforms.emplace_back(truth_from_poses_name, error.truth_from_estimate);
   return error.truth_from_estimate;
 }
 

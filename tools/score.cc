@@ -14,6 +14,7 @@
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
 #include "tools/plane_report.h"
+#include "tools/result_counts.h"
 #include "tools/score_store.h"
 
 namespace {
@@ -66,9 +67,7 @@ std::optional<Eigen::Vector3d> parse_up(const std::string& text) {
 
 void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& result,
                  const ScoreOptions& options) {
-  const auto count = [&](const char* name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   const Eigen::Vector3d& origin = result.map.lattice.origin_m;
   manifest.frame = options.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
   manifest.transforms.emplace_back("terrain_from_input", result.map.terrain_from_input);
@@ -184,7 +183,7 @@ void score(ScoreOptions& options, Run& run) {
   add_terrain_input(options.terrain, run);
   run.add_input(gripper_file);
   add_results(manifest, result, options);
-  graspmap_tools::carry_site_transform(options.terrain, run);
+  graspmap_tools::carry_transforms(options.terrain, run);
   say_result(result, options, run);
   const libmap::PointCloud cloud = libgtd::to_cloud(result.map, options.frame);
   run.write_output(options.output,

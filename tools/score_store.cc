@@ -106,13 +106,17 @@ class StoreScoring {
     if (run_.options().dry_run) return;
     const bool is_new = !fs::exists(options_.store);
     progress_.open();
+    std::optional<libgtd::TileJournal> journal;
     try {
-      run_.timed("plan", [&] { agree_on_plan(stream); });
+      run_.timed("plan", [&] {
+        const libmap::FileLock lock = progress_.lock();
+        agree_on_plan(stream);
+        journal.emplace(progress_.store(), options_.detection.share, plan_.key);
+      });
     } catch (...) {
       if (is_new) progress_.remove_if_bare();
       throw;
     }
-    libgtd::TileJournal journal(progress_.store(), options_.detection.share, plan_.key);
     const std::vector<TileNumber> wanted = run_.timed("check", [&] { return missing_tiles(); });
     if (!wanted.empty()) {
       libmap::PointSpool spool(progress_.store() / "progress",
@@ -121,7 +125,7 @@ class StoreScoring {
       run_.timed("tiles", [&] {
         libgtd::detect_streamed(
             frame_, SpooledPoints(spool), wanted, options_.detection,
-            [&](std::vector<libgtd::StreamedTile> tiles) { journal.add(write(tiles)); },
+            [&](std::vector<libgtd::StreamedTile> tiles) { journal->add(write(tiles)); },
             run_.progress(), {.max_points = options_.points_at_once});
       });
     }
@@ -129,9 +133,9 @@ class StoreScoring {
   }
 
  private:
-  // The plan that is there, if it is of the same parameters and inputs; else a new one.
+  // The plan that is there, if it is of the same parameters and inputs; else a new one. The caller
+  // holds the lock.
   void agree_on_plan(const libmap::PieceStream& stream) {
-    const libmap::FileLock lock = progress_.lock();
     const auto earlier = run_.options().force ? std::nullopt : progress_.plan();
     if (!earlier && !run_.options().force && fs::exists(progress_.store() / "index.json"))
       throw libmap::Error(
@@ -150,6 +154,7 @@ class StoreScoring {
       restore_frame();
     } else {
       if (earlier) require_appendable(*earlier, plan);
+      progress_.require_idle();
       make_frame(stream, plan);
       if (earlier)
         keep_tiles(*earlier, plan);
@@ -164,7 +169,7 @@ class StoreScoring {
   // Parameters and inputs, and what `score` says beside any map.
   libmap::Manifest manifest_of(const std::vector<TerrainPiece>& pieces) {
     libmap::Manifest& manifest = run_.manifest();
-    carry_site_transform(options_.terrain, run_);
+    carry_transforms(options_.terrain, run_);
     for (const TerrainPiece& piece : pieces) manifest.inputs.push_back(piece.input);
     run_.add_input(options_.gripper_file);
     manifest.frame = options_.frame == libgtd::MapFrame::terrain ? "terrain" : "input";

@@ -63,7 +63,8 @@ void bind(libmap::ParameterTable& table, SheetOptions& options) {
 libmap::ColorImage read_picture(const std::string& file) {
   constexpr std::uint64_t max_file_bytes = std::uint64_t{1} << 30;
   try {
-    return libmap::decode_color(libmap::read_whole_file(file, max_file_bytes));
+    return libmap::decode_color(libmap::read_whole_file(file, max_file_bytes),
+                                libmap::max_picture_pixels);
   } catch (const libmap::Error& error) {
     throw error.in_file(file);
   }

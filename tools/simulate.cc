@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "libmap/core/text.h"
+#include "tools/standard_output.h"
 
 namespace {
 
@@ -43,7 +44,7 @@ int main(int argc, char** argv) {
   const std::string what = argc > 1 ? argv[1] : "";
   if (what == "--help" || what == "-h") {
     print_help();
-    return 0;
+    return graspmap_tools::exit_code_of_printing("graspmap simulate");
   }
   std::vector<std::string> names;
   for (const Entry& entry : entries) {

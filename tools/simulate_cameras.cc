@@ -64,7 +64,7 @@ libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
     constexpr double largest = 65534;
     if (camera.far_m / camera.depth_scale_m > largest)
       throw libmap::Error("16-bit images cannot hold what this camera measures",
-                          {.file = {},
+                          {.file = file.string(),
                            .field = "depth_scale_m of " + camera.name,
                            .value = libmap::to_text(camera.depth_scale_m),
                            .bound = ">= far_m / 65534, " +

@@ -13,6 +13,7 @@
 #include "libmap/simulate/scan_simulation.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
+#include "tools/result_counts.h"
 #include "tools/simulate_commands.h"
 
 namespace {
@@ -54,9 +55,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {
   libmap::Manifest& manifest = run.manifest();
-  const auto count = [&](const char* name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   count("frames", result.graph.nodes.size());
   count("links", result.graph.links.size());
   count("closures", result.graph.links.size() + 1 - result.graph.nodes.size());

@@ -60,10 +60,14 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
   const libmap::RockSite site = load(options, file);
   run.add_input(file);
   run.manifest().frame = "site";
-  const libmap::TriangleMesh mesh =
-      run.timed("meshing", [&] { return libmap::site_mesh(site, options.meshing); });
-  const auto points =
-      run.timed("field points", [&] { return libmap::choose_field_points(site, mesh); });
+  libmap::TriangleMesh mesh;
+  std::vector<libmap::FieldPoint> points;
+  try {
+    mesh = run.timed("meshing", [&] { return libmap::site_mesh(site, options.meshing); });
+    points = run.timed("field points", [&] { return libmap::choose_field_points(site, mesh); });
+  } catch (const libmap::Error& error) {
+    throw error.in_file(file.string());
+  }
   run.manifest().results.emplace_back("rocks", static_cast<std::int64_t>(site.rocks.size()));
   run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
   run.manifest().results.emplace_back("triangles",

@@ -15,6 +15,7 @@
 #include "libmap/scan/scan_source.h"
 #include "tools/command_line.h"
 #include "tools/map_frame.h"
+#include "tools/result_counts.h"
 #include "tools/scan_poses.h"
 
 namespace {
@@ -51,8 +52,7 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
 
 bool in_true_frame(const TextureCommandOptions& options) {
   if (options.frame != MeshFrame::automatic) return options.frame == MeshFrame::ground_truth;
-  const auto manifest = libmap::read_manifest_of(options.mesh);
-  return manifest && manifest->frame == "ground truth";
+  return graspmap_tools::is_from_true_frame(options.mesh);
 }
 
 // The poses in the frame of the mesh.
@@ -67,7 +67,7 @@ libmap::Trajectory poses_of(TextureCommandOptions& options, const libmap::ScanSo
   if (const auto site_from_map = graspmap_tools::site_from_map_of(options.mesh)) {
     mesh_from_poses = *site_from_map * mesh_from_poses;
     run.manifest().frame = "site";
-    graspmap_tools::carry_site_transform(options.mesh, run);
+    run.manifest().transforms.emplace_back(graspmap_tools::site_from_map_name, *site_from_map);
     run.say("poses are carried into the site's frame");
   }
   for (libmap::TrajectoryPose& pose : poses)
@@ -89,9 +89,7 @@ libmap::TextureResult textured(const TextureCommandOptions& options, const libma
 }
 
 void add_results(const libmap::TextureResult& result, libmap::Manifest& manifest) {
-  const auto count = [&](const char* name, std::size_t value) {
-    manifest.results.emplace_back(name, static_cast<std::int64_t>(value));
-  };
+  const graspmap_tools::ResultCounts count(manifest);
   const auto number = [&](const char* name, double value) {
     manifest.results.emplace_back(name, value);
   };
@@ -134,6 +132,9 @@ void say_result(const libmap::TextureResult& result, Run& run) {
       result.photos, result.charts, result.model.pages.size(),
       result.model.pages.size() == 1 ? "" : "s", 1e3 * result.texel_size_m, result.unseen_triangles,
       result.model.mesh.triangles.size(), result.unseen_m2));
+  // More than what lies behind the rocks: the poses are of another frame, or see another part.
+  if (5 * result.unseen_triangles > result.model.mesh.triangles.size())
+    run.warn("a fifth of the triangles or more is seen by no photograph: see --frame and --poses");
   if (result.split_charts > 0)
     run.say(fmt::format("{} charts larger than a page were cut", result.split_charts));
   if (result.shrunk_charts > 0)

@@ -45,13 +45,6 @@ Confusion confusion_of(std::span<const std::uint8_t> judged,
       sum_of);
 }
 
-Confusion transposed(const Confusion& counts) {
-  return {.true_positives = counts.true_positives,
-          .false_positives = counts.false_negatives,
-          .true_negatives = counts.true_negatives,
-          .false_negatives = counts.false_positives};
-}
-
 std::optional<Kappa> cohens_kappa(const Confusion& counts) {
   const Rate judged_yes{counts.predicted_positives(), counts.size()};
   const Rate reference_yes{counts.positives(), counts.size()};

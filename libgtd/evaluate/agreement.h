@@ -15,15 +15,12 @@ namespace libgtd {
 Confusion confusion_of(std::span<const std::uint8_t> judged,
                        std::span<const std::uint8_t> reference);
 
-// Of a table with judged and reference changed for each other.
-Confusion transposed(const Confusion& counts);
-
 // Cohen's kappa: 1 all agree, 0 as many as chance gives, negative fewer.
 struct Kappa {
   double value = 0.0;
-  // Of the estimate, for large samples; 0 where all agree or one says the same
-  // everywhere. It takes places for independent:
-  // neighbouring voxels of a map are not, and their kappa is less certain than it says.
+  // Of the estimate, for large samples; 0 where all agree or one says the same everywhere. It takes
+  // places for independent: neighbouring voxels of a map are not, and their kappa is less certain
+  // than it says.
   double standard_error = 0.0;
   Interval normal_95;  // value -+ 1.96 standard errors, within -1..1
 };

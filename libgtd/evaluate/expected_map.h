@@ -24,6 +24,7 @@ struct ExpectedRegion {
   std::optional<bool> graspable;  // nothing: undecided
   std::string why;
 
+  // Whether the point lies within radius_m of the line from `from` to `to`.
   bool contains(const Eigen::Vector3d& point) const;
 };
 

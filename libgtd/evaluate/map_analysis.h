@@ -43,7 +43,7 @@ struct GroundBin {
   double score_sum = 0.0;
 
   std::optional<double> graspable_share() const;  // of the area
-  std::optional<double> mean_score() const;
+  std::optional<double> mean_score() const;       // of its judged voxels; nothing if there is none
 };
 
 struct MapAnalysis {

@@ -40,6 +40,7 @@ struct VoxelPair {
   std::uint32_t other = 0;
 };
 
+// Of a pair of voxels by whether each can be held.
 ChangeClass class_of(const VoxelMap& map, const VoxelMap& other, const VoxelPair& pair);
 
 // Of the scores of OTHER less those of MAP, over pairs that both have a score.

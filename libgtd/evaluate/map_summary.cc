@@ -71,8 +71,9 @@ std::vector<double> quantiles_of(std::vector<double> values) {
 void add_quantiles(const std::string& prefix, const std::vector<double>& values, Row& row) {
   for (std::size_t q = 0; q < summary_quantiles.size(); ++q) {
     const std::string percent = libmap::to_fixed_text(100.0 * summary_quantiles[q], 0);
-    row.add(prefix + "_p" + (percent.size() < 2 ? "0" : "") + percent,
-            values.empty() ? std::nullopt : std::optional(values[q]));
+    std::string name = prefix + (percent.size() < 2 ? "_p0" : "_p");
+    name += percent;
+    row.add(name, values.empty() ? std::nullopt : std::optional(values[q]));
   }
 }
 
@@ -186,6 +187,7 @@ libmap::Table summary_table(const std::vector<SummarizedMap>& maps) {
   const bool with_expected = std::any_of(
       maps.begin(), maps.end(), [](const SummarizedMap& map) { return map.expected.has_value(); });
   std::vector<Row> rows;
+  rows.reserve(maps.size());
   for (const SummarizedMap& map : maps) rows.push_back(row_of(map, with_expected));
   return table_of(rows);
 }

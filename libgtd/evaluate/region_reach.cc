@@ -186,6 +186,7 @@ std::vector<RegionLink> spanning_links(const Graph& graph) {
       graph, std::back_inserter(kept),
       boost::weight_map(boost::get(&RegionLink::distance_m, graph)));
   std::vector<RegionLink> links;
+  links.reserve(kept.size());
   for (const Graph::edge_descriptor& edge : kept) links.push_back(graph[edge]);
   return links;
 }

@@ -39,7 +39,7 @@ struct Rate {
   std::size_t count = 0;
   std::size_t total = 0;
 
-  std::optional<double> value() const;
+  std::optional<double> value() const;        // count / total; nothing where total is 0
   std::optional<Interval> wilson_95() const;  // score interval without continuity correction
                                               // (Wilson 1927)
 };

@@ -58,6 +58,7 @@ libmap::Table accuracy_table(const TableEvaluation& evaluation);
 // Everything but the ROC points. Undefined values are null.
 std::string to_json(const TableEvaluation& evaluation);
 
+// The summary as a page: areas with their intervals, rates at the cutoff, and what was left out.
 std::string to_markdown(const TableEvaluation& evaluation, const std::string& title);
 
 }  // namespace libgtd

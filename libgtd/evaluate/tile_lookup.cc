@@ -6,6 +6,7 @@
 #include <tuple>
 #include <utility>
 
+#include "libgtd/terrain/voxel_fields.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 
@@ -36,10 +37,7 @@ const std::vector<double>& field_of(const libmap::PointCloud& tile, const char* 
 class TilePoints {
  public:
   explicit TilePoints(libmap::PointCloud tile)
-      : tile_(std::move(tile)),
-        i_(field_of(tile_, "i")),
-        j_(field_of(tile_, "j")),
-        k_(field_of(tile_, "k")) {
+      : tile_(std::move(tile)), voxels_(VoxelFields(tile_).all()) {
     if (tile_.empty()) throw libmap::Error("a tile has no points");
     first_i_ = voxel(0).i;
     rows_.assign(1, 0);
@@ -58,9 +56,7 @@ class TilePoints {
   TilePoints& operator=(const TilePoints&) = delete;
 
   const libmap::PointCloud& cloud() const { return tile_; }
-  Voxel voxel(std::size_t n) const {
-    return {static_cast<int>(i_[n]), static_cast<int>(j_[n]), static_cast<int>(k_[n])};
-  }
+  const Voxel& voxel(std::size_t n) const { return voxels_[n]; }
   std::vector<double> values(std::size_t n) const {
     std::vector<double> values;
     for (const libmap::ScalarField& field : tile_.fields) values.push_back(field.values[n]);
@@ -77,13 +73,13 @@ class TilePoints {
     for (std::int64_t r = std::max<std::int64_t>(0, row - reach);
          r <= std::min(last_row, row + reach); ++r) {
       const auto begin =
-          j_.begin() + static_cast<std::ptrdiff_t>(rows_[static_cast<std::size_t>(r)]);
+          voxels_.begin() + static_cast<std::ptrdiff_t>(rows_[static_cast<std::size_t>(r)]);
       const auto end =
-          j_.begin() + static_cast<std::ptrdiff_t>(rows_[static_cast<std::size_t>(r) + 1]);
-      const auto low = static_cast<double>(middle.j - reach);
-      const auto high = static_cast<double>(middle.j + reach);
-      for (auto at = std::lower_bound(begin, end, low); at != end && *at <= high; ++at) {
-        visit(static_cast<std::size_t>(at - j_.begin()));
+          voxels_.begin() + static_cast<std::ptrdiff_t>(rows_[static_cast<std::size_t>(r) + 1]);
+      auto at = std::lower_bound(begin, end, middle.j - reach,
+                                 [](const Voxel& voxel, std::int64_t j) { return voxel.j < j; });
+      for (; at != end && at->j <= middle.j + reach; ++at) {
+        visit(static_cast<std::size_t>(at - voxels_.begin()));
         ++visited;
       }
     }
@@ -92,9 +88,7 @@ class TilePoints {
 
  private:
   libmap::PointCloud tile_;
-  const std::vector<double>& i_;
-  const std::vector<double>& j_;
-  const std::vector<double>& k_;
+  std::vector<Voxel> voxels_;
   int first_i_ = 0;
   std::vector<std::size_t> rows_;  // where each i begins, and the end
 };

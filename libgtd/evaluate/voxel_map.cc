@@ -5,6 +5,7 @@
 #include <numeric>
 #include <string>
 
+#include "libgtd/terrain/voxel_fields.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 
@@ -30,23 +31,12 @@ const std::vector<double>* optional_values(const PointCloud& map, const char* na
   return field == nullptr ? nullptr : &field->values;
 }
 
-int index_of(double value, const char* name) {
-  if (!(std::abs(value) <= index_bound) || value != std::floor(value))
-    throw libmap::Error(
-        "no index of a voxel",
-        {.field = name, .value = libmap::to_text(value), .bound = "a whole number within +-2^29"});
-  return static_cast<int>(value);
-}
-
 // Of the points `kept`, by the fields i, j and k.
 std::vector<Voxel> voxels_of_fields(const PointCloud& map, const std::vector<std::uint32_t>& kept) {
-  const std::vector<double>& i = values_of(map, "i");
-  const std::vector<double>& j = values_of(map, "j");
-  const std::vector<double>& k = values_of(map, "k");
+  const VoxelFields fields(map);
   std::vector<Voxel> voxels;
   voxels.reserve(kept.size());
-  for (const std::uint32_t n : kept)
-    voxels.push_back({index_of(i[n], "i"), index_of(j[n], "j"), index_of(k[n], "k")});
+  for (const std::uint32_t n : kept) voxels.push_back(fields.at(n));
   return voxels;
 }
 
@@ -167,13 +157,6 @@ MapFacts facts_of(const libmap::Manifest& manifest) {
       pose != nullptr && manifest.frame == "input")
     facts.terrain_from_map = *pose;
   return facts;
-}
-
-std::size_t VoxelMap::find(const Voxel& voxel) const {
-  const auto place = std::lower_bound(voxels.begin(), voxels.end(), voxel);
-  return place == voxels.end() || *place != voxel
-             ? size()
-             : static_cast<std::size_t>(place - voxels.begin());
 }
 
 VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {

@@ -47,8 +47,6 @@ struct VoxelMap {
   bool judged(std::size_t n, bool edges) const {
     return scores[n] == scores[n] && above_zero_plane(n) && (edges || edge[n] == 0);
   }
-  // The entry of a voxel, or size().
-  std::size_t find(const Voxel& voxel) const;
 };
 
 // Needs the fields "score" and "graspable", and voxels: the fields i, j and k, or a known lattice.

@@ -15,6 +15,7 @@ namespace libgtd {
 Gripper read_gripper(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& overrides = {});
 
+// The same of the text of such a file, called `file` in errors.
 Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides = {});
 

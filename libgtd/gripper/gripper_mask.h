@@ -19,7 +19,7 @@ namespace libgtd {
 enum class Method { thesis, envelope, climblab, corrected };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
-std::string name_of(Method method);
+std::string name_of(Method method);  // its name, as flags and files have it
 
 struct GripperMaskOptions {
   Method method = Method::corrected;

@@ -35,8 +35,8 @@ struct BitLoops {
                    std::size_t length, std::uint32_t* totals);
 };
 
-bool has_path(BitPath path);  // whether this processor can run it
-BitPath best_path();
-const BitLoops& loops_of(BitPath path);
+bool has_path(BitPath path);             // whether this processor can run it
+BitPath best_path();                     // the fastest that it can
+const BitLoops& loops_of(BitPath path);  // its loops; only where has_path(path)
 
 }  // namespace libgtd

@@ -7,6 +7,7 @@
 
 namespace libgtd::loops {
 
+// BitLoops::lower: all columns of the window sink by `distance` layers.
 __attribute__((always_inline)) inline void lower(std::uint16_t* planes, std::size_t plane_count,
                                                  std::size_t columns, unsigned distance) {
   for (std::size_t p = 0; p + 1 < plane_count; ++p) {
@@ -19,6 +20,7 @@ __attribute__((always_inline)) inline void lower(std::uint16_t* planes, std::siz
   for (std::size_t n = 0; n < columns; ++n) top[n] = static_cast<std::uint16_t>(top[n] >> distance);
 }
 
+// BitLoops::slide: running sums of columns, one step on.
 __attribute__((always_inline)) inline void slide(std::uint16_t* sums, const std::uint16_t* entering,
                                                  const std::uint16_t* leaving, std::size_t count) {
   for (std::size_t n = 0; n < count; ++n)

@@ -1,6 +1,6 @@
 #include "libgtd/score/bit_count_x86.h"
 
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
 
 #include <immintrin.h>
 

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
+#include "libgtd/terrain/voxel_fields.h"
 #include "libmap/core/error.h"
 #include "libmap/core/score_color.h"
 
@@ -15,6 +16,7 @@ using libmap::ScalarField;
 using libmap::ScalarType;
 
 constexpr const char* obstacle_field = "obstacle";
+constexpr const char* slope_field = "slope_deg";
 
 template <typename Value>
 void add_values(PointCloud& cloud, const char* name, ScalarType type,
@@ -22,13 +24,6 @@ void add_values(PointCloud& cloud, const char* name, ScalarType type,
   ScalarField& field = cloud.add_field(name, type);
   for (std::size_t n = 0; n < voxels.size(); ++n)
     field.values[n] = static_cast<double>(value(voxels[n]));
-}
-
-const std::vector<double>& index_values(const PointCloud& cloud, const char* name) {
-  const ScalarField* field = cloud.find_field(name);
-  if (field == nullptr)
-    throw libmap::Error("not a graspability map: it has no such field", {.field = name});
-  return field->values;
 }
 
 void append(PointCloud& whole, const PointCloud& part) {
@@ -94,14 +89,12 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
 }
 
 std::size_t add_obstacles(PointCloud& map, double voxel_size_m, const ObstacleOptions& options) {
-  const auto index = [&](const char* name) { return index_values(map, name); };
-  const std::vector<double> i = index("i"), j = index("j"), k = index("k");
-  const std::vector<double> slopes = index("slope_deg");
-  std::vector<Voxel> voxels;
-  for (std::size_t n = 0; n < map.size(); ++n)
-    voxels.push_back({static_cast<int>(i[n]), static_cast<int>(j[n]), static_cast<int>(k[n])});
+  const ScalarField* slopes = map.find_field(slope_field);
+  if (slopes == nullptr)
+    throw libmap::Error("not a map with slopes: it has no such field", {.field = slope_field});
   const std::vector<Obstacle> obstacles = find_obstacles(
-      voxels, std::vector<float>(slopes.begin(), slopes.end()), voxel_size_m, options);
+      VoxelFields(map).all(), std::vector<float>(slopes->values.begin(), slopes->values.end()),
+      voxel_size_m, options);
   ScalarField& field = map.add_field(obstacle_field, ScalarType::uint8);
   std::size_t count = 0;
   for (std::size_t n = 0; n < map.size(); ++n) {
@@ -119,21 +112,18 @@ PointCloud merge_map_clouds(const std::vector<PointCloud>& parts) {
     else
       append(whole, parts[n]);
   }
-  const std::vector<double>& i = index_values(whole, "i");
-  const std::vector<double>& j = index_values(whole, "j");
-  const std::vector<double>& k = index_values(whole, "k");
-  const auto key = [&](std::size_t n) { return std::array{i[n], j[n], k[n]}; };
+  const std::vector<Voxel> voxels = VoxelFields(whole).all();
   std::vector<std::size_t> order(whole.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::sort(order.begin(), order.end(),
-            [&](std::size_t a, std::size_t b) { return key(a) < key(b); });
+            [&](std::size_t a, std::size_t b) { return voxels[a] < voxels[b]; });
   for (std::size_t n = 1; n < order.size(); ++n)
-    if (key(order[n - 1]) == key(order[n]))
+    if (voxels[order[n - 1]] == voxels[order[n]])
       throw libmap::Error(
           "two parts hold the same voxel",
           {.field = "i, j, k",
-           .value = libmap::to_text(i[order[n]]) + ", " + libmap::to_text(j[order[n]]) + ", " +
-                    libmap::to_text(k[order[n]])});
+           .value = std::to_string(voxels[order[n]].i) + ", " + std::to_string(voxels[order[n]].j) +
+                    ", " + std::to_string(voxels[order[n]].k)});
   return libmap::select_points(whole, order);
 }
 

@@ -1,54 +1,40 @@
 #include "libgtd/score/map_thinning.h"
 
 #include <algorithm>
-#include <array>
+#include <cstdint>
 #include <cstdlib>
-#include <utility>
 #include <vector>
 
-#include "libmap/core/error.h"
+#include "libgtd/terrain/voxel_fields.h"
 
 namespace libgtd {
 
 namespace {
 
-std::array<const std::vector<double>*, 3> voxels_of(const libmap::PointCloud& map) {
-  std::array<const std::vector<double>*, 3> values{};
-  const std::array<const char*, 3> names = {"i", "j", "k"};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    const libmap::ScalarField* field = map.find_field(names[axis]);
-    if (field == nullptr)
-      throw libmap::Error("not a graspability map: it has no such field", {.field = names[axis]});
-    values[axis] = &field->values;
-  }
-  return values;
-}
-
 // Twice the distance of a column from its square's middle, along one axis.
-int off_middle(int column, int square, int width) {
-  return std::abs(2 * (column - square * width) - (width - 1));
+std::int64_t off_middle(int column, int square, int width) {
+  return std::abs(2 * (column - std::int64_t{square} * width) - (width - 1));
 }
 
 // The point nearest the middle of each square of columns, or of each cube, the highest of equals.
 libmap::PointCloud thin(const libmap::PointCloud& map, int width, bool by_layers) {
-  const auto [i, j, k] = voxels_of(map);
+  const VoxelFields voxels(map);
   struct Candidate {
     TileNumber square;
     int layer = 0;
-    int off_middle = 0;
+    std::int64_t off_middle = 0;
     int below_top = 0;
     std::size_t point = 0;
     auto operator<=>(const Candidate&) const = default;
   };
   std::vector<Candidate> candidates(map.size());
   for (std::size_t n = 0; n < map.size(); ++n) {
-    const Voxel voxel{static_cast<int>((*i)[n]), static_cast<int>((*j)[n]),
-                      static_cast<int>((*k)[n])};
+    const Voxel voxel = voxels.at(n);
     const TileNumber square = tile_of(voxel, width);
     const int layer = by_layers ? tile_of({voxel.k, 0, 0}, width).i : 0;
-    const int x = off_middle(voxel.i, square.i, width);
-    const int y = off_middle(voxel.j, square.j, width);
-    const int z = by_layers ? off_middle(voxel.k, layer, width) : 0;
+    const std::int64_t x = off_middle(voxel.i, square.i, width);
+    const std::int64_t y = off_middle(voxel.j, square.j, width);
+    const std::int64_t z = by_layers ? off_middle(voxel.k, layer, width) : 0;
     candidates[n] = {square, layer, x * x + y * y + z * z, -voxel.k, n};
   }
   std::sort(candidates.begin(), candidates.end());
@@ -71,14 +57,13 @@ libmap::PointCloud thin_map_in_cubes(const libmap::PointCloud& map, int width) {
 }
 
 void center_in_squares(const TileStoreIndex& index, int width, libmap::PointCloud& map) {
-  const auto [i, j, k] = voxels_of(map);
+  const VoxelFields voxels(map);
   const libmap::Pose terrain_from_map = index.frame == MapFrame::input
                                             ? index.terrain_from_input()
                                             : libmap::Pose(libmap::Pose::Identity());
   const libmap::Pose map_from_terrain = terrain_from_map.inverse();
   for (std::size_t n = 0; n < map.size(); ++n) {
-    const Voxel voxel{static_cast<int>((*i)[n]), static_cast<int>((*j)[n]),
-                      static_cast<int>((*k)[n])};
+    const Voxel voxel = voxels.at(n);
     const TileNumber square = tile_of(voxel, width);
     const Eigen::Vector3d cell(width * (square.i + 0.5), width * (square.j + 0.5), voxel.k + 0.5);
     map.positions[n] =

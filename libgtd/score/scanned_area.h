@@ -16,7 +16,7 @@ inline constexpr int scan_gap_voxels = 3;
 // Columns as a summed-area table (Crow 1984): how many columns of a rectangle are set.
 class ColumnSums {
  public:
-  explicit ColumnSums(const TileBounds& bounds);
+  explicit ColumnSums(const TileBounds& bounds);  // no column is set
 
   const TileBounds& bounds() const { return bounds_; }
   void set(int i, int j) { sums_[at(i + 1, j + 1)] = 1; }
@@ -36,7 +36,9 @@ class ColumnSums {
   std::vector<std::uint32_t> sums_;
 };
 
+// The rectangle with `below` columns more at its low sides and `above` at its high ones.
 TileBounds grown(const TileBounds& bounds, int below, int above);
+// The columns from i - below to i + above, and the same of j.
 TileBounds columns_around(int i, int j, int below, int above);
 
 // The columns of `bounds` that are not in the closing (morphological, by a square of

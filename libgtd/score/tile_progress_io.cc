@@ -5,12 +5,14 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <fstream>
 #include <sstream>
 #include <utility>
 
 #include "libgtd/score/tile_store_json.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/json_input.h"
 
 namespace libgtd {
 
@@ -46,10 +48,10 @@ TerrainPiece piece_from(const Json& json) {
   TerrainPiece piece;
   piece.input.path = json.at("path").get<std::string>();
   piece.input.sha256 = json.at("sha256").get<std::string>();
-  piece.input.bytes = json.at("bytes").get<std::uint64_t>();
-  piece.modified_ns = json.at("modified_ns").get<std::int64_t>();
-  piece.points = json.at("points").get<std::uint64_t>();
-  piece.dropped_points = json.at("dropped_points").get<std::uint64_t>();
+  piece.input.bytes = libmap::integer_at<std::uint64_t>(json, "bytes");
+  piece.modified_ns = libmap::integer_at<std::int64_t>(json, "modified_ns");
+  piece.points = libmap::integer_at<std::uint64_t>(json, "points");
+  piece.dropped_points = libmap::integer_at<std::uint64_t>(json, "dropped_points");
   piece.box.min = vector_from(json.at("min"));
   piece.box.max = vector_from(json.at("max"));
   return piece;
@@ -73,9 +75,9 @@ void read_journal(const fs::path& path, const TilePlan& plan,
                   std::map<TileNumber, StoredTile>& done) {
   std::istringstream lines(libmap::read_whole_file(path, max_file_bytes));
   for (std::string line; std::getline(lines, line);) {
-    const Json json = Json::parse(line, nullptr, false);
-    if (!json.is_object() || json.value("key", "") != plan.key) continue;
     try {
+      const auto json = libmap::parse_json<Json>(line);
+      if (json.at("key") != plan.key) continue;
       const StoredTile tile = tile_from(json, plan.index.tile_voxels);
       done[tile.number] = tile;
     } catch (const nlohmann::json::exception&) {
@@ -95,6 +97,14 @@ void append_whole(int file, const std::string& text, const fs::path& path) {
     done += static_cast<std::size_t>(written);
   }
   if (fsync(file) != 0) throw libmap::system_failure(path, "cannot be synced", errno);
+}
+
+// Not so where a killed run left a line half written.
+bool ends_in_a_line(const fs::path& path) {
+  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  if (file.tellg() <= 0) return true;
+  file.seekg(-1, std::ios::end);
+  return file.get() == '\n';
 }
 
 void make_folder(const fs::path& folder) {
@@ -185,8 +195,7 @@ void TileProgress::clear() const {
   // What says that tiles are done goes first.
   fs::remove(store_ / "index.json");
   fs::remove(plan_path(store_));
-  for (const fs::directory_entry& entry : fs::directory_iterator(store_ / "progress"))
-    if (entry.path().extension() == ".jsonl") fs::remove(entry.path());
+  for (const fs::path& path : journals()) fs::remove(path);
   fs::remove_all(store_ / "tiles");
   make_folder(store_ / "tiles");
 }
@@ -195,14 +204,25 @@ libmap::FileLock TileProgress::lock() const {
   return libmap::FileLock(store_ / "progress" / "lock");
 }
 
+void TileProgress::require_idle() const {
+  for (const fs::path& path : journals())
+    if (!libmap::FileLock::try_lock(path))
+      throw libmap::Error("another process is writing it", {.file = store_.string()},
+                          libmap::ErrorKind::failed);
+}
+
+std::vector<fs::path> TileProgress::journals() const {
+  std::vector<fs::path> paths;
+  for (const fs::directory_entry& entry : fs::directory_iterator(store_ / "progress"))
+    if (entry.path().extension() == ".jsonl") paths.push_back(entry.path());
+  std::sort(paths.begin(), paths.end());
+  return paths;
+}
+
 std::map<TileNumber, StoredTile> TileProgress::done(const TilePlan& plan) const {
   std::map<TileNumber, StoredTile> done;
   for (const StoredTile& tile : plan.kept) done[tile.number] = tile;
-  std::vector<fs::path> journals;
-  for (const fs::directory_entry& entry : fs::directory_iterator(store_ / "progress"))
-    if (entry.path().extension() == ".jsonl") journals.push_back(entry.path());
-  std::sort(journals.begin(), journals.end());
-  for (const fs::path& path : journals) read_journal(path, plan, done);
+  for (const fs::path& path : journals()) read_journal(path, plan, done);
   return done;
 }
 
@@ -237,8 +257,7 @@ TileJournal::TileJournal(const fs::path& store, const TileShare& share, std::str
                         {.file = store.string()}, libmap::ErrorKind::failed);
   file_ = open(path_.c_str(), O_WRONLY | O_APPEND | O_CLOEXEC);
   if (file_ < 0) throw libmap::system_failure(path_, "cannot be written", errno);
-  // After a line that a killed run left half written.
-  if (fs::file_size(path_) > 0) append_whole(file_, "\n", path_);
+  if (!ends_in_a_line(path_)) append_whole(file_, "\n", path_);
 }
 
 TileJournal::~TileJournal() {

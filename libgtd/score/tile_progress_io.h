@@ -48,6 +48,7 @@ std::string key_of(const libmap::Manifest& manifest);
 
 class TileProgress {
  public:
+  // `store` is NAME.tiles; nothing is read or made yet.
   explicit TileProgress(std::filesystem::path store);
   // Makes the folder and its sub-folders where they are missing. Throws Error if something else is
   // there.
@@ -64,6 +65,9 @@ class TileProgress {
 
   // Waits for its turn.
   libmap::FileLock lock() const;
+
+  // Throws Error (failed) if a process works on a share; the caller holds the lock.
+  void require_idle() const;
 
   // Every tile that is done, whoever did it.
   std::map<TileNumber, StoredTile> done(const TilePlan& plan) const;
@@ -82,13 +86,16 @@ class TileProgress {
   const std::filesystem::path& store() const { return store_; }
 
  private:
+  std::vector<std::filesystem::path> journals() const;
+
   std::filesystem::path store_;
 };
 
 // The journal of one share, held by one process at a time.
 class TileJournal {
  public:
-  // Throws Error (failed) if another process works on this share.
+  // Throws Error (failed) if another process works on this share. Whoever may make a new plan must
+  // not come between the plan and this: the caller holds the lock of both.
   TileJournal(const std::filesystem::path& store, const TileShare& share, std::string key);
   ~TileJournal();
   TileJournal(const TileJournal&) = delete;

@@ -1,9 +1,8 @@
 #include "libgtd/score/tile_store.h"
 
 #include <algorithm>
-#include <array>
 
-#include "libmap/core/error.h"
+#include "libgtd/terrain/voxel_fields.h"
 
 namespace libgtd {
 
@@ -39,17 +38,10 @@ std::uint64_t TileStoreIndex::voxels() const {
 }
 
 void restore_positions(const TileStoreIndex& index, libmap::PointCloud& tile) {
-  const std::array<const libmap::ScalarField*, 3> fields = {
-      tile.find_field("i"), tile.find_field("j"), tile.find_field("k")};
-  for (const libmap::ScalarField* field : fields)
-    if (field == nullptr)
-      throw libmap::Error("is no tile of a map: the fields i, j and k are not all there");
+  const VoxelFields voxels(tile);
   const libmap::Pose input_from_terrain = index.terrain_from_input().inverse();
   for (std::size_t n = 0; n < tile.size(); ++n) {
-    const Voxel voxel{static_cast<int>(fields[0]->values[n]),
-                      static_cast<int>(fields[1]->values[n]),
-                      static_cast<int>(fields[2]->values[n])};
-    const Eigen::Vector3d center = index.lattice.center_of(voxel);
+    const Eigen::Vector3d center = index.lattice.center_of(voxels.at(n));
     tile.positions[n] = index.frame == MapFrame::input ? input_from_terrain * center : center;
   }
 }

@@ -1,8 +1,9 @@
 #include "libgtd/score/tile_store_json.h"
 
-#include <array>
 #include <cmath>
 #include <cstdint>
+
+#include "libmap/core/json_input.h"
 
 namespace libgtd {
 
@@ -12,8 +13,10 @@ constexpr const char* format_name = "graspmap tile store";
 constexpr int format_version = 1;
 
 Voxel voxel_from(const Json& json) {
-  const auto numbers = json.get<std::array<int, 3>>();
-  return {numbers[0], numbers[1], numbers[2]};
+  const auto at = [&](std::size_t axis) {
+    return libmap::integer_of<int>(json.at(axis), "a voxel's index");
+  };
+  return {at(0), at(1), at(2)};
 }
 
 void require(bool holds, const std::string& field, const std::string& value,
@@ -56,16 +59,19 @@ Json json_of(const StoredTile& tile) {
 
 StoredTile tile_from(const Json& json, int tile_voxels) {
   StoredTile tile;
-  tile.number = {json.at("i").get<int>(), json.at("j").get<int>()};
+  tile.number = {libmap::integer_at<int>(json, "i"), libmap::integer_at<int>(json, "j")};
   tile.min = voxel_from(json.at("min"));
   tile.max = voxel_from(json.at("max"));
-  tile.voxels = json.at("voxels").get<std::uint64_t>();
-  tile.occupied_voxels = json.at("occupied_voxels").get<std::uint64_t>();
-  tile.edge_voxels = json.at("edge_voxels").get<std::uint64_t>();
-  tile.graspable_voxels = json.at("graspable_voxels").get<std::uint64_t>();
+  tile.voxels = libmap::integer_at<std::uint64_t>(json, "voxels");
+  tile.occupied_voxels = libmap::integer_at<std::uint64_t>(json, "occupied_voxels");
+  tile.edge_voxels = libmap::integer_at<std::uint64_t>(json, "edge_voxels");
+  tile.graspable_voxels = libmap::integer_at<std::uint64_t>(json, "graspable_voxels");
   tile.file = json.at("file").get<std::string>();
-  tile.bytes = json.at("bytes").get<std::uint64_t>();
+  tile.bytes = libmap::integer_at<std::uint64_t>(json, "bytes");
   tile.sha256 = json.at("sha256").get<std::string>();
+  for (const int number : {tile.number.i, tile.number.j})
+    require(std::abs(static_cast<double>(number) * tile_voxels) <= 0x1p30, "number of a tile",
+            std::to_string(number), "columns within +-2^30");
   if (tile.voxels == 0) return tile;
   const std::string name = std::to_string(tile.number.i) + ", " + std::to_string(tile.number.j);
   // 64 bits: the numbers may be anything.
@@ -113,7 +119,7 @@ TileStoreIndex index_from(const Json& json, const std::string& file) {
   index.lattice.voxel_size_m = json.at("lattice").at("voxel_size_m").get<double>();
   require(index.lattice.voxel_size_m > 0.0, "voxel_size_m",
           libmap::to_text(index.lattice.voxel_size_m), "> 0");
-  index.tile_voxels = json.at("tile_voxels").get<int>();
+  index.tile_voxels = libmap::integer_at<int>(json, "tile_voxels");
   require(index.tile_voxels >= 1 && index.tile_voxels <= 1 << 20, "tile_voxels",
           std::to_string(index.tile_voxels), "1 to 2^20");
   index.min = voxel_from(json.at("min"));

@@ -6,6 +6,7 @@
 
 #include "libgtd/score/tile_store.h"
 #include "libmap/core/error.h"
+#include "libmap/core/json_input.h"
 
 namespace libgtd {
 
@@ -29,9 +30,12 @@ template <typename Read>
 auto read_json(const std::string& text, const std::string& file, const char* what,
                const Read& read) {
   try {
-    return read(Json::parse(text));
+    return read(libmap::parse_json<Json>(text));
   } catch (const nlohmann::json::exception& error) {
-    throw libmap::Error(std::string("is no ") + what + ": " + error.what(), {.file = file});
+    // "[json.exception.KIND.NUMBER] REASON"
+    const std::string reason = error.what();
+    throw libmap::Error(std::string("is no ") + what + ": " + reason.substr(reason.find("] ") + 2),
+                        {.file = file});
   } catch (const libmap::Error& error) {
     throw error.in_file(file);
   }

@@ -1,6 +1,6 @@
 #include "libgtd/score/tilted_cells.h"
 
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
 #include <immintrin.h>
 #endif
 
@@ -16,7 +16,7 @@ namespace portable {
 constexpr TiltedLoops all = {find_cells, count_common};
 }  // namespace portable
 
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
 
 #pragma GCC push_options
 #pragma GCC target("avx2,popcnt")
@@ -76,7 +76,7 @@ constexpr TiltedLoops all = {find_cells, count_common};
 }  // namespace
 
 const TiltedLoops& tilted_loops_of([[maybe_unused]] BitPath path) {
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
   if (path == BitPath::avx512) return avx512::all;
   if (path == BitPath::avx2) return avx2::all;
 #endif

@@ -1,6 +1,6 @@
 #include "libgtd/shape/neighbor_loops.h"
 
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
 #include <immintrin.h>
 #endif
 
@@ -53,7 +53,7 @@ namespace portable {
 constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};
 }  // namespace portable
 
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
 
 #pragma GCC push_options
 #pragma GCC target("avx2")
@@ -137,7 +137,7 @@ constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};
 }  // namespace
 
 const NeighborLoops& neighbor_loops_of([[maybe_unused]] BitPath path) {
-#if defined(__x86_64__)
+#if defined(GRASPMAP_X86_LOOPS)
   if (path == BitPath::avx512) return avx512::all;
   if (path == BitPath::avx2) return avx2::all;
 #endif

@@ -27,11 +27,10 @@ constexpr std::size_t max_kept_neighbors = std::size_t{1} << 26;
 
 // Three numbers side by side, and a fourth for the register.
 using Quad [[gnu::vector_size(16)]] = float;
-using QuadOrder [[gnu::vector_size(16)]] = int;
 
 Quad quad(float x, float y, float z) { return Quad{x, y, z, 0.0F}; }
 // y, z, x: beside the numbers themselves, those that they are multiplied with for xy, yz, zx.
-Quad turned(const Quad& q) { return __builtin_shuffle(q, QuadOrder{1, 2, 0, 3}); }
+Quad turned(const Quad& q) { return __builtin_shufflevector(q, q, 1, 2, 0, 3); }
 
 // Sums of x, y, z, of their squares and of xy, yz, zx, each in the order in which it is added to.
 struct Sums {

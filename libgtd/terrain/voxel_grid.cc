@@ -113,10 +113,6 @@ SortedCells sort_by_cell(const std::vector<Cell>& cells) {
 
 }  // namespace
 
-double VoxelGrid::cells_in_box() const {
-  return (1.0 + max.i - min.i) * (1.0 + max.j - min.j) * (1.0 + max.k - min.k);
-}
-
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m) {
   require_voxel_size(voxel_size_m);
   VoxelGrid grid;

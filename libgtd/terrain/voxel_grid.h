@@ -17,8 +17,6 @@ struct VoxelGrid {
   std::vector<Voxel> voxels;  // occupied, ascending, each once
   Voxel min;                  // of the box of the grid; may be larger than that of the voxels
   Voxel max;
-
-  double cells_in_box() const;
 };
 
 // A rectangle of voxel columns, [begin, end) in i and j.

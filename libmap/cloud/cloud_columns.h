@@ -15,7 +15,7 @@
 
 namespace libmap {
 
-enum class NotFinite { drop, refuse };
+enum class NotFinite { drop, refuse };  // what becomes of points whose position is not finite
 
 struct CloudFromColumns {
   PointCloud cloud;

@@ -1,12 +1,13 @@
 #include "libmap/cloud/cloud_io.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
-#include <limits>
 #include <utility>
 
 #include "libmap/cloud/cloud_columns.h"
@@ -85,8 +86,10 @@ std::string format_of(const std::filesystem::path& path) {
 }
 
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path) {
-  auto bytes = std::make_shared<const std::string>(
-      read_whole_file(path, std::numeric_limits<std::uint64_t>::max()));
+  // More than the machine's memory would end the program, not the reading.
+  const auto memory = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+                      static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+  auto bytes = std::make_shared<const std::string>(read_whole_file(path, memory));
   if (bytes->empty()) throw Error("is empty", {.file = path.string()});
   return bytes;
 }

@@ -21,6 +21,7 @@ class CloudBlockReader {
   ~CloudBlockReader();
   CloudBlockReader(CloudBlockReader&&) noexcept;
 
+  // Of the file as its header says: no points; with normals; cloud_from_sensor.
   bool is_empty() const;
   bool has_normals() const;
   const Pose& viewpoint() const;
@@ -63,6 +64,7 @@ struct PieceFacts {
   std::size_t dropped_points = 0;
   Bounds3d box;
 };
+// Reads the whole piece once. Throws Error naming it if it cannot be read.
 PieceFacts survey_piece(const std::filesystem::path& piece);
 
 struct PiecesReadResult {

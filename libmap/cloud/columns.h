@@ -36,6 +36,8 @@ enum class StoredType {
   uint64
 };
 
+// A type in a file, the other way round (64-bit integers become doubles), and the bytes of a
+// number.
 StoredType stored_as(ScalarType type);
 ScalarType scalar_type_of(StoredType type);
 std::size_t size_of(StoredType type);
@@ -54,7 +56,7 @@ struct ColumnSet {
   std::vector<Column> columns;
   std::vector<std::shared_ptr<const void>> storage;  // keeps alive what the columns view
 
-  const Column* find(std::string_view name) const;
+  const Column* find(std::string_view name) const;  // the column of that name, or nullptr
   // A new column of `rows` numbers to be filled; the set owns them.
   double* add_numbers(std::string name, ScalarType type);
 };
@@ -90,31 +92,9 @@ std::size_t record_size(const std::vector<Column>& columns);
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                          char separator, std::string& out);
 
-// Lines of blank-separated words; empty lines are passed over.
-class TextRows {
- public:
-  // `line` is the number, from 1, of the line that begins at `position`.
-  TextRows(std::string_view text, std::size_t position, std::size_t line)
-      : text_(text), position_(position), line_(line) {}
-  // The next line's words, or false at the end.
-  bool next(std::vector<std::string_view>& words);
-  std::size_t line() const { return line_ - 1; }  // of the words given last
-  std::size_t remaining() const { return text_.size() - position_; }
-  // A word as a number that fits `type`. Throws Error naming field and line.
-  double number(std::string_view word, const std::string& field, ScalarType type) const;
-
- private:
-  std::string_view text_;
-  std::size_t position_;
-  std::size_t line_;
-};
-
-// Throws Error if `rows` lines of `words` words cannot stand in `bytes` bytes.
-void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
-                           const std::string& what);
-
 inline constexpr std::size_t rows_a_chunk = 16384;  // that one thread takes
 
+// body(row, value) for each row, in order; the numbers are stored as T.
 template <typename T, typename Body>
 void for_each_stored(const Column& column, std::size_t rows, const Body& body) {
   const std::byte* at = column.first;

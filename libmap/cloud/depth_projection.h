@@ -30,6 +30,7 @@ PixelRays pixel_rays(const Camera& camera);
 // The rays of each lens once. May be used from several threads.
 class PixelRayCache {
  public:
+  // Computed at the first call for this camera.
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera);
 
  private:

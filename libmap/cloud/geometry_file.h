@@ -10,6 +10,7 @@
 
 namespace libmap {
 
+// How the numbers of a file are stored; PLY knows the first two.
 enum class FileEncoding { ascii, binary, binary_compressed };
 
 struct FileField {

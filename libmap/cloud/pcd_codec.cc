@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "libmap/cloud/cloud_columns.h"
+#include "libmap/cloud/text_rows.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -39,11 +40,11 @@ struct PcdHeader {
 
 using HeaderLines = std::map<std::string, std::vector<std::string>, std::less<>>;
 
-Error bad_header(const std::string& reason, const std::string& key, const std::string& value = {},
+Error bad_header(const std::string& reason, const std::string& key, const std::string& text = {},
                  const std::string& bound = {}) {
   return Error(
       reason,
-      {.file = {}, .field = "header line " + key, .value = value.substr(0, 80), .bound = bound});
+      {.file = {}, .field = "header line " + key, .value = text.substr(0, 80), .bound = bound});
 }
 
 std::uint64_t header_count(const std::string& key, const std::string& word, std::uint64_t min) {

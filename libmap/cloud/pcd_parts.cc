@@ -1,5 +1,6 @@
 #include "libmap/cloud/pcd_parts.h"
 
+#include <cerrno>
 #include <sstream>
 #include <string>
 #include <utility>
@@ -7,6 +8,7 @@
 #include "libmap/cloud/cloud_columns.h"
 #include "libmap/cloud/pcd_codec.h"
 #include "libmap/core/error.h"
+#include "libmap/core/output_lock.h"
 
 namespace libmap {
 
@@ -35,13 +37,18 @@ void replace(std::string& text, const std::string& word, const std::string& by) 
 
 PcdPartsWriter::PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options)
     : path_(std::move(path)), options_(options), file_(path_, std::ios::binary | std::ios::trunc) {
-  write("");
+  require_good();
 }
 
-// An ofstream tells of a failed open or write by its state alone.
 void PcdPartsWriter::write(const std::string& bytes) {
   file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
-  if (!file_) throw Error("cannot be written", {.file = path_.string()}, ErrorKind::failed);
+  require_good();
+}
+
+// An ofstream tells of a failed open, write or close by its state alone; the system's call that
+// failed was the last one.
+void PcdPartsWriter::require_good() const {
+  if (!file_) throw system_failure(path_, "cannot be written", errno);
 }
 
 void PcdPartsWriter::append(const PointCloud& part) {
@@ -68,7 +75,7 @@ void PcdPartsWriter::finish() {
   if (written_ != options_.points)
     throw Error("holds fewer points than were promised", {.file = path_.string()});
   file_.close();
-  if (!file_) throw Error("cannot be written", {.file = path_.string()}, ErrorKind::failed);
+  require_good();
 }
 
 }  // namespace libmap

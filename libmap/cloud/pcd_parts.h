@@ -30,6 +30,7 @@ class PcdPartsWriter {
 
  private:
   void write(const std::string& bytes);
+  void require_good() const;
 
   std::filesystem::path path_;
   PcdPartsOptions options_;

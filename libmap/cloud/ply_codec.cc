@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "libmap/cloud/ply_header.h"
+#include "libmap/cloud/text_rows.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 

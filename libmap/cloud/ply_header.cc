@@ -6,6 +6,7 @@
 #include <map>
 #include <utility>
 
+#include "libmap/cloud/text_rows.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 

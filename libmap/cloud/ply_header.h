@@ -24,7 +24,7 @@ struct PlyElement {
   std::uint64_t count = 0;
   std::vector<PlyProperty> properties;
 
-  bool has_lists() const;
+  bool has_lists() const;  // whether a row's length depends on its content
   // Bytes of a row in a binary file, the least if it has lists.
   std::size_t record_bytes() const;
 };
@@ -38,7 +38,7 @@ struct PlyHeader {
   std::size_t data_begin = 0;
   std::size_t data_line = 1;
 
-  const PlyElement* find(std::string_view name) const;
+  const PlyElement* find(std::string_view name) const;  // the element of that name, or nullptr
 };
 
 // Throws Error (without the file's name) naming the line.

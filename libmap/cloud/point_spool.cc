@@ -63,6 +63,9 @@ PointSpool::PointSpool(std::filesystem::path folder, const PointSpoolOptions& op
     : folder_(std::move(folder)),
       options_(options),
       record_bytes_(bare_record_bytes + (options.has_normals ? sizeof(Eigen::Vector3f) : 0)) {
+  // Without a name it goes with the process, however that ends; not every file system has such.
+  file_ = open(folder_.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+  if (file_ >= 0) return;
   std::string name = (folder_ / ".points-XXXXXX").string();
   file_ = mkostemp(name.data(), O_CLOEXEC);
   if (file_ < 0) throw system_failure(folder_, "no file can be made in it", errno);

@@ -221,11 +221,10 @@ const Direction& choose(const std::vector<Direction>& directions) {
   int most = growth_of(directions.front());
   for (const Direction& direction : directions) most = std::max(most, growth_of(direction));
   const auto is_best = [&](std::size_t n) { return growth_of(directions[n]) == most; };
-  std::size_t least_turned = directions.size();
-  for (std::size_t n = 0; n < directions.size(); ++n)
-    if (is_best(n) &&
-        (least_turned == directions.size() ||
-         std::abs(directions[n].yaw_deg) < std::abs(directions[least_turned].yaw_deg)))
+  std::size_t least_turned = 0;
+  while (!is_best(least_turned)) ++least_turned;
+  for (std::size_t n = least_turned + 1; n < directions.size(); ++n)
+    if (is_best(n) && std::abs(directions[n].yaw_deg) < std::abs(directions[least_turned].yaw_deg))
       least_turned = n;
   if (directions[least_turned].yaw_deg == 0.0) return directions[least_turned];
   std::size_t first = least_turned;

@@ -28,6 +28,7 @@ struct SurfacePoints {
   PointCloud cloud;
   SurfacePointCounts counts;
 };
+// The refined elements as points: contradicted ones dropped, one left a voxel, edges extended.
 SurfacePoints make_surface_points(const RefinedSurface& surface,
                                   const SurfacePointOptions& options);
 

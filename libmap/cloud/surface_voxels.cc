@@ -244,12 +244,13 @@ class ElementMaker {
 
   void expect(const Neighbour& there, const Piece& piece, float weight) {
     const std::uint32_t n = beside_index_.find_or_add(pack(there.place));
-    if (n == beside_.size()) beside_.push_back({.axis = piece.axis});
+    Beside& beside =
+        n < beside_.size() ? beside_[n] : beside_.emplace_back(Beside{.axis = piece.axis});
     // Columns along another axis have their middle elsewhere.
-    if (beside_[n].axis != piece.axis) return;
-    beside_[n].weight += weight;
-    beside_[n].height += weight * there.height;
-    beside_[n].normal += weight * piece.normal;
+    if (beside.axis != piece.axis) return;
+    beside.weight += weight;
+    beside.height += weight * there.height;
+    beside.normal += weight * piece.normal;
   }
 
   std::vector<SurfaceElement> in_order() const {

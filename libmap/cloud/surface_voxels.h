@@ -27,9 +27,9 @@ class VoxelIndex {
  public:
   static constexpr std::uint32_t none = 0xffffffff;
 
-  VoxelIndex();
-  std::uint32_t find(std::uint64_t key) const;
-  std::uint32_t find_or_add(std::uint64_t key);
+  VoxelIndex();                                  // no key yet
+  std::uint32_t find(std::uint64_t key) const;   // the key's number, or `none`
+  std::uint32_t find_or_add(std::uint64_t key);  // the key's number, the next one if it is new
   std::size_t size() const { return keys_.size(); }
   const std::vector<std::uint64_t>& keys() const { return keys_; }
 

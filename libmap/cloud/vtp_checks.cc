@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libmap/cloud/columns.h"
+#include "libmap/cloud/text_rows.h"
 #include "libmap/cloud/vtp_blocks.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"

@@ -30,7 +30,7 @@ struct Camera {
   std::vector<double> distortion{};  // 4, 5, 8 or 12 numbers; 4 where equidistant
   Pose base_from_camera = optical_to_body_rotation();
 
-  bool is_distorted() const;
+  bool is_distorted() const;  // whether any term of the distortion is not 0
   // Throws Error naming the field, its value and its bound: sizes and focal lengths > 0, all
   // finite, a known number of distortion terms.
   void check() const;

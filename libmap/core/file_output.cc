@@ -10,21 +10,13 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/output_lock.h"
+#include "libmap/core/unfinished_outputs.h"
 
 namespace libmap {
 
 namespace fs = std::filesystem;
 
 namespace {
-
-void sync_path(const fs::path& path, int flags) {
-  const int descriptor = open(path.c_str(), flags);
-  if (descriptor < 0) throw system_failure(path, "cannot be opened to sync it", errno);
-  const int result = fsync(descriptor);
-  const int code = errno;
-  close(descriptor);
-  if (result != 0) throw system_failure(path, "cannot be synced", code);
-}
 
 int open_file(const char* path) {
   return open(path, O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW, 0666);
@@ -44,13 +36,17 @@ OutputFile::OutputFile(fs::path final_path) : final_path_(std::move(final_path))
   // The extension stays at the end: writers choose the format by it.
   temporary_path_ =
       folder / ("." + final_path_.stem().string() + ".partial" + final_path_.extension().string());
+  const OutputsInStep step;
   lock_ = lock_temporary(temporary_path_, final_path_, open_file);
+  add_unfinished_output(temporary_path_);
 }
 
 OutputFile::~OutputFile() {
   if (lock_ < 0) return;
+  const OutputsInStep step;
   std::error_code ignored;
   fs::remove(temporary_path_, ignored);
+  drop_unfinished_output(temporary_path_);
   close(lock_);
 }
 
@@ -60,12 +56,14 @@ OutputFile::OutputFile(OutputFile&& other) noexcept
       lock_(std::exchange(other.lock_, -1)) {}
 
 void OutputFile::commit() {
-  sync_path(temporary_path_, O_RDONLY | O_CLOEXEC);
+  sync_file(temporary_path_);
+  const OutputsInStep step;
   std::error_code code;
   fs::rename(temporary_path_, final_path_, code);
   if (code) throw system_failure(final_path_, "cannot be put in place", code.value());
+  drop_unfinished_output(temporary_path_);
   close(std::exchange(lock_, -1));
-  sync_path(folder_of(final_path_), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  sync_file(folder_of(final_path_));
 }
 
 void write_text(const fs::path& path, std::string_view content) {

@@ -23,7 +23,7 @@ class OutputFile {
 
   const std::filesystem::path& temporary_path() const { return temporary_path_; }
   const std::filesystem::path& final_path() const { return final_path_; }
-  void commit();
+  void commit();  // throws Error (failed) if the file cannot be synced or renamed
 
  private:
   std::filesystem::path final_path_;

@@ -12,6 +12,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/output_lock.h"
+#include "libmap/core/unfinished_outputs.h"
 
 namespace libmap {
 
@@ -63,7 +64,9 @@ OutputFolder::OutputFolder(fs::path final_path, const std::vector<std::string>& 
     throw Error("no such folder: " + folder.string(), {.file = final_path_.string()});
   require_own_content(final_path_, names);
   temporary_path_ = folder / ("." + final_path_.filename().string() + ".partial");
+  const OutputsInStep step;
   lock_ = lock_temporary(temporary_path_, final_path_, open_folder);
+  add_unfinished_output(temporary_path_);
   // What a run that was killed has left.
   for (const fs::directory_entry& entry : fs::directory_iterator(temporary_path_))
     fs::remove_all(entry.path());
@@ -71,20 +74,24 @@ OutputFolder::OutputFolder(fs::path final_path, const std::vector<std::string>& 
 
 OutputFolder::~OutputFolder() {
   if (lock_ < 0) return;
+  const OutputsInStep step;
   std::error_code ignored;
   fs::remove_all(temporary_path_, ignored);
+  drop_unfinished_output(temporary_path_);
   close(lock_);
 }
 
 void OutputFolder::commit() {
   // All files at once: one by one it takes a write to the disk each.
   if (syncfs(lock_) != 0) throw system_failure(final_path_, "cannot be synced", errno);
+  const OutputsInStep step;
   // The earlier folder is locked too, so that nobody takes it for a temporary of his own.
   const int earlier = open(final_path_.c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
   if (earlier >= 0) flock(earlier, LOCK_EX | LOCK_NB);
   const bool exchanged = put_in_place(temporary_path_, final_path_);
   std::error_code ignored;
   if (exchanged) fs::remove_all(temporary_path_, ignored);
+  drop_unfinished_output(temporary_path_);
   if (earlier >= 0) close(earlier);
   close(std::exchange(lock_, -1));
   const int parent = open(folder_of(final_path_).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);

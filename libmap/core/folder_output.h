@@ -22,7 +22,7 @@ class OutputFolder {
   OutputFolder& operator=(const OutputFolder&) = delete;
 
   const std::filesystem::path& temporary_path() const { return temporary_path_; }
-  void commit();
+  void commit();  // throws Error (failed) if the folder cannot be synced or put in place
 
  private:
   std::filesystem::path final_path_;

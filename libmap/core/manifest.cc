@@ -10,6 +10,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/json_input.h"
 
 namespace libmap {
 
@@ -52,7 +53,8 @@ double from_json_number(const Json& json) {
 
 ManifestValue from_json_value(const Json& json) {
   if (json.is_boolean()) return json.get<bool>();
-  if (json.is_number_integer()) return json.get<std::int64_t>();
+  if (json.is_number_integer() && json <= std::numeric_limits<std::int64_t>::max())
+    return json.get<std::int64_t>();
   if (json.is_number() || json.is_null()) return from_json_number(json);
   if (json.is_array()) {
     std::vector<double> numbers;
@@ -162,7 +164,7 @@ std::optional<Manifest> read_manifest_of(const std::filesystem::path& output) {
 
 Manifest parse_manifest(const std::string& text, const std::string& file) {
   try {
-    const Json json = Json::parse(text);
+    const auto json = parse_json<Json>(text);
     Manifest manifest;
     manifest.version = json.at("version").get<std::string>();
     manifest.command = json.at("command").get<std::string>();
@@ -170,20 +172,23 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     for (const Json& input : json.at("inputs"))
       manifest.inputs.push_back({input.at("path").get<std::string>(),
                                  input.at("sha256").get<std::string>(),
-                                 input.at("bytes").get<std::uint64_t>()});
+                                 integer_at<std::uint64_t>(input, "bytes")});
     manifest.frame = json.at("frame").get<std::string>();
     for (const auto& [name, numbers] : json.at("transforms").items())
       manifest.transforms.emplace_back(name, from_numbers(numbers.get<std::vector<double>>()));
     manifest.results = from_json_object(json.at("results"));
     if (json.contains("run")) {
       const Json& run = json.at("run");
-      manifest.threads = run.at("threads").get<unsigned>();
+      manifest.threads = integer_at<unsigned>(run, "threads");
       for (const auto& [name, seconds] : run.at("timings_s").items())
         manifest.timings_s.emplace_back(name, seconds.get<double>());
     }
     return manifest;
   } catch (const nlohmann::json::exception& error) {
-    throw Error(std::string("not a manifest of this toolkit: ") + error.what(), {.file = file});
+    // "[json.exception.KIND.NUMBER] REASON"
+    const std::string reason = error.what();
+    throw Error("not a manifest of this toolkit: " + reason.substr(reason.find("] ") + 2),
+                {.file = file});
   } catch (const Error& error) {
     throw error.in_file(file);
   }

@@ -34,17 +34,17 @@ struct Manifest {
   std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"
   unsigned threads = 0;                                        // in the section "run"
 
-  void add_parameters(const ParameterTable& table);
+  void add_parameters(const ParameterTable& table);   // each key with the value in force
   void add_input(const std::filesystem::path& path);  // reads and hashes the file
-  const ManifestValue* find_parameter(std::string_view name) const;
-  const ManifestValue* find_result(std::string_view name) const;
-  const Pose* find_transform(std::string_view name) const;
+  const ManifestValue* find_parameter(std::string_view name) const;  // or nullptr
+  const ManifestValue* find_result(std::string_view name) const;     // or nullptr
+  const Pose* find_transform(std::string_view name) const;           // or nullptr
 };
 
 // "map.pcd" -> "map.pcd.json".
 std::filesystem::path manifest_path(const std::filesystem::path& output);
 
-std::string to_json(const Manifest& manifest);
+std::string to_json(const Manifest& manifest);  // fixed order; numbers read back the same
 // The other way round; the section "run" may be missing. Throws Error naming `file`.
 Manifest parse_manifest(const std::string& json, const std::string& file);
 // Throws Error naming file and field. Nothing if there is no manifest beside `output`.

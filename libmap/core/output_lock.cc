@@ -28,6 +28,15 @@ Error system_failure(const fs::path& path, const std::string& what, int code) {
   return Error(what + ": " + std::strerror(code), {.file = path.string()}, ErrorKind::failed);
 }
 
+void sync_file(const fs::path& path) {
+  const int descriptor = open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  if (descriptor < 0) throw system_failure(path, "cannot be opened to sync it", errno);
+  const int result = fsync(descriptor);
+  const int code = errno;
+  close(descriptor);
+  if (result != 0) throw system_failure(path, "cannot be synced", code);
+}
+
 fs::path folder_of(const fs::path& path) {
   return path.has_parent_path() ? path.parent_path() : fs::path(".");
 }
@@ -74,8 +83,11 @@ int lock_temporary(const fs::path& temporary, const fs::path& final_path,
     const int lock = open_temporary(temporary.c_str());
     if (lock < 0 && errno == ENOENT && fs::is_directory(folder_of(temporary))) continue;
     if (lock < 0) throw system_failure(final_path, "cannot be written", errno);
-    if (flock(lock, LOCK_EX | LOCK_NB) != 0) {
+    // NFS locks no folder that is open for reading (EBADF): it goes without.
+    if (flock(lock, LOCK_EX | LOCK_NB) != 0 && errno != EBADF) {
+      const int code = errno;
       close(lock);
+      if (code != EWOULDBLOCK) throw system_failure(final_path, "cannot be locked", code);
       throw Error("another process is writing it", {.file = final_path.string()},
                   ErrorKind::failed);
     }

@@ -14,6 +14,9 @@ namespace libmap {
 // "WHAT: the system's message", kind failed. `code` is an errno.
 Error system_failure(const std::filesystem::path& path, const std::string& what, int code);
 
+// Has what was written to a file or folder put on the disk. Throws Error (failed) naming `path`.
+void sync_file(const std::filesystem::path& path);
+
 // "." where the path has no folder.
 std::filesystem::path folder_of(const std::filesystem::path& path);
 

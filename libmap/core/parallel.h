@@ -38,7 +38,7 @@ T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk&
 // Bounds the number of threads while it lives; 0 means all of the machine's.
 class ThreadLimit {
  public:
-  explicit ThreadLimit(unsigned threads);
+  explicit ThreadLimit(unsigned threads);  // 0: as many as the machine has
   ~ThreadLimit();
   ThreadLimit(const ThreadLimit&) = delete;
   ThreadLimit& operator=(const ThreadLimit&) = delete;

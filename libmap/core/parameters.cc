@@ -6,6 +6,8 @@
 #include <cmath>
 #include <set>
 
+#include "libmap/core/yaml_document.h"
+
 namespace libmap {
 
 namespace {
@@ -178,13 +180,10 @@ std::string flag_of(std::string_view key) {
 
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file) {
-  try {
-    const std::vector<YAML::Node> documents = YAML::LoadAll(text);
-    if (documents.size() > 1) throw Error("holds more than one YAML document");
-    if (documents.empty() || documents.front().IsNull()) return {};
-    const YAML::Node root = documents.front();
+  std::set<std::string> seen;
+  read_yaml(text, file, [&](const YAML::Node& root) {
+    if (root.IsNull()) return;
     if (!root.IsMap()) throw Error("not a map of keys and values");
-    std::set<std::string> seen;
     for (const auto& entry : root) {
       const std::string key = entry.first.as<std::string>();
       if (!table.knows(key))
@@ -194,13 +193,8 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
     }
     for (const auto& entry : root)
       table.set(entry.first.as<std::string>(), entry.second.as<std::string>());
-    return {seen.begin(), seen.end()};
-  } catch (const Error& error) {
-    throw error.in_file(file);
-  } catch (const YAML::Exception& error) {
-    throw Error("not valid YAML: " + error.msg,
-                {.file = file, .field = "line " + std::to_string(error.mark.line + 1)});
-  }
+  });
+  return {seen.begin(), seen.end()};
 }
 
 std::string to_yaml(const ParameterTable& table) {

@@ -16,7 +16,7 @@
 
 namespace libmap {
 
-enum class ParameterType { boolean, integer, real, text };
+enum class ParameterType { boolean, integer, real, text };  // of a flag's or key's value
 
 // What a number may be. An open end excludes its value.
 struct Range {
@@ -57,8 +57,8 @@ class ParameterTable {
   void add_overrides(std::string prefix, std::vector<std::pair<std::string, std::string>>& texts);
 
   const std::vector<Parameter>& parameters() const { return parameters_; }
-  std::vector<std::string> keys() const;
-  const Parameter* find(std::string_view key) const;
+  std::vector<std::string> keys() const;              // in the order in which they were added
+  const Parameter* find(std::string_view key) const;  // the parameter of that key, or nullptr
   // Whether set() takes this key: a parameter, or one with the prefix of overrides.
   bool knows(std::string_view key) const;
   // Every key and its value as text, overrides included, as set_from_yaml would take them.

@@ -10,6 +10,9 @@ namespace libmap {
 
 namespace {
 
+// What is done with a table may take time by the square of its columns.
+constexpr std::size_t max_columns = 10000;
+
 // One record of `text` from `position` on, which moves behind its end of line.
 std::vector<std::string> next_record(std::string_view text, std::size_t& position,
                                      std::size_t& line) {
@@ -99,6 +102,10 @@ Table parse_csv(std::string_view text, const std::string& file) {
       const std::size_t first_line = line;
       std::vector<std::string> cells = next_record(text, position, line);
       if (table.columns.empty()) {
+        if (cells.size() > max_columns)
+          throw Error("too many columns", {.field = "line " + std::to_string(first_line),
+                                           .value = std::to_string(cells.size()) + " cells long",
+                                           .bound = "<= " + std::to_string(max_columns)});
         for (std::string& cell : cells) table.columns.emplace_back(trim(cell));
         continue;
       }

@@ -15,7 +15,7 @@ struct Table {
   std::vector<std::vector<std::string>> rows;  // each as long as `columns`
   std::string file;                            // where it was read from, for errors; may be empty
 
-  std::optional<std::size_t> find_column(std::string_view name) const;
+  std::optional<std::size_t> find_column(std::string_view name) const;  // its index
   // Throws Error naming the file, the column and the nearest known one.
   std::size_t column(std::string_view name) const;
   // The cell as a number. Throws Error naming file, line and column if it is not one.

@@ -22,7 +22,7 @@ std::optional<std::int64_t> parse_integer(std::string_view text);
 // true/false, yes/no, on/off, 1/0.
 std::optional<bool> parse_bool(std::string_view text);
 
-std::string_view trim(std::string_view text);
+std::string_view trim(std::string_view text);  // without white space at both ends
 
 // "a, b,,c" -> a, b, c.
 std::vector<std::string> split_list(std::string_view text);

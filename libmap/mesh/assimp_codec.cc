@@ -9,6 +9,7 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <fstream>
 #include <memory>
 #include <new>
 #include <numeric>
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/mesh/guarded_model.h"
 
 namespace libmap {
 namespace {
@@ -330,6 +332,22 @@ DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
   return result;
 }
 
+// assimp takes memory for the length of the text before it compares it with the file's.
+void require_sound_glb(std::string_view header, std::uint64_t bytes) {
+  constexpr std::size_t text_length_at = 12;
+  constexpr std::size_t text_at = 20;
+  std::uint32_t length = 0;
+  if (header.size() < text_at || !header.starts_with("glTF"))
+    throw Error("not a readable glb file: no header");
+  std::memcpy(&length, header.data() + text_length_at, sizeof length);
+  if (text_at + std::uint64_t{length} > bytes)
+    throw Error("not a readable glb file",
+                {.file = {},
+                 .field = "length of its text",
+                 .value = std::to_string(length),
+                 .bound = "within its " + std::to_string(bytes) + " bytes"});
+}
+
 // read(importer) gives the scene, take(scene, builder) the result.
 template <typename Read, typename Take>
 auto decode(const std::string& format, const Read& read, const Take& take) {
@@ -363,18 +381,29 @@ std::string exported(const aiScene& scene, const char* format) {
 }  // namespace
 
 TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format) {
-  return decode(
-      format,
-      [&](Assimp::Importer& importer) {
-        return importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
-      },
-      [](const aiScene&, MeshBuilder& builder) { return builder.take(); });
+  if (format == "glb") require_sound_glb(bytes, bytes.size());
+  const auto read = [&](Assimp::Importer& importer) {
+    return importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
+  };
+  const auto take = [](const aiScene&, MeshBuilder& builder) {
+    DecodedModel result;
+    result.model.mesh = builder.take();
+    return result;
+  };
+  return decode_guarded(bytes.size(), [&] { return decode(format, read, take); }).model.mesh;
 }
 
 DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format) {
-  return decode(
-      format, [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); },
-      [](const aiScene& scene, MeshBuilder& builder) { return model_of(scene, builder); });
+  if (format == "glb") {
+    std::string header(20, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(header.data(), static_cast<std::streamsize>(header.size()));
+    header.resize(static_cast<std::size_t>(file.gcount()));
+    require_sound_glb(header, std::filesystem::file_size(path));
+  }
+  const auto read = [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); };
+  return decode_guarded(std::filesystem::file_size(path),
+                        [&] { return decode(format, read, model_of); });
 }
 
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {

@@ -23,7 +23,7 @@ class EmbreeMesh {
   EmbreeMesh(const EmbreeMesh&) = delete;
   EmbreeMesh& operator=(const EmbreeMesh&) = delete;
 
-  RTCSceneTy* scene() const;
+  RTCSceneTy* scene() const;  // embree's scene, which this object owns; coordinates less centre()
   const Eigen::Vector3d& centre() const { return centre_; }
   Eigen::Vector3d size() const { return size_; }  // of the bounding box, m
   const std::vector<Triangle>& triangles() const { return triangles_; }

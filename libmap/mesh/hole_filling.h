@@ -21,6 +21,7 @@ using BoundaryLoop = std::vector<HalfEdge>;  // as boundary_loops()
 // component.
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m);
 
+// What a patch must be to be kept.
 enum class PatchCheck {
   manifold,      // patches continue the manifold and have no degenerate triangle
   intersection,  // and meet no other triangle

@@ -10,6 +10,7 @@
 
 namespace libmap {
 
+// The surface that closes a hole.
 enum class PatchShape {
   faired,        // as smooth as the surface around it: tangent planes continued (C1)
   refined,       // triangles as large as those around the hole

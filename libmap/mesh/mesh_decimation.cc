@@ -192,13 +192,6 @@ double deviation(const TriangleMesh& original, const TriangleMesh& smaller, doub
 
 }  // namespace
 
-std::optional<double> surface_deviation(const TriangleMesh& from, const TriangleMesh& to,
-                                        double bound_m) {
-  const double largest = largest_of(deviations(from, to, bound_m));
-  if (largest > bound_m) return {};
-  return largest;
-}
-
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m, Progress& progress) {
   MeshDecimation result;
   if (max_error_m <= 0.0 || mesh.triangles.empty()) return result;

@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstddef>
-#include <optional>
 
 #include "libmap/core/progress.h"
 #include "libmap/core/triangle_mesh.h"
@@ -18,19 +17,14 @@ struct MeshDecimation {
 
 // Edges are collapsed into one of their ends (OpenMesh: quadric error first; no removed vertex
 // farther than a tolerance from the triangles that replace its own; no normal turned by more than
-// 30 degrees; no needles). Then the distance of the surfaces is bounded both ways (see
-// surface_deviation). Where it exceeds `max_error_m`, the vertices there are locked and all is done
-// again, later with a smaller tolerance, too; if no attempt succeeds the mesh stays as it was.
+// 30 degrees; no needles). Then the distance of the surfaces is bounded both ways:
+// triangles are divided until all corners of a part lie within the bound of one and the same
+// triangle, which is convex, so that all points between them do, too. Where it exceeds
+// `max_error_m`, the vertices there are locked and all is done again, later with a smaller
+// tolerance, too; if no attempt succeeds the mesh stays as it was.
 // Vertices and triangles that stay keep their values and their order. The mesh must be an oriented
 // manifold.
 MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
                              Progress& progress = no_progress());
-
-// A bound on the distance of every point of `from`'s surface from `to`'s, if one below `bound_m`
-// can be proved: triangles are divided until all corners of a part lie within the bound of one and
-// the same triangle, which is convex, so that all points between them do, too. Nothing if a point
-// lies farther away.
-std::optional<double> surface_deviation(const TriangleMesh& from, const TriangleMesh& to,
-                                        double bound_m);
 
 }  // namespace libmap

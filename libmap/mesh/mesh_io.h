@@ -36,7 +36,7 @@ struct MeshWriteOptions {
   bool big_endian = false;   // PLY, binary
 };
 
-enum class FileKind { cloud, mesh };
+enum class FileKind { cloud, mesh };  // what a file holds: points alone, or faces too
 
 // Polygons of more than three corners are cut into fans of triangles, each with the polygon's face
 // fields; lines and points are passed over. Throws Error naming the file: it cannot be read, is not

@@ -24,7 +24,7 @@ std::vector<ScalarField> picked(const std::vector<ScalarField>& fields,
                                 const std::vector<std::uint32_t>& from) {
   std::vector<ScalarField> result;
   for (const ScalarField& field : fields) {
-    ScalarField& copy = result.emplace_back(field.name, field.type, std::vector<double>());
+    ScalarField& copy = result.emplace_back(ScalarField{field.name, field.type, {}});
     copy.values.reserve(from.size());
     for (const std::uint32_t n : from) copy.values.push_back(field.values[n]);
   }

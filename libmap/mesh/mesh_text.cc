@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "libmap/cloud/columns.h"
+#include "libmap/cloud/text_rows.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 

@@ -61,6 +61,7 @@ struct PointDistances {
   std::vector<double> distance_m;
   std::vector<double> signed_distance_m;  // equal to distance_m where the surface has no sides
 };
+// The distance of each point to the surface; bytes do not depend on the number of threads.
 PointDistances distances_to(const ReferenceSurface& surface,
                             const std::vector<Eigen::Vector3d>& points);
 

@@ -53,6 +53,7 @@ struct DistanceStatistics {
   double p95_m = 0.0;  // 95 of 100 are as near
   double max_m = 0.0;
 };
+// Mean, root mean square, median, 95th percentile and maximum; zeros of no distances.
 DistanceStatistics distance_statistics(std::vector<double> distances_m);
 
 // Points of the surface, `per_m2` on each square metre on the mean, drawn with `seed`: the same for

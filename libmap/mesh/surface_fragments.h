@@ -25,6 +25,7 @@ struct PlacedFragment {
   Fragment fragment;
   std::array<Eigen::Vector3d, 3> corners;
 
+  // Of the fragment's triangle.
   double area_m2() const;
   double square_of_longest_side() const;
   // Cut through the middle of its longest side (Rivara 1984).
@@ -55,6 +56,7 @@ class SurfacePieces {
   SurfacePieces(const SurfacePieces& triangles, double longest_m, std::size_t most_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
+  // Of all pieces together; one piece by its number.
   double area_m2() const;
   PlacedFragment piece(std::size_t number) const;
 

@@ -22,6 +22,7 @@ namespace libmap {
 // Points of the world in a photograph.
 class PhotoProjector {
  public:
+  // Of a picture that `camera` took from `world_from_camera`.
   PhotoProjector(const Camera& camera, const Pose& world_from_camera);
 
   const Camera& camera() const { return camera_; }

@@ -35,6 +35,7 @@ struct ViewQuality {
 class ViewTable {
  public:
   ViewTable() = default;
+  // So many things, with `capacity` views each at most.
   ViewTable(std::size_t rows, std::size_t capacity);
 
   std::size_t rows() const { return counts_.size(); }

@@ -144,10 +144,10 @@ std::string textured_glb(const TexturedMesh& model, const TexturedMeshWriteOptio
 }
 
 ColorImage read_picture(const TexturePicture& picture, const fs::path& model) {
-  if (!picture.bytes.empty()) return decode_color(picture.bytes);
+  if (!picture.bytes.empty()) return decode_color(picture.bytes, max_picture_pixels);
   const fs::path path = model.parent_path() / picture.path;
   try {
-    return decode_color(read_whole_file(path));
+    return decode_color(read_whole_file(path), max_picture_pixels);
   } catch (const Error& error) {
     throw error.in_file(path.string());
   }

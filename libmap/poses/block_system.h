@@ -14,7 +14,7 @@ namespace libmap {
 
 class BlockSystem {
  public:
-  explicit BlockSystem(std::size_t blocks);
+  explicit BlockSystem(std::size_t blocks);  // all zero
   std::size_t size() const { return size_; }
 
   // The information matrix's block (row, column) and its mirror image.
@@ -43,6 +43,7 @@ class BlockSolver {
   BlockSolver& operator=(const BlockSolver&) = delete;
 
   bool valid() const;  // positive definite
+  // The unknowns for one right-hand side; only where valid().
   std::vector<Vector6d> solve(const std::vector<Vector6d>& side) const;
   // Blocks (row, column) of the inverse for each row, of one column.
   std::vector<Matrix6d> inverse_column(std::size_t column) const;

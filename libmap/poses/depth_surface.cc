@@ -54,9 +54,9 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
 
 DepthSurface::DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells)
     : camera_(depth_camera), step_px_(step_px), cells_(std::move(cells)) {
-  if (step_px > 0) {
-    columns_ = (camera_.width + step_px - 1) / step_px;
-    rows_ = (camera_.height + step_px - 1) / step_px;
+  if (step_px > 0 && camera_.width > 0 && camera_.height > 0) {
+    columns_ = (camera_.width - 1) / step_px + 1;
+    rows_ = (camera_.height - 1) / step_px + 1;
   }
   if (cells_.empty() ||
       cells_.size() != static_cast<std::size_t>(columns_) * static_cast<std::size_t>(rows_))

@@ -9,6 +9,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/json_input.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/parameters.h"
 
@@ -80,11 +81,42 @@ std::string packed(const FrameFeatures& frame) {
   return bytes;
 }
 
-FrameFeatures unpacked(std::string_view bytes, const std::vector<Camera>& depth_cameras) {
+// Whether CBOR is nested no deeper than ours: nlohmann's parser goes down by calling itself.
+class DepthCheck : public Json::json_sax_t {
+ public:
+  static bool passes(std::string_view bytes) {
+    DepthCheck check;
+    return Json::sax_parse(bytes, &check, Json::input_format_t::cbor);
+  }
+
+  bool null() override { return true; }
+  bool boolean(bool) override { return true; }
+  bool number_integer(number_integer_t) override { return true; }
+  bool number_unsigned(number_unsigned_t) override { return true; }
+  bool number_float(number_float_t, const string_t&) override { return true; }
+  bool string(string_t&) override { return true; }
+  bool binary(binary_t&) override { return true; }
+  bool key(string_t&) override { return true; }
+  bool start_object(std::size_t) override { return ++depth_ <= max_depth; }
+  bool end_object() override { return --depth_ >= 0; }
+  bool start_array(std::size_t) override { return ++depth_ <= max_depth; }
+  bool end_array() override { return --depth_ >= 0; }
+  bool parse_error(std::size_t, const std::string&, const Json::exception&) override {
+    return false;
+  }
+
+ private:
+  static constexpr int max_depth = 4;
+  int depth_ = 0;
+};
+
+FrameFeatures unpacked(std::string_view bytes, FeatureType type,
+                       const std::vector<Camera>& depth_cameras) {
+  if (!DepthCheck::passes(bytes)) throw Error("is no CBOR of ours");
   const Json json = Json::from_cbor(bytes);
   if (json.at("version") != format_version) throw Error("another version");
   FrameFeatures frame;
-  json.at("without_depth").get_to(frame.without_depth);
+  frame.without_depth = integer_at<std::size_t>(json, "without_depth");
   const auto numbers = values_of<float>(json.at("numbers"));
   for (const std::uint16_t camera : values_of<std::uint16_t>(json.at("cameras"))) {
     const std::size_t first = 5 * frame.features.size();
@@ -97,10 +129,13 @@ FrameFeatures unpacked(std::string_view bytes, const std::vector<Camera>& depth_
                               camera});
   }
   frame.descriptors = values_of<std::uint8_t>(json.at("descriptors"));
+  if (numbers.size() != 5 * frame.features.size() ||
+      frame.descriptors.size() != descriptor_bytes(type) * frame.features.size())
+    throw Error("features are not whole");
   if (json.at("surfaces").size() != depth_cameras.size()) throw Error("surfaces are not whole");
   for (const Json& surface : json.at("surfaces"))
     frame.surfaces.emplace_back(depth_cameras[frame.surfaces.size()],
-                                surface.at("step_px").get<int>(),
+                                integer_at<int>(surface, "step_px"),
                                 values_of<DepthSurface::Cell>(surface.at("cells")));
   return frame;
 }
@@ -136,7 +171,7 @@ bool FeatureCache::read(const std::string& key, const std::vector<Camera>& depth
     if (text.size() <= digest_digits || text[digest_digits] != '\n') return false;
     const std::string_view body = std::string_view(text).substr(digest_digits + 1);
     if (sha256_of(body) != std::string_view(text).substr(0, digest_digits)) return false;
-    FrameFeatures read = unpacked(body, depth_cameras);
+    FrameFeatures read = unpacked(body, frame.type, depth_cameras);
     frame.features = std::move(read.features);
     frame.descriptors = std::move(read.descriptors);
     frame.surfaces = std::move(read.surfaces);

@@ -22,10 +22,6 @@ constexpr double sift_scale = 512.0;  // square-rooted SIFT of unit length in by
 // halves the places of features again: they lie a quarter of a pixel too far right and down.
 constexpr float sift_offset_px = 0.25F;
 
-std::size_t descriptor_bytes(FeatureType type) {
-  return type == FeatureType::sift ? sift_bytes : orb_bytes;
-}
-
 // OpenCV runs on our threads alone while this lives.
 class SingleThreadedOpenCv {
  public:
@@ -261,6 +257,10 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
     result.frames.push_back(std::move(frames[n].frame));
   }
   return result;
+}
+
+std::size_t descriptor_bytes(FeatureType type) {
+  return type == FeatureType::sift ? sift_bytes : orb_bytes;
 }
 
 Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame) {

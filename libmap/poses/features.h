@@ -23,6 +23,9 @@ namespace libmap {
 // et al. 2011).
 enum class FeatureType { sift, orb };
 
+// Of one feature's descriptor.
+std::size_t descriptor_bytes(FeatureType type);
+
 struct FeatureOptions {
   FeatureType type = FeatureType::sift;
   int max_features = 800;         // >= 1: of a camera, the strongest
@@ -53,6 +56,7 @@ struct FrameFeatures {
   std::vector<DepthSurface> surfaces;     // one a camera
   std::size_t without_depth = 0;          // features that were dropped for it
 
+  // Where feature n lies by its depth, in its camera's optical frame; in the frame of the base.
   Eigen::Vector3d point_in_camera(std::size_t n) const;
   Eigen::Vector3d point_in_base(std::size_t n) const;
 };

@@ -27,8 +27,8 @@ class GraphCovariance {
   GraphCovariance(const GraphCovariance&) = delete;
   GraphCovariance& operator=(const GraphCovariance&) = delete;
 
-  bool valid() const;
-  bool connected(int a, int b) const;
+  bool valid() const;                  // whether the graph determines its poses
+  bool connected(int a, int b) const;  // whether links lead from one node to the other
   // Of a step of the node's pose against the gauge node of its component.
   Matrix6d of_node(int node) const;
   // Of a step of a_from_b, of two nodes that are connected.

@@ -37,6 +37,7 @@ struct HeldOutCosts {
   std::vector<double> matches;
   std::vector<double> surfaces;
 };
+// The costs of what was held out, at these poses.
 HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
                             const std::vector<FeatureLink>& links,
                             const std::map<int, Pose>& map_from_base);

@@ -82,6 +82,8 @@ class Alignment {
                   double max_distance_m, PairEquations& equations) const;
   PairEquations equations_of(FramePair pair, double max_distance_m) const;
   void drop_degenerate(PairEquations& equations) const;
+  void add_prior(BlockSystem& system) const;
+  double add_pairs(double max_distance_m, BlockSystem& system);
   double step(double max_distance_m, double& rms_m);
 
   const std::vector<FrameFeatures>& frames_;
@@ -236,14 +238,8 @@ PairEquations Alignment::equations_of(FramePair pair, double max_distance_m) con
   return equations;
 }
 
-// One step of Gauss and Newton; how far the poses moved.
-double Alignment::step(double max_distance_m, double& rms_m) {
-  std::vector<PairEquations> equations(pairs_.size());
-  parallel_for(pairs_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      equations[n] = equations_of(pairs_[n], max_distance_m);
-  });
-  BlockSystem system(place_.size());
+// What the prior asks of the poses as they are.
+void Alignment::add_prior(BlockSystem& system) const {
   system.add(prior_);
   system.clear_side();
   std::vector<Vector6d> steps;
@@ -253,6 +249,15 @@ double Alignment::step(double max_distance_m, double& rms_m) {
     system.add_side(key.first, -block * steps[key.second]);
     if (key.first != key.second) system.add_side(key.second, -block.transpose() * steps[key.first]);
   }
+}
+
+// What the surfaces of the pairs ask; their root mean square distance.
+double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
+  std::vector<PairEquations> equations(pairs_.size());
+  parallel_for(pairs_.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      equations[n] = equations_of(pairs_[n], max_distance_m);
+  });
   double squares = 0.0;
   double weight = 0.0;
   result_.samples = 0;
@@ -273,7 +278,14 @@ double Alignment::step(double max_distance_m, double& rms_m) {
     result_.samples += equations[n].samples;
     result_.degenerate_directions += equations[n].degenerate;
   }
-  rms_m = weight > 0.0 ? std::sqrt(squares / weight) : 0.0;
+  return weight > 0.0 ? std::sqrt(squares / weight) : 0.0;
+}
+
+// One step of Gauss and Newton; how far the poses moved.
+double Alignment::step(double max_distance_m, double& rms_m) {
+  BlockSystem system(place_.size());
+  add_prior(system);
+  rms_m = add_pairs(max_distance_m, system);
   result_.information = system;
   result_.information.clear_side();
   // Gauge nodes stand still: what they are bound by is not asked.

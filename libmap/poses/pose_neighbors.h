@@ -11,6 +11,7 @@ namespace libmap {
 
 class PoseNeighbors {
  public:
+  // Of these places, known by their index.
   explicit PoseNeighbors(std::vector<Eigen::Vector3d> places);
   ~PoseNeighbors();
   PoseNeighbors(const PoseNeighbors&) = delete;

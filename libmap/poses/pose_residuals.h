@@ -21,6 +21,7 @@ struct PoseView {
   Eigen::Map<const Eigen::Matrix<T, 3, 1>> translation;
 };
 
+// The rotation as axis times angle, the shorter way; differentiable at no rotation too.
 template <typename T>
 Eigen::Matrix<T, 3, 1> rotation_vector(const Eigen::Quaternion<T>& q) {
   using std::atan2;

@@ -35,9 +35,11 @@ class Refinement {
  public:
   Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress,
              const FeatureCache& cache)
-      : scan_(scan), options_(options), progress_(progress), cache_(cache) {
-    truth_ = trajectory_of(scan.graph(), PoseSource::ground_truth);
-  }
+      : scan_(scan),
+        options_(options),
+        progress_(progress),
+        cache_(cache),
+        truth_(trajectory_of(scan.graph(), PoseSource::ground_truth)) {}
   RefinementResult run();
 
  private:

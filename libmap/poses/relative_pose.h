@@ -31,7 +31,7 @@ struct MatchResidual {
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Identity();
   Eigen::Matrix<double, 3, 6> jacobian;  // by a step of a_from_b (rigid_motion.h)
 
-  double chi_square() const;
+  double chi_square() const;  // squared Mahalanobis length, 3 degrees of freedom
 };
 MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
                              const FeatureMatch& match, const Pose& a_from_b,
@@ -45,6 +45,7 @@ struct RelativePoseOptions {
   double min_spread = 0.06;        // across the inliers' least extent, of the focal length
 };
 
+// Why a pair has no relative pose, or that it has.
 enum class RelativePoseOutcome { found, too_few_matches, too_few_inliers, narrow, not_converged };
 
 struct RelativePose {

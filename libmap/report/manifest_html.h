@@ -17,6 +17,6 @@ std::string sources_html(const ReportContent& content);
 // Milliseconds, each step by each case, with sums for each command and in all.
 std::string timings_html(const TimingTable& table);
 
-std::string values_html(const ReportValues& values);
+std::string values_html(const ReportValues& values);  // names and values as a list
 
 }  // namespace libmap

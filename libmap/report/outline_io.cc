@@ -9,6 +9,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/core/yaml_document.h"
 
 namespace libmap {
 
@@ -238,21 +239,17 @@ const std::vector<std::pair<std::string, ItemKind>>& item_kind_names() {
 }
 
 Outline parse_outline(const std::string& yaml, const std::string& file) {
-  try {
-    Keys keys(YAML::Load(yaml), "outline");
-    Outline outline;
+  Outline outline;
+  read_yaml(yaml, file, [&](const YAML::Node& root) {
+    Keys keys(root, "outline");
     outline.title = keys.required_text("title");
     outline.text = keys.text("text");
     keys.each("items", [&](const auto& entry) { outline.items.push_back(parse_item(entry)); });
     keys.each("sections",
               [&](const auto& entry) { outline.sections.push_back(parse_section(entry, 1)); });
     keys.end();
-    return outline;
-  } catch (const YAML::Exception& error) {
-    throw Error(std::string("is no YAML: ") + error.what(), {.file = file});
-  } catch (const Error& error) {
-    throw error.in_file(file);
-  }
+  });
+  return outline;
 }
 
 Outline read_outline(const std::filesystem::path& path) {

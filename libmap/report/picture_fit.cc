@@ -32,7 +32,8 @@ bool is_svg(std::string_view bytes) {
 // Transparent pixels lie on white.
 ColorImage decode_on_white(const std::string& bytes) {
   const auto info = read_image_info(bytes);
-  if (!info || info->channels != 4 || info->bits != 8) return decode_color(bytes);
+  if (!info || info->channels != 4 || info->bits != 8)
+    return decode_color(bytes, max_picture_pixels);
   const RgbaImage image = decode_rgba(bytes);
   ColorImage flat(image.width, image.height);
   for (std::size_t n = 0; n < image.pixels.size(); ++n)
@@ -58,7 +59,7 @@ ReportPicture read_picture_bytes(std::string bytes) {
   }
   const auto format = image_format(bytes);
   if (!format) throw Error("is neither PNG nor JPEG nor SVG");
-  const ColorImage image = decode_color(bytes);
+  const ColorImage image = decode_color(bytes, max_picture_pixels);
   picture.media_type = *format == ImageFormat::png ? "image/png" : "image/jpeg";
   picture.width = image.width;
   picture.height = image.height;

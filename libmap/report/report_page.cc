@@ -260,7 +260,7 @@ std::string report_page(const ReportContent& content, const PageAssets& assets) 
   std::vector<std::string> scripts;
   if (writer.has_views())
     for (const std::string& library : assets.libraries) scripts.push_back(escape_code(library));
-  scripts.push_back(escape_code(assets.script));
+  for (const std::string& script : assets.scripts) scripts.push_back(escape_code(script));
   const std::string style = "\n" + escape_code(assets.style) + palette_style();
 
   std::string html = head_html(content, assets, style, scripts);

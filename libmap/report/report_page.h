@@ -11,7 +11,7 @@ namespace libmap {
 // What the page brings along.
 struct PageAssets {
   std::string style;                   // CSS
-  std::string script;                  // our own
+  std::vector<std::string> scripts;    // our own, in their order
   std::vector<std::string> libraries;  // scripts that it needs, in their order; none: no 3-D views
   std::string library_notice;          // whose they are, with their licence
   std::string version;                 // of this toolkit

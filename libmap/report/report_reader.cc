@@ -9,6 +9,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/json_input.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 #include "libmap/report/picture_fit.h"
@@ -246,7 +247,8 @@ class Reader {
       value = {asked.label, "", asked.unit, asked.published};
       fill(item, path, [&] {
         try {
-          const auto json = nlohmann::ordered_json::parse(read_whole_file(path, max_json_bytes));
+          const auto json =
+              parse_json<nlohmann::ordered_json>(read_whole_file(path, max_json_bytes));
           value.value = text_of(json.at(nlohmann::ordered_json::json_pointer(asked.at)));
         } catch (const nlohmann::json::parse_error&) {
           throw Error("is no JSON, or '" + asked.at + "' no place in it");

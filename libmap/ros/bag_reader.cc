@@ -1,25 +1,16 @@
 #include "libmap/ros/bag_reader.h"
 
-#include <fcntl.h>
 #include <rosbag/bag.h>
 #include <rosbag/view.h>
-#include <sys/prctl.h>
-#include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <csignal>
-#include <cstdio>
-#include <cstring>
 #include <fstream>
 #include <map>
-#include <memory>
 #include <optional>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/guarded_process.h"
 #include "libmap/core/text.h"
 #include "libmap/ros/ros_messages.h"
 
@@ -30,7 +21,7 @@ namespace {
 namespace fs = std::filesystem;
 using ros_message::printable;
 
-constexpr rlim_t max_data_bytes = rlim_t{3} << 30;
+constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 30;
 
 // What comes through the pipe: one head, then `bytes` of text or message.
 struct Parcel {
@@ -47,54 +38,23 @@ struct Parcel {
 // The end of the pipe at which librosbag works.
 class Sender {
  public:
-  explicit Sender(int pipe) : pipe_(pipe) {}
+  explicit Sender(const GuardedProcess::Write& write) : write_(write) {}
 
   void send(Parcel parcel, std::string_view bytes) {
     parcel.bytes = bytes.size();
-    write_all(reinterpret_cast<const char*>(&parcel), sizeof parcel);
-    write_all(bytes.data(), bytes.size());
+    write_({reinterpret_cast<const char*>(&parcel), sizeof parcel});
+    write_(bytes);
   }
   void send_error(const std::string& text) { send({.kind = Parcel::Kind::error}, text); }
 
  private:
-  void write_all(const char* bytes, std::size_t count) {
-    while (count > 0) {
-      const ssize_t written = write(pipe_, bytes, count);
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) _exit(0);  // Nobody listens any more.
-      bytes += written;
-      count -= static_cast<std::size_t>(written);
-    }
-  }
-
-  int pipe_;
+  const GuardedProcess::Write& write_;
 };
 
 using Work = std::function<void(const rosbag::Bag&, Sender&)>;
 
-// librosbag and its plugin loader write to the terminal; the Error says it all.
-void be_silent() {
-  const int null = open("/dev/null", O_WRONLY);
-  if (null < 0) return;
-  dup2(null, STDOUT_FILENO);
-  dup2(null, STDERR_FILENO);
-}
-
-void bound_memory() {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
-  const rlimit limit{max_data_bytes, max_data_bytes};
-  setrlimit(RLIMIT_DATA, &limit);
-  const rlimit no_core{0, 0};
-  setrlimit(RLIMIT_CORE, &no_core);
-#endif
-}
-
-[[noreturn]] void serve(const fs::path& path, int pipe, const Work& work) {
-  prctl(PR_SET_PDEATHSIG, SIGKILL);
-  for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGPIPE}) std::signal(signal, SIG_DFL);
-  be_silent();
-  bound_memory();
-  Sender sender(pipe);
+void serve(const fs::path& path, const GuardedProcess::Write& write, const Work& work) {
+  Sender sender(write);
   try {
     rosbag::Bag bag;
     bag.open(path.string(), rosbag::bagmode::Read);
@@ -110,69 +70,35 @@ void bound_memory() {
     // The loader of encryption plugins, for one.
     sender.send_error("cannot be read: " + printable(std::string(error.what())));
   }
-  _exit(0);
 }
 
-// The process in which librosbag reads, and this end of its pipe.
+// The process in which librosbag reads.
 class GuardedBag {
  public:
-  GuardedBag(const fs::path& path, const Work& work) : path_(path) {
-    int ends[2];
-    if (pipe2(ends, O_CLOEXEC) != 0) fail("no pipe");
-    process_ = fork();
-    if (process_ == 0) {
-      close(ends[0]);
-      serve(path, ends[1], work);
-    }
-    close(ends[1]);
-    pipe_.reset(fdopen(ends[0], "rb"));
-    if (process_ < 0 || !pipe_) fail("no process");
-  }
-  ~GuardedBag() {
-    pipe_.reset();  // A process that still writes ends by it.
-    wait();
-  }
-  GuardedBag(const GuardedBag&) = delete;
-  GuardedBag& operator=(const GuardedBag&) = delete;
+  GuardedBag(const fs::path& path, const Work& work)
+      : path_(path), process_(max_data_bytes, [&](const GuardedProcess::Write& write) {
+          serve(path, write, work);
+        }) {}
 
   // The next topic or message and its bytes; nothing after the last.
   std::optional<Parcel> receive(std::string& bytes) {
     Parcel parcel;
-    if (std::fread(&parcel, sizeof parcel, 1, pipe_.get()) != 1) throw_fallen();
+    if (!process_.read(&parcel, sizeof parcel)) throw_fallen();
     bytes.resize(parcel.bytes);
-    if (parcel.bytes > 0 && std::fread(bytes.data(), bytes.size(), 1, pipe_.get()) != 1)
-      throw_fallen();
+    if (!process_.read(bytes.data(), bytes.size())) throw_fallen();
     if (parcel.kind == Parcel::Kind::error) throw Error(bytes, {.file = path_.string()});
     if (parcel.kind == Parcel::Kind::end) return std::nullopt;
     return parcel;
   }
 
  private:
-  struct CloseFile {
-    void operator()(std::FILE* file) const { std::fclose(file); }
-  };
-
-  [[noreturn]] void fail(const std::string& what) {
-    throw Error(what + " to read it in: " + std::strerror(errno), {.file = path_.string()},
-                ErrorKind::failed);
-  }
-  int wait() {
-    int status = 0;
-    if (process_ > 0)
-      while (waitpid(process_, &status, 0) < 0 && errno == EINTR) continue;
-    process_ = -1;
-    return status;
-  }
   [[noreturn]] void throw_fallen() {
-    const int status = wait();
-    const std::string how =
-        WIFSIGNALED(status) ? " (signal " + std::to_string(WTERMSIG(status)) + ")" : "";
-    throw Error("is broken: ROS's bag library fell over it" + how, {.file = path_.string()});
+    throw Error("is broken: ROS's bag library fell over it" + process_.end(),
+                {.file = path_.string()});
   }
 
   fs::path path_;
-  pid_t process_ = -1;
-  std::unique_ptr<std::FILE, CloseFile> pipe_;
+  GuardedProcess process_;
 };
 
 void require_bag(const fs::path& path) {

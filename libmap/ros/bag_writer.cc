@@ -3,7 +3,9 @@
 #include <rosbag/bag.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <cmath>
+#include <cstring>
 #include <memory>
 #include <set>
 #include <vector>
@@ -105,17 +107,19 @@ class BagFile {
   std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
 };
 
-// librosbag's exceptions as Errors: only the disk can fail it.
+// librosbag's exceptions as Errors: only the disk can fail it, and the system knows how.
 template <typename Write>
 void write_bag_file(const fs::path& path, BagCompression compression, const Write& write) {
+  errno = 0;
   try {
     BagFile bag;
     bag.open(path, compression);
     write(bag);
     bag.close();
   } catch (const rosbag::BagException& error) {
-    throw Error(std::string("cannot be written: ") + error.what(), {.file = path.string()},
-                ErrorKind::failed);
+    throw Error(
+        std::string("cannot be written: ") + (errno == 0 ? error.what() : std::strerror(errno)),
+        {.file = path.string()}, ErrorKind::failed);
   }
 }
 

@@ -12,7 +12,7 @@
 
 namespace libmap {
 
-enum class BagCompression { none, bz2, lz4 };
+enum class BagCompression { none, bz2, lz4 };  // of a bag's chunks
 const std::vector<std::pair<std::string, BagCompression>>& bag_compression_names();
 
 struct BagContent {

@@ -55,7 +55,7 @@ void set_units(std::size_t pixel, std::uint16_t value, const DepthUnits& units, 
 
 template <typename T>
 T value_at(const char* bytes, bool swapped) {
-  char ordered[sizeof(T)];
+  char ordered[sizeof(T)] = {};
   for (std::size_t n = 0; n < sizeof(T); ++n) ordered[n] = bytes[swapped ? sizeof(T) - 1 - n : n];
   T value;
   std::memcpy(&value, ordered, sizeof(T));

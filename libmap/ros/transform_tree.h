@@ -19,8 +19,8 @@ class TransformTree {
   void add(const std::string& parent, const std::string& child, const Pose& parent_from_child);
 
   bool empty() const { return frames_.empty(); }
-  bool has(const std::string& frame) const;
-  std::vector<std::string> frames() const;  // ascending
+  bool has(const std::string& frame) const;  // whether the tree knows the frame
+  std::vector<std::string> frames() const;   // ascending
 
   // The frame that hangs on no other, above `frame`. Throws Error: an unknown frame (with the
   // nearest known one), or one that hangs on itself.

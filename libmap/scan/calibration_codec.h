@@ -13,6 +13,7 @@
 
 namespace libmap {
 
+// How Data.calibration is laid out, by the version of RTAB-Map that wrote it.
 enum class CalibrationLayout {
   records,           // 0.18.0 on: a record for each camera or stereo pair
   floats_with_size,  // 0.11.2 to 0.17: fx fy cx cy [baseline] width height L, float32

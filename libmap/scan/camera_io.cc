@@ -13,6 +13,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/core/yaml_document.h"
 
 namespace libmap {
 
@@ -188,15 +189,9 @@ std::string quoted(const std::string& text) {
 }  // namespace
 
 CameraFile parse_camera(const std::string& text, const std::string& file) {
-  try {
-    return camera_of(YAML::Load(text));
-  } catch (const YAML::Exception& error) {
-    const std::string place =
-        error.mark.is_null() ? "" : "line " + std::to_string(error.mark.line + 1);
-    throw Error("not valid YAML: " + error.msg, {.file = file, .field = place});
-  } catch (const Error& error) {
-    throw error.in_file(file);
-  }
+  CameraFile camera;
+  read_yaml(text, file, [&](const YAML::Node& root) { camera = camera_of(root); });
+  return camera;
 }
 
 CameraFile read_camera(const std::filesystem::path& path) {

@@ -26,7 +26,7 @@ void bind(ParameterTable& table, ColmapBuilderOptions& options);
 // construction (ERROR is -1: not known). Images with equal cameras share one.
 class ColmapBuilder {
  public:
-  explicit ColmapBuilder(const ColmapBuilderOptions& options = {});
+  explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model
 
   // Image ids count from 1 in this order. Without depth the image gets neither points nor features.
   // Throws Error: COLMAP has no such camera, the pose is not finite.

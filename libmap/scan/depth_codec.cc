@@ -15,10 +15,8 @@ namespace {
 
 constexpr std::string_view rvl_signature = "DEPTHRVL";
 constexpr std::size_t rvl_header_bytes = 16;
-constexpr std::uint64_t max_pixels = std::uint64_t{1} << 27;
-// A larger image must hold something: at most that many pixels a byte.
-constexpr std::uint64_t always_allowed_pixels = std::uint64_t{1} << 24;
-constexpr std::uint64_t rvl_pixels_per_byte = 64;
+// 4096 x 4096. A few bytes can stand for that many zeros.
+constexpr std::uint64_t max_pixels = std::uint64_t{1} << 24;
 constexpr std::uint16_t no_measurement = 65535;
 
 std::uint32_t uint32_at(std::string_view bytes, std::size_t at) {
@@ -97,17 +95,22 @@ class NibbleWriter {
   int count_ = 0;
 };
 
+void check_size(std::uint64_t columns, std::uint64_t rows) {
+  if (columns <= max_pixels && rows <= max_pixels && columns * rows <= max_pixels &&
+      (columns == 0) == (rows == 0))
+    return;
+  throw Error("depth image of no valid size",
+              {.file = {},
+               .field = "image size",
+               .value = std::to_string(columns) + " x " + std::to_string(rows),
+               .bound = "<= " + std::to_string(max_pixels) + " pixels"});
+}
+
 DepthInfo rvl_info(std::string_view bytes) {
   if (bytes.size() < rvl_header_bytes) throw Error("RVL ends in its header");
   const std::uint32_t columns = uint32_at(bytes, 8);
   const std::uint32_t rows = uint32_at(bytes, 12);
-  if (std::uint64_t{columns} * rows > max_pixels || columns > max_pixels || rows > max_pixels ||
-      (columns == 0) != (rows == 0))
-    throw Error("RVL of no valid size",
-                {.file = {},
-                 .field = "image size",
-                 .value = std::to_string(columns) + " x " + std::to_string(rows),
-                 .bound = "<= " + std::to_string(max_pixels) + " pixels"});
+  check_size(columns, rows);
   return {DepthFormat::rvl, static_cast<int>(columns), static_cast<int>(rows)};
 }
 
@@ -136,6 +139,7 @@ std::optional<DepthInfo> read_depth_info(std::string_view bytes) {
   if (bytes.starts_with(rvl_signature)) return rvl_info(bytes);
   const std::optional<ImageInfo> info = read_image_info(bytes);
   if (!info || info->format != ImageFormat::png) return std::nullopt;
+  check_size(static_cast<std::uint64_t>(info->width), static_cast<std::uint64_t>(info->height));
   if (info->channels == 1 && info->bits == 16)
     return DepthInfo{DepthFormat::png16, info->width, info->height};
   if (info->channels == 4 && info->bits == 8)
@@ -164,9 +168,6 @@ MillimetreImage decode_rvl(std::string_view bytes) {
   const DepthInfo info = rvl_info(bytes);
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);
-  if (pixels > always_allowed_pixels && pixels > rvl_pixels_per_byte * bytes.size())
-    throw Error("RVL of more pixels than its " + std::to_string(bytes.size()) + " bytes can hold",
-                {.file = {}, .field = "pixels", .value = std::to_string(pixels)});
   NibbleReader reader(bytes.substr(rvl_header_bytes));
   MillimetreImage image(info.width, info.height);
   std::uint64_t at = 0;
@@ -204,8 +205,7 @@ std::string encode_rvl(const MillimetreImage& image) {
     writer.number(static_cast<std::uint32_t>(last - first));
     for (at = first; at != last; ++at) {
       const std::int32_t delta = *at - previous;
-      writer.number((static_cast<std::uint32_t>(delta) << 1) ^
-                    static_cast<std::uint32_t>(delta >> 31));
+      writer.number((static_cast<std::uint32_t>(delta) << 1) ^ (delta < 0 ? 0xFFFFFFFFU : 0U));
       previous = *at;
     }
   }

@@ -14,8 +14,8 @@ namespace libmap {
 
 using MillimetreImage = Image<std::uint16_t>;  // 0 and 65535: nothing was measured
 
-enum class DepthFormat { rvl, png16, float_png };
-std::string to_text(DepthFormat format);  // "RVL", "16-bit PNG", "float PNG"
+enum class DepthFormat { rvl, png16, float_png };  // how a depth image is stored
+std::string to_text(DepthFormat format);           // "RVL", "16-bit PNG", "float PNG"
 
 struct DepthInfo {
   DepthFormat format = DepthFormat::rvl;

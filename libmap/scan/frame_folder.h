@@ -32,6 +32,7 @@
 
 namespace libmap {
 
+// What a file of poses moves: the camera's optical frame, or the base.
 enum class PoseFrame { camera, base };
 const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names();
 
@@ -87,6 +88,8 @@ class FrameFolder : public ScanSource {
   std::vector<std::string> warnings_;
 };
 
+// The folder as a scan; `defaults` stand where it has no scan.yaml. Throws Error naming the file
+// that is missing or broken.
 std::unique_ptr<ScanSource> open_frame_folder(const std::filesystem::path& path,
                                               const FrameFolderOptions& defaults = {});
 

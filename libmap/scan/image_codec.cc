@@ -16,7 +16,6 @@ namespace libmap {
 
 namespace {
 
-constexpr std::int64_t max_pixels = std::int64_t{1} << 27;
 // A smaller image is never refused for its number of bytes.
 constexpr std::int64_t always_allowed_pixels = std::int64_t{1} << 18;
 // deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
@@ -36,7 +35,7 @@ std::string size_text(std::int64_t width, std::int64_t height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-void check_size(const ImageInfo& info, std::size_t bytes) {
+void check_size(const ImageInfo& info, std::size_t bytes, std::int64_t max_pixels) {
   const std::int64_t pixels = std::int64_t{info.width} * info.height;
   const std::string text = size_text(info.width, info.height) + " pixels";
   if (pixels > max_pixels)
@@ -122,11 +121,11 @@ std::optional<ImageInfo> jpeg_info(std::string_view bytes) {
   return std::nullopt;
 }
 
-ImageInfo checked_info(std::string_view bytes) {
+ImageInfo checked_info(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels) {
   const std::optional<ImageInfo> info = read_image_info(bytes);
   if (!info)
     throw Error("image ends in its header, after " + std::to_string(bytes.size()) + " bytes");
-  check_size(*info, bytes.size());
+  check_size(*info, bytes.size(), max_pixels);
   return *info;
 }
 
@@ -341,8 +340,8 @@ std::optional<ImageInfo> read_image_info(std::string_view bytes) {
   return *format == ImageFormat::jpeg ? jpeg_info(bytes) : png_info(bytes);
 }
 
-ColorImage decode_color(std::string_view bytes) {
-  const ImageInfo info = checked_info(bytes);
+ColorImage decode_color(std::string_view bytes, std::int64_t max_pixels) {
+  const ImageInfo info = checked_info(bytes, max_pixels);
   if (info.format == ImageFormat::png) return decode_png_as<Color>(bytes, info, PngWanted::color);
   ColorImage image(info.width, info.height);
   decode_jpeg(bytes, info, TJPF_RGB, image.pixels.data()->data());

@@ -78,7 +78,7 @@ void read_info(LaserScan& scan, std::string_view info) {
   constexpr std::size_t pose_bytes = 48;
   if (info.empty()) return;
   std::vector<float> numbers(info.size() / sizeof(float));
-  std::memcpy(numbers.data(), info.data(), numbers.size() * sizeof(float));
+  if (!numbers.empty()) std::memcpy(numbers.data(), info.data(), numbers.size() * sizeof(float));
   float points = 0;
   if (info.size() == 76) {
     scan.format = format_of(numbers[0]);

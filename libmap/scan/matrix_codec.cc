@@ -12,7 +12,7 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t trailer_bytes = 12;
-constexpr std::uint64_t max_bytes = std::uint64_t{1} << 30;
+constexpr std::uint64_t max_bytes = std::uint64_t{1} << 28;
 // deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
 constexpr std::uint64_t deflate_ratio = 1032;
 constexpr int max_channels = 512;  // OpenCV's

@@ -46,7 +46,7 @@ DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 struct RigMoment {
   double stamp_s = 0.0;
   struct Camera {
-    enum class State { seen, late, missing };
+    enum class State { seen, late, missing };  // of its image at this moment
     State state = State::missing;  // late: the nearest image is outside the tolerance; missing: the
                                    // camera has no image at all
     std::size_t image = 0;         // index of its image nearest to stamp_s, unless missing
@@ -54,7 +54,7 @@ struct RigMoment {
   };
   std::vector<Camera> cameras{};  // one for each of the rig
 
-  std::size_t seen() const;
+  std::size_t seen() const;  // how many cameras have an image of this moment
 };
 
 // What the cameras saw at `stamp_s`: of each camera the image nearest in time, the earlier of two

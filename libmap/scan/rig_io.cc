@@ -11,6 +11,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/core/yaml_document.h"
 #include "libmap/scan/camera_io.h"
 
 namespace libmap {
@@ -226,15 +227,10 @@ void CameraRig::check() const {
 }
 
 CameraRig parse_rig(const std::string& text, const std::string& file) {
-  try {
-    return rig_of(YAML::Load(text), fs::path(file).parent_path());
-  } catch (const YAML::Exception& error) {
-    const std::string place =
-        error.mark.is_null() ? "" : "line " + std::to_string(error.mark.line + 1);
-    throw Error("not valid YAML: " + error.msg, {.file = file, .field = place});
-  } catch (const Error& error) {
-    throw error.in_file(file);
-  }
+  CameraRig rig;
+  read_yaml(text, file,
+            [&](const YAML::Node& root) { rig = rig_of(root, fs::path(file).parent_path()); });
+  return rig;
 }
 
 CameraRig read_rig(const fs::path& path) {

@@ -13,9 +13,11 @@ class SqliteFile;
 
 class RtabmapColumns {
  public:
+  // Reads the schema. Throws Error if the file holds none.
   explicit RtabmapColumns(const SqliteFile& file);
 
   bool has_table(const std::string& table) const { return columns_.contains(table); }
+  // Whether the table is there and has the column.
   bool has(const std::string& table, const std::string& column) const;
   // `column` where the table has it, else "NULL", for a query's list.
   std::string or_null(const std::string& table, const std::string& column) const;

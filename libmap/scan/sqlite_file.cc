@@ -97,6 +97,8 @@ struct SqliteFile::Connection {
     database.exec(
         "PRAGMA trusted_schema = OFF; PRAGMA query_only = ON; PRAGMA temp_store = MEMORY");
     if (mode.exclusive) database.exec("PRAGMA locking_mode = EXCLUSIVE");
+    // Else a -wal without a sound frame is deleted when the connection closes.
+    sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   }
 
   SQLite::Database database;
@@ -159,14 +161,16 @@ void SqliteFile::copy_to(const fs::path& target) const {
   write_text(target, {});
   try {
     SQLite::Database copy(target.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
+    // The copy is of use as a whole only: nothing to roll back to, no journal to leave.
+    copy.exec("PRAGMA journal_mode = OFF; PRAGMA synchronous = OFF;");
     if (SQLite::Backup(copy, connection_->database).executeStep() != SQLITE_DONE)
       throw Error("another program keeps writing to it", {.file = path_.string()},
                   ErrorKind::failed);
     // The copy of a file in WAL mode would call for a -wal of its own.
     copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = DELETE;");
   } catch (const SQLite::Exception& error) {
-    throw Error("cannot be copied to " + target.string() + ": " + error.what(),
-                {.file = path_.string()}, ErrorKind::failed);
+    throw Error(std::string("cannot be written: ") + error.what(), {.file = target.string()},
+                ErrorKind::failed);
   }
 }
 

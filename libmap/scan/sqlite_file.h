@@ -16,11 +16,11 @@ class SqliteRow {
  public:
   explicit SqliteRow(const void* statement) : statement_(statement) {}
 
-  bool is_null(int column) const;
-  std::int64_t integer(int column) const;
-  double real(int column) const;        // NaN where NULL
-  std::string bytes(int column) const;  // of a blob or a text
-  bool is_text(int column) const;
+  bool is_null(int column) const;          // of the row's column, counted from 0
+  std::int64_t integer(int column) const;  // 0 where NULL
+  double real(int column) const;           // NaN where NULL
+  std::string bytes(int column) const;     // of a blob or a text
+  bool is_text(int column) const;          // neither number, blob nor NULL
 
  private:
   const void* statement_;

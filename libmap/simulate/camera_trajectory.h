@@ -32,7 +32,7 @@ struct CameraTrajectoryOptions {
   double tremor_deg = 1.0;        // and of its turns about each axis
   double frame_interval_s = 1.0;  // between two poses
 
-  void check() const;
+  void check() const;  // throws Error naming the first field that cannot be
 };
 // All but the target.
 void bind(ParameterTable& table, CameraTrajectoryOptions& options);

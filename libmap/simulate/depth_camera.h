@@ -77,7 +77,7 @@ struct DepthSensorOptions {
   double flying_pixels = 0.35;      // share of the edge pixels that lie between front and back
   double edge_dropouts = 0.35;      // share of the edge pixels that give nothing
 
-  void check() const;
+  void check() const;  // throws Error naming the first field that cannot be
 };
 void bind(ParameterTable& table, DepthSensorOptions& options);
 // All but step and limits.
@@ -102,6 +102,7 @@ struct PhotoOptions {
 };
 void bind(ParameterTable& table, PhotoOptions& options);
 
+// The photograph of the view: shaded texture, vignetting, noise drawn from `seed`.
 ColorImage take_photo(const SurfaceView& view, const PhotoOptions& options, std::uint64_t seed);
 
 }  // namespace libmap

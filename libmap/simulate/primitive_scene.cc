@@ -5,7 +5,6 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/simulate/scene_geometry.h"
 
 namespace libmap {
 
@@ -157,14 +156,6 @@ PrimitiveScene thesis_primitive_scene() {
     scene.shapes.push_back(
         {Cone{0.15, cone_heights_m[i]}, {.x_m = columns_m[i], .y_m = 1.0}, "cone"});
   return scene;
-}
-
-std::optional<SurfaceTruth> truth_from_above(const PrimitiveScene& scene, double x_m, double y_m) {
-  return SceneGeometry(scene).from_above(x_m, y_m);
-}
-
-double signed_distance(const PrimitiveScene& scene, const Eigen::Vector3d& point) {
-  return SceneGeometry(scene).signed_distance(point);
 }
 
 }  // namespace libmap

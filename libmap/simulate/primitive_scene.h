@@ -11,7 +11,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <string>
 #include <variant>
 #include <vector>
@@ -80,7 +79,7 @@ struct Placement {
   double pitch_deg = 0.0;
   double yaw_deg = 0.0;
   bool operator==(const Placement&) const = default;
-  Pose pose() const;
+  Pose pose() const;  // scene_from_shape
 };
 
 struct SceneShape {
@@ -121,13 +120,5 @@ struct SurfaceTruth {
   int shape = 0;        // index in the scene; on the ground within a bump's radius, the bump that
                         // lifts or lowers the ground most there
 };
-
-// The highest surface point on the vertical line through (x, y), or nothing. For many queries on
-// one scene, SceneGeometry (scene_geometry.h) reads it once.
-std::optional<SurfaceTruth> truth_from_above(const PrimitiveScene& scene, double x_m, double y_m);
-
-// Signed distance to the nearest solid, negative inside: exact for each solid and outside their
-// union, a lower bound of the depth inside several; on bent ground it is of first order.
-double signed_distance(const PrimitiveScene& scene, const Eigen::Vector3d& point);
 
 }  // namespace libmap

@@ -7,6 +7,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/core/yaml_document.h"
 
 namespace libmap {
 
@@ -96,14 +97,9 @@ PrimitiveScene parse_root(const YAML::Node& root) {
 }  // namespace
 
 PrimitiveScene parse_scene(const std::string& text, const std::string& file) {
-  try {
-    return parse_root(YAML::Load(text));
-  } catch (const Error& error) {
-    throw error.in_file(file);
-  } catch (const YAML::Exception& error) {
-    throw Error("not valid YAML: " + error.msg,
-                {.file = file, .field = "line " + std::to_string(error.mark.line + 1)});
-  }
+  PrimitiveScene scene;
+  read_yaml(text, file, [&](const YAML::Node& root) { scene = parse_root(root); });
+  return scene;
 }
 
 PrimitiveScene load_scene(const std::filesystem::path& path) {

@@ -44,7 +44,7 @@ struct SiteRock {
   std::uint64_t seed = 0;     // of its form and colours
 };
 
-enum class GroundTexture { soil, rock, panel };
+enum class GroundTexture { soil, rock, panel };  // the colours of the ground
 const std::vector<std::pair<std::string, GroundTexture>>& ground_texture_names();
 
 struct SiteGround {
@@ -102,11 +102,11 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 // Height of the ground at a point of its own frame: bumps and random relief.
 class GroundRelief {
  public:
-  explicit GroundRelief(const RockSite& site);
+  explicit GroundRelief(const RockSite& site);  // of the site's ground, drawn from its seed
   ~GroundRelief();
   GroundRelief(const GroundRelief&) = delete;
   GroundRelief& operator=(const GroundRelief&) = delete;
-  double height(double x_m, double y_m) const;
+  double height(double x_m, double y_m) const;  // metres above the ground's plane
 
  private:
   struct Parts;

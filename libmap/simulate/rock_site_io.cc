@@ -8,6 +8,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/core/yaml_document.h"
 #include "libmap/simulate/solid_noise.h"
 
 namespace libmap {
@@ -155,14 +156,9 @@ void emit(YAML::Emitter& yaml, const ParameterTable& table) {
 
 RockSite parse_site(const std::string& text, const std::string& file,
                     std::optional<std::uint64_t> seed) {
-  try {
-    return parse_root(YAML::Load(text), seed);
-  } catch (const Error& error) {
-    throw error.in_file(file);
-  } catch (const YAML::Exception& error) {
-    throw Error("not valid YAML: " + error.msg,
-                {.file = file, .field = "line " + std::to_string(error.mark.line + 1)});
-  }
+  RockSite site;
+  read_yaml(text, file, [&](const YAML::Node& root) { site = parse_root(root, seed); });
+  return site;
 }
 
 RockSite load_site(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {

@@ -48,8 +48,9 @@ class SceneGeometry {
   const SceneSolid* ground() const { return ground_ < 0 ? nullptr : &solids_[index(ground_)]; }
   bool has_bumps() const { return !bumps_.empty(); }
 
-  GroundHeight ground_height(double x, double y) const;
+  GroundHeight ground_height(double x, double y) const;  // of the ground at (x, y), bumps included
 
+  // To the surface of one solid, or of all together: negative inside.
   double signed_distance(const SceneSolid& solid, const Eigen::Vector3d& point) const;
   double signed_distance(const Eigen::Vector3d& point) const;
 
@@ -66,6 +67,7 @@ class SceneGeometry {
   bool is_hidden_by(const SceneSolid& solid, const SceneSolid& other,
                     const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const;
 
+  // The topmost surface at (x, y); nothing where there is none.
   std::optional<SurfaceTruth> from_above(double x, double y) const;
 
  private:

@@ -17,15 +17,19 @@ struct ProfileSegment {
   double angle_start = 0.0;  // from the +a direction, radians
   double angle_end = 0.0;
 
+  // A straight segment; an arc about (centre_a, 0).
   static ProfileSegment line(Eigen::Vector2d start, Eigen::Vector2d end);
   static ProfileSegment arc(double centre_a, double radius, double angle_start, double angle_end);
 
-  double length() const;
-  double area() const;  // turned once about the axis
+  double length() const;  // of the segment, in metres
+  double area() const;    // turned once about the axis
+  // The part of area() between two places, t0 <= t1.
   double area_between(double t0, double t1) const;
   Eigen::Vector2d point(double t) const;  // t from 0 to 1 along the length
+  // Outward unit normal at a point of the segment.
   Eigen::Vector2d normal_at(const Eigen::Vector2d& point) const;
   double curvature_along() const;  // of the profile itself
+  // Of the surface in the direction round the axis (Meusnier).
   double curvature_around(const Eigen::Vector2d& point) const;
   // t such that the part of the area between t0 and t1 that lies before it is `share`.
   double t_of_area_share(double t0, double t1, double share) const;

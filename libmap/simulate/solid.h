@@ -37,7 +37,7 @@ struct HeightGrid {
   std::size_t columns = 0;  // of points
   std::size_t rows = 0;
   std::vector<double> heights_m;
-  Eigen::Vector2d at(std::size_t column, std::size_t row) const;
+  Eigen::Vector2d at(std::size_t column, std::size_t row) const;  // x and y of a grid point
 };
 Solid block_solid(const HeightGrid& top, double base_m);
 

@@ -1,5 +1,7 @@
 #include "libmap/view/charts.h"
 
+#include <sys/mman.h>
+#include <unistd.h>
 #include <vtkAxis.h>
 #include <vtkBrush.h>
 #include <vtkChartLegend.h>
@@ -22,6 +24,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <charconv>
 #include <cmath>
 #include <cstring>
@@ -340,20 +343,34 @@ class PlainLocale {
   std::locale before_;
 };
 
-// The text of an SVG file that VTK makes beside `path`.
-std::string exported_svg(const std::filesystem::path& path, const Chart& chart,
-                         vtkRenderWindow* window) {
+// A file in memory: VTK does not say when the disk is full.
+class MemoryFile {
+ public:
+  MemoryFile() : descriptor_(memfd_create("graspmap", MFD_CLOEXEC)) {
+    if (descriptor_ < 0)
+      throw Error(std::string("no file in memory: ") + std::strerror(errno), {}, ErrorKind::failed);
+  }
+  ~MemoryFile() { close(descriptor_); }
+  MemoryFile(const MemoryFile&) = delete;
+  MemoryFile& operator=(const MemoryFile&) = delete;
+  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
+
+ private:
+  int descriptor_;
+};
+
+std::string exported_svg(const Chart& chart, vtkRenderWindow* window) {
   const PlainLocale plain;
-  const OutputFile scratch(path);  // never committed
+  const MemoryFile file;
   vtkNew<vtkSVGExporter> exporter;
   exporter->SetRenderWindow(window);
   exporter->SetTitle(chart.title.c_str());
   exporter->SetDescription(description(chart).c_str());
   // VTK's own text elements come out displaced, in points for pixels, and turned the wrong way.
   exporter->SetTextAsPath(true);
-  exporter->SetFileName(scratch.temporary_path().c_str());
+  exporter->SetFileName(file.path().c_str());
   exporter->Write();
-  return read_whole_file(scratch.temporary_path());
+  return read_whole_file(file.path());
 }
 
 // VTK 9.1 defines the frame that clips the curves only where it defines markers as well.
@@ -403,7 +420,7 @@ ColorImage draw_chart(const Chart& chart, const ChartSize& size) {
 
 void write_chart_svg(const std::filesystem::path& path, const Chart& chart, const ChartSize& size) {
   ChartView view(chart, size);
-  write_whole_file(path, with_clipping_frame(exported_svg(path, chart, view.render()), size));
+  write_text(path, with_clipping_frame(exported_svg(chart, view.render()), size));
 }
 
 Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title) {

@@ -39,6 +39,7 @@ struct ChartAxis {
   std::optional<std::pair<double, double>> range;  // default: round numbers around the data
 };
 
+// Where the legend stands in the chart.
 enum class LegendCorner { none, top_left, top_right, bottom_left, bottom_right };
 
 struct Chart {
@@ -59,8 +60,10 @@ struct ChartSize {
   int height_px = 700;
 };
 
+// The chart as a picture. Throws Error as Chart::check does.
 ColorImage draw_chart(const Chart& chart, const ChartSize& size = {});
 
+// The same as an SVG file at `path`.
 void write_chart_svg(const std::filesystem::path& path, const Chart& chart,
                      const ChartSize& size = {});
 

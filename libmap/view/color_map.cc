@@ -95,7 +95,8 @@ std::vector<double> values_of(const ColorSource& source, const std::string& name
   return values;
 }
 
-// The 2nd and the 98th percentile, by nearest rank; of a diverging scale as far below 0 as above.
+// The 2nd and the 98th percentile, by nearest rank, or all values where these two are equal; of a
+// diverging scale as far below 0 as above.
 std::pair<double, double> percentile_range(std::vector<double> values, ColorScale scale) {
   std::erase_if(values, [](double value) { return !std::isfinite(value); });
   if (values.empty()) return {0.0, 0.0};
@@ -107,8 +108,14 @@ std::pair<double, double> percentile_range(std::vector<double> values, ColorScal
     std::nth_element(values.begin(), values.begin() + rank, values.end());
     return values[static_cast<std::size_t>(rank)];
   };
-  if (scale == ColorScale::diverging) return {-at(0.98), at(0.98)};
-  return {at(0.02), at(0.98)};
+  // Where nearly all values are equal the few others shall be seen: of a flag, say.
+  const auto [least, greatest] = std::ranges::minmax(values);
+  if (scale == ColorScale::diverging) {
+    const double end = at(0.98) > 0.0 ? at(0.98) : greatest;
+    return {-end, end};
+  }
+  if (const std::pair ends{at(0.02), at(0.98)}; ends.first < ends.second) return ends;
+  return {least, greatest};
 }
 
 // Whites the points below the plane and says so in the legend; tells of missing values too.

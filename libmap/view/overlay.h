@@ -13,7 +13,7 @@ class vtkRenderer;
 
 namespace libmap {
 
-enum class TextAlign { left, center, right };
+enum class TextAlign { left, center, right };  // on which side of its point a text stands
 
 struct TextStyle {
   int size_px = 12;
@@ -33,6 +33,7 @@ std::string shortened_text(const std::string& text, const TextStyle& style, doub
 // left corner of the picture.
 class Overlay {
  public:
+  // Filled shapes and a line, in pixels; later ones lie over earlier ones.
   void rectangle(const PixelRect& rect, const Color& color, std::uint8_t opacity = 255);
   void disc(const Eigen::Vector2d& center, double radius_px, const Color& color);
   void line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width_px,

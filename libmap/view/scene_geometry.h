@@ -44,6 +44,8 @@ struct PointSpacing {
   bool lattice = false;
   bool gaps = false;  // cells of a surface on the lattice are empty; always where there is none
 };
+// From the points themselves: their lattice, if they lie on one, else the median distance of
+// nearest neighbours.
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);
 
 struct ColoredTriangles {

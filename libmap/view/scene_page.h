@@ -38,6 +38,7 @@ std::string length_text(double length_m);
 // Pixels that legends one below the other take, wide and high.
 Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px);
 
+// Title, legends and axes at their places on the page.
 void draw_title(const ScenePage& page, const std::string& title, Overlay& overlay);
 void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Overlay& overlay);
 void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overlay);

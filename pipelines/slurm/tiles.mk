@@ -30,6 +30,9 @@ ifneq ($(shell test '$(SHARES)' -ge 1 2>/dev/null && echo yes),yes)
   $(error SHARES is '$(SHARES)': it must be a whole number >= 1)
 endif
 
+include $(here)../one_run.mk
+ifdef is_alone
+
 # Tasks run in the folder of their submission; paths are made whole all the same.
 program := $(shell command -v $(GRASPMAP))
 terrain := $(abspath $(TERRAIN))
@@ -63,4 +66,5 @@ $(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
 	@touch -c $@
 
 $(OUT)/map.pcd: $(store)/index.json
-	@$(program) merge $(store) -o $@
+	@exec $(program) merge $(store) -o $@
+endif

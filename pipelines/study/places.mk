@@ -26,7 +26,7 @@ define column
 $(folder_$(1))/$(2)/places/$(3).csv: $(folder_$(1))/$(2)/$(4)/map.pcd $(7) \
     $(folder_$(1))/$(2)/looked_up_with
 	@mkdir -p $$(@D)
-	@$$(GRASPMAP) lookup $$(wordlist 1,2,$$^) -o $$@ --points-frame map $(look_$(5)_$(1)) \
+	@exec $$(GRASPMAP) lookup $$(wordlist 1,2,$$^) -o $$@ --points-frame map $(look_$(5)_$(1)) \
 	  $(6) --column '$(3)=$($(5)_$(1))' --quiet
 endef
 
@@ -50,7 +50,7 @@ $(foreach n,$(sites),$(foreach method,$(METHODS),$(eval $(call places,$(n),$(met
 # Method.
 define wall_evaluation
 $(folder_3)/$(1)/evaluation/accuracy.csv: $(folder_3)/$(1)/table.csv
-	@$$(GRASPMAP) evaluate $$< -o $$(@D) --label prescan --title 'against the pre-scanned map' \
+	@exec $$(GRASPMAP) evaluate $$< -o $$(@D) --label prescan --title 'against the pre-scanned map' \
 	  --score prescan_combined,realtime_raw,realtime_interpolated,realtime_combined --quiet
 results += $(folder_3)/$(1)/evaluation/accuracy.csv
 endef

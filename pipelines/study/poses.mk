@@ -21,25 +21,26 @@ $(eval $(call stamp,$(folder_poses)/posed_with,$(METHODS) $(poses)))
 define pose
 $(folder_poses)/$(1)/panorama.pcd: $(ground_4) $(folder_4)/seen_with
 	@mkdir -p $$(@D)
-	@$$(GRASPMAP) simulate cameras $$< $(pose_4) \
+	@exec $$(GRASPMAP) simulate cameras $$< $(pose_4) \
 	  $(call turn_$(call direction_of,$(1)),$(call angle_of,$(1))) $$(SENSOR) $$(CAMERAS) \
 	  --seed $$(SEED) -o $$(@D)/cameras --quiet
-	@$$(GRASPMAP) panorama $$(@D)/cameras -o $$@ $$(PANORAMA) --quiet
+	@exec $$(GRASPMAP) panorama $$(@D)/cameras -o $$@ $$(PANORAMA) --quiet
 endef
 $(foreach one,$(poses),$(eval $(call pose,$(one))))
 
 # Pose, method, the table before it: a map, a row of planes.csv, a column of places_METHOD.csv.
 define plane_of_pose
 $(folder_poses)/$(1)/$(2).pcd: $(folder_poses)/$(1)/panorama.pcd
-	@$$(GRASPMAP) score $$< -o $$@ --config artificial_rocks_realtime --method $(2) \
+	@exec $$(GRASPMAP) score $$< -o $$@ --config artificial_rocks_realtime --method $(2) \
 	  --no-interpolation --curvature-radius 0 --quiet
 $(folder_poses)/$(1)/$(2).csv: $(folder_poses)/$(1)/$(2).pcd
 	@set -- $$$$($$(GRASPMAP) info $$< | \
 	  sed -n 's/^points: //p;s/^ *tilt_from_map_z_deg: //p') && \
-	  printf '%s,%s,%s,%s,%.2f\n' $(call direction_of,$(1)) $(call angle_of,$(1)) $(2) $$$$1 $$$$2 > $$@
+	  printf '%s,%s,%s,%s,%.2f\n' $(call direction_of,$(1)) $(call angle_of,$(1)) $(2) $$$$1 $$$$2 \
+	  > $$@.partial && mv $$@.partial $$@
 $(folder_poses)/$(1)/places_$(2).csv: $(folder_poses)/$(1)/$(2).pcd $(3) \
     $(folder_4)/$(2)/looked_up_with
-	@$$(GRASPMAP) lookup $$(wordlist 1,2,$$^) -o $$@ --points-frame map $$(LOOKUP) --quiet \
+	@exec $$(GRASPMAP) lookup $$(wordlist 1,2,$$^) -o $$@ --points-frame map $$(LOOKUP) --quiet \
 	  --visible $$(@D)/panorama.pcd --column '$(1)=score'
 endef
 $(foreach method,$(METHODS),\
@@ -54,9 +55,10 @@ $(addprefix $(folder_poses)/places_,$(addsuffix .csv,$(METHODS))):
 
 $(folder_poses)/planes.csv: $(folder_poses)/posed_with \
     $(foreach one,$(poses),$(foreach method,$(METHODS),$(folder_poses)/$(one)/$(method).csv))
-	@echo direction,inclination_deg,method,voxels,plane_to_ground_deg > $@
-	@cat $(filter %.csv,$^) >> $@
-	@cat $@
+	@echo direction,inclination_deg,method,voxels,plane_to_ground_deg > $@.partial
+	@cat $(filter %.csv,$^) >> $@.partial
+	@cat $@.partial
+	@mv $@.partial $@
 results += $(folder_poses)/planes.csv \
   $(addprefix $(folder_poses)/places_,$(addsuffix .csv,$(METHODS)))
 endif

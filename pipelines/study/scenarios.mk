@@ -8,7 +8,7 @@
 # points, their frame, further flags of score.
 define map
 $(1)/map.pcd: $(2) $(6) FORCE
-	@$$(MAKE) --no-print-directory -s -f $(here)site.mk SITE=$(strip $(2)) SCENARIO=$(strip $(3)) \
+	@exec $$(MAKE) --no-print-directory -s -f $(here)site.mk SITE=$(strip $(2)) SCENARIO=$(strip $(3)) \
 	  METHOD=$(strip $(4)) POINTS=$(strip $(6)) POINTS_FRAME=$(strip $(7)) SCORE='$(strip $(8))' OUT=$(1) \
 	  SHARES=$(SHARES) GRASPMAP=$(GRASPMAP) TITLE='$(strip $(5))'
 results += $(1)/map.pcd
@@ -17,7 +17,7 @@ endef
 # A picture: picture, what it shows, flags of render, title.
 define picture
 $(1): $(2)
-	@$$(GRASPMAP) render $(2) -o $$@ $(3) --title '$(strip $(4))' --quiet
+	@exec $$(GRASPMAP) render $(2) -o $$@ $(3) --title '$(strip $(4))' --quiet
 results += $(1)
 endef
 
@@ -26,9 +26,9 @@ ifneq ($(filter 1,$(SCENARIOS)),)
 points_1 := $(data)/field_test/primitive_shapes.csv
 $(eval $(call stamp,$(folder_1)/simulated_with,$(SPACING) $(SEED)))
 $(folder_1)/terrain.pcd: $(folder_1)/simulated_with
-	@$(GRASPMAP) simulate scene --spacing $(SPACING) --seed $(SEED) -o $@
+	@exec $(GRASPMAP) simulate scene --spacing $(SPACING) --seed $(SEED) -o $@
 $(folder_1)/scene.ply: | $(folder_1)/simulated_with
-	@$(GRASPMAP) simulate scene --mesh -o $@
+	@exec $(GRASPMAP) simulate scene --mesh -o $@
 $(eval $(call picture,$(folder_1)/scene.png,$(folder_1)/scene.ply,--view oblique --color single,\
   primitive shapes))
 $(foreach method,$(METHODS),$(eval $(call map,$(folder_1)/$(method)/prescan,\
@@ -63,17 +63,17 @@ $(call stamp,$(folder_$(1))/sampled_with,$(crop_$(1)) $(COUNT))
 $(call stamp,$(folder_$(1))/seen_with,$(pose_$(1)) $(SENSOR) $(CAMERAS) $(PANORAMA))
 
 $(folder_$(1))/site/mesh.ply $(folder_$(1))/site/field_points.csv &: $(folder_$(1))/simulated_with
-	@$$(GRASPMAP) simulate site --site $(site_$(1)) --seed $$(SEED) --edge-length $$(EDGE) \
+	@exec $$(GRASPMAP) simulate site --site $(site_$(1)) --seed $$(SEED) --edge-length $$(EDGE) \
 	  -o $(folder_$(1))/site
 $(folder_$(1))/site.ply: $(folder_$(1))/site/mesh.ply $(folder_$(1))/sampled_with
-	@$$(GRASPMAP) crop $$< -o $$@ $(crop_$(1))
+	@exec $$(GRASPMAP) crop $$< -o $$@ $(crop_$(1))
 $(folder_$(1))/terrain.pcd: $(folder_$(1))/site.ply $(folder_$(1))/sampled_with
-	@$$(GRASPMAP) resample $$< -o $$@ --count $$(COUNT) --seed $$(SEED)
+	@exec $$(GRASPMAP) resample $$< -o $$@ --count $$(COUNT) --seed $$(SEED)
 $(folder_$(1))/cameras.json: $(ground_$(1)) $(folder_$(1))/seen_with
-	@$$(GRASPMAP) simulate cameras $$< $(pose_$(1)) $$(SENSOR) $$(CAMERAS) --seed $$(SEED) \
+	@exec $$(GRASPMAP) simulate cameras $$< $(pose_$(1)) $$(SENSOR) $$(CAMERAS) --seed $$(SEED) \
 	  -o $(folder_$(1))/cameras
 $(folder_$(1))/panorama.pcd: $(folder_$(1))/cameras.json
-	@$$(GRASPMAP) panorama $(folder_$(1))/cameras -o $$@ $$(PANORAMA)
+	@exec $$(GRASPMAP) panorama $(folder_$(1))/cameras -o $$@ $$(PANORAMA)
 $(call picture,$(folder_$(1))/site.png,$(folder_$(1))/site.ply,--view oblique --color own,\
 $(subst _, ,$(name_$(1))))
 $(call picture,$(folder_$(1))/panorama.png,$(folder_$(1))/panorama.pcd,--view top --color height,\

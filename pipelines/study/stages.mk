@@ -11,7 +11,7 @@ cases_bouldering_wall := prescan_combined,$(insitu_cases)
 define published
 $(OUT)/published/$(1)/accuracy.csv: $(tables)/$(2)
 	@mkdir -p $(OUT)/published
-	@$$(GRASPMAP) evaluate $$< -o $$(@D) --label $(3) --score $(cases_$(1)) --cutoff $(4) --quiet \
+	@exec $$(GRASPMAP) evaluate $$< -o $$(@D) --label $(3) --score $(cases_$(1)) --cutoff $(4) --quiet \
 	  --title 'published: $(subst _, ,$(1))'
 results += $(OUT)/published/$(1)/accuracy.csv
 endef
@@ -24,14 +24,14 @@ endif
 # --- The threshold study on scenario 1, and the masks on the terrains of all scenarios.
 ifneq ($(and $(filter thresholds,$(STAGES)),$(filter 1,$(SCENARIOS))),)
 $(OUT)/thresholds/thresholds.csv: $(folder_1)/terrain.pcd $(data)/expected/primitive_shapes.csv FORCE
-	@$(MAKE) --no-print-directory -s -f $(here)thresholds.mk OUT=$(@D) SITE=$< \
+	@exec $(MAKE) --no-print-directory -s -f $(here)thresholds.mk OUT=$(@D) SITE=$< \
 	  EXPECTED=$(word 2,$^) METHODS='$(METHODS)' GRASPMAP=$(GRASPMAP) TITLE='primitive shapes'
 results += $(OUT)/thresholds/thresholds.csv
 endif
 ifneq ($(filter masks,$(STAGES)),)
 mask_sites := $(foreach n,$(SCENARIOS),$(name_$(n)):$(folder_$(n))/terrain.pcd)
 $(OUT)/masks/pairs.csv: $(foreach n,$(SCENARIOS),$(folder_$(n))/terrain.pcd) FORCE
-	@$(MAKE) --no-print-directory -s -f $(here)masks.mk OUT=$(@D) SITES='$(mask_sites)' \
+	@exec $(MAKE) --no-print-directory -s -f $(here)masks.mk OUT=$(@D) SITES='$(mask_sites)' \
 	  METHODS='thesis envelope climblab corrected' GRASPMAP=$(GRASPMAP)
 results += $(OUT)/masks/pairs.csv
 endif
@@ -41,4 +41,4 @@ ifneq ($(filter report,$(STAGES)),)
 all: $(OUT)/report.html
 endif
 $(OUT)/report.html: $(data)/reports/study.yaml $(results)
-	@$(GRASPMAP) report $(OUT) --outline study -o $@
+	@exec $(GRASPMAP) report $(OUT) --outline study -o $@

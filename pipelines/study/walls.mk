@@ -14,8 +14,8 @@ $(eval $(call map,$(folder_walls)/surface,$(folder_4)/terrain.pcd,artificial_roc
 $(eval $(call picture,$(folder_walls)/obstacles.png,$(surface_map),--view oblique --color flags,\
   artificial rocks: what cannot be climbed))
 $(folder_walls)/footholds.csv: $(surface_map)
-	@$(GRASPMAP) footholds $< -o $@
+	@exec $(GRASPMAP) footholds $< -o $@
 $(folder_walls)/analysis/summary.json: $(surface_map) $(upright_map)
-	@$(GRASPMAP) analyze $^ -o $(@D)
+	@exec $(GRASPMAP) analyze $^ -o $(@D)
 results += $(folder_walls)/footholds.csv $(folder_walls)/analysis/summary.json
 endif

@@ -1,4 +1,5 @@
-// fuzz_seeds FOLDER: well-formed inputs of every fuzz target, a folder each.
+// fuzz_seeds FOLDER: well-formed inputs of every fuzz target, a folder each. Prints the targets,
+// one a line, and what they read.
 #include <iostream>
 
 #include "tests/fuzz/fuzz_targets.h"
@@ -8,7 +9,9 @@ int main(int argc, char** argv) {
     std::cerr << "usage: fuzz_seeds FOLDER\n";
     return 2;
   }
-  for (const graspmap_fuzz::FuzzTarget& target : graspmap_fuzz::fuzz_targets())
+  for (const graspmap_fuzz::FuzzTarget& target : graspmap_fuzz::fuzz_targets()) {
     graspmap_fuzz::write_seeds(target, std::filesystem::path(argv[1]) / target.name);
+    std::cout << target.name << '\t' << target.reads << '\n';
+  }
   return 0;
 }

@@ -16,15 +16,17 @@ struct FuzzTarget {
   const char* name;
   const char* reads;
   bool (*run)(std::string_view bytes);
+  std::vector<std::string> (*seeds)();  // well-formed inputs, from which a fuzzer begins
 };
 
 inline void PrintTo(const FuzzTarget& target, std::ostream* out) { *out << target.name; }
 
+// By name.
 const std::vector<FuzzTarget>& fuzz_targets();
 // Throws std::out_of_range if there is none of that name.
 const FuzzTarget& fuzz_target(std::string_view name);
 
-// Files of well-formed content for `target`, written into `folder`: a fuzzer begins from them.
+// A file a seed in `folder`, which is made.
 void write_seeds(const FuzzTarget& target, const std::filesystem::path& folder);
 
 }  // namespace graspmap_fuzz

@@ -1,13 +1,25 @@
 #!/bin/sh
-# Every output of the demo's pipelines but pictures has the same bytes for any number of threads and
-# in any locale; manifests but for their section `run`. On smaller inputs; with FULL=1 on those of
-# scripts/demo, each number of threads twice.
+# Every output of the demo's pipelines but pictures has the same bytes for any number of threads, in
+# any locale, wherever it runs and whatever the umask; manifests but for their section `run`. On
+# smaller inputs; with FULL=1 on those of pipelines/demo.mk (DEMO_WITH: variables of make), each number
+# of threads twice, and says whether the pictures agree too.
 . "$(dirname "$0")/check.sh"
 if [ -n "${FULL:-}" ]; then
-  small_site= small_scene= runs='1 1 2 2 8 8'
+  demo_with=${DEMO_WITH:-}
+  runs='1:C 1:de_DE.UTF-8 2:tr_TR.UTF-8 2:C 8:de_DE.UTF-8 8:tr_TR.UTF-8'
 else
-  small_site='FRAMES=8 EDGE=0.03' small_scene='SPACING=0.02' runs='1 2 8'
+  demo_with='FRAMES=8 EDGE=0.03 SPACING=0.02'
+  runs='1:C 2:de_DE.UTF-8 8:tr_TR.UTF-8'
 fi
+
+# Locales that this machine does not have are made for the test.
+for locale in de_DE tr_TR; do
+  if locale -a | grep -qix "$locale.utf-\?8"; then continue; fi
+  mkdir -p "$scratch/locales"
+  localedef -i "$locale" -f UTF-8 "$scratch/locales/$locale.UTF-8" ||
+    fail "there is no locale $locale.UTF-8: install Debian's locales or locales-all"
+  export LOCPATH="$scratch/locales"
+done
 
 # A program that runs graspmap with so many threads where the pipeline does not say how many.
 cat >"$scratch/graspmap" <<END
@@ -19,44 +31,47 @@ exec "$graspmap" "\$@" --threads "\$GRASPMAP_TEST_THREADS"
 END
 chmod +x "$scratch/graspmap"
 
-# SHA-256 of all outputs of the run $1, in the folder's order.
-digest() {
-  (cd "$scratch/$1" && find . -type f ! -name '*.png' | LC_ALL=C sort | while read -r file; do
-    case $file in
-      # As every output is a part of the folder's run, its manifest ends in the section "run".
-      *.json) sed '/^  "run": {/,$d' "$file" | sha256sum | sed "s|-|$file|" ;;
-      *) sha256sum "$file" ;;
-    esac
-  done)
-}
+# A report tells how long the commands took: two of the same folder are the same.
+same_reports() (
+  cd "$1"
+  LC_ALL=C "$graspmap" report out -o one.html --threads 1 --quiet
+  LC_ALL=tr_TR.UTF-8 "$graspmap" report out -o other.html --threads 8 --quiet
+  cmp one.html other.html || fail "the report differs"
+)
 
+pictures_agree=yes
 run() {
-  name=$1
-  GRASPMAP_TEST_THREADS=$2
-  export GRASPMAP_TEST_THREADS
-  # One folder name for every run: manifests hold the inputs' paths.
-  rm -rf "$scratch/out"
-  mkdir "$scratch/out"
+  threads=${1%%:*}
+  locale=${1#*:}
+  number=$2
+  # Manifests hold the inputs' paths: OUT is the same, its place another.
+  folder=$scratch/"place $number"
+  mkdir "$folder" "$scratch/tmp_$number"
+  # shellcheck disable=SC2086 # words
   (
-    cd "$scratch"
-    # shellcheck disable=SC2086 # words
-    make --no-print-directory -f "$source/pipelines/rock_site.mk" OUT=out/rock_site $small_site \
+    cd "$folder"
+    umask "$((number % 2 * 55))"
+    LC_ALL=$locale LANG=$locale TMPDIR=$scratch/tmp_$number GRASPMAP_TEST_THREADS=$threads \
+      make --no-print-directory -f "$source/pipelines/demo.mk" OUT=out $demo_with \
       GRASPMAP="$scratch/graspmap" -j2
-    # shellcheck disable=SC2086 # words
-    make --no-print-directory -f "$source/pipelines/primitive_shapes.mk" OUT=out/primitive_shapes \
-      $small_scene GRASPMAP="$scratch/graspmap" -j2
-  ) >"$scratch/log" 2>&1 || { cat "$scratch/log" >&2; fail "$name did not end well"; }
-  digest out >"$scratch/digests"
-  if [ ! -f "$scratch/first" ]; then
+  ) >"$scratch/log" 2>&1 || { cat "$scratch/log" >&2; fail "run $1 did not end well"; }
+  digest "$folder/out" '*.png' >"$scratch/digests"
+  digest "$folder/out" '*.[!p]*' >"$scratch/pictures"
+  same_reports "$folder"
+  rm -r "$folder"
+  if [ "$number" -eq 1 ]; then
     mv "$scratch/digests" "$scratch/first"
+    mv "$scratch/pictures" "$scratch/first_pictures"
     [ "$(wc -l <"$scratch/first")" -ge 40 ] || fail "too few outputs to compare"
   else
-    diff "$scratch/first" "$scratch/digests" || fail "$name differs"
+    diff "$scratch/first" "$scratch/digests" || fail "run $1 differs"
+    cmp -s "$scratch/first_pictures" "$scratch/pictures" || pictures_agree=no
   fi
 }
 
-for threads in $runs; do run "$threads threads" "$threads"; done
-for locale in C de_DE.UTF-8 tr_TR.UTF-8; do
-  LC_ALL=$locale LANG=$locale run "locale $locale" 2
+count=0
+for one in $runs; do
+  count=$((count + 1))
+  run "$one" "$count"
 done
-echo "passed: $(wc -l <"$scratch/first") outputs"
+echo "passed: $(wc -l <"$scratch/first") outputs of $count runs; pictures alike: $pictures_agree"

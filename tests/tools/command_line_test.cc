@@ -185,6 +185,71 @@ TEST(CommandLine, FailedRunKeepsTheEarlierOutput) {
   EXPECT_EQ(content("map.csv.json"), manifest);
 }
 
+// `graspmap WORDS` in a shell that has run `before`.
+ProgramResult in_shell(const std::string& before, const std::string& words) {
+  const std::string program = (graspmap_test::build_folder() / "graspmap").string();
+  return graspmap_test::run_program({"/bin/sh", "-c", before + "\"$0\" " + words, program},
+                                    {.folder = scratch("")});
+}
+
+TEST(CommandLine, AFileThatGrowsBeyondItsLimitIsAnError) {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(succeeded(score_quickly({})));
+  const std::string map = content("map.csv");
+  const auto names = graspmap_test::names_in_scratch();
+  const ProgramResult result =
+      in_shell("ulimit -f 8; ", "score terrain.pcd --curvature-radius 0 -o map.csv --quiet");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.standard_error,
+            "graspmap score: error: map.csv: cannot be written: File too large\n");
+  EXPECT_EQ(content("map.csv"), map);
+  EXPECT_EQ(graspmap_test::names_in_scratch(), names);
+}
+
+TEST(CommandLine, WhatStandsInAFileReachesTheTerminalAsPlainText) {
+  write_text(scratch("a.csv"), "x,y,z\n\x1b[2J\xff\r\xc3\xa9\xc2\x9b,0,0\n");
+  EXPECT_TRUE(bad_input(graspmap({"lookup", "a.csv", "a.csv", "-o", "b.csv"}),
+                        {"'\\x1b[2J\\xff\\x0d\xc3\xa9\\xc2\\x9b': not a number"}));
+  write_text(scratch("b.csv"), "x,y,z\n" + std::string(100'000, 'n') + ",0,0\n");
+  const graspmap_test::ProgramResult result = graspmap({"lookup", "b.csv", "b.csv", "-o", "c.csv"});
+  EXPECT_TRUE(bad_input(result, {"b.csv", "not a number", "nnn ... nnn"}));
+  EXPECT_LT(result.standard_error.size(), 1100U);
+}
+
+TEST(CommandLine, FaultsOfTheConfigurationNameItsFile) {
+  graspmap_test::write_terrain();
+  write_text(scratch("s.yaml"), "gripper: scare\n");
+  EXPECT_TRUE(bad_input(graspmap({"score", "terrain.pcd", "--config", "s.yaml", "-o", "a.pcd"}),
+                        {"error: s.yaml: gripper is scare"}));
+  EXPECT_TRUE(bad_input(
+      graspmap({"score", "terrain.pcd", "--config", "s.yaml", "--gripper", "scarf", "-o", "a.pcd"}),
+      {"error: gripper is scarf"}));
+}
+
+TEST(CommandLine, PathsThatLeadNowhere) {
+  std::filesystem::create_symlink("loop.pcd", scratch("loop.pcd"));
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "loop.pcd", "a.ply"}), {"loop.pcd", "symbolic links"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", std::string(300, 'n') + ".pcd", "a.ply"}),
+                        {"nnn.pcd", "name too long"}));
+}
+
+TEST(CommandLine, WhatCannotBePrintedIsAnError) {
+  graspmap_test::write_terrain();
+  for (const auto& [words, program] : {std::pair{"info terrain.pcd", "graspmap info"},
+                                       {"score --print-config", "graspmap score"},
+                                       {"score --help", "graspmap score"},
+                                       {"simulate --help", "graspmap simulate"},
+                                       {"--help", "graspmap"},
+                                       {"--version", "graspmap"}}) {
+    const ProgramResult result = in_shell("", std::string(words) + " > /dev/full");
+    EXPECT_EQ(result.exit_code, 1) << words;
+    EXPECT_EQ(result.standard_error,
+              std::string(program) +
+                  ": error: standard output: cannot be written: No space left on device\n");
+  }
+}
+
 TEST(CommandLine, ManifestSaysWhatMadeTheMap) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(succeeded(score_quickly({"--set", "gripper.opening_angle_deg=80"})));

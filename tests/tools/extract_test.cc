@@ -28,12 +28,7 @@ using graspmap_test::succeeded;
 
 ExampleScan write_example(const libmap::RtabmapWriterOptions& options = {}) {
   const ExampleScan scan = graspmap_test::example_scan();
-  libmap::RtabmapWriter writer(scratch("scan.db"), options);
-  for (const libmap::GraphNode& node : scan.graph.nodes)
-    writer.add_node(node, scan.frames.at(node.id));
-  for (const libmap::PoseLink& link : scan.graph.links) writer.add_link(link);
-  writer.set_optimized_poses(scan.graph.optimized_map_from_base);
-  writer.finish();
+  graspmap_test::write_database(scratch("scan.db"), scan, options);
   return scan;
 }
 

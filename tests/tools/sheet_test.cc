@@ -100,6 +100,12 @@ TEST(Chart, CurvesOfATable) {
                         {"t.csv", "kind"}));
   EXPECT_TRUE(
       bad_input(graspmap({"chart", "t.csv", "-o", "d.jpg", "--x", "x", "--y", "y"}), {"d.jpg"}));
+  std::string many = "x,y,id\n";
+  for (int row = 0; row < 200'000; ++row) many += "1,2," + std::to_string(row) + "\n";
+  graspmap_test::write_text(scratch("many.csv"), many);
+  EXPECT_TRUE(bad_input(
+      graspmap({"chart", "many.csv", "-o", "d.png", "--x", "x", "--y", "y", "--series", "id"}),
+      {"many.csv", "--series is id", "<= 500"}));
 }
 
 bool near(const libmap::Color& a, const libmap::Color& b) {

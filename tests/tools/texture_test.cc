@@ -3,6 +3,7 @@
 #include <cmath>
 #include <set>
 
+#include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/textured_mesh.h"
 #include "libmap/mesh/mesh_io.h"
@@ -62,6 +63,35 @@ Words operator+(Words words, const Words& more) {
   return words;
 }
 
+// Those of a frame of the scan, where it sees the surface.
+void expect_colors_of_photographs(const libmap::TexturedMesh& model) {
+  const auto scan = libmap::open_scan(scan_file());
+  const auto& node = scan->graph().nodes[14];
+  const auto view = libmap::camera_views(scan->read_frame(node.id))[0];
+  const libmap::Pose camera_from_world =
+      (*node.truth_from_base * view.color_camera.base_from_camera).inverse();
+  double error = 0.0;
+  int count = 0;
+  for (std::uint32_t t = 0; t < model.mesh.triangles.size(); t += 7) {
+    const Eigen::Vector3d point =
+        camera_from_world * libmap::position_on(model.mesh, {t, 0.3, 0.3});
+    const auto pixel = libmap::project_point(view.color_camera, point);
+    if (!pixel || !(pixel->minCoeff() > 5 && pixel->x() < 506 && pixel->y() < 418)) continue;
+    const int column = static_cast<int>(std::lround(pixel->x()));
+    const int row = static_cast<int>(std::lround(pixel->y()));
+    const double depth = static_cast<double>(view.depth.at(column, row));
+    if (std::abs(depth - point.z()) > 0.02) continue;
+    const Eigen::Vector3f color = libmap::texture_color(model, t, 0.3, 0.3);
+    for (std::size_t c = 0; c < 3; ++c)
+      error += std::abs(static_cast<double>(color[static_cast<Eigen::Index>(c)]) -
+                        view.color.at(column, row)[c]) /
+               3.0;
+    ++count;
+  }
+  EXPECT_GT(count, 500);
+  EXPECT_LT(error / count, 8.0);
+}
+
 TEST(Texture, RealScanAsObjAndGlb) {
   GRASPMAP_REQUIRE_DATA();
   write_site_part("site.ply");
@@ -81,32 +111,7 @@ TEST(Texture, RealScanAsObjAndGlb) {
     EXPECT_LT(results.at("seams_m"), 0.7 * results.at("seams_before_m").get<double>());
     EXPECT_LT(results.at("color_spread"), 0.15);
     EXPECT_EQ(json_of(name + ".json").at("inputs").size(), 3U);
-    // Colours are those of the photographs: of a frame of the scan, where it sees the surface.
-    const auto scan = libmap::open_scan(scan_file());
-    const auto& node = scan->graph().nodes[14];
-    const auto view = libmap::camera_views(scan->read_frame(node.id))[0];
-    const libmap::Pose camera_from_world =
-        (*node.truth_from_base * view.color_camera.base_from_camera).inverse();
-    double error = 0.0;
-    int count = 0;
-    for (std::uint32_t t = 0; t < triangles; t += 7) {
-      const Eigen::Vector3d point =
-          camera_from_world * libmap::position_on(model.mesh, {t, 0.3, 0.3});
-      const auto pixel = libmap::project_point(view.color_camera, point);
-      if (!pixel || !(pixel->minCoeff() > 5 && pixel->x() < 506 && pixel->y() < 418)) continue;
-      const int column = static_cast<int>(std::lround(pixel->x()));
-      const int row = static_cast<int>(std::lround(pixel->y()));
-      const double depth = static_cast<double>(view.depth.at(column, row));
-      if (std::abs(depth - point.z()) > 0.02) continue;
-      const Eigen::Vector3f color = libmap::texture_color(model, t, 0.3, 0.3);
-      for (std::size_t c = 0; c < 3; ++c)
-        error += std::abs(static_cast<double>(color[static_cast<Eigen::Index>(c)]) -
-                          view.color.at(column, row)[c]) /
-                 3.0;
-      ++count;
-    }
-    EXPECT_GT(count, 500);
-    EXPECT_LT(error / count, 8.0);
+    expect_colors_of_photographs(model);
   }
   EXPECT_EQ(names_in_scratch(), (Words{"model.glb", "model.glb.json", "model.mtl", "model.obj",
                                        "model.obj.json", "model_0.png", "site.ply", "six.tum"}));
@@ -192,6 +197,26 @@ TEST(Texture, BadInput) {
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
   ASSERT_TRUE(succeeded(graspmap(texture_words("m.obj") + Words{"--dry-run"})));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
+}
+
+TEST(Texture, RemembersThatTheMeshComesFromTheTrueFrame) {
+  GRASPMAP_REQUIRE_DATA();
+  write_site_part("site.ply");
+  libmap::Manifest manifest;
+  manifest.command = "mesh";
+  manifest.transforms.emplace_back("ground_truth_from_poses", libmap::Pose::Identity());
+  libmap::write_text(scratch("site.ply.json"), libmap::to_json(manifest));
+  ASSERT_TRUE(succeeded(graspmap({"crop", "site.ply", "--size", "0.8x0.8", "-o", "cropped.ply"})));
+  for (const char* mesh : {"site.ply", "cropped.ply"}) {
+    Words words = texture_words("part.glb");
+    words[1] = mesh;
+    words.insert(words.end(), {"--force"});
+    const auto result = graspmap(words);
+    ASSERT_TRUE(succeeded(result));
+    EXPECT_NE(result.standard_error.find("aligned with"), std::string::npos);
+    words.insert(words.end(), {"--frame", "poses"});
+    EXPECT_EQ(graspmap(words).standard_error.find("aligned with"), std::string::npos);
+  }
 }
 
 TEST(Texture, CroppedSitesCarryThePosesWithThem) {

@@ -214,6 +214,14 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
   };
   EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), reversed, points); }).reason(),
             "a tile's points are not in order");
+  const auto nowhere = [&](std::size_t tile) {
+    PointCloud cloud = map.load(tile);
+    for (libmap::ScalarField& field : cloud.fields)
+      if (field.name == "k") field.values.back() = 1e10;
+    return cloud;
+  };
+  EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), nowhere, points); }).context().field,
+            "k");
   EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), load, points, {.radius_m = -1}); })
                 .context()
                 .field,

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "libmap/core/score_color.h"
 #include "tests/support/test_support.h"
 
@@ -53,6 +55,18 @@ TEST(Merge, RefusesWhatIsNoMapAndVoxelsThatStandTwice) {
   PointCloud other = libmap::select_points(cloud, {});
   other.fields.pop_back();
   error_of([&] { merge_map_clouds({cloud, other}); });
+}
+
+// Such numbers have no order, and no integer holds them.
+TEST(Merge, RefusesIndicesThatAreNone) {
+  for (const double index : {std::nan(""), HUGE_VAL, 1e300, 0.5, 0x1p29 + 1}) {
+    PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
+    cloud.add_field("slope_deg", libmap::ScalarType::float32);
+    for (libmap::ScalarField& field : cloud.fields)
+      if (field.name == "j") field.values[1] = index;
+    EXPECT_EQ(error_of([&] { merge_map_clouds({cloud}); }).context().field, "j");
+    EXPECT_EQ(error_of([&] { add_obstacles(cloud, 0.01, {}); }).context().field, "j");
+  }
 }
 
 TEST(Merge, OrdersByVoxelAndTakesEmptyParts) {

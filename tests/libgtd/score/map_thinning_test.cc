@@ -42,6 +42,17 @@ TEST(MapThinning, TheUppermostOfTheMiddleColumnStays) {
   EXPECT_EQ(libgtd::thin_map(map, 1).size(), 5U) << "one a column";
 }
 
+// Squares so wide that distances from their middles, squared, need more than 32 bits; and an index
+// that is none.
+TEST(MapThinning, FarVoxelsAndNone) {
+  PointCloud map = map_of({{-(1 << 29), 0, 0}, {-5, 0, 0}, {5, 7, 0}, {1 << 29, 0, 1 << 29}});
+  EXPECT_EQ(voxels_in(libgtd::thin_map(map, 1 << 29)),
+            (std::vector<Voxel>{{-5, 0, 0}, {5, 7, 0}, {1 << 29, 0, 1 << 29}}));
+  map.fields.back().values[1] = 1e10;
+  EXPECT_EQ(graspmap_test::error_of([&] { libgtd::thin_map(map, 3); }).context().field,
+            map.fields.back().name);
+}
+
 TEST(MapThinning, PartsMakeTheWhole) {
   std::set<Voxel> some;
   while (some.size() < 600)

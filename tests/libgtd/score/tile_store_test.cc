@@ -126,6 +126,8 @@ TEST(TileStore, RestoredPositionsAreTheVoxelsCentres) {
   libgtd::restore_positions(index, cloud);
   EXPECT_EQ(cloud.positions[0], index.lattice.center_of({-3, -3, -3}));
   EXPECT_EQ(cloud.positions[1], index.lattice.center_of({40000, 40000, 40000}));
+  cloud.fields[2].values[1] = -1e10;
+  EXPECT_EQ(error_of([&] { libgtd::restore_positions(index, cloud); }).context().field, "k");
 }
 
 // Each change of a good index is refused in one line that names the file and what is wrong.
@@ -155,8 +157,13 @@ TEST(TileStore, HostileIndex) {
   expect_error("\"key\"", "\"kee\"", "key");
   expect_error("tiles/-1_0.pcd", "../../../etc/passwd", "file of tile -1, 0");
   expect_error("\"i\": -1", "\"i\": 3000000000", "tile");
-  expect_error("\"i\": -1", "\"i\": \"x\"", "index of a tile store");
+  expect_error("\"i\": -1", "\"i\": \"x\"", "i is string");
   expect_error("\"i\": 0", "\"i\": -1", "tile");
+  expect_error("\"i\": 0", "\"i\": 1e300", "i is 1e+300");
+  expect_error("\"j\": 0", "\"j\": 214748364", "number of a tile is 214748364");
+  expect_error("\"map\": {",
+               "\"map\": {\"a\": " + std::string(1000, '[') + std::string(1000, ']') + ",",
+               "nested deeper than 64 levels");
   for (std::size_t size = 0; size < text.size() - 2; size += 37) {
     write_text(store / "index.json", text.substr(0, size));
     error_of([&] { libgtd::read_tile_store(store); });

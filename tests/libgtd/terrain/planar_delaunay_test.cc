@@ -26,9 +26,10 @@ constexpr std::size_t one_strip = 1'000'000;
 Triangles triangles_of(const Points& points, std::size_t points_a_strip) {
   Triangles triangles;
   for (const auto& corners : triangulate_in_plane(points, points_a_strip).triangles) {
-    std::array<Corner, 3>& one = triangles.emplace_back();
+    std::array<Corner, 3> one;
     for (std::size_t a = 0; a < 3; ++a) one[a] = {points[corners[a]].x(), points[corners[a]].y()};
     EXPECT_EQ(one[0], *std::min_element(one.begin(), one.end()));
+    triangles.push_back(one);
   }
   std::sort(triangles.begin(), triangles.end());
   EXPECT_EQ(std::adjacent_find(triangles.begin(), triangles.end()), triangles.end());

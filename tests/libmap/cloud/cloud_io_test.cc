@@ -1,16 +1,18 @@
+// Every format of clouds, both ways; CSV; the clouds of the thesis.
 #include "libmap/cloud/cloud_io.h"
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
 #include <clocale>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <limits>
 #include <locale>
 
 #include "libmap/core/parallel.h"
 #include "tests/libmap/cloud/cloud_samples.h"
+#include "tests/libmap/cloud/given_bytes.h"
 #include "tests/support/test_support.h"
 
 // Third-party readers that give up on a broken file leave some of their own memory behind.
@@ -20,7 +22,9 @@ namespace libmap {
 namespace {
 
 namespace fs = std::filesystem;
+using graspmap_test::error_as;
 using graspmap_test::error_of;
+using graspmap_test::read_as;
 using graspmap_test::read_text;
 using graspmap_test::sample_cloud;
 using graspmap_test::scratch_folder;
@@ -56,37 +60,6 @@ fs::path write_sample(const Format& format, const PointCloud& cloud) {
   const fs::path path = scratch_folder() / (std::string("cloud") + format.extension);
   write_cloud(path, cloud, {format.encoding, format.big_endian});
   return path;
-}
-
-CloudReadResult read_as(const std::string& extension, const std::string& bytes) {
-  const fs::path path = scratch_folder() / ("given" + extension);
-  write_text(path, bytes);
-  return read_cloud(path);
-}
-
-std::string error_as(const std::string& extension, const std::string& bytes) {
-  const Error error = error_of([&] { read_as(extension, bytes); });
-  EXPECT_EQ(error.kind(), ErrorKind::bad_input);
-  EXPECT_THAT(error.context().file, HasSubstr("given" + extension));
-  return error.what();
-}
-
-// The bytes of a number, little-endian as the machine's.
-template <typename T>
-std::string raw(T value) {
-  std::string bytes(sizeof(T), '\0');
-  std::memcpy(bytes.data(), &value, sizeof(T));
-  return bytes;
-}
-
-std::string pcd_header(const std::string& points, const std::string& data) {
-  return "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 1\nWIDTH " +
-         points + "\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS " + points + "\nDATA " + data + "\n";
-}
-
-std::string ply_header(const std::string& encoding, const std::string& points) {
-  return "ply\nformat " + encoding + " 1.0\nelement vertex " + points +
-         "\nproperty float x\nproperty float y\nproperty float z\nend_header\n";
 }
 
 // CSV's decimals are those of the floats, and read as other doubles.
@@ -324,273 +297,6 @@ TEST(CloudIo, UnknownExtensionNamesTheKnownOnes) {
   }
   EXPECT_THAT(error_of([] { read_cloud("site.laz"); }).what(), HasSubstr("Debian"));
   EXPECT_EQ(format_of("A.B.PcD"), ".pcd");
-}
-
-TEST(PcdFiles, AnyOrderTypesCountsAndPadding) {
-  std::string bytes =
-      "# .PCD v.7 - Point Cloud Data file format\nVERSION .7\n"
-      "FIELDS intensity _ z rgb x y histogram _ id\nSIZE 2 1 8 4 8 8 4 4 8\n"
-      "TYPE U U F F F F F F I\nCOUNT 1 3 1 1 1 1 2 1 1\nWIDTH 2\nHEIGHT 1\n"
-      "VIEWPOINT 1 2 3 1 0 0 0\nPOINTS 2\nDATA binary\n";
-  const std::uint32_t packed = 0xFF102030;  // as float32 it is not a number
-  for (int i = 0; i < 2; ++i)
-    bytes += raw<std::uint16_t>(static_cast<std::uint16_t>(65000 + i)) + "abc" + raw(3.5 + i) +
-             raw(packed) + raw(1.25) + raw(2.25) + raw(0.5F) + raw(0.75F) + "pad!" +
-             raw<std::int64_t>(-5000000000LL - i);
-  const CloudReadResult read = read_as(".pcd", bytes);
-  ASSERT_EQ(read.cloud.size(), 2U);
-  EXPECT_EQ(read.cloud.positions[1], Eigen::Vector3d(1.25, 2.25, 4.5));
-  EXPECT_EQ(read.cloud.colors[1], (Color{0x10, 0x20, 0x30}));
-  ASSERT_EQ(read.cloud.fields.size(), 4U);
-  EXPECT_EQ(read.cloud.find_field("intensity")->type, ScalarType::uint16);
-  EXPECT_EQ(read.cloud.find_field("intensity")->values[1], 65001.0);
-  EXPECT_EQ(read.cloud.find_field("histogram_0")->values[0], 0.5);
-  EXPECT_EQ(read.cloud.find_field("histogram_1")->values[1], 0.75);
-  EXPECT_EQ(read.cloud.find_field("id")->values[1], -5000000001.0);
-  EXPECT_EQ(read.cloud.viewpoint.translation(), Eigen::Vector3d(1, 2, 3));
-  EXPECT_THAT(read.info.skipped, ElementsAre("padding of 3 bytes", "padding of 4 bytes"));
-  EXPECT_THAT(read.info.fields, Contains(FileField{"histogram", ScalarType::float32, 2}));
-}
-
-// A header of any length, so that the numbers behind it lie on no whole multiple of their size, and
-// a file whose last byte is the last of a page of memory.
-TEST(PcdFiles, NumbersMayLieAnywhere) {
-  for (const std::size_t filling : {1u, 2u, 3u, 4u, 5u, 6u, 7u, 8u, 3900u}) {
-    std::string head =
-        "FIELDS tag x y z\nSIZE 1 8 8 4\nTYPE U F F F\nWIDTH 3\nHEIGHT 1\nDATA binary\n";
-    std::string data;
-    for (int n = 0; n < 3; ++n)
-      data += raw(static_cast<std::uint8_t>(7 + n)) + raw(0.1 + n) + raw(-2.0 * n) + raw(0.5F);
-    std::size_t comment = filling;
-    if (filling == 3900u) comment = 4096 - head.size() - data.size() - 2;
-    const std::string bytes = "#" + std::string(comment, '-') + "\n" + head + data;
-    if (filling == 3900u) {
-      ASSERT_EQ(bytes.size(), 4096u);
-    }
-    const PointCloud cloud = read_as(".pcd", bytes).cloud;
-    ASSERT_EQ(cloud.size(), 3u);
-    for (int n = 0; n < 3; ++n) {
-      const auto at = static_cast<std::size_t>(n);
-      EXPECT_EQ(cloud.positions[at], Eigen::Vector3d(0.1 + n, -2.0 * n, 0.5));
-      EXPECT_EQ(cloud.find_field("tag")->values[at], 7 + n);
-    }
-    for (const std::size_t missing : {1u, 4u, 12u, 21u, 22u, 63u})
-      EXPECT_THAT(error_as(".pcd", bytes.substr(0, bytes.size() - missing)),
-                  HasSubstr("promises 3 points of 21 bytes, but only " +
-                            std::to_string(data.size() - missing) + " bytes of data follow"));
-  }
-}
-
-TEST(PcdFiles, PackedColoursInText) {
-  const std::string header =
-      "FIELDS x y z rgba\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
-      "DATA ascii\n";
-  EXPECT_EQ(read_as(".pcd", header + "1 2 3 4278194208\n").cloud.colors[0], (Color{0, 16, 32}));
-  std::string as_float = header;
-  as_float.replace(as_float.find("F F F U"), 7, "F F F F");
-  // The documentation's own example; its bits are 0x4A8080E0.
-  EXPECT_EQ(read_as(".pcd", as_float + "0.93773 0.33763 0 4.2108e+06\n").cloud.colors[0],
-            (Color{128, 128, 224}));
-}
-
-TEST(PcdFiles, CompressedPaddingMayBeLeftOut) {
-  const fs::path path = scratch_folder() / "padded.pcd";
-  PointCloud cloud = sample_cloud(50);
-  cloud.fields.clear();
-  write_cloud(path, cloud, {FileEncoding::binary_compressed, false});
-  std::string bytes = read_text(path);
-  for (const auto& [from, to] : {std::pair<std::string, std::string>{"FIELDS x", "FIELDS _ x"},
-                                 {"SIZE 4", "SIZE 1 4"},
-                                 {"TYPE F", "TYPE U F"},
-                                 {"COUNT 1", "COUNT 4 1"}})
-    bytes.replace(bytes.find(from), from.size(), to);
-  EXPECT_EQ(read_as(".pcd", bytes).cloud.positions, cloud.positions);
-}
-
-TEST(PcdFiles, HeadersThatLie) {
-  const std::string ten(10 * 12, '\1');
-  EXPECT_THAT(error_as(".pcd", pcd_header("11", "binary") + ten),
-              HasSubstr("promises 11 points of 12 bytes, but only 120 bytes of data follow (10"));
-  EXPECT_THAT(error_as(".pcd", pcd_header("3", "ascii") + "1 2 3\n4 5 6\n7777777 8\n"),
-              HasSubstr("line 14 holds 2 of 3 numbers"));
-  EXPECT_THAT(error_as(".pcd", pcd_header("3", "ascii") + "1.25 2.25 3.25\n4.25 5.25 6.25\n"),
-              HasSubstr("promises 3 points, but only 2 lines of data follow"));
-  EXPECT_THAT(error_as(".pcd", pcd_header("1", "ascii") + "1 2 three\n"), HasSubstr("three"));
-  for (const char* const points : {"9223372036854775807", "4611686018427387904", "1000000000000"})
-    for (const char* const data : {"binary", "ascii", "binary_compressed"})
-      EXPECT_THAT(error_as(".pcd", pcd_header(points, data) + std::string(100, '\0')),
-                  HasSubstr("promises"))
-          << points;
-  for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
-    error_as(".pcd", pcd_header(points, "binary") + ten);
-  error_as(".pcd", pcd_header("10", "zip") + ten);
-}
-
-TEST(PcdFiles, CompressedSizesThatLie) {
-  const std::string header = pcd_header("10", "binary_compressed");
-  const auto sizes = [](std::uint32_t compressed, std::uint32_t uncompressed) {
-    return raw(compressed) + raw(uncompressed);
-  };
-  EXPECT_THAT(error_as(".pcd", header + sizes(1000, 120) + "abc"),
-              HasSubstr("end after 3 of 1000 bytes"));
-  EXPECT_THAT(error_as(".pcd", header + sizes(3, 119) + "abc"), HasSubstr("hold 119 bytes"));
-  EXPECT_THAT(error_as(".pcd", header + sizes(0, 120)), HasSubstr("cannot hold"));
-  EXPECT_THAT(error_as(".pcd", header + sizes(3, 120) + "\xff\xff\xff"), HasSubstr("broken"));
-  EXPECT_THAT(error_as(".pcd", header + "abc"), HasSubstr("no size"));
-  EXPECT_THAT(error_as(".pcd", pcd_header("300000000", "binary_compressed") +
-                                   sizes(3, 3600000000U) + "abc"),
-              HasSubstr("cannot hold"));
-}
-
-TEST(PcdFiles, HeaderLinesThatDoNotFit) {
-  const std::string good = pcd_header("1", "ascii") + "1 2 3\n";
-  EXPECT_EQ(read_as(".pcd", good).cloud.size(), 1U);
-  const auto changed = [&](const std::string& from, const std::string& to) {
-    std::string bytes = good;
-    bytes.replace(bytes.find(from), from.size(), to);
-    return error_as(".pcd", bytes);
-  };
-  EXPECT_THAT(changed("COUNT 1 1 1", "COUNT 1 1"), HasSubstr("COUNT"));
-  EXPECT_THAT(changed("COUNT 1 1 1", "COUNT 1 1 0"), HasSubstr("COUNT"));
-  EXPECT_THAT(changed("COUNT 1 1 1", "COUNT 1 1 99999999999"), HasSubstr("COUNT"));
-  EXPECT_THAT(changed("SIZE 4 4 4", "SIZE 4 4 3"), HasSubstr("SIZE"));
-  EXPECT_THAT(changed("SIZE 4 4 4", "SIZE 4 4 4 4"), HasSubstr("SIZE"));
-  EXPECT_THAT(changed("TYPE F F F", "TYPE F F Q"), HasSubstr("TYPE"));
-  EXPECT_THAT(changed("SIZE 4 4 4", "SIZE 4 4 2"), HasSubstr("TYPE"));
-  EXPECT_THAT(changed("FIELDS x y z", "FIELDS x y w"), HasSubstr("x, y and z"));
-  EXPECT_THAT(changed("FIELDS x y z", "FIELDS x y z z"), HasSubstr("SIZE"));
-  EXPECT_THAT(changed("FIELDS x y z", "FIELDS"), HasSubstr("FIELDS"));
-  EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 2"), HasSubstr("WIDTH x HEIGHT = 2"));
-  EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 1\nHEIGHT 1"), HasSubstr("twice"));
-  EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0"), HasSubstr("VIEWPOINT"));
-  EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0 0 1 0 0 nan"),
-              HasSubstr("VIEWPOINT"));
-  EXPECT_THAT(changed("DATA ascii", "ascii"), HasSubstr("unknown line"));
-}
-
-TEST(PcdFiles, FieldNameWithBlankIsRefused) {
-  PointCloud cloud = sample_cloud(2);
-  cloud.add_field("two words", ScalarType::float32);
-  for (const char* const extension : {".pcd", ".ply"})
-    EXPECT_THAT(error_of([&] {
-                  write_cloud(scratch_folder() / (std::string("c") + extension), cloud);
-                }).what(),
-                HasSubstr("'two words'"));
-  write_cloud(scratch_folder() / "c.csv", cloud);
-  EXPECT_NE(read_cloud(scratch_folder() / "c.csv").cloud.find_field("two words"), nullptr);
-}
-
-TEST(PlyFiles, ForeignElementsListsAndNames) {
-  const std::string bytes =
-      "ply\r\nformat ascii 1.0\r\ncomment made elsewhere\r\nobj_info 3\r\nelement camera 1\r\n"
-      "property float view_px\r\nelement vertex 2\r\nproperty double Y\r\nproperty double X\r\n"
-      "property list uchar int neighbours\r\nproperty float64 Z\r\nproperty float diffuse_red\r\n"
-      "property float diffuse_green\r\nproperty float diffuse_blue\r\nproperty uint16 quality\r\n"
-      "element face 1\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
-      "7\r\n2 1 3 5 6 7 3 1 0.5 0 77\r\n\r\n5 4 0 6 0 0 1 78\r\n3 0 1 0\r\n";
-  const CloudReadResult read = read_as(".ply", bytes);
-  ASSERT_EQ(read.cloud.size(), 2U);
-  EXPECT_EQ(read.cloud.positions[0], Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(read.cloud.positions[1], Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(read.cloud.colors[0], (Color{255, 128, 0}));
-  ASSERT_EQ(read.cloud.fields.size(), 1U);
-  EXPECT_EQ(read.cloud.fields[0].type, ScalarType::uint16);
-  EXPECT_EQ(read.cloud.fields[0].values, (std::vector<double>{77, 78}));
-  EXPECT_THAT(read.info.skipped, ElementsAre("element camera", "list neighbours", "1 faces"));
-}
-
-TEST(PlyFiles, ListsInBinary) {
-  const std::string header =
-      "ply\nformat binary_little_endian 1.0\nelement vertex 2\nproperty float x\n"
-      "property list ushort double extra\nproperty float y\nproperty float z\nend_header\n";
-  const std::string first =
-      raw(1.0F) + raw<std::uint16_t>(2) + raw(9.0) + raw(8.0) + raw(2.0F) + raw(3.0F);
-  const std::string second = raw(4.0F) + raw<std::uint16_t>(0) + raw(5.0F) + raw(6.0F);
-  const CloudReadResult read = read_as(".ply", header + first + second);
-  EXPECT_EQ(read.cloud.positions[0], Eigen::Vector3d(1, 2, 3));
-  EXPECT_EQ(read.cloud.positions[1], Eigen::Vector3d(4, 5, 6));
-  const std::string lying = raw(4.0F) + raw<std::uint16_t>(60000) + raw(5.0F) + raw(6.0F);
-  EXPECT_THAT(error_as(".ply", header + first + lying), HasSubstr("list longer than the data"));
-}
-
-TEST(PlyFiles, HeadersThatLie) {
-  EXPECT_THAT(error_as(".ply", ply_header("binary_little_endian", "11") + std::string(120, '\1')),
-              HasSubstr("promises 11 rows of 'vertex' of 12 bytes, but only 120"));
-  EXPECT_THAT(error_as(".ply", ply_header("ascii", "3") + "1.5 2.5 3.5\n1.5 2.5 3.5\n"),
-              HasSubstr("promises 3 rows of 'vertex', but the data end in row 2"));
-  EXPECT_THAT(error_as(".ply", ply_header("ascii", "1") + "1 2 3 4\n"), HasSubstr("more than one"));
-  EXPECT_THAT(error_as(".ply", ply_header("ascii", "1") + "1 22 \n"), HasSubstr("z"));
-  for (const char* const points : {"9223372036854775807", "1537228672809129302", "1000000000000"})
-    for (const char* const encoding : {"ascii", "binary_little_endian", "binary_big_endian"})
-      EXPECT_THAT(error_as(".ply", ply_header(encoding, points) + std::string(100, '1')),
-                  HasSubstr("promises"));
-  for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
-    error_as(".ply", ply_header("ascii", points) + "1 2 3\n");
-  error_as(".ply", ply_header("binary_middle_endian", "1") + "1 2 3\n");
-  EXPECT_THAT(error_as(".ply",
-                       "ply\nformat ascii 1.0\nelement vertex 1\nproperty uchar x\n"
-                       "property uchar y\nproperty uchar z\nend_header\n1 2 256\n"),
-              HasSubstr("uint8"));
-  EXPECT_THAT(error_as(".ply",
-                       "ply\nformat ascii 1.0\nelement point 1\nproperty float x\n"
-                       "end_header\n1\n"),
-              HasSubstr("no element vertex"));
-}
-
-TEST(VtpFiles, PointsAreVertexCells) {
-  const fs::path path = scratch_folder() / "cloud.vtp";
-  write_cloud(path, sample_cloud(17), {FileEncoding::ascii, false});
-  EXPECT_THAT(read_text(path), HasSubstr("NumberOfVerts=\"17\""));
-  EXPECT_THAT(read_text(path), HasSubstr("Normals=\"Normals\""));
-}
-
-// As ParaView writes by default: base64 beside the XML, 32-bit block headers.
-std::string inline_vtp(const std::string& points_base64, const std::string& score_base64) {
-  return "<?xml version=\"1.0\"?>\n<VTKFile type=\"PolyData\" version=\"0.1\" "
-         "byte_order=\"LittleEndian\">\n<PolyData><Piece NumberOfPoints=\"2\" NumberOfVerts=\"0\" "
-         "NumberOfLines=\"0\" NumberOfStrips=\"0\" NumberOfPolys=\"0\">\n<PointData><DataArray "
-         "type=\"Int16\" Name=\"level\" format=\"binary\">" +
-         score_base64 +
-         "</DataArray></PointData>\n<Points><DataArray type=\"Float32\" Name=\"Points\" "
-         "NumberOfComponents=\"3\" format=\"binary\">\n  " +
-         points_base64 + "\n</DataArray></Points></Piece></PolyData></VTKFile>\n";
-}
-
-TEST(VtpFiles, InlineBase64) {
-  // A length of 24 and 1 2 3 4 5 6; a length of 4 and 7 -1.
-  const std::string points = "GAAAAAAAgD8AAABAAABAQAAAgEAAAKBAAADAQA==";
-  const CloudReadResult read = read_as(".vtp", inline_vtp(points, "BAAAAAcA//8="));
-  ASSERT_EQ(read.cloud.size(), 2U);
-  EXPECT_EQ(read.cloud.positions[1], Eigen::Vector3d(4, 5, 6));
-  EXPECT_EQ(read.cloud.fields[0], (ScalarField{"level", ScalarType::int16, {7, -1}}));
-  EXPECT_THAT(error_as(".vtp", inline_vtp("//8" + points, "BAAAAAcA//8=")),
-              HasSubstr("claims more than the file holds"));
-  error_as(".vtp", inline_vtp(points, ""));
-}
-
-TEST(VtpFiles, AppendedDataBeginWithAnUnderscore) {
-  const fs::path path = scratch_folder() / "cloud.vtp";
-  write_cloud(path, sample_cloud(17), {FileEncoding::binary_compressed, false});
-  std::string bytes = read_text(path);
-  bytes[bytes.find('>', bytes.find("<AppendedData")) + 1] = 'x';
-  EXPECT_THAT(error_as(".vtp", bytes), HasSubstr("'_'"));
-}
-
-TEST(VtpFiles, CountsThatLie) {
-  const fs::path path = scratch_folder() / "cloud.vtp";
-  write_cloud(path, sample_cloud(17), {FileEncoding::ascii, false});
-  const std::string good = read_text(path);
-  const auto changed = [&](const std::string& from, const std::string& to) {
-    std::string bytes = good;
-    bytes.replace(bytes.find(from), from.size(), to);
-    return error_as(".vtp", bytes);
-  };
-  changed("NumberOfPoints=\"17\"", "NumberOfPoints=\"18\"");
-  EXPECT_THAT(changed("NumberOfPoints=\"17\"", "NumberOfPoints=\"17000000000000\""),
-              HasSubstr("NumberOfPoints"));
-  EXPECT_THAT(changed("NumberOfComponents=\"3\"", "NumberOfComponents=\"1000000000\""),
-              HasSubstr("NumberOfComponents"));
-  EXPECT_THAT(changed("</VTKFile>", "</VTKFil>"), HasSubstr("VTK cannot read it"));
 }
 
 TEST(CsvFiles, NamesTypesAndTextColumns) {

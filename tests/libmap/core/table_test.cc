@@ -124,4 +124,13 @@ TEST(TableTest, ReadsAFileAndNamesIt) {
   EXPECT_EQ(error_of([&] { libmap::read_csv(path); }).context().file, path.string());
 }
 
+TEST(TableTest, MoreColumnsThanATableHasAreAnError) {
+  std::string header = "c0";
+  for (int n = 1; n < 10000; ++n) header += ",c" + std::to_string(n);
+  EXPECT_EQ(libmap::parse_csv(header + "\n", "t.csv").columns.size(), 10000U);
+  const libmap::Error error = error_of([&] { libmap::parse_csv(header + ",c\n", "t.csv"); });
+  EXPECT_EQ(error.context().value, "10001 cells long");
+  EXPECT_EQ(error.context().file, "t.csv");
+}
+
 }  // namespace

@@ -277,6 +277,16 @@ TEST(MeshFiles, GlbHasYUp) {
   EXPECT_EQ(read_mesh(path).mesh.vertices, mesh.vertices);
 }
 
+// A primitive without attributes, where assimp reads at address 0.
+TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
+  const fs::path path = scratch_folder() / "mesh.glb";
+  fs::copy_file(
+      graspmap_test::source_folder() / "tests/fuzz/findings/glb/primitive_without_attributes",
+      path);
+  EXPECT_THAT(error_of([&] { read_mesh(path); }).what(),
+              HasSubstr("mesh.glb: is broken: the library for its format fell over it"));
+}
+
 TEST(MeshFiles, ObjWithQuadsAndGroups) {
   const MeshReadResult read =
       read_as(".obj",

@@ -217,6 +217,14 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
         whole.substr(0, static_cast<std::size_t>(share * static_cast<double>(whole.size()))));
     EXPECT_THROW(libmap::read_textured_mesh(folder / "cut.glb"), libmap::Error) << share;
   }
+  for (const std::size_t at : {12U, 13U, 14U, 15U}) {  // the length of the text
+    std::string forged = whole;
+    forged[at] = '\xff';
+    graspmap_test::write_text(folder / "forged.glb", forged);
+    const libmap::Error error =
+        error_of([&] { libmap::read_textured_mesh(folder / "forged.glb"); });
+    EXPECT_TRUE(at == 12U || error.context().field == "length of its text") << error.what();
+  }
   TexturedMesh wrong = model;
   wrong.page_of_triangle[3] = 2;
   EXPECT_EQ(error_of([&] { libmap::write_textured_mesh(folder / "w.glb", wrong); }).context().field,

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <nlohmann/json.hpp>
 #include <string>
 #include <vector>
 
 #include "libmap/core/file_output.h"
+#include "libmap/core/manifest.h"
 #include "tests/libmap/poses/textured_scan.h"
 #include "tests/support/test_support.h"
 
@@ -128,6 +130,33 @@ TEST(FeatureCache, DamagedFilesAreMadeAnew) {
     EXPECT_EQ(libmap::read_whole_file(files[0]), whole);
   }
   EXPECT_EQ(files_in(folder()).size(), 2U);
+}
+
+// With the right digest of what no run of ours would write.
+TEST(FeatureCache, ForeignContentIsMadeAnew) {
+  const TexturedScan scan = two_frames();
+  const FeatureCache cache(folder());
+  const FeatureResult first = found(scan, cache);
+  const fs::path file = files_in(folder())[0];
+  const std::string body = libmap::read_whole_file(file).substr(65);
+  const auto expect_anew = [&](const std::string& content, const std::string& what) {
+    libmap::write_text(file, libmap::sha256_of(content) + "\n" + content);
+    const FeatureResult again = found(scan, cache);
+    EXPECT_EQ(again.from_cache, 1U) << what;
+    expect_same(first, again);
+  };
+  const auto change = [&](const char* key, const nlohmann::json& value) {
+    auto json = nlohmann::json::from_cbor(body);
+    json[nlohmann::json::json_pointer(key)] = value;
+    std::string changed;
+    nlohmann::json::to_cbor(json, changed);
+    expect_anew(changed, key);
+  };
+  change("/descriptors", nlohmann::json::binary({1, 2, 3}));
+  change("/surfaces/0/step_px", 2147483647);
+  change("/surfaces/0/step_px", 1e300);
+  change("/without_depth", -1);
+  expect_anew(std::string(1 << 20, '\x81'), "arrays in arrays");
 }
 
 TEST(FeatureCache, WithoutAFolderNothingIsKept) {

@@ -43,6 +43,13 @@ inline std::vector<Eigen::Vector3d> random_points(std::size_t count) {
   return points;
 }
 
+// On a way along y that sways and turns.
+inline libmap::Pose beside(double y) {
+  return libmap::make_pose_from_rpy(
+      {0.05 * std::sin(3.0 * y), y, 0.03 * std::cos(2.0 * y)},
+      {3.0 * std::sin(y), 2.0 * std::cos(y), 5.0 * std::sin(2.0 * y)});
+}
+
 struct FeatureNoise {
   double pixel = 0.2;  // as the features claim
   double depth_m = 0.002;

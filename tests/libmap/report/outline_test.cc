@@ -83,7 +83,7 @@ TEST(OutlineFile, WhatIsWrongIsNamedWithItsLine) {
             std::string::npos);
   EXPECT_NE(error(head + "    items:\n      - timings: [{name: a}]\n").find("a folder or files"),
             std::string::npos);
-  EXPECT_NE(error("title: [a\n").find("is no YAML"), std::string::npos);
+  EXPECT_NE(error("title: [a\n").find("line 2: not valid YAML"), std::string::npos);
   EXPECT_NE(error("- a\n").find("no map of keys"), std::string::npos);
   EXPECT_NE(error("title: a\ntitle: b\n").find("stands twice"), std::string::npos);
   std::string deep = "title: a\n";

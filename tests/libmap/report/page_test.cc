@@ -32,7 +32,7 @@ ReportPicture picture_of(const ColorImage& image) {
 }
 
 const PageAssets assets{.style = "p { color: red }",
-                        .script = "start();",
+                        .scripts = {"start();"},
                         .libraries = {},
                         .library_notice = "",
                         .version = "1.2.3"};

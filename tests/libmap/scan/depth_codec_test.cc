@@ -140,6 +140,14 @@ TEST(Rvl, SizesThatCannotBe) {
   error_of([&] { libmap::decode_depth(with_size(32, 23)); });
 }
 
+// Some 130 kB stand for 8000 x 8000 zeros.
+TEST(DepthCodec, ImagesLargerThanAnyCamerasAreRefusedByTheirHeader) {
+  const std::string bytes = libmap::encode_png(MillimetreImage(4097, 4096));
+  const libmap::Error error = error_of([&] { libmap::decode_depth(bytes.substr(0, 40)); });
+  EXPECT_EQ(error.context().value, "4097 x 4096");
+  EXPECT_EQ(error.context().bound, "<= 16777216 pixels");
+}
+
 TEST(DepthCodec, MillimetresBecomeMetres) {
   MillimetreImage image(4, 1);
   image.pixels = {0, 1, 1234, 65535};

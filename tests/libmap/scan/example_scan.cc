@@ -131,6 +131,16 @@ ExampleScan example_scan() {
   return scan;
 }
 
+void write_database(const std::filesystem::path& path, const ExampleScan& scan,
+                    const libmap::RtabmapWriterOptions& options) {
+  libmap::RtabmapWriter writer(path, options);
+  for (const libmap::PoseLink& link : scan.graph.links) writer.add_link(link);
+  for (const libmap::GraphNode& node : scan.graph.nodes)
+    writer.add_node(node, scan.frames.at(node.id));
+  writer.set_optimized_poses(scan.graph.optimized_map_from_base);
+  writer.finish();
+}
+
 void expect_same_camera(const libmap::Camera& actual, const libmap::Camera& expected,
                         double tolerance) {
   EXPECT_EQ(actual.width, expected.width);

@@ -1,11 +1,13 @@
 // A small scan of random content, and comparison of scans.
 #pragma once
 
+#include <filesystem>
 #include <map>
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
 #include "libmap/scan/rgbd_frame.h"
+#include "libmap/scan/rtabmap_writer.h"
 #include "libmap/scan/scan_source.h"
 
 namespace graspmap_test {
@@ -23,6 +25,9 @@ libmap::DepthImage random_depth(int width, int height);  // 0 here and there
 
 // Nodes 1, 2, 5 and 9 in two sessions with everything that a node can hold; links of several types.
 ExampleScan example_scan();
+
+void write_database(const std::filesystem::path& path, const ExampleScan& scan,
+                    const libmap::RtabmapWriterOptions& options = {});
 
 // Frames with single cameras.
 void expect_same_frame(const libmap::RgbdFrame& actual, const libmap::RgbdFrame& expected,

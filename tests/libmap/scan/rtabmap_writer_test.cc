@@ -1,13 +1,10 @@
 #include "libmap/scan/rtabmap_writer.h"
 
-#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <cstring>
-#include <filesystem>
 #include <limits>
-#include <map>
 #include <set>
 #include <string>
 #include <vector>
@@ -16,7 +13,7 @@
 #include "libmap/scan/matrix_codec.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
-#include "libmap/scan/sqlite_file.h"
+#include "tests/libmap/scan/database_rows.h"
 #include "tests/libmap/scan/example_scan.h"
 #include "tests/support/test_support.h"
 
@@ -24,70 +21,22 @@ namespace {
 
 namespace fs = std::filesystem;
 using graspmap_test::ExampleScan;
+using graspmap_test::open_database;
+using graspmap_test::query;
+using graspmap_test::Rows;
+using graspmap_test::write_database;
 using libmap::DepthFormat;
 using libmap::ImageFormat;
 using libmap::LinkType;
 using libmap::Pose;
 using libmap::RtabmapWriter;
-using libmap::RtabmapWriterOptions;
 
 fs::path scratch(const std::string& name) { return graspmap_test::scratch_folder() / name; }
-
-void write_scan(const fs::path& path, const ExampleScan& scan,
-                const RtabmapWriterOptions& options = {}) {
-  RtabmapWriter writer(path, options);
-  for (const libmap::PoseLink& link : scan.graph.links) writer.add_link(link);
-  for (const libmap::GraphNode& node : scan.graph.nodes)
-    writer.add_node(node, scan.frames.at(node.id));
-  writer.set_optimized_poses(scan.graph.optimized_map_from_base);
-  writer.finish();
-}
 
 libmap::RgbdFrame empty_frame(int node) {
   libmap::RgbdFrame frame;
   frame.node = node;
   return frame;
-}
-
-SQLite::Database open_database(const fs::path& path) {
-  return SQLite::Database(path.string(), SQLite::OPEN_READONLY);
-}
-
-using Rows = std::vector<std::vector<std::string>>;
-
-std::string cell_of(const SQLite::Column& column) {
-  if (column.isNull()) return "NULL";
-  const auto* bytes = static_cast<const char*>(column.getBlob());
-  const auto size = static_cast<std::size_t>(column.getBytes());
-  return std::to_string(column.getType()) + ":" +
-         (bytes == nullptr ? std::string() : std::string(bytes, size));
-}
-
-Rows query(SQLite::Database& database, const std::string& text) {
-  SQLite::Statement statement(database, text);
-  Rows rows;
-  while (statement.executeStep()) {
-    rows.emplace_back();
-    for (int i = 0; i < statement.getColumnCount(); ++i)
-      rows.back().push_back(cell_of(statement.getColumn(i)));
-  }
-  return rows;
-}
-
-Rows query(const fs::path& path, const std::string& text) {
-  SQLite::Database database = open_database(path);
-  return query(database, text);
-}
-
-// Every row of every table but Admin.
-std::map<std::string, Rows> tables_of(const fs::path& path) {
-  SQLite::Database database = open_database(path);
-  std::map<std::string, Rows> tables;
-  for (const auto& row : query(database, "SELECT name FROM sqlite_master WHERE type = 'table'"))
-    tables[row[0].substr(2)] =
-        query(database, "SELECT rowid, * FROM " + row[0].substr(2) + " ORDER BY rowid");
-  tables.erase("Admin");
-  return tables;
 }
 
 std::vector<std::string> names_beside(const fs::path& path) {
@@ -102,7 +51,7 @@ TEST(RtabmapWriter, KeepsNodesPosesLinksAndFrames) {
   for (const DepthFormat depth : {DepthFormat::rvl, DepthFormat::png16, DepthFormat::float_png}) {
     SCOPED_TRACE(to_text(depth));
     const fs::path path = scratch("scan.db");
-    write_scan(path, scan, {.depth = depth, .color = ImageFormat::png});
+    write_database(path, scan, {.depth = depth, .color = ImageFormat::png});
     const libmap::RtabmapDatabase read(path);
     EXPECT_EQ(read.warnings(), std::vector<std::string>());
     graspmap_test::expect_same_graph(read.graph(), scan.graph, 2e-7);
@@ -117,7 +66,7 @@ TEST(RtabmapWriter, KeepsNodesPosesLinksAndFrames) {
 TEST(RtabmapWriter, StoresTheFloatsOfPosesAndTheDoublesOfInformation) {
   const ExampleScan scan = graspmap_test::example_scan();
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan);
+  write_database(path, scan);
   const Rows poses = query(path, "SELECT pose FROM Node ORDER BY id");
   for (std::size_t i = 0; i < poses.size(); ++i) {
     float stored[12];
@@ -136,7 +85,7 @@ TEST(RtabmapWriter, KeepsFloatDepthBitForBit) {
   for (float& pixel : scan.frames.at(5).depth.pixels)
     pixel = static_cast<float>(graspmap_test::uniform(0.1, 90.0));
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan, {.depth = DepthFormat::float_png});
+  write_database(path, scan, {.depth = DepthFormat::float_png});
   EXPECT_TRUE(libmap::RtabmapDatabase(path).read_frame(5).depth == scan.frames.at(5).depth);
 }
 
@@ -147,7 +96,7 @@ TEST(RtabmapWriter, StoresJpegByDefault) {
     for (int x = 0; x < image.width; ++x)
       image.at(x, y) = {static_cast<std::uint8_t>(4 * x), static_cast<std::uint8_t>(5 * y), 90};
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan);
+  write_database(path, scan);
   const libmap::RtabmapDatabase read(path);
   EXPECT_EQ(libmap::image_format(read.read_blobs(1).image), ImageFormat::jpeg);
   const libmap::ColorImage color = read.read_frame(1).color;
@@ -168,7 +117,7 @@ TEST(RtabmapWriter, KeepsCamerasSideBySideAndTheirDistortion) {
   frame.cameras[1].distortion_model = libmap::DistortionModel::equidistant;
   frame.cameras[1].distortion = {0.1, -0.05, 0.001, -0.002};
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan, {.color = ImageFormat::png});
+  write_database(path, scan, {.color = ImageFormat::png});
   graspmap_test::expect_same_frame(libmap::RtabmapDatabase(path).read_frame(2), frame);
 }
 
@@ -186,7 +135,7 @@ TEST(RtabmapWriter, KeepsStereoPairs) {
   stereo.right_from_left.translation().x() = -0.12;
   frame.stereo = {stereo};
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan, {.color = ImageFormat::png});
+  write_database(path, scan, {.color = ImageFormat::png});
   const libmap::RgbdFrame read = libmap::RtabmapDatabase(path).read_frame(5);
   EXPECT_TRUE(read.color == frame.color);
   EXPECT_TRUE(read.right == frame.right);
@@ -197,7 +146,7 @@ TEST(RtabmapWriter, KeepsStereoPairs) {
   graspmap_test::expect_same_camera(read.stereo[0].left, stereo.left);
   // What was read can be written again.
   scan.frames.at(5) = read;
-  write_scan(scratch("again.db"), scan, {.color = ImageFormat::png});
+  write_database(scratch("again.db"), scan, {.color = ImageFormat::png});
   EXPECT_EQ(query(scratch("again.db"), "SELECT calibration FROM Data WHERE id = 5"),
             query(path, "SELECT calibration FROM Data WHERE id = 5"));
 }
@@ -205,7 +154,7 @@ TEST(RtabmapWriter, KeepsStereoPairs) {
 TEST(RtabmapWriter, StoresLinksInBothDirectionsWithOneInformation) {
   const ExampleScan scan = graspmap_test::example_scan();
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan);
+  write_database(path, scan);
   const Rows rows = query(path,
                           "SELECT a.information_matrix = b.information_matrix, a.transform, "
                           "b.transform FROM Link a JOIN Link b ON a.from_id = b.to_id AND "
@@ -231,7 +180,7 @@ TEST(RtabmapWriter, WritesLandmarksAndPriorsInOneDirection) {
   scan.graph.links = {{.from = 2, .to = -7, .type = LinkType::landmark},
                       {.from = 5, .to = 5, .type = LinkType::pose_prior}};
   const fs::path path = scratch("scan.db");
-  write_scan(path, scan);
+  write_database(path, scan);
   EXPECT_EQ(query(path, "SELECT from_id, to_id, type FROM Link ORDER BY from_id"),
             (Rows{{"1:2", "1:-7", "1:8"}, {"1:5", "1:5", "1:7"}}));
 }
@@ -259,7 +208,7 @@ TEST(RtabmapWriter, KeepsParametersAndTheLastLocalization) {
   const ExampleScan scan = graspmap_test::example_scan();
   const std::map<std::string, std::string> parameters = {
       {"Kp/MaxFeatures", "500"}, {"Mem/Folder", "a:b c"}, {"Vis/Empty", ""}};
-  write_scan(scratch("scan.db"), scan, {.parameters = parameters});
+  write_database(scratch("scan.db"), scan, {.parameters = parameters});
   const libmap::RtabmapDatabase read(scratch("scan.db"));
   EXPECT_EQ(read.parameters(), parameters);
   EXPECT_EQ(read.version(), "0.23.0");
@@ -272,10 +221,10 @@ TEST(RtabmapWriter, KeepsParametersAndTheLastLocalization) {
 // Equal input gives equal bytes, whatever the time and whatever stood in the file and in memory.
 TEST(RtabmapWriter, WritesTheSameBytesEachTime) {
   const ExampleScan scan = graspmap_test::example_scan();
-  write_scan(scratch("a.db"), scan);
+  write_database(scratch("a.db"), scan);
   libmap::write_text(scratch("b.db"), std::string(200000, 'x'));
   { const std::vector<std::string> dirt(5000, std::string(777, '\xA5')); }
-  write_scan(scratch("b.db"), scan);
+  write_database(scratch("b.db"), scan);
   EXPECT_EQ(graspmap_test::read_text(scratch("a.db")), graspmap_test::read_text(scratch("b.db")));
   EXPECT_EQ(query(scratch("a.db"), "SELECT id, time_enter FROM Node WHERE id IN (1, 9)"),
             (Rows{{"1:1", "3:2020-09-13 12:26:40"}, {"1:9", "3:2020-09-13 12:26:40"}}));
@@ -285,7 +234,7 @@ TEST(RtabmapWriter, WritesTheSameBytesEachTime) {
 }
 
 TEST(RtabmapWriter, MakesASoundDatabase) {
-  write_scan(scratch("scan.db"), graspmap_test::example_scan());
+  write_database(scratch("scan.db"), graspmap_test::example_scan());
   EXPECT_EQ(query(scratch("scan.db"), "PRAGMA integrity_check"), (Rows{{"3:ok"}}));
   EXPECT_EQ(query(scratch("scan.db"), "PRAGMA foreign_key_check"), Rows());
   EXPECT_EQ(query(scratch("scan.db"), "PRAGMA journal_mode"), (Rows{{"3:delete"}}));
@@ -337,7 +286,7 @@ Rows triggers_of(const fs::path& path) {
 TEST(RtabmapWriter, HasTheSchemaOfARealDatabase) {
   GRASPMAP_REQUIRE_DATA();
   const fs::path real = graspmap_test::data_folder() / "scans/site_full.db";
-  write_scan(scratch("scan.db"), graspmap_test::example_scan());
+  write_database(scratch("scan.db"), graspmap_test::example_scan());
   EXPECT_EQ(schema_of(scratch("scan.db")), schema_of(real));
   EXPECT_EQ(triggers_of(scratch("scan.db")), triggers_of(real));
   for (const char* pragma : {"page_size", "encoding", "auto_vacuum", "user_version"})
@@ -428,186 +377,6 @@ TEST_F(RtabmapWriterRefusal, OfParametersThatTheFormatCannotHold) {
        std::map<std::string, std::string>{{"a:b", "c"}, {"a;b", "c"}, {"a", "b;c"}, {"", "c"}}) {
     SCOPED_TRACE(key + "=" + value);
     EXPECT_THROW(RtabmapWriter(scratch("other.db"), {.parameters = {{key, value}}}), libmap::Error);
-  }
-}
-
-std::map<int, Pose> other_poses(const libmap::PoseGraph& graph) {
-  std::map<int, Pose> poses;
-  for (const libmap::GraphNode& node : graph.nodes)
-    poses[node.id] = graspmap_test::random_float_pose();
-  return poses;
-}
-
-TEST(CopyWithOptimizedPoses, ChangesNothingElse) {
-  GRASPMAP_REQUIRE_DATA();
-  for (const char* name : {"site_drift.db", "site_killed.db", "site_tiny.db", "site_tiny_v0160.db",
-                           "site_tiny_v0180.db"}) {
-    SCOPED_TRACE(name);
-    const fs::path source = graspmap_test::data_folder() / "scans" / name;
-    const fs::path target = scratch(name);
-    const libmap::RtabmapDatabase before(source);
-    const std::map<int, Pose> poses = other_poses(before.graph());
-    libmap::copy_with_optimized_poses(source, target, poses);
-    const libmap::RtabmapDatabase after(target);
-    libmap::PoseGraph expected = before.graph();
-    expected.optimized_map_from_base = poses;
-    graspmap_test::expect_same_graph(after.graph(), expected, 2e-7);
-    EXPECT_TRUE(tables_of(target) == tables_of(source));
-    EXPECT_EQ(query(target, "SELECT * FROM sqlite_master"),
-              query(source, "SELECT * FROM sqlite_master"));
-    EXPECT_EQ(query(target, "SELECT version, preview_image, time_enter FROM Admin"),
-              query(source, "SELECT version, preview_image, time_enter FROM Admin"));
-    EXPECT_EQ(query(target, "PRAGMA integrity_check"), (Rows{{"3:ok"}}));
-  }
-}
-
-TEST(CopyWithOptimizedPoses, MovesTheLastLocalizationWithItsNode) {
-  ExampleScan scan = graspmap_test::example_scan();
-  write_scan(scratch("a.db"), scan);
-  const auto localization_after = [&](const std::map<int, Pose>& poses) {
-    libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), poses);
-    return libmap::RtabmapDatabase(scratch("b.db")).stored_map().last_localization_map_from_base;
-  };
-  const std::map<int, Pose> poses = other_poses(scan.graph);
-  ASSERT_TRUE(localization_after(poses));
-  EXPECT_TRUE(localization_after(poses)->isApprox(poses.at(9), 1e-6));
-  EXPECT_FALSE(localization_after({{1, Pose::Identity()}}));
-  EXPECT_FALSE(localization_after({}));
-  EXPECT_EQ(query(scratch("b.db"), "SELECT opt_ids, opt_poses, opt_last_localization FROM Admin"),
-            (Rows{{"NULL", "NULL", "NULL"}}));
-}
-
-// What RTAB-Map made with the earlier poses, it would show with the new ones.
-TEST(CopyWithOptimizedPoses, DropsTheStoredMap) {
-  const ExampleScan scan = graspmap_test::example_scan();
-  write_scan(scratch("a.db"), scan);
-  {
-    SQLite::Database database(scratch("a.db").string(), SQLite::OPEN_READWRITE);
-    database.exec(
-        "UPDATE Admin SET preview_image = x'07', opt_cloud = x'01', opt_polygons_size = 3, "
-        "opt_polygons = x'02', opt_tex_coords = x'03', opt_tex_materials = x'04', opt_map = x'05', "
-        "opt_map_x_min = 1, opt_map_y_min = 2, opt_map_resolution = 0.05, "
-        "dictionary_index = x'06'");
-  }
-  libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), other_poses(scan.graph));
-  EXPECT_EQ(query(scratch("b.db"),
-                  "SELECT opt_cloud, opt_polygons_size, opt_polygons, opt_tex_coords, "
-                  "opt_tex_materials, opt_map, opt_map_x_min, opt_map_y_min, opt_map_resolution "
-                  "FROM Admin"),
-            (Rows{std::vector<std::string>(9, "NULL")}));
-  EXPECT_EQ(query(scratch("b.db"), "SELECT preview_image, dictionary_index FROM Admin"),
-            query(scratch("a.db"), "SELECT preview_image, dictionary_index FROM Admin"));
-}
-
-TEST(CopyWithOptimizedPoses, LandmarksMoveWithTheNodeThatSeesThem) {
-  ExampleScan scan = graspmap_test::example_scan();
-  const Pose landmark = graspmap_test::random_float_pose();
-  scan.graph.optimized_map_from_base[-3] = landmark;
-  scan.graph.links.push_back({.from = 9, .to = -3, .type = libmap::LinkType::landmark});
-  // Seen by no node that has a pose.
-  scan.graph.optimized_map_from_base[-4] = landmark;
-  scan.graph.links.push_back({.from = 5, .to = -4, .type = libmap::LinkType::landmark});
-  write_scan(scratch("a.db"), scan);
-  const std::map<int, Pose> poses = other_poses(scan.graph);
-  libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), poses);
-  SQLite::Database database(scratch("b.db").string());
-  const auto matrix = [&](const char* column) {
-    const auto blob = database.execAndGet(std::string("SELECT ") + column + " FROM Admin");
-    return libmap::decode_matrix(
-        {static_cast<const char*>(blob.getBlob()), static_cast<std::size_t>(blob.getBytes())});
-  };
-  const std::vector<int> ids = matrix("opt_ids").values<int>();
-  EXPECT_EQ(ids, (std::vector<int>{-3, 1, 2, 5, 9}));
-  const std::string stored = matrix("opt_poses").bytes;
-  ASSERT_EQ(stored.size(), 5 * 48U);
-  const Pose moved = *libmap::decode_pose(stored.substr(0, 48));
-  const Pose before = scan.graph.optimized_map_from_base.at(9);
-  EXPECT_TRUE((poses.at(9).inverse() * moved).isApprox(before.inverse() * landmark, 1e-5));
-}
-
-// Links and poses as RTAB-Map itself stores them: both directions, inverse transforms, one matrix;
-// sizes and trailers of the blobs as in the database that it wrote.
-TEST(CopyWithOptimizedPoses, NewRowsHaveTheFormOfRealOnes) {
-  GRASPMAP_REQUIRE_DATA();
-  const fs::path source = graspmap_test::data_folder() / "scans" / "site_full.db";
-  const libmap::PoseGraph graph = libmap::RtabmapDatabase(source).graph();
-  libmap::PoseLink link{.from = 1, .to = 17, .type = libmap::LinkType::local_space_closure};
-  link.from_from_to = graspmap_test::random_float_pose();
-  link.information(0, 5) = link.information(5, 0) = 0.25;
-  libmap::copy_with_optimized_poses(source, scratch("b.db"), graph.optimized_map_from_base, {link});
-  // The same ids and poses: the same matrices, whatever the compression made of them.
-  const char* trailers =
-      "SELECT hex(substr(opt_ids, -12)), hex(substr(opt_poses, -12)), "
-      "typeof(opt_last_localization), length(opt_last_localization) FROM Admin";
-  EXPECT_EQ(query(scratch("b.db"), trailers), query(source, trailers));
-  const std::string form =
-      "SELECT DISTINCT typeof(from_id), typeof(to_id), typeof(type), typeof(information_matrix), "
-      "length(information_matrix), typeof(transform), length(transform), typeof(user_data) "
-      "FROM Link";
-  EXPECT_EQ(query(scratch("b.db"), form), query(source, form));
-  const std::string added =
-      " FROM Link WHERE (from_id = 1 AND to_id = 17) OR "
-      "(from_id = 17 AND to_id = 1)";
-  EXPECT_EQ(query(source, "SELECT COUNT(*)" + added), (Rows{{"1:0"}}));
-  EXPECT_EQ(query(scratch("b.db"), "SELECT COUNT(*), COUNT(DISTINCT information_matrix)" + added),
-            (Rows{{"1:2", "1:1"}}));
-  EXPECT_EQ(query(scratch("b.db"), "PRAGMA foreign_key_check"), Rows{});
-}
-
-TEST(CopyWithOptimizedPoses, DropsALocalizationThatStandsNowhere) {
-  write_scan(scratch("a.db"), graspmap_test::example_scan());
-  {
-    SQLite::Database database(scratch("a.db").string(), SQLite::OPEN_READWRITE);
-    database.exec("UPDATE Admin SET opt_last_localization = zeroblob(48)");
-  }
-  libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {{9, Pose::Identity()}});
-  EXPECT_EQ(query(scratch("b.db"), "SELECT opt_last_localization FROM Admin"), (Rows{{"NULL"}}));
-}
-
-TEST(CopyWithOptimizedPoses, CopiesADatabaseThatIsOpenElsewhere) {
-  const ExampleScan scan = graspmap_test::example_scan();
-  write_scan(scratch("a.db"), scan);
-  for (const std::string mode : {"DELETE", "WAL"}) {
-    SCOPED_TRACE(mode);
-    SQLite::Database other(scratch("a.db").string(), SQLite::OPEN_READWRITE);
-    other.exec("PRAGMA journal_mode = " + mode);
-    libmap::SqliteFile(scratch("a.db")).copy_to(scratch("plain.db"));
-    EXPECT_EQ(query(scratch("plain.db"), "PRAGMA journal_mode"), (Rows{{"3:delete"}}));
-    // Begun and not committed: the copy must not see it.
-    other.exec("BEGIN IMMEDIATE; UPDATE Node SET map_id = 77;");
-    libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {{9, Pose::Identity()}});
-    other.exec("ROLLBACK");
-    libmap::PoseGraph expected = scan.graph;
-    expected.optimized_map_from_base = {{9, Pose::Identity()}};
-    graspmap_test::expect_same_graph(libmap::RtabmapDatabase(scratch("b.db")).graph(), expected,
-                                     2e-7);
-    EXPECT_EQ(query(scratch("b.db"), "PRAGMA journal_mode"), (Rows{{"3:delete"}}));
-    EXPECT_FALSE(fs::exists(scratch("b.db-wal")));
-    EXPECT_FALSE(fs::exists(scratch("b.db-journal")));
-  }
-}
-
-TEST(CopyWithOptimizedPoses, RefusesWhatHasNoPlaceForThem) {
-  write_scan(scratch("a.db"), graspmap_test::example_scan());
-  const libmap::Error missing = graspmap_test::error_of([] {
-    libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {{4, Pose::Identity()}});
-  });
-  EXPECT_EQ(missing.context().file, scratch("a.db").string());
-  EXPECT_EQ(missing.context().value, "4");
-  {
-    SQLite::Database other(scratch("other.db").string(),
-                           SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-    other.exec("CREATE TABLE Weather (day TEXT)");
-    SQLite::Database old(scratch("old.db").string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);
-    old.exec(
-        "CREATE TABLE Node (id INTEGER); CREATE TABLE Admin (version TEXT);"
-        "INSERT INTO Admin VALUES ('0.11.8')");
-  }
-  for (const auto& [name, reason] : std::map<std::string, std::string>{
-           {"other.db", "no RTAB-Map database"}, {"old.db", "before 0.13"}}) {
-    const libmap::Error error = graspmap_test::error_of(
-        [&] { libmap::copy_with_optimized_poses(scratch(name), scratch("b.db"), {}); });
-    EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
   }
 }
 

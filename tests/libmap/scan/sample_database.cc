@@ -181,6 +181,37 @@ void insert_admin(Inserter& insert, SchemaVersion version) {
   insert.row(table, {{"parameters", "'Old/Key:0'"}, {"time_enter", "'2020-01-01'"}});
 }
 
+// `columns` in versions from that one on, and in those before it.
+std::string from(SchemaVersion version, SchemaVersion first, const std::string& columns) {
+  return version >= first ? columns : std::string();
+}
+std::string before(SchemaVersion version, SchemaVersion end, const std::string& columns) {
+  return version < end ? columns : std::string();
+}
+
+// Of the runs of the program, of what it found, and of whole images.
+void append_statistics(SchemaVersion version, std::vector<std::string>& statements) {
+  const std::string sizes =
+      "STM_size INTEGER, last_sign_added INTEGER, process_mem_used INTEGER, database_mem_used "
+      "INTEGER, dictionary_size INTEGER" +
+      from(version, {11, 8}, ", parameters TEXT") + ", time_enter DATE";
+  if (version >= SchemaVersion{11, 11}) {
+    statements.push_back("CREATE TABLE Info (" + sizes + ")");
+    statements.push_back("CREATE TABLE Statistics (id INTEGER NOT NULL, stamp FLOAT, data BLOB" +
+                         from(version, {16, 2}, ", wm_state BLOB") + ")");
+  } else {
+    statements.push_back("CREATE TABLE Statistics (" + sizes + ")");
+  }
+  if (version >= SchemaVersion{20, 0})
+    statements.emplace_back(
+        "CREATE TABLE GlobalDescriptor (node_id INTEGER NOT NULL, type INTEGER NOT NULL, info "
+        "BLOB, data BLOB NOT NULL)");
+  else if (version >= SchemaVersion{18, 0})
+    statements.emplace_back(
+        "CREATE TABLE Tag (node_id INTEGER NOT NULL, tag_id INTEGER NOT NULL, stamp FLOAT NOT "
+        "NULL, transform BLOB NOT NULL)");
+}
+
 }  // namespace
 
 std::string SchemaVersion::text() const {
@@ -194,69 +225,48 @@ std::vector<SchemaVersion> schema_versions() {
 }
 
 std::vector<std::string> table_statements(SchemaVersion version) {
-  const auto from = [&](int minor, int patch, const std::string& columns) {
-    return version >= SchemaVersion{minor, patch} ? columns : std::string();
-  };
-  const auto before = [&](int minor, int patch, const std::string& columns) {
-    return version < SchemaVersion{minor, patch} ? columns : std::string();
-  };
   const std::string words =
       "(node_id INTEGER NOT NULL, word_id INTEGER NOT NULL, pos_x FLOAT NOT NULL, pos_y FLOAT NOT "
       "NULL, size INTEGER NOT NULL, dir FLOAT NOT NULL, response FLOAT NOT NULL, " +
-      from(12, 0, "octave INTEGER NOT NULL, ") + "depth_x FLOAT, depth_y FLOAT, depth_z FLOAT" +
-      from(11, 2, ", descriptor_size INTEGER, descriptor BLOB") + ")";
+      from(version, {12, 0}, "octave INTEGER NOT NULL, ") +
+      "depth_x FLOAT, depth_y FLOAT, depth_z FLOAT" +
+      from(version, {11, 2}, ", descriptor_size INTEGER, descriptor BLOB") + ")";
   std::vector<std::string> statements{
       "CREATE TABLE Node (id INTEGER NOT NULL, map_id INTEGER NOT NULL, weight INTEGER, stamp "
       "FLOAT, pose BLOB, " +
-          from(11, 1, "ground_truth_pose BLOB, ") + from(13, 0, "velocity BLOB, ") +
-          "label TEXT, " + from(14, 0, "gps BLOB, ") + from(18, 0, "env_sensors BLOB, ") +
-          before(10, 1, "user_data BLOB, ") + "time_enter DATE, PRIMARY KEY (id))",
+          from(version, {11, 1}, "ground_truth_pose BLOB, ") +
+          from(version, {13, 0}, "velocity BLOB, ") + "label TEXT, " +
+          from(version, {14, 0}, "gps BLOB, ") + from(version, {18, 0}, "env_sensors BLOB, ") +
+          before(version, {10, 1}, "user_data BLOB, ") + "time_enter DATE, PRIMARY KEY (id))",
       "CREATE TABLE Data (id INTEGER NOT NULL, image BLOB, depth BLOB, " +
-          from(22, 0, "depth_confidence BLOB, ") + "calibration BLOB, " +
-          before(11, 10, "scan_max_pts INTEGER, ") +
-          (version < SchemaVersion{11, 10} ? from(10, 7, "scan_max_range FLOAT, ") : "") +
+          from(version, {22, 0}, "depth_confidence BLOB, ") + "calibration BLOB, " +
+          before(version, {11, 10}, "scan_max_pts INTEGER, ") +
+          (version < SchemaVersion{11, 10} ? from(version, {10, 7}, "scan_max_range FLOAT, ")
+                                           : "") +
           "scan BLOB, " +
-          from(11, 10,
+          from(version, {11, 10},
                "scan_info BLOB, ground_cells BLOB, obstacle_cells BLOB, cell_size FLOAT, "
                "view_point_x FLOAT, view_point_y FLOAT, view_point_z FLOAT, ") +
-          from(16, 0, "empty_cells BLOB, ") + from(10, 1, "user_data BLOB, ") +
-          "time_enter DATE, PRIMARY KEY (id))",
+          from(version, {16, 0}, "empty_cells BLOB, ") +
+          from(version, {10, 1}, "user_data BLOB, ") + "time_enter DATE, PRIMARY KEY (id))",
       "CREATE TABLE Link (from_id INTEGER NOT NULL, to_id INTEGER NOT NULL, type INTEGER NOT "
       "NULL, " +
-          from(13, 0, "information_matrix BLOB NOT NULL, ") +
-          before(13, 0, "rot_variance FLOAT NOT NULL, trans_variance FLOAT NOT NULL, ") +
-          "transform BLOB" + from(10, 10, ", user_data BLOB") + ")",
+          from(version, {13, 0}, "information_matrix BLOB NOT NULL, ") +
+          before(version, {13, 0}, "rot_variance FLOAT NOT NULL, trans_variance FLOAT NOT NULL, ") +
+          "transform BLOB" + from(version, {10, 10}, ", user_data BLOB") + ")",
       "CREATE TABLE Word (id INTEGER NOT NULL, descriptor_size INTEGER NOT NULL, descriptor BLOB "
       "NOT NULL, time_enter DATE, PRIMARY KEY (id))",
       "CREATE TABLE " +
           std::string(version >= SchemaVersion{13, 0} ? "Feature " : "Map_Node_Word ") + words,
       "CREATE TABLE Admin (version TEXT" +
-          from(13, 0,
+          from(version, {13, 0},
                ", preview_image BLOB, opt_cloud BLOB, opt_ids BLOB, opt_poses BLOB, "
                "opt_polygons_size INTEGER, opt_polygons BLOB, opt_tex_coords BLOB, "
                "opt_tex_materials BLOB") +
-          from(16, 0, ", opt_map BLOB, opt_map_x_min FLOAT, opt_map_y_min FLOAT") +
-          from(17, 0, ", opt_last_localization BLOB, opt_map_resolution FLOAT") +
-          from(23, 0, ", dictionary_index BLOB") + ", time_enter DATE)"};
-  const std::string sizes =
-      "STM_size INTEGER, last_sign_added INTEGER, process_mem_used INTEGER, database_mem_used "
-      "INTEGER, dictionary_size INTEGER" +
-      from(11, 8, ", parameters TEXT") + ", time_enter DATE";
-  if (version >= SchemaVersion{11, 11}) {
-    statements.push_back("CREATE TABLE Info (" + sizes + ")");
-    statements.push_back("CREATE TABLE Statistics (id INTEGER NOT NULL, stamp FLOAT, data BLOB" +
-                         from(16, 2, ", wm_state BLOB") + ")");
-  } else {
-    statements.push_back("CREATE TABLE Statistics (" + sizes + ")");
-  }
-  if (version >= SchemaVersion{20, 0})
-    statements.emplace_back(
-        "CREATE TABLE GlobalDescriptor (node_id INTEGER NOT NULL, type INTEGER NOT NULL, info "
-        "BLOB, data BLOB NOT NULL)");
-  else if (version >= SchemaVersion{18, 0})
-    statements.emplace_back(
-        "CREATE TABLE Tag (node_id INTEGER NOT NULL, tag_id INTEGER NOT NULL, stamp FLOAT NOT "
-        "NULL, transform BLOB NOT NULL)");
+          from(version, {16, 0}, ", opt_map BLOB, opt_map_x_min FLOAT, opt_map_y_min FLOAT") +
+          from(version, {17, 0}, ", opt_last_localization BLOB, opt_map_resolution FLOAT") +
+          from(version, {23, 0}, ", dictionary_index BLOB") + ", time_enter DATE)"};
+  append_statistics(version, statements);
   return statements;
 }
 

@@ -103,6 +103,20 @@ TEST(SqliteFile, WalThatWasLeftBehind) {
   EXPECT_EQ(files_in(left), before);
 }
 
+// Without a sound frame in it SQLite would delete it.
+TEST(SqliteFile, WalOfNoiseStays) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  {
+    SQLite::Database((folder / "a.db").string(), SQLite::OPEN_READWRITE)
+        .exec("PRAGMA journal_mode = WAL");
+  }
+  graspmap_test::write_text(folder / "a.db-wal", std::string(9000, 'n'));
+  const auto before = files_in(folder);
+  expect_sample(RtabmapDatabase(folder / "a.db"));
+  EXPECT_EQ(files_in(folder), before);
+}
+
 TEST(SqliteFile, RollbackModeWithAWriterInItsTransaction) {
   const fs::path folder = scratch_folder();
   write_sample(folder / "a.db");

@@ -85,7 +85,7 @@ TEST(TruthFromAbove, is_the_closed_form_on_the_thesis_scene) {
   EXPECT_EQ(ground.shape, 0);
   EXPECT_EQ(ground.height, 0.0);
   EXPECT_FALSE(geometry.from_above(1.51, 0.0).has_value());
-  EXPECT_FALSE(truth_from_above(thesis_primitive_scene(), 0.0, -2.0).has_value());
+  EXPECT_FALSE(geometry.from_above(0.0, -2.0).has_value());
 }
 
 // Descends the vertical line by the distance to the union: slow, and knows no formula but it.
@@ -245,7 +245,7 @@ TEST(Profile, a_share_of_the_area_lies_before_the_point_that_marks_it) {
 
 TEST(SignedDistance, is_the_closed_form_of_each_solid) {
   const auto distance = [](ShapeGeometry geometry, double x, double y, double z) {
-    return signed_distance(scene_of({{std::move(geometry), {}, {}}}), {x, y, z});
+    return SceneGeometry(scene_of({{std::move(geometry), {}, {}}})).signed_distance({x, y, z});
   };
   EXPECT_NEAR(distance(Sphere{0.5}, 0.0, 3.0, 4.0), 4.5, 1e-14);
   EXPECT_NEAR(distance(Sphere{0.5}, 0.0, 0.0, 0.1), -0.4, 1e-14);

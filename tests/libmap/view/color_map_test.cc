@@ -85,6 +85,19 @@ TEST(Diverging, IsGreyInTheMiddleAndSymmetricInItsRange) {
   EXPECT_EQ(color(cloud, coloring).colors[3], diverging(0.5));
 }
 
+TEST(Viridis, ShowsTheFewValuesThatDiffer) {
+  PointCloud cloud = row_of_points(1000);
+  ScalarField& filled = cloud.add_field("filled", ScalarType::uint8);
+  filled.values[7] = 1.0;
+  for (const ColorScale scale : {ColorScale::viridis, ColorScale::diverging}) {
+    const ColoredPoints colored =
+        color(cloud, {.mode = ColorMode::field, .field = "filled", .scale = scale});
+    EXPECT_TRUE(colored.legend.continuous);
+    EXPECT_EQ(colored.legend.max, 1.0);
+    EXPECT_NE(colored.colors[7], colored.colors[8]);
+  }
+}
+
 TEST(Viridis, EndsAreThePublishedOnesAndLightnessGrows) {
   EXPECT_EQ(viridis(0.0), (Color{68, 1, 84}));
   EXPECT_EQ(viridis(1.0), (Color{253, 231, 37}));

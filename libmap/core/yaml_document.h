@@ -1,0 +1,18 @@
+// A text of YAML, with errors that name file and line.
+#pragma once
+
+#include <functional>
+#include <string>
+
+namespace YAML {
+class Node;
+}
+
+namespace libmap {
+
+// Gives the one document in `text` to `read`, a null node where there is none. Throws Error naming
+// `file` where the text is no YAML or holds more documents, and names `file` in what `read` throws.
+void read_yaml(const std::string& text, const std::string& file,
+               const std::function<void(const YAML::Node&)>& read);
+
+}  // namespace libmap

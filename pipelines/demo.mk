@@ -1,0 +1,25 @@
+# graspmap's main job without any data: rock_site.mk, from a simulated scan's database to the map;
+# primitive_shapes.mk, the thesis's shapes with their known truth; one page of both.
+#
+#   make -f pipelines/demo.mk OUT=folder -j2
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+OUT ?= demo
+
+include $(here)one_run.mk
+ifdef is_alone
+
+page := $(OUT)/report.html
+
+.DELETE_ON_ERROR:
+.PHONY: all rock_site primitive_shapes
+# The page is written again only if something is newer than it.
+all: rock_site primitive_shapes
+	@test -f $(page) && test -z "$$(find $(OUT) -type f -newer $(page) ! -name 'report.html*' \
+	    ! -name .lock -print -quit)" || \
+	  exec $(GRASPMAP) report $(OUT) --title "graspmap: the demo" --force -o $(page)
+
+rock_site primitive_shapes:
+	@exec $(MAKE) --no-print-directory -f $(here)$@.mk OUT=$(OUT)/$@ GRASPMAP=$(GRASPMAP)
+endif

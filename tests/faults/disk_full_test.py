@@ -1,0 +1,233 @@
+#!/usr/bin/python3
+"""Every command that writes, on a disk that is full.
+
+disk_full_test.py GRASPMAP SOURCE_FOLDER
+
+Each command runs once on a small disk of its own (a tmpfs in a namespace of mounts), then once more
+with nothing left of it, and once with half of what its outputs take. The second and third must end
+ - with exit code 1 and one line that names a file and says that the disk is full (with half left: or
+   with all outputs as they were, where that was enough);
+ - with every earlier file as it was, and no other beside them.
+What prints to standard output must fail on /dev/full alike. Ends with 77 where no disk can be mounted.
+Without FULL: each command once or twice; FULL=1: each use of it in tests/hostile/commands.py. ONLY: a
+part of a command to run alone.
+"""
+import os
+import pathlib
+import re
+import shutil
+import subprocess
+import sys
+import tempfile
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent.parent / "hostile"))
+import commands
+import good_inputs
+
+SKIPPED = 77
+PAGE = 4096
+REASON = re.compile(r"No space left on device|database or disk is full|[Dd]isk full")
+MORE = [
+    "convert {good}/terrain.pcd out.ply",
+    "convert {good}/terrain.pcd out.pcd --encoding ascii",
+    "convert {good}/mesh.ply out.stl",
+    "convert {good}/mesh.ply out.off",
+    "convert {good}/mesh.ply out.ply --encoding ascii",
+    "convert {good}/mesh.ply out.vtp",
+    "convert {good}/poses.tum out.tum",
+    "simulate scan {good}/mesh.ply --camera {good}/camera.yaml --frames 5 --depth-format float -o out.db",
+    "refine {good}/scan.db --feature-cache off --report out.json -o out.colmap",
+    "refine {good}/scan.db --report out.txt -o out.g2o",
+    "texture {good}/mesh.ply --scan {good}/scan.db --frame ground-truth --texture-size 256 -o out.obj",
+    "texture {good}/mesh.ply --scan {good}/scan.db --frame ground-truth --texture-size 256 -o out.glb",
+    "summarize {good}/map.pcd -o out",
+    "compare {good}/terrain.pcd {good}/mesh.ply --picture out.png",
+    "calibrate {good}/pictures --report out -o out.yaml",
+    "chart {good}/lookup.csv --x x --y score -o out.png",
+    "mask --sections -o out.png",
+    "mask -o out.pcd",
+    "merge {good}/map.tiles -o out.csv",
+    "analyze {good}/map.pcd -o out",
+    "bag {good}/map.bag --topic /merged_pcd -o out.csv",
+    "bag {good}/rig -o out.bag",
+]
+PRINTING = [
+    "info {good}/scan.db",
+    "info {good}/map.pcd --json",
+    "compare {good}/terrain.pcd {good}/mesh.ply",
+    "mesh {good}/terrain.pcd --cell-size 0.05 --report -o out.ply",
+    "spot-check {good}/mesh.ply",
+    "bag {good}/rig.bag --list",
+    "score --print-config",
+    "score --help",
+    "simulate --help",
+    "--help",
+    "--version",
+]
+# Outputs whose content differs from run to run: how long it took.
+WITH_TIMES = (".json", ".txt", ".html")
+
+
+def mounted_disks():
+    """Whether this process may mount: it has a namespace of its own."""
+    return os.environ.get("GRASPMAP_TEST_MOUNTS") == "1"
+
+
+def enter_namespace():
+    line = ["unshare", "--mount", "--map-root-user"]
+    probe = "mount -t tmpfs -o size=64k none /mnt"
+    if shutil.which("unshare") is None or subprocess.run(line + ["sh", "-c", probe], capture_output=True, check=False).returncode != 0:
+        print("skipped: no disk can be mounted here (unshare --mount --map-root-user)")
+        sys.exit(SKIPPED)
+    os.environ["GRASPMAP_TEST_MOUNTS"] = "1"
+    os.execvp("unshare", line + [sys.executable] + sys.argv)
+
+
+def snapshot(folder):
+    found = {}
+    for root, folders, files in os.walk(folder):
+        for name in folders:
+            found[os.path.relpath(os.path.join(root, name), folder)] = None
+        for name in files:
+            path = pathlib.Path(root, name)
+            found[os.path.relpath(path, folder)] = path.read_bytes()
+    return found
+
+
+def differences(before, after):
+    for name in sorted(before.keys() | after.keys()):
+        if name not in after:
+            yield f"{name} is gone"
+        elif name not in before:
+            yield f"{name} was not there before"
+        elif before[name] != after[name] and not name.endswith(WITH_TIMES):
+            yield f"{name} has changed"
+        elif before[name] and not after[name]:
+            yield f"{name} is empty"
+
+
+class Disk:
+    def __init__(self, place):
+        self.place = place
+        place.mkdir()
+        subprocess.run(["mount", "-t", "tmpfs", "-o", "size=64m", "none", str(place)], check=True)
+        self.folder = place / "run"
+
+    def empty(self):
+        shutil.rmtree(self.folder, ignore_errors=True)
+        self.folder.mkdir()
+
+    def leave(self, free):
+        """Fills it but for `free` bytes; what took the place lies outside of the folder."""
+        filler = self.place / "filler"
+        filler.unlink(missing_ok=True)
+        left = os.statvfs(self.place)
+        bytes_left = left.f_bavail * left.f_frsize - free
+        with open(filler, "wb") as file:
+            os.posix_fallocate(file.fileno(), 0, max(bytes_left, 1))
+
+    def make_room(self):
+        (self.place / "filler").unlink(missing_ok=True)
+
+
+class Test:
+    def __init__(self, graspmap, scratch):
+        self.graspmap, self.scratch = graspmap, scratch
+        self.good = scratch / "good"
+        self.disk = Disk(scratch / "disk")
+        self.failures = []
+        self.runs = 0
+        self.refused = 0
+
+    def run(self, line, **how):
+        words = line.replace("{good}", str(self.good)).split()
+        self.runs += 1
+        return subprocess.run([self.graspmap] + words, cwd=self.disk.folder, stdin=subprocess.DEVNULL, text=True,
+                              stderr=subprocess.PIPE, check=False, **{"stdout": subprocess.DEVNULL, **how})
+
+    def expect(self, holds, line, what, run):
+        if not holds:
+            self.failures.append(f"{line}: {what}")
+            print(f"{line}: {what}\n    exit code {run.returncode}: {run.stderr!r}", flush=True)
+
+    def expect_clear_error(self, line, run):
+        errors = [one for one in run.stderr.splitlines() if ": error: " in one]
+        self.expect(run.returncode == 1, line, "not exit code 1", run)
+        self.expect(len(errors) == 1 and run.stderr.rstrip("\n").endswith(errors[0]), line, "not one line of error", run)
+        self.expect(len(errors) == 1 and REASON.search(errors[0]), line, "does not say that the disk is full", run)
+        named = re.search(r": error: (\S+|standard output): ", errors[0] if errors else "")
+        self.expect(named and ".partial" not in run.stderr, line, "names no file, or one that is gone", run)
+
+    def writing(self, line):
+        self.disk.make_room()
+        self.disk.empty()
+        first = self.run(line)
+        if first.returncode == 3 and line not in MORE:
+            return False  # the good inputs alone do not make it
+        if first.returncode != 0:
+            self.expect(False, line, "fails on a disk with room", first)
+            return False
+        before = snapshot(self.disk.folder)
+        size = sum(-(-len(content) // PAGE) * PAGE for content in before.values() if content is not None)
+        for free in (0, size // 2 // PAGE * PAGE):
+            self.disk.leave(free)
+            title = f"{line} ({free} bytes left)"
+            run = self.run(line)
+            # A store that is complete has nothing to write.
+            if (free == 0 and "out.tiles" not in line) or run.returncode != 0:
+                self.refused += 1
+                self.expect_clear_error(title, run)
+            after = snapshot(self.disk.folder)
+            for difference in differences(before, after):
+                self.expect(False, title, difference, run)
+        return True
+
+    def new(self, line):
+        """No earlier output: nothing appears."""
+        self.disk.make_room()
+        self.disk.empty()
+        self.disk.leave(0)
+        run = self.run(line)
+        self.expect_clear_error(line + " (new)", run)
+        # A store of tiles is gone on with later.
+        left = [name for name in snapshot(self.disk.folder) if not re.match(r"out\.(tiles|txt\.features|g2o\.features)", name)]
+        self.expect(not left, line + " (new)", f"leaves {left}", run)
+
+    def printing(self, line):
+        self.disk.make_room()
+        self.disk.empty()
+        with open("/dev/full", "w", encoding="ascii") as full:
+            run = self.run(line, stdout=full)
+        self.expect_clear_error(line + " > /dev/full", run)
+        self.expect("standard output: cannot be written" in run.stderr, line, "names not standard output", run)
+
+
+def main():
+    if not mounted_disks():
+        enter_namespace()
+    graspmap, source = sys.argv[1], pathlib.Path(sys.argv[2])
+    only = os.environ.get("ONLY", "")
+    scratch = pathlib.Path(tempfile.mkdtemp(prefix="disk_full_"))
+    try:
+        test = Test(graspmap, scratch)
+        good_inputs.make(test.good, graspmap, source)
+        lines = []
+        for one in commands.USES:
+            line = " ".join(one.words).replace("{x}", "{good}/" + one.example)
+            if " out" in line and line not in lines and (one.main or "FULL" in os.environ):
+                lines.append(line)
+        for line in [one for one in lines + MORE if only in one]:
+            if test.writing(line):
+                test.new(line)
+        for line in [one for one in PRINTING if only in one]:
+            test.printing(line)
+        subprocess.run(["umount", str(test.disk.place)], check=False)
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+    if test.failures:
+        print(f"FAILED: {len(test.failures)} findings in {test.runs} runs")
+        sys.exit(1)
+    print(f"passed: {test.runs} runs, {test.refused} on a full disk")
+
+
+main()

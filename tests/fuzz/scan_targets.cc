@@ -1,0 +1,251 @@
+// Scans: databases, their blobs, folders of images, and what else gives poses.
+#include "libmap/core/file_output.h"
+#include "libmap/poses/trajectory_io.h"
+#include "libmap/scan/calibration_codec.h"
+#include "libmap/scan/camera_io.h"
+#include "libmap/scan/colmap_io.h"
+#include "libmap/scan/depth_codec.h"
+#include "libmap/scan/frame_folder.h"
+#include "libmap/scan/image_codec.h"
+#include "libmap/scan/laser_scan.h"
+#include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rtabmap_reader.h"
+#include "libmap/scan/scan_verification.h"
+#include "libmap/scan/trajectory_text.h"
+#include "tests/fuzz/scratch_file.h"
+#include "tests/fuzz/stored_blobs.h"
+#include "tests/fuzz/target_support.h"
+#include "tests/libmap/scan/sample_database.h"
+
+namespace graspmap_fuzz {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+bool run_calibration(std::string_view bytes) {
+  return accepts([&] {
+    const libmap::Calibration calibration = libmap::decode_calibration(bytes);
+    libmap::encode_calibration(calibration);
+    libmap::cameras_of(calibration, 512, 424);
+    libmap::stereo_cameras_of(calibration, 512, 424);
+  });
+}
+
+Seeds calibration_seeds() {
+  Seeds seeds;
+  for (const graspmap_test::SchemaVersion version : graspmap_test::schema_versions())
+    seeds.push_back(graspmap_test::sample_calibration(version));
+  return seeds;
+}
+
+bool run_depth(std::string_view bytes) {
+  accepts([&] { libmap::read_depth_info(bytes); });
+  return accepts([&] { libmap::to_millimetres(libmap::decode_depth(bytes)); });
+}
+
+Seeds depth_seeds() {
+  const auto depth = graspmap_test::sample_depth(1);
+  return {libmap::encode_rvl(depth), libmap::encode_png(depth),
+          libmap::encode_float_png(libmap::to_metres(depth))};
+}
+
+bool run_image(std::string_view bytes) {
+  accepts([&] { libmap::read_image_info(bytes); });
+  return any_accepts([&] { libmap::decode_color(bytes); }, [&] { libmap::decode_gray(bytes); },
+                     [&] { libmap::decode_gray16(bytes); }, [&] { libmap::decode_rgba(bytes); });
+}
+
+Seeds image_seeds() {
+  const auto color = graspmap_test::sample_color(1);
+  return {libmap::encode_png(color), libmap::encode_jpeg(color),
+          libmap::encode_png(graspmap_test::sample_depth(1))};
+}
+
+bool run_matrix(std::string_view bytes) {
+  return any_accepts([&] { libmap::decode_matrix(bytes); },
+                     [&] { libmap::decode_compressed_text(bytes); });
+}
+
+std::string sample_matrix() {
+  return libmap::encode_matrix({1, 2, 3, libmap::MatrixElement::float32,
+                                graspmap_test::bytes_of(std::vector<float>{1, 2, 3, 4, 5, 6})});
+}
+
+Seeds matrix_seeds() { return {sample_matrix(), libmap::encode_compressed_text("a text\n")}; }
+
+// The first byte is the length of the description, which stands before the points.
+bool run_laser_scan(std::string_view bytes) {
+  const std::size_t length = take_choice(bytes, 256);
+  const std::string_view info = bytes.substr(0, length);
+  bytes.remove_prefix(info.size());
+  return accepts([&] { libmap::decode_laser_scan(bytes, info); });
+}
+
+Seeds laser_scan_seeds() {
+  const std::string info =
+      graspmap_test::bytes_of(std::vector<float>{5, 0.1F, 10, -1, 1, 0.5F, 2}) +
+      graspmap_test::pose_bytes(libmap::Pose::Identity());
+  return {with_choice(info.size(), info + sample_matrix())};
+}
+
+bool read_database(const fs::path& path) {
+  return accepts([&] {
+    const libmap::RtabmapDatabase database(path);
+    accepts([&] { database.parameters(); });
+    accepts([&] { database.stored_map(); });
+    accepts([&] { database.each_content([](const libmap::NodeContent&) {}); });
+    for (const auto& node : database.graph().nodes) {
+      accepts([&, id = node.id] { database.read_frame(id); });
+      accepts([&, id = node.id] { database.features(id); });
+      accepts([&, id = node.id] { database.laser_scan(id); });
+    }
+    libmap::verify_scan(database);
+  });
+}
+
+bool run_database(std::string_view bytes) {
+  static const ScratchFile file("database.db");
+  file.write(bytes);
+  return read_database(file.path());
+}
+
+Seeds database_seeds() {
+  Seeds seeds;
+  for (const graspmap_test::SchemaVersion version : graspmap_test::schema_versions())
+    seeds.push_back(written("sample.db", [&](const fs::path& path) {
+      fs::remove(path);
+      graspmap_test::write_sample(path, version);
+    }));
+  return seeds;
+}
+
+bool run_database_blob(std::string_view bytes) {
+  static const StoredBlobs blobs;
+  const std::size_t place = take_choice(bytes, blobs.places());
+  return read_database(blobs.database_with(place, bytes));
+}
+
+Seeds database_blob_seeds() {
+  const StoredBlobs blobs;
+  Seeds seeds;
+  for (std::size_t place = 0; place < blobs.places(); ++place)
+    seeds.push_back(with_choice(place, blobs.blob(place)));
+  return seeds;
+}
+
+// The lists of a folder's images and poses.
+bool run_frame_list(std::string_view bytes) {
+  static const ScratchFile calibration("frames/calibration.yaml");
+  static const ScratchFile colors("frames/rgb.txt");
+  static const ScratchFile depths("frames/depth.txt");
+  static const ScratchFile poses("frames/groundtruth.txt");
+  libmap::CameraFile camera;
+  camera.camera.width = camera.camera.height = 8;
+  camera.camera.fx = camera.camera.fy = 8.0;
+  calibration.write(libmap::to_yaml(camera));
+  for (const ScratchFile* file : {&colors, &depths, &poses}) file->write(take_file(bytes));
+  return accepts([&] {
+    const libmap::FrameFolder folder(colors.path().parent_path());
+    for (const auto& node : folder.graph().nodes)
+      accepts([&, id = node.id] { folder.read_frame(id); });
+  });
+}
+
+Seeds frame_list_seeds() {
+  return {
+      "# stamp file\n1.0 rgb/1.png\n2.0 rgb/2.png\n\f"
+      "1.0 depth/1.png\n2.01 depth/2.png\n\f"
+      "1.0 0 0 0 0 0 0 1\n2.0 0.5 0 0 0 0 0 1\n"};
+}
+
+// The table of a rig's images.
+bool run_rig_images(std::string_view bytes) {
+  static const ScratchFile file(std::string("rig/") + libmap::rig_images_file_name);
+  file.write(bytes);
+  return accepts([&] {
+    libmap::CameraRig rig;
+    rig.cameras.resize(2);
+    rig.cameras[0].name = "front";
+    rig.cameras[1].name = "rear";
+    const auto images = libmap::list_rig_images(file.path().parent_path(), rig);
+    libmap::rig_moments(images, rig.cameras.size(), 0.02);
+    libmap::fullest_rig_moment(images, rig.cameras.size(), 0.02);
+  });
+}
+
+Seeds rig_images_seeds() {
+  return {
+      "camera,stamp_s,file\nfront,1.5,front/a.png\nrear,1.51,rear/a.png\n"
+      "front,2,\"b,b.png\"\nrear,2.5e0,c.png\n"};
+}
+
+bool run_poses(std::string_view bytes) {
+  static const std::vector<libmap::TrajectoryFormat> formats = [] {
+    std::vector<libmap::TrajectoryFormat> all;
+    for (const auto& [name, format] : libmap::trajectory_format_names()) all.push_back(format);
+    return all;
+  }();
+  static const ScratchFile file("poses.txt");
+  const libmap::TrajectoryFormat format = formats[take_choice(bytes, formats.size())];
+  file.write(bytes);
+  return accepts([&] { libmap::read_trajectory(file.path(), format); });
+}
+
+libmap::Trajectory small_trajectory() {
+  libmap::Trajectory trajectory;
+  for (int node = 1; node <= 3; ++node)
+    trajectory.push_back({node, 100.25 + node, graspmap_test::sample_pose(node)});
+  return trajectory;
+}
+
+Seeds pose_seeds() {
+  Seeds seeds;
+  for (std::size_t choice = 0; choice < libmap::trajectory_format_names().size(); ++choice)
+    for (const std::string& text :
+         {libmap::to_tum(small_trajectory()), libmap::to_kitti(small_trajectory()),
+          libmap::to_g2o(small_trajectory(), {}), libmap::to_toro(small_trajectory(), {})})
+      seeds.push_back(with_choice(choice, text));
+  return seeds;
+}
+
+bool run_colmap(std::string_view bytes) {
+  const std::size_t choice = take_choice(bytes, 3);
+  return accepts([&] {
+    if (choice == 0) {
+      for (const auto& entry : libmap::parse_colmap_cameras(bytes, file_name))
+        libmap::to_camera(entry.second);
+    } else if (choice == 1) {
+      libmap::parse_colmap_images(bytes, file_name);
+    } else {
+      libmap::parse_colmap_points(bytes, file_name);
+    }
+  });
+}
+
+Seeds colmap_seeds() {
+  return {with_choice(0, "# cameras\n1 PINHOLE 512 424 365 365 256.5 212.5\n"),
+          with_choice(1, "# images\n1 1 0 0 0 0.5 0 1 1 one.jpg\n10.5 20.5 7\n"),
+          with_choice(2, "# points\n7 0.5 0.25 1 10 20 30 0.1 1 0 2 3\n")};
+}
+
+}  // namespace
+
+std::vector<FuzzTarget> scan_targets() {
+  return {
+      {"calibration", "calibration blobs", run_calibration, calibration_seeds},
+      {"colmap", "COLMAP's text models", run_colmap, colmap_seeds},
+      {"database", "scan databases as a whole", run_database, database_seeds},
+      {"database_blob", "any blob of a scan database", run_database_blob, database_blob_seeds},
+      {"depth", "depth images: RVL, PNG, float PNG", run_depth, depth_seeds},
+      {"frame_list", "lists of a folder of images", run_frame_list, frame_list_seeds},
+      {"image", "colour and grey images", run_image, image_seeds},
+      {"laser_scan", "laser scans", run_laser_scan, laser_scan_seeds},
+      {"matrix", "compressed matrices and texts", run_matrix, matrix_seeds},
+      {"poses", "TUM, KITTI, g2o, TORO and other files of poses", run_poses, pose_seeds},
+      {"rig_images", "tables of a rig's images", run_rig_images, rig_images_seeds},
+  };
+}
+
+}  // namespace graspmap_fuzz

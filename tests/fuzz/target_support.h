@@ -1,0 +1,65 @@
+// What the fuzz targets share.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "tests/fuzz/fuzz_targets.h"
+
+namespace graspmap_fuzz {
+
+using Seeds = std::vector<std::string>;
+
+std::vector<FuzzTarget> scan_targets();
+std::vector<FuzzTarget> cloud_targets();
+std::vector<FuzzTarget> mesh_targets();
+std::vector<FuzzTarget> text_targets();
+std::vector<FuzzTarget> map_targets();
+std::vector<FuzzTarget> feature_targets();
+std::vector<FuzzTarget> bag_targets();  // of builds with ROS alone
+
+// What errors name as the file.
+inline constexpr const char* file_name = "bytes";
+
+// Whether `read` came to its end.
+template <typename Read>
+bool accepts(const Read& read) {
+  try {
+    read();
+    return true;
+  } catch (const libmap::Error&) {
+    return false;
+  }
+}
+
+// Calls all of them; whether one came to its end.
+template <typename... Reads>
+bool any_accepts(const Reads&... reads) {
+  bool any = false;
+  ((any = accepts(reads) || any), ...);
+  return any;
+}
+
+// The first byte chooses among `count` formats that share a target.
+std::size_t take_choice(std::string_view& bytes, std::size_t count);
+std::string with_choice(std::size_t choice, const std::string& bytes);
+
+// Several files in one input, form feeds between: the bytes up to the next one.
+std::string_view take_file(std::string_view& bytes);
+
+// What `write` leaves in a file of that name.
+std::string written(const std::string& name,
+                    const std::function<void(const std::filesystem::path&)>& write);
+
+// Every file of the toolkit's own data of a kind.
+void add_data(Seeds& seeds, std::size_t choice, const std::string& kind);
+
+libmap::Manifest small_manifest();
+
+}  // namespace graspmap_fuzz

@@ -1,0 +1,48 @@
+#include "libmap/core/guarded_process.h"
+
+#include <gtest/gtest.h>
+
+#include <csignal>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace {
+
+using libmap::GuardedProcess;
+
+constexpr std::uint64_t memory = std::uint64_t{1} << 30;
+
+TEST(GuardedProcess, WhatItWritesIsRead) {
+  const std::string text(1 << 20, 'x');  // more than a pipe holds
+  GuardedProcess process(memory, [&](const GuardedProcess::Write& write) {
+    write(text);
+    write("end");
+  });
+  std::string read(text.size() + 3, '\0');
+  ASSERT_TRUE(process.read(read.data(), read.size()));
+  EXPECT_EQ(read, text + "end");
+  EXPECT_FALSE(process.read(read.data(), 1));
+  EXPECT_EQ(process.end(), "");
+}
+
+TEST(GuardedProcess, ItsFallIsNotOurs) {
+  GuardedProcess killed(memory, [](const GuardedProcess::Write& write) {
+    write("ab");
+    raise(SIGKILL);
+  });
+  std::string read(3, '\0');
+  EXPECT_FALSE(killed.read(read.data(), 3));
+  EXPECT_EQ(killed.end(), " (signal 9)");
+  GuardedProcess thrown(memory, [](const GuardedProcess::Write&) { throw std::logic_error("x"); });
+  EXPECT_FALSE(thrown.read(read.data(), 1));
+  EXPECT_EQ(thrown.end(), "");
+}
+
+TEST(GuardedProcess, EndsWithItsReader) {
+  const GuardedProcess process(memory, [](const GuardedProcess::Write& write) {
+    while (true) write("for ever");
+  });
+}
+
+}  // namespace

@@ -1,0 +1,53 @@
+#include "libmap/core/yaml_document.h"
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include "tests/support/test_support.h"
+
+namespace {
+
+std::string fault_of(const std::string& text) {
+  return graspmap_test::error_of([&] {
+           libmap::read_yaml(text, "given.yaml",
+                             [](const YAML::Node& root) { (void)root["a"].as<double>(); });
+         })
+      .what();
+}
+
+TEST(YamlDocument, GivesTheOneDocument) {
+  double value = 0.0;
+  libmap::read_yaml("a: 1.5\n", "given.yaml",
+                    [&](const YAML::Node& root) { value = root["a"].as<double>(); });
+  EXPECT_EQ(value, 1.5);
+  bool is_null = false;
+  libmap::read_yaml("# nothing\n", "given.yaml",
+                    [&](const YAML::Node& root) { is_null = root.IsNull(); });
+  EXPECT_TRUE(is_null);
+}
+
+TEST(YamlDocument, FaultsNameFileAndLine) {
+  EXPECT_EQ(fault_of("b: 1\na: [1\n").find("given.yaml: line 3: not valid YAML: "), 0U);
+  EXPECT_EQ(fault_of("b: 1\na: high\n").find("given.yaml: line 2: not valid YAML: "), 0U);
+  EXPECT_EQ(fault_of("a: 1\n---\na: 2\n"), "given.yaml: holds more than one YAML document");
+  EXPECT_EQ(graspmap_test::error_of([] {
+              libmap::read_yaml("a: 1\n", "given.yaml", [](const YAML::Node&) {
+                throw libmap::Error("is too small", {.field = "a"});
+              });
+            }).what(),
+            std::string("given.yaml: a: is too small"));
+}
+
+// yaml-cpp finds documents without end there.
+TEST(YamlDocument, WhatBelongsToNoDocumentIsRefused) {
+  for (const char* text : {"{a: 1}, b", "{a: 1},", ", a", "[a]\n, b"})
+    EXPECT_EQ(fault_of(text), "given.yaml: holds more than one YAML document") << text;
+}
+
+// What has no place in the text has no line.
+TEST(YamlDocument, FaultsWithoutAPlace) {
+  const std::string fault = fault_of("b: 1\n");
+  EXPECT_EQ(fault.find("given.yaml: not valid YAML: "), 0U) << fault;
+}
+
+}  // namespace

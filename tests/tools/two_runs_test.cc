@@ -1,0 +1,139 @@
+// Two runs at the same time into the same output: the second says so at once and harms nothing.
+#include <gtest/gtest.h>
+#include <signal.h>
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/output_lock.h"
+#include "tests/support/running_program.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+using namespace std::chrono_literals;
+
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::ProgramResult;
+using graspmap_test::RunningProgram;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using Words = std::vector<std::string>;
+
+std::vector<std::string> temporaries() {
+  std::vector<std::string> names;
+  std::error_code code;
+  for (auto entry = fs::recursive_directory_iterator(scratch(""), code);
+       !code && entry != fs::recursive_directory_iterator(); entry.increment(code)) {
+    const std::string name = entry->path().filename().string();
+    if (name.find(".partial") != std::string::npos) names.push_back(name);
+  }
+  return names;
+}
+
+// It has claimed its output, and writes nothing yet.
+void wait_for_claim(const RunningProgram& program) {
+  for (;;) {
+    const auto names = temporaries();
+    if (names.size() == 1 && names.front().ends_with(".partial.json")) return;
+    if (program.has_ended()) return;
+    std::this_thread::sleep_for(1ms);
+  }
+}
+
+// Runs the command twice at once; the first is stopped while the second runs.
+void expect_one_of_two(const Words& words, const std::string& output) {
+  Words line = words;
+  line.insert(line.begin(), (graspmap_test::build_folder() / "graspmap").string());
+  RunningProgram first(line, {.folder = scratch("")});
+  wait_for_claim(first);
+  kill(first.process(), SIGSTOP);
+  ASSERT_FALSE(first.has_ended());
+  const ProgramResult second = graspmap(words);
+  kill(first.process(), SIGCONT);
+  EXPECT_EQ(second.exit_code, 1) << second.standard_error;
+  EXPECT_NE(second.standard_error.find(" " + output + ": another process is writing it\n"),
+            std::string::npos)
+      << second.standard_error;
+  EXPECT_EQ(std::count(second.standard_error.begin(), second.standard_error.end(), '\n'), 1);
+  EXPECT_TRUE(succeeded(first.wait()));
+  EXPECT_TRUE(fs::exists(scratch(output)));
+  EXPECT_TRUE(fs::exists(scratch(output + ".json")));
+  EXPECT_TRUE(temporaries().empty());
+}
+
+TEST(TwoRuns, IntoAFile) {
+  libmap::write_cloud(scratch("t.pcd"), graspmap_test::bumpy_terrain(1.2));
+  expect_one_of_two({"score", "t.pcd", "-o", "o.pcd", "--quiet"}, "o.pcd");
+}
+
+TEST(TwoRuns, IntoAFolderOfFiles) {
+  expect_one_of_two({"simulate", "site", "--edge-length", "0.03", "-o", "o", "--quiet"}, "o");
+  expect_one_of_two({"simulate", "site", "--edge-length", "0.03", "-o", "new/o/", "--quiet"},
+                    "new/o");
+}
+
+TEST(TwoRuns, IntoAFolderThatIsReplaced) {
+  expect_one_of_two({"simulate", "terrain", "--size", "6", "-o", "o", "--quiet"}, "o");
+}
+
+TEST(TwoRuns, OfAReport) {
+  libmap::write_cloud(scratch("t.pcd"), graspmap_test::bumpy_terrain());
+  ASSERT_TRUE(succeeded(graspmap({"score", "t.pcd", "-o", "m.pcd", "--quiet"})));
+  expect_one_of_two({"report", ".", "-o", "o.html", "--no-3d", "--quiet"}, "o.html");
+}
+
+// A store whose shares others score is not begun anew.
+TEST(TwoRuns, IntoAStoreOfTiles) {
+  libmap::write_cloud(scratch("t.pcd"), graspmap_test::bumpy_terrain(0.6));
+  const Words share = {"score", "t.pcd", "-o", "m.tiles", "--tile", "1/2", "--quiet"};
+  ASSERT_TRUE(succeeded(graspmap(share)));
+  const auto refused = [](const ProgramResult& result) {
+    return result.exit_code == 1 &&
+           result.standard_error.find("m.tiles: another process is writing it") !=
+               std::string::npos;
+  };
+  const std::string plan = content("m.tiles/progress/plan.json");
+  {
+    const libmap::FileLock working(scratch("m.tiles/progress/1_of_2.jsonl"));
+    EXPECT_TRUE(refused(graspmap({"score", "t.pcd", "-o", "m.tiles", "--force", "--quiet"})));
+    EXPECT_EQ(content("m.tiles/progress/plan.json"), plan);
+    EXPECT_TRUE(succeeded(graspmap({"score", "t.pcd", "-o", "m.tiles", "--tile", "2/2"})));
+  }
+  EXPECT_TRUE(succeeded(graspmap({"score", "t.pcd", "-o", "m.tiles", "--force", "--quiet"})));
+}
+
+// What a killed run leaves blocks nobody.
+TEST(TwoRuns, AKilledRunHoldsNothing) {
+  libmap::write_cloud(scratch("t.pcd"), graspmap_test::bumpy_terrain(1.2));
+  const Words words = {"score", "t.pcd", "-o", "o.pcd", "--quiet"};
+  Words line = words;
+  line.insert(line.begin(), (graspmap_test::build_folder() / "graspmap").string());
+  RunningProgram killed(line, {.folder = scratch("")});
+  wait_for_claim(killed);
+  kill(killed.process(), SIGKILL);
+  EXPECT_EQ(killed.wait().exit_code, 128 + SIGKILL);
+  EXPECT_TRUE(succeeded(graspmap(words)));
+  EXPECT_TRUE(temporaries().empty());
+}
+
+// As one that was killed while it wrote the first output of a folder.
+TEST(TwoRuns, AFolderOfWhatAKilledRunLeftIsNobodys) {
+  const Words words = {"simulate", "site", "--edge-length", "0.1", "-o", "o", "--quiet"};
+  fs::create_directory(scratch("o"));
+  graspmap_test::write_text(scratch("o/.mesh.partial.ply"), "half");
+  EXPECT_TRUE(succeeded(graspmap(words)));
+  EXPECT_TRUE(temporaries().empty());
+  fs::remove_all(scratch("o"));
+  fs::remove(scratch("o.json"));
+  fs::create_directory(scratch("o"));
+  graspmap_test::write_text(scratch("o/.partial"), "mine");
+  graspmap_test::write_text(scratch("o/mine"), "mine");
+  EXPECT_TRUE(graspmap_test::bad_input(graspmap(words), {"o: is not empty"}));
+}
+
+}  // namespace

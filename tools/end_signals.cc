@@ -1,0 +1,81 @@
+#include "tools/end_signals.h"
+
+#include <fcntl.h>
+#include <pthread.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <csignal>
+#include <cstring>
+#include <thread>
+
+#include "libmap/core/error.h"
+#include "libmap/core/unfinished_outputs.h"
+
+namespace graspmap_tools {
+
+namespace {
+
+// Signal handlers have nothing but what is global. The pipe is open as long as the process lives.
+int told_end = -1;
+std::atomic<bool> is_told = false;
+static_assert(std::atomic<bool>::is_always_lock_free);
+
+// Removing files takes more than a handler may call: it tells a thread.
+extern "C" void tell(int signal) {
+  const int code = errno;
+  is_told = true;
+  const auto number = static_cast<unsigned char>(signal);
+  if (write(told_end, &number, 1) != 1) _exit(128 + signal);
+  errno = code;
+}
+
+// POSIX has no exit status for "ended by a signal" but the signal itself.
+[[noreturn]] void end_by(int signal) {
+  std::signal(signal, SIG_DFL);
+  sigset_t only;
+  sigemptyset(&only);
+  sigaddset(&only, signal);
+  pthread_sigmask(SIG_UNBLOCK, &only, nullptr);
+  raise(signal);
+  _exit(128 + signal);
+}
+
+void wait_for_a_signal(int end) {
+  unsigned char number = 0;
+  while (read(end, &number, 1) != 1) {
+    if (errno != EINTR) return;
+  }
+  libmap::abandon_unfinished_outputs();
+  end_by(number);
+}
+
+void take(int signal) {
+  struct sigaction before {};
+  if (sigaction(signal, nullptr, &before) != 0 || before.sa_handler == SIG_IGN) return;
+  struct sigaction action {};
+  action.sa_handler = tell;
+  action.sa_flags = SA_RESTART;
+  sigemptyset(&action.sa_mask);
+  sigaction(signal, &action, nullptr);
+}
+
+}  // namespace
+
+void end_cleanly_on_signals() {
+  int ends[2];
+  if (pipe2(ends, O_CLOEXEC) != 0)
+    throw libmap::Error(std::string("no pipe for signals: ") + std::strerror(errno), {},
+                        libmap::ErrorKind::failed);
+  told_end = ends[1];
+  std::thread(wait_for_a_signal, ends[0]).detach();
+  for (const int signal : {SIGHUP, SIGINT, SIGTERM}) take(signal);
+  std::signal(SIGXFSZ, SIG_IGN);
+}
+
+void end_if_told() {
+  while (is_told) pause();
+}
+
+}  // namespace graspmap_tools

@@ -1,0 +1,34 @@
+#include "tools/standard_output.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <iostream>
+#include <string>
+
+#include "libmap/core/error.h"
+
+namespace graspmap_tools {
+
+void require_printed() {
+  errno = 0;
+  std::cout.flush();
+  std::fflush(stdout);
+  // They tell of a failed write by their state alone.
+  if (std::cout && std::ferror(stdout) == 0) return;
+  throw libmap::Error(std::string("cannot be written") +
+                          (errno == 0 ? "" : std::string(": ") + std::strerror(errno)),
+                      {.file = "standard output"}, libmap::ErrorKind::failed);
+}
+
+int exit_code_of_printing(const std::string& program) {
+  try {
+    require_printed();
+    return 0;
+  } catch (const libmap::Error& error) {
+    std::cerr << program << ": error: " << error.what() << "\n";
+    return 1;
+  }
+}
+
+}  // namespace graspmap_tools
