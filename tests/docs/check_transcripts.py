@@ -1,36 +1,29 @@
 #!/usr/bin/python3
 """Runs the command lines of a document and compares what they print with what it shows.
 
-check_transcripts.py BUILD_FOLDER SOURCE_FOLDER DOCUMENT
+check_transcripts.py BUILD_FOLDER SOURCE_FOLDER DOCUMENT [--begin-with FOLDER] [--in FOLDER]
+                     [--makes FILE] [--write]
 
-Blocks fenced as ```console hold `$ COMMAND` lines, each followed by its output, standard output and
-error together; `...` stands for any number of lines. All commands of a document run in one scratch
-folder, in order, with `graspmap` on the PATH and the source's `data` and `pipelines` in it. Commands
-that name $GRASPMAP_DATA run only where it is set.
+What a document's blocks mean says documents.py; in what a command prints, `...` stands for any
+number of lines. All commands of a document run in one scratch folder, in order, with `graspmap` on
+the PATH and the source's `data`, `pipelines`, `scripts` and `tests` in it. --begin-with: the scratch
+folder begins with the files of this one; --in: it is this folder, emptied first and kept; --makes:
+the document's commands leave this file; --write: the document is changed to show what its commands
+print. Ends with 77 if nothing could be run.
 """
 
+import argparse
 import os
 import pathlib
 import re
+import shutil
 import subprocess
 import sys
 import tempfile
 
+from documents import Document
 
-def transcripts(text):
-    """(line number, command, expected lines) of every command of every console block."""
-    found = []
-    inside = False
-    for number, line in enumerate(text.splitlines(), start=1):
-        if line.startswith("```"):
-            inside = line.strip() == "```console"
-        elif inside and line.startswith("$ "):
-            found.append((number, line[2:], []))
-        elif inside and found and found[-1][1].endswith("\\"):
-            found[-1] = (found[-1][0], found[-1][1][:-1] + line, found[-1][2])
-        elif inside and found:
-            found[-1][2].append(line)
-    return found
+SOURCE_LINKS = ("data", "pipelines", "scripts", "tests")
 
 
 def matches(expected, actual):
@@ -41,26 +34,83 @@ def matches(expected, actual):
     return re.fullmatch(pattern, "".join(line + "\n" for line in actual)) is not None
 
 
-def main():
-    build, source, document = (pathlib.Path(word).resolve() for word in sys.argv[1:4])
-    environment = dict(os.environ, PATH=f"{build}:{os.environ['PATH']}", LC_ALL="C.UTF-8")
-    failed = 0
-    with tempfile.TemporaryDirectory() as scratch:
-        for name in ("data", "pipelines"):
-            os.symlink(source / name, pathlib.Path(scratch) / name)
-        for number, command, expected in transcripts(document.read_text()):
-            if "$GRASPMAP_DATA" in command and not os.environ.get("GRASPMAP_DATA"):
-                continue
-            run = subprocess.run(["bash", "-c", command], cwd=scratch, env=environment, text=True,
-                                 stdout=subprocess.PIPE, stderr=subprocess.STDOUT, check=False)
-            actual = [line.rstrip() for line in run.stdout.splitlines()]
+def run_command(command, folder, environment):
+    """(exit code, lines) of one command line."""
+    run = subprocess.run(["bash", "-c", command], cwd=folder, env=environment, text=True,
+                         stdin=subprocess.DEVNULL, stdout=subprocess.PIPE,
+                         stderr=subprocess.STDOUT, errors="replace", check=False)
+    return run.returncode, [line.rstrip() for line in run.stdout.splitlines()]
+
+
+def run_document(document, folder, environment, write):
+    """(number of commands that were run, number of those that failed)."""
+    count = failed = 0
+    changes = []
+    for block in document.consoles():
+        if block.skipped():
+            print(f"{document.path.name}:{block.number}: not run: {block.skipped()}")
+            continue
+        for transcript in block.transcripts():
+            count += 1
+            code, actual = run_command(transcript.command, folder, environment)
+            expected = list(transcript.output)
             while expected and not expected[-1].strip():
                 expected.pop()
-            if run.returncode != 0 or not matches(expected, actual):
+            right = matches(expected, actual)
+            if write and code == 0 and not right:
+                first = transcript.first_output - 1
+                changes.append((first, first + len(expected), actual))
+            elif code != 0 or not right:
                 failed += 1
-                print(f"{document.name}:{number}: $ {command}\n  exit code {run.returncode}; it prints")
-                print("".join(f"    {line}\n" for line in actual), end="")
-    return 1 if failed else 0
+                print(f"{document.path.name}:{transcript.number}: $ {transcript.command}\n"
+                      f"  exit code {code}; it prints")
+                print("".join(f"    {line}\n" for line in actual), end="", flush=True)
+    if changes:
+        lines = document.path.read_text(encoding="utf-8").splitlines()
+        for first, end, actual in reversed(changes):
+            lines[first:end] = actual
+        document.path.write_text("".join(f"{line}\n" for line in lines), encoding="utf-8")
+    return count, failed
+
+
+def prepare(folder, source, begin_with):
+    """Puts the files of `begin_with` and links to the source's folders into the scratch folder."""
+    if begin_with:
+        for entry in begin_with.iterdir():
+            if entry.is_dir() and not entry.is_symlink():
+                shutil.copytree(entry, folder / entry.name, symlinks=True)
+            elif not entry.is_symlink():
+                shutil.copy2(entry, folder / entry.name)
+    for name in SOURCE_LINKS:
+        os.symlink(source / name, folder / name)
+
+
+def main():
+    parser = argparse.ArgumentParser()
+    for name in ("build", "source", "document"):
+        parser.add_argument(name, type=lambda text: pathlib.Path(text).resolve())
+    for name in ("--begin-with", "--in"):
+        parser.add_argument(name, type=lambda text: pathlib.Path(text).resolve(),
+                            dest=name[2:].replace("-", "_") + "_folder")
+    parser.add_argument("--makes")
+    parser.add_argument("--write", action="store_true")
+    words = parser.parse_args()
+    environment = dict(os.environ, PATH=f"{words.build}:{os.environ['PATH']}", LC_ALL="C.UTF-8")
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = pathlib.Path(scratch)
+        if words.in_folder:
+            folder = words.in_folder
+            shutil.rmtree(folder, ignore_errors=True)
+            folder.mkdir(parents=True)
+        prepare(folder, words.source, words.begin_with_folder)
+        count, failed = run_document(Document(words.document), folder, environment,
+                                     words.write)
+        if count and words.makes and not (folder / words.makes).is_file():
+            failed += 1
+            print(f"{words.document.name}: its commands leave no {words.makes}")
+    if failed:
+        return 1
+    return 0 if count else 77
 
 
 if __name__ == "__main__":
