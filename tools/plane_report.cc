@@ -6,8 +6,8 @@ namespace graspmap_tools {
 
 namespace {
 
-// Third standardised moment of the heights. Rocks and holds on their ground have +0.5 to +3, the same
-// upside down as much below 0; rolling ground has about 0.
+// Third standardised moment of the heights. Rocks and holds on their ground have +0.5 to +3, the
+// same upside down as much below 0; rolling ground has about 0.
 constexpr double upside_down_skewness = -1.0;
 
 }  // namespace

@@ -8,8 +8,9 @@
 
 namespace graspmap_tools {
 
-// What decided which side is up, unless it was given; a warning where that was the frame's z axis and
-// the relief says otherwise, as of a cloud in a camera's frame, whose z axis points into the ground.
+// What decided which side is up, unless it was given; a warning where that was the frame's z axis
+// and the relief says otherwise, as of a cloud in a camera's frame, whose z axis points into the
+// ground.
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run);
 
 }  // namespace graspmap_tools
