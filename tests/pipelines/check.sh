@@ -1,7 +1,7 @@
 # Shared by the tests of the pipelines; sourced with the program $1 and the source folder $2.
 set -eu
-graspmap=$1
-source=$2
+graspmap=$(realpath "$1")
+source=$(realpath "$2")
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 
