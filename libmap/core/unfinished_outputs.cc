@@ -25,12 +25,19 @@ Unfinished& unfinished() {
   return *all;
 }
 
-// Other threads may go on filling a folder for a while.
+// Other threads may go on filling a folder by its name: under another one it is theirs no more, but
+// for the files that they are just opening.
 void remove_whole(const fs::path& path) {
   constexpr int tries = 100;
   std::error_code code;
+  fs::path doomed = path;
+  if (fs::is_directory(fs::symlink_status(path, code))) {
+    doomed += ".gone";
+    fs::rename(path, doomed, code);
+    if (code) doomed = path;
+  }
   for (int n = 0; n < tries; ++n) {
-    fs::remove_all(path, code);
+    fs::remove_all(doomed, code);
     if (!code) return;
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }

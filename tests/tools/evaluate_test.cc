@@ -1,8 +1,7 @@
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include "libmap/core/table.h"
+#include "tests/support/file_names.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace {
@@ -10,6 +9,7 @@ namespace {
 using graspmap_test::bad_input;
 using graspmap_test::content;
 using graspmap_test::graspmap;
+using graspmap_test::names_in;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using graspmap_test::write_text;
@@ -17,14 +17,6 @@ using Words = std::vector<std::string>;
 
 const Words files = {"accuracy.csv", "rates.csv",    "roc.csv",   "roc.png",
                      "roc.svg",      "summary.json", "summary.md"};
-
-Words names_in(const std::string& folder) {
-  Words names;
-  for (const auto& entry : std::filesystem::directory_iterator(scratch(folder)))
-    names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 void write_table() {
   write_text(scratch("t.csv"),
@@ -34,7 +26,7 @@ void write_table() {
 TEST(Evaluate, PerfectAndReversedScores) {
   write_table();
   ASSERT_TRUE(succeeded(graspmap({"evaluate", "t.csv", "-o", "out"})));
-  EXPECT_EQ(names_in("out"), files);
+  EXPECT_EQ(names_in(scratch("out")), files);
   const nlohmann::json results = graspmap_test::json_of("out.json").at("results");
   EXPECT_EQ(results.at("rows"), 4);
   EXPECT_EQ(results.at("good.auc_trapezoid"), 1.0);

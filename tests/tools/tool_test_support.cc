@@ -1,9 +1,9 @@
 #include "tests/tools/tool_test_support.h"
 
-#include <algorithm>
 #include <cmath>
 
 #include "libmap/cloud/cloud_io.h"
+#include "tests/support/file_names.h"
 
 namespace graspmap_test {
 
@@ -61,13 +61,7 @@ testing::AssertionResult wrong_usage(const ProgramResult& result,
 
 fs::path scratch(const std::string& name) { return scratch_folder() / name; }
 
-std::vector<std::string> names_in_scratch() {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(scratch_folder()))
-    names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
+std::vector<std::string> names_in_scratch() { return names_in(scratch_folder()); }
 
 std::string content(const std::string& name) { return read_text(scratch(name)); }
 

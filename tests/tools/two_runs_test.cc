@@ -1,9 +1,11 @@
 // Two runs at the same time into the same output: the second says so at once and harms nothing.
 #include <gtest/gtest.h>
 #include <signal.h>
+#include <sys/wait.h>
 
 #include <algorithm>
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include "libmap/cloud/cloud_io.h"
@@ -35,32 +37,53 @@ std::vector<std::string> temporaries() {
   return names;
 }
 
-// It has claimed its output, and writes nothing yet.
-void wait_for_claim(const RunningProgram& program) {
-  for (;;) {
-    const auto names = temporaries();
-    if (names.size() == 1 && names.front().ends_with(".partial.json")) return;
-    if (program.has_ended()) return;
+// Whether the manifest in the making is there, which is what the run's outputs are claimed with.
+bool claims() {
+  const auto names = temporaries();
+  return std::any_of(names.begin(), names.end(),
+                     [](const std::string& name) { return name.ends_with(".partial.json"); });
+}
+
+bool wait_for_claim(const RunningProgram& program) {
+  while (!program.has_ended()) {
+    if (claims()) return true;
     std::this_thread::sleep_for(1ms);
   }
+  return false;
+}
+
+// Whether the program was stopped in the midst of its work: a short one may be done before.
+bool stopped_at_work(const RunningProgram& program) {
+  if (!wait_for_claim(program)) return false;
+  std::this_thread::sleep_for(5ms);
+  kill(program.process(), SIGSTOP);
+  siginfo_t info{};
+  waitid(P_PID, static_cast<id_t>(program.process()), &info, WSTOPPED | WEXITED | WNOWAIT);
+  return !program.has_ended() && claims();
 }
 
 // Runs the command twice at once; the first is stopped while the second runs.
 void expect_one_of_two(const Words& words, const std::string& output) {
   Words line = words;
   line.insert(line.begin(), (graspmap_test::build_folder() / "graspmap").string());
-  RunningProgram first(line, {.folder = scratch("")});
-  wait_for_claim(first);
-  kill(first.process(), SIGSTOP);
-  ASSERT_FALSE(first.has_ended());
+  std::optional<RunningProgram> first;
+  for (int attempt = 0;; ++attempt) {
+    ASSERT_LT(attempt, 50) << "it was never caught at work";
+    first.emplace(line, graspmap_test::ProgramSurroundings{.folder = scratch("")});
+    if (stopped_at_work(*first)) break;
+    kill(first->process(), SIGCONT);
+    ASSERT_TRUE(succeeded(first->wait()));
+    fs::remove_all(scratch(output));
+    fs::remove(scratch(output + ".json"));
+  }
   const ProgramResult second = graspmap(words);
-  kill(first.process(), SIGCONT);
+  kill(first->process(), SIGCONT);
   EXPECT_EQ(second.exit_code, 1) << second.standard_error;
   EXPECT_NE(second.standard_error.find(" " + output + ": another process is writing it\n"),
             std::string::npos)
       << second.standard_error;
   EXPECT_EQ(std::count(second.standard_error.begin(), second.standard_error.end(), '\n'), 1);
-  EXPECT_TRUE(succeeded(first.wait()));
+  EXPECT_TRUE(succeeded(first->wait()));
   EXPECT_TRUE(fs::exists(scratch(output)));
   EXPECT_TRUE(fs::exists(scratch(output + ".json")));
   EXPECT_TRUE(temporaries().empty());
@@ -114,7 +137,7 @@ TEST(TwoRuns, AKilledRunHoldsNothing) {
   Words line = words;
   line.insert(line.begin(), (graspmap_test::build_folder() / "graspmap").string());
   RunningProgram killed(line, {.folder = scratch("")});
-  wait_for_claim(killed);
+  ASSERT_TRUE(wait_for_claim(killed));
   kill(killed.process(), SIGKILL);
   EXPECT_EQ(killed.wait().exit_code, 128 + SIGKILL);
   EXPECT_TRUE(succeeded(graspmap(words)));

@@ -5,28 +5,21 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <optional>
 
 #include "libmap/core/error.h"
+#include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
 namespace {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
+using graspmap_test::names_in;
 using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using libmap::ErrorKind;
 using libmap::OutputFile;
-
-std::vector<std::string> names_in(const fs::path& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder))
-    names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 TEST(FileOutputTest, CommittedFileIsWholeAndAlone) {
   const fs::path path = scratch_folder() / "map.pcd";

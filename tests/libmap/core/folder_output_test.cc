@@ -4,27 +4,20 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 #include <string>
 #include <vector>
 
+#include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
 namespace {
 
 namespace fs = std::filesystem;
+using graspmap_test::names_in;
 using libmap::OutputFolder;
 
 const std::vector<std::string> names = {"a.txt", "b"};
-
-std::vector<std::string> names_in(const fs::path& folder) {
-  std::vector<std::string> found;
-  for (const auto& entry : fs::directory_iterator(folder))
-    found.push_back(entry.path().filename().string());
-  std::sort(found.begin(), found.end());
-  return found;
-}
 
 void fill(const OutputFolder& output, const std::string& text) {
   graspmap_test::write_text(output.temporary_path() / "a.txt", text);

@@ -4,7 +4,6 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <fstream>
@@ -14,23 +13,17 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/folder_output.h"
+#include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
 namespace {
 
 namespace fs = std::filesystem;
+using graspmap_test::names_in;
 using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using libmap::OutputFile;
 using libmap::OutputFolder;
-
-std::vector<std::string> names_in(const fs::path& folder) {
-  std::vector<std::string> names;
-  for (const auto& entry : fs::directory_iterator(folder))
-    names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  return names;
-}
 
 // Runs `action` in a process of its own, as abandoning is for good.
 template <typename Action>

@@ -14,18 +14,12 @@ using graspmap_test::boulders;
 using graspmap_test::looking;
 using graspmap_test::plane_z;
 using graspmap_test::random_step;
+using graspmap_test::small_options;
 using graspmap_test::TexturedScan;
 using libmap::Pose;
 using libmap::RefinementOptions;
 using libmap::RefinementResult;
 using libmap::Vector6d;
-
-RefinementOptions small_options() {
-  RefinementOptions options;
-  options.features.max_features = 400;
-  options.closures.appearance.words = 64;
-  return options;
-}
 
 TexturedScan loop_of(int frames, bool textured = true) {
   TexturedScan scan;

@@ -21,19 +21,13 @@ using graspmap_test::beside;
 using graspmap_test::boulders;
 using graspmap_test::looking;
 using graspmap_test::plane_z;
+using graspmap_test::small_options;
 using graspmap_test::TexturedScan;
 using libmap::Pose;
 using libmap::RefinementOptions;
 using libmap::RefinementResult;
 using libmap::StartPoses;
 using libmap::Vector6d;
-
-RefinementOptions small_options() {
-  RefinementOptions options;
-  options.features.max_features = 400;
-  options.closures.appearance.words = 64;
-  return options;
-}
 
 void forget_poses(TexturedScan& scan) {
   scan.graph_.links.clear();

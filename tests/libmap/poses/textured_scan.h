@@ -7,6 +7,7 @@
 #include <random>
 
 #include "libmap/core/random_stream.h"
+#include "libmap/poses/refinement.h"
 #include "libmap/poses/rigid_motion.h"
 #include "tests/libmap/cloud/depth_scenes.h"
 
@@ -52,6 +53,14 @@ inline libmap::Camera textured_camera() {
   camera.cx = 127.5;
   camera.cy = 95.5;
   return camera;
+}
+
+// For its small pictures.
+inline libmap::RefinementOptions small_options() {
+  libmap::RefinementOptions options;
+  options.features.max_features = 400;
+  options.closures.appearance.words = 64;
+  return options;
 }
 
 class TexturedScan : public libmap::ScanSource {
