@@ -70,15 +70,8 @@ constexpr BitLoops portable = {count, lower, slide, add_runs};
 
 }  // namespace
 
-bool has_path(BitPath path) { return path == BitPath::portable || has_x86_path(path); }
-
-BitPath best_path() {
-  if (has_path(BitPath::avx512)) return BitPath::avx512;
-  return has_path(BitPath::avx2) ? BitPath::avx2 : BitPath::portable;
-}
-
-const BitLoops& loops_of(BitPath path) {
-  return path == BitPath::portable ? portable : x86_loops(path);
+const BitLoops& loops_of(InstructionSet instructions) {
+  return instructions == InstructionSet::portable ? portable : x86_loops(instructions);
 }
 
 }  // namespace libgtd

@@ -6,6 +6,8 @@
 #include <cstddef>
 #include <cstdint>
 
+#include "libgtd/shape/instruction_set.h"
+
 namespace libgtd {
 
 // 64 bytes of a mask: the bits of up to 32 neighbouring columns, 16 layers each.
@@ -13,9 +15,6 @@ struct MaskChunk {
   static constexpr std::size_t columns = 32;
   alignas(64) std::uint16_t bits[columns];
 };
-
-// avx512: F, BW, VL and VPOPCNTDQ.
-enum class BitPath { portable, avx2, avx512 };
 
 struct BitLoops {
   // For each origin the sum over all chunks of popcount(window[origin + offset ...] & chunk), where
@@ -35,8 +34,7 @@ struct BitLoops {
                    std::size_t length, std::uint32_t* totals);
 };
 
-bool has_path(BitPath path);             // whether this processor can run it
-BitPath best_path();                     // the fastest that it can
-const BitLoops& loops_of(BitPath path);  // its loops; only where has_path(path)
+// Of instructions that the processor has.
+const BitLoops& loops_of(InstructionSet instructions);
 
 }  // namespace libgtd

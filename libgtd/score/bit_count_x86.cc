@@ -187,21 +187,8 @@ constexpr BitLoops all = {count, lower, slide, add_runs};
 
 }  // namespace
 
-bool has_x86_path(BitPath path) {
-  switch (path) {
-    case BitPath::portable:
-      return false;
-    case BitPath::avx2:
-      return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("popcnt");
-    case BitPath::avx512:
-      return __builtin_cpu_supports("avx512f") && __builtin_cpu_supports("avx512bw") &&
-             __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512vpopcntdq");
-  }
-  return false;
-}
-
-const BitLoops& x86_loops(BitPath path) {
-  return path == BitPath::avx512 ? avx512::all : avx2::all;
+const BitLoops& x86_loops(InstructionSet instructions) {
+  return instructions == InstructionSet::avx512 ? avx512::all : avx2::all;
 }
 
 }  // namespace libgtd
@@ -210,8 +197,7 @@ const BitLoops& x86_loops(BitPath path) {
 
 namespace libgtd {
 
-bool has_x86_path(BitPath) { return false; }
-const BitLoops& x86_loops(BitPath) { return loops_of(BitPath::portable); }
+const BitLoops& x86_loops(InstructionSet) { return loops_of(InstructionSet::portable); }
 
 }  // namespace libgtd
 

@@ -5,9 +5,7 @@
 
 namespace libgtd {
 
-// False on processors of other kinds.
-bool has_x86_path(BitPath path);
-// Of a path other than `portable`, which the processor has.
-const BitLoops& x86_loops(BitPath path);
+// Of instructions other than `portable`, which the processor has.
+const BitLoops& x86_loops(InstructionSet instructions);
 
 }  // namespace libgtd

@@ -54,8 +54,8 @@ class Lanes {
 // Scores blocks one after the other; keeps its memory for the next one.
 class BlockMatcher {
  public:
-  BlockMatcher(const VoxelGrid& grid, const MatchingPlan& plan, BitPath path)
-      : grid_(grid), plan_(plan), loops_(loops_of(path)) {}
+  BlockMatcher(const VoxelGrid& grid, const MatchingPlan& plan, InstructionSet instructions)
+      : grid_(grid), plan_(plan), loops_(loops_of(instructions)) {}
 
   // A run of neighbouring pivots: the places first .. last - 1 of `pivots`.
   struct Run {

@@ -97,7 +97,8 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
   pivots.reserve(flags.size());
   for (std::size_t at = 0; at < flags.size(); ++at)
     if (flags[at] != 0) pivots.push_back(at);
-  const std::vector<VoxelCounts> counts = match_voxels(grid, mask, pivots, options.path, progress);
+  const std::vector<VoxelCounts> counts =
+      match_voxels(grid, mask, pivots, options.instructions, progress);
   std::vector<ScoredVoxel> scored(pivots.size());
   libmap::parallel_for(pivots.size(), grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {

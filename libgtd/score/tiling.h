@@ -34,7 +34,7 @@ struct ScoredVoxel {
 
 struct ScoringOptions {
   int solid_voxel_threshold = 120;
-  BitPath path = best_path();  // changes the time alone
+  InstructionSet instructions = best_instruction_set();  // changes the time alone
 };
 
 // Every pivot of the tiles, ascending by voxel, each once.

@@ -75,10 +75,10 @@ constexpr TiltedLoops all = {find_cells, count_common};
 
 }  // namespace
 
-const TiltedLoops& tilted_loops_of([[maybe_unused]] BitPath path) {
+const TiltedLoops& tilted_loops_of([[maybe_unused]] InstructionSet instructions) {
 #if defined(GRASPMAP_X86_LOOPS)
-  if (path == BitPath::avx512) return avx512::all;
-  if (path == BitPath::avx2) return avx2::all;
+  if (instructions == InstructionSet::avx512) return avx512::all;
+  if (instructions == InstructionSet::avx2) return avx2::all;
 #endif
   return portable::all;
 }

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "libgtd/score/bit_count.h"
+#include "libgtd/shape/instruction_set.h"
 
 namespace libgtd {
 
@@ -36,7 +36,7 @@ struct TiltedLoops {
   std::uint32_t (*count_common)(const std::uint64_t* a, const std::uint64_t* b, std::size_t words);
 };
 
-// Of a path that the processor has.
-const TiltedLoops& tilted_loops_of(BitPath path);
+// Of instructions that the processor has.
+const TiltedLoops& tilted_loops_of(InstructionSet instructions);
 
 }  // namespace libgtd

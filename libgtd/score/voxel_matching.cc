@@ -69,15 +69,15 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
 }
 
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
-                                      const std::vector<std::size_t>& pivots, BitPath path,
-                                      libmap::Progress& progress) {
+                                      const std::vector<std::size_t>& pivots,
+                                      InstructionSet instructions, libmap::Progress& progress) {
   const MatchingPlan plan = plan_matching(mask);
   const Blocks blocks = cut_into_blocks(grid, pivots);
   std::vector<VoxelCounts> counts(pivots.size());
   const std::size_t count = blocks.first_of_block.size() - 1;
   progress.begin("voxel matching", count);
   libmap::parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
-    BlockMatcher matcher(grid, plan, path);
+    BlockMatcher matcher(grid, plan, instructions);
     for (std::size_t b = begin; b < end; ++b) {
       const std::size_t first = blocks.first_of_block[b];
       matcher.match(pivots, &blocks.runs[first], blocks.first_of_block[b + 1] - first,

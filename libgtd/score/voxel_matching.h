@@ -27,11 +27,11 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
 
 // Counts of each pivot, by population counts over bits of the terrain around blocks of pivots.
 // Blocks run in parallel; the counts of a pivot do not depend on which others are asked for, on the
-// number of threads or on `path`, which the processor must have. Memory goes with the number of
-// voxels and the size of the mask, not with the box around them.
+// number of threads or on `instructions`, which the processor must have. Memory goes with the
+// number of voxels and the size of the mask, not with the box around them.
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
                                       const std::vector<std::size_t>& pivots,
-                                      BitPath path = best_path(),
+                                      InstructionSet instructions = best_instruction_set(),
                                       libmap::Progress& progress = libmap::no_progress());
 
 // The same by the plain triple loop of listing A.6, over a dense array of the whole box, one

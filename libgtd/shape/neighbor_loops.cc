@@ -136,10 +136,10 @@ constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};
 
 }  // namespace
 
-const NeighborLoops& neighbor_loops_of([[maybe_unused]] BitPath path) {
+const NeighborLoops& neighbor_loops_of([[maybe_unused]] InstructionSet instructions) {
 #if defined(GRASPMAP_X86_LOOPS)
-  if (path == BitPath::avx512) return avx512::all;
-  if (path == BitPath::avx2) return avx2::all;
+  if (instructions == InstructionSet::avx512) return avx512::all;
+  if (instructions == InstructionSet::avx2) return avx2::all;
 #endif
   return portable::all;
 }

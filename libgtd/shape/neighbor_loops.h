@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "libgtd/score/bit_count.h"
+#include "libgtd/shape/instruction_set.h"
 
 namespace libgtd {
 
@@ -44,7 +44,7 @@ struct NeighborLoops {
   static constexpr std::size_t rank_lanes = 16;
 };
 
-// Of a path that the processor has.
-const NeighborLoops& neighbor_loops_of(BitPath path);
+// Of instructions that the processor has.
+const NeighborLoops& neighbor_loops_of(InstructionSet instructions);
 
 }  // namespace libgtd

@@ -1,7 +1,7 @@
 // Voxel matching against the plain triple loop of listing A.6, on the same voxels in one run. The
 // counter `speedup` is the loop's least time over ours; `peak_percent` the bytes of mask that were
-// counted in a second of a processor over the most that the innermost loop of that path counts on
-// this machine.
+// counted in a second of a processor over the most that the innermost loop of those instructions
+// counts on this machine.
 #include <chrono>
 #include <cmath>
 #include <map>
@@ -20,8 +20,8 @@ namespace {
 using graspmap_bench::folder_of;
 using graspmap_bench::time_iterations;
 using graspmap_bench::Times;
-using libgtd::BitPath;
 using libgtd::GripperMask;
+using libgtd::InstructionSet;
 using libgtd::Method;
 using libgtd::VoxelGrid;
 
@@ -91,9 +91,9 @@ Workload& workload(const Set& set) {
 }
 
 // Bytes of mask a second, one thread: the loop alone on aligned bits in the first cache.
-double peak_bytes_per_s(BitPath path) {
-  static std::map<BitPath, double> measured;
-  const auto [at, is_new] = measured.try_emplace(path);
+double peak_bytes_per_s(InstructionSet instructions) {
+  static std::map<InstructionSet, double> measured;
+  const auto [at, is_new] = measured.try_emplace(instructions);
   if (!is_new) return at->second;
   constexpr std::size_t chunk_count = 64, pivot_count = 4096;
   std::vector<libgtd::MaskChunk> window(chunk_count), chunks(chunk_count);
@@ -107,8 +107,9 @@ double peak_bytes_per_s(BitPath path) {
   for (int round = 0; round < 30; ++round)
     graspmap_bench::time_once(
         [&] {
-          libgtd::loops_of(path).count(window.front().bits, origins.data(), pivot_count,
-                                       chunks.data(), offsets.data(), chunk_count, counts.data());
+          libgtd::loops_of(instructions)
+              .count(window.front().bits, origins.data(), pivot_count, chunks.data(),
+                     offsets.data(), chunk_count, counts.data());
           benchmark::DoNotOptimize(counts.data());
         },
         times);
@@ -126,8 +127,9 @@ void triple_loop(benchmark::State& state, const Set& set) {
   state.SetLabel("triple loop, 1 thread");
 }
 
-void matching(benchmark::State& state, const Set& set, BitPath path, const char* path_name) {
-  if (!libgtd::has_path(path)) {
+void matching(benchmark::State& state, const Set& set, InstructionSet instructions,
+              const char* name_of_them) {
+  if (!libgtd::has_instruction_set(instructions)) {
     state.SkipWithError("this processor has no such instructions");
     return;
   }
@@ -137,7 +139,7 @@ void matching(benchmark::State& state, const Set& set, BitPath path, const char*
   const auto tiles =
       libgtd::make_tiles(work.grid, static_cast<int>(std::lround(1.0 / set.voxel_size_m)));
   libgtd::ScoringOptions options;
-  options.path = path;
+  options.instructions = instructions;
   const Times times = time_iterations(state, [&] {
     benchmark::DoNotOptimize(libgtd::score_tiles(work.grid, work.mask, tiles, options));
   });
@@ -146,9 +148,10 @@ void matching(benchmark::State& state, const Set& set, BitPath path, const char*
                        sizeof(libgtd::MaskChunk);
   state.counters["pivots"] = static_cast<double>(work.pivots.size());
   if (work.baseline_s) state.counters["speedup"] = *work.baseline_s / times.least();
-  state.counters["peak_percent"] = 100.0 * bytes / times.processor_s / peak_bytes_per_s(path);
+  state.counters["peak_percent"] =
+      100.0 * bytes / times.processor_s / peak_bytes_per_s(instructions);
   graspmap_bench::set_marks(state, set.marks);
-  state.SetLabel(std::string(path_name) + ", " + graspmap_bench::threads_text(threads));
+  state.SetLabel(std::string(name_of_them) + ", " + graspmap_bench::threads_text(threads));
 }
 
 const bool registered = [] {
@@ -160,12 +163,13 @@ const bool registered = [] {
                                  [&set](benchmark::State& state) { triple_loop(state, set); })
         ->Iterations(1)
         ->Unit(benchmark::kMillisecond);
-    for (const auto& [path, path_name] :
-         {std::pair(BitPath::portable, "portable"), std::pair(BitPath::avx2, "AVX2"),
-          std::pair(BitPath::avx512, "AVX-512")})
+    for (const auto& [instructions, name_of_them] :
+         {std::pair(InstructionSet::portable, "portable"), std::pair(InstructionSet::avx2, "AVX2"),
+          std::pair(InstructionSet::avx512, "AVX-512")})
       benchmark::RegisterBenchmark(
-          name.c_str(), [&set, path = path, path_name = path_name](
-                            benchmark::State& state) { matching(state, set, path, path_name); })
+          name.c_str(),
+          [&set, instructions = instructions, name_of_them = name_of_them](
+              benchmark::State& state) { matching(state, set, instructions, name_of_them); })
           ->Arg(1)
           ->Arg(2)
           ->Iterations(30)

@@ -12,6 +12,7 @@
 #include "libgtd/score/tilted_cells.h"
 #include "libgtd/score/tilted_matching.h"
 #include "libmap/core/parallel.h"
+#include "tests/libgtd/instruction_sets.h"
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
@@ -357,10 +358,10 @@ TEST(SurfaceOrientation, AllInstructionSetsYieldTheSame) {
     for (int a = 0; a < 3; ++a)
       for (int b = 0; b < 3; ++b) lattice.axes[a][b] = tilted_axes(normal)(b, a);
     std::vector<std::vector<int>> found;
-    for (const BitPath path : {BitPath::portable, BitPath::avx2, BitPath::avx512}) {
-      if (!has_path(path)) continue;
+    for (const auto instructions : graspmap_test::instruction_sets()) {
       std::vector<int>& cells = found.emplace_back(count + TiltedLoops::lanes);
-      cells.resize(tilted_loops_of(path).find_cells(axes, count, lattice, box, cells.data()));
+      cells.resize(
+          tilted_loops_of(instructions).find_cells(axes, count, lattice, box, cells.data()));
       EXPECT_EQ(cells, found.front());
     }
     EXPECT_GT(found.front().size(), 5U);

@@ -8,6 +8,7 @@
 #include <sstream>
 
 #include "libgtd/score/scoring.h"
+#include "tests/libgtd/instruction_sets.h"
 #include "tests/libgtd/score/score_test_support.h"
 #include "tests/support/reference_data.h"
 
@@ -17,7 +18,6 @@ using graspmap_test::grid_of;
 using graspmap_test::gripper_named;
 using graspmap_test::uniform;
 using graspmap_test::whole_box;
-using libgtd::BitPath;
 using libgtd::Gripper;
 using libgtd::GripperMask;
 using libgtd::Method;
@@ -39,13 +39,6 @@ struct ReferenceCase {
 void PrintTo(const ReferenceCase& given, std::ostream* out) { *out << given.name; }
 
 // The loops for vector registers that this processor has.
-std::vector<BitPath> paths() {
-  std::vector<BitPath> here;
-  for (const BitPath path : {BitPath::portable, BitPath::avx2, BitPath::avx512})
-    if (libgtd::has_path(path)) here.push_back(path);
-  return here;
-}
-
 class AuthorsProgram : public testing::TestWithParam<ReferenceCase> {
  protected:
   std::filesystem::path file(const std::string& kind) const {
@@ -83,8 +76,8 @@ TEST_P(AuthorsProgram, SameCountsAndScoreOfEveryPivot) {
       gripper, {given.method, given.voxel_size_m, given.extra_void_layers});
   const auto pivots = libgtd::pivots_in(voxelized, mask, whole_box(voxelized));
   const auto counts = libgtd::match_voxels(voxelized, mask, pivots);
-  for (const BitPath path : paths())
-    EXPECT_TRUE(libgtd::match_voxels(voxelized, mask, pivots, path) == counts);
+  for (const auto instructions : graspmap_test::instruction_sets())
+    EXPECT_TRUE(libgtd::match_voxels(voxelized, mask, pivots, instructions) == counts);
   const auto reference = graspmap_test::read_scores_gz(file("scores.csv.gz"));
   ASSERT_EQ(pivots.size(), reference.rows.size());
   std::size_t differences = 0;
@@ -159,9 +152,9 @@ TEST(ClimbLab, SameGraspableVoxels) {
 void expect_as_plainly(const VoxelGrid& grid, const GripperMask& mask,
                        const std::vector<std::size_t>& pivots, const std::string& what) {
   const auto expected = libgtd::match_voxels_plainly(grid, mask, pivots);
-  for (const BitPath path : paths())
-    EXPECT_TRUE(libgtd::match_voxels(grid, mask, pivots, path) == expected)
-        << what << ", path " << static_cast<int>(path);
+  for (const auto instructions : graspmap_test::instruction_sets())
+    EXPECT_TRUE(libgtd::match_voxels(grid, mask, pivots, instructions) == expected)
+        << what << ", instructions " << static_cast<int>(instructions);
 }
 
 void expect_as_plainly(const VoxelGrid& grid, const GripperMask& mask, const std::string& what) {

@@ -9,12 +9,13 @@
 #include <limits>
 #include <vector>
 
+#include "tests/libgtd/instruction_sets.h"
 #include "tests/support/test_support.h"
 
 namespace {
 
 using graspmap_test::uniform;
-using libgtd::BitPath;
+using libgtd::InstructionSet;
 using libgtd::NeighborLoops;
 
 constexpr std::size_t lanes = NeighborLoops::lanes;
@@ -36,17 +37,10 @@ NeighborLoops::Places places_of(Columns<double>& columns) {
   return {columns.axes[0].data(), columns.axes[1].data(), columns.axes[2].data()};
 }
 
-std::vector<BitPath> paths() {
-  std::vector<BitPath> all;
-  for (const BitPath path : {BitPath::portable, BitPath::avx2, BitPath::avx512})
-    if (libgtd::has_path(path)) all.push_back(path);
-  return all;
-}
-
 constexpr double far = std::numeric_limits<double>::infinity();
 
 TEST(NeighborLoops, SelectKeepsThePlacesWithinTheRadiusInOrder) {
-  for (const BitPath path : paths())
+  for (const auto instructions : graspmap_test::instruction_sets())
     for (const std::size_t count : {0u, 1u, 7u, 8u, 9u, 100u, 411u}) {
       Columns<double> candidates(count, lanes, far), neighbors(count, lanes, 99.0);
       candidates.fill(count, 1.0);
@@ -57,8 +51,9 @@ TEST(NeighborLoops, SelectKeepsThePlacesWithinTheRadiusInOrder) {
         candidates.axes[0][2] += 0.5;
         candidates.axes[0][5] += 0.5 + 1e-12;
       }
-      const std::size_t selected = libgtd::neighbor_loops_of(path).select(
-          places_of(candidates), count, center.data(), 0.5, places_of(neighbors));
+      const std::size_t selected =
+          libgtd::neighbor_loops_of(instructions)
+              .select(places_of(candidates), count, center.data(), 0.5, places_of(neighbors));
       std::size_t expected = 0;
       for (std::size_t n = 0; n < count; ++n) {
         std::array<double, 3> d{};
@@ -94,16 +89,16 @@ TEST(NeighborLoops, SumsAreTheSameBitsOnEveryPath) {
     const auto along = [&](std::size_t c, double x, double y, double z) {
       return x * frame[3 * c] + y * frame[3 * c + 1] + z * frame[3 * c + 2];
     };
-    for (const BitPath path : paths()) {
+    for (const auto instructions : graspmap_test::instruction_sets()) {
       std::array<double, NeighborLoops::moments> m{};
-      libgtd::neighbor_loops_of(path).sum_moments(places_of(neighbors), count, m.data());
+      libgtd::neighbor_loops_of(instructions).sum_moments(places_of(neighbors), count, m.data());
       EXPECT_EQ(m[0], sum_of([](double x, double, double) { return x; }));
       EXPECT_EQ(m[4], sum_of([](double x, double y, double) { return x * y; }));
       EXPECT_EQ(m[7], sum_of([](double, double y, double z) { return y * z; }));
       EXPECT_EQ(m[8], sum_of([](double, double, double z) { return z * z; }));
       std::array<double, NeighborLoops::quadric_sums> q{};
-      libgtd::neighbor_loops_of(path).sum_quadric(places_of(neighbors), count, frame.data(),
-                                                  q.data());
+      libgtd::neighbor_loops_of(instructions)
+          .sum_quadric(places_of(neighbors), count, frame.data(), q.data());
       // Exponents of u, v, w of each sum.
       constexpr std::array<std::array<int, 3>, NeighborLoops::quadric_sums> powers = {
           {{1, 0, 0}, {0, 1, 0}, {2, 0, 0}, {1, 1, 0}, {0, 2, 0}, {3, 0, 0}, {2, 1, 0},
@@ -118,7 +113,7 @@ TEST(NeighborLoops, SumsAreTheSameBitsOnEveryPath) {
                     1e-12 * static_cast<double>(count))
             << s;
       std::array<double, NeighborLoops::quadric_sums> portable{};
-      libgtd::neighbor_loops_of(BitPath::portable)
+      libgtd::neighbor_loops_of(InstructionSet::portable)
           .sum_quadric(places_of(neighbors), count, frame.data(), portable.data());
       EXPECT_EQ(q, portable);
     }
@@ -143,11 +138,11 @@ TEST(NeighborLoops, RanksOrderByDistanceThenByNumber) {
       if (square < 0.5F)
         expected.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(square)} << 32 | n);
     }
-    for (const BitPath path : paths()) {
+    for (const auto instructions : graspmap_test::instruction_sets()) {
       std::vector<std::uint64_t> keys(count + beyond);
-      keys.resize(libgtd::neighbor_loops_of(path).rank(
-          candidates.axes[0].data(), candidates.axes[1].data(), candidates.axes[2].data(), count,
-          center.data(), 0.5F, keys.data()));
+      keys.resize(libgtd::neighbor_loops_of(instructions)
+                      .rank(candidates.axes[0].data(), candidates.axes[1].data(),
+                            candidates.axes[2].data(), count, center.data(), 0.5F, keys.data()));
       EXPECT_EQ(keys, expected);
     }
   }
