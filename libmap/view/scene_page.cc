@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <set>
+#include <tuple>
 
 #include "libmap/core/text.h"
 #include "libmap/view/charts.h"
@@ -22,6 +24,7 @@ constexpr double bar_width = 1.3;
 constexpr double swatch = 1.05;
 constexpr double legend_gap = 1.2;  // between two legends
 constexpr int most_ticks = 6;
+constexpr std::size_t many_markers = 5000;  // from here on they are thinned
 
 // Where no round number lies between the ends, the ends.
 std::vector<double> ticks_of(const Legend& legend) {
@@ -129,6 +132,44 @@ Color verdict_color(Verdict verdict) {
       break;
   }
   return {40, 44, 52};
+}
+
+struct SeenMarker {
+  const Marker* marker;
+  Eigen::Vector2d pixel;
+};
+
+std::vector<SeenMarker> seen_markers(const ScenePage& page, const SceneCamera& camera,
+                                     const std::vector<Marker>& markers) {
+  std::vector<SeenMarker> seen;
+  for (const Marker& marker : markers) {
+    if (!marker.position.allFinite() || !(camera.depth_of(marker.position) > 0.0)) continue;
+    const Eigen::Vector2d pixel = camera.pixel_of(marker.position);
+    if (page.plot.contains(pixel)) seen.push_back({&marker, pixel});
+  }
+  return seen;
+}
+
+// Keeps the markers whose labels are drawn, and of the others of one verdict in each square of that
+// side the first.
+void thin_markers(double side_px, bool labelled, std::vector<SeenMarker>& seen) {
+  std::set<std::tuple<Verdict, long, long>> taken;
+  std::erase_if(seen, [&](const SeenMarker& one) {
+    if (labelled && !one.marker->label.empty()) return false;
+    const Eigen::Vector2d square = one.pixel / side_px;
+    return !taken
+                .emplace(one.marker->verdict, std::lround(std::floor(square.x())),
+                         std::lround(std::floor(square.y())))
+                .second;
+  });
+}
+
+// Labels that would cover more than the plot, were they as narrow as they are high, are of no use.
+bool have_room_for_labels(const std::vector<SeenMarker>& seen, const PixelRect& plot,
+                          double height_px) {
+  const auto labels = std::count_if(
+      seen.begin(), seen.end(), [](const SeenMarker& one) { return !one.marker->label.empty(); });
+  return static_cast<double>(labels) * height_px * height_px <= plot.width * plot.height;
 }
 
 }  // namespace
@@ -313,36 +354,36 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
   const double border = std::max(1.0, std::round(0.1 * f));
   const TextStyle style{.size_px = std::max(least_font_px, static_cast<int>(0.85 * f)),
                         .align = TextAlign::center};
-  std::vector<const Marker*> visible;
+  std::vector<SeenMarker> seen = seen_markers(page, camera, markers);
+  const bool labelled = have_room_for_labels(seen, page.plot, 1.3 * style.size_px);
+  if (seen.size() > many_markers) thin_markers(radius, labelled, seen);
   std::vector<LabelRequest> requests;
-  for (const Marker& marker : markers) {
-    if (!marker.position.allFinite() || !(camera.depth_of(marker.position) > 0.0)) continue;
-    const Eigen::Vector2d pixel = camera.pixel_of(marker.position);
-    if (!page.plot.contains(pixel)) continue;
-    visible.push_back(&marker);
-    const Eigen::Vector2d size = text_size(marker.label, style);
-    requests.push_back({pixel, marker.label.empty() ? 0.0 : size.x() + 0.6 * f + 2.0 * border,
-                        marker.label.empty() ? 0.0 : 1.3 * style.size_px + 2.0 * border});
-  }
+  if (labelled)
+    for (const SeenMarker& one : seen) {
+      LabelRequest& request = requests.emplace_back(LabelRequest{.anchor = one.pixel});
+      if (one.marker->label.empty()) continue;
+      request.width_px = text_size(one.marker->label, style).x() + 0.6 * f + 2.0 * border;
+      request.height_px = 1.3 * style.size_px + 2.0 * border;
+    }
   const std::vector<PixelRect> boxes = place_labels(requests, radius + border, page.plot);
 
-  for (std::size_t i = 0; i < visible.size(); ++i) {
-    if (visible[i]->label.empty()) continue;
+  for (std::size_t i = 0; i < boxes.size(); ++i) {
+    if (requests[i].width_px == 0.0) continue;
     const PixelRect& box = boxes[i];
     const Eigen::Vector2d middle(box.left + box.width / 2.0, box.top + box.height / 2.0);
     overlay.line(requests[i].anchor, middle, border, ink);
   }
-  for (std::size_t i = 0; i < visible.size(); ++i) {
-    const Color color = verdict_color(visible[i]->verdict);
-    overlay.disc(requests[i].anchor, radius + border, paper);
-    overlay.disc(requests[i].anchor, radius, color);
-    if (visible[i]->label.empty()) continue;
+  for (std::size_t i = 0; i < seen.size(); ++i) {
+    const Color color = verdict_color(seen[i].marker->verdict);
+    overlay.disc(seen[i].pixel, radius + border, paper);
+    overlay.disc(seen[i].pixel, radius, color);
+    if (!labelled || seen[i].marker->label.empty()) continue;
     const PixelRect& box = boxes[i];
     overlay.rectangle(box, color);
     overlay.rectangle(
         {box.left + border, box.top + border, box.width - 2.0 * border, box.height - 2.0 * border},
         paper);
-    overlay.text({box.left + box.width / 2.0, box.top + box.height / 2.0}, visible[i]->label,
+    overlay.text({box.left + box.width / 2.0, box.top + box.height / 2.0}, seen[i].marker->label,
                  style);
   }
 }

@@ -45,7 +45,9 @@ void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overla
 // In perspective the bar is true at `reference`, and says so.
 void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
                     const Eigen::Vector3d& reference, Overlay& overlay);
-// Markers and dimension lines in the terrain frame.
+// Markers and dimension lines in the terrain frame. Where the plot has no room for the markers'
+// labels, not even if each were as narrow as high, none is drawn, and of thousands of markers that
+// cover each other one in each square of a disc's radius.
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
                   const std::vector<Marker>& markers, Overlay& overlay);
 

@@ -243,6 +243,21 @@ TEST_F(SceneViewTest, MarkersLieOverTheTerrainAndTakeTheirVerdictsColour) {
   EXPECT_GT(count(image, {255, 255, 255}), 300U);
 }
 
+TEST_F(SceneViewTest, LabelsThatHaveNoRoomAreLeftOut) {
+  Scene scene;
+  scene.layers.push_back(
+      colored_points({{-1, -1, 9}, {1, 1, 9}, {0, 0, 9}}, {blue, blue, blue}, 1.2));
+  for (int i = 0; i < 6000; ++i)
+    scene.markers.push_back({{uniform(-1, 1), uniform(-1, 1), 0}, "P", Verdict::pass});
+  const ColorImage labelled = render_scene(scene, bare(200, 200));
+  for (Marker& marker : scene.markers) marker.label.clear();
+  EXPECT_TRUE(labelled.pixels == render_scene(scene, bare(200, 200)).pixels);
+  scene.markers.resize(20);
+  const ColorImage few = render_scene(scene, bare(200, 200));
+  for (Marker& marker : scene.markers) marker.label = "P";
+  EXPECT_FALSE(few.pixels == render_scene(scene, bare(200, 200)).pixels);
+}
+
 TEST_F(SceneViewTest, EqualInputGivesEqualBytes) {
   Scene scene;
   PointCloud cloud;
