@@ -27,7 +27,7 @@ struct LookupCommandOptions {
   std::string map;
   std::string points;
   std::string output;
-  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
+  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::automatic;
   libgtd::LookupOptions lookup;
   std::string columns;  // empty: found, distance_m and every field
   std::string visible;  // a cloud, if not empty
@@ -36,9 +36,10 @@ struct LookupCommandOptions {
 
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
-  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
+  table.add("points_frame", options.points_frame, graspmap_tools::listed_point_frame_names(),
             "frame of the points: of the cloud that was scored, the terrain's, or the map's before "
-            "it was cropped or a simulated robot stood in it");
+            "it was cropped or a simulated robot stood in it; auto: as the manifest of POINTS "
+            "says, else input");
   table.add("column", options.columns,
             "what is added, with commas between: NAME=FIELD, or NAME=FIELD>=VALUE for 1 or 0; "
             "none: found, distance_m and every field of the map");
@@ -211,6 +212,8 @@ void lookup(LookupCommandOptions& options, Run& run) {
   const std::vector<AddedColumn> columns = parse_columns(options.columns);
   options.map = graspmap_tools::without_trailing_slash(options.map);
   run.claim_output(options.output, {options.map, options.points, options.visible});
+  options.points_frame =
+      graspmap_tools::frame_of_points(options.points, options.points_frame, options.map, run);
   libmap::Table table = libmap::read_csv(options.points);
   MapAnswers map = graspmap_tools::is_tile_store(options.map)
                        ? ask_tiles(options, graspmap_tools::positions_of(table), run)

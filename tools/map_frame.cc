@@ -11,6 +11,15 @@ const std::vector<std::pair<std::string, PointFrame>>& point_frame_names() {
   return names;
 }
 
+const std::vector<std::pair<std::string, PointFrame>>& listed_point_frame_names() {
+  static const auto names = [] {
+    auto all = point_frame_names();
+    all.insert(all.begin(), {"auto", PointFrame::automatic});
+    return all;
+  }();
+  return names;
+}
+
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table) {
   const std::size_t columns[] = {table.column("x"), table.column("y"), table.column("z")};
   std::vector<Eigen::Vector3d> positions;
@@ -32,7 +41,39 @@ std::optional<libmap::Manifest> manifest_of(const std::filesystem::path& path) {
   return libmap::read_manifest_of(path.has_filename() ? path : path.parent_path());
 }
 
+PointFrame recorded_frame(const std::string& points, const std::string& map) {
+  const auto manifest = manifest_of(points);
+  if (!manifest) return PointFrame::input;
+  const libmap::ManifestValue* value = manifest->find_parameter("points_frame");
+  const auto* recorded = value == nullptr ? nullptr : std::get_if<std::string>(value);
+  if (recorded != nullptr)
+    for (const auto& [name, frame] : point_frame_names())
+      if (name == *recorded) return frame;
+  if (manifest->frame != "terrain") return PointFrame::input;
+  const libmap::Pose* own = manifest->find_transform("terrain_from_input");
+  const auto of_map = manifest_of(map);
+  const libmap::Pose* others = of_map ? of_map->find_transform("terrain_from_input") : nullptr;
+  if (own == nullptr || others == nullptr || own->matrix() != others->matrix())
+    throw libmap::Error("its places lie in the terrain frame of another map",
+                        {.file = points,
+                         .field = "--points-frame",
+                         .value = "auto",
+                         .bound = "input, terrain or map"});
+  return PointFrame::terrain;
+}
+
 }  // namespace
+
+PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
+                           Run& run) {
+  if (asked != PointFrame::automatic) return asked;
+  const PointFrame found = recorded_frame(points, map);
+  for (const auto& [name, frame] : point_frame_names())
+    if (frame == found)
+      for (auto& [key, value] : run.manifest().parameters)
+        if (key == "points_frame") value = name;
+  return found;
+}
 
 std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
   const auto manifest = manifest_of(file);

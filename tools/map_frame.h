@@ -15,8 +15,17 @@ namespace graspmap_tools {
 
 // Which frame listed points are in: that of the cloud that was scored, the terrain frame, or that
 // of the map that `graspmap crop` made the site from or in which a simulated robot stood.
-enum class PointFrame { input, terrain, map };
+enum class PointFrame { input, terrain, map, automatic };
+// Without `automatic`, for what comes from no file.
 const std::vector<std::pair<std::string, PointFrame>>& point_frame_names();
+// With it: as the manifest beside the file of points says, else `input`.
+const std::vector<std::pair<std::string, PointFrame>>& listed_point_frame_names();
+
+// The frame of the points in the file `points`: `asked`, unless that is automatic. The run's
+// parameter points_frame becomes what was found. Throws Error if the points lie in the terrain
+// frame of another map than `map`.
+PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
+                           Run& run);
 
 // The columns x, y, z, in metres. Throws Error naming the file, the row and the column.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);

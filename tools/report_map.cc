@@ -79,18 +79,6 @@ ThinnedMap read_store_map(const fs::path& path, std::size_t max_cells) {
   return map;
 }
 
-// Of what `lookup` wrote: the frame in which its points were given.
-PointFrame frame_of(const fs::path& lookup) {
-  const auto manifest = libmap::read_manifest_of(lookup);
-  const libmap::ManifestValue* value =
-      manifest ? manifest->find_parameter("points_frame") : nullptr;
-  const auto* name = value == nullptr ? nullptr : std::get_if<std::string>(value);
-  if (name != nullptr)
-    for (const auto& [known, frame] : point_frame_names())
-      if (known == *name) return frame;
-  return PointFrame::input;
-}
-
 }  // namespace
 
 libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path>& lookup,
@@ -101,8 +89,10 @@ libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path
   view.voxels = map.voxels;
   if (!lookup) return view;
   const auto manifest = libmap::read_manifest_of(path);
+  const PointFrame frame =
+      frame_of_points(lookup->string(), PointFrame::automatic, path.string(), run);
   const libmap::Pose terrain_from_points =
-      terrain_from_map(manifest) * map_from_points(path.string(), frame_of(*lookup), run);
+      terrain_from_map(manifest) * map_from_points(path.string(), frame, run);
   for (const Eigen::Vector3d& point : positions_of(libmap::read_csv(*lookup)))
     view.markers.push_back({.label = {}, .point_in_terrain = terrain_from_points * point});
   return view;

@@ -34,8 +34,11 @@ libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::siz
 std::vector<libmap::Marker> read_markers(const SceneFileOptions& options) {
   const libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> positions = positions_of(table);
-  const bool labelled = options.label != "none";
-  const std::size_t label = options.label == "auto" || !labelled ? 0 : table.column(options.label);
+  const std::size_t label =
+      options.label == "auto" || options.label == "none" ? 0 : table.column(options.label);
+  const std::string& first = table.columns.front();
+  const bool nameless = first == "x" || first == "y" || first == "z";
+  const bool labelled = options.label != "none" && !(options.label == "auto" && nameless);
   std::vector<libmap::Marker> markers;
   for (std::size_t row = 0; row < positions.size(); ++row) {
     libmap::Marker& marker = markers.emplace_back();
@@ -115,7 +118,8 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   }
   if (!options.points.empty()) {
     scene.markers = read_markers(options);
-    const libmap::Pose scene_from_points = map_from_points(file, options.points_frame, run);
+    const PointFrame frame = frame_of_points(options.points, options.points_frame, file, run);
+    const libmap::Pose scene_from_points = map_from_points(file, frame, run);
     for (libmap::Marker& marker : scene.markers)
       marker.position = scene_from_points * marker.position;
   }
@@ -152,11 +156,12 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
             "of a tile store: larger parts are thinned to about so many points");
   table.add("shading", options.shading, libmap::shading_names(), "where light falls");
   table.add("label", options.label,
-            "column of the marked points' names; auto: the first column; none: no names");
+            "column of the marked points' names; auto: the first column, unless it is x, y or z; "
+            "none: no names");
   table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
-  table.add("points_frame", options.points_frame, point_frame_names(),
+  table.add("points_frame", options.points_frame, listed_point_frame_names(),
             "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
-            "before it was cropped");
+            "before it was cropped; auto: as their manifest says, else input");
   table.add("heading", options.heading, map_heading_names(),
             "which way a map lies: as in its terrain frame, or with the x and y of its input");
 }

@@ -25,7 +25,7 @@ struct SceneFileOptions {
   std::string label = "auto";
   std::string verdict;
   std::string zero_plane = "auto";
-  PointFrame points_frame = PointFrame::input;
+  PointFrame points_frame = PointFrame::automatic;
   double point_size_m = 0.0;
   std::string box;  // of the plan that is shown
   std::uint64_t max_points = 1'000'000;

@@ -109,11 +109,12 @@ class FootholdSearch {
     return candidates;
   }
 
-  // Against the axis of the mask that was matched.
+  // Against the axis of the mask that was matched. From zero, so that no component is -0.
   Eigen::Vector3d approach_at(std::size_t point) const {
-    if (!map_.has_normals()) return -up_;
+    const Eigen::Vector3d zero = Eigen::Vector3d::Zero();
+    if (!map_.has_normals()) return zero - up_;
     const Eigen::Vector3d axis = map_.normals[point].cast<double>();
-    return axis.allFinite() && axis.norm() > 0.0 ? -axis.normalized() : -up_;
+    return zero - (axis.allFinite() && axis.norm() > 0.0 ? axis.normalized() : up_);
   }
 
   void look_around(Foothold& foothold, const std::vector<double>* graspable,

@@ -10,6 +10,7 @@ namespace {
 
 using graspmap_test::bad_input;
 using graspmap_test::graspmap;
+using graspmap_test::json_of;
 using graspmap_test::ProgramResult;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
@@ -125,6 +126,12 @@ TEST(Lookup, FramesOfMapAndPointsMeet) {
     for (const std::string points : {"terrain", "input"}) {
       ASSERT_TRUE(succeeded(graspmap(
           {"lookup", map, points + ".csv", "--points-frame", points, "-o", "answers.csv"})));
+      // The points' manifest says as much.
+      ASSERT_TRUE(succeeded(graspmap({"lookup", map, points + ".csv", "-o", "by_manifest.csv"})));
+      EXPECT_EQ(graspmap_test::content("by_manifest.csv"), graspmap_test::content("answers.csv"));
+      EXPECT_EQ(json_of("by_manifest.csv.json").at("parameters").at("points_frame"), points);
+      ASSERT_TRUE(succeeded(graspmap({"lookup", map, "answers.csv", "-o", "again.csv"})));
+      EXPECT_EQ(json_of("again.csv.json").at("parameters").at("points_frame"), points);
       const Table answers = libmap::read_csv(scratch("answers.csv"));
       ASSERT_EQ(answers.rows.size(), scores.rows.size());
       std::size_t wrong = 0;
@@ -135,6 +142,21 @@ TEST(Lookup, FramesOfMapAndPointsMeet) {
       }
       EXPECT_EQ(wrong, 0U) << map << " looked up at points in the frame " << points;
     }
+}
+
+TEST(Lookup, PointsInTheTerrainFrameOfAnotherMapAreRefused) {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", "map.csv"})));
+  libmap::write_cloud(
+      scratch("moved.pcd"),
+      libmap::transform_cloud(graspmap_test::bumpy_terrain(),
+                              libmap::make_pose_from_rpy({4, -7, 2}, {12, -20, 35})));
+  ASSERT_TRUE(succeeded(graspmap({"score", "moved.pcd", "-o", "other.pcd"})));
+  EXPECT_TRUE(bad_input(graspmap({"lookup", "other.pcd", "map.csv", "-o", "answers.csv"}),
+                        {"map.csv: --points-frame is auto", "in the terrain frame of another map",
+                         "input, terrain or map"}));
+  EXPECT_TRUE(succeeded(graspmap(
+      {"lookup", "other.pcd", "map.csv", "--points-frame", "terrain", "-o", "answers.csv"})));
 }
 
 TEST(Lookup, ConvertedMapStillKnowsItsFrame) {

@@ -40,6 +40,29 @@ TEST(Render, CloudWithMarkedPoints) {
   EXPECT_EQ(content("a.png"), content("b.png"));
 }
 
+// Positions without names, in the map's own frame, as their manifest says.
+TEST(Render, FootholdsOfTheMap) {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(succeeded(
+      graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--solid-voxel-threshold", "1"})));
+  ASSERT_TRUE(succeeded(
+      graspmap({"footholds", "map.pcd", "-o", "footholds.csv", "--no-graspable-only", "--edges"})));
+  const std::vector<std::string> words = {
+      "render", "map.pcd", "--points", "footholds.csv", "--width", "320", "--height", "240", "-o"};
+  const std::map<std::string, std::vector<std::string>> pictures = {
+      {"a.png", {}},
+      {"b.png", {"--points-frame", "terrain", "--label", "none"}},
+      {"c.png", {"--points-frame", "terrain", "--label", "score"}}};
+  for (const auto& [name, more] : pictures) {
+    std::vector<std::string> call = words;
+    call.push_back(name);
+    call.insert(call.end(), more.begin(), more.end());
+    ASSERT_TRUE(succeeded(graspmap(call)));
+  }
+  EXPECT_EQ(content("a.png"), content("b.png"));
+  EXPECT_NE(content("a.png"), content("c.png"));
+}
+
 TEST(Render, NeedsNoDisplay) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(succeeded(

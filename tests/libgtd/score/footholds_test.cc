@@ -142,6 +142,7 @@ TEST(Footholds, NormalSlopeAndApproachOfAnInclinedPlane) {
     EXPECT_NEAR(one.slope_deg, 25.0, 0.1);
     EXPECT_NEAR(one.k1, 0.0F, 1e-2F);
     EXPECT_EQ(one.approach, Eigen::Vector3d(0, 0, -1));
+    EXPECT_FALSE(std::signbit(one.approach.x())) << "it would be written as -0";
   }
   // In another frame all turns with it.
   const libmap::Pose turn(Eigen::AngleAxisd(2.1, Eigen::Vector3d(1, 2, -1).normalized()));
