@@ -106,7 +106,7 @@ class BoxTree {
 
   BoxTree(const TriangleMesh& mesh, std::vector<std::uint32_t> triangles,
           const std::vector<bool>& only)
-      : mesh_(mesh), only_(only), order_(std::move(triangles)) {
+      : only_(only), order_(std::move(triangles)) {
     boxes_.resize(mesh.triangles.size());
     for (const std::uint32_t t : order_)
       for (const std::uint32_t v : mesh.triangles[t]) boxes_[t].extend(mesh.vertices[v]);
@@ -174,7 +174,6 @@ class BoxTree {
     nodes_[index].after = static_cast<std::uint32_t>(nodes_.size());
   }
 
-  const TriangleMesh& mesh_;
   const std::vector<bool>& only_;
   std::vector<std::uint32_t> order_;
   std::vector<Eigen::AlignedBox3d> boxes_;

@@ -166,7 +166,7 @@ TEST_P(CloudFormat, ThreadsDoNotMatter) {
 }
 
 TEST_P(CloudFormat, HoldsEmptyAndSinglePoint) {
-  for (const std::size_t size : {0, 1}) {
+  for (const std::size_t size : {0u, 1u}) {
     const CloudReadResult read = read_cloud(write_sample(GetParam(), sample_cloud(size)));
     EXPECT_EQ(read.cloud.size(), size);
     EXPECT_EQ(read.cloud.fields.size(), 8U);

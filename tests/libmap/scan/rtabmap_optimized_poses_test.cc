@@ -212,8 +212,9 @@ TEST(CopyWithOptimizedPoses, RefusesWhatHasNoPlaceForThem) {
   }
   for (const auto& [name, reason] : std::map<std::string, std::string>{
            {"other.db", "no RTAB-Map database"}, {"old.db", "before 0.13"}}) {
-    const libmap::Error error = graspmap_test::error_of(
-        [&] { libmap::copy_with_optimized_poses(scratch(name), scratch("b.db"), {}); });
+    const libmap::Error error = graspmap_test::error_of([&, &name = name] {
+      libmap::copy_with_optimized_poses(scratch(name), scratch("b.db"), {});
+    });
     EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
   }
 }
