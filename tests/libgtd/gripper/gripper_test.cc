@@ -87,9 +87,8 @@ TEST(GripperMaskErrors, NameTheVoxelSize) {
   const Gripper gripper = libgtd::read_gripper(file_of("scar-e"));
   for (const auto& [name, method] : libgtd::method_names())
     for (const double size : {0.0, -1.0, 10.0, 0.2, 1e-5, 1e-8, 1e-300}) {
-      const libmap::Error error = error_of([&] {
-        libgtd::make_gripper_mask(gripper, {method, size, 1});
-      });
+      const libgtd::GripperMaskOptions options = {method, size, 1};
+      const libmap::Error error = error_of([&] { libgtd::make_gripper_mask(gripper, options); });
       EXPECT_EQ(error.context().field, "voxel_size_m") << name << " " << size;
     }
   EXPECT_EQ(error_of([&] {

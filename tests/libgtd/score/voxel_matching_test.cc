@@ -240,8 +240,8 @@ TEST(VoxelMatching, FullGroundUnderAFullMask) {
   mask.pivot_xy = 32;
   mask.pivot_z = 16;
   std::vector<std::size_t> pivots;
-  for (const std::size_t i : {33, 34, 67})
-    for (const std::size_t j : {32, 33, 35}) pivots.push_back((i * side + j) * layers + 16);
+  for (const std::size_t i : {33u, 34u, 67u})
+    for (const std::size_t j : {32u, 33u, 35u}) pivots.push_back((i * side + j) * layers + 16);
   expect_as_plainly(grid, mask, pivots, "V = 1");
   mask.counted.front() = 0;
   expect_as_plainly(grid, mask, pivots, "one voxel not counted");

@@ -22,8 +22,9 @@ double linear(const Eigen::Vector3d& p) { return 3 * p.x() - 2 * p.y() + 5 * p.z
 
 TriangleMesh valued_ball() {
   TriangleMesh mesh = ball_mesh(8, 12, {0.5, -0.25, 2.0});
-  ScalarField& real =
-      mesh.vertex_fields.emplace_back("height", ScalarType::float64, std::vector<double>());
+  ScalarField& real = mesh.vertex_fields.emplace_back();
+  real.name = "height";
+  real.type = ScalarType::float64;
   ScalarField whole{"views", ScalarType::int32, {}};
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v) {
     const Eigen::Vector3d& p = mesh.vertices[v];

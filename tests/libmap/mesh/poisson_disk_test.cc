@@ -221,14 +221,14 @@ TEST(PoissonDisk, BlueNoise) {
 
 TEST(PoissonDisk, Count) {
   const TriangleMesh mesh = rough_mesh(0.03);
-  for (const std::uint64_t count : {100, 500, 3000, 20000}) {
+  for (const std::uint64_t count : {100u, 500u, 3000u, 20000u}) {
     const PoissonDiskResult result = by_count(mesh, count);
     EXPECT_NEAR(static_cast<double>(result.cloud.size()), static_cast<double>(count),
                 static_cast<double>(count) / 100);
     expect_maximal(mesh, result);
     EXPECT_EQ(by_radius(mesh, result.radius_m).cloud.positions, result.cloud.positions);
   }
-  for (const std::uint64_t count : {1, 2, 3, 4, 7, 10, 25, 60, 99}) {
+  for (const std::uint64_t count : {1u, 2u, 3u, 4u, 7u, 10u, 25u, 60u, 99u}) {
     const PoissonDiskResult result = by_count(mesh, count);
     EXPECT_EQ(result.cloud.size(), count);
     expect_maximal(mesh, result, 5000);
@@ -239,7 +239,7 @@ TEST(PoissonDisk, CountOfIslandsFarApart) {
   TriangleMesh mesh;
   for (int n = 0; n < 3; ++n)
     mesh = join_meshes(mesh, moved(square_mesh(0.0, 0.01), {n * n * 20.0, 0, 0}));
-  for (const std::uint64_t count : {1, 2, 3, 12})
+  for (const std::uint64_t count : {1u, 2u, 3u, 12u})
     EXPECT_EQ(by_count(mesh, count).cloud.size(), count);
 }
 
