@@ -7,7 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
+#include "libgtd/score/tile_store.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/pcd_parts.h"
 #include "libmap/core/error.h"
@@ -94,6 +96,26 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
                            "occupied_voxels", "mask_side_voxels", "mask_layers", "normal_radius_m"})
     if (const libmap::ManifestValue* value = part.find_result(name))
       whole.results.emplace_back(name, *value);
+}
+
+// Single precision in some shares' files and double in others would meet in the whole.
+void restore_full_precision(const libmap::Manifest& part, const std::string& name,
+                            libmap::PointCloud& whole) {
+  libgtd::TileStoreIndex index;
+  const auto lattice = libgtd::facts_of(part).lattice;
+  if (!lattice) return;
+  index.lattice = *lattice;
+  const libmap::ManifestValue* method = part.find_parameter("method");
+  // The thesis's program counts in single precision, its voxels' size included.
+  if (method != nullptr && *method == libmap::ManifestValue(std::string("thesis")))
+    index.lattice.voxel_size_m = static_cast<float>(index.lattice.voxel_size_m);
+  index.frame = part.frame == "input" ? libgtd::MapFrame::input : libgtd::MapFrame::terrain;
+  index.manifest.transforms = part.transforms;
+  try {
+    libgtd::restore_positions(index, whole);
+  } catch (const libmap::Error& error) {
+    throw error.in_file(name);
+  }
 }
 
 // Points whose flag is set.
@@ -213,6 +235,7 @@ void merge(const MergeOptions& options, Run& run) {
   std::vector<libmap::PointCloud> parts;
   for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
   libmap::PointCloud whole = joined(parts, options.tiles.front());
+  restore_full_precision(manifests.front(), options.tiles.front(), whole);
   copy_common_facts(manifests.front(), run.manifest());
   // The terrain and the gripper that the parts were made from, then the parts.
   run.manifest().inputs = manifests.front().inputs;

@@ -138,6 +138,9 @@ void score(ScoreOptions& options, Run& run) {
   options.detection.share = parse_share(options.tile);
   options.detection.up = parse_up(options.up);
   scenario.check();
+  if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
+    throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
+                        {.field = "--up", .value = options.up});
   const auto gripper_file = graspmap_tools::find_data_file("grippers", scenario.gripper);
   options.detection.gripper = libgtd::read_gripper(gripper_file, scenario.gripper_overrides);
   // Before any work: a voxel size that does not suit the gripper shows here.
@@ -156,6 +159,8 @@ void score(ScoreOptions& options, Run& run) {
     return;
   }
   if (options.append) throw libmap::Error("adds to a tile store, MAP.tiles", {.field = "--append"});
+  if (options.points_at_once != ScoreOptions{}.points_at_once)
+    throw libmap::Error("is for a tile store, MAP.tiles", {.field = "--points-at-once"});
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.terrain});
   const libmap::PiecesReadResult read =

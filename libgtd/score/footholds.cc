@@ -188,6 +188,7 @@ PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
   std::vector<std::size_t> points;
   for (const Foothold& foothold : result.footholds) points.push_back(foothold.map_point);
   PointCloud cloud = libmap::select_points(map, points);
+  std::erase_if(cloud.fields, [](const auto& field) { return field.name == "slope_deg"; });
   cloud.normals.clear();
   for (const Foothold& foothold : result.footholds) cloud.normals.push_back(foothold.normal);
   const auto add = [&](const char* name, const auto& value_of) {

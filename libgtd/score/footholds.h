@@ -58,8 +58,9 @@ struct FootholdResult {
 FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptions& options = {},
                               const FootholdFrame& frame = {});
 
-// A point for each: its place, normal and colour; the map's own fields; mean_score,
-// graspable_points, approach_x, approach_y, approach_z, slope_deg, k1, k2.
+// A point for each: its place, normal and colour; the map's own fields, but for slope_deg, which is
+// that of this normal; mean_score, graspable_points, approach_x, approach_y, approach_z, slope_deg,
+// k1, k2.
 libmap::PointCloud to_cloud(const FootholdResult& result, const libmap::PointCloud& map);
 
 }  // namespace libgtd

@@ -35,6 +35,18 @@ void for_each_pair(const std::vector<Voxel>& voxels, int reach, const Visit& vis
   }
 }
 
+// The most that two voxels are apart along an axis.
+int extent_of(const std::vector<Voxel>& voxels) {
+  if (voxels.empty()) return 0;
+  Voxel low = voxels.front();
+  Voxel high = low;
+  for (const Voxel& voxel : voxels) {
+    low = {std::min(low.i, voxel.i), std::min(low.j, voxel.j), std::min(low.k, voxel.k)};
+    high = {std::max(high.i, voxel.i), std::max(high.j, voxel.j), std::max(high.k, voxel.k)};
+  }
+  return std::max({high.i - low.i, high.j - low.j, high.k - low.k});
+}
+
 // Disjoint sets of voxels (Galler and Fischer 1964); each goes by its first voxel.
 class VoxelSets {
  public:
@@ -83,7 +95,9 @@ std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
   for (std::size_t n = 0; n < voxels.size(); ++n)
     if (is_steep[n] != 0) rises[faces.find(n)].hold(voxels[n].k);
   const double square = radius_voxels * radius_voxels;
-  for_each_pair(voxels, static_cast<int>(radius_voxels), [&](std::size_t n, std::size_t m) {
+  // No further than any two voxels are apart: a radius may be larger than an int can be.
+  const double reach = std::min(radius_voxels, static_cast<double>(extent_of(voxels)));
+  for_each_pair(voxels, static_cast<int>(reach), [&](std::size_t n, std::size_t m) {
     if (is_steep[n] == 0 && is_steep[m] == 0) return;
     const double di = voxels[m].i - voxels[n].i, dj = voxels[m].j - voxels[n].j,
                  dk = voxels[m].k - voxels[n].k;

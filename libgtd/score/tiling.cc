@@ -52,7 +52,7 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
   std::vector<TileBounds> tiles;
   for (int i = i_first; i <= i_last; ++i)
     for (int j = j_first; j <= j_last; ++j)
-      // Cut to the grid: a tile larger than the cloud takes no more memory than the cloud.
+      // Cut to the grid: a tile takes no more memory than the grid's columns do.
       tiles.push_back(
           {std::max(i * tile_voxels, grid.min.i), std::min((i + 1) * tile_voxels, grid.max.i + 1),
            std::max(j * tile_voxels, grid.min.j), std::min((j + 1) * tile_voxels, grid.max.j + 1)});

@@ -87,15 +87,18 @@ class Finder {
     return {std::move(parameters)};
   }
 
-  // A case for each folder with a map.
+  // A case for each folder with a map: what lies in it and below, but for lower folders with maps.
   std::vector<OutlineSection> running_times() const {
     OutlineItem timings{.kind = ItemKind::timings};
+    std::set<fs::path> known;
     for (const fs::path& map : maps_) {
-      const fs::path folder = map.parent_path().lexically_relative(root_);
-      const bool known =
-          std::any_of(timings.cases.begin(), timings.cases.end(),
-                      [&](const OutlineCase& one) { return one.folder == folder.string(); });
-      if (!known) timings.cases.push_back({.name = place_of(map), .folder = folder.string()});
+      const fs::path folder = map.parent_path();
+      if (!known.insert(folder).second) continue;
+      OutlineCase one{.name = maps_in(folder) == 1 ? place_of(map) : name_of(folder)};
+      for (const ReportSource& source : manifests_below(folder, true))
+        if (source.error.empty() && folder_with_map_of(source.output) == folder)
+          one.files.push_back(fs::path(source.output).lexically_relative(root_).string());
+      timings.cases.push_back(std::move(one));
     }
     if (timings.cases.empty()) return {};
     timings.commands = {"simulate scene", "simulate site", "simulate cameras", "panorama", "fuse",
@@ -106,23 +109,42 @@ class Finder {
   }
 
  private:
-  // A map by its folder, in the run's own by its name.
+  std::ptrdiff_t maps_in(const fs::path& folder) const {
+    return std::count_if(maps_.begin(), maps_.end(),
+                         [&](const fs::path& map) { return map.parent_path() == folder; });
+  }
+
+  // The nearest folder around `output` that has a map.
+  fs::path folder_with_map_of(const fs::path& output) const {
+    fs::path folder = output.parent_path();
+    while (maps_in(folder) == 0 && folder != root_ && folder.has_relative_path())
+      folder = folder.parent_path();
+    return folder;
+  }
+
+  std::string name_of(const fs::path& folder) const {
+    return folder == root_ ? folder.filename().string() : folder.lexically_relative(root_).string();
+  }
+
+  // A map by its folder; in the run's own, or beside others, by its name.
   std::string place_of(const fs::path& map) const {
-    const fs::path name = map.lexically_relative(root_);
-    return (name.has_parent_path() ? name.parent_path() : name).string();
+    const bool alone = map.parent_path() != root_ && maps_in(map.parent_path()) == 1;
+    return alone ? name_of(map.parent_path()) : map.lexically_relative(root_).string();
   }
 
   void add_maps(const FolderListing& listing, OutlineSection& section) {
     std::vector<fs::path> candidates = listing.files;
     candidates.insert(candidates.end(), listing.folders.begin(), listing.folders.end());
     std::set<std::string> stems;
+    std::erase_if(candidates, [&](const fs::path& file) {
+      return !is_map(file, manifest_of(file)) || !stems.insert(file.stem().string()).second;
+    });
     for (const fs::path& file : candidates) {
-      if (!is_map(file, manifest_of(file)) || !stems.insert(file.stem().string()).second) continue;
       maps_.push_back(file);
       OutlineItem item{.kind = ItemKind::map, .files = {file.filename().string()}};
       item.lookup = lookup_of(file, listing);
       if (!item.lookup.empty()) item.columns = columns_of(file.parent_path() / item.lookup);
-      item.picture = still_of(file, listing);
+      item.picture = still_of(file, listing, candidates.size() == 1);
       section.items.push_back(std::move(item));
     }
   }
@@ -159,11 +181,19 @@ class Finder {
     }
   }
 
-  static std::string still_of(const fs::path& map, const FolderListing& listing) {
+  // One that was made from this map, as its manifest says; a folder's only map is what one without
+  // a manifest shows.
+  static std::string still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
+    const auto shows = [&](const fs::path& picture) {
+      const auto manifest = manifest_of(picture);
+      if (!manifest || manifest->inputs.empty()) return only_map;
+      return fs::path(manifest->inputs.front().path).stem() == map.stem();
+    };
     for (const std::string& name :
          {map.stem().string() + ".png", std::string("oblique.png"), std::string("top.png")})
       for (const fs::path& file : listing.files)
-        if (file.filename() == name) return name;
+        if (file.filename() == name && (name == map.stem().string() + ".png" || shows(file)))
+          return name;
     return "";
   }
 

@@ -174,6 +174,35 @@ void parse_content(Keys& keys, const YAML::Node& content, OutlineItem& item) {
     default:
       item.files = Keys::list_of(content, "path");
       if (item.files.empty()) fail(content, keys.name(), "names no file");
+      if (item.files.size() > 1 && item.kind != ItemKind::picture &&
+          item.kind != ItemKind::parameters)
+        fail(content, keys.name(), "names more than one file");
+  }
+}
+
+// What says how the content is shown; keys of other kinds are not known.
+void parse_manner(Keys& keys, OutlineItem& item) {
+  switch (item.kind) {
+    case ItemKind::picture:
+    case ItemKind::parameters:
+      item.labels = keys.texts("labels");
+      break;
+    case ItemKind::map:
+      item.lookup = keys.text("lookup");
+      item.verdict = keys.text("verdict");
+      item.picture = keys.text("picture");
+      [[fallthrough]];
+    case ItemKind::table:
+      keys.each("columns", [&](const auto& entry) { item.columns.push_back(parse_column(entry)); });
+      if (const auto rows = keys.find("rows")) item.rows = parse_rows(*rows);
+      break;
+    case ItemKind::timings:
+      item.commands = keys.texts("commands");
+      if (const auto published = keys.find("published"))
+        item.published = parse_published(*published);
+      break;
+    default:
+      break;
   }
 }
 
@@ -189,21 +218,14 @@ OutlineItem parse_item(const YAML::Node& node) {
     content = found;
     item.kind = kind;
   }
-  item.caption = keys.text("caption");
-  item.labels = keys.texts("labels");
-  keys.each("columns", [&](const auto& entry) { item.columns.push_back(parse_column(entry)); });
-  if (const auto rows = keys.find("rows")) item.rows = parse_rows(*rows);
-  item.lookup = keys.text("lookup");
-  item.verdict = keys.text("verdict");
-  if (item.kind == ItemKind::map) item.picture = keys.text("picture");
-  item.commands = keys.texts("commands");
-  if (const auto published = keys.find("published")) item.published = parse_published(*published);
-  keys.end();
   if (!content) {
     std::string kinds;
     for (const auto& [name, kind] : item_kind_names()) kinds += (kinds.empty() ? "" : ", ") + name;
     fail(node, "item", "is of no kind: " + kinds);
   }
+  item.caption = keys.text("caption");
+  parse_manner(keys, item);
+  keys.end();
   parse_content(keys, *content, item);
   if (!item.labels.empty() && item.labels.size() != item.files.size())
     fail(node, "labels", "are not as many as the files");

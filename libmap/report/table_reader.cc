@@ -38,13 +38,16 @@ FileHead read_head(const std::filesystem::path& path) {
   stream.read(head.text.data(), static_cast<std::streamsize>(head_bytes));
   head.text.resize(static_cast<std::size_t>(stream.gcount()));
   head.lines = static_cast<std::uint64_t>(std::count(head.text.begin(), head.text.end(), '\n'));
+  char last = head.text.empty() ? '\n' : head.text.back();
   std::string more(head_bytes, '\0');
   while (stream.read(more.data(), static_cast<std::streamsize>(head_bytes)) ||
          stream.gcount() > 0) {
     head.whole = false;
     head.lines +=
         static_cast<std::uint64_t>(std::count(more.begin(), more.begin() + stream.gcount(), '\n'));
+    last = more[static_cast<std::size_t>(stream.gcount()) - 1];
   }
+  if (last != '\n') ++head.lines;
   if (!head.whole) cut_at_row(head.text);
   return head;
 }

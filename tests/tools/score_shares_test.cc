@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/pose.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace {
@@ -126,6 +128,28 @@ TEST_F(Merge, KeepsWhatTheSharesHaveInCommon) {
   EXPECT_EQ(whole.at("results").at("scored_voxels"),
             part.at("results").at("scored_voxels").get<int>() +
                 graspmap_test::json_of("b.pcd.json").at("results").at("scored_voxels").get<int>());
+}
+
+// Coordinates from 256 m on are stored in double precision, those of some shares alone here.
+TEST(MergeOfShares, AcrossTheBoundOfSinglePrecisionIsTheWholeMap) {
+  libmap::write_cloud(
+      scratch("terrain.pcd"),
+      libmap::transform_cloud(graspmap_test::bumpy_terrain(),
+                              libmap::make_pose_from_rpy({255.93, 255.97, 0.0}, {0, 0, 0})));
+  for (const std::string format : {".pcd", ".csv", ".ply"})
+    for (const std::string method : {"corrected", "thesis"}) {
+      const Words more = {"--plane", "none", "--method", method, "--curvature-radius", "0"};
+      ASSERT_TRUE(succeeded(score_to("whole" + format, more)));
+      Words merge = {"merge", "-o", "merged" + format};
+      for (const char* number : {"1", "2", "3", "4"}) {
+        Words share = more;
+        share.insert(share.end(), {"--tile", std::string(number) + "/4"});
+        merge.push_back(std::string("part") + number + format);
+        ASSERT_TRUE(succeeded(score_to(merge.back(), share)));
+      }
+      ASSERT_TRUE(succeeded(graspmap(merge)));
+      EXPECT_TRUE(content("merged" + format) == content("whole" + format)) << format << method;
+    }
 }
 
 TEST_F(Merge, MissingShare) {

@@ -237,6 +237,13 @@ TEST(Obstacles, AgreeWithTheDefinitionOnRandomPlaces) {
     const auto found = find_obstacles(voxels, slopes, 0.01, options);
     EXPECT_EQ(found, by_hand(voxels, slopes, options, 0.01));
     for (const Obstacle one : found) ++seen[one];
+    // Radii beyond all voxels, and beyond what an int holds, are the same.
+    const auto within = [&](double radius_m) {
+      ObstacleOptions wide = options;
+      wide.normal_radius_m = radius_m;
+      return find_obstacles(voxels, slopes, 0.01, wide);
+    };
+    EXPECT_EQ(within(1e12), within(0.5));
   }
   EXPECT_EQ(seen.size(), 3U);
 }

@@ -83,6 +83,14 @@ TEST(OutlineFile, WhatIsWrongIsNamedWithItsLine) {
             std::string::npos);
   EXPECT_NE(error(head + "    items:\n      - timings: [{name: a}]\n").find("a folder or files"),
             std::string::npos);
+  EXPECT_NE(error(head + "    items:\n      - table: [a.csv, b.csv]\n").find("more than one file"),
+            std::string::npos);
+  for (const char* item :
+       {"{table: a.csv, lookup: b.csv}", "{table: a.csv, verdict: c}", "{picture: a.png, rows: 3}",
+        "{note: a, labels: [b]}", "{map: a.pcd, commands: [score]}", "{values: [], columns: [a]}"})
+    EXPECT_NE(error(head + "    items:\n      - " + item + "\n").find("is not known in a item"),
+              std::string::npos)
+        << item;
   EXPECT_NE(error("title: [a\n").find("line 2: not valid YAML"), std::string::npos);
   EXPECT_NE(error("- a\n").find("no map of keys"), std::string::npos);
   EXPECT_NE(error("title: a\ntitle: b\n").find("stands twice"), std::string::npos);

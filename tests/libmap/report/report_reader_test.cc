@@ -181,6 +181,34 @@ TEST(FoundOutline, OfAFolder) {
   EXPECT_EQ(times.rows[0].command, "score");
 }
 
+// Of several maps in one folder and below it: each manifest's time counts once.
+TEST(FoundOutline, OfMapsTogether) {
+  for (const char* map : {"a.pcd", "b.pcd", "sub/map.pcd", "sub/second.pcd", "sub/c/deep.pcd"}) {
+    put(map, "");
+    put_manifest(map, "score");
+  }
+  put("oblique.png", "");
+  put_manifest("oblique.png", "render", {{"a.pcd", "", 1}});
+  put("sub/top.png", "");
+  put("sub/evaluation/roc.csv", "a\n1\n");
+  put_manifest("sub/evaluation", "evaluate");
+  const Outline outline = libmap::outline_of_folder(scratch_folder());
+  EXPECT_EQ(outline.items[0].labels,
+            (std::vector<std::string>{"a.pcd", "b.pcd", "sub/map.pcd", "sub/second.pcd", "sub/c"}));
+  EXPECT_EQ(outline.items[1].picture, "oblique.png");
+  EXPECT_EQ(outline.items[2].picture, "");
+  EXPECT_EQ(outline.sections[0].items[0].picture, "") << "of which of the two maps?";
+  const auto& cases = outline.sections.back().items[0].cases;
+  ASSERT_EQ(cases.size(), 3U);
+  EXPECT_EQ(cases[0].name, scratch_folder().filename().string());
+  EXPECT_EQ(cases[0].files.size(), 3U);
+  EXPECT_EQ(cases[1].name, "sub");
+  EXPECT_EQ(cases[1].files,
+            (std::vector<std::string>{"sub/evaluation", "sub/map.pcd", "sub/second.pcd"}));
+  EXPECT_EQ(cases[2].name, "sub/c");
+  EXPECT_EQ(cases[2].files, std::vector<std::string>{"sub/c/deep.pcd"});
+}
+
 TEST(FoundOutline, OfNothing) {
   EXPECT_NE(std::string(error_of([] { libmap::outline_of_folder(scratch_folder()); }).what())
                 .find("nothing that a report could show"),

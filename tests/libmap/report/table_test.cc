@@ -102,6 +102,9 @@ TEST(Table, OfAMillionRowsOnlyTheFirstAreRead) {
   EXPECT_EQ(table.table.rows.size(), 1000U);
   EXPECT_EQ(table.table.rows[999], std::vector<std::string>{"999"});
   EXPECT_EQ(table.lines, 2'000'001U);
+  graspmap_test::write_text(scratch_folder() / "unended.csv", text.substr(0, text.size() - 1));
+  EXPECT_EQ(libmap::read_report_table(scratch_folder() / "unended.csv", {}, 1, 1).lines,
+            2'000'001U);
   EXPECT_EQ(error_of([] {
               libmap::read_report_table(scratch_folder() / "large.csv", {{"valu", ""}}, 1, 1);
             })
