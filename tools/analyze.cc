@@ -326,6 +326,9 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
 }
 
 void analyze(AnalyzeOptions& options, Run& run) {
+  if (options.other.empty() && options.transform != "auto")
+    throw libmap::Error("is for comparing with OTHER, which is not given",
+                        {.field = "--transform", .value = options.transform});
   run.claim_output_tree(options.folder, output_names(), {options.map, options.other});
   options.regions.edges = options.change.edges = options.analysis.edges;
   options.change.height_bin_m = options.analysis.height_bin_m;

@@ -1,6 +1,8 @@
 // graspmap bag: ROS 1 bags in and out, offline.
 #include <cmath>
 #include <filesystem>
+#include <initializer_list>
+#include <map>
 #include <optional>
 #include <string>
 
@@ -21,7 +23,7 @@ using graspmap_tools::Run;
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
   table.add("stamp_s", options.stamp,
             "out of a bag: the moment, or the cloud, nearest to it alone (auto: all moments; the "
-            "cloud of most points); into a bag: of all messages (auto: the inputs' own)");
+            "cloud of most points); a map into a bag: of all messages (auto: the inputs' own)");
   table.add("strict", options.strict, "end with an error if an image cannot be used");
   bind(table, options.depth);
   table.add("frame", options.frame,
@@ -40,23 +42,46 @@ void require_output(const BagCommandOptions& options) {
     throw libmap::Error("is missing (or --list)", {.file = {}, .field = "--output"});
 }
 
+// Options that what is asked for would ignore.
+void refuse(const BagCommandOptions& options, std::initializer_list<const char*> names,
+            const std::string& reason) {
+  const std::map<std::string, bool> given = {
+      {"--topic", !options.topics.empty()},        {"--rig", !options.rig.empty()},
+      {"--stamp", options.stamp != "auto"},        {"--terrain", !options.terrain.empty()},
+      {"--curvature", !options.curvature.empty()}, {"--footholds", !options.footholds.empty()}};
+  for (const char* name : names)
+    if (given.at(name)) throw libmap::Error(reason, {.file = {}, .field = name});
+}
+
+void write_bag(const BagCommandOptions& options, Run& run) {
+  if (is_bag(options.input))
+    throw libmap::Error("one of the two must be something else than a bag",
+                        {.file = options.input});
+  const bool rig = fs::is_directory(options.input);
+  if (rig) {
+    refuse(options, {"--topic", "--terrain", "--curvature", "--footholds"},
+           "is not for a rig's folder");
+    refuse(options, {"--stamp"}, "is not for a rig's folder: --stamp-offset moves its stamps");
+  } else {
+    refuse(options, {"--topic", "--rig"}, "is not for a map");
+  }
+  try {
+    return rig ? graspmap_tools::write_rig_folder_bag(options, run)
+               : graspmap_tools::write_map_bag(options, run);
+  } catch (const libmap::Error& error) {
+    throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
+  }
+}
+
 void run_bag(const BagCommandOptions& options, Run& run) {
   libmap::require_ros();
   if (options.list) return graspmap_tools::list_bag_topics(options);
   require_output(options);
-  if (is_bag(options.output)) {
-    if (is_bag(options.input))
-      throw libmap::Error("one of the two must be something else than a bag",
-                          {.file = options.input});
-    try {
-      return fs::is_directory(options.input) ? graspmap_tools::write_rig_folder_bag(options, run)
-                                             : graspmap_tools::write_map_bag(options, run);
-    } catch (const libmap::Error& error) {
-      throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
-    }
-  }
+  if (is_bag(options.output)) return write_bag(options, run);
+  refuse(options, {"--terrain", "--curvature", "--footholds"}, "is for a bag that is written");
   if (fs::path(options.output).has_extension()) {
     libmap::require_cloud_format(options.output);
+    refuse(options, {"--rig"}, "is not for a cloud");
     return graspmap_tools::read_bag_into_cloud(options, run);
   }
   graspmap_tools::read_bag_into_folder(options, run);

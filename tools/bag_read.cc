@@ -63,12 +63,12 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
                     "(--depth-scale)",
                     options.input, result.pixels_beyond));
   std::size_t fullest = 0;
-  for (const libmap::RigMoment& moment : plan.moments) fullest = std::max(fullest, moment.seen());
+  for (const libmap::RigMoment& moment : result.moments) fullest = std::max(fullest, moment.seen());
   const ResultCounts count(run.manifest());
   count("cameras", plan.rig.cameras.size());
   count("images", result.images);
   count("images_broken", result.broken);
-  count("moments", plan.moments.size());
+  count("moments", result.moments.size());
   count("moments_in_bag", plan.all_moments);
   count("cameras_of_fullest_moment", fullest);
   count("pixels_beyond", result.pixels_beyond);
@@ -80,8 +80,8 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     if (plan.topics[n].empty()) run.warn(camera.name + ": no topic of its images");
   }
   run.say(fmt::format("{} images of {} cameras, {} of {} moments, {} cameras at the fullest",
-                      result.images, plan.rig.cameras.size(), plan.moments.size(), plan.all_moments,
-                      fullest));
+                      result.images, plan.rig.cameras.size(), result.moments.size(),
+                      plan.all_moments, fullest));
 }
 
 }  // namespace

@@ -86,9 +86,13 @@ std::vector<libgtd::MapPair> compare_all(const std::vector<libgtd::SummarizedMap
   std::vector<libgtd::MapPair> pairs;
   for (std::size_t first = 0; first < maps.size(); ++first) {
     for (std::size_t second = first + 1; second < maps.size(); ++second) {
-      pairs.push_back(libgtd::compare_pair(
-          voxels[first], voxels[second],
-          terrain_from_input(maps[first]) * terrain_from_input(maps[second]).inverse()));
+      try {
+        pairs.push_back(libgtd::compare_pair(
+            voxels[first], voxels[second],
+            terrain_from_input(maps[first]) * terrain_from_input(maps[second]).inverse()));
+      } catch (const libmap::Error& error) {
+        throw error.in_file(maps[first].name + " and " + maps[second].name);
+      }
       pairs.back().first = first;
       pairs.back().second = second;
     }
@@ -132,7 +136,8 @@ void summarize(const SummarizeOptions& options, Run& run) {
   for (const std::string& file : options.maps) {
     try {
       ReadMap read = summarize_one(file, options, expected ? &*expected : nullptr, run);
-      if (maps.size() < names.size()) read.summarized.name = names[maps.size()];
+      if (maps.size() < names.size() && !names[maps.size()].empty())
+        read.summarized.name = names[maps.size()];
       maps.push_back(std::move(read.summarized));
       voxels.push_back(std::move(read.voxels));
     } catch (const libmap::Error& error) {

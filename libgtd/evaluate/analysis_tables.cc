@@ -16,7 +16,7 @@ using libmap::Table;
 
 std::string text(std::size_t value) { return libmap::to_text(static_cast<std::int64_t>(value)); }
 
-// Areas and places are sums of single-precision numbers: more digits say nothing.
+// Areas are sums of single-precision numbers: more digits say nothing.
 std::string text(double value) {
   return std::isfinite(value) ? libmap::to_text(static_cast<float>(value)) : std::string();
 }
@@ -24,7 +24,12 @@ std::string text(double value) {
 std::string text(std::optional<double> value) { return value ? text(*value) : std::string(); }
 
 void add_place(const Eigen::Vector3d& place, std::vector<std::string>& row) {
-  for (const double coordinate : place) row.push_back(text(coordinate));
+  // To the micrometre: in single precision a place in UTM coordinates would be off by decimetres.
+  constexpr double steps_a_m = 1e6;
+  for (const double coordinate : place)
+    row.push_back(std::isfinite(coordinate)
+                      ? libmap::to_text(std::round(coordinate * steps_a_m) / steps_a_m)
+                      : std::string());
 }
 
 Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }

@@ -218,6 +218,7 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
   expected.check();
   const libmap::ScalarField& score = scores_of(map);
   const libmap::ScalarField* flag = map.find_field("graspable");
+  const libmap::ScalarField* obstacle = map.find_field("obstacle");
   ExpectedMapResult result;
   result.regions.resize(expected.regions.size());
   if (flag != nullptr) result.voxels_by_flag.emplace();
@@ -232,7 +233,8 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
       continue;
     }
     const bool reached = reaches_cutoff(value, cutoff);
-    const bool flagged = flag != nullptr && flag->values[n] != 0.0;
+    const bool flagged = flag != nullptr && flag->values[n] > 0.0 &&
+                         !(obstacle != nullptr && obstacle->values[n] > 0.0);
     for (const std::size_t r : at.regions) {
       RegionResult& region = result.regions[r];
       ++region.voxels;

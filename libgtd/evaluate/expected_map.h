@@ -59,9 +59,10 @@ struct ExpectedMapResult {
   std::vector<RegionResult> regions;  // one a region; undecided ones too
   std::size_t undecided_voxels = 0;   // left out: in an undecided region
   std::size_t unlisted_voxels = 0;    // left out: in none, or without a score
-  // A voxel is predicted graspable where its score reaches the cutoff, or where the map's flag
-  // says so. One that lies in several regions counts once. Neighbouring voxels are not independent:
-  // Wilson intervals of their rates are too narrow, those of the places are not.
+  // Of all voxels with a score, those below the zero plane and at the edge included. A voxel is
+  // predicted graspable where its score reaches the cutoff, or where the map's flag says so and it
+  // is no obstacle. One that lies in several regions counts once. Neighbouring voxels are not
+  // independent: Wilson intervals of their rates are too narrow, those of the places are not.
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nothing if the map has no field "graspable"
   Confusion places;                         // a region a place; those without a voxel are left out

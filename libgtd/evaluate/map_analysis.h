@@ -32,7 +32,7 @@ struct ScoreBin {
   double area_m2 = 0.0;       // of those judged
 };
 
-// Judged voxels with low <= value < high; the last slope bin holds 90 degrees.
+// Judged voxels with low <= value < high; the last bin holds its high end too.
 struct GroundBin {
   double low = 0.0;
   double high = 0.0;

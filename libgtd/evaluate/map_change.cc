@@ -107,11 +107,18 @@ std::vector<VoxelPair> pairs_by_distance(const VoxelMap& map, const VoxelMap& ot
   return pairs;
 }
 
-double by_rank(std::vector<double>& values, double share) {
-  const auto rank =
-      static_cast<std::ptrdiff_t>(std::lround(share * static_cast<double>(values.size() - 1)));
-  std::nth_element(values.begin(), values.begin() + rank, values.end());
-  return values[static_cast<std::size_t>(rank)];
+// All three turn their signs, and low and high change places, with the values' signs.
+double middle_of(const std::vector<double>& ordered) {
+  return (ordered[(ordered.size() - 1) / 2] + ordered[ordered.size() / 2]) / 2.0;
+}
+
+double low_of(const std::vector<double>& ordered, double share) {
+  const double rank = std::ceil(share * static_cast<double>(ordered.size()) - 1e-9);
+  return ordered[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
+}
+double high_of(const std::vector<double>& ordered, double share) {
+  const double rank = std::ceil((1.0 - share) * static_cast<double>(ordered.size()) - 1e-9);
+  return ordered[ordered.size() - static_cast<std::size_t>(std::max(rank, 1.0))];
 }
 
 ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
@@ -136,12 +143,12 @@ ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
   result.mean /= n;
   result.mean_absolute /= n;
   result.rms = std::sqrt(result.rms / n);
-  result.low_5 = by_rank(differences, 0.05);
-  result.median = by_rank(differences, 0.5);
-  result.high_95 = by_rank(differences, 0.95);
-  const auto [least, most] = std::minmax_element(differences.begin(), differences.end());
-  result.min = *least;
-  result.max = *most;
+  std::sort(differences.begin(), differences.end());
+  result.low_5 = low_of(differences, 0.05);
+  result.median = middle_of(differences);
+  result.high_95 = high_of(differences, 0.95);
+  result.min = differences.front();
+  result.max = differences.back();
   const auto varies = [](const std::vector<double>& scores) {
     return std::any_of(scores.begin(), scores.end(),
                        [&](double score) { return score != scores.front(); });

@@ -49,8 +49,8 @@ struct ScoreDifference {
   double mean = 0.0;
   double mean_absolute = 0.0;
   double rms = 0.0;
-  double low_5 = 0.0;  // 5th, 50th and 95th percentile, by nearest rank
-  double median = 0.0;
+  double low_5 = 0.0;   // 5th and 95th percentile by nearest rank, each from its own end
+  double median = 0.0;  // of an even number of values, the mean of the two in the middle
   double high_95 = 0.0;
   double min = 0.0;
   double max = 0.0;

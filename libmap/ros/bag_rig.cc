@@ -282,6 +282,7 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   const std::vector<std::string> names = names_by_difference(survey.images);
   BagRigPlan plan;
   plan.depth_unit_m = options.depth_unit_m;
+  plan.tolerance_s = options.tolerance_s;
   if (options.rig) plan.rig = *options.rig;
   if (!options.rig) plan.rig.cameras.resize(choices.size());
   plan.topics.resize(plan.rig.cameras.size());
@@ -289,6 +290,8 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
     const std::size_t camera = options.rig ? camera_of_rig(plan.rig, choices[n], names[n]) : n;
     if (!options.rig)
       plan.rig.cameras[n].name = choices[n].name.empty() ? names[n] : choices[n].name;
+    if (std::find(plan.topics.begin(), plan.topics.end(), choices[n].topic) != plan.topics.end())
+      throw Error("is named twice", {.file = {}, .field = "topic", .value = choices[n].topic});
     if (!plan.topics[camera].empty())
       throw Error("belongs to the same camera as " + plan.topics[camera],
                   {.file = {}, .field = "topic", .value = choices[n].topic});

@@ -50,6 +50,7 @@ struct BagRigPlan {
   std::size_t all_moments = 0;
   std::vector<std::string> warnings{};
   double depth_unit_m = 0.001;
+  double tolerance_s = 0.02;
 };
 
 // What is to be taken: all moments, every N-th, or that nearest to `stamp_s`. An image's stamp is
@@ -67,7 +68,8 @@ std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan);
 
 struct BagRigExport {
   std::size_t images = 0;
-  std::size_t pixels_beyond = 0;  // whose depth 16 bits cannot hold at the camera's depth scale
+  std::vector<RigMoment> moments{};  // the plan's, without the images that cannot be used
+  std::size_t pixels_beyond = 0;     // whose depth 16 bits cannot hold at the camera's depth scale
   // Images that cannot be used, with the reason of the first of each camera.
   std::size_t broken = 0;
   std::vector<std::string> warnings{};

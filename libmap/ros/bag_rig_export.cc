@@ -50,6 +50,9 @@ class ImageWriter {
     for (const auto& [camera, reason] : reasons_)
       result_.warnings.push_back(plan_.topics[camera] + ": " + std::to_string(reason.second) +
                                  " images cannot be used: " + reason.first);
+    result_.moments = plan_.moments;
+    if (written_.size() < plan_.images.size() && !written_.empty())
+      result_.moments = rig_moments(written_, plan_.rig.cameras.size(), plan_.tolerance_s);
     return std::move(result_);
   }
 
@@ -110,6 +113,7 @@ class ImageWriter {
         write_text(folder_ / rig_image_name(name, ros_message::seconds_of(one.image.stamp_ns)),
                    one.png);
       }
+      written_.push_back({one.image.camera, ros_message::seconds_of(one.image.stamp_ns)});
       ++result_.images;
       result_.pixels_beyond += one.beyond;
     }
@@ -120,6 +124,7 @@ class ImageWriter {
   fs::path folder_;
   std::set<BagImage> waiting_;
   std::vector<Waiting> batch_;
+  std::vector<RigImage> written_;
   std::map<std::size_t, std::pair<std::string, std::size_t>> reasons_;  // by camera
   BagRigExport result_;
 };
@@ -158,7 +163,7 @@ BagRigExport export_bag_rig(const fs::path& bag, const BagRigPlan& plan, const f
                 {.file = bag.string()});
   if (!folder.empty()) {
     write_text(folder / rig_file_name, to_yaml(plan.rig));
-    write_text(folder / rig_moments_file_name, moments_table(plan.moments));
+    write_text(folder / rig_moments_file_name, moments_table(result.moments));
   }
   return result;
 }

@@ -20,7 +20,13 @@ bool same_calibration(const Camera& a, const Camera& b) {
 }
 
 // Drivers of rectified images publish the calibration of the raw ones and say by P how they differ.
-bool is_rectified(const std::string& topic) { return topic.find("rect") != std::string::npos; }
+// The word stands in the image's name, "image_rect" or "image_rect_raw", before a transport's.
+bool is_rectified(const std::string& topic) {
+  const std::size_t name = topic.find("/image_rect");
+  if (name == std::string::npos) return false;
+  const char after = topic.c_str()[name + std::string_view("/image_rect").size()];
+  return after == '\0' || after == '_' || after == '/';
+}
 
 void take_image(const BagMessage& message, SurveyedImages& images) {
   DepthMessageHead head;

@@ -2,6 +2,7 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
+#include "libmap/core/text.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace {
@@ -111,6 +112,22 @@ TEST(Analyze, MapsWithoutAManifestAndStarts) {
   EXPECT_EQ(regions.at("reachable_regions"), 1);
 }
 
+// Far from the origin, as in UTM coordinates, places keep their centimetres.
+TEST(Analyze, PlacesFarFromTheOriginAreExact) {
+  std::string map = "x,y,z,score,graspable,i,j,k\n";
+  for (int i = 0; i < 3; ++i)
+    for (int j = 0; j < 3; ++j)
+      map += libmap::to_fixed_text(691233.305 + 0.01 * i, 3) + "," +
+             libmap::to_fixed_text(5334567.205 + 0.01 * j, 3) + ",100.005,0.9,1," +
+             std::to_string(i) + "," + std::to_string(j) + ",0\n";
+  graspmap_test::write_text(scratch("map.csv"), map);
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures"})));
+  const libmap::Table regions = libmap::read_csv(scratch("out/regions.csv"));
+  ASSERT_EQ(regions.rows.size(), 1U);
+  EXPECT_NEAR(regions.number(0, regions.column("x")), 691233.315, 1e-3);
+  EXPECT_NEAR(regions.number(0, regions.column("y")), 5334567.215, 1e-3);
+}
+
 TEST(Analyze, BadInputIsSaidInOneLine) {
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "out"}),
@@ -126,6 +143,8 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
   EXPECT_TRUE(bad_input(
       graspmap({"analyze", "map.pcd", "map.pcd", "-o", "out", "--transform", "50,0,0,0,0,0"}),
       {"map.pcd", "no voxel in common"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--transform", "bogus"}),
+                        {"--transform is bogus", "OTHER"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.tiles", "-o", "out"}), {"merge"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("out")));
 }

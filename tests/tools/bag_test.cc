@@ -235,6 +235,14 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
   says({"map.csv", "-o", "out.bag", "--stamp", "-1"}, {"ROS has no such time"});
   says({"map.csv", "-o", "out.bag", "--compression", "zip"}, {"zip", "lz4"});
+  says({"map.csv", "-o", "out.bag", "--topic", "/a"}, {"--topic", "not for a map"});
+  says({"map.csv", "-o", "out.bag", "--rig", "r"}, {"--rig", "not for a map"});
+  says({"good.bag", "-o", "out.pcd", "--terrain", "terrain.pcd"}, {"--terrain", "is written"});
+  says({"good.bag", "-o", "out.pcd", "--rig", "r"}, {"--rig", "not for a cloud"});
+  fs::create_directory(scratch("rig"));
+  says({"rig", "-o", "out.bag", "--stamp", "5"}, {"--stamp", "--stamp-offset"});
+  says({"rig", "-o", "out.bag", "--terrain", "t"}, {"--terrain", "not for a rig's folder"});
+  fs::remove(scratch("rig"));
   write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
   says({"cut.bag", "--list"}, {"cut.bag: is broken or cut off"});
   fs::remove(scratch("cut.bag"));

@@ -77,6 +77,17 @@ TEST(ExpectedMap, CountsByHand) {
   EXPECT_EQ(result.places.size(), 2U);
 }
 
+// As in all other counts, an obstacle is not graspable, whatever its flag says.
+TEST(ExpectedMap, ObstaclesAreNotFlagged) {
+  libmap::PointCloud map =
+      map_of({{0, 0, 0}, {0, 0.05, 0}, {0, 0, 0.05}}, {0.9, 0.9, 0.9}, {1, 1, std::nan("")});
+  map.add_field("obstacle", libmap::ScalarType::uint8).values = {0, 2, 0};
+  const ExpectedMapResult result = evaluate_expected_map(map, parse("yes,0,0,0,,,,0.1,1,\n"), 0.8);
+  EXPECT_EQ(result.voxels_by_score.true_positives, 3U);
+  EXPECT_EQ(result.voxels_by_flag->true_positives, 1U);
+  EXPECT_EQ(result.regions[0].graspable, 1U);
+}
+
 // An independent look: the nearest of a thousand places along each segment.
 bool holds(const ExpectedRegion& region, const Eigen::Vector3d& point) {
   constexpr int steps = 1000;

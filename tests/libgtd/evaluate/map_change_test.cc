@@ -94,7 +94,22 @@ TEST(MapChange, ExchangedMapsTranspose) {
     EXPECT_EQ(there.judged.graspable.true_positives, back.judged.graspable.true_positives);
     EXPECT_NEAR(there.judged.kappa->value, back.judged.kappa->value, 1e-12);
     EXPECT_NEAR(there.judged.difference.mean, -back.judged.difference.mean, 1e-12);
+    EXPECT_EQ(there.judged.difference.median, -back.judged.difference.median);
+    EXPECT_EQ(there.judged.difference.low_5, -back.judged.difference.high_95);
+    EXPECT_EQ(there.judged.difference.high_95, -back.judged.difference.low_5);
   }
+}
+
+TEST(MapChange, PercentilesByHand) {
+  const std::vector<Voxel> voxels = {{0, 0, 0}, {1, 0, 0}};
+  const VoxelMap map = libgtd::voxel_map_of(map_cloud(voxels, [](const Voxel&) { return 0.25; }));
+  const VoxelMap other = libgtd::voxel_map_of(
+      map_cloud(voxels, [](const Voxel& voxel) { return voxel.i == 0 ? 0.375 : 0.75; }));
+  const auto difference =
+      libgtd::compare_maps(map, level_surface(map), other, same).judged.difference;
+  EXPECT_EQ(difference.low_5, 0.125);
+  EXPECT_EQ(difference.median, 0.3125);
+  EXPECT_EQ(difference.high_95, 0.5);
 }
 
 TEST(MapChange, LatticesShiftedByWholeVoxelsAreOne) {

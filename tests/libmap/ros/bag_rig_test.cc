@@ -202,6 +202,25 @@ TEST(BagRig, CalibrationsOfAllKinds) {
   EXPECT_THAT(error_of([&] { camera_of(info, false); }).what(), HasSubstr("fx"));
 }
 
+// What a topic is called decides whether its images are rectified: "direct" is no such name.
+TEST(BagRig, RectifiedImagesAreToldByTheirName) {
+  rm::CameraInfo info = sample_info("o", 5.0);
+  info.D = {0.1, 0.02, 0.001, 0.002, 0.3};
+  for (const auto& [name, distorted] :
+       std::map<std::string, bool>{{"/direct/image_raw", true},
+                                   {"/d/image_rect_raw", false},
+                                   {"/d/image_rect", false},
+                                   {"/rect/image_rectangle", true}}) {
+    const std::string folder = name.substr(0, name.rfind('/'));
+    SampleBag bag(bag_path());
+    bag.write(name, 5.0, sample_depth("o", 5.0));
+    bag.write(folder + "/camera_info", 5.0, info);
+    bag.transform("base_link", "o", Pose::Identity());
+    bag.close();
+    EXPECT_EQ(plan().rig.cameras[0].camera.is_distorted(), distorted) << name;
+  }
+}
+
 TEST(BagRig, MomentsAreChosen) {
   SampleBag bag(bag_path());
   bag.transform("base_link", "a_optical", Pose::Identity());
@@ -266,6 +285,9 @@ TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
   ASSERT_EQ(result.warnings.size(), 1U);
   EXPECT_THAT(result.warnings[0], HasSubstr("/a/image_raw: 8 images"));
   EXPECT_THAT(result.warnings[0], HasSubstr("23 bytes"));
+  // A moment of which no image is left is none.
+  ASSERT_EQ(result.moments.size(), 1U);
+  EXPECT_EQ(result.moments[0].stamp_s, 5.0);
 }
 
 TEST(BagRig, RigOfOnesOwn) {
@@ -294,6 +316,8 @@ TEST(BagRig, RigOfOnesOwn) {
   EXPECT_EQ(images_of(result, "left")[0][0], 2000);
   options.topics = {"left=/robot/left_cam/depth", "left=/robot/other/depth"};
   EXPECT_THAT(refusal(options), HasSubstr("same camera"));
+  options.topics = {"left=/robot/left_cam/depth", "other=/robot/left_cam/depth"};
+  EXPECT_THAT(refusal(options), HasSubstr("is named twice"));
   options.topics = {"lfet=/robot/left_cam/depth"};
   EXPECT_THAT(refusal(options), HasSubstr("did you mean 'left'"));
 }
