@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -143,22 +144,41 @@ std::optional<BoardFit> with_poses(const Camera& camera, const BoardCorners& cor
   return fit;
 }
 
+// Squared; infinite where a board lies behind the camera.
+std::vector<double> picture_errors(const BoardFit& fit, const BoardCorners& corners) {
+  std::vector<double> errors;
+  for (std::size_t n = 0; n < corners.in_images.size(); ++n) {
+    const double error = squared_error({fit.camera, {fit.camera_from_board[n]}},
+                                       {corners.in_board, {corners.in_images[n]}});
+    errors.push_back(std::isfinite(error) ? error : std::numeric_limits<double>::infinity());
+  }
+  return errors;
+}
+
+// Of the three quarters of the boards that fit best, so that a bad picture does not choose.
+double robust_error(const BoardFit& fit, const BoardCorners& corners) {
+  std::vector<double> errors = picture_errors(fit, corners);
+  std::sort(errors.begin(), errors.end());
+  const auto used = static_cast<std::ptrdiff_t>((3 * errors.size() + 3) / 4);
+  return std::accumulate(errors.begin(), errors.begin() + used, 0.0);
+}
+
 // Many focal lengths are tried: cv::fisheye::calibrate knows one start, and gives up where a board
 // looks ill-conditioned from there.
-BoardFit fit_fisheye(const BoardCorners& corners, int width, int height) {
+BoardFit fit_from_many_starts(const BoardCorners& corners, int width, int height, LensModel lens) {
   Camera camera;
   camera.width = width;
   camera.height = height;
   camera.cx = (width - 1) / 2.0;
   camera.cy = (height - 1) / 2.0;
-  camera.distortion_model = DistortionModel::equidistant;
-  camera.distortion.assign(4, 0.0);
+  camera.distortion_model = distortion_of(lens);
+  camera.distortion.assign(lens_terms(lens), 0.0);
   std::vector<std::pair<double, BoardFit>> starts;
   for (double share = 0.2; share < 2.5; share *= 1.2) {
     camera.fx = camera.fy = share * width;
     const std::optional<BoardFit> fit = with_poses(camera, corners);
     if (!fit) continue;
-    const double error = squared_error(*fit, corners);
+    const double error = robust_error(*fit, corners);
     if (std::isfinite(error)) starts.emplace_back(error, *fit);
   }
   if (starts.empty()) refuse_undetermined();
@@ -169,8 +189,9 @@ BoardFit fit_fisheye(const BoardCorners& corners, int width, int height) {
 
 BoardFit fit_camera(const BoardCorners& corners, int width, int height, LensModel lens) {
   try {
-    BoardFit fit = lens == LensModel::equidistant ? fit_fisheye(corners, width, height)
-                                                  : fit_by_opencv(corners, width, height, lens);
+    BoardFit fit = lens == LensModel::equidistant
+                       ? fit_from_many_starts(corners, width, height, lens)
+                       : fit_by_opencv(corners, width, height, lens);
     // OpenCV rounds corners to float32.
     const double error = adjust_boards(fit, corners);
     fit.camera.check();
@@ -259,6 +280,22 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures
   if (!(result.relative_focal_deviation() <= max_relative_deviation)) refuse_undetermined();
   add_coverage(result);
   return result;
+}
+
+// The picture that no camera explains while it explains the others: its corners may be mixed up,
+// and all of them together then determine no camera.
+std::optional<std::size_t> find_odd_picture(const std::vector<BoardPicture>& pictures, int width,
+                                            int height, const CameraCalibrationOptions& options) {
+  constexpr double times_the_median = 5.0;
+  if (pictures.size() <= min_pictures) return std::nullopt;
+  const BoardCorners corners = corners_of(pictures, options.board);
+  const std::vector<double> errors =
+      picture_errors(fit_from_many_starts(corners, width, height, options.lens), corners);
+  std::vector<double> sorted = errors;
+  std::sort(sorted.begin(), sorted.end());
+  const double median = std::sqrt(sorted[sorted.size() / 2]);
+  if (!(std::sqrt(sorted.back()) > times_the_median * median)) return std::nullopt;
+  return static_cast<std::size_t>(std::max_element(errors.begin(), errors.end()) - errors.begin());
 }
 
 cv::Mat as_mat(const GrayImage& image) {
@@ -408,8 +445,21 @@ CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictur
     else
       repeated.push_back(picture.name);
   }
+  const auto reject = [&](std::size_t n) {
+    rejected.push_back(kept[n].name);
+    kept.erase(kept.begin() + static_cast<std::ptrdiff_t>(n));
+  };
   for (;;) {
-    CameraCalibrationResult result = calibrate_once(kept, width, height, options);
+    CameraCalibrationResult result;
+    try {
+      result = calibrate_once(kept, width, height, options);
+    } catch (const Error&) {
+      if (options.max_picture_error_px == 0) throw;
+      const auto odd = find_odd_picture(kept, width, height, options);
+      if (!odd) throw;
+      reject(*odd);
+      continue;
+    }
     const auto worst = std::max_element(
         result.pictures.begin(), result.pictures.end(),
         [](const CalibratedPicture& a, const CalibratedPicture& b) { return a.rms_px < b.rms_px; });
@@ -419,8 +469,7 @@ CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictur
       return result;
     }
     // One at a time: a bad picture spoils the others'.
-    rejected.push_back(worst->name);
-    kept.erase(kept.begin() + (worst - result.pictures.begin()));
+    reject(static_cast<std::size_t>(worst - result.pictures.begin()));
   }
 }
 
