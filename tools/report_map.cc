@@ -5,14 +5,17 @@
 #include <string>
 #include <utility>
 #include <variant>
+#include <vector>
 
+#include "libgtd/evaluate/voxel_map.h"
+#include "libgtd/score/graspability_map.h"
 #include "libgtd/score/map_thinning.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
 #include "tools/map_frame.h"
 #include "tools/map_tiles.h"
-#include "tools/map_window.h"
 
 namespace graspmap_tools {
 
@@ -47,16 +50,25 @@ void set_zero_plane(const std::optional<libmap::Manifest>& manifest, ThinnedMap&
   map.options.has_zero_plane = true;
 }
 
+// Of cubes, for a map of that many voxels if it is even ground.
+int first_width(std::uint64_t voxels, std::size_t max_cells) {
+  return std::max(
+      1, static_cast<int>(std::sqrt(static_cast<double>(voxels) / static_cast<double>(max_cells))));
+}
+
 ThinnedMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
   const auto manifest = libmap::read_manifest_of(path);
   const libmap::PointCloud whole =
       libmap::transform_cloud(libmap::read_cloud(path).cloud, terrain_from_map(manifest));
   ThinnedMap map;
   map.voxels = whole.size();
-  if (!whole.empty()) map.options.lattice = libmap::lattice_of(whole);
-  const double share = static_cast<double>(whole.size()) / static_cast<double>(max_cells);
+  const auto lattice = manifest ? libgtd::facts_of(*manifest).lattice : std::nullopt;
+  if (lattice)
+    map.options.lattice = {lattice->voxel_size_m, lattice->origin_m};
+  else if (!whole.empty())
+    map.options.lattice = libmap::lattice_of(whole);
   int& width = map.options.voxels_a_cell;
-  width = std::max(1, static_cast<int>(std::sqrt(share)));
+  width = first_width(map.voxels, max_cells);
   do {
     map.points = width == 1 ? whole : libgtd::thin_map_in_cubes(whole, width);
   } while (map.points.size() > max_cells && ++width > 0);
@@ -64,16 +76,30 @@ ThinnedMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
   return map;
 }
 
-// Of a store only columns are thinned: it is never whole in memory.
+// The tiles' points that stay at that width.
+libmap::PointCloud thin_tiles(const MapTiles& tiles, int width) {
+  std::vector<libmap::PointCloud> parts(tiles.index().tiles.size());
+  libmap::parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      parts[n] = libgtd::thin_map_in_cubes(tiles.load(n), width);
+  });
+  // Cubes that two tiles share have a point of each.
+  return libgtd::thin_map_in_cubes(libgtd::merge_map_clouds(parts), width);
+}
+
+// The same cells, but thinned tile by tile: a store is never whole in memory.
 ThinnedMap read_store_map(const fs::path& path, std::size_t max_cells) {
   const MapTiles tiles(path.string());
-  MapWindow window = read_window(tiles, std::nullopt, max_cells);
   ThinnedMap map;
   const auto& index = tiles.index();
-  for (const auto& tile : index.tiles) map.voxels += tile.voxels;
+  map.voxels = index.voxels();
   const std::optional<libmap::Manifest> manifest = index.manifest;
-  map.points = libmap::transform_cloud(window.cloud, terrain_from_map(manifest));
-  map.options.voxels_a_cell = window.columns_a_point;
+  int& width = map.options.voxels_a_cell;
+  width = first_width(map.voxels, max_cells);
+  do {
+    map.points = thin_tiles(tiles, width);
+  } while (map.points.size() > max_cells && ++width > 0);
+  map.points = libmap::transform_cloud(map.points, terrain_from_map(manifest));
   map.options.lattice = {index.lattice.voxel_size_m, index.lattice.origin_m};
   set_zero_plane(manifest, map);
   return map;

@@ -49,6 +49,31 @@ TEST(Report, LargeMapsAreThinned) {
   EXPECT_LE(html.size(), 1'500'000U);
 }
 
+// A store is thinned tile by tile to the cells of the same map in one file, walls included.
+TEST(Report, AStoreIsShownAsItsMap) {
+  std::string corner = "x,y,z\n";
+  for (int a = 0; a < 120; ++a)
+    for (int b = 0; b < 120; ++b)
+      corner += std::to_string(0.01 * a) + "," + std::to_string(0.01 * b) + ",0\n" +
+                std::to_string(0.01 * a) + ",1.2," + std::to_string(0.01 * b) + "\n";
+  graspmap_test::write_text(scratch("corner.csv"), corner);
+  const auto view_of = [](const std::string& folder, const std::string& map) {
+    std::filesystem::create_directories(scratch(folder));
+    EXPECT_TRUE(succeeded(
+        graspmap({"score", "corner.csv", "-o", folder + "/" + map, "--method", "corrected",
+                  "--plane", "none", "--curvature-radius", "0", "--tile-size", "0.25"})));
+    EXPECT_TRUE(
+        succeeded(graspmap({"report", folder, "-o", folder + ".html", "--max-cells", "2000"})));
+    const std::string html = content(folder + ".html");
+    const std::size_t begin = html.find("class=\"map-data\">");
+    EXPECT_NE(begin, std::string::npos);
+    return html.substr(begin, html.find("</script>", begin) - begin);
+  };
+  const std::string view = view_of("file", "map.pcd");
+  EXPECT_GT(view.size(), 2000U);
+  EXPECT_TRUE(view_of("store", "map.tiles") == view);
+}
+
 TEST(Report, AnOutlineSaysWhatIsMissing) {
   make_run();
   graspmap_test::write_text(
