@@ -21,7 +21,9 @@ constexpr TiltedLoops all = {find_cells, count_common};
 #pragma GCC push_options
 #pragma GCC target("avx2,popcnt")
 namespace avx2 {
+// NOLINTNEXTLINE(readability-duplicate-include): compiled again for these instructions
 #include "libgtd/score/tilted_cells_body.h"
+// NOLINTNEXTLINE(readability-duplicate-include)
 #include "libgtd/score/tilted_count_body.h"
 constexpr TiltedLoops all = {find_cells, count_common};
 }  // namespace avx2
@@ -65,6 +67,7 @@ std::size_t find_cells(const double* const points[3], std::size_t count,
   return found;
 }
 
+// NOLINTNEXTLINE(readability-duplicate-include)
 #include "libgtd/score/tilted_count_body.h"
 constexpr TiltedLoops all = {find_cells, count_common};
 

@@ -255,7 +255,7 @@ class EdgeSearch {
   template <typename Window>
   bool is_edge(const TiltedPivot& pivot, Window& window) const {
     ColumnSums occupied({-half_, half_ + 1, -half_, half_ + 1});
-    const auto side = static_cast<std::size_t>(2 * half_ + 1);
+    const std::size_t side = 2 * static_cast<std::size_t>(half_) + 1;
     window.visit_cells(pivot, [&](std::size_t column) {
       occupied.set(static_cast<int>(column / side) - half_,
                    static_cast<int>(column % side) - half_);

@@ -58,6 +58,7 @@ constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};
 #pragma GCC push_options
 #pragma GCC target("avx2")
 namespace avx2 {
+// NOLINTNEXTLINE(readability-duplicate-include): compiled again for these instructions
 #include "libgtd/shape/neighbor_loops_body.h"
 constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};
 }  // namespace avx2
@@ -66,6 +67,7 @@ constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};
 #pragma GCC push_options
 #pragma GCC target("avx512f,prefer-vector-width=512")
 namespace avx512 {
+// NOLINTNEXTLINE(readability-duplicate-include)
 #include "libgtd/shape/neighbor_loops_body.h"
 
 std::size_t select(const NeighborLoops::Places& candidates, std::size_t count, const double* center,

@@ -15,9 +15,6 @@
 #include "tests/libmap/cloud/given_bytes.h"
 #include "tests/support/test_support.h"
 
-// Third-party readers that give up on a broken file leave some of their own memory behind.
-extern "C" const char* __lsan_default_suppressions() { return "leak:libvtk"; }
-
 namespace libmap {
 namespace {
 

@@ -12,9 +12,6 @@
 #include "tests/libmap/cloud/cloud_samples.h"
 #include "tests/support/test_support.h"
 
-// Third-party readers that give up on a broken file leave some of their own memory behind.
-extern "C" const char* __lsan_default_suppressions() { return "leak:libassimp\nleak:libvtk"; }
-
 namespace libmap {
 namespace {
 
