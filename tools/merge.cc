@@ -10,6 +10,7 @@
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/tile_store.h"
+#include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/pcd_parts.h"
 #include "libmap/core/error.h"
@@ -105,10 +106,12 @@ void restore_full_precision(const libmap::Manifest& part, const std::string& nam
   const auto lattice = libgtd::facts_of(part).lattice;
   if (!lattice) return;
   index.lattice = *lattice;
-  const libmap::ManifestValue* method = part.find_parameter("method");
   // The thesis's program counts in single precision, its voxels' size included.
-  if (method != nullptr && *method == libmap::ManifestValue(std::string("thesis")))
-    index.lattice.voxel_size_m = static_cast<float>(index.lattice.voxel_size_m);
+  const libmap::ManifestValue* value = part.find_parameter("method");
+  for (const auto& [known, method] : libgtd::method_names())
+    if (value != nullptr && *value == libmap::ManifestValue(known) &&
+        libgtd::follows_thesis(method))
+      index.lattice.voxel_size_m = static_cast<float>(index.lattice.voxel_size_m);
   index.frame = part.frame == "input" ? libgtd::MapFrame::input : libgtd::MapFrame::terrain;
   index.manifest.transforms = part.transforms;
   try {

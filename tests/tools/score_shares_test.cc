@@ -137,7 +137,7 @@ TEST(MergeOfShares, AcrossTheBoundOfSinglePrecisionIsTheWholeMap) {
       libmap::transform_cloud(graspmap_test::bumpy_terrain(),
                               libmap::make_pose_from_rpy({255.93, 255.97, 0.0}, {0, 0, 0})));
   for (const std::string format : {".pcd", ".csv", ".ply"})
-    for (const std::string method : {"corrected", "thesis"}) {
+    for (const std::string method : {"corrected", "thesis", "envelope", "climblab"}) {
       const Words more = {"--plane", "none", "--method", method, "--curvature-radius", "0"};
       ASSERT_TRUE(succeeded(score_to("whole" + format, more)));
       Words merge = {"merge", "-o", "merged" + format};
