@@ -4,20 +4,24 @@
 using Lanes [[gnu::vector_size(lanes * sizeof(double))]] = double;
 using Wholes [[gnu::vector_size(lanes * sizeof(int))]] = int;
 
-using LanesInMemory
-    [[gnu::vector_size(sizeof(Lanes)), gnu::aligned(sizeof(double)), gnu::may_alias]] = double;
-
-inline const LanesInMemory& lanes_at(const double* values) {
-  return *reinterpret_cast<const LanesInMemory*>(values);
+// Without asking for alignment. Not returned: how vectors are depends on the instruction set.
+inline void load_lanes(const double* values, Lanes& loaded) {
+  __builtin_memcpy(&loaded, values, sizeof(Lanes));
 }
 
 std::size_t find_cells(const double* const points[3], std::size_t count,
                        const TiltedLattice& lattice, const TiltedBox& box, int* cells) {
   std::size_t found = 0;
   for (std::size_t k = 0; k < count; k += lanes) {
-    const Lanes x = lanes_at(points[0] + k) - lattice.origin[0];
-    const Lanes y = lanes_at(points[1] + k) - lattice.origin[1];
-    const Lanes z = lanes_at(points[2] + k) - lattice.origin[2];
+    Lanes x;
+    Lanes y;
+    Lanes z;
+    load_lanes(points[0] + k, x);
+    load_lanes(points[1] + k, y);
+    load_lanes(points[2] + k, z);
+    x -= lattice.origin[0];
+    y -= lattice.origin[1];
+    z -= lattice.origin[2];
     Wholes cell = {};
     Wholes is_inside = {};
     is_inside -= 1;

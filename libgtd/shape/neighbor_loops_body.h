@@ -3,11 +3,16 @@
 
 using Lanes [[gnu::vector_size(NeighborLoops::lanes * sizeof(double))]] = double;
 
-using LanesInMemory
-    [[gnu::vector_size(sizeof(Lanes)), gnu::aligned(sizeof(double)), gnu::may_alias]] = double;
+// Without asking for alignment. Not returned: how vectors are depends on the instruction set.
+inline void load_lanes(const double* values, Lanes& loaded) {
+  __builtin_memcpy(&loaded, values, sizeof(Lanes));
+}
 
-inline const LanesInMemory& lanes_at(const double* values) {
-  return *reinterpret_cast<const LanesInMemory*>(values);
+inline void load_places(const NeighborLoops::Places& places, std::size_t at, Lanes& x, Lanes& y,
+                        Lanes& z) {
+  load_lanes(places.x + at, x);
+  load_lanes(places.y + at, y);
+  load_lanes(places.z + at, z);
 }
 
 template <std::size_t count>
@@ -21,8 +26,8 @@ inline void join_lanes(const Lanes (&sums)[count], double* joined) {
 void sum_moments(const NeighborLoops::Places& neighbors, std::size_t count, double* sums) {
   Lanes s[NeighborLoops::moments] = {};
   for (std::size_t k = 0; k < count; k += NeighborLoops::lanes) {
-    const Lanes x = lanes_at(neighbors.x + k), y = lanes_at(neighbors.y + k),
-                z = lanes_at(neighbors.z + k);
+    Lanes x, y, z;
+    load_places(neighbors, k, x, y, z);
     s[0] += x;
     s[1] += y;
     s[2] += z;
@@ -40,8 +45,8 @@ void sum_quadric(const NeighborLoops::Places& neighbors, std::size_t count, cons
                  double* sums) {
   Lanes s[NeighborLoops::quadric_sums] = {};
   for (std::size_t k = 0; k < count; k += NeighborLoops::lanes) {
-    const Lanes x = lanes_at(neighbors.x + k), y = lanes_at(neighbors.y + k),
-                z = lanes_at(neighbors.z + k);
+    Lanes x, y, z;
+    load_places(neighbors, k, x, y, z);
     const Lanes u = x * frame[0] + y * frame[1] + z * frame[2];
     const Lanes v = x * frame[3] + y * frame[4] + z * frame[5];
     const Lanes w = x * frame[6] + y * frame[7] + z * frame[8];
