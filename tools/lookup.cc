@@ -214,6 +214,8 @@ void lookup(LookupCommandOptions& options, Run& run) {
   run.claim_output(options.output, {options.map, options.points, options.visible});
   options.points_frame =
       graspmap_tools::frame_of_points(options.points, options.points_frame, options.map, run);
+  if (options.points_frame == graspmap_tools::PointFrame::terrain)
+    graspmap_tools::carry_terrain_transform(options.map, run);
   libmap::Table table = libmap::read_csv(options.points);
   MapAnswers map = graspmap_tools::is_tile_store(options.map)
                        ? ask_tiles(options, graspmap_tools::positions_of(table), run)

@@ -41,25 +41,28 @@ std::optional<libmap::Manifest> manifest_of(const std::filesystem::path& path) {
   return libmap::read_manifest_of(path.has_filename() ? path : path.parent_path());
 }
 
-PointFrame recorded_frame(const std::string& points, const std::string& map) {
-  const auto manifest = manifest_of(points);
-  if (!manifest) return PointFrame::input;
-  const libmap::ManifestValue* value = manifest->find_parameter("points_frame");
+// As the look-up was told, or as the points of a map or of its footholds lie.
+PointFrame recorded_frame(const libmap::Manifest& points) {
+  const libmap::ManifestValue* value = points.find_parameter("points_frame");
   const auto* recorded = value == nullptr ? nullptr : std::get_if<std::string>(value);
   if (recorded != nullptr)
     for (const auto& [name, frame] : point_frame_names())
       if (name == *recorded) return frame;
-  if (manifest->frame != "terrain") return PointFrame::input;
-  const libmap::Pose* own = manifest->find_transform("terrain_from_input");
+  return points.frame == "terrain" ? PointFrame::terrain : PointFrame::input;
+}
+
+void require_same_terrain_frame(const libmap::Manifest& points, const std::string& file,
+                                const std::string& map) {
+  const libmap::Pose* own = points.find_transform(terrain_from_input_name);
+  if (own == nullptr) return;
   const auto of_map = manifest_of(map);
-  const libmap::Pose* others = of_map ? of_map->find_transform("terrain_from_input") : nullptr;
-  if (own == nullptr || others == nullptr || own->matrix() != others->matrix())
+  const libmap::Pose* others = of_map ? of_map->find_transform(terrain_from_input_name) : nullptr;
+  if (others == nullptr || own->matrix() != others->matrix())
     throw libmap::Error("its places lie in the terrain frame of another map",
-                        {.file = points,
+                        {.file = file,
                          .field = "--points-frame",
                          .value = "auto",
                          .bound = "input, terrain or map"});
-  return PointFrame::terrain;
 }
 
 }  // namespace
@@ -67,7 +70,11 @@ PointFrame recorded_frame(const std::string& points, const std::string& map) {
 PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
                            Run& run) {
   if (asked != PointFrame::automatic) return asked;
-  const PointFrame found = recorded_frame(points, map);
+  PointFrame found = PointFrame::input;
+  if (const auto manifest = manifest_of(points)) {
+    found = recorded_frame(*manifest);
+    if (found == PointFrame::terrain) require_same_terrain_frame(*manifest, points, map);
+  }
   for (const auto& [name, frame] : point_frame_names())
     if (frame == found)
       for (auto& [key, value] : run.manifest().parameters)
@@ -79,7 +86,7 @@ std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
   const auto manifest = manifest_of(file);
   if (!manifest) return std::nullopt;
   const libmap::Pose* site_from_map = manifest->find_transform(site_from_map_name);
-  const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
+  const libmap::Pose* terrain_from_input = manifest->find_transform(terrain_from_input_name);
   if (manifest->frame != "terrain" || terrain_from_input == nullptr)
     return site_from_map == nullptr ? std::nullopt : std::optional(*site_from_map);
   return site_from_map == nullptr ? *terrain_from_input : *terrain_from_input * *site_from_map;
@@ -97,6 +104,14 @@ void carry_truth_transform(const std::string& input, Run& run) {
       manifest ? manifest->find_transform(truth_from_poses_name) : nullptr;
   if (truth_from_poses != nullptr)
     run.manifest().transforms.emplace_back(truth_from_poses_name, *truth_from_poses);
+}
+
+void carry_terrain_transform(const std::string& map, Run& run) {
+  const auto manifest = manifest_of(map);
+  const libmap::Pose* terrain_from_input =
+      manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
+  if (terrain_from_input != nullptr)
+    run.manifest().transforms.emplace_back(terrain_from_input_name, *terrain_from_input);
 }
 
 void carry_transforms(const std::string& input, Run& run) {
@@ -121,7 +136,7 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
     return libmap::Pose::Identity();
   }
   // Clouds and meshes that were never scored have one frame alone.
-  const libmap::Pose* terrain_from_input = manifest->find_transform("terrain_from_input");
+  const libmap::Pose* terrain_from_input = manifest->find_transform(terrain_from_input_name);
   const bool map_in_terrain = manifest->frame == "terrain";
   const bool points_in_terrain = points_frame == PointFrame::terrain;
   if (terrain_from_input == nullptr || map_in_terrain == points_in_terrain)
@@ -132,7 +147,7 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
 libmap::Pose input_from_map(const std::string& map) {
   const auto manifest = libmap::read_manifest_of(map);
   const libmap::Pose* terrain_from_input =
-      manifest ? manifest->find_transform("terrain_from_input") : nullptr;
+      manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
   if (terrain_from_input == nullptr || manifest->frame != "terrain")
     return libmap::Pose::Identity();
   return terrain_from_input->inverse();
@@ -140,7 +155,7 @@ libmap::Pose input_from_map(const std::string& map) {
 
 Eigen::Vector3d up_of_map(const std::optional<libmap::Manifest>& manifest) {
   const libmap::Pose* terrain_from_input =
-      manifest ? manifest->find_transform("terrain_from_input") : nullptr;
+      manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
   if (!terrain_from_input || manifest->frame == "terrain") return Eigen::Vector3d::UnitZ();
   return terrain_from_input->linear().transpose() * Eigen::Vector3d::UnitZ();
 }

@@ -30,6 +30,9 @@ PointFrame frame_of_points(const std::string& points, PointFrame asked, const st
 // The columns x, y, z, in metres. Throws Error naming the file, the row and the column.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
+// The name of the transform of what was scored.
+inline constexpr const char* terrain_from_input_name = "terrain_from_input";
+
 // The name of the transform that `crop` and `simulate cameras` make and that others carry on. It
 // always leads from the map as it was before the first of them.
 inline constexpr const char* site_from_map_name = "site_from_map";
@@ -50,6 +53,9 @@ bool is_from_true_frame(const std::string& file);
 void carry_transforms(const std::string& input, Run& run);
 // The latter alone.
 void carry_truth_transform(const std::string& input, Run& run);
+
+// For an output in the terrain frame of `map`: its manifest gets the map's terrain_from_input.
+void carry_terrain_transform(const std::string& map, Run& run);
 
 // From the frame of listed points to that of the points in `map`, as its manifest says; the
 // identity, with a warning, if it has none. Throws Error if points are in the frame of a map that

@@ -155,6 +155,12 @@ TEST(Lookup, PointsInTheTerrainFrameOfAnotherMapAreRefused) {
   EXPECT_TRUE(bad_input(graspmap({"lookup", "other.pcd", "map.csv", "-o", "answers.csv"}),
                         {"map.csv: --points-frame is auto", "in the terrain frame of another map",
                          "input, terrain or map"}));
+  // Neither by way of a look-up, nor on a cloud that was never scored.
+  ASSERT_TRUE(succeeded(graspmap({"lookup", "map.csv", "map.csv", "-o", "own.csv"})));
+  for (const char* map : {"other.pcd", "terrain.pcd"})
+    EXPECT_TRUE(bad_input(graspmap({"lookup", map, "own.csv", "-o", "answers.csv"}),
+                          {"own.csv: --points-frame is auto"}))
+        << map;
   EXPECT_TRUE(succeeded(graspmap(
       {"lookup", "other.pcd", "map.csv", "--points-frame", "terrain", "-o", "answers.csv"})));
 }
