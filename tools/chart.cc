@@ -1,6 +1,8 @@
 // graspmap chart: columns of a table as curves.
 #include <algorithm>
+#include <cmath>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,10 +42,10 @@ struct ChartOptions {
   std::string title;
   std::string x_title;
   std::string y_title;
-  double x_min = 0.0;
-  double x_max = 0.0;
-  double y_min = 0.0;
-  double y_max = 0.0;
+  std::string x_min = "auto";
+  std::string x_max = "auto";
+  std::string y_min = "auto";
+  std::string y_max = "auto";
   bool markers = true;
   libmap::LegendCorner legend = libmap::LegendCorner::top_right;
   libmap::ChartSize size;
@@ -59,10 +61,10 @@ void bind(libmap::ParameterTable& table, ChartOptions& options) {
   table.add("title", options.title, "above the chart");
   table.add("x_title", options.x_title, "of the horizontal axis; empty: the column's name");
   table.add("y_title", options.y_title, "of the vertical axis; empty: the columns' names");
-  table.add("x_min", options.x_min, libmap::any_number, "lower end of the horizontal axis");
-  table.add("x_max", options.x_max, libmap::any_number, "upper end; equal to x_min: from the data");
-  table.add("y_min", options.y_min, libmap::any_number, "lower end of the vertical axis");
-  table.add("y_max", options.y_max, libmap::any_number, "upper end; equal to y_min: from the data");
+  table.add("x_min", options.x_min, "left end of the horizontal axis; auto: from the data");
+  table.add("x_max", options.x_max, "right end of the horizontal axis; auto: from the data");
+  table.add("y_min", options.y_min, "lower end of the vertical axis; auto: from the data");
+  table.add("y_max", options.y_max, "upper end of the vertical axis; auto: from the data");
   table.add("markers", options.markers, "a dot at each value");
   table.add("legend", options.legend, legend_names(), "where the curves' names stand");
   table.add("width_px", options.size.width_px, pixels, "width of the picture, pixels");
@@ -75,6 +77,18 @@ std::string series_of(const libmap::Table& table, std::size_t row,
   for (const std::size_t column : columns)
     text += (text.empty() ? "" : ", ") + table.rows[row][column];
   return text;
+}
+
+std::optional<double> finite_number(const libmap::Table& table, std::size_t row,
+                                    std::size_t column) {
+  const auto value = table.optional_number(row, column);
+  if (value && !std::isfinite(*value))
+    throw libmap::Error("cannot be drawn", {.file = table.file,
+                                            .field = "row " + std::to_string(row + 1) +
+                                                     ", column '" + table.columns[column] + "'",
+                                            .value = table.rows[row][column],
+                                            .bound = "a finite number, or nothing"});
+  return value;
 }
 
 // Rows without one of the two numbers are passed over. Curves stand in the order in which their
@@ -90,8 +104,8 @@ void add_curves(const libmap::Table& table, const ChartOptions& options, const s
   std::map<std::string, std::size_t> places;  // in `names`
   std::vector<std::vector<std::pair<double, double>>> points;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    const auto x = table.optional_number(row, x_column);
-    const auto value = table.optional_number(row, y_column);
+    const auto x = finite_number(table, row, x_column);
+    const auto value = finite_number(table, row, y_column);
     if (!x || !value) continue;
     const auto [at, is_new] = places.emplace(series_of(table, row, series), names.size());
     if (is_new) {
@@ -120,6 +134,28 @@ void add_curves(const libmap::Table& table, const ChartOptions& options, const s
   }
 }
 
+// An end that is not given is the data's.
+void set_range(const std::string& low, const std::string& high, const char* low_name,
+               const char* high_name, std::pair<double, double> found, libmap::ChartAxis& axis) {
+  const auto number = [](const std::string& text, const char* name, double automatic) {
+    if (text == "auto") return automatic;
+    const auto value = libmap::parse_double(text);
+    if (!value || !std::isfinite(*value))
+      throw libmap::Error("not an end of an axis",
+                          {.field = name, .value = text, .bound = "auto or a number"});
+    return *value;
+  };
+  found = {number(low, low_name, found.first), number(high, high_name, found.second)};
+  const bool low_alone = high == "auto";
+  if (!(found.first < found.second))
+    throw libmap::Error("the axis ends before it begins",
+                        {.field = low_alone ? low_name : high_name,
+                         .value = low_alone ? low : high,
+                         .bound = (low_alone ? "< " : "> ") +
+                                  libmap::to_text(low_alone ? found.second : found.first)});
+  axis.range = found;
+}
+
 libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) {
   const std::vector<std::string> columns = libmap::split_list(options.y);
   if (columns.empty())
@@ -129,8 +165,6 @@ libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) 
   chart.legend = options.legend;
   chart.x_axis.title = options.x_title.empty() ? options.x : options.x_title;
   chart.y_axis.title = options.y_title.empty() ? options.y : options.y_title;
-  if (options.x_min != options.x_max) chart.x_axis.range = {options.x_min, options.x_max};
-  if (options.y_min != options.y_max) chart.y_axis.range = {options.y_min, options.y_max};
   for (const std::string& y : columns) add_curves(table, options, y, columns.size() > 1, chart);
   // Those below are wider: of curves that are one, each shows.
   const auto curves = static_cast<double>(chart.curves.size());
@@ -144,6 +178,8 @@ libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) 
   } catch (const libmap::Error& error) {
     throw error.in_file(table.file);
   }
+  set_range(options.x_min, options.x_max, "--x-min", "--x-max", x_range(chart), chart.x_axis);
+  set_range(options.y_min, options.y_max, "--y-min", "--y-max", y_range(chart), chart.y_axis);
   return chart;
 }
 

@@ -76,11 +76,26 @@ std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
   return libmap::to_png(libmap::render_scene(scene, view));
 }
 
+// Options of another output than the one that is asked for.
+void refuse_ignored(const MaskOptions& options, const std::string& extension) {
+  const MaskOptions unset;
+  const auto refuse = [](const char* name, const std::string& reason) {
+    throw libmap::Error(reason, {.file = {}, .field = name});
+  };
+  if (!options.sections && options.section_layer != unset.section_layer)
+    refuse("--section-layer", "is for --sections");
+  if (!options.sections && options.cell_width_px != unset.cell_width_px)
+    refuse("--cell-width", "is for --sections");
+  if (options.view != unset.view && (options.sections || extension != ".png"))
+    refuse("--view", "is for a picture (.png) without --sections");
+}
+
 void mask(const MaskOptions& options, Run& run) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
   if (options.sections && extension != ".png")
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
+  refuse_ignored(options, extension);
   run.claim_output(options.output);
   const auto file = graspmap_tools::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);

@@ -50,6 +50,11 @@ std::optional<std::string> differing_parameter(const libmap::Manifest& one,
 // What all shares of one map have in common.
 void require_same_map(const libmap::Manifest& first, const libmap::Manifest& other,
                       const std::string& first_name, const std::string& name) {
+  // Another version may score the same points otherwise.
+  if (other.version != first.version)
+    throw libmap::Error(
+        "was scored by another version than " + first_name,
+        {.file = name, .field = "version", .value = other.version, .bound = first.version});
   std::optional<std::string> key = differing_parameter(first, other);
   if (!key) key = differing_parameter(other, first);  // one that only the other has
   if (key) throw libmap::Error("differs from that of " + first_name, {.file = name, .field = *key});

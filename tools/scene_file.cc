@@ -78,6 +78,18 @@ libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
   return pose;
 }
 
+// What says how places are marked, without any.
+void require_points(const SceneFileOptions& options) {
+  if (!options.points.empty()) return;
+  const std::pair<const char*, bool> given[] = {
+      {"--label", options.label != "auto"},
+      {"--verdict", !options.verdict.empty()},
+      {"--points-frame", options.points_frame != PointFrame::automatic}};
+  for (const auto& [name, is_given] : given)
+    if (is_given)
+      throw libmap::Error("is for --points, which is not given", {.file = {}, .field = name});
+}
+
 SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run& run) {
   SceneFile read;
   libmap::Scene& scene = read.scene;
@@ -167,6 +179,7 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
 }
 
 SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
+  require_points(options);
   try {
     return scene_of(file, options, run);
   } catch (const libmap::Error& error) {

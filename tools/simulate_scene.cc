@@ -65,7 +65,30 @@ void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& o
                    [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); });
 }
 
+// Options of the other output.
+void refuse_ignored(const SimulateOptions& options) {
+  const libmap::SceneSamplingOptions samples;
+  const libmap::SceneMeshOptions surface;
+  const auto refuse = [](bool given, const char* name, const char* reason) {
+    if (given) throw libmap::Error(reason, {.file = {}, .field = name});
+  };
+  const libmap::SceneSamplingOptions& sampling = options.sampling;
+  const char* of_clouds = "is for a cloud, not with --mesh";
+  refuse(options.mesh && sampling.spacing_m != samples.spacing_m, "--spacing", of_clouds);
+  refuse(options.mesh && sampling.count != samples.count, "--count", of_clouds);
+  refuse(options.mesh && sampling.jitter != samples.jitter, "--jitter", of_clouds);
+  refuse(options.mesh && sampling.noise_m != samples.noise_m, "--noise", of_clouds);
+  refuse(options.mesh && sampling.seed != samples.seed, "--seed", of_clouds);
+  const char* of_meshes = "is for --mesh";
+  const libmap::SceneMeshOptions& meshing = options.meshing;
+  refuse(!options.mesh && meshing.edge_length_m != surface.edge_length_m, "--edge-length",
+         of_meshes);
+  refuse(!options.mesh && meshing.chord_error_m != surface.chord_error_m, "--chord-error",
+         of_meshes);
+}
+
 void simulate(const SimulateOptions& options, Run& run) {
+  refuse_ignored(options);
   if (options.mesh)
     libmap::require_mesh_format(options.output);
   else

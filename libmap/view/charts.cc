@@ -92,6 +92,8 @@ std::pair<double, double> range_around(const std::vector<double>& values) {
   return {std::floor(*low / step + 1e-9) * step, std::ceil(*high / step - 1e-9) * step};
 }
 
+}  // namespace
+
 std::pair<double, double> x_range(const Chart& chart) {
   if (chart.x_axis.range) return *chart.x_axis.range;
   std::vector<double> values;
@@ -116,6 +118,8 @@ std::pair<double, double> y_range(const Chart& chart) {
   }
   return range_around(values);
 }
+
+namespace {
 
 // One axis of the drawing: the numbers low..high over the pixels from..to. VTK is given pixels and
 // nothing else: its SVG writer clips before it transforms, rounds to six digits after it subtracts

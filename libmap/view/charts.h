@@ -55,6 +55,10 @@ struct Chart {
   void check() const;
 };
 
+// What an axis shows, low and high: its range, or round numbers around the data.
+std::pair<double, double> x_range(const Chart& chart);
+std::pair<double, double> y_range(const Chart& chart);
+
 struct ChartSize {
   int width_px = 900;
   int height_px = 700;

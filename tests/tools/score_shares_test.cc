@@ -187,6 +187,17 @@ TEST_F(Merge, SharesOfDifferentInputs) {
   EXPECT_TRUE(bad_input(merge({"a.pcd", "e.pcd"}), {"e.pcd", "other inputs"}));
 }
 
+TEST_F(Merge, SharesOfDifferentVersions) {
+  const std::string manifest = content("b.pcd.json");
+  const std::string version = graspmap_test::json_of("b.pcd.json").at("version");
+  const std::string with = "\"version\": \"" + version + "\"";
+  const std::size_t at = manifest.find(with);
+  ASSERT_NE(at, std::string::npos);
+  graspmap_test::write_text(scratch("b.pcd.json"), std::string(manifest).replace(
+                                                       at, with.size(), "\"version\": \"9.8.7\""));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {"b.pcd", "version", "9.8.7", version}));
+}
+
 TEST_F(Merge, CloudsThatAreNoShares) {
   EXPECT_TRUE(bad_input(merge({"a.pcd", "terrain.pcd"}), {"terrain.pcd", "no manifest"}));
   graspmap_test::write_text(scratch("b.pcd.json"), "{");

@@ -108,6 +108,25 @@ TEST(Chart, CurvesOfATable) {
       {"many.csv", "--series is id", "<= 500"}));
 }
 
+TEST(Chart, OneEndOfAnAxis) {
+  graspmap_test::write_text(scratch("t.csv"), "x,y\n2,1\n1,3\n3,nan\n");
+  const auto chart = [](const char* table, std::vector<std::string> more) {
+    more.insert(more.begin(), {"chart", table, "-o", "c.svg", "--x", "x", "--y", "y", "--force"});
+    return graspmap(more);
+  };
+  EXPECT_TRUE(bad_input(chart("t.csv", {}), {"t.csv", "row 3, column 'y'", "nan"}));
+  graspmap_test::write_text(scratch("t.csv"), "x,y\n2,1\n1,3\n3,\n");
+  ASSERT_TRUE(succeeded(chart("t.csv", {})));
+  const std::string whole = content("c.svg");
+  for (const auto& [end, value] : {std::pair{"--x-min", "-5"}, std::pair{"--y-min", "-5"},
+                                   std::pair{"--x-max", "9"}, std::pair{"--y-max", "9"}}) {
+    ASSERT_TRUE(succeeded(chart("t.csv", {end, value})));
+    EXPECT_TRUE(content("c.svg") != whole) << end;
+  }
+  EXPECT_TRUE(bad_input(chart("t.csv", {"--x-min", "9"}), {"--x-min is 9", "< 2"}));
+  EXPECT_TRUE(bad_input(chart("t.csv", {"--y-max", "inf"}), {"--y-max is inf"}));
+}
+
 bool near(const libmap::Color& a, const libmap::Color& b) {
   int difference = 0;
   for (std::size_t c = 0; c < 3; ++c) difference = std::max(difference, std::abs(a[c] - b[c]));
@@ -168,6 +187,24 @@ TEST(Mask, SectionsBadInput) {
   EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "-o", "m.txt"}), {"m.txt"}));
   EXPECT_TRUE(bad_input(graspmap({"mask", "--sections", "--section-layer", "99", "-o", "m.png"}),
                         {"section_layer", "99"}));
+}
+
+TEST(Mask, OptionsOfAnotherOutputAreRefused) {
+  EXPECT_TRUE(
+      bad_input(graspmap({"mask", "--section-layer", "2", "-o", "m.png"}), {"--section-layer"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--cell-width", "99", "-o", "m.png"}), {"--cell-width"}));
+  EXPECT_TRUE(bad_input(graspmap({"mask", "--view", "top", "-o", "m.txt"}), {"--view"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"mask", "--sections", "--view", "top", "-o", "m.png"}), {"--view"}));
+}
+
+TEST(Sheet, HowPlacesAreMarkedNeedsPlaces) {
+  graspmap_test::write_terrain();
+  for (const auto& [name, value] :
+       {std::pair{"--verdict", "graspable"}, std::pair{"--label", "none"},
+        std::pair{"--points-frame", "map"}})
+    EXPECT_TRUE(bad_input(graspmap({"sheet", "terrain.pcd", name, value, "-o", "s.png"}),
+                          {name, "--points"}));
 }
 
 }  // namespace

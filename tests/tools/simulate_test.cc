@@ -15,6 +15,16 @@ using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using graspmap_test::wrong_usage;
 
+TEST(SimulateScene, OptionsOfTheOtherOutputAreRefused) {
+  for (const char* name : {"--spacing", "--count", "--jitter", "--noise", "--seed"})
+    EXPECT_TRUE(
+        bad_input(graspmap({"simulate", "scene", "--mesh", name, "0.25", "-o", "s.ply"}), {name}))
+        << name;
+  for (const char* name : {"--edge-length", "--chord-error"})
+    EXPECT_TRUE(
+        bad_input(graspmap({"simulate", "scene", name, "0.25", "-o", "s.ply"}), {name, "--mesh"}));
+}
+
 TEST(SimulateScene, SamplesLieOnTheShapes) {
   ASSERT_TRUE(succeeded(graspmap({"simulate", "scene", "--spacing", "0.03", "-o", "a.pcd"})));
   const libmap::PointCloud cloud = libmap::read_cloud(scratch("a.pcd")).cloud;
