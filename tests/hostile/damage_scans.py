@@ -36,9 +36,12 @@ def database(corpus, name, statements, refused=False):
     connection.close()
 
 
-def database_rows(corpus):
-    def add(name, *statements, refused=False):
-        database(corpus, name, statements, refused)
+NAN_POSE = struct.pack("<12f", *[float("nan")] * 12)
+
+
+def database_links(corpus):
+    def add(name, *statements):
+        database(corpus, name, statements, False)
 
     link = ("INSERT INTO Link SELECT {0}, {1}, type, information_matrix, transform, user_data FROM Link "
             "WHERE from_id = 1 LIMIT 1")
@@ -51,9 +54,8 @@ def database_rows(corpus):
     add("link of type 99", "UPDATE Link SET type = 99")
     add("link of type -1", "UPDATE Link SET type = -1")
     add("links without transforms", "UPDATE Link SET transform = NULL")
-    nan12, nan36 = struct.pack("<12f", *[float("nan")] * 12), struct.pack("<36d", *[float("nan")] * 36)
-    add("links of NaN", ("UPDATE Link SET transform = ?", (nan12,)))
-    add("links certain to NaN", ("UPDATE Link SET information_matrix = ?", (nan36,)))
+    add("links of NaN", ("UPDATE Link SET transform = ?", (NAN_POSE,)))
+    add("links certain to NaN", ("UPDATE Link SET information_matrix = ?", (struct.pack("<36d", *[float("nan")] * 36),)))
     add("links certain to 1e300", ("UPDATE Link SET information_matrix = ?", (struct.pack("<36d", *[1e300] * 36),)))
     add("links certain to zero", ("UPDATE Link SET information_matrix = zeroblob(288)", ()))
     add("links certain to less than zero",
@@ -61,6 +63,12 @@ def database_rows(corpus):
     add("link cut", "UPDATE Link SET transform = substr(transform, 1, 17)")
     add("links far away", ("UPDATE Link SET transform = ?", (struct.pack("<12f", 1, 0, 0, 3e38, 0, 1, 0, 0, 0, 0, 1, 0),)))
     add("links of zero turns", "UPDATE Link SET transform = zeroblob(48)")
+
+
+def database_rows(corpus):
+    def add(name, *statements, refused=False):
+        database(corpus, name, statements, refused)
+
     free = ("CREATE TABLE Free AS SELECT * FROM Node", "DROP TABLE Node", "ALTER TABLE Free RENAME TO Node")
     add("node twice", *free, "INSERT INTO Node SELECT * FROM Node WHERE id = 2")
     add("node -1", "UPDATE Node SET id = -1 WHERE id = 1")
@@ -70,7 +78,7 @@ def database_rows(corpus):
     add("node without data", "DELETE FROM Data WHERE id = 2")
     add("data without nodes", "DELETE FROM Node")
     add("no data", "DELETE FROM Data")
-    for name, value in (("NaN", nan12), ("zero", bytes(48)), ("cut", nan12[:13]), ("long", nan12 * 1000)):
+    for name, value in (("NaN", NAN_POSE), ("zero", bytes(48)), ("cut", NAN_POSE[:13]), ("long", NAN_POSE * 1000)):
         add(f"poses {name}", ("UPDATE Node SET pose = ?, ground_truth_pose = ?", (value, value)))
     add("poses as text", "UPDATE Node SET pose = 'here', ground_truth_pose = 'there'")
     add("poses as numbers", "UPDATE Node SET pose = 7, ground_truth_pose = 2.5")
@@ -278,6 +286,7 @@ def bags(corpus):
 
 
 def make(corpus):
+    database_links(corpus)
     database_rows(corpus)
     database_blobs(corpus)
     database_file(corpus)

@@ -136,18 +136,9 @@ def tables(corpus):
         corpus.add("transform", f"matrix {name}", ".txt", text, name != "1e300")
 
 
-def tile_stores(corpus):
-    index = json.loads((corpus.good / "map.tiles/index.json").read_text())
-    names = [tile["file"] for tile in index["tiles"]]
-
-    def with_index(name, change, refused=True):
-        other = json.loads(json.dumps(index))
-        change(other)
-        path = corpus.copy("tiles", name, "map.tiles", ".tiles", refused)
-        (path / "index.json").write_text(json.dumps(other))
-        return path, other
-
+def tile_files(corpus):
     text = (corpus.good / "map.tiles/index.json").read_text()
+    names = [tile["file"] for tile in json.loads(text)["tiles"]]
     draw = corpus.random("tiles")
     for name, content in (("missing", None), ("empty", b""), ("cut", text[:draw.randrange(100, len(text) - 5)]),
                           ("noise", draw.randbytes(400)), ("an array", "[]"), ("nested 10^5 deep", "[" * 100_000),
@@ -161,6 +152,20 @@ def tile_stores(corpus):
     (path / names[0]).rename(path / "other")
     (path / names[1]).rename(path / names[0])
     (path / "other").rename(path / names[1])
+    path = corpus.copy("tiles", "folder of tiles is a file", "map.tiles", ".tiles", True)
+    shutil.rmtree(path / "tiles")
+    (path / "tiles").write_text("")
+
+
+def tile_indexes(corpus):
+    index = json.loads((corpus.good / "map.tiles/index.json").read_text())
+
+    def with_index(name, change, refused=True):
+        other = json.loads(json.dumps(index))
+        change(other)
+        path = corpus.copy("tiles", name, "map.tiles", ".tiles", refused)
+        (path / "index.json").write_text(json.dumps(other))
+        return path, other
 
     def first(**values):
         return lambda other: other["tiles"][0].update(values)
@@ -190,16 +195,15 @@ def tile_stores(corpus):
     with_index("another format", lambda other: other.update(format="other"))
     with_index("no map", lambda other: other.pop("map"))
     # Hashes that are right, of a tile that is not.
+    file = index["tiles"][0]["file"]
+    tile = (corpus.good / "map.tiles" / file).read_bytes()
     forged = tile.replace(b"POINTS ", b"POINTS 9", 1).replace(b"WIDTH ", b"WIDTH 9", 1)
     for name, content in (("forged header", forged), ("forged fields", tile.replace(b" i j k", b" i j q", 1)),
                           ("forged voxels", tile[:-12] + b"\x7f" * 12)):
         path, other = with_index(name, lambda other: None, False)
         other["tiles"][0].update(bytes=len(content), sha256=hashlib.sha256(content).hexdigest())
-        (path / names[0]).write_bytes(content)
+        (path / file).write_bytes(content)
         (path / "index.json").write_text(json.dumps(other))
-    path = corpus.copy("tiles", "folder of tiles is a file", "map.tiles", ".tiles", True)
-    shutil.rmtree(path / "tiles")
-    (path / "tiles").write_text("")
 
 
 def runs(corpus):
@@ -228,5 +232,6 @@ def make(corpus):
     yaml(corpus)
     poses(corpus)
     tables(corpus)
-    tile_stores(corpus)
+    tile_files(corpus)
+    tile_indexes(corpus)
     runs(corpus)
