@@ -45,7 +45,8 @@ ifdef is_alone
 
 refined := $(if $(filter refined,$(POSES)),$(OUT)/poses.tum)
 poses := $(or $(refined),$(POSES))
-poses_flags := --poses $(poses) $(if $(TRUTH),--frame ground-truth)
+true_frame := $(if $(TRUTH),--frame ground-truth)
+poses_flags := --poses $(poses) $(true_frame)
 # A site that is not cropped has no straight edges to check.
 results := $(OUT)/scan.txt $(OUT)/cloud.png $(OUT)/site.png $(if $(CROP),$(OUT)/spot_check.txt) \
   $(if $(TRUTH),$(OUT)/accuracy.txt) $(if $(TEXTURE),$(OUT)/texture.png)
@@ -59,22 +60,28 @@ $(OUT):
 
 # Stamps of the variables that a result depends on: written anew only if they change.
 export fused_with := $(SCAN) $(poses_flags) $(FUSE)
+export refined_with := $(SCAN)
+export checked_with := $(TRUTH)
 export meshed_with := $(MESH)
 export cropped_with := $(CROP)
 export resampled_with := $(RESAMPLE)
-stamps := $(addprefix $(OUT)/,fused_with meshed_with cropped_with resampled_with)
+stamps := $(addprefix $(OUT)/,refined_with fused_with meshed_with cropped_with resampled_with \
+  checked_with)
 $(stamps): FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
-$(OUT)/scan.txt: $(SCAN) | $(OUT)
+$(OUT)/scan.txt: $(SCAN) $(OUT)/refined_with
 	@exec $(GRASPMAP) info $< > $@.partial
 	@mv $@.partial $@
 
-$(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) | $(OUT)
+$(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) $(OUT)/refined_with
 	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json
 
-$(OUT)/cloud.ply: $(SCAN) $(or $(refined),$(wildcard $(POSES))) $(OUT)/fused_with
-	@exec $(GRASPMAP) fuse $(SCAN) -o $@ $(poses_flags) $(FUSE)
+# fuse corrects the poses; photographs match its cloud by the corrected ones alone.
+$(OUT)/cloud.ply $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \
+    $(OUT)/fused_with
+	@exec $(GRASPMAP) fuse $(SCAN) -o $(OUT)/cloud.ply --corrected-poses $(OUT)/fused_poses.tum \
+	  $(poses_flags) $(FUSE)
 
 $(OUT)/mesh.ply $(OUT)/mesh.txt &: $(OUT)/cloud.ply $(OUT)/meshed_with
 	@exec $(GRASPMAP) mesh $< -o $(OUT)/mesh.ply --report $(MESH) > $(OUT)/mesh.txt.partial
@@ -86,8 +93,8 @@ $(OUT)/site.ply: $(OUT)/mesh.ply $(OUT)/cropped_with
 $(OUT)/terrain.pcd: $(OUT)/site.ply $(OUT)/resampled_with
 	@exec $(GRASPMAP) resample $< -o $@ $(RESAMPLE)
 
-$(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(or $(refined),$(wildcard $(POSES)))
-	@exec $(GRASPMAP) texture $< --scan $(SCAN) $(poses_flags) -o $@
+$(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(OUT)/fused_poses.tum
+	@exec $(GRASPMAP) texture $< --scan $(SCAN) --poses $(OUT)/fused_poses.tum $(true_frame) -o $@
 
 $(OUT)/cloud.png: $(OUT)/cloud.ply
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: cloud" --quiet
@@ -99,12 +106,12 @@ $(OUT)/texture.png: $(OUT)/$(TEXTURE)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
 
 # Without a true mesh the ground is the plane that was found.
-$(OUT)/spot_check.txt: $(OUT)/site.ply $(TRUTH)
+$(OUT)/spot_check.txt: $(OUT)/site.ply $(TRUTH) $(OUT)/checked_with
 	@exec $(GRASPMAP) spot-check $< -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
 	  --truth-frame map) > $@.partial
 	@mv $@.partial $@
 
-$(OUT)/accuracy.txt: $(OUT)/cloud.ply $(OUT)/site.ply $(TRUTH)
+$(OUT)/accuracy.txt: $(OUT)/cloud.ply $(OUT)/site.ply $(TRUTH) $(OUT)/checked_with
 	@echo 'cloud:' > $@.partial
 	@exec $(GRASPMAP) compare $(OUT)/cloud.ply $(TRUTH) >> $@.partial
 	@echo 'surface of the site:' >> $@.partial

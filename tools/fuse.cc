@@ -100,9 +100,8 @@ void fuse(FuseOptions options, Run& run) {
   const bool strict = options.fusion.strict;
   const auto scan = graspmap_tools::open_scan(options.scan, strict, run);
   const libmap::Trajectory poses = graspmap_tools::find_poses(*scan, options.poses, strict, run);
-  std::optional<libmap::Pose> alignment;
-  if (options.frame == CloudFrame::ground_truth)
-    alignment = graspmap_tools::truth_from_poses(*scan, poses, options.poses, run);
+  const bool in_true_frame = options.frame == CloudFrame::ground_truth;
+  if (in_true_frame) graspmap_tools::require_truth(*scan);
   libmap::DepthFusionResult result;
   try {
     result = libmap::fuse_depth(*scan, poses, options.fusion, run.progress());
@@ -112,10 +111,15 @@ void fuse(FuseOptions options, Run& run) {
     throw error.in_file(options.scan);
   }
   for (const auto& [node, fault] : result.skipped) run.warn("skipped: " + fault);
-  if (alignment) result.cloud = libmap::transform_cloud(result.cloud, *alignment);
+  // By the poses that the cloud was made with.
+  if (in_true_frame)
+    result.cloud = libmap::transform_cloud(
+        result.cloud,
+        graspmap_tools::truth_from_poses(
+            *scan, result.registration_rounds > 0 ? result.poses : poses, options.poses, run));
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   libmap::Manifest& manifest = run.manifest();
-  manifest.frame = alignment ? "ground truth" : "poses";
+  manifest.frame = in_true_frame ? "ground truth" : "poses";
   add_results(result, manifest);
   say_result(result, options, run);
   run.write_output(options.output,

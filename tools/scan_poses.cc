@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "libmap/core/error.h"
@@ -11,6 +12,7 @@
 #include "libmap/poses/pose_import.h"
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
+#include "libmap/scan/rtabmap_reader.h"
 #include "tools/map_frame.h"
 
 namespace graspmap_tools {
@@ -100,6 +102,18 @@ void report_nodes_without_pose(const std::string& scan, const std::string& wante
   run.warn(scan + ": " + text + ": their frames are left out");
 }
 
+// The odometry of each session has a frame of its own.
+void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
+                     const libmap::Trajectory& poses, Run& run) {
+  std::set<int> sessions;
+  for (const libmap::TrajectoryPose& pose : poses)
+    if (const libmap::GraphNode* node = graph.find_node(pose.node)) sessions.insert(node->session);
+  if (sessions.size() < 2) return;
+  const std::string text = fmt::format(
+      "odometry of {} sessions, each in a frame of its own: refine joins them", sessions.size());
+  run.warn(scan + ": " + text);
+}
+
 }  // namespace
 
 void add_poses_option(Command& command, PosesOption& poses) {
@@ -119,7 +133,8 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool strict, Run& run) {
   auto scan = run.timed("open", [&] { return libmap::open_scan(path); });
   for (const std::string& warning : scan->warnings()) {
-    if (strict) throw libmap::Error(warning).in_file(path);
+    if (strict && !libmap::is_about_unknown_part(warning))
+      throw libmap::Error(warning).in_file(path);
     run.warn(path + ": " + warning);
   }
   return scan;
@@ -134,17 +149,25 @@ libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses
   }
   libmap::Trajectory found = wanted_poses(scan, poses, run);
   report_nodes_without_pose(path, poses.source, scan.graph(), found, strict, run);
+  if (poses.source == to_text(PoseSource::odometry))
+    report_sessions(path, scan.graph(), found, run);
   run.manifest().parameters.emplace_back("poses", poses.source);
   return found;
+}
+
+libmap::Trajectory require_truth(const libmap::ScanSource& scan) {
+  libmap::Trajectory truth = libmap::trajectory_of(scan.graph(), PoseSource::ground_truth);
+  if (truth.empty())
+    throw libmap::Error(
+        "the scan has no ground truth",
+        {.file = scan.path().string(), .field = "--frame", .value = "ground-truth", .bound = {}});
+  return truth;
 }
 
 libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Trajectory& poses,
                               const PosesOption& taken, Run& run) {
   const std::string path = scan.path().string();
-  const libmap::Trajectory truth = libmap::trajectory_of(scan.graph(), PoseSource::ground_truth);
-  if (truth.empty())
-    throw libmap::Error("the scan has no ground truth",
-                        {.file = path, .field = "--frame", .value = "ground-truth", .bound = {}});
+  const libmap::Trajectory truth = require_truth(scan);
   if (taken.source == to_text(PoseSource::ground_truth)) {
     run.manifest().transforms.emplace_back(truth_from_poses_name, libmap::Pose::Identity());
     return libmap::Pose::Identity();

@@ -33,6 +33,9 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool stri
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,
                               Run& run);
 
+// The scan's true poses. Throws Error if it has none.
+libmap::Trajectory require_truth(const libmap::ScanSource& scan);
+
 // The rigid transform that aligns `poses` with the scan's true ones; the identity where they are
 // those. Says how well, and keeps it in the manifest as ground_truth_from_poses. Throws Error if
 // the scan has no ground truth.

@@ -28,6 +28,9 @@ mean=$(sed -n 's/^mean of .* places: \([0-9.]*\) m.*/\1/p' "$out/scan/spot_check
 awk -v mean="$mean" 'BEGIN { exit !(mean > 0 && mean < 0.004) }' || fail "the edges are $mean m off"
 [ "$(wc -l <"$out/scan/map/lookup.csv")" -eq 31 ] || fail "not 30 places were looked up"
 
+# Photographs are laid on by the poses that the cloud was made by.
+grep -q 'fused_poses.tum' "$out/scan/model.glb.json" || fail "the texture has other poses"
+
 before=$(listing "$out")
 run -j2 POSES=ground-truth
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"
@@ -46,4 +49,11 @@ run -j2 POSES=odometry TEXTURE=
 [ "$cloud" != "$(sha256sum <"$out/scan/cloud.ply")" ] || fail "other poses were not seen"
 run -j2 POSES=odometry SEED=2 TEXTURE=
 [ "$scan" != "$(sha256sum <"$out/scan.db")" ] || fail "another seed was not seen"
+# So is another scan, older than what was made of the first.
+cp "$out/scan.db" "$scratch/other.db"
+touch -d 2001-01-01 "$scratch/other.db"
+before=$(listing "$out/scan" | grep '^scan.txt ')
+make --no-print-directory -f "$source/pipelines/scan.mk" SCAN="$scratch/other.db" OUT="$out/scan" \
+  GRASPMAP="$graspmap" "$out/scan/scan.txt"
+[ "$before" != "$(listing "$out/scan" | grep '^scan.txt ')" ] || fail "an older scan was not seen"
 echo "passed"
