@@ -2,9 +2,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "libmap/core/error.h"
@@ -33,13 +35,15 @@ struct ExtractOptions {
 
 struct Counts {
   std::size_t broken_frames = 0;
-  std::size_t rounded_depth_images = 0;  // of floats
+  std::size_t rounded_depth_images = 0;
+  std::size_t lost_depth_pixels = 0;
 };
 
 struct NodeImages {
   libmap::RgbdFrame frame;
   libmap::StoredImages stored;
-  bool is_rounded = false;
+  bool is_rounded = false;            // depth, to millimetres
+  std::size_t lost_depth_pixels = 0;  // beyond what millimetres of 16 bits hold
   std::optional<libmap::Error> error{};
 };
 
@@ -50,9 +54,22 @@ void keep_files(const libmap::RtabmapDatabase& database, NodeImages& images) {
   if (!images.frame.right.empty()) images.stored.right = std::move(blobs.depth);
   if (images.frame.depth.empty()) return;
   const auto info = libmap::read_depth_info(blobs.depth);
-  images.is_rounded = info && info->format == libmap::DepthFormat::float_png;
   if (info && info->format == libmap::DepthFormat::png16)
     images.stored.depth = std::move(blobs.depth);
+}
+
+// Floats, or 16 bits of another unit.
+void round_depth(NodeImages& images) {
+  constexpr double told_m = 1e-5;
+  const libmap::MillimetreImage rounded = libmap::to_millimetres(images.frame.depth);
+  for (std::size_t n = 0; n < rounded.pixels.size(); ++n) {
+    const double depth_m = static_cast<double>(images.frame.depth.pixels[n]);
+    if (!(depth_m > 0.0)) continue;
+    const bool is_lost = rounded.pixels[n] == 0 && depth_m > 1.0;
+    if (is_lost) ++images.lost_depth_pixels;
+    if (std::abs(rounded.pixels[n] * 1e-3 - depth_m) > told_m) images.is_rounded = true;
+  }
+  images.stored.depth = libmap::encode_png(rounded);
 }
 
 NodeImages read_images(const libmap::ScanSource& scan, int node) {
@@ -62,8 +79,7 @@ NodeImages read_images(const libmap::ScanSource& scan, int node) {
     images.frame = scan.read_frame(node);
     if (const auto* database = dynamic_cast<const libmap::RtabmapDatabase*>(&scan))
       keep_files(*database, images);
-    if (!images.frame.depth.empty() && images.stored.depth.empty())
-      images.stored.depth = libmap::encode_png(libmap::to_millimetres(images.frame.depth));
+    if (!images.frame.depth.empty() && images.stored.depth.empty()) round_depth(images);
   } catch (const libmap::Error& error) {
     images.error = error;
   }
@@ -90,6 +106,7 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
         ++counts.broken_frames;
       } else {
         if (images.is_rounded) ++counts.rounded_depth_images;
+        counts.lost_depth_pixels += images.lost_depth_pixels;
         if (writer != nullptr) writer->add_frame(images.frame, images.stored);
       }
     }
@@ -117,7 +134,7 @@ void add_results(libmap::Manifest& manifest, const libmap::PoseGraph& graph, con
   count("calibrations", written.calibrations);
   count("associations", written.associations);
   count("broken_frames", counts.broken_frames);
-  count("depth_images_rounded_from_float", counts.rounded_depth_images);
+  count("depth_images_rounded", counts.rounded_depth_images);
   manifest.results.emplace_back("depth_unit_m", 0.001);
 }
 
@@ -135,13 +152,30 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
     if (written.right_images > 0)
       run.say(fmt::format("{} right images of stereo pairs", written.right_images));
     if (counts.rounded_depth_images > 0)
-      run.say(fmt::format("{} depth images of floats were rounded to millimetres",
-                          counts.rounded_depth_images));
+      run.say(
+          fmt::format("{} depth images were rounded to millimetres", counts.rounded_depth_images));
+    if (counts.lost_depth_pixels > 0)
+      run.warn(fmt::format("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels));
   };
   run.write_output_tree(options.output, libmap::frame_folder_names(), work);
 }
 
+// What says how photographs are chosen and where they stand.
+void refuse_ignored(const ExtractOptions& options) {
+  if (options.pictures.wanted()) return;
+  const graspmap_tools::PictureOptions unset;
+  const std::pair<const char*, bool> given[] = {
+      {"--poses", options.pictures.poses.source != unset.poses.source},
+      {"--transform", options.pictures.transform != unset.transform},
+      {"--keep", options.pictures.keep != unset.keep}};
+  for (const auto& [name, is_given] : given)
+    if (is_given)
+      throw libmap::Error("is for --bundler and --colmap: a folder keeps the scan's own poses",
+                          {.file = {}, .field = name});
+}
+
 void extract(ExtractOptions& options, Run& run) {
+  refuse_ignored(options);
   const bool pictures = options.pictures.wanted();
   if (options.output.empty() && !pictures)
     throw libmap::Error("nothing to write: -o, --bundler or --colmap names a folder");

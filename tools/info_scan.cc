@@ -302,11 +302,17 @@ Json database_json(const RtabmapDatabase& scan, std::vector<std::string>& warnin
 }
 
 // Of any other scan the first frame stands for all.
-Json frames_json(const ScanSource& scan) {
+Json frames_json(const ScanSource& scan, std::vector<std::string>& warnings) {
   Json cameras = Json::array();
   Json json = Json::object();
   if (scan.graph().nodes.empty()) return json;
-  const libmap::RgbdFrame frame = scan.read_frame(scan.graph().nodes.front().id);
+  libmap::RgbdFrame frame;
+  try {
+    frame = scan.read_frame(scan.graph().nodes.front().id);
+  } catch (const libmap::Error& error) {
+    warnings.emplace_back(error.what());
+    return json;
+  }
   for (const Camera& camera : frame.cameras) cameras.push_back(camera_json(camera));
   const auto size = [](const auto& image) {
     return image.empty() ? Json(nullptr) : Json(fmt::format("{} x {}", image.width, image.height));
@@ -348,7 +354,8 @@ ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progr
   ScanInfo info{.json = {{"kind", "scan"}, {"file", file_json(*scan, database)}}, .faults = {}};
   info.json.update(graph_json(scan->graph()));
   std::vector<std::string> warnings = scan->warnings();
-  info.json.update(database != nullptr ? database_json(*database, warnings) : frames_json(*scan));
+  info.json.update(database != nullptr ? database_json(*database, warnings)
+                                       : frames_json(*scan, warnings));
   info.json["warnings"] = warnings;
   if (verify) {
     libmap::ScanVerificationResult result = verify_scan(*scan, progress);

@@ -141,6 +141,8 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   frame.node = node;
   frame.type = options.type;
   const std::vector<CameraView> views = camera_views(read);
+  if (views.empty() && read.cameras.empty() && !(read.color.empty() && read.depth.empty()))
+    throw Error("has no calibration");
   std::string key;
   if (cache.enabled()) {
     std::vector<Camera> depth_cameras;

@@ -1,5 +1,11 @@
 #include "libmap/poses/graph_links.h"
 
+#include <Eigen/Eigenvalues>
+#include <cstddef>
+#include <string>
+#include <utility>
+
+#include "libmap/core/error.h"
 #include "libmap/poses/rigid_motion.h"
 
 namespace libmap {
@@ -14,6 +20,16 @@ bool is_absolute(const PoseLink& link) {
   return link.type == LinkType::pose_prior || link.type == LinkType::gravity;
 }
 
+void require_usable(const PoseLink& link) {
+  const Matrix6d& information = link.information;
+  const std::string field = "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);
+  if (!information.allFinite() || !link.from_from_to.matrix().allFinite())
+    throw Error("is not finite", {.field = field});
+  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information, Eigen::EigenvaluesOnly);
+  if (solver.eigenvalues()(5) <= 0.0 || solver.eigenvalues()(0) < -1e-9 * solver.eigenvalues()(5))
+    throw Error("its information matrix is not positive", {.field = field});
+}
+
 std::vector<GraphLink> stored_links(const PoseGraph& graph) {
   std::vector<GraphLink> links;
   for (const PoseLink& link : graph.links) {
@@ -22,6 +38,22 @@ std::vector<GraphLink> stored_links(const PoseGraph& graph) {
     links.push_back({link, to_text(link.type), closure});
   }
   return links;
+}
+
+void drop_unusable(std::vector<GraphLink>& links, std::vector<std::string>& warnings) {
+  std::size_t dropped = 0;
+  std::string first;
+  std::erase_if(links, [&](const GraphLink& link) {
+    try {
+      require_usable(link.link);
+      return false;
+    } catch (const Error& error) {
+      if (dropped++ == 0) first = error.what();
+      return true;
+    }
+  });
+  if (dropped > 0)
+    warnings.push_back(std::to_string(dropped) + " stored links are left out, the first: " + first);
 }
 
 std::vector<GraphLink> odometry_links(const PoseGraph& graph) {

@@ -39,16 +39,6 @@ Matrix6d usable_information(const PoseLink& link) {
   return information;
 }
 
-void check(const PoseLink& link) {
-  const Matrix6d& information = link.information;
-  const std::string field = "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);
-  if (!information.allFinite() || !link.from_from_to.matrix().allFinite())
-    throw Error("is not finite", {.field = field});
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information, Eigen::EigenvaluesOnly);
-  if (solver.eigenvalues()(5) <= 0.0 || solver.eigenvalues()(0) < -1e-9 * solver.eigenvalues()(5))
-    throw Error("its information matrix is not positive", {.field = field});
-}
-
 struct Scales {
   double translation = 1.0;
   double rotation = 1.0;
@@ -61,7 +51,7 @@ class Optimization {
       : links_(links), options_(options), start_(map_from_base) {
     result_.map_from_base = map_from_base;
     for (const GraphLink& link : links) {
-      check(link.link);
+      require_usable(link.link);
       result_.links.push_back({link.link, false, 1.0, 0.0});
       result_.links.back().link.information = usable_information(link.link);
       ++result_.groups[link.group].links;

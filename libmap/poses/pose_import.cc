@@ -151,14 +151,18 @@ std::vector<CameraPose> poses_of_nodes(const NodeTrajectory& trajectory, const S
   return poses;
 }
 
-// The scan's own poses by node: odometry, which is metric, else stored ones.
+// The scan's own poses by node: odometry, which is metric, of the longest session, since each has
+// a frame of its own; else stored ones.
 std::map<int, Pose> own_poses(const PoseGraph& graph) {
+  std::map<int, std::map<int, Pose>> sessions;
+  for (const TrajectoryPose& pose : trajectory_of(graph, PoseSource::odometry))
+    sessions[graph.find_node(pose.node)->session].emplace(pose.node, pose.world_from_base);
   std::map<int, Pose> poses;
-  for (const PoseSource source : {PoseSource::odometry, PoseSource::stored}) {
-    for (const TrajectoryPose& pose : trajectory_of(graph, source))
-      poses.emplace(pose.node, pose.world_from_base);
-    if (!poses.empty()) break;
-  }
+  for (auto& [session, of_session] : sessions)
+    if (of_session.size() > poses.size()) poses = std::move(of_session);
+  if (!poses.empty()) return poses;
+  for (const TrajectoryPose& pose : trajectory_of(graph, PoseSource::stored))
+    poses.emplace(pose.node, pose.world_from_base);
   return poses;
 }
 

@@ -132,6 +132,10 @@ void Refinement::close(StageReport stage) {
 }
 
 void Refinement::start() {
+  const int gauge = options_.graph.gauge_node;
+  if (gauge != 0 && scan_.graph().find_node(gauge) == nullptr)
+    throw Error("the scan has no such node",
+                {.field = "gauge_node", .value = std::to_string(gauge), .bound = {}});
   InitialPoses initial = initial_poses(scan_.graph(), options_.start);
   poses_ = std::move(initial.map_from_base);
   parts_ = std::move(initial.parts);
@@ -139,7 +143,8 @@ void Refinement::start() {
   stored_ = stored_links(scan_.graph());
   if (options_.start == StartPoses::visual)
     std::erase_if(stored_, [](const GraphLink& link) { return is_motion(link.link); });
-  else if (stored_.empty())
+  drop_unusable(stored_, result_.warnings);
+  if (stored_.empty() && options_.start != StartPoses::visual)
     stored_ = odometry_links(scan_.graph());
   if (may_be_visual()) {
     tracked_.insert(result_.without_pose.begin(), result_.without_pose.end());

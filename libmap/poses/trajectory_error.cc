@@ -1,5 +1,6 @@
 #include "libmap/poses/trajectory_error.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -9,6 +10,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/pose.h"
 #include "libmap/scan/stamp_pairing.h"
 
 namespace libmap {
@@ -83,6 +85,18 @@ TrajectoryError summarize(const std::vector<double>& distances_m,
   return error;
 }
 
+// Whether the positions lie so near to a line that they do not tell a turn about it.
+bool is_straight(const Eigen::Matrix3Xd& positions) {
+  constexpr double least_width = 0.05;  // of the length
+  const Eigen::Matrix3Xd centred = positions.colwise() - positions.rowwise().mean();
+  const Eigen::Vector3d spreads =
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(centred * centred.transpose()),
+                                                     Eigen::EigenvaluesOnly)
+          .eigenvalues();
+  return spreads[1] <= least_width * least_width * spreads[2];
+}
+
+// Least squares of the positions (Umeyama 1991).
 Pose best_alignment(const std::vector<PosePair>& pairs) {
   const auto count = static_cast<Eigen::Index>(pairs.size());
   Eigen::Matrix3Xd from(3, count);
@@ -93,7 +107,16 @@ Pose best_alignment(const std::vector<PosePair>& pairs) {
     to.col(i) = pair.truth.translation();
   }
   Pose alignment = Pose::Identity();
-  alignment.matrix() = Eigen::umeyama(from, to, false);
+  if (!is_straight(from) && !is_straight(to)) {
+    alignment.matrix() = Eigen::umeyama(from, to, false);
+    return alignment;
+  }
+  // Positions on a line leave the turn about it open: the rotations tell it.
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
+  for (const PosePair& pair : pairs)
+    turns += pair.truth.linear() * pair.estimate.linear().transpose();
+  alignment.linear() = nearest_rotation(turns);
+  alignment.translation() = to.rowwise().mean() - alignment.linear() * from.rowwise().mean();
   return alignment;
 }
 

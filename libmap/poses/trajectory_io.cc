@@ -4,7 +4,9 @@
 #include <array>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
+#include <string_view>
 #include <utility>
 
 #include "libmap/core/error.h"
@@ -28,6 +30,9 @@ constexpr std::array<std::pair<const char*, TrajectoryFormat>, 4> extensions = {
     {".toro", TrajectoryFormat::toro},
 }};
 
+// Of vertices that are the places of poses in their order.
+constexpr std::string_view numbered_head = "# graspmap: poses without nodes, numbered in order";
+
 std::string extension_of(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension)
@@ -47,7 +52,9 @@ using NodePairs = std::vector<std::pair<const GraphNode*, const TrajectoryPose*>
 NodePairs pair_by_node(const Trajectory& trajectory, const PoseGraph& graph) {
   NodePairs pairs;
   for (const TrajectoryPose& pose : trajectory)
-    if (const GraphNode* node = graph.find_node(pose.node)) pairs.emplace_back(node, &pose);
+    if (const GraphNode* node = graph.find_node(pose.node);
+        node != nullptr && node->weight != invalid_weight)
+      pairs.emplace_back(node, &pose);
   return pairs;
 }
 
@@ -125,6 +132,8 @@ TrajectoryFile parse_poses(TrajectoryFormat format, const std::string& text,
   if (format == TrajectoryFormat::g2o || format == TrajectoryFormat::toro) {
     PoseGraphText graph =
         format == TrajectoryFormat::g2o ? parse_g2o(text, file) : parse_toro(text, file);
+    if (text.starts_with(numbered_head))
+      for (TrajectoryPose& pose : graph.poses) pose.node = 0;
     return {std::move(graph.poses), std::move(graph.links)};
   }
   const bool is_kitti =
@@ -184,12 +193,20 @@ TrajectoryFile read_trajectory(const fs::path& path, TrajectoryFormat format) {
 
 namespace {
 
-// Vertices need names: 1, 2, ... where no node is known, as RTAB-Map counts lines.
-void number_nodes(Trajectory& poses) {
+// Vertices need names: 1, 2, ... where no node is known, as RTAB-Map counts lines. Whether they
+// were made up, which a comment of g2o says (RTAB-Map's reader of TORO takes none).
+bool number_nodes(Trajectory& poses) {
   const auto is_known = [](const TrajectoryPose& pose) { return pose.node != 0; };
-  if (std::any_of(poses.begin(), poses.end(), is_known)) return;
+  if (std::any_of(poses.begin(), poses.end(), is_known)) return false;
   int node = 0;
   for (TrajectoryPose& pose : poses) pose.node = ++node;
+  return true;
+}
+
+bool have_distinct_stamps(const Trajectory& poses) {
+  std::set<double> stamps;
+  for (const TrajectoryPose& pose : poses) stamps.insert(pose.stamp_s);
+  return stamps.size() == poses.size();
 }
 
 }  // namespace
@@ -197,20 +214,26 @@ void number_nodes(Trajectory& poses) {
 void write_trajectory_as(TrajectoryFormat format, const fs::path& path,
                          const TrajectoryFile& trajectory, bool nodes) {
   Trajectory poses = trajectory.poses;
-  if (format == TrajectoryFormat::toro || format == TrajectoryFormat::g2o) number_nodes(poses);
+  const bool has_vertices = format == TrajectoryFormat::toro || format == TrajectoryFormat::g2o;
+  const bool is_numbered = has_vertices && number_nodes(poses);
+  // Poses of one stamp can be told apart by their nodes alone.
+  const bool have_nodes = std::all_of(poses.begin(), poses.end(),
+                                      [](const TrajectoryPose& pose) { return pose.node > 0; });
+  const bool with_nodes = nodes || (have_nodes && !have_distinct_stamps(poses));
   for (TrajectoryPose& pose : poses)
     pose.world_from_base = to_axes(axes_of(format), pose.world_from_base);
   switch (format) {
     case TrajectoryFormat::tum:
     case TrajectoryFormat::tum_motion_capture:
-      return write_text(path, to_tum(poses, nodes));
+      return write_text(path, to_tum(poses, with_nodes));
     case TrajectoryFormat::kitti:
     case TrajectoryFormat::kitti_optical:
       return write_text(path, to_kitti(poses));
     case TrajectoryFormat::toro:
       return write_text(path, to_toro(poses, trajectory.links));
     case TrajectoryFormat::g2o:
-      return write_text(path, to_g2o(poses, trajectory.links));
+      return write_text(path, (is_numbered ? std::string(numbered_head) + "\n" : "") +
+                                  to_g2o(poses, trajectory.links));
     case TrajectoryFormat::automatic:
     case TrajectoryFormat::colmap:
       break;

@@ -273,12 +273,13 @@ Pose base_from_camera_of(const CalibrationRecord& record) {
 }
 
 void set_distortion(Camera& camera, std::vector<double> terms) {
-  if (std::all_of(terms.begin(), terms.end(), [](double term) { return term == 0; })) return;
+  // A fisheye lens whose terms are 0 still is none: its angles are its radii.
   if (terms.size() == 6) {
     camera.distortion_model = DistortionModel::equidistant;
     camera.distortion = {terms[0], terms[1], terms[4], terms[5]};
     return;
   }
+  if (std::all_of(terms.begin(), terms.end(), [](double term) { return term == 0; })) return;
   // Terms 13 and 14 tilt the sensor.
   if (terms.size() == 14 && terms[12] == 0 && terms[13] == 0) terms.resize(12);
   camera.distortion_model = DistortionModel::radial_tangential;

@@ -47,10 +47,16 @@ void make_folder(const fs::path& folder) {
     throw Error("cannot be made: " + code.message(), {.file = folder.string()}, ErrorKind::failed);
 }
 
-bool have_distinct_stamps(const PoseGraph& graph) {
+// Whether stamps tell apart the poses of a trajectory, of which some nodes may have none: then the
+// poses of others must lie too far off in time to stand in for it.
+bool do_stamps_tell_nodes(const PoseGraph& graph, const Trajectory& trajectory) {
+  const double pairing_tolerance_s = FrameFolderOptions().pairing_tolerance_s;
   std::set<double> stamps;
   for (const GraphNode& node : graph.nodes) stamps.insert(node.stamp_s);
-  return stamps.size() == graph.nodes.size();
+  if (stamps.size() != graph.nodes.size()) return false;
+  if (trajectory.size() == graph.nodes.size()) return true;
+  const auto near = [&](double a, double b) { return b - a <= 2.0 * pairing_tolerance_s; };
+  return std::adjacent_find(stamps.begin(), stamps.end(), near) == stamps.end();
 }
 
 }  // namespace
@@ -160,14 +166,14 @@ std::size_t FrameFolderWriter::write_associations(const PoseGraph& graph) const 
 }
 
 void FrameFolderWriter::write_poses(const PoseGraph& graph) const {
-  // Nodes of the same stamp can be told apart by their numbers alone.
-  const bool with_nodes = !have_distinct_stamps(graph);
   const std::pair<PoseSource, const char*> sources[] = {{PoseSource::odometry, files::odometry},
                                                         {PoseSource::stored, files::stored},
                                                         {PoseSource::ground_truth, files::truth}};
   for (const auto& [source, name] : sources) {
     const Trajectory trajectory = trajectory_of(graph, source);
-    if (!trajectory.empty()) write_text(folder_ / name, to_tum(trajectory, with_nodes));
+    if (trajectory.empty()) continue;
+    const bool with_nodes = !do_stamps_tell_nodes(graph, trajectory);
+    write_text(folder_ / name, to_tum(trajectory, with_nodes));
   }
   Trajectory vertices = trajectory_of(graph, PoseSource::stored);
   if (vertices.empty()) vertices = trajectory_of(graph, PoseSource::odometry);

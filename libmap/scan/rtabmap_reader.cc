@@ -19,6 +19,7 @@ namespace {
 
 // RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
 constexpr std::size_t absent_bytes = 4;
+constexpr const char* unknown_part = " is not known and is not read";
 // Enough for the frame header of a JPEG that cameras make.
 constexpr std::size_t header_bytes = 4096;
 
@@ -170,9 +171,10 @@ RtabmapDatabase::RtabmapDatabase(const fs::path& path)
   warnings_ = std::move(read.warnings);
   if (!columns_.has_table("Data") && !columns_.has_table("Image"))
     warnings_.push_back("it has no table Data: there are no images");
-  for (const std::string& name : columns_.unknown())
-    warnings_.push_back(name + " is not known and is not read");
+  for (const std::string& name : columns_.unknown()) warnings_.push_back(name + unknown_part);
 }
+
+bool is_about_unknown_part(const std::string& warning) { return warning.ends_with(unknown_part); }
 
 RtabmapDatabase::~RtabmapDatabase() = default;
 

@@ -125,4 +125,8 @@ class RtabmapDatabase : public ScanSource {
   std::vector<std::string> warnings_;
 };
 
+// Whether a warning of warnings() is about a table or column that RTAB-Map got after this was
+// written: nothing is broken.
+bool is_about_unknown_part(const std::string& warning);
+
 }  // namespace libmap

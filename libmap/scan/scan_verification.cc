@@ -300,6 +300,7 @@ ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress) {
     verify_frames(scan, result, progress);
   // What the graph had to leave out, unless its blob is listed.
   for (const std::string& warning : scan.warnings()) {
+    if (is_about_unknown_part(warning)) continue;
     const bool is_listed =
         std::any_of(result.faults.begin(), result.faults.end(),
                     [&](const ScanFault& fault) { return warning.ends_with(fault.reason); });

@@ -28,8 +28,8 @@ struct ScanVerificationResult {
 
 // In parallel, one node's images a thread in memory. Of a database every blob of every table, and
 // SQLite's own check of the file; of any other scan every frame. What the scan's graph had to
-// leave out (warnings()) is a fault too. A fault is no Error; Error means
-// that the file cannot be read any further.
+// leave out (warnings()) is a fault too, but for tables and columns of a later version. A fault is
+// no Error; Error means that the file cannot be read any further.
 ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress = no_progress());
 
 }  // namespace libmap

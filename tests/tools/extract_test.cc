@@ -89,12 +89,29 @@ TEST(Extract, DoesNotDependOnTheNumberOfThreads) {
 }
 
 TEST(Extract, SaysThatFloatsWereRounded) {
-  const ExampleScan scan = write_example({.depth = libmap::DepthFormat::float_png});
+  ExampleScan scan = graspmap_test::example_scan();
+  const libmap::DepthImage exact = scan.frames.at(5).depth;
+  for (float& depth : scan.frames.at(5).depth.pixels)
+    if (depth > 0.0F) depth += 0.0003F;
+  scan.frames.at(9).depth.pixels[7] = 70.0F;
+  graspmap_test::write_database(scratch("scan.db"), scan,
+                                {.depth = libmap::DepthFormat::float_png});
   const auto result = graspmap({"extract", "scan.db", "-o", "out"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("4 depth images of floats were rounded"), std::string::npos);
-  EXPECT_EQ(json_of("out.json")["results"]["depth_images_rounded_from_float"], 4);
-  EXPECT_TRUE(libmap::open_scan(scratch("out"))->read_frame(5).depth == scan.frames.at(5).depth);
+  EXPECT_NE(result.standard_error.find("2 depth images were rounded"), std::string::npos);
+  EXPECT_NE(result.standard_error.find("1 depth pixels beyond 65.5 m"), std::string::npos);
+  EXPECT_EQ(json_of("out.json")["results"]["depth_images_rounded"], 2);
+  EXPECT_TRUE(libmap::open_scan(scratch("out"))->read_frame(5).depth == exact);
+}
+
+TEST(Extract, OptionsOfPicturesNeedPictures) {
+  write_example();
+  for (const auto& [name, value] :
+       {std::pair{"--poses", "odometry"}, std::pair{"--transform", "1,0,0,0,0,0"},
+        std::pair{"--keep", "first"}})
+    EXPECT_TRUE(
+        bad_input(graspmap({"extract", "scan.db", "-o", "out", name, value}), {name, "--bundler"}));
+  EXPECT_FALSE(fs::exists(scratch("out")));
 }
 
 TEST(Extract, KeepsMillimetrePngsByteForByte) {
@@ -327,9 +344,10 @@ TEST(ExtractBundler, BadInput) {
   EXPECT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("node 5: image"), std::string::npos);
   EXPECT_EQ(files_in("out").count("images/000005.jpg"), 0U);
-  EXPECT_TRUE(bad_input(
-      graspmap({"extract", "scan.db", "--bundler", "two", "--poses", "odometry", "--strict"}),
-      {"node 5: image"}));
+  const auto strict =
+      graspmap({"extract", "scan.db", "--bundler", "two", "--poses", "odometry", "--strict"});
+  EXPECT_EQ(strict.exit_code, 3);
+  EXPECT_NE(strict.standard_error.find("error: scan.db: node 5: image"), std::string::npos);
 }
 
 TEST(Extract, TakesEveryRealScan) {

@@ -70,9 +70,10 @@ TEST(InfoScan, Plainly) {
 }
 
 // Exit code 3 and one line on stderr; what was found stands on stdout.
-void expect_broken(const ProgramResult& result, const std::string& what) {
+void expect_broken(const ProgramResult& result, const std::string& what,
+                   const std::string& scan = "a.db") {
   EXPECT_EQ(result.exit_code, 3);
-  EXPECT_EQ(result.standard_error, "graspmap info: error: a.db: " + what + "\n");
+  EXPECT_EQ(result.standard_error, "graspmap info: error: " + scan + ": " + what + "\n");
 }
 
 TEST(InfoScan, VerifyListsWhatIsBrokenNodeByNode) {
@@ -105,6 +106,17 @@ TEST(InfoScan, VerifyListsWhatTheGraphLeavesOut) {
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
   // Without --verify such a scan can still be looked at.
   EXPECT_EQ(graspmap({"info", "a.db"}).exit_code, 0);
+}
+
+TEST(InfoScan, FolderWhoseFirstFrameIsBroken) {
+  write_sample(scratch("a.db"));
+  ASSERT_TRUE(succeeded(graspmap({"extract", "a.db", "-o", "scan"})));
+  std::filesystem::path first;
+  for (const auto& entry : std::filesystem::directory_iterator(scratch("scan") / "color"))
+    if (first.empty() || entry.path() < first) first = entry.path();
+  std::filesystem::remove(first);
+  EXPECT_EQ(graspmap({"info", "scan"}).exit_code, 0);
+  expect_broken(graspmap({"info", "scan", "--verify"}), "1 part is broken, in 1 node", "scan");
 }
 
 TEST(InfoScan, SessionsAndErrorsOfTheirOdometry) {

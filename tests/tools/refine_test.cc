@@ -224,6 +224,26 @@ TEST(Refine, ReportsInJsonAndInText) {
     EXPECT_NE(text.find(words), std::string::npos) << words;
 }
 
+// One link that cannot be used does not end it, nor does a node without a calibration.
+TEST(Refine, UnusableLinksAndFramesAreLeftOutAndNamed) {
+  GRASPMAP_REQUIRE_DATA();
+  std::filesystem::copy_file(scan_file("site_tiny_q.db"), scratch("scan.db"));
+  std::filesystem::permissions(scratch("scan.db"), std::filesystem::perms::owner_all);
+  {
+    SQLite::Database file(scratch("scan.db"), SQLite::OPEN_READWRITE);
+    file.exec("UPDATE Link SET information_matrix = zeroblob(288) WHERE from_id = 1 AND to_id = 2");
+    file.exec("UPDATE Data SET calibration = NULL WHERE id = 4");
+  }
+  const auto result = graspmap({"refine", "scan.db", "-o", "p.tum"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("stored links are left out, the first: link 1 -> 2: its "
+                                       "information matrix is not positive"),
+            std::string::npos)
+      << result.standard_error;
+  EXPECT_NE(result.standard_error.find("node 4: has no calibration"), std::string::npos)
+      << result.standard_error;
+}
+
 TEST(Refine, BadInputIsOneLine) {
   GRASPMAP_REQUIRE_DATA();
   const std::string scan = scan_file("site_tiny_q.db");
@@ -233,6 +253,8 @@ TEST(Refine, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--links", "links.tum"}),
                         {"--links", ".g2o"}));
   EXPECT_TRUE(bad_input(graspmap({"refine", "none.db", "-o", "p.tum"}), {"none.db"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--gauge-node", "999"}),
+                        {"gauge_node is 999"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
 }
 

@@ -54,6 +54,25 @@ TEST(AbsoluteTrajectoryError, IsZeroForTheSameTrajectoryInAnotherFrame) {
   EXPECT_TRUE(error.truth_from_estimate.isApprox(estimate_from_truth.inverse(), 1e-12));
 }
 
+// The turn about a straight way is that of the rotations: the noise of positions does not tell it.
+TEST(AbsoluteTrajectoryError, StraightWaysAreTurnedByTheirRotations) {
+  const Pose estimate_from_truth = random_pose();
+  Trajectory truth;
+  Trajectory estimate;
+  for (int i = 0; i < 6; ++i) {
+    Pose pose = random_pose();
+    pose.translation() = Eigen::Vector3d(0.1 * i, 0.2, 0.3);
+    truth.push_back({i + 1, 0.1 * i, pose});
+    Pose seen = estimate_from_truth * pose;
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      seen.translation()[axis] += graspmap_test::uniform(-0.001, 0.001);
+    estimate.push_back({i + 1, 0.1 * i, seen});
+  }
+  const auto error = libmap::absolute_trajectory_error(estimate, truth);
+  EXPECT_LT(error.max_rotation_deg, 1e-4);
+  EXPECT_LT(error.max_m, 0.002);
+}
+
 TEST(AbsoluteTrajectoryError, KeepsScaleErrors) {
   const auto error = libmap::absolute_trajectory_error(poses_on_axes(1.01), poses_on_axes(1.0));
   EXPECT_NEAR(error.rmse_m, 0.01, 1e-12);

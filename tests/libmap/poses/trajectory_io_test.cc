@@ -74,8 +74,25 @@ TEST(TrajectoryIo, NumbersPosesWithoutNodes) {
   for (const char* name : {"poses.g2o", "poses.toro"}) {
     libmap::write_trajectory(graspmap_test::scratch_folder() / name, written);
     const auto read = libmap::read_trajectory(graspmap_test::scratch_folder() / name);
-    for (int i = 0; i < 3; ++i) EXPECT_EQ(read.poses[static_cast<std::size_t>(i)].node, i + 1);
+    ASSERT_EQ(read.poses.size(), 3U);
+    // Made up: in order, and where the file can say so no nodes of a scan.
+    for (std::size_t i = 0; i < 3; ++i) {
+      EXPECT_EQ(read.poses[i].node, std::string(name) == "poses.g2o" ? 0 : static_cast<int>(i) + 1);
+      EXPECT_TRUE(read.poses[i].world_from_base.isApprox(written.poses[i].world_from_base, 1e-14));
+    }
+    const std::string text = graspmap_test::read_text(graspmap_test::scratch_folder() / name);
+    EXPECT_NE(text.find(" 3 "), std::string::npos) << text;
   }
+}
+
+TEST(TrajectoryIo, NodesStandWhereStampsDoNotTellPosesApart) {
+  libmap::TrajectoryFile written = example();
+  const fs::path path = graspmap_test::scratch_folder() / "poses.tum";
+  libmap::write_trajectory(path, written);
+  EXPECT_EQ(libmap::read_trajectory(path).poses[1].node, 0);
+  written.poses[1].stamp_s = written.poses[0].stamp_s;
+  libmap::write_trajectory(path, written);
+  EXPECT_EQ(libmap::read_trajectory(path).poses[1].node, 3);
 }
 
 TEST(TrajectoryIo, NamesTheFileThatIsOfNoUse) {
@@ -109,6 +126,9 @@ TEST(AssignNodes, TakesTheNodesOfThePoses) {
   EXPECT_EQ(result.poses[0].stamp_s, 102.0);
   EXPECT_TRUE(result.poses[0].world_from_base.isApprox(poses[1].world_from_base));
   EXPECT_EQ(result.foreign, 1U);
+  // Node 3 is invalid.
+  const Trajectory more = {{3, 0, random_pose()}, {4, 0, random_pose()}};
+  EXPECT_EQ(nodes_of(libmap::assign_nodes(more, graph_of_nodes()).poses), std::vector<int>{4});
 }
 
 TEST(AssignNodes, PairsStampsWithinTwentyMilliseconds) {

@@ -226,7 +226,8 @@ TEST(CalibrationCodec, RecordOfACameraReadsBack) {
   for (const auto& [model, terms] :
        {std::pair{DistortionModel::none, std::vector<double>{}},
         {DistortionModel::radial_tangential, {0.1, -0.2, 0.01, 0.02, 0.05}},
-        {DistortionModel::equidistant, {0.1, -0.2, 0.03, 0.04}}}) {
+        {DistortionModel::equidistant, {0.1, -0.2, 0.03, 0.04}},
+        {DistortionModel::equidistant, {0, 0, 0, 0}}}) {
     camera.distortion_model = model;
     camera.distortion = terms;
     const Camera read = only_camera(libmap::encode_calibration(

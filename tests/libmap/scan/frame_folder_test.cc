@@ -118,6 +118,20 @@ TEST(FrameFolder, KeepsNodesOfTheSameStampApart) {
   graspmap_test::expect_same_graph(FrameFolder(folder).graph(), scan.graph, 2e-7);
 }
 
+// A node without a pose does not get that of its neighbour in time.
+TEST(FrameFolder, KeepsNodesOfNearStampsApart) {
+  ExampleScan scan = graspmap_test::example_scan();
+  double stamp_s = 5.0;
+  for (libmap::GraphNode& node : scan.graph.nodes) {
+    node.stamp_s = stamp_s += 0.01;
+    scan.frames.at(node.id).stamp_s = stamp_s;
+  }
+  scan.graph.nodes[1].odometry_from_base.reset();
+  const fs::path folder = new_folder();
+  write_scan(folder, scan);
+  EXPECT_FALSE(FrameFolder(folder).graph().nodes[1].odometry_from_base.has_value());
+}
+
 TEST(FrameFolder, ReadsOnlyThePartsThatAreAskedFor) {
   const ExampleScan scan = graspmap_test::example_scan();
   const fs::path folder = new_folder();

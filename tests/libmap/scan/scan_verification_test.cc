@@ -139,6 +139,17 @@ TEST(ScanVerification, WhatTheGraphLeavesOut) {
   EXPECT_EQ(std::count(lines.begin(), lines.end(), '\n'), 2) << lines;
 }
 
+// RTAB-Map's next version may have them: nothing is broken.
+TEST(ScanVerification, UnknownTablesAndColumnsAreNoFaults) {
+  const fs::path file = scratch_folder() / "a.db";
+  write_sample(file);
+  execute(file, "CREATE TABLE Notes (id INTEGER)");
+  execute(file, "ALTER TABLE Node ADD COLUMN mood TEXT");
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.warnings().size(), 2U);
+  EXPECT_EQ(lines_of(libmap::verify_scan(scan)), "");
+}
+
 TEST(ScanVerification, IsTheSameForAnyNumberOfThreads) {
   const fs::path file = scratch_folder() / "a.db";
   write_sample(file);
