@@ -84,6 +84,8 @@ ReadMap read_map(const std::string& file, Run& run) {
     run.warn(file +
              ": no manifest beside it: its points are taken in the terrain frame, all above "
              "the zero plane");
+  else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
+    run.warn(file + ": its manifest tells no zero plane: all its points are taken to lie above");
   run.add_input(file);
   return map;
 }

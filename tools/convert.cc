@@ -1,11 +1,17 @@
 // graspmap convert: any format to any other.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
 #include <string>
+#include <vector>
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
+#include "libmap/core/single_precision.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/textured_mesh_io.h"
 #include "libmap/poses/trajectory_io.h"
 #include "tools/command_line.h"
 
@@ -49,38 +55,120 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
   return cloud;
 }
 
-// The manifest of a converted map still says in which frame it is. Once it is read: what cannot be
-// read need not be hashed.
+template <typename Facts>
+void carry_facts(const Facts& source, Facts& facts) {
+  for (const auto& [name, value] : source) {
+    const bool is_known = std::any_of(facts.begin(), facts.end(),
+                                      [&](const auto& fact) { return fact.first == name; });
+    if (!is_known) facts.emplace_back(name, value);
+  }
+}
+
+// The manifest of a converted map still says in which frame it is, and how it was made: its zero
+// plane, lattice and method. Once all is read: what cannot be read need not be hashed.
 void add_input(const ConvertOptions& options, Run& run) {
   run.add_input(options.input);
-  if (const auto source = libmap::read_manifest_of(options.input)) {
-    run.manifest().frame = source->frame;
-    run.manifest().transforms = source->transforms;
-  }
+  const auto source = libmap::read_manifest_of(options.input);
+  if (!source) return;
+  run.manifest().frame = source->frame;
+  run.manifest().transforms = source->transforms;
+  carry_facts(source->parameters, run.manifest().parameters);
+  carry_facts(source->results, run.manifest().results);
+}
+
+// Encodings that a format does not have.
+void refuse_ignored(const ConvertOptions& options) {
+  const std::string format = libmap::format_of(options.output);
+  if (options.encoding == FileEncoding::binary_compressed && format != ".pcd")
+    throw libmap::Error(
+        "is an encoding of .pcd",
+        {.file = options.output, .field = "--encoding", .value = "binary_compressed", .bound = {}});
+  if (options.big_endian && format != ".ply")
+    throw libmap::Error("is for .ply", {.file = options.output, .field = "--big-endian"});
+}
+
+// The farthest that single precision moves a coordinate.
+double rounding_of(const std::vector<Eigen::Vector3d>& positions) {
+  double most = 0.0;
+  for (const Eigen::Vector3d& position : positions)
+    most = std::max(most, (libmap::rounded_to_single(position) - position).cwiseAbs().maxCoeff());
+  return most;
+}
+
+// What the mesh has and the output's format has not.
+void tell_losses(const libmap::TriangleMesh& mesh, const std::string& format, Run& run) {
+  const bool geometry_alone = format == ".stl" || format == ".off";
+  const bool no_fields = geometry_alone || format == ".obj" || format == ".glb";
+  std::vector<std::string> lost;
+  if (geometry_alone && !mesh.vertex_colors.empty()) lost.emplace_back("colours");
+  if (no_fields)
+    for (const auto* fields : {&mesh.vertex_fields, &mesh.face_fields})
+      for (const libmap::ScalarField& field : *fields) lost.push_back(field.name);
+  if (!lost.empty())
+    run.warn(fmt::format("{} has no place for: {}", format, fmt::join(lost, ", ")));
+  constexpr double told_m = 1e-5;
+  if (const double moved_m = rounding_of(mesh.vertices);
+      (format == ".stl" || format == ".glb") && moved_m > told_m)
+    run.warn(fmt::format("{} keeps single precision: coordinates are off by up to {:.3g} mm",
+                         format, 1e3 * moved_m));
 }
 
 void convert_cloud(const ConvertOptions& options, Run& run) {
   const libmap::CloudReadResult read = libmap::read_cloud(options.input);
-  add_input(options, run);
   if (read.dropped_points > 0)
     run.warn(fmt::format("{} points without a position were dropped", read.dropped_points));
   if (holds_meshes_alone(options.output))
     throw libmap::Error("a cloud has no faces: this format holds meshes alone",
                         {.file = options.output});
   run.manifest().results.emplace_back("points", static_cast<std::int64_t>(read.cloud.size()));
+  add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_cloud(temporary, read.cloud, {options.encoding, options.big_endian});
   });
 }
 
-void convert_mesh(const ConvertOptions& options, Run& run) {
-  const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
+// A model whose pictures cannot be read still has its shape.
+libmap::TexturedMesh read_model(const std::string& file, Run& run) {
+  try {
+    return libmap::read_textured_mesh(file);
+  } catch (const libmap::Error& error) {
+    libmap::TexturedMesh model;
+    model.mesh = libmap::read_mesh(file).mesh;
+    run.warn(fmt::format("the texture is left out: {}", error.what()));
+    return model;
+  }
+}
+
+// With its textures, where both formats have them. Whether that was done.
+bool convert_textured(const ConvertOptions& options, Run& run) {
+  if (!libmap::is_textured_format(options.input)) return false;
+  const libmap::TexturedMesh model = read_model(options.input, run);
+  if (model.pages.empty()) return false;
+  if (!libmap::is_textured_format(options.output)) {
+    run.warn("the texture is left out: .obj and .glb have a place for it");
+    return false;
+  }
+  const libmap::TexturedMeshWriteOptions writing;
+  run.require_own_companions(options.output, libmap::companions_of_model(options.output, writing));
+  run.manifest().results.emplace_back("pages", static_cast<std::int64_t>(model.pages.size()));
   add_input(options, run);
+  Run::Files writers;
+  for (const libmap::ModelFile& file : libmap::textured_mesh_files(options.output, model, writing))
+    writers.emplace_back(file.path, file.write);
+  run.write_outputs(options.output, writers);
+  return true;
+}
+
+void convert_mesh(const ConvertOptions& options, Run& run) {
+  if (convert_textured(options, run)) return;
+  const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
+  tell_losses(mesh, libmap::format_of(options.output), run);
   const bool to_cloud = holds_clouds_alone(options.output);
   if (to_cloud) run.say("the output holds the mesh's vertices alone");
   run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
   run.manifest().results.emplace_back("triangles",
                                       static_cast<std::int64_t>(mesh.triangles.size()));
+  add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
     if (to_cloud)
       libmap::write_cloud(temporary, vertices_of(mesh), {options.encoding, options.big_endian});
@@ -93,13 +181,20 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   const bool named = options.output_poses_format != TrajectoryFormat::automatic;
   if (!named) libmap::require_trajectory_format(options.output);
   const libmap::TrajectoryFile read = libmap::read_trajectory(options.input, options.poses_format);
-  add_input(options, run);
   if (!read.images.empty())
     throw libmap::Error("poses of photographs: only those of the scan know its base (fuse --poses)",
                         {.file = options.input});
   run.manifest().results.emplace_back("poses", static_cast<std::int64_t>(read.poses.size()));
   run.manifest().results.emplace_back("links", static_cast<std::int64_t>(read.links.size()));
+  add_input(options, run);
   const bool nodes = read.poses.front().node != 0;
+  const auto is_output = [&](TrajectoryFormat format, const char* extension) {
+    return named ? options.output_poses_format == format
+                 : std::filesystem::path(options.output).extension() == extension;
+  };
+  if (!nodes &&
+      (is_output(TrajectoryFormat::g2o, ".g2o") || is_output(TrajectoryFormat::toro, ".toro")))
+    run.warn("the poses have no nodes: vertices 1, 2, ... are their places in the file");
   run.write_output(options.output, [&](const auto& temporary) {
     if (named)
       libmap::write_trajectory_as(options.output_poses_format, temporary, read, nodes);
@@ -111,6 +206,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
 void convert(const ConvertOptions& options, Run& run) {
   const bool poses = holds_poses(options);
   if (!poses) libmap::format_of(options.output);
+  if (!poses) refuse_ignored(options);
   run.claim_output(options.output, {options.input});
   if (poses)
     convert_poses(options, run);

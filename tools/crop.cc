@@ -116,6 +116,9 @@ void read_region(CropCommandOptions& options) {
     crop.region = CropRegion::border;
   }
   crop.level = options.level;
+  if (options.up != "auto" && !crop.level)
+    throw libmap::Error("is for levelling, which --level none leaves out",
+                        {.file = {}, .field = "--up", .value = options.up});
   if (options.up != "auto") crop.up = graspmap_tools::parse_vector(options.up, "--up");
   if (options.yaw != "auto") {
     crop.yaw_deg = libmap::parse_double(options.yaw);
@@ -262,6 +265,7 @@ void crop(CropCommandOptions& options, Run& run) {
   run.claim_output(options.output, inputs);
   run.require_own_companions(options.output, {transform_path(options.output)});
   run.manifest().parameters.emplace_back("box", options.box);
+  run.manifest().parameters.emplace_back("polygon", options.polygon);
   run.manifest().parameters.emplace_back("size", options.size);
   run.manifest().parameters.emplace_back("border", options.border);
   try {

@@ -236,6 +236,8 @@ void mesh(const MeshOptions& options, Run& run) {
   }
   if (options.report || options.json) report(options, cloud, surface, run);
   run.add_input(options.cloud);
+  if (const auto source = libmap::read_manifest_of(options.cloud))
+    run.manifest().frame = source->frame;
   graspmap_tools::carry_transforms(options.cloud, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });

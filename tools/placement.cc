@@ -116,8 +116,9 @@ libmap::PointCloud part_in_box(const libmap::PointCloud& cloud,
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (is_inside(box, cloud.positions[n])) inside.push_back(n);
   if (inside.empty())
-    throw libmap::Error(cloud.empty() ? "the cloud has no points" : "no point lies in the box",
-                        {.file = file});
+    throw cloud.empty()
+        ? libmap::Error("the cloud has no points", {.file = file})
+        : libmap::Error("no point lies in the box", {.file = file, .field = "--box"});
   return libmap::select_points(cloud, inside);
 }
 

@@ -39,8 +39,7 @@ void say_result(const libmap::PoissonDiskResult& result, std::uint64_t wanted, R
   run.say(fmt::format("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}",
                       result.area_m2, result.cloud.size(), 1e3 * result.radius_m,
                       result.relative_radius));
-  const auto found = static_cast<double>(result.cloud.size());
-  if (wanted > 0 && std::abs(found / static_cast<double>(wanted) - 1.0) > 0.01)
+  if (!result.count_reached)
     run.warn(fmt::format("no radius was found that yields {} points; {} are the nearest", wanted,
                          result.cloud.size()));
 }

@@ -148,6 +148,24 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape
   return at_zero;
 }
 
+// Of the data in the box, where one is given.
+libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, Shape& shape,
+                                  const SpotCheckCommandOptions& options) {
+  if (!shape.mesh) {
+    if (box)
+      std::erase_if(shape.cloud.positions, [&](const Eigen::Vector3d& point) {
+        return point.z() < box->min.z() || point.z() > box->max.z();
+      });
+    return libmap::heights_of(shape.cloud.positions, options.radius_m, options.min_points);
+  }
+  if (!box) return libmap::heights_of(*shape.mesh);
+  return [heights = libmap::heights_of(*shape.mesh, box->max.z()),
+          bottom = box->min.z()](const Eigen::Vector2d& place) {
+    const std::optional<double> height = heights(place);
+    return height && *height >= bottom ? height : std::nullopt;
+  };
+}
+
 Check check_site(const SpotCheckCommandOptions& options, Run& run) {
   Shape shape = read_shape(options.file);
   Check check;
@@ -157,19 +175,9 @@ Check check_site(const SpotCheckCommandOptions& options, Run& run) {
     check.site =
         box ? libmap::corners_of(box->min.head<2>(), box->max.head<2>())
             : libmap::bounding_corners(shape.positions(), options.outline == SiteOutline::turned);
-    if (box)
-      std::erase_if(shape.cloud.positions, [&](const Eigen::Vector3d& point) {
-        return point.z() < box->min.z() || point.z() > box->max.z();
-      });
-    const double top = box ? box->max.z() : std::numeric_limits<double>::infinity();
-    check.result = run.timed("check", [&] {
-      return libmap::check_edges(
-          check.site,
-          shape.mesh
-              ? libmap::heights_of(*shape.mesh, top)
-              : libmap::heights_of(shape.cloud.positions, options.radius_m, options.min_points),
-          ground, options.check);
-    });
+    const libmap::HeightFunction heights = heights_in(box, shape, options);
+    check.result = run.timed(
+        "check", [&] { return libmap::check_edges(check.site, heights, ground, options.check); });
   } catch (const libmap::Error& error) {
     throw error.in_file(options.file);
   }

@@ -65,6 +65,8 @@ ReadMap summarize_one(const std::string& file, const SummarizeOptions& options,
   libgtd::MapSummaryOptions own = libgtd::summary_options(map.manifest);
   own.graspability_threshold = map.cutoff = cutoff_of(options, own);
   read.voxels = libgtd::voxel_map_of(cloud, libgtd::facts_of(map.manifest));
+  if (map.manifest.find_parameter("zero_plane_m") == nullptr)
+    run.warn(file + ": no manifest tells its zero plane: all its points are taken to lie above");
   map.summary = libgtd::summarize_map(cloud, read.voxels, own);
   if (expected != nullptr)
     map.expected = libgtd::evaluate_expected_map(

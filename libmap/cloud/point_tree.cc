@@ -73,6 +73,20 @@ std::vector<NeighborPoint> PointTree::within(const Eigen::Vector3d& point, doubl
   return neighbors;
 }
 
+namespace {
+
+// The square of the distance to the nearest point that lies elsewhere; 0 if none was met among
+// many that lie here.
+double square_to_next(const PointTree& tree, const Eigen::Vector3d& point) {
+  constexpr std::size_t most_here = 512;
+  for (std::size_t count = 2; count <= most_here; count *= 4)
+    for (const NeighborPoint& neighbor : tree.nearest(point, count))
+      if (neighbor.square_m2 > 0.0) return neighbor.square_m2;
+  return 0.0;
+}
+
+}  // namespace
+
 double median_spacing(const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t most = 10000;
   if (points.size() < 2) return 0.0;
@@ -81,9 +95,11 @@ double median_spacing(const std::vector<Eigen::Vector3d>& points) {
   parallel_for(squares.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const std::size_t index = n * points.size() / squares.size();
-      squares[n] = tree.nearest(points[index], 2).back().square_m2;
+      squares[n] = square_to_next(tree, points[index]);
     }
   });
+  std::erase(squares, 0.0);
+  if (squares.empty()) return 0.0;
   const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
   std::nth_element(squares.begin(), middle, squares.end());
   return std::sqrt(*middle);

@@ -34,8 +34,8 @@ class PointTree {
   std::unique_ptr<Index> index_;
 };
 
-// Median of the distances from points to their nearest other point, m; of at most 10000 of them,
-// spread evenly over the list. 0 if there are fewer than two.
+// Median of the distances from points to the nearest elsewhere, m; of at most 10000 of them, spread
+// evenly over the list. 0 if there are no two places.
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 }  // namespace libmap

@@ -56,6 +56,26 @@ PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>
   return selected;
 }
 
+namespace {
+
+// Of the fields NAME_x, NAME_y, NAME_z, if all three are there.
+template <typename Change>
+void change_vectors(PointCloud& cloud, const std::string& name, const Change& change) {
+  ScalarField* x = cloud.find_field(name + "_x");
+  ScalarField* y = cloud.find_field(name + "_y");
+  ScalarField* z = cloud.find_field(name + "_z");
+  if (x == nullptr || y == nullptr || z == nullptr) return;
+  for (std::size_t n = 0; n < x->values.size(); ++n) {
+    const Eigen::Vector3d changed =
+        change(Eigen::Vector3d(x->values[n], y->values[n], z->values[n]));
+    x->values[n] = changed.x();
+    y->values[n] = changed.y();
+    z->values[n] = changed.z();
+  }
+}
+
+}  // namespace
+
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source) {
   PointCloud moved = cloud;
   for (Eigen::Vector3d& point : moved.positions) point = target_from_source * point;
@@ -64,6 +84,12 @@ PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_sour
   // The identity says that the viewpoint is not known, and a move does not make it known.
   if (!cloud.viewpoint.matrix().isIdentity(0.0))
     moved.viewpoint = target_from_source * cloud.viewpoint;
+  change_vectors(moved, "vp", [&](const Eigen::Vector3d& place) -> Eigen::Vector3d {
+    return target_from_source * place;
+  });
+  change_vectors(moved, "approach", [&](const Eigen::Vector3d& direction) -> Eigen::Vector3d {
+    return target_from_source.linear() * direction;
+  });
   return moved;
 }
 

@@ -56,8 +56,8 @@ struct PointCloud {
 // The points of `cloud` at `indices`, in that order, with all that belongs to them.
 PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>& indices);
 
-// The cloud moved: positions and a known viewpoint by `target_from_source`, normals by its
-// rotation.
+// The cloud moved: positions, a known viewpoint and the fields vp_x, vp_y, vp_z by
+// `target_from_source`; normals and the fields approach_x, approach_y, approach_z by its rotation.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);
 
 struct Bounds3d {

@@ -56,6 +56,18 @@ std::uint8_t to_byte(float fraction) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(fraction, 0.0F, 1.0F) * 255.0F));
 }
 
+// glTF's vertex colours are linear (glTF 2.0, 3.9.2), ours sRGB (IEC 61966-2-1).
+float linear_of(std::uint8_t byte) {
+  const double srgb = byte / 255.0;
+  return static_cast<float>(srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4));
+}
+
+float srgb_of(float linear) {
+  const double light = std::clamp(static_cast<double>(linear), 0.0, 1.0);
+  return static_cast<float>(light <= 0.0031308 ? 12.92 * light
+                                               : 1.055 * std::pow(light, 1.0 / 2.4) - 0.055);
+}
+
 Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
   Eigen::Affine3d affine = Eigen::Affine3d::Identity();
   affine.matrix() << static_cast<double>(m.a1), static_cast<double>(m.a2),
@@ -79,8 +91,9 @@ constexpr unsigned no_material = 0xffffffff;
 // Gathers the parts of a scene into one mesh.
 class MeshBuilder {
  public:
-  MeshBuilder(const aiScene& scene, bool with_normals) : scene_(scene) {
-    has_normals_ = with_normals;
+  MeshBuilder(const aiScene& scene, const std::string& format)
+      : scene_(scene), has_linear_colors_(format == "glb") {
+    has_normals_ = format != "stl";
     has_colors_ = true;
     for (unsigned i = 0; i < scene.mNumMeshes; ++i) {
       has_normals_ = has_normals_ && scene.mMeshes[i]->HasNormals();
@@ -158,7 +171,10 @@ class MeshBuilder {
     Color color{};
     if (has_colors_) {
       const aiColor4D& c = part.mColors[0][index];
-      color = {to_byte(c.r), to_byte(c.g), to_byte(c.b)};
+      const auto byte = [&](float value) {
+        return to_byte(has_linear_colors_ ? srgb_of(value) : value);
+      };
+      color = {byte(c.r), byte(c.g), byte(c.b)};
     }
     const Corner corner = corner_of(position, normal, color);
     const auto [found, is_new] =
@@ -174,6 +190,7 @@ class MeshBuilder {
   const aiScene& scene_;
   bool has_normals_ = false;
   bool has_colors_ = false;
+  bool has_linear_colors_;
   TriangleMesh mesh_;
   std::vector<TextureCorners> coordinates_;
   std::vector<unsigned> materials_;
@@ -209,9 +226,8 @@ void copy_vertices(const TriangleMesh& mesh, aiMesh& part) {
   part.mColors[0] = new aiColor4D[count];
   for (std::size_t i = 0; i < count; ++i) {
     const Color& c = mesh.vertex_colors[i];
-    part.mColors[0][i] =
-        aiColor4D(static_cast<float>(c[0]) / 255.0F, static_cast<float>(c[1]) / 255.0F,
-                  static_cast<float>(c[2]) / 255.0F, 1.0F);
+    // STL keeps none.
+    part.mColors[0][i] = aiColor4D(linear_of(c[0]), linear_of(c[1]), linear_of(c[2]), 1.0F);
   }
 }
 
@@ -233,7 +249,8 @@ std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
   const aiShadingMode unlit = aiShadingMode_Unlit;
   material->AddProperty(&unlit, 1, AI_MATKEY_SHADING_MODEL);
   if (page == no_page) {
-    const aiColor4D grey(0.5F, 0.5F, 0.5F, 1.0F);
+    const float grey_128 = linear_of(128);
+    const aiColor4D grey(grey_128, grey_128, grey_128, 1.0F);
     material->AddProperty(&grey, 1, AI_MATKEY_BASE_COLOR);
     return material;
   }
@@ -359,7 +376,7 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
       throw Error("not a readable " + format + " file: " + first_line(importer.GetErrorString()));
     Eigen::Affine3d root = Eigen::Affine3d::Identity();
     if (format == "glb") root.linear() = z_up_from_y_up();
-    MeshBuilder builder(*scene, format != "stl");
+    MeshBuilder builder(*scene, format);
     builder.add_node(*scene->mRootNode, root);
     return take(*scene, builder);
   } catch (const std::bad_alloc&) {

@@ -158,6 +158,10 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
     return sample_disks(
         surface, options.radius_m, options.seed, [](std::size_t) { return true; }, progress);
   });
+  const auto wanted = static_cast<double>(options.count);
+  result.count_reached =
+      options.count == 0 ||
+      std::abs(static_cast<double>(samples.positions.size()) - wanted) <= count_tolerance * wanted;
   result.smallest_distance_m = timed(result.timings_s, "smallest distance", [&] {
     return smallest_distance(samples.positions, result.radius_m);
   });

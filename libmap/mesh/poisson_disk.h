@@ -34,7 +34,8 @@ struct PoissonDiskResult {
   // smallest_distance_m over that of the densest packing of as many discs in the plane: R / (2
   // sqrt(A / (2 sqrt(3) N))) (Lagae and Dutre 2008). At most 1 in the plane.
   double relative_radius = 0.0;
-  std::size_t tries = 0;  // radii that were tried
+  std::size_t tries = 0;      // radii that were tried
+  bool count_reached = true;  // within 1 %, if a number was asked for
   StageTimings timings_s;
 };
 

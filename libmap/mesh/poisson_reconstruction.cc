@@ -161,6 +161,13 @@ void Reconstruction::choose_cell_size() {
   const Bounds3d bounds = bounds_of(places);
   origin_ = (bounds.min + bounds.max) / 2;
   const double extent = (bounds.max - bounds.min).maxCoeff();
+  // The surface is kept as far as cells reach: such ones would invent ground around the points.
+  if (result_.cell_size_m > extent)
+    throw Error("cells larger than the cloud",
+                {.file = {},
+                 .field = "cell_size_m",
+                 .value = to_text(static_cast<float>(result_.cell_size_m)),
+                 .bound = "<= " + to_text(static_cast<float>(extent)) + " m"});
   const double cells = cube_margin * extent / result_.cell_size_m;
   const double most = std::exp2(max_octree_depth);
   if (!(cells <= most))

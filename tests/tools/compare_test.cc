@@ -285,6 +285,21 @@ TEST(Compare, ExtremesAreOneShortLine) {
   }
 }
 
+TEST(Compare, OnePointIsAReference) {
+  libmap::PointCloud cloud;
+  cloud.positions = {{0, 0, 0}};
+  libmap::write_cloud(scratch("one.ply"), cloud);
+  cloud.positions = {{0.3, 0, 0.4}};
+  libmap::write_cloud(scratch("other.ply"), cloud);
+  graspmap_test::write_text(scratch("t.txt"), "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n");
+  const auto result =
+      graspmap({"compare", "other.ply", "one.ply", "--transform", "t.txt", "-o", "d.ply"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_output.find("rmse: 500.00 mm"), std::string::npos)
+      << result.standard_output;
+  EXPECT_EQ(graspmap_test::json_of("d.ply.json").at("inputs").size(), 3U) << "the transform too";
+}
+
 TEST(Compare, TransformFilesThatAreNone) {
   write_square_and_points();
   const auto refused = [](const std::string& text) {

@@ -2,6 +2,8 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/textured_mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace {
@@ -90,6 +92,58 @@ TEST(Convert, ManifestOfAMapIsPassedOn) {
   EXPECT_EQ(to.at("frame"), from.at("frame"));
   EXPECT_EQ(to.at("transforms"), from.at("transforms"));
   EXPECT_EQ(to.at("command"), "convert");
+  // What analyses of the map ask for.
+  EXPECT_EQ(to.at("parameters").at("zero_plane_m"), from.at("parameters").at("zero_plane_m"));
+  EXPECT_EQ(to.at("results").at("lattice_origin_m"), from.at("results").at("lattice_origin_m"));
+  const auto judged = [](const char* map) {
+    EXPECT_TRUE(succeeded(graspmap({"summarize", map, "-o", "sum", "--names", "map", "--force"})));
+    return content("sum/maps.csv");
+  };
+  EXPECT_EQ(judged("map.vtp"), judged("map.pcd"));
+}
+
+TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
+  libmap::TriangleMesh mesh;
+  mesh.vertices = {{4.5e6 + 0.1, 0, 0}, {4.5e6 + 1.1, 0, 0}, {4.5e6, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  mesh.vertex_colors = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  mesh.vertex_fields.push_back({"seen", libmap::ScalarType::float32, {1, 2, 3}});
+  libmap::write_mesh(scratch("m.ply"), mesh);
+  const auto told = [](const char* output) {
+    const auto result = graspmap({"convert", "m.ply", output});
+    EXPECT_TRUE(succeeded(result));
+    return result.standard_error;
+  };
+  EXPECT_EQ(told("m.vtp"), "");
+  EXPECT_NE(told("m.stl").find(".stl has no place for: colours, seen"), std::string::npos);
+  EXPECT_NE(told("m.stl").find("off by up to 100 mm"), std::string::npos);
+  EXPECT_NE(told("m.obj").find(".obj has no place for: seen"), std::string::npos);
+  EXPECT_EQ(told("m.obj").find("single precision"), std::string::npos);
+}
+
+TEST(Convert, TexturesGoFromModelToModel) {
+  libmap::TexturedMesh model;
+  model.mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  model.mesh.triangles = {{0, 1, 2}};
+  model.texture_coordinates = {
+      {Eigen::Vector2f(0, 0), Eigen::Vector2f(1, 0), Eigen::Vector2f(0, 1)}};
+  model.page_of_triangle = {0};
+  model.pages.emplace_back(4, 4, libmap::Color{200, 10, 30});
+  libmap::write_textured_mesh(scratch("a.obj"), model);
+  ASSERT_TRUE(succeeded(graspmap({"convert", "a.obj", "b.glb"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "b.glb", "c.obj"})));
+  const libmap::TexturedMesh read = libmap::read_textured_mesh(scratch("c.obj"));
+  ASSERT_EQ(read.pages.size(), 1U);
+  EXPECT_EQ(read.pages[0].pixels, model.pages[0].pixels);
+  EXPECT_EQ(read.mesh.vertices, model.mesh.vertices);
+  // Where there is no place for it, or its picture is gone, the shape alone goes on.
+  const auto plain = graspmap({"convert", "a.obj", "d.ply"});
+  ASSERT_TRUE(succeeded(plain));
+  EXPECT_NE(plain.standard_error.find("texture is left out"), std::string::npos);
+  std::filesystem::remove(scratch("a_0.png"));
+  const auto broken = graspmap({"convert", "a.obj", "e.glb"});
+  ASSERT_TRUE(succeeded(broken));
+  EXPECT_NE(broken.standard_error.find("a_0.png"), std::string::npos) << broken.standard_error;
 }
 
 TEST(Convert, BadInputLeavesNothing) {
@@ -105,6 +159,10 @@ TEST(Convert, BadInputLeavesNothing) {
   EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "foreign.ply"}), {"foreign.ply", "--force"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.pcd", "--encoding", "asci"}),
                         {"--encoding is asci", "did you mean 'ascii'"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.ply", "--encoding", "binary_compressed"}),
+                        {"b.ply", "--encoding"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.pcd", "--big-endian"}),
+                        {"b.pcd", "--big-endian"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
   EXPECT_EQ(content("foreign.ply"), "precious");
 }

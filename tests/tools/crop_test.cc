@@ -189,6 +189,8 @@ TEST(Crop, BadInput) {
     return graspmap(words);
   };
   EXPECT_TRUE(bad_input(with({"--box", "1,2,3"}), {"--box", "1,2,3", "XMIN,YMIN"}));
+  EXPECT_TRUE(bad_input(with({"--level", "none", "--up", "1,0,0", "--box", "0,0,1,1"}),
+                        {"--up is 1,0,0", "--level none"}));
   EXPECT_TRUE(bad_input(with({"--box", "1,2,3,4,5"}), {"--box"}));
   EXPECT_TRUE(bad_input(with({"--box", "1,2,0,3"}), {"--box", "inside out"}));
   EXPECT_TRUE(bad_input(with({"--box", "nan,0,1,1"}), {"--box"}));

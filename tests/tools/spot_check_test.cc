@@ -142,6 +142,19 @@ TEST(SpotCheckCommand, SiteInABoxAndTurned) {
   EXPECT_NEAR(turned.at("mean_m"), (1.45e-3 + 1.5e-3 * 24.0 / 49) / 2, 2e-5);
 }
 
+// A floor below the box is no part of it, of a mesh as of a cloud.
+TEST(SpotCheckCommand, MeshBelowTheBoxHasNoHeight) {
+  libmap::write_mesh(scratch("mesh.ply"), site_mesh(-1.0));
+  const Words words = {"mesh.ply", "--ground", "zero"};
+  Words above = words;
+  above.emplace_back("--box=-1.5,-1,-0.3,1.5,1,0.5");
+  above.insert(above.begin(), "spot-check");
+  EXPECT_TRUE(bad_input(graspmap(above), {"mesh.ply", "no place"}));
+  Words around = words;
+  around.emplace_back("--box=-1.5,-1,-1.3,1.5,1,0.5");
+  EXPECT_EQ(checked(around).at("missing"), 0);
+}
+
 TEST(SpotCheckCommand, BadInput) {
   libmap::write_cloud(scratch("site.ply"), site_cloud());
   libmap::write_mesh(scratch("mesh.ply"), site_mesh(0.0));

@@ -56,6 +56,12 @@ TEST(PointTree, SpacingOfALattice) {
   for (int x = 0; x < 150; ++x)
     for (int y = 0; y < 150; ++y) points.emplace_back(0.01 * x, 0.02 * y, 5.0);
   EXPECT_NEAR(median_spacing(points), 0.01, 1e-12);
+  // Whether a place holds one point or several does not matter.
+  for (int n = 0; n < 22500; ++n)
+    for (int twins = 0; twins < n % 3; ++twins)
+      points.push_back(points[static_cast<std::size_t>(n)]);
+  EXPECT_NEAR(median_spacing(points), 0.01, 1e-12);
+  EXPECT_EQ(median_spacing(std::vector<Eigen::Vector3d>(9, {1, 2, 3})), 0.0);
   EXPECT_EQ(median_spacing({{1, 2, 3}}), 0.0);
   EXPECT_EQ(median_spacing({}), 0.0);
 }

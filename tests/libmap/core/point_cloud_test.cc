@@ -105,6 +105,29 @@ TEST(PointCloudTest, TransformMovesPointsAndTurnsNormals) {
   EXPECT_EQ(moved.colors, cloud.colors);
 }
 
+TEST(PointCloudTest, TransformMovesViewpointsAndTurnsApproachesOfPoints) {
+  PointCloud cloud = three_points();
+  const Eigen::Vector3d vector(1, 2, 3);
+  for (const std::string name : {"vp", "approach"})
+    for (std::size_t axis = 0; axis < 3; ++axis)
+      cloud.add_field(name + "_" + "xyz"[axis], ScalarType::float64)
+          .values.assign(3, vector[static_cast<Eigen::Index>(axis)]);
+  cloud.add_field("approach_xy", ScalarType::float64).values.assign(3, 7.0);
+  const libmap::Pose pose = libmap::make_pose_from_rpy({10, 0, 0}, {0, 0, 90});
+  const PointCloud moved = libmap::transform_cloud(cloud, pose);
+  const auto vector_of = [&](const std::string& name) {
+    return Eigen::Vector3d(moved.find_field(name + "_x")->values[2],
+                           moved.find_field(name + "_y")->values[2],
+                           moved.find_field(name + "_z")->values[2]);
+  };
+  EXPECT_TRUE(vector_of("vp").isApprox(Eigen::Vector3d(8, 1, 3), 1e-12));
+  EXPECT_TRUE(vector_of("approach").isApprox(Eigen::Vector3d(-2, 1, 3), 1e-12));
+  EXPECT_EQ(moved.find_field("approach_xy")->values[0], 7.0);
+  // Two of three are something else.
+  std::erase_if(cloud.fields, [](const auto& field) { return field.name == "vp_z"; });
+  EXPECT_EQ(libmap::transform_cloud(cloud, pose).find_field("vp_x")->values[0], 1.0);
+}
+
 TEST(PointCloudTest, TransformThereAndBack) {
   const PointCloud cloud = three_points();
   const libmap::Pose pose = libmap::make_pose_from_rpy({1e3, -2e3, 5}, {12, -34, 156});

@@ -274,6 +274,29 @@ TEST(MeshFiles, GlbHasYUp) {
   EXPECT_EQ(read_mesh(path).mesh.vertices, mesh.vertices);
 }
 
+// Mid grey, 188 of 255 in sRGB, is half the light; and every byte comes back.
+TEST(MeshFiles, GlbHasLinearColors) {
+  TriangleMesh mesh;
+  for (int n = 0; n < 256; ++n) {
+    mesh.vertices.emplace_back(n, n % 7, 0);
+    const auto byte = static_cast<std::uint8_t>(n);
+    mesh.vertex_colors.push_back({byte, static_cast<std::uint8_t>(255 - n), 188});
+  }
+  for (std::uint32_t n = 0; n < 254; ++n) mesh.triangles.push_back({n, n + 1, n + 2});
+  const fs::path path = scratch_folder() / "colors.glb";
+  write_mesh(path, mesh);
+  EXPECT_EQ(read_mesh(path).mesh.vertex_colors, mesh.vertex_colors);
+  // The blue of a vertex as float32 in the file: 0.50289 (IEC 61966-2-1).
+  const std::string bytes = read_text(path);
+  int near_half = 0;
+  for (std::size_t at = 0; at + 4 <= bytes.size(); at += 4) {
+    float value = 0;
+    std::memcpy(&value, bytes.data() + at, 4);
+    near_half += std::abs(value - 0.50289F) < 1e-4F ? 1 : 0;
+  }
+  EXPECT_GE(near_half, 256);
+}
+
 // A primitive without attributes, where assimp reads at address 0.
 TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
   const fs::path path = scratch_folder() / "mesh.glb";

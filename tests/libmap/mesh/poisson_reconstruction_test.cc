@@ -352,6 +352,19 @@ TEST(PoissonReconstruction, OptionsOutOfTheirRangesAreNamed) {
                                HasSubstr("deeper than 12")));
 }
 
+TEST(PoissonReconstruction, CellsLargerThanTheCloudAreRefused) {
+  PointCloud cloud;
+  for (int x = 0; x <= 20; ++x)
+    for (int y = 0; y <= 10; ++y) {
+      cloud.positions.emplace_back(0.05 * x, 0.05 * y, 3.0);
+      cloud.normals.emplace_back(0, 0, 1);
+    }
+  const Error error = graspmap_test::error_of([&] { reconstruct_surface(cloud, cells_of(1.01)); });
+  EXPECT_EQ(error.context().field, "cell_size_m");
+  EXPECT_EQ(error.context().bound, "<= 1 m");
+  EXPECT_LT(surface_area(reconstruct_surface(cloud, cells_of(0.1)).mesh), 1.1);
+}
+
 TEST(PoissonReconstruction, StandardOutputStaysClean) {
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
