@@ -69,7 +69,7 @@ HeaderLines read_lines(std::string_view text, PcdHeader& header) {
     ++header.data_line;
     if (line.empty() || line.front() == '#') continue;
     std::vector<std::string_view> words;
-    TextRows(line, 0, 1).next(words);
+    if (!TextRows(line, 0, 1).next(words)) continue;
     std::string key(words.front());
     const bool is_data = key == "DATA";
     if (!is_data && std::find(known.begin(), known.end(), key) == known.end())
