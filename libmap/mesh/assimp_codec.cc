@@ -445,6 +445,7 @@ std::string encode_model_by_assimp(const std::vector<ModelPart>& parts,
     copy_coordinates(part.texture_coordinates, *meshes.back());
     materials.push_back(make_material(part.page));
   }
+  textures.reserve(pictures.size());
   for (const EncodedPicture& picture : pictures) textures.push_back(make_texture(picture));
   const auto scene = scene_of(std::move(meshes), std::move(materials), true);
   scene->mTextures = hang(textures, scene->mNumTextures);

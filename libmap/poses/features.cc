@@ -146,6 +146,7 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   std::string key;
   if (cache.enabled()) {
     std::vector<Camera> depth_cameras;
+    depth_cameras.reserve(views.size());
     for (const CameraView& view : views) depth_cameras.push_back(view.depth_camera);
     key = feature_key(read, options);
     result.from_cache = cache.read(key, depth_cameras, frame);

@@ -61,6 +61,8 @@ NodePairs pair_by_node(const Trajectory& trajectory, const PoseGraph& graph) {
 NodePairs pair_by_time(const Trajectory& trajectory, const std::vector<const GraphNode*>& nodes) {
   std::vector<double> node_stamps;
   std::vector<double> pose_stamps;
+  node_stamps.reserve(nodes.size());
+  pose_stamps.reserve(trajectory.size());
   for (const GraphNode* node : nodes) node_stamps.push_back(node->stamp_s);
   for (const TrajectoryPose& pose : trajectory) pose_stamps.push_back(pose.stamp_s);
   NodePairs pairs;
