@@ -57,10 +57,10 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
 
 template <typename Facts>
 void carry_facts(const Facts& source, Facts& facts) {
-  for (const auto& [name, value] : source) {
+  for (const auto& fact : source) {
     const bool is_known = std::any_of(facts.begin(), facts.end(),
-                                      [&](const auto& fact) { return fact.first == name; });
-    if (!is_known) facts.emplace_back(name, value);
+                                      [&](const auto& known) { return known.first == fact.first; });
+    if (!is_known) facts.push_back(fact);
   }
 }
 

@@ -61,9 +61,8 @@ libmap::Bounds3d box_of(const std::string& text) {
   const std::vector<double> n = std::count(text.begin(), text.end(), ',') == 5
                                     ? graspmap_tools::parse_numbers(text, 6, "--box", bound)
                                     : graspmap_tools::parse_numbers(text, 4, "--box", bound);
-  const libmap::Bounds3d box = n.size() == 6
-                                   ? libmap::Bounds3d{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}
-                                   : libmap::Bounds3d{{n[0], n[1], -open}, {n[2], n[3], open}};
+  libmap::Bounds3d box = n.size() == 6 ? libmap::Bounds3d{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}}
+                                       : libmap::Bounds3d{{n[0], n[1], -open}, {n[2], n[3], open}};
   if (!(box.min.array() < box.max.array()).all())
     throw libmap::Error("the box is inside out or empty",
                         {.field = "--box", .value = text, .bound = bound});

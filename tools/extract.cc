@@ -51,7 +51,10 @@ struct NodeImages {
 void keep_files(const libmap::RtabmapDatabase& database, NodeImages& images) {
   libmap::FrameBlobs blobs = database.read_blobs(images.frame.node);
   images.stored.color = std::move(blobs.image);
-  if (!images.frame.right.empty()) images.stored.right = std::move(blobs.depth);
+  if (!images.frame.right.empty()) {
+    images.stored.right = std::move(blobs.depth);
+    return;
+  }
   if (images.frame.depth.empty()) return;
   const auto info = libmap::read_depth_info(blobs.depth);
   if (info && info->format == libmap::DepthFormat::png16)

@@ -49,7 +49,7 @@ void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
 
 // Appends a column; one that the points already have (a verdict named "graspable") keeps its name.
 void add_column(libmap::Table& table, std::string name) {
-  while (table.find_column(name)) name = "map_" + name;
+  while (table.find_column(name)) name.insert(0, "map_");
   table.columns.push_back(std::move(name));
 }
 

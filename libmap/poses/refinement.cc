@@ -271,6 +271,7 @@ std::vector<GraphLink> Refinement::with_features(const std::vector<FeatureLink>&
 void Refinement::join_new(const std::vector<FeatureLink>& links) {
   if (parts_.size() < 2) return;
   std::vector<PoseLink> between;
+  between.reserve(links.size());
   for (const FeatureLink& link : links) between.push_back(link.link);
   parts_ = join_parts(poses_, parts_, between);
 }

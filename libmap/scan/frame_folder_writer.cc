@@ -83,7 +83,7 @@ FrameFolderWriter::FrameFolderWriter(fs::path folder) : folder_(std::move(folder
 
 std::string FrameFolderWriter::write_image(const char* folder, int node, const std::string& bytes) {
   const ImageFormat format = image_format(bytes).value_or(ImageFormat::png);
-  const std::string name = std::string(folder) + "/" + padded(node) + file_extension(format);
+  std::string name = std::string(folder) + "/" + padded(node) + file_extension(format);
   write_text(folder_ / name, bytes);
   return name;
 }
@@ -94,7 +94,7 @@ std::string FrameFolderWriter::write_camera(const Camera& camera) {
   const auto known = cameras_.find(key);
   if (known != cameras_.end()) return known->second;
   const std::string stem = "camera_" + std::to_string(cameras_.size() + 1);
-  const std::string name = std::string(files::calibration_folder) + "/" + stem + ".yaml";
+  std::string name = std::string(files::calibration_folder) + "/" + stem + ".yaml";
   write_text(folder_ / name, to_yaml({.name = stem, .camera = camera}));
   cameras_.emplace(key, name);
   return name;
@@ -158,7 +158,8 @@ std::size_t FrameFolderWriter::write_associations(const PoseGraph& graph) const 
     if (place == files_.end() || place->second.color.empty() || place->second.depth.empty())
       continue;
     const std::string stamp = stamp_text(node.stamp_s);
-    text += stamp + " " + place->second.color + " " + stamp + " " + place->second.depth + "\n";
+    for (const std::string& word : {stamp, place->second.color, stamp}) (text += word) += ' ';
+    (text += place->second.depth) += '\n';
     ++count;
   }
   write_text(folder_ / files::associations, text);

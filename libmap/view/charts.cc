@@ -133,6 +133,7 @@ struct PixelAxis {
   }
   std::vector<double> pixels(const std::vector<double>& values) const {
     std::vector<double> result;
+    result.reserve(values.size());
     for (const double value : values) result.push_back(pixel(value));
     return result;
   }
