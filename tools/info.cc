@@ -124,11 +124,18 @@ Json surface_json(const libmap::MeshReport& report) {
          report.self_intersections_counted ? Json(report.self_intersections) : Json(nullptr)}}}};
 }
 
+libmap::MeshReport report_of(const libmap::TriangleMesh& mesh, const InfoOptions& options) {
+  try {
+    return libmap::report_mesh(mesh, {.self_intersections = !options.quick});
+  } catch (const libmap::Error& error) {
+    throw error.in_file(options.file);
+  }
+}
+
 Json mesh_json(const InfoOptions& options) {
   const libmap::MeshReadResult read = libmap::read_mesh(options.file);
   const libmap::TriangleMesh& mesh = read.mesh;
-  const libmap::MeshReport report =
-      libmap::report_mesh(mesh, {.self_intersections = !options.quick});
+  const libmap::MeshReport report = report_of(mesh, options);
   return {{"kind", "mesh"},
           {"file", file_json(read.info)},
           {"vertices", mesh.vertices.size()},

@@ -105,7 +105,7 @@ class Results {
 void add_timings(const std::string& stage,
                  const std::vector<std::pair<std::string, double>>& timings_s, Run& run) {
   for (const auto& [name, seconds] : timings_s) {
-    run.manifest().timings_s.emplace_back(stage + ": " + name, seconds);
+    run.manifest().timings_s.emplace_back(fmt::format("{}: {}", stage, name), seconds);
     run.detail(fmt::format("{}: {}: {:.3f} s", stage, name, seconds));
   }
 }

@@ -144,6 +144,8 @@ TEST(Info, MapSaysWhatMadeIt) {
 }
 
 TEST(Info, BadInput) {
+  graspmap_test::write_text(scratch("far.off"), "OFF\n3 1 0\n0 0 0\n1 0 0\n0 1e32 0\n3 0 1 2\n");
+  EXPECT_TRUE(bad_input(graspmap({"info", "far.off"}), {"far.off: vertex 2", "1e30 m"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "none.pcd"}), {"none.pcd: no such file"}));
   graspmap_test::write_text(scratch("a.txt"), "hello");
   EXPECT_TRUE(bad_input(graspmap({"info", "a.txt"}), {"a.txt"}));
