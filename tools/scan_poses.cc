@@ -52,7 +52,8 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
          .bound = "auto, odometry, stored, ground-truth or a file"});
   libmap::ImportedPoses imported = libmap::import_poses(file, scan, poses.file);
   run.add_input(libmap::file_of_trajectory(file));
-  for (const std::string& warning : imported.warnings) run.warn(file + ": " + warning);
+  for (const std::string& warning : imported.warnings)
+    run.warn(fmt::format("{}: {}", file, warning));
   run.say(fmt::format("{} of {} poses belong to nodes of the scan",
                       imported.poses_in_file - imported.trajectory.foreign,
                       imported.poses_in_file));
@@ -135,7 +136,7 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool stri
   for (const std::string& warning : scan->warnings()) {
     if (strict && !libmap::is_about_unknown_part(warning))
       throw libmap::Error(warning).in_file(path);
-    run.warn(path + ": " + warning);
+    run.warn(fmt::format("{}: {}", path, warning));
   }
   return scan;
 }

@@ -134,7 +134,7 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape
       options.ground == Ground::zero ||
       (options.ground == Ground::automatic && graspmap_tools::site_from_map_of(options.file));
   check.ground = zero ? "z = 0" : "fitted plane";
-  const libmap::HeightFunction at_zero = [](const Eigen::Vector2d&) { return 0.0; };
+  libmap::HeightFunction at_zero = [](const Eigen::Vector2d&) { return 0.0; };
   if (zero) return at_zero;
   check.plane = run.timed("ground", [&] { return fit_ground(shape, options.plane); });
   const libmap::Pose level_from_map = libmap::level_from_map(*check.plane);
