@@ -134,26 +134,31 @@ void add_curves(const libmap::Table& table, const ChartOptions& options, const s
   }
 }
 
-// An end that is not given is the data's.
-void set_range(const std::string& low, const std::string& high, const char* low_name,
-               const char* high_name, std::pair<double, double> found, libmap::ChartAxis& axis) {
-  const auto number = [](const std::string& text, const char* name, double automatic) {
-    if (text == "auto") return automatic;
-    const auto value = libmap::parse_double(text);
-    if (!value || !std::isfinite(*value))
-      throw libmap::Error("not an end of an axis",
-                          {.field = name, .value = text, .bound = "auto or a number"});
-    return *value;
-  };
-  found = {number(low, low_name, found.first), number(high, high_name, found.second)};
-  const bool low_alone = high == "auto";
-  if (!(found.first < found.second))
+std::optional<double> end_of_axis(const std::string& text, const char* name) {
+  if (text == "auto") return std::nullopt;
+  const auto value = libmap::parse_double(text);
+  if (!value || !std::isfinite(*value))
+    throw libmap::Error("not an end of an axis",
+                        {.field = name, .value = text, .bound = "auto or a number"});
+  return value;
+}
+
+// range_with(values) is that of the data and of the end that is given; the other end is its.
+template <typename Range>
+std::pair<double, double> range_of(const std::string& low_text, const std::string& high_text,
+                                   const char* low_name, const char* high_name,
+                                   const Range& range_with) {
+  const std::optional<double> low = end_of_axis(low_text, low_name);
+  const std::optional<double> high = end_of_axis(high_text, high_name);
+  if (low && high && !(*low < *high))
     throw libmap::Error("the axis ends before it begins",
-                        {.field = low_alone ? low_name : high_name,
-                         .value = low_alone ? low : high,
-                         .bound = (low_alone ? "< " : "> ") +
-                                  libmap::to_text(low_alone ? found.second : found.first)});
-  axis.range = found;
+                        {.field = high_name, .value = high_text, .bound = "> " + low_text});
+  std::vector<double> ends;
+  if (low) ends.push_back(*low);
+  if (high) ends.push_back(*high);
+  const std::pair<double, double> found = range_with(ends);
+  const std::pair<double, double> range = {low.value_or(found.first), high.value_or(found.second)};
+  return range.first < range.second ? range : found;
 }
 
 libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) {
@@ -178,8 +183,10 @@ libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) 
   } catch (const libmap::Error& error) {
     throw error.in_file(table.file);
   }
-  set_range(options.x_min, options.x_max, "--x-min", "--x-max", x_range(chart), chart.x_axis);
-  set_range(options.y_min, options.y_max, "--y-min", "--y-max", y_range(chart), chart.y_axis);
+  chart.x_axis.range = range_of(options.x_min, options.x_max, "--x-min", "--x-max",
+                                [&](const auto& ends) { return x_range(chart, ends); });
+  chart.y_axis.range = range_of(options.y_min, options.y_max, "--y-min", "--y-max",
+                                [&](const auto& ends) { return y_range(chart, ends); });
   return chart;
 }
 

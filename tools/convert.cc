@@ -205,7 +205,6 @@ void convert_poses(const ConvertOptions& options, Run& run) {
 
 void convert(const ConvertOptions& options, Run& run) {
   const bool poses = holds_poses(options);
-  if (!poses) libmap::format_of(options.output);
   if (!poses) refuse_ignored(options);
   run.claim_output(options.output, {options.input});
   if (poses)

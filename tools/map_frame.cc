@@ -65,6 +65,12 @@ void require_same_terrain_frame(const libmap::Manifest& points, const std::strin
                          .bound = "input, terrain or map"});
 }
 
+void carry_transform(const std::string& file, const char* name, Run& run) {
+  const auto manifest = manifest_of(file);
+  const libmap::Pose* transform = manifest ? manifest->find_transform(name) : nullptr;
+  if (transform != nullptr) run.manifest().transforms.emplace_back(name, *transform);
+}
+
 }  // namespace
 
 PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
@@ -99,19 +105,11 @@ bool is_from_true_frame(const std::string& file) {
 }
 
 void carry_truth_transform(const std::string& input, Run& run) {
-  const auto manifest = manifest_of(input);
-  const libmap::Pose* truth_from_poses =
-      manifest ? manifest->find_transform(truth_from_poses_name) : nullptr;
-  if (truth_from_poses != nullptr)
-    run.manifest().transforms.emplace_back(truth_from_poses_name, *truth_from_poses);
+  carry_transform(input, truth_from_poses_name, run);
 }
 
 void carry_terrain_transform(const std::string& map, Run& run) {
-  const auto manifest = manifest_of(map);
-  const libmap::Pose* terrain_from_input =
-      manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
-  if (terrain_from_input != nullptr)
-    run.manifest().transforms.emplace_back(terrain_from_input_name, *terrain_from_input);
+  carry_transform(map, terrain_from_input_name, run);
 }
 
 void carry_transforms(const std::string& input, Run& run) {

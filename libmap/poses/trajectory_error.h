@@ -22,7 +22,8 @@ struct AbsoluteTrajectoryError : TrajectoryError {
   Pose truth_from_estimate = Pose::Identity();  // the alignment that was used
 };
 
-// Positions after the rigid alignment that fits them best (Umeyama 1991, without scale); rotations
+// Positions after the rigid alignment that fits them best (Umeyama 1991, without scale), or, where
+// they lie on a line, the one that fits the rotations best (their chordal mean); rotations
 // after the same alignment. Poses are paired by node, or by time (within 20 ms) where nodes are not
 // known. Throws Error if fewer than 3 pairs are there.
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,

@@ -94,9 +94,8 @@ std::pair<double, double> range_around(const std::vector<double>& values) {
 
 }  // namespace
 
-std::pair<double, double> x_range(const Chart& chart) {
+std::pair<double, double> x_range(const Chart& chart, std::vector<double> values) {
   if (chart.x_axis.range) return *chart.x_axis.range;
-  std::vector<double> values;
   for (const ChartCurve& curve : chart.curves)
     values.insert(values.end(), curve.x.begin(), curve.x.end());
   for (const ChartHistogram& histogram : chart.histograms) {
@@ -107,9 +106,8 @@ std::pair<double, double> x_range(const Chart& chart) {
   return range_around(values);
 }
 
-std::pair<double, double> y_range(const Chart& chart) {
+std::pair<double, double> y_range(const Chart& chart, std::vector<double> values) {
   if (chart.y_axis.range) return *chart.y_axis.range;
-  std::vector<double> values;
   for (const ChartCurve& curve : chart.curves)
     values.insert(values.end(), curve.y.begin(), curve.y.end());
   for (const ChartHistogram& histogram : chart.histograms) {

@@ -55,9 +55,9 @@ struct Chart {
   void check() const;
 };
 
-// What an axis shows, low and high: its range, or round numbers around the data.
-std::pair<double, double> x_range(const Chart& chart);
-std::pair<double, double> y_range(const Chart& chart);
+// What an axis shows, low and high: its range, or round numbers around the data and `values`.
+std::pair<double, double> x_range(const Chart& chart, std::vector<double> values = {});
+std::pair<double, double> y_range(const Chart& chart, std::vector<double> values = {});
 
 struct ChartSize {
   int width_px = 900;

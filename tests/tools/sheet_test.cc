@@ -123,7 +123,7 @@ TEST(Chart, OneEndOfAnAxis) {
     ASSERT_TRUE(succeeded(chart("t.csv", {end, value})));
     EXPECT_TRUE(content("c.svg") != whole) << end;
   }
-  EXPECT_TRUE(bad_input(chart("t.csv", {"--x-min", "9"}), {"--x-min is 9", "< 2"}));
+  EXPECT_TRUE(bad_input(chart("t.csv", {"--x-min", "9", "--x-max", "2"}), {"--x-max is 2", "> 9"}));
   EXPECT_TRUE(bad_input(chart("t.csv", {"--y-max", "inf"}), {"--y-max is inf"}));
 }
 
