@@ -76,7 +76,7 @@ Box box_of(const Bounds3d& bounds, double margin) {
 class NearestPairs {
  public:
   NearestPairs(const std::vector<PointSet>& sets, double reach_m)
-      : sets_(sets), reach_m_(reach_m * tolerance) {
+      : sets_(sets), given_reach_m_(reach_m), reach_m_(reach_m * tolerance) {
     std::vector<std::pair<Box, std::uint32_t>> boxes;
     for (std::uint32_t s = 0; s < sets.size(); ++s) boxes.emplace_back(box_of(sets[s].box, 0.0), s);
     tree_ = BoxTree(boxes);
@@ -91,7 +91,7 @@ class NearestPairs {
       pairs += smaller[s].size();
       if (pairs > most_links)
         throw libmap::Error("joins more than 10 million pairs of regions",
-                            {.field = "stride_m", .value = libmap::to_text(reach_m_)});
+                            {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
     libmap::parallel_for(sets_.size(), 8, [&](std::size_t begin, std::size_t end) {
       for (std::size_t s = begin; s < end; ++s)
@@ -155,6 +155,7 @@ class NearestPairs {
   }
 
   const std::vector<PointSet>& sets_;
+  double given_reach_m_;
   double reach_m_;
   BoxTree tree_;
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <string>
 #include <tuple>
 #include <utility>
 
@@ -46,7 +47,10 @@ class TilePoints {
       const Voxel before = voxel(n - 1);
       if (here <= before) throw libmap::Error("a tile's points are not in order");
       if (std::int64_t{here.i} - first_i_ > widest_tile)
-        throw libmap::Error("a tile is wider than any can be");
+        throw libmap::Error("a tile is wider than any can be",
+                            {.field = "i",
+                             .value = std::to_string(here.i),
+                             .bound = "<= " + std::to_string(first_i_ + widest_tile)});
       if (here.i != before.i) rows_.resize(static_cast<std::size_t>(here.i - first_i_) + 1, n);
     }
     rows_.push_back(tile_.size());

@@ -59,7 +59,10 @@ TerrainPiece piece_from(const Json& json) {
 
 TilePlan plan_from(const Json& json, const std::string& file) {
   if (json.at("format") != plan_format || json.at("version") != plan_version)
-    throw libmap::Error("is not of this format and version");
+    throw libmap::Error("is not of this format and version",
+                        {.field = "format and version",
+                         .value = json.at("format").dump() + ", " + json.at("version").dump(),
+                         .bound = Json(plan_format).dump() + ", " + std::to_string(plan_version)});
   TilePlan plan;
   plan.index = index_from(json.at("index"), file);
   plan.key = plan.index.key;

@@ -392,11 +392,14 @@ BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
     band.seen = std::min(band.seen, side.seen);
   }
   corners = corners_of(sides);
-  for (std::size_t n = 0; n < 4; ++n)
-    if (!corners[n].allFinite() ||
-        (corners[(n + 1) % 4] - corners[n]).dot(sides[n].along()) < options.min_side_m)
+  for (std::size_t n = 0; n < 4; ++n) {
+    const double side_m = (corners[(n + 1) % 4] - corners[n]).dot(sides[n].along());
+    if (!corners[n].allFinite() || side_m < options.min_side_m)
       throw Error("the area inside the white band is too small",
-                  {.field = "side", .bound = ">= " + to_text(options.min_side_m) + " m"});
+                  {.field = "side",
+                   .value = to_text(static_cast<float>(side_m)) + " m",
+                   .bound = ">= " + to_text(options.min_side_m) + " m"});
+  }
   band.corners.assign(corners.begin(), corners.end());
   return band;
 }

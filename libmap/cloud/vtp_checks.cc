@@ -3,7 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
@@ -102,7 +104,7 @@ void require_sane_tag(const XmlTag& tag, double max_count) {
     require_sane(count && *count >= 0 && static_cast<double>(*count) <= limit, tag, name);
   }
   if (tag.name == "VTKFile") require_sane(tag.attribute("type") == "PolyData", tag, "type");
-  if (tag.name != "DataArray") return;
+  if (tag.name != "DataArray" && tag.name != "Array") return;
   const std::string_view format = tag.attribute("format");
   require_sane(format == "ascii" || format == "binary" || format == "appended", tag, "format");
 }
@@ -147,15 +149,25 @@ class ArrayChecks {
     constexpr std::array<std::string_view, 8> parts = {
         "FieldData", "PointData", "CellData", "Points", "Verts", "Lines", "Strips", "Polys"};
     if (tag.name == "VTKFile") layout_ = layout_of(tag);
-    if (tag.name == "Piece") piece_ = tag;
+    if (tag.name == "Piece") {
+      piece_ = tag;
+      points_ += points_of_piece();
+      cells_ += cells_of_piece();
+    }
     if (tag.name == "Piece" || std::find(parts.begin(), parts.end(), tag.name) != parts.end()) {
       require_sane_cells();
       part_ = tag.name;
+      names_.clear();
     }
   }
 
+  std::uint64_t points() const { return points_; }  // of all pieces so far
+
   // `behind` is where the array's tag ends.
   void check(const XmlTag& array, std::size_t behind) {
+    add_name(array);
+    if (array.name == "Array" && array.attribute("type") == "String")
+      return require_texts(array, behind);
     const StoredType type = type_of(array);
     const std::uint64_t number_bytes = size_of(type);
     const bool is_cells =
@@ -179,6 +191,19 @@ class ArrayChecks {
     if (is_offsets) last_offset_ = last_of(numbers_of_block(place, type));
   }
 
+  // VTK leaves the rest of an array as the memory was.
+  void require_whole_arrays() const {
+    for (const auto& [place, rows] : rows_) {
+      const std::uint64_t all = place.first == "PointData" ? points_ : cells_;
+      if (rows != all)
+        throw Error("an array is not in every piece",
+                    {.file = {},
+                     .field = "rows of array '" + quotable(place.second) + "'",
+                     .value = std::to_string(rows),
+                     .bound = std::to_string(all)});
+    }
+  }
+
   // VTK takes memory for as many corners as the last offset says.
   void require_sane_cells() {
     if (last_offset_ > corners_)
@@ -187,16 +212,69 @@ class ArrayChecks {
   }
 
  private:
-  bool is_zero(std::string_view count) const {
-    return parse_integer(piece_.attribute(count)).value_or(0) == 0;
+  static std::uint64_t count_of(const XmlTag& tag, std::string_view count) {
+    return static_cast<std::uint64_t>(
+        std::max<std::int64_t>(0, parse_integer(tag.attribute(count)).value_or(0)));
   }
+  std::uint64_t points_of_piece() const { return count_of(piece_, "NumberOfPoints"); }
+  std::uint64_t cells_of_piece() const {
+    return count_of(piece_, "NumberOfVerts") + count_of(piece_, "NumberOfLines") +
+           count_of(piece_, "NumberOfStrips") + count_of(piece_, "NumberOfPolys");
+  }
+  std::uint64_t rows_of_part() const {
+    return part_ == "PointData" ? points_of_piece() : cells_of_piece();
+  }
+  // VTK finds arrays by their names, and takes the first of a name for the second.
+  void add_name(const XmlTag& array) {
+    if (part_ == "FieldData") return;
+    const std::string_view name = array.attribute("Name");
+    if (!names_.insert(name).second)
+      throw Error(
+          "two arrays of one name",
+          {.file = {}, .field = "array '" + quotable(name) + "'", .value = {}, .bound = {}});
+    if (part_ == "PointData" || part_ == "CellData") rows_[{part_, name}] += rows_of_part();
+  }
+  bool is_zero(std::string_view count) const { return count_of(piece_, count) == 0; }
   bool is_empty(const XmlTag& array) const {
     if (part_ == "FieldData") return array.attribute("NumberOfTuples") == "0";
     if (part_ == "Points" || part_ == "PointData") return is_zero("NumberOfPoints");
-    if (part_ == "CellData")
-      return is_zero("NumberOfVerts") && is_zero("NumberOfLines") && is_zero("NumberOfStrips") &&
-             is_zero("NumberOfPolys");
+    if (part_ == "CellData") return cells_of_piece() == 0;
     return is_zero("NumberOf" + std::string(part_));
+  }
+  // VTK reads on behind the last byte until it has found as many texts as there are to be.
+  void require_texts(const XmlTag& array, std::size_t behind) const {
+    const bool is_data = part_ == "PointData" || part_ == "CellData";
+    require_sane(is_data || part_ == "FieldData", array, "type");
+    const std::uint64_t rows = is_data ? rows_of_part() : count_of(array, "NumberOfTuples");
+    const std::uint64_t texts =
+        rows * std::max<std::uint64_t>(1, count_of(array, "NumberOfComponents"));
+    if (texts == 0) return;
+    const std::string bytes = bytes_of_texts(array, behind);
+    const auto found = static_cast<std::uint64_t>(std::count(bytes.begin(), bytes.end(), '\0'));
+    if (found != texts || bytes.back() != '\0')
+      throw Error("an array of texts holds another number of them than its data",
+                  {.file = {},
+                   .field = "array '" + quotable(array.attribute("Name")) + "'",
+                   .value = std::to_string(found),
+                   .bound = std::to_string(texts)});
+  }
+  // Each text ends with a zero.
+  std::string bytes_of_texts(const XmlTag& array, std::size_t behind) const {
+    if (array.attribute("format") == "binary")
+      return unpack_block({text_behind(behind), true}, layout_, 1);
+    if (array.attribute("format") == "appended")
+      return unpack_block(appended_place(array), layout_, 1);
+    std::string bytes;
+    std::vector<std::string_view> words;
+    TextRows rows(text_behind(behind), 0, 1);
+    while (rows.next(words))
+      for (const std::string_view word : words) {
+        const std::optional<std::int64_t> byte = parse_integer(word);
+        if (!byte || *byte < 0 || *byte > 255)
+          throw Error("an array of texts holds something that is no byte");
+        bytes += static_cast<char>(*byte);
+      }
+    return bytes;
   }
   std::string_view text_behind(std::size_t behind) const {
     const std::string_view text = xml_.substr(std::min(behind, xml_.size()));
@@ -249,13 +327,17 @@ class ArrayChecks {
   BlockLayout layout_;
   XmlTag piece_;
   std::string_view part_;
+  std::set<std::string_view> names_;                                             // in this part
+  std::map<std::pair<std::string_view, std::string_view>, std::uint64_t> rows_;  // part, array
+  std::uint64_t points_ = 0;
+  std::uint64_t cells_ = 0;
   std::uint64_t corners_ = 0;
   std::uint64_t last_offset_ = 0;
 };
 
 }  // namespace
 
-void require_sane_vtp(std::string_view bytes) {
+std::uint64_t require_sane_vtp(std::string_view bytes) {
   if (bytes.empty()) throw Error("is empty");
   const std::string_view xml = bytes.substr(0, bytes.find("<AppendedData"));
   if (xml.find("<VTKFile") == std::string_view::npos) throw Error("not a VTK XML file");
@@ -270,9 +352,11 @@ void require_sane_vtp(std::string_view bytes) {
   while (const std::optional<XmlTag> tag = next_tag(xml, at)) {
     require_sane_tag(*tag, max_count);
     checks.enter(*tag);
-    if (tag->name == "DataArray") checks.check(*tag, at);
+    if (tag->name == "DataArray" || tag->name == "Array") checks.check(*tag, at);
   }
   checks.require_sane_cells();
+  checks.require_whole_arrays();
+  return checks.points();
 }
 
 }  // namespace libmap

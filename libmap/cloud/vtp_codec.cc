@@ -228,7 +228,7 @@ void require_cells(vtkCellArray* cells, vtkIdType points, const std::string& wha
 vtkSmartPointer<vtkPolyData> read_poly_data(const std::string& bytes) {
   try {
     const VtkMessages messages;
-    require_sane_vtp(bytes);
+    const std::uint64_t points = require_sane_vtp(bytes);
     vtkNew<vtkXMLPolyDataReader> reader;
     reader->ReadFromInputStringOn();
     reader->SetInputString(bytes);
@@ -236,6 +236,12 @@ vtkSmartPointer<vtkPolyData> read_poly_data(const std::string& bytes) {
     messages.require_none();
     vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
     if (data == nullptr || reader->GetErrorCode() != 0) throw Error("VTK cannot read it");
+    // Of some files VTK reads nothing, without a word.
+    if (static_cast<std::uint64_t>(data->GetNumberOfPoints()) != points)
+      throw Error("VTK cannot read all of it", {.file = {},
+                                                .field = "points",
+                                                .value = std::to_string(data->GetNumberOfPoints()),
+                                                .bound = std::to_string(points)});
     return data;
   } catch (const std::bad_alloc&) {
     throw Error("a block of data claims more than the memory holds");
@@ -246,8 +252,6 @@ vtkSmartPointer<vtkPolyData> read_poly_data(const std::string& bytes) {
 
 void require_sane_data(vtkPolyData& data) {
   const vtkIdType points = data.GetNumberOfPoints();
-  if (points > 0 && data.GetPoints()->GetData()->GetNumberOfComponents() != 3)
-    throw Error("the points have not three coordinates");
   require_cells(data.GetVerts(), points, "vertex cells");
   require_cells(data.GetLines(), points, "lines");
   require_cells(data.GetPolys(), points, "polygons");

@@ -42,11 +42,13 @@ int open_folder(const char* path) {
 bool put_in_place(const fs::path& temporary, const fs::path& final_path) {
   if (renameat2(AT_FDCWD, temporary.c_str(), AT_FDCWD, final_path.c_str(), RENAME_EXCHANGE) == 0)
     return true;
-  if (errno != ENOENT && errno != EINVAL && errno != ENOSYS)
-    throw system_failure(final_path, "cannot be put in place", errno);
-  // Nothing is there, or the file system cannot exchange.
+  const int exchange_code = errno;
+  if (exchange_code != ENOENT && exchange_code != EINVAL && exchange_code != ENOSYS)
+    throw system_failure(final_path, "cannot be put in place", exchange_code);
+  // Nothing is there, or the temporary is gone, and the earlier folder stays; or the file system
+  // cannot exchange.
   std::error_code code;
-  fs::remove_all(final_path, code);
+  if (exchange_code != ENOENT) fs::remove_all(final_path, code);
   if (!code) fs::rename(temporary, final_path, code);
   if (code) throw system_failure(final_path, "cannot be put in place", code.value());
   return false;

@@ -419,11 +419,12 @@ BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
                                      const std::vector<GraphComponent>& components,
                                      const BundleAdjustmentOptions& options,
                                      const std::vector<FeatureTrack>& system_tracks) {
-  if (!(options.robust_scale > 0.0) || options.max_iterations < 1)
-    throw Error("a bundle cannot be adjusted so", {.file = {},
-                                                   .field = "robust_scale",
-                                                   .value = to_text(options.robust_scale),
-                                                   .bound = describe(positive)});
+  const auto fail = [](const char* field, double value, const Range& range) {
+    throw Error("a bundle cannot be adjusted so",
+                {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
+  };
+  if (!(options.robust_scale > 0.0)) fail("robust_scale", options.robust_scale, positive);
+  if (options.max_iterations < 1) fail("max_iterations", options.max_iterations, {1.0});
   return Adjustment(frames, tracks, map_from_base, options).run(links, components, system_tracks);
 }
 

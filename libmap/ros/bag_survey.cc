@@ -108,7 +108,8 @@ BagSurvey survey_bag(const std::filesystem::path& bag,
   if (!transform_topic.empty()) requests.push_back({transform_topic});
   read_bag(bag, requests, [&](const BagMessage& message) {
     const std::string& topic = message.topic.name;
-    if (!transform_topic.empty() && topic == transform_topic)
+    if (!transform_topic.empty() && topic == transform_topic &&
+        message.topic.md5sum == ros_message::md5sum_of<ros_message::TFMessage>())
       take_transforms(message, survey.transforms);
     for (SurveyedImages& images : survey.images) {
       if (topic == images.topic) take_image(message, images);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <utility>
@@ -37,10 +38,11 @@ StoredType type_of(const PointField& field) {
                                .bound = "1 to 8"});
 }
 
-std::uint8_t number_of(StoredType type) {
-  for (const auto& [number, known] : field_types)
-    if (known == type) return number;
-  throw Error("PointCloud2 has no numbers of 64 bits but doubles");
+// Each ScalarType is among them.
+std::uint8_t number_of(ScalarType type) {
+  return std::find_if(std::begin(field_types), std::end(field_types),
+                      [&](const auto& known) { return known.second == stored_as(type); })
+      ->first;
 }
 
 Error does_not_fit(const std::string& field, std::uint64_t value, std::uint64_t least) {
@@ -127,8 +129,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
     has_color = has_color || is_color;
     field.name = ros_message::to_ros(column.name);
     field.offset = static_cast<std::uint32_t>(offset);
-    field.datatype =
-        is_color ? std::uint8_t{PointField::FLOAT32} : number_of(stored_as(column.type));
+    field.datatype = is_color ? std::uint8_t{PointField::FLOAT32} : number_of(column.type);
     field.count = 1;
     message.fields.push_back(field);
     offset += size_of(stored_as(column.type));

@@ -113,9 +113,11 @@ DepthMessageImage decode_compressed(const ros_message::CompressedImage& message,
     throw Error("only PNG is read", {.file = {}, .field = "format", .value = format});
   CompressionHeader header;
   if (message.data.size() < sizeof header)
-    throw Error(
-        "its data end too early",
-        {.file = {}, .field = "data", .value = std::to_string(message.data.size()) + " bytes"});
+    throw Error("its data end too early",
+                {.file = {},
+                 .field = "data",
+                 .value = std::to_string(message.data.size()) + " bytes",
+                 .bound = ">= " + std::to_string(sizeof header) + " bytes"});
   std::memcpy(&header, message.data.data(), sizeof header);
   const std::string_view png(reinterpret_cast<const char*>(message.data.data()) + sizeof header,
                              message.data.size() - sizeof header);

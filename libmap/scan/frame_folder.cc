@@ -44,9 +44,11 @@ int integer_in(const Table& table, std::size_t row, const char* column, int miss
   const std::string cell = cell_of(table, row, column);
   if (cell.empty()) return missing;
   const std::optional<std::int64_t> value = parse_integer(cell);
-  if (!value || std::abs(*value) > std::numeric_limits<int>::max())
-    throw Error("not a whole number",
-                {.file = table.file, .field = field_of(row, column), .value = cell});
+  if (!value || *value < std::numeric_limits<int>::min() ||
+      *value > std::numeric_limits<int>::max())
+    throw Error(
+        "not a whole number",
+        {.file = table.file, .field = field_of(row, column), .value = cell, .bound = "of 32 bits"});
   return static_cast<int>(*value);
 }
 

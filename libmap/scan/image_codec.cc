@@ -161,7 +161,8 @@ std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int p
                                  &size, subsampling, quality, TJFLAG_ACCURATEDCT);
   const std::unique_ptr<unsigned char, decltype(&tjFree)> owner(buffer, &tjFree);
   if (result != 0)
-    throw Error(std::string("JPEG cannot be made: ") + tjGetErrorStr2(handle.get()), {},
+    throw Error(std::string("JPEG cannot be made: ") + tjGetErrorStr2(handle.get()),
+                {.file = {}, .field = "image size", .value = size_text(width, height)},
                 ErrorKind::failed);
   return std::string(reinterpret_cast<const char*>(buffer), size);
 }
@@ -289,7 +290,10 @@ std::string encode_png(const PngPixels& pixels) {
   const bool is_written = info != nullptr && encode_png_rows(sink, pixels, png, info);
   png_destroy_write_struct(&png, &info);
   if (!is_written)
-    throw Error(std::string("PNG cannot be made: ") + sink.message, {}, ErrorKind::failed);
+    throw Error(
+        std::string("PNG cannot be made: ") + sink.message,
+        {.file = {}, .field = "image size", .value = size_text(pixels.width, pixels.height)},
+        ErrorKind::failed);
   return std::move(sink.bytes);
 }
 

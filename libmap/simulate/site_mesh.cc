@@ -161,11 +161,9 @@ Solid part_of_ground(const Solid& solid, const RockSite& site) {
   for (std::size_t part = 1; part <= count; ++part) {
     if (part == ground || volumes[part] < 0.0) continue;
     const SiteRock& rock = site.rocks[static_cast<std::size_t>(labels[part]) - 1];
+    const std::string name = rock.name.empty() ? "" : " (" + rock.name + ")";
     throw Error("does not touch the ground",
-                {.file = {},
-                 .field = "rocks[" + std::to_string(labels[part] - 1) + "] (" + rock.name + ")",
-                 .value = {},
-                 .bound = {}});
+                {.field = "rocks[" + std::to_string(labels[part] - 1) + "]" + name});
   }
   return select(solid, [&, &owner = parts](std::size_t n) { return owner[n] == ground; });
 }

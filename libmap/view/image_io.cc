@@ -5,7 +5,9 @@
 #include <vtkPNGWriter.h>
 #include <vtkUnsignedCharArray.h>
 
+#include <algorithm>
 #include <cstring>
+#include <string>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
@@ -13,9 +15,18 @@
 namespace libmap {
 namespace {
 
+// libpng takes no more, and VTK leaves it to end the program by that.
+constexpr int largest_side = 1'000'000;
+
 void check(const ColorImage& image) {
   if (image.width <= 0 || image.height <= 0)
     throw Error("an image without pixels cannot be written");
+  if (std::max(image.width, image.height) > largest_side)
+    throw Error("too large for a PNG",
+                {.file = {},
+                 .field = "size",
+                 .value = std::to_string(image.width) + " x " + std::to_string(image.height),
+                 .bound = "at most " + std::to_string(largest_side) + " a side"});
   const std::size_t pixels =
       static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   if (image.pixels.size() != pixels)

@@ -1,5 +1,6 @@
 #include "libmap/view/offscreen.h"
 
+#include <vtkLogger.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
 #include <vtkOutputWindow.h>
@@ -44,14 +45,24 @@ vtkStandardNewMacro(QuietOutput);
 
 class QuietScope {
  public:
-  QuietScope() : former_(vtkOutputWindow::GetInstance()) { vtkOutputWindow::SetInstance(quiet_); }
-  ~QuietScope() { vtkOutputWindow::SetInstance(former_); }
+  QuietScope()
+      : former_(vtkOutputWindow::GetInstance()),
+        verbosity_before_(vtkLogger::GetCurrentVerbosityCutoff()) {
+    vtkOutputWindow::SetInstance(quiet_);
+    // VTK's log writes errors to the console beside the window.
+    vtkLogger::SetStderrVerbosity(vtkLogger::VERBOSITY_OFF);
+  }
+  ~QuietScope() {
+    vtkLogger::SetStderrVerbosity(verbosity_before_);
+    vtkOutputWindow::SetInstance(former_);
+  }
   QuietScope(const QuietScope&) = delete;
   QuietScope& operator=(const QuietScope&) = delete;
   const std::string& first_error() const { return quiet_->first_error(); }
 
  private:
   vtkSmartPointer<vtkOutputWindow> former_;
+  vtkLogger::Verbosity verbosity_before_;
   vtkNew<QuietOutput> quiet_;
 };
 

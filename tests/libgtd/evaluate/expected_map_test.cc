@@ -175,6 +175,8 @@ TEST(ExpectedMap, HostileTables) {
   EXPECT_THAT(of_text("region,x,y,z,to_x,to_y,to_z,radius,graspable,why,raduis\n"),
               HasSubstr("radius"));
   EXPECT_THAT(of_text("region,x,y,z,radius,graspable,why\na,0,0,0,1,1,\n"), HasSubstr("to_x"));
+  EXPECT_THAT(of_text("region,x,y,z,to_x,to_y,to_z,radius,graspable,why,y\n"),
+              HasSubstr("e.csv: y: stands twice"));
 }
 
 // Two verdicts on one place: balls, a ball on a segment, crossing and passing segments.

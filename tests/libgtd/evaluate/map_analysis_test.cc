@@ -94,6 +94,12 @@ TEST(VoxelMap, HostileMapsAreSaid) {
     cloud.find_field(name)->values[1] = cloud.find_field(name)->values[0];
   cloud.positions[1] = cloud.positions[0];
   EXPECT_EQ(field_of(cloud), "i, j, k");
+  cloud = graded_floor();
+  std::erase_if(cloud.fields, [](const auto& field) { return field.name == "i"; });
+  cloud.positions[17].x() = 1e9;
+  const libmap::Error far = error_of([&] { libgtd::voxel_map_of(cloud, {.lattice = lattice}); });
+  EXPECT_EQ(far.reason(), "a point lies too far off for voxels of this size");
+  EXPECT_EQ(far.context().field, "point 18");
   const PointCloud one = map_cloud({{3, 4, 5}}, [](const Voxel&) { return 1.0; });
   EXPECT_EQ(field_of(one), "voxel_size_m");
   EXPECT_EQ(libgtd::voxel_map_of(one, {.lattice = lattice}).size(), 1U);
@@ -197,6 +203,16 @@ TEST(MapAnalysis, BinsOutOfBounds) {
   EXPECT_EQ(field_of({.score_bin = 1e-7}), "score_bin");
   EXPECT_EQ(field_of({.height_bin_m = -1.0}), "height_bin_m");
   EXPECT_EQ(field_of({.slope_bin_deg = 1e-6}), "slope_bin_deg");
+}
+
+TEST(MapAnalysis, SurfaceOfAnotherMap) {
+  const VoxelMap map = libgtd::voxel_map_of(graded_floor());
+  for (const bool is_slope : {true, false}) {
+    libgtd::MapSurface surface = level_surface(map);
+    (is_slope ? surface.slope_deg : surface.area_m2).pop_back();
+    EXPECT_EQ(error_of([&] { libgtd::analyze_map(map, surface); }).reason(),
+              "the surface is of another map");
+  }
 }
 
 }  // namespace

@@ -205,6 +205,17 @@ TEST(MapChange, MapsApartAndOptionsOutOfBounds) {
                 .context()
                 .field,
             "match_distance_voxels");
+  const auto error_with = [&](const libgtd::MapChangeOptions& options) {
+    return error_of([&] { libgtd::compare_maps(map, level_surface(map), map, same, options); });
+  };
+  EXPECT_EQ(error_with({.height_bin_m = 0.0}).reason(), "no width of a bin");
+  EXPECT_EQ(error_with({.height_bin_m = 0.0}).context().field, "height_bin_m");
+  EXPECT_EQ(error_with({.slope_bin_deg = -1.0}).context().value, "-1");
+  EXPECT_EQ(error_with({.slope_bin_deg = std::nan("")}).context().field, "slope_bin_deg");
+  libgtd::MapSurface surface = level_surface(map);
+  surface.area_m2.pop_back();
+  EXPECT_EQ(error_of([&] { libgtd::compare_maps(map, surface, map, same); }).reason(),
+            "the surface is of another map");
 }
 
 }  // namespace

@@ -268,6 +268,24 @@ TEST(RegionReach, OptionsOutOfBounds) {
           .context()
           .field,
       "adjacency_voxels");
+  libgtd::MapSurface surface = level_surface(map);
+  surface.area_m2.pop_back();
+  EXPECT_EQ(error_of([&] { libgtd::find_regions(map, surface); }).reason(),
+            "the surface is of another map");
+}
+
+TEST(RegionReach, TooManyPairsWithinAStride) {
+  std::vector<Patch> patches;
+  for (int i = 0; i < 68; ++i)
+    for (int j = 0; j < 68; ++j) patches.push_back({2 * i, 2 * j});
+  const VoxelMap map = map_of(patches);
+  const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
+  ASSERT_EQ(regions.regions.size(), 68U * 68U);
+  const libmap::Error error =
+      error_of([&] { libgtd::find_reach(map, regions, {.stride_m = 2.5}); });
+  EXPECT_EQ(error.reason(), "joins more than 10 million pairs of regions");
+  EXPECT_EQ(error.context().field, "stride_m");
+  EXPECT_EQ(error.context().value, "2.5");
 }
 
 }  // namespace

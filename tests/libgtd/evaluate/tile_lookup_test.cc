@@ -222,6 +222,16 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
   };
   EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), nowhere, points); }).context().field,
             "k");
+  const auto wide = [&](std::size_t tile) {
+    PointCloud cloud = map.load(tile);
+    for (libmap::ScalarField& field : cloud.fields)
+      if (field.name == "i") field.values.back() = field.values.front() + 0x1p24 + 1.0;
+    return cloud;
+  };
+  const libmap::Error error = error_of([&] { libgtd::look_up_tiles(map.index(), wide, points); });
+  EXPECT_EQ(error.reason(), "a tile is wider than any can be");
+  EXPECT_EQ(error.context().field, "i");
+  EXPECT_EQ(std::stoll(error.context().value), std::stoll(error.context().bound.substr(3)) + 1);
   EXPECT_EQ(error_of([&] { libgtd::look_up_tiles(map.index(), load, points, {.radius_m = -1}); })
                 .context()
                 .field,

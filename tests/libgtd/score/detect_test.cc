@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "libgtd/tile_detection.h"
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
@@ -121,6 +122,21 @@ TEST(DetectionErrors, PointsInOnePlaceOrOnALineAreNoTerrain) {
     for (int n = 0; n < 50; ++n) cloud.positions.emplace_back(0.3 + 0.01 * n, 0.2, 0.1);
     error_of([&] { detect(cloud, options); });
   }
+}
+
+TEST(DetectionErrors, RadiiOfTooManyVoxels) {
+  const GripperMask mask = make_gripper_mask(gripper_named("scar-e"), {});
+  Scenario scenario;
+  scenario.curvature_radius_m = 1e7;
+  libmap::Error error = error_of([&] { halo_voxels(mask, scenario); });
+  EXPECT_EQ(error.reason(), "too large for voxels of this size");
+  EXPECT_EQ(error.context().field, "curvature_radius_m");
+  EXPECT_EQ(error.context().value, "1e+07");
+  scenario = {};
+  scenario.orientation = Orientation::surface;
+  scenario.normal_radius_m = 1e7;
+  error = error_of([&] { halo_voxels(mask, scenario); });
+  EXPECT_EQ(error.context().field, "normal_radius_m");
 }
 
 TEST(Detection, WhatLiesBelowTheZeroPlaneIsScoredButNoTarget) {

@@ -57,6 +57,29 @@ TEST(Merge, RefusesWhatIsNoMapAndVoxelsThatStandTwice) {
   error_of([&] { merge_map_clouds({cloud, other}); });
 }
 
+TEST(Merge, RefusesPartsOfWhichOnlySomeHaveColoursOrNormals) {
+  const PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
+  PointCloud other = libmap::select_points(cloud, {1, 2});
+  other.colors.clear();
+  EXPECT_EQ(error_of([&] {
+              merge_map_clouds({libmap::select_points(cloud, {0}), other});
+            }).reason(),
+            "only some parts have colours");
+  other = libmap::select_points(cloud, {1, 2});
+  other.normals.assign(2, Eigen::Vector3f::UnitZ());
+  EXPECT_EQ(error_of([&] {
+              merge_map_clouds({libmap::select_points(cloud, {0}), other});
+            }).reason(),
+            "only some parts have normals");
+}
+
+TEST(Obstacles, AreNotFoundInAMapWithoutSlopes) {
+  PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
+  const libmap::Error error = error_of([&] { add_obstacles(cloud, 0.01, {}); });
+  EXPECT_EQ(error.reason(), "not a map with slopes: it has no such field");
+  EXPECT_EQ(error.context().field, "slope_deg");
+}
+
 // Such numbers have no order, and no integer holds them.
 TEST(Merge, RefusesIndicesThatAreNone) {
   for (const double index : {std::nan(""), HUGE_VAL, 1e300, 0.5, 0x1p29 + 1}) {

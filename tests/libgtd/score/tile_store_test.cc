@@ -130,6 +130,29 @@ TEST(TileStore, RestoredPositionsAreTheVoxelsCentres) {
   EXPECT_EQ(error_of([&] { libgtd::restore_positions(index, cloud); }).context().field, "k");
 }
 
+TEST(TileStore, AFileIsNone) {
+  const fs::path store = scratch_folder() / "m.tiles";
+  write_text(store, "");
+  const libmap::Error error = error_of([&] { libgtd::read_tile_store(store); });
+  EXPECT_EQ(error.reason(), "is a file, not a tile store");
+  EXPECT_EQ(error.context().file, store.string());
+}
+
+TEST(TileProgress, PlanOfAnotherVersion) {
+  const fs::path store = scratch_folder() / "m.tiles";
+  const TileProgress progress(store);
+  progress.open();
+  progress.set_plan(small_plan());
+  const fs::path path = store / "progress/plan.json";
+  std::string text = read_text(path);
+  write_text(path, text.replace(text.find("\"version\": 1"), 12, "\"version\": 2"));
+  const libmap::Error error = error_of([&] { progress.plan(); });
+  EXPECT_EQ(error.context().file, path.string());
+  EXPECT_EQ(error.context().field, "format and version");
+  EXPECT_EQ(error.context().value, "\"graspmap tile store progress\", 2");
+  EXPECT_EQ(error.context().bound, "\"graspmap tile store progress\", 1");
+}
+
 // Each change of a good index is refused in one line that names the file and what is wrong.
 TEST(TileStore, HostileIndex) {
   const fs::path store = scratch_folder() / "m.tiles";
@@ -167,6 +190,14 @@ TEST(TileStore, HostileIndex) {
   for (std::size_t size = 0; size < text.size() - 2; size += 37) {
     write_text(store / "index.json", text.substr(0, size));
     error_of([&] { libgtd::read_tile_store(store); });
+  }
+  for (const std::vector<StoredTile>& tiles :
+       {std::vector{tile(0, 0, 7), tile(-1, 0, 3)}, std::vector{tile(0, 0, 7), tile(0, 0, 7)}}) {
+    good.tiles = tiles;
+    progress.write_index(good, good.manifest);
+    const libmap::Error error = error_of([&] { libgtd::read_tile_store(store); });
+    EXPECT_EQ(error.reason(), "tiles do not ascend");
+    EXPECT_EQ(error.context().value, tiles[1].file);
   }
 }
 

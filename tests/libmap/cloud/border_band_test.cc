@@ -10,6 +10,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -130,6 +131,14 @@ TEST(BorderBand, MarginMovesEverySideInwards) {
   FloorOptions smaller = o;
   smaller.half_x = smaller.half_y = 1.4;
   EXPECT_LT(corner_error(band, smaller), 0.006);
+}
+
+TEST(BorderBand, MarginThatLeavesNothing) {
+  const Error error = error_of([] { find_border_band(floor_with_band({}), 1.4); });
+  EXPECT_EQ(error.reason(), "the area inside the white band is too small");
+  EXPECT_EQ(error.context().field, "side");
+  EXPECT_NEAR(std::stod(error.context().value), 0.2, 0.01);
+  EXPECT_EQ(error.context().bound, ">= " + to_text(BorderBandOptions{}.min_side_m) + " m");
 }
 
 TEST(BorderBand, DimLightAndAGivenLevel) {

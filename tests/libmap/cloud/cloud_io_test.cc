@@ -2,6 +2,7 @@
 #include "libmap/cloud/cloud_io.h"
 
 #include <gmock/gmock.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <clocale>
@@ -13,6 +14,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/libmap/cloud/cloud_samples.h"
 #include "tests/libmap/cloud/given_bytes.h"
+#include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -333,6 +335,21 @@ TEST(RealClouds, HoldThePublishedNumbersOfPoints) {
     EXPECT_EQ(read_cloud_info(path).points, points) << name;
     EXPECT_TRUE(read.cloud.has_colors()) << name;
   }
+}
+
+// A file with holes, larger than the addresses that are left.
+TEST(CloudFiles, PcdThatCannotBeMapped) {
+  constexpr std::uint64_t gibibyte = std::uint64_t{1} << 30U;
+  const fs::path path = scratch_folder() / "large.pcd";
+  write_text(path, "VERSION 0.7\n");
+  fs::resize_file(path, 4 * gibibyte);
+  std::uint64_t pages = 0;
+  std::ifstream("/proc/self/statm") >> pages;
+  const graspmap_test::LowerLimit limit(
+      RLIMIT_AS, pages * static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE)) + gibibyte);
+  const Error error = error_of([&] { read_cloud(path); });
+  EXPECT_EQ(error.reason(), "cannot be read: Cannot allocate memory");
+  EXPECT_EQ(error.context().file, path.string());
 }
 
 TEST(RealClouds, TheTestSiteIsAsDescribed) {

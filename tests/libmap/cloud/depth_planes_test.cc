@@ -12,6 +12,7 @@ namespace libmap {
 namespace {
 
 using graspmap_test::box;
+using graspmap_test::error_of;
 using graspmap_test::looking;
 using graspmap_test::nearest_of;
 using graspmap_test::plane_z;
@@ -137,6 +138,13 @@ TEST(DepthPlanes, GrazingSurfacesAreDropped) {
     if (planes.support[n] > 0) {
       ASSERT_GE(planes.cos_incidence[n], least);
     }
+}
+
+TEST(DepthPlanes, RaysOfAnotherSize) {
+  const Camera camera = small_camera();
+  const DepthImage depth(camera.width, camera.height - 1, 1.0F);
+  EXPECT_EQ(error_of([&] { fit_depth_planes(depth, pixel_rays(camera)); }).reason(),
+            "depth image and rays differ in size");
 }
 
 TEST(DepthPlanes, TinyImages) {

@@ -3,8 +3,10 @@
 
 #include <gmock/gmock.h>
 
+#include <sstream>
 #include <string>
 
+#include "libmap/cloud/pcd_codec.h"
 #include "tests/libmap/cloud/cloud_samples.h"
 #include "tests/libmap/cloud/given_bytes.h"
 #include "tests/support/test_support.h"
@@ -165,10 +167,26 @@ TEST(PcdFiles, HeaderLinesThatDoNotFit) {
   EXPECT_THAT(changed("FIELDS x y z", "FIELDS"), HasSubstr("FIELDS"));
   EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 2"), HasSubstr("WIDTH x HEIGHT = 2"));
   EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 1\nHEIGHT 1"), HasSubstr("twice"));
+  EXPECT_THAT(changed("WIDTH 1\nHEIGHT 1", "WIDTH 4611686018427387904\nHEIGHT 2"),
+              HasSubstr("times HEIGHT is no number of points"));
   EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0"), HasSubstr("VIEWPOINT"));
   EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0 0 1 0 0 nan"),
               HasSubstr("VIEWPOINT"));
   EXPECT_THAT(changed("DATA ascii", "ascii"), HasSubstr("unknown line"));
+}
+
+// LZF counts bytes in 32 bits. All rows are one number in memory.
+TEST(PcdFiles, TooLargeToBeCompressed) {
+  const float number = 1.0F;
+  ColumnSet set;
+  set.rows = 800'000'000;
+  set.columns.push_back({"x", ScalarType::float32, StoredType::float32,
+                         reinterpret_cast<const std::byte*>(&number), 0, false});
+  std::ostringstream out;
+  const Error error =
+      error_of([&] { encode_pcd(set, Pose::Identity(), FileEncoding::binary_compressed, out); });
+  EXPECT_THAT(error.reason(), HasSubstr("too large for binary_compressed PCD"));
+  EXPECT_EQ(error.context().value, "3200000000 bytes");
 }
 
 TEST(PcdFiles, FieldNameWithBlankIsRefused) {

@@ -3,8 +3,11 @@
 
 #include <gmock/gmock.h>
 
+#include <sstream>
 #include <string>
+#include <vector>
 
+#include "libmap/cloud/ply_codec.h"
 #include "tests/libmap/cloud/cloud_samples.h"
 #include "tests/libmap/cloud/given_bytes.h"
 #include "tests/support/test_support.h"
@@ -13,6 +16,7 @@ namespace libmap {
 namespace {
 
 using graspmap_test::error_as;
+using graspmap_test::error_of;
 using graspmap_test::raw;
 using graspmap_test::read_as;
 using ::testing::ElementsAre;
@@ -78,6 +82,32 @@ TEST(PlyFiles, HeadersThatLie) {
                        "ply\nformat ascii 1.0\nelement point 1\nproperty float x\n"
                        "end_header\n1\n"),
               HasSubstr("no element vertex"));
+}
+
+TEST(PlyFiles, HeaderLinesThatDoNotFit) {
+  EXPECT_THAT(error_as(".ply",
+                       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                       "property list float int extra\nend_header\n1 1 1\n"),
+              HasSubstr("PLY header line 5 is float: a list's length is an integer"));
+  EXPECT_THAT(error_as(".ply",
+                       "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
+                       "element vertex 1\nproperty float x\nend_header\n1\n1\n"),
+              HasSubstr("PLY header line 5 is vertex: this element stands twice"));
+}
+
+// All rows are one number in memory.
+TEST(PlyFiles, MoreVerticesThanAMeshCanName) {
+  const float number = 1.0F;
+  ColumnSet set;
+  set.rows = std::size_t{1} << 31U;
+  set.columns.push_back({"x", ScalarType::float32, StoredType::float32,
+                         reinterpret_cast<const std::byte*>(&number), 0, false});
+  const std::vector<Triangle> triangles;
+  std::ostringstream out;
+  const Error error =
+      error_of([&] { encode_ply({.vertices = &set, .triangles = &triangles}, {}, out); });
+  EXPECT_EQ(error.reason(), "too many vertices for a PLY mesh");
+  EXPECT_EQ(error.context().value, "2147483648");
 }
 
 }  // namespace

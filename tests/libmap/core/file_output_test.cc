@@ -181,6 +181,34 @@ TEST(FileOutputTest, ReadingRefusesWhatIsNoFile) {
   EXPECT_EQ(error_of([&] { libmap::require_readable_file(""); }).reason(), "no such file");
 }
 
+// Where the superuser runs the tests: as if somebody else had started them.
+class AsSomebodyElse {
+ public:
+  AsSomebodyElse() : good_(getuid() != 0 || setresuid(65534, 0, 0) == 0) {}
+  ~AsSomebodyElse() {
+    if (geteuid() == 0) {
+      EXPECT_EQ(setresuid(0, 0, 0), 0);
+    }
+  }
+  AsSomebodyElse(const AsSomebodyElse&) = delete;
+  AsSomebodyElse& operator=(const AsSomebodyElse&) = delete;
+  bool good() const { return good_; }
+
+ private:
+  bool good_;
+};
+
+TEST(FileOutputTest, ReadingRefusesWhatIsNotAllowed) {
+  const fs::path path = scratch_folder() / "secret";
+  graspmap_test::write_text(path, "12345");
+  fs::permissions(path, fs::perms::none);
+  const AsSomebodyElse somebody;
+  if (!somebody.good()) GTEST_SKIP() << "there is nobody else here";
+  const libmap::Error error = error_of([&] { libmap::require_readable_file(path); });
+  EXPECT_EQ(error.reason(), "cannot be read: Permission denied");
+  EXPECT_EQ(error.context().file, path.string());
+}
+
 TEST(FileOutputTest, ReadingRefusesWhatIsTooLarge) {
   const fs::path path = scratch_folder() / "large";
   graspmap_test::write_text(path, "12345");

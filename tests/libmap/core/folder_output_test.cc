@@ -99,6 +99,23 @@ TEST_F(OutputFolderTest, TakesOverWhatAKilledRunLeft) {
   EXPECT_EQ(names_in(scratch_), std::vector<std::string>{"out"});
 }
 
+TEST_F(OutputFolderTest, KeepsTheEarlierOneIfItsOwnIsGone) {
+  for (const bool has_earlier : {false, true}) {
+    if (has_earlier) {
+      fs::create_directory(folder_);
+      graspmap_test::write_text(folder_ / "a.txt", "old");
+    }
+    OutputFolder output(folder_, names);
+    fill(output, "new");
+    fs::remove_all(output.temporary_path());
+    const libmap::Error error = graspmap_test::error_of([&] { output.commit(); });
+    EXPECT_EQ(error.reason(), "cannot be put in place: No such file or directory");
+    EXPECT_EQ(error.context().file, folder_.string());
+    EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+    EXPECT_EQ(fs::exists(folder_ / "a.txt"), has_earlier);
+  }
+}
+
 TEST_F(OutputFolderTest, BelongsToOneAtATime) {
   OutputFolder output(folder_, names);
   const libmap::Error error = graspmap_test::error_of([&] { OutputFolder(folder_, names); });

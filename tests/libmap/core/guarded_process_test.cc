@@ -7,6 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "tests/support/lower_limit.h"
+#include "tests/support/test_support.h"
+
 namespace {
 
 using libmap::GuardedProcess;
@@ -43,6 +46,15 @@ TEST(GuardedProcess, EndsWithItsReader) {
   const GuardedProcess process(memory, [](const GuardedProcess::Write& write) {
     while (true) write("for ever");
   });
+}
+
+TEST(GuardedProcess, NoneWithoutFiles) {
+  const libmap::Error error = graspmap_test::error_of([] {
+    const graspmap_test::LowerLimit no_file(RLIMIT_NOFILE, 0);
+    const GuardedProcess process(memory, [](const GuardedProcess::Write&) {});
+  });
+  EXPECT_EQ(error.reason(), "no process to read it in: Too many open files");
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
 }
 
 }  // namespace

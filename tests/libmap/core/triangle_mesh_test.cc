@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "libmap/core/pose.h"
+#include "libmap/core/textured_mesh.h"
 #include "tests/support/test_support.h"
 
 namespace {
@@ -157,6 +158,19 @@ TEST(TriangleMeshTest, JoinWithNothing) {
   EXPECT_EQ(libmap::join_meshes(base, {}).vertex_normals, base.vertex_normals);
   EXPECT_EQ(libmap::join_meshes({}, base).vertex_normals, base.vertex_normals);
   EXPECT_EQ(libmap::join_meshes({}, base).triangles, base.triangles);
+}
+
+TEST(TexturedMeshTest, CoordinatesThatAreNotFinite) {
+  libmap::TexturedMesh model;
+  model.mesh = box({1, 1, 1});
+  model.texture_coordinates.assign(
+      12, {Eigen::Vector2f(0, 0), Eigen::Vector2f(1, 0), Eigen::Vector2f(0, 1)});
+  model.page_of_triangle.assign(12, libmap::no_page);
+  model.check();
+  model.texture_coordinates[7][2].y() = std::nanf("");
+  const libmap::Error error = error_of([&] { model.check(); });
+  EXPECT_EQ(error.reason(), "texture coordinate is not finite");
+  EXPECT_EQ(error.context().field, "triangle 7");
 }
 
 }  // namespace

@@ -244,6 +244,9 @@ TEST(Crop, WhatCannotBe) {
   options.size_m = {3, 3};
   options.frame = CropFrame::map;
   EXPECT_NE(message(options).find("level frame"), std::string::npos);
+  options = {};
+  options.yaw_deg = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(message(options), "yaw is inf: not an angle");
   EXPECT_THROW(crop_cloud({}, {}), Error);
   EXPECT_THROW(crop_mesh({}, {}), Error);
   TriangleMesh broken = site_mesh();

@@ -307,6 +307,36 @@ TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
               HasSubstr("mesh.glb: is broken: the library for its format fell over it"));
 }
 
+// What the library for the format says, and numbers that it lets pass.
+TEST(MeshFiles, WhatAssimpRefusesIsSaid) {
+  const std::string two = "v 0 0 0\nv 0 1 0\n";
+  EXPECT_THAT(error_as(".obj", two + "v 1 0 0\nf 1 2 9\n"),
+              HasSubstr("given.obj: not a readable obj file: OBJ: vertex index out of range"));
+  EXPECT_THAT(error_as(".stl", std::string(84, 'x')), HasSubstr("not a readable stl file: "));
+  for (const char* const number : {"nan", "1e999"})
+    EXPECT_THAT(error_as(".obj", two + "v " + number + " 0 0\nf 1 2 3\n"),
+                HasSubstr("given.obj: vertex 2: position is not finite"))
+        << number;
+  const fs::path path = scratch_folder() / "mesh.glb";
+  TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0.625}};
+  mesh.triangles = {{0, 1, 2}};
+  write_mesh(path, mesh);
+  std::string bytes = read_text(path);
+  const float z = 0.625F;
+  const std::size_t at = bytes.rfind(std::string(reinterpret_cast<const char*>(&z), sizeof z));
+  ASSERT_NE(at, std::string::npos);
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  bytes.replace(at, sizeof nan, reinterpret_cast<const char*>(&nan), sizeof nan);
+  EXPECT_THAT(error_as(".glb", bytes), HasSubstr("vertex 2: position is not finite"));
+}
+
+TEST(MeshFiles, NoTriangleIsNotWrittenByAssimp) {
+  for (const std::string format : {"stl", "glb"})
+    EXPECT_EQ(error_of([&] { write_mesh(scratch_folder() / ("mesh." + format), {}); }).reason(),
+              "a mesh without triangles cannot be written as " + format);
+}
+
 TEST(MeshFiles, ObjWithQuadsAndGroups) {
   const MeshReadResult read =
       read_as(".obj",

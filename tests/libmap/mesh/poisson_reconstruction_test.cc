@@ -13,6 +13,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_cleaning.h"
 #include "libmap/mesh/mesh_report.h"
+#include "libmap/mesh/pcl_poisson.h"
 #include "libmap/mesh/surface_distance.h"
 #include "tests/support/test_support.h"
 
@@ -363,6 +364,19 @@ TEST(PoissonReconstruction, CellsLargerThanTheCloudAreRefused) {
   EXPECT_EQ(error.context().field, "cell_size_m");
   EXPECT_EQ(error.context().bound, "<= 1 m");
   EXPECT_LT(surface_area(reconstruct_surface(cloud, cells_of(0.1)).mesh), 1.1);
+}
+
+// Deeper than reconstruct_surface lets it go, PCL's tables have no size.
+TEST(PoissonReconstruction, WhatPclThrowsIsSaid) {
+  std::vector<PoissonSample> samples;
+  for (int x = -2; x <= 2; ++x)
+    for (int y = -2; y <= 2; ++y) {
+      const Eigen::Vector2f place = 0.1F * Eigen::Vector2i(x, y).cast<float>();
+      samples.push_back({{place.x(), place.y(), 0.0F}, Eigen::Vector3f::UnitZ()});
+    }
+  const Error error = error_of([&] { solve_poisson(samples, {.depth = 15, .cube_m = 0.5}); });
+  EXPECT_EQ(error.kind(), ErrorKind::failed);
+  EXPECT_THAT(error.what(), HasSubstr("Poisson reconstruction failed: std::bad_array_new_length"));
 }
 
 TEST(PoissonReconstruction, StandardOutputStaysClean) {

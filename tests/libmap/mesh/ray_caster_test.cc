@@ -4,13 +4,17 @@
 
 #include <Eigen/Geometry>
 #include <cmath>
+#include <cstdint>
+#include <fstream>
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "libmap/core/parallel.h"
 #include "tests/libmap/mesh/mesh_samples.h"
+#include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
 namespace {
@@ -228,10 +232,40 @@ TEST(RayCaster, RefusesMeshesThatAreNone) {
   mesh = square_mesh(std::numeric_limits<double>::quiet_NaN());
   EXPECT_NE(std::string(error_of([&] { RayCaster{mesh}; }).what()).find("not finite"),
             std::string::npos);
+  std::vector<RayHit> hits(2);
+  const RayCaster caster(square_mesh(0.0));
+  EXPECT_EQ(error_of([&] {
+              caster.cast_bundle({0, 0, 1}, std::vector<Eigen::Vector3d>(3, {0, 0, -1}), hits);
+            }).reason(),
+            "a bundle of 3 rays wants as many hits");
   // Triangles without area are there and never met.
   mesh = square_mesh(0.0);
   mesh.triangles = {{0, 0, 0}, {1, 1, 2}};
   EXPECT_FALSE(RayCaster(mesh).cast({0, 0, 1}, {0, 0, -1}));
 }
+
+#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
+// Memory for the caster's own copy of the triangles, but not for Embree's.
+TEST(RayCaster, SaysThatEmbreeCannotBuildTheScene) {
+  TriangleMesh mesh = square_mesh(0.0);
+  const RayCaster before(mesh);  // Embree's threads are there
+  constexpr std::size_t count = std::size_t{1} << 22;
+  mesh.triangles.resize(count, mesh.triangles[0]);
+  std::ifstream status("/proc/self/status");
+  std::string word;
+  std::uint64_t data_kib = 0;
+  while (status >> word)
+    if (word == "VmData:") status >> data_kib;
+  ASSERT_GT(data_kib, 0U);
+  const libmap::Error error = error_of([&] {
+    const graspmap_test::LowerLimit limit(
+        RLIMIT_DATA, data_kib * 1024 + count * sizeof(libmap::Triangle) * 3 / 2);
+    RayCaster{mesh};
+  });
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+  EXPECT_EQ(error.reason(), "Embree cannot build the scene (error 4)");
+  EXPECT_TRUE(before.cast({0, 0, 1}, {0, 0, -1}));
+}
+#endif
 
 }  // namespace

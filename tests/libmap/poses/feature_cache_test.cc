@@ -153,6 +153,7 @@ TEST(FeatureCache, ForeignContentIsMadeAnew) {
     expect_anew(changed, key);
   };
   change("/descriptors", nlohmann::json::binary({1, 2, 3}));
+  change("/cameras", nlohmann::json::binary({1, 0}));  // the scan has camera 0 alone
   change("/surfaces/0/step_px", 2147483647);
   change("/surfaces/0/step_px", 1e300);
   change("/without_depth", -1);

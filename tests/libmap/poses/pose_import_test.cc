@@ -128,6 +128,15 @@ TEST(PoseImport, ImagesOfColmapByTheScansOwnNamesAndByStamps) {
               HasSubstr("1700000006.021.png"));
 }
 
+TEST(PoseImport, CamerasThatTheRigHasNotAreLeftOut) {
+  const RigScan scan;
+  const fs::path folder = write_model({{"3.jpg", random_pose()}, {"4_2.jpg", random_pose()}});
+  const libmap::ImportedPoses imported = libmap::import_poses(folder, scan);
+  EXPECT_THAT(nodes_of(imported), ElementsAre(3));
+  EXPECT_THAT(imported.warnings, ElementsAre("scan: node 4 is camera 2: has no such camera (must "
+                                             "be < 2); its pose is left out"));
+}
+
 TEST(PoseImport, CamerasOfOneNodeGiveTheMean) {
   const RigScan scan;
   const Pose truth = random_pose();

@@ -6,6 +6,7 @@
 #include "libmap/scan/trajectory_text.h"
 #include "tests/libmap/poses/synthetic_features.h"
 #include "tests/libmap/poses/textured_scan.h"
+#include "tests/support/test_support.h"
 
 namespace {
 
@@ -186,6 +187,31 @@ TEST(IcpRefinement, ReliefBringsFramesTogether) {
     EXPECT_LT(error.head<3>().norm(), 1.2e-3);
     EXPECT_LT(error.tail<3>().norm(), 1e-3);
   }
+}
+
+TEST(IcpRefinement, WantsABlockOfThePriorForEachPose) {
+  const libmap::Error error = graspmap_test::error_of([] {
+    libmap::align_surfaces({}, {{1, Pose::Identity()}}, libmap::BlockSystem(3), {}, {});
+  });
+  EXPECT_STREQ(error.what(), "blocks of the prior is 3: surfaces cannot be aligned so (must be 1)");
+}
+
+TEST(Features, OptionsOutOfTheirRangesAreNamed) {
+  const auto refusal = [](auto change) {
+    libmap::FeatureOptions options;
+    change(options);
+    return std::string(graspmap_test::error_of([&] {
+                         libmap::find_features(TexturedScan(), {}, options);
+                       }).what());
+  };
+  EXPECT_EQ(refusal([](auto& o) { o.max_features = 0; }),
+            "max_features is 0: features cannot be found so (must be >= 1 and <= 1e+05)");
+  EXPECT_EQ(refusal([](auto& o) { o.pixel_noise_px = 0.0; }),
+            "pixel_noise_px is 0: features cannot be found so (must be > 0)");
+  EXPECT_EQ(refusal([](auto& o) {
+              o.planes.max_depth_m = o.planes.min_depth_m;
+            }).substr(0, std::string("max_depth_m is ").size()),
+            "max_depth_m is ");
 }
 
 // OpenCV 4.6 places SIFT's features a quarter of a pixel off; ours stand where the picture has

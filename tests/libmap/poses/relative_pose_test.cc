@@ -5,9 +5,11 @@
 #include "libmap/poses/bundle_adjustment.h"
 #include "libmap/poses/feature_tracks.h"
 #include "tests/libmap/poses/synthetic_features.h"
+#include "tests/support/test_support.h"
 
 namespace {
 
+using graspmap_test::error_of;
 using graspmap_test::random_points;
 using graspmap_test::random_step;
 using graspmap_test::same_numbers;
@@ -176,6 +178,19 @@ TEST(BundleAdjustment, RecoversAnExactScene) {
   EXPECT_LT(error_of_poses(scene, result.map_from_base), 2e-6);
   EXPECT_LT(result.reprojection_rms_px, 1e-3);
   EXPECT_EQ(result.tracks, 150U);
+}
+
+TEST(BundleAdjustment, OptionsOutOfTheirRangesAreNamed) {
+  const auto refusal = [](const libmap::BundleAdjustmentOptions& options) {
+    return std::string(error_of([&] {
+                         libmap::adjust_bundle({}, std::vector<libmap::FeatureTrack>{}, {}, {}, {},
+                                               options);
+                       }).what());
+  };
+  EXPECT_EQ(refusal({.robust_scale = 0.0}),
+            "robust_scale is 0: a bundle cannot be adjusted so (must be > 0)");
+  EXPECT_EQ(refusal({.max_iterations = 0}),
+            "max_iterations is 0: a bundle cannot be adjusted so (must be >= 1)");
 }
 
 TEST(BundleAdjustment, InformationIsThatOfTheErrors) {

@@ -53,6 +53,13 @@ TEST(TrajectoryIo, NamesTheFormatsItKnows) {
   EXPECT_EQ(error.context().value, ".csv");
   EXPECT_EQ(error.context().bound, "one of .tum .kitti .g2o .toro");
   EXPECT_FALSE(fs::exists(graspmap_test::scratch_folder() / "poses.csv"));
+  const fs::path path = graspmap_test::scratch_folder() / "poses.txt";
+  for (const auto format : {libmap::TrajectoryFormat::automatic, libmap::TrajectoryFormat::colmap})
+    EXPECT_EQ(std::string(graspmap_test::error_of([&] {
+                            libmap::write_trajectory_as(format, path, example());
+                          }).what()),
+              path.string() + ": no format of a file of poses");
+  EXPECT_FALSE(fs::exists(path));
 }
 
 TEST(TrajectoryIo, KnowsOtherNamesByTheirContent) {

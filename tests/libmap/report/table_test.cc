@@ -1,6 +1,9 @@
 #include "libmap/report/table_html.h"
 
 #include <gtest/gtest.h>
+#include <sys/mman.h>
+
+#include <string_view>
 
 #include "libmap/report/html.h"
 #include "libmap/report/manifest_html.h"
@@ -53,6 +56,17 @@ TEST(Html, Base64OfTheStandard) {
   // The example of Content Security Policy Level 3, section 6.7.2.
   EXPECT_EQ(libmap::csp_hash("alert('Hello, world.');"),
             "'sha256-qznLcsROx4GACP2dm0UCKCzCG+HiZ1guq6ZZDob/Tng='");
+}
+
+TEST(Html, Base64IsOfLessThanAGigabyte) {
+  // Pages that nobody touches take no memory.
+  constexpr std::size_t size = std::size_t{1} << 30;
+  void* const pages = mmap(nullptr, size, PROT_READ, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  ASSERT_NE(pages, MAP_FAILED);
+  const std::string_view bytes(static_cast<const char*>(pages), size);
+  EXPECT_STREQ(error_of([&] { libmap::to_base64(bytes); }).what(),
+               "'1073741824 bytes': too large to be put into a page (must be <= 1073741823)");
+  munmap(pages, size);
 }
 
 TEST(Table, NumbersOfAColumnHaveTheirPointsInOneLine) {

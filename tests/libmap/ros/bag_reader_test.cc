@@ -53,6 +53,24 @@ TEST(BagReader, TopicsInTheOrderOfRecording) {
   }
 }
 
+TEST(BagReader, TopicsOfOtherTypesAreSaid) {
+  write_sample();
+  const libmap::BagListing listing = libmap::list_bag(bag_path());
+  const auto said = [&](const std::string& type, const std::string& md5sum) {
+    return std::string(
+        error_of([&] { libmap::require_topic(listing, "/front/image_raw", type, md5sum); }).what());
+  };
+  const std::string md5sum = "060021388200f6f0f447d0fcd9c64743";
+  EXPECT_EQ(
+      libmap::require_topic(listing, "/front/image_raw", "sensor_msgs/Image", md5sum).messages, 2U);
+  EXPECT_EQ(said("sensor_msgs/Image", "0123"),
+            "md5sum of /front/image_raw is " + md5sum +
+                ": is another definition of sensor_msgs/Image (must be 0123)");
+  EXPECT_EQ(said("tf2_msgs/TFMessage", md5sum),
+            "type of /front/image_raw is sensor_msgs/Image: is of another type (must be "
+            "tf2_msgs/TFMessage)");
+}
+
 TEST(BagReader, MessagesOfTheWantedTopicsUntilItIsEnough) {
   write_sample();
   std::vector<std::string> seen;

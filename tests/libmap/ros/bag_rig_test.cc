@@ -290,6 +290,35 @@ TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
   EXPECT_EQ(result.moments[0].stamp_s, 5.0);
 }
 
+TEST(BagRig, ABagWithoutAnImageThatCanBeUsedIsAnError) {
+  const auto write = [](const auto& change) {
+    SampleBag bag(bag_path());
+    rm::Image image = sample_depth("a_optical", 5.0);
+    change(image);
+    add_surroundings(bag, "a");
+    bag.write("/a/image_raw", 5.0, image).close();
+  };
+  write([](rm::Image& image) { image.data.resize(23); });
+  const BagRigPlan broken = plan();
+  const auto said = [&] {
+    return std::string(error_of([&] { libmap::export_bag_rig(bag_path(), broken, {}); }).what());
+  };
+  EXPECT_THAT(said(), HasSubstr("a.bag: /a/image_raw: 1 images cannot be used: data is 23 bytes"));
+  // Another bag by now.
+  write([](rm::Image& image) { image.header.stamp = ros::Time(7.0); });
+  EXPECT_EQ(said(), bag_path().string() + ": no image can be used");
+  // Compressed, of fewer bytes than come before the PNG.
+  rm::CompressedImage image;
+  image.header = sample_header("a_optical", 5.0);
+  image.format = rm::to_ros("16UC1; compressedDepth png");
+  image.data.resize(11);
+  SampleBag bag(bag_path());
+  add_surroundings(bag, "a");
+  bag.write("/a/image_raw/compressedDepth", 5.0, image).close();
+  EXPECT_THAT(error_of([&] { libmap::export_bag_rig(bag_path(), plan(), {}); }).what(),
+              HasSubstr("data is 11 bytes: its data end too early (must be >= 12 bytes)"));
+}
+
 TEST(BagRig, RigOfOnesOwn) {
   SampleBag(bag_path())
       .write("/robot/left_cam/depth", 5.0, sample_depth("l", 5.0))
@@ -343,6 +372,14 @@ TEST(BagRig, WhatIsMissingIsNamed) {
     made.transform("base_link", "a", Pose::Identity());
   });
   EXPECT_THAT(refusal(), HasSubstr("topic is /a/camera_info"));
+  bag([](SampleBag& made) {
+    rm::Image image = sample_depth("a_optical", 1.0);
+    image.header.seq = 7;  // as a number of transforms it would promise too much
+    made.write("/a/image_raw", 1.0, image);
+  });
+  EXPECT_THAT(refusal({.transform_topic = "/a/image_raw"}),
+              HasSubstr("type of /a/image_raw is sensor_msgs/Image: is of another type (must be "
+                        "tf2_msgs/TFMessage)"));
   bag([](SampleBag& made) {
     made.camera("/a", {1.0}).transform("base_link", "a_optcal", Pose::Identity());
   });

@@ -104,6 +104,7 @@ TEST(Bundler, CamerasThatItCannotHoldAreRefused) {
     return std::string(error_of([&] { to_bundle_text({view}); }).what());
   };
   EXPECT_THAT(refused([](auto& v) { v.camera = some_camera(); }), HasSubstr("a.jpg: distortion"));
+  EXPECT_THAT(refused([](auto& v) { v.camera.fx = 0; }), HasSubstr("a.jpg: fx is 0"));
   EXPECT_THAT(refused([](auto& v) { v.camera.fy *= 1.01; }), HasSubstr("fy"));
   EXPECT_THAT(refused([](auto& v) { v.camera.cx += 0.5; }), HasSubstr("cx"));
   EXPECT_THAT(refused([](auto& v) { v.camera.cy -= 0.5; }), HasSubstr("cy"));

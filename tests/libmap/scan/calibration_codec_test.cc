@@ -256,6 +256,35 @@ TEST(CalibrationCodec, TruncationsAndLyingCounts) {
   error_of([] { libmap::decode_calibration(std::string(100, '\1')); });
 }
 
+TEST(CalibrationCodec, RecordsThatDoNotBelongTogether) {
+  const std::string stereo = stereo_record({.k = k}, {.k = k}, eye, {-0.1, 0, 0});
+  const auto refusal_of = [&](std::size_t at, std::int32_t number) {
+    std::string changed = stereo;
+    std::memcpy(changed.data() + at, &number, 4);
+    return std::string(error_of([&] { libmap::decode_calibration(changed); }).what());
+  };
+  // 10 int32, R and T stand before the left camera, three int32 of a version before its kind.
+  EXPECT_EQ(refusal_of(40 + 72 + 24 + 12, 1), "'1': calibration of an unknown kind (must be 0)");
+  EXPECT_EQ(refusal_of(32, 163),
+            "'163': calibration of a stereo camera has another length than it says");
+  EXPECT_EQ(error_of([&] { libmap::decode_calibration(stereo + record({.k = k})); }).reason(),
+            "calibration holds single and stereo cameras");
+}
+
+TEST(CalibrationCodec, FloatsHoldKAndL) {
+  Calibration calibration = libmap::decode_calibration(record({.k = k, .l = {}}));
+  calibration.layout = CalibrationLayout::floats;
+  EXPECT_EQ(error_of([&] { encode_calibration(calibration); }).reason(),
+            "calibration without K and L does not fit its layout");
+}
+
+TEST(CalibrationCodec, StereoCamerasAtOnePlace) {
+  const Calibration calibration =
+      libmap::decode_calibration(stereo_record({.k = k}, {.k = k}, eye, {0, 0, 0}));
+  EXPECT_EQ(std::string(error_of([&] { stereo_cameras_of(calibration, 0, 0); }).what()),
+            "baseline_m is 0: stereo camera cannot be used (must be > 0)");
+}
+
 TEST(CalibrationCodec, NumbersThatAreNoCamera) {
   std::vector<double> zero = k;
   zero[0] = 0;

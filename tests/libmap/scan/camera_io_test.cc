@@ -187,6 +187,8 @@ TEST(CameraIo, BadFilesAreNamed) {
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 2]", {"camera_matrix", "3 x 3"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 1, 2, 0, 1, 2, 0, 0, 1]", {"skew"}},
       {"image_width: 3\nimage_height: 480\ncamera_matrix: [0, 0, 2, 0, 1, 2, 0, 0, 1]", {"fx"}},
+      {"image_width: 3\nimage_height: 480\ncamera_matrix: [1, 0, 2, 0, 1, 2, 0, 0, 2]",
+       {"camera_matrix: is no camera matrix"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, .nan, 0, 1, 2, 0, 0, 1]", {".nan"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: [1, 0, x, 0, 1, 2, 0, 0, 1]", {"is x"}},
       {"image_width: 3\nimage_height: 4\ncamera_matrix: {rows: 3, cols: 3}",

@@ -122,6 +122,13 @@ TEST(Rvl, FlippedBytesNeverReachBeyondTheImage) {
     }
 }
 
+// Each nibble says that another follows; 32 bits need eleven.
+TEST(Rvl, NumbersThatDoNotEnd) {
+  const std::string bytes = std::string("DEPTHRVL\3\0\0\0\1\0\0\0", 16) + std::string(8, '\xff');
+  EXPECT_EQ(error_of([&] { libmap::decode_rvl(bytes); }).reason(),
+            "RVL holds a number of more than 32 bits");
+}
+
 TEST(Rvl, SizesThatCannotBe) {
   std::string bytes = libmap::encode_rvl(sample_depth(1));
   const auto with_size = [&](std::uint32_t columns, std::uint32_t rows) {

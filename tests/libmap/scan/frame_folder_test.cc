@@ -310,6 +310,22 @@ TEST_F(TumFolder, NamesWhatIsBroken) {
   }
 }
 
+TEST_F(TumFolder, NamesTheCellThatIsNoNumber) {
+  const std::map<std::string, std::string> refusals{
+      {"node,stamp_s,baseline_m\n1,5,0.1 x\n", "row 1, column baseline_m is 0.1 x: not a number"},
+      {"node,stamp_s,gps\n1,5,1 2 3 4 5 inf\n", "row 1, column gps is 1 2 3 4 5 inf: not a number"},
+      {"node,stamp_s\n7,5\n0,6\n", "row 2, column node is 0: no number of a node (must be > 0)"},
+      {"node,stamp_s,session\n1,5,2147483648\n",
+       "row 1, column session is 2147483648: not a whole number (must be of 32 bits)"},
+      {"node,stamp_s,session\n1,5,-9223372036854775808\n",
+       "row 1, column session is -9223372036854775808: not a whole number (must be of 32 bits)"}};
+  for (const auto& [text, refusal] : refusals) {
+    write_text(folder_ / "nodes.csv", text);
+    const libmap::Error error = graspmap_test::error_of([&] { FrameFolder read(folder_); });
+    EXPECT_EQ(std::string(error.what()), (folder_ / "nodes.csv").string() + ": " + refusal);
+  }
+}
+
 TEST_F(TumFolder, DropsLinksOfMissingNodes) {
   write_pair();
   write_text(folder_ / "nodes.csv", "node,stamp_s\n3,1\n4,2\n");
@@ -329,6 +345,26 @@ TEST(FrameFolderError, OfFoldersThatAreNoScan) {
   EXPECT_EQ(error.context().file, folder.string());
   EXPECT_NE(error.reason().find("associations.txt"), std::string::npos);
   EXPECT_THROW(FrameFolder(folder / "missing"), libmap::Error);
+}
+
+TEST(FrameFolderError, OfNodesThatAreNotThere) {
+  const fs::path folder = new_folder();
+  write_scan(folder, graspmap_test::example_scan());
+  const FrameFolder read(folder);
+  EXPECT_EQ(std::string(graspmap_test::error_of([&] { read.read_frame(4); }).what()),
+            folder.string() + ": node is 4: no such node");
+}
+
+TEST(FrameFolderError, OfFoldersThatCannotBeMade) {
+  const fs::path folder = new_folder();
+  write_text(folder / "color", "a file");
+  for (const fs::path& place : {folder, folder / "missing"}) {
+    const libmap::Error error =
+        graspmap_test::error_of([&] { libmap::FrameFolderWriter writer(place); });
+    EXPECT_EQ(error.context().file, (place / "color").string());
+    EXPECT_EQ(error.reason().find("cannot be made: "), 0U) << error.what();
+    EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+  }
 }
 
 TEST(FrameFolder, HoldsARealScan) {

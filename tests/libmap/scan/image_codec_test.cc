@@ -120,6 +120,25 @@ TEST(ImageCodec, SizesThatCannotBeAreRefusedByTheirHeader) {
   set_big_endian(jpeg, frame + 7, 5000, 2);
   EXPECT_NE(error_of([&] { libmap::decode_color(jpeg); }).reason().find("can hold"),
             std::string::npos);
+  set_big_endian(jpeg, frame + 5, 0, 2);
+  EXPECT_EQ(std::string(error_of([&] { libmap::decode_color(jpeg); }).what()),
+            "'5000 x 0': JPEG of no valid size");
+}
+
+TEST(ImageCodec, JpegsWithoutAFrameBeforeTheirPixels) {
+  for (const char marker : {'\xda', '\xd8', '\xd9', '\x01'}) {
+    const std::string bytes = std::string("\xff\xd8\xff") + marker + std::string("\0\x8\0", 3);
+    EXPECT_EQ(error_of([&] { libmap::decode_color(bytes); }).reason(), "JPEG header is broken");
+  }
+}
+
+TEST(ImageCodec, ImagesThatNoFileCanHold) {
+  const libmap::Error jpeg = error_of([] { libmap::encode_jpeg(GrayImage(65501, 1)); });
+  EXPECT_EQ(std::string(jpeg.what()).find("image size is 65501 x 1: JPEG cannot be made: "), 0U)
+      << jpeg.what();
+  const libmap::Error png = error_of([] { libmap::encode_png(GrayImage(1000001, 1)); });
+  EXPECT_EQ(std::string(png.what()).find("image size is 1000001 x 1: PNG cannot be made: "), 0U)
+      << png.what();
 }
 
 TEST(ImageCodec, OnlyWhatWasAskedForIsTaken) {

@@ -121,6 +121,12 @@ TEST(LaserScan, WhatIsBroken) {
   error_of([&] { libmap::decode_laser_scan(blob, info_76(1)); });
   error_of([&] { libmap::decode_laser_scan(blob, info_76(5).substr(1)); });
   error_of([&] { libmap::decode_laser_scan(blob.substr(1), info_76(5)); });
+  for (const float points : {-1.0F, NAN, 3e9F}) {
+    std::string info = info_76(5);
+    info.replace(24, 4, bytes_of(std::vector<float>{points}));
+    EXPECT_EQ(error_of([&] { libmap::decode_laser_scan(blob, info); }).reason(),
+              "scan_info holds no number of points");
+  }
   error_of([&] { libmap::decode_laser_scan(scan_blob(9, std::vector<float>(9, 1.0F)), ""); });
 }
 

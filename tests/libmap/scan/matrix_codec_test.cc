@@ -80,6 +80,13 @@ TEST(MatrixCodec, SizesThatDoNotFit) {
             "compressed matrix too large");
 }
 
+TEST(MatrixCodec, BytesThatDoNotFitTheSizeAreNotWritten) {
+  StoredMatrix matrix = example(MatrixElement::float32, 2, 3, 1);
+  matrix.bytes.pop_back();
+  EXPECT_EQ(std::string(error_of([&] { encode_matrix(matrix); }).what()),
+            "'23 bytes': matrix whose bytes do not fit its size (must be 24)");
+}
+
 TEST(MatrixCodec, TruncationsAndFlips) {
   const std::string whole = encode_matrix(example(MatrixElement::uint8, 4, 5, 1));
   for (std::size_t size = 0; size < whole.size(); ++size)

@@ -13,6 +13,7 @@
 #include "libmap/scan/sqlite_file.h"
 #include "tests/libmap/scan/database_rows.h"
 #include "tests/libmap/scan/example_scan.h"
+#include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
 namespace {
@@ -217,6 +218,66 @@ TEST(CopyWithOptimizedPoses, RefusesWhatHasNoPlaceForThem) {
     });
     EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
   }
+}
+
+TEST(CopyWithOptimizedPoses, RefusesPosesAndLinksThatCannotBe) {
+  write_database(scratch("a.db"), graspmap_test::example_scan());
+  const auto refusal_of = [](const std::map<int, Pose>& poses,
+                             const std::vector<libmap::PoseLink>& links) {
+    return std::string(graspmap_test::error_of([&] {
+                         libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), poses,
+                                                           links);
+                       }).what());
+  };
+  Pose lost = Pose::Identity();
+  lost.translation().y() = std::numeric_limits<double>::quiet_NaN();
+  libmap::PoseLink link{.from = 1, .to = 4};
+  EXPECT_EQ(refusal_of({}, {link}),
+            scratch("a.db").string() + ": link 1 -> 4 is 4: the scan has no such node");
+  link.to = 9;
+  link.from_from_to = lost;
+  EXPECT_EQ(refusal_of({}, {link}), "link 1 -> 9: is not finite");
+  link.from_from_to = Pose::Identity();
+  link.information(2, 2) = std::numeric_limits<double>::infinity();
+  EXPECT_EQ(refusal_of({}, {link}), "link 1 -> 9: is not finite");
+  EXPECT_EQ(refusal_of({{2, lost}}, {}), "optimised pose of node 2: is not finite");
+}
+
+TEST(CopyWithOptimizedPoses, RefusesTablesOfAnotherForm) {
+  const auto refusal_of = [](const std::string& changes) {
+    write_database(scratch("a.db"), graspmap_test::example_scan());
+    SQLite::Database(scratch("a.db").string(), SQLite::OPEN_READWRITE).exec(changes);
+    const libmap::Error error = graspmap_test::error_of([] {
+      libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {},
+                                        {{.from = 1, .to = 9}});
+    });
+    EXPECT_EQ(error.context().file, scratch("a.db").string());
+    return std::string(error.what()).substr(scratch("a.db").string().size());
+  };
+  EXPECT_EQ(refusal_of("INSERT INTO Admin (version) VALUES ('0.23.0')"),
+            ": rows of table Admin is 2: is no RTAB-Map database (must be 1)");
+  EXPECT_EQ(refusal_of("DELETE FROM Admin"),
+            ": rows of table Admin is 0: is no RTAB-Map database (must be 1)");
+  EXPECT_EQ(refusal_of("DROP TABLE Link; CREATE TABLE Link (from_id INTEGER, to_id INTEGER, "
+                       "type INTEGER, variance FLOAT, transform BLOB)"),
+            ": has no place for links with information matrices: RTAB-Map before 0.13 made it");
+}
+
+TEST(CopyWithOptimizedPoses, ReportsAFullDisk) {
+  write_database(scratch("a.db"), graspmap_test::example_scan());
+  std::map<int, Pose> landmarks;
+  for (int id = -2000; id < 0; ++id) landmarks[id] = graspmap_test::random_float_pose();
+  // While the file is copied, and when more is written into the copy.
+  for (const std::uintmax_t bytes : {std::uintmax_t{8192}, fs::file_size(scratch("a.db"))}) {
+    const libmap::Error error = graspmap_test::error_of([&] {
+      const graspmap_test::FileSizeLimit limit(bytes);
+      libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), landmarks);
+    });
+    EXPECT_EQ(error.context().file, scratch("b.db").string());
+    EXPECT_EQ(error.reason().find("cannot be written: "), 0U) << error.what();
+    EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+  }
+  EXPECT_EQ(fs::file_size(scratch("b.db")), fs::file_size(scratch("a.db")));
 }
 
 }  // namespace

@@ -71,6 +71,19 @@ TEST(RtabmapReader, LinksThatCannotBeUsedAreNamed) {
   EXPECT_NE(scan.warnings()[2].find("not finite"), std::string::npos);
 }
 
+// Before 0.13 a link has variances in place of a matrix.
+TEST(RtabmapReader, LinksWithoutAVarianceAreNamed) {
+  const fs::path file = sample_file({12, 0});
+  const std::size_t links = RtabmapDatabase(file).graph().links.size();
+  execute(file, "UPDATE Link SET rot_variance = 0 WHERE from_id = 1 AND to_id = 2");
+  execute(file, "UPDATE Link SET trans_variance = 9e999 WHERE from_id = 2 AND to_id = 1");
+  const RtabmapDatabase scan(file);
+  EXPECT_EQ(scan.graph().links.size(), links - 1);
+  EXPECT_EQ(scan.warnings(),
+            (std::vector<std::string>{"link 1 -> 2: is left out: variance that is not above 0",
+                                      "link 2 -> 1: is left out: variance that is not above 0"}));
+}
+
 TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
   const fs::path file = sample_file();
   execute(file, "INSERT INTO Node (id, map_id) VALUES (-4, 0)");
@@ -127,6 +140,23 @@ TEST(RtabmapReader, BrokenOptimisedPosesAreLeftOut) {
   EXPECT_TRUE(scan.warnings()[0].starts_with("Admin.opt_poses: "));
   execute(file, "UPDATE Admin SET opt_poses = NULL");
   EXPECT_TRUE(RtabmapDatabase(file).warnings().empty());
+}
+
+TEST(RtabmapReader, OptimisedPosesThatDoNotFitTheirIdsAreLeftOut) {
+  const fs::path file = sample_file();
+  const auto warnings_with = [&](libmap::MatrixElement element, int count) {
+    const std::string ids = bytes_of(std::vector<std::int32_t>(static_cast<std::size_t>(count), 1));
+    execute(file, "UPDATE Admin SET opt_ids = ?",
+            {encode_matrix(libmap::StoredMatrix{1, count, 1, element, ids})});
+    const RtabmapDatabase scan(file);
+    EXPECT_TRUE(scan.graph().optimized_map_from_base.empty());
+    return scan.warnings();
+  };
+  EXPECT_EQ(
+      warnings_with(libmap::MatrixElement::float32, 3),
+      std::vector<std::string>{"Admin.opt_poses: matrices of other types than int32 and float32"});
+  EXPECT_EQ(warnings_with(libmap::MatrixElement::int32, 2),
+            std::vector<std::string>{"Admin.opt_poses: '2 and 3': other numbers of ids and poses"});
 }
 
 // ----------------------------------------------------------------------------------------- frames

@@ -15,6 +15,7 @@
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/database_rows.h"
 #include "tests/libmap/scan/example_scan.h"
+#include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
 namespace {
@@ -315,6 +316,17 @@ TEST(RtabmapWriter, ReportsWhereItCannotWrite) {
   EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
 }
 
+TEST(RtabmapWriter, ReportsAFullDisk) {
+  const ExampleScan scan = graspmap_test::example_scan();
+  const libmap::Error error = graspmap_test::error_of([&] {
+    const graspmap_test::FileSizeLimit limit(8192);
+    write_database(scratch("scan.db"), scan);
+  });
+  EXPECT_EQ(error.context().file, scratch("scan.db").string());
+  EXPECT_EQ(error.reason().find("cannot be written: "), 0U) << error.what();
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+}
+
 class RtabmapWriterRefusal : public testing::Test {
  protected:
   ExampleScan scan_ = graspmap_test::example_scan();
@@ -349,6 +361,11 @@ TEST_F(RtabmapWriterRefusal, OfNodesThatCannotBe) {
   frame.right = libmap::GrayImage(40, 30);
   EXPECT_NE(refusal_of_node(node, frame).find("both"), std::string::npos);
   frame.right = {};
+  const libmap::StereoCamera pair{.left = frame.cameras[0], .right = frame.cameras[0]};
+  frame.stereo = {pair, pair};
+  EXPECT_EQ(refusal_of_node(node, frame),
+            "node 2: cameras is 1: a stereo frame has no cameras but its left ones (must be 2)");
+  frame.stereo.clear();
   frame.cameras[0].fx = -1.0;
   EXPECT_NE(refusal_of_node(node, frame).find("node 2: camera"), std::string::npos);
   EXPECT_NE(refusal_of_node({.id = 0}, empty_frame(0)).find("> 0"), std::string::npos);

@@ -2,6 +2,7 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
+#include <sqlite3.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -127,6 +128,38 @@ TEST(SqliteFile, RollbackModeWithAWriterInItsTransaction) {
   // Reading does not keep the writer from its commit.
   writer.exec("COMMIT");
   expect_sample(RtabmapDatabase(folder / "a.db"), 4);
+}
+
+// SQLite's usual way to files, but for waits: they are over at once.
+class WithoutWaiting {
+ public:
+  WithoutWaiting() : files_(*sqlite3_vfs_find(nullptr)) {
+    files_.zName = "without-waiting";
+    files_.xSleep = [](sqlite3_vfs*, int microseconds) { return microseconds; };
+    sqlite3_vfs_register(&files_, 1);
+  }
+  ~WithoutWaiting() { sqlite3_vfs_unregister(&files_); }
+  WithoutWaiting(const WithoutWaiting&) = delete;
+  WithoutWaiting& operator=(const WithoutWaiting&) = delete;
+
+ private:
+  sqlite3_vfs files_;
+};
+
+TEST(SqliteFile, CopyOfAFileThatStaysLocked) {
+  const fs::path folder = scratch_folder();
+  write_sample(folder / "a.db");
+  const WithoutWaiting without_waiting;
+  const libmap::SqliteFile file(folder / "a.db");
+  SQLite::Database writer((folder / "a.db").string(), SQLite::OPEN_READWRITE);
+  writer.exec("BEGIN EXCLUSIVE");
+  const libmap::Error error = error_of([&] { file.copy_to(folder / "b.db"); });
+  EXPECT_EQ(std::string(error.what()),
+            (folder / "a.db").string() + ": another program keeps writing to it");
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
+  writer.exec("COMMIT");
+  file.copy_to(folder / "b.db");
+  expect_sample(RtabmapDatabase(folder / "b.db"));
 }
 
 TEST(SqliteFile, JournalOfAnInterruptedWrite) {

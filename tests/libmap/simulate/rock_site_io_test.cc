@@ -117,6 +117,25 @@ TEST(RockSiteIo, SaysWhatIsWrong) {
   }
 }
 
+TEST(RockSiteIo, EntriesAreBounded) {
+  std::string text = "bumps: [";
+  for (int n = 0; n <= 10'000; ++n) text += "0,";
+  EXPECT_STREQ(error_of([&] { parse(text + "]"); }).what(),
+               "site.yaml: bumps is 10001: too many entries (must be at most 10000)");
+}
+
+// Of sites that were read from no file.
+TEST(RockSiteIo, CheckNamesTheEntry) {
+  RockSite site = parse("rocks:\n  - {name: a, height_m: 0.3, x_m: 1, y_m: 1}\n");
+  EXPECT_NO_THROW(site.check());
+  site.rocks[0].sides = 99;
+  EXPECT_STREQ(error_of([&] { site.check(); }).what(),
+               "rocks[0] (a).sides is 99: out of range (must be >= 4 and <= 12)");
+  site = {};
+  site.ground.size_x_m = 1e9;
+  EXPECT_EQ(error_of([&] { site.check(); }).context().field, "ground.size_x_m");
+}
+
 TEST(RockSiteIo, EmptyIsGroundAlone) {
   EXPECT_TRUE(parse("{}").rocks.empty());
   EXPECT_TRUE(parse("rocks:\nbumps:\n").rocks.empty());

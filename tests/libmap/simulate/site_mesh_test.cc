@@ -192,6 +192,22 @@ TEST(SiteMesh, EverySeedGivesASite) {
   }
 }
 
+// On the top of a bump that the ground's triangles miss.
+TEST(SiteMesh, ARockInTheAirIsAnError) {
+  RockSite site = parse_site(
+      "ground: {unevenness_m: 0}\n"
+      "bumps: [{x_m: 0.4, y_m: 0.4, height_m: 1, radius_m: 0.25}]\n"
+      "rocks: [{height_m: 0.1, width_m: 0.1, depth_m: 0.1, x_m: 0.4, y_m: 0.4, ledges: 0,"
+      " cleft_m: 0, overhang_deg: 0}]\n",
+      "bump.yaml");
+  EXPECT_STREQ(error_of([&] { site_mesh(site, {.edge_length_m = 1.0}); }).what(),
+               "rocks[0]: does not touch the ground");
+  site.rocks[0].name = "boulder";
+  EXPECT_STREQ(error_of([&] { site_mesh(site, {.edge_length_m = 1.0}); }).what(),
+               "rocks[0] (boulder): does not touch the ground");
+  EXPECT_NO_THROW(site_mesh(site, {.edge_length_m = 0.05}));
+}
+
 TEST(SiteMesh, BadOptionsAreErrors) {
   RockSite site = small_site();
   EXPECT_EQ(error_of([&] { site_mesh(site, {.edge_length_m = 0.0}); }).context().field,

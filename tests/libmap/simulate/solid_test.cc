@@ -150,6 +150,15 @@ TEST(RefineFacets, KeepsHolesInAFacet) {
   EXPECT_NEAR(volume(fine), 0.5 * (1.0 - 0.4 * 0.41), 1e-12);
 }
 
+// Of three walls of a box the edges between the first and the last lie behind each other.
+TEST(RefineFacets, ARegionThatIsNotFlatIsAnError) {
+  Solid solid = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
+  for (int& label : solid.labels)
+    if (label == 1 || label == 3) label = 0;
+  EXPECT_EQ(error_of([&] { refine_facets(solid, 0.5); }).reason(),
+            "two corners of a facet coincide");
+}
+
 TEST(Booleans, FollowInclusionAndExclusion) {
   Solid a = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   Solid b = box({0.51, 0.52, 0.53}, {1.5, 1.5, 1.5});
@@ -189,6 +198,12 @@ TEST(Booleans, TouchingSolidsAreAnErrorOrAManifold) {
   const Solid a = box({0.0, 0.0, 0.0}, {1.0, 1.0, 1.0});
   const Solid b = box({1.0, 1.0, 0.0}, {2.0, 2.0, 1.0});
   EXPECT_NE(error_of([&] { unite({a, b}); }).reason().find("touch"), std::string::npos);
+  // Nor has what is left of a box without two opposite quarters.
+  const Solid rest = subtract(a, box({-1.0, -1.0, -1.0}, {0.5, 0.5, 2.0}));
+  EXPECT_EQ(error_of([&] {
+              subtract(rest, box({0.5, 0.5, -1.0}, {2.0, 2.0, 2.0}));
+            }).reason(),
+            "the difference of two solids is no manifold");
 }
 
 TEST(Booleans, SplintersGoWithoutMovingTheSurface) {

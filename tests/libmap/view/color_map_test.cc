@@ -211,6 +211,10 @@ TEST(ColorPoints, ErrorsNameWhatWasMeant) {
   EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("no colours"));
   coloring.mode = ColorMode::flags;
   EXPECT_EQ(error_of([&] { color(cloud, coloring); }).context().value, "convex");
+  coloring = {.mode = ColorMode::field, .field = "curvature"};
+  cloud.fields[0].values.pop_back();
+  EXPECT_STREQ(error_of([&] { color(cloud, coloring); }).what(),
+               "curvature is 2 values: the field has not one value a point (must be 3)");
   coloring.mode = ColorMode::single;
   coloring.color = "gren";
   EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("green"));

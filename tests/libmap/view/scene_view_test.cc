@@ -332,6 +332,10 @@ TEST_F(SceneViewTest, RefusesSizesAndColoursThatCannotBe) {
   SceneViewOptions options;
   options.background = "blak";
   EXPECT_THAT(error_of([&] { render_scene(scene, options); }).what(), HasSubstr("'black'"));
+  options = {};
+  options.extent = Bounds3d{{0, 1, 0}, {1, 0, 1}};
+  EXPECT_STREQ(error_of([&] { render_scene(scene, options); }).what(),
+               "extent: an empty box cannot be shown");
 }
 
 TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
@@ -347,6 +351,10 @@ TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
     to_png(broken);
   });
   error_of([] { to_png({}); });
+  // libpng would end the program.
+  const Error wide = error_of([] { to_png(ColorImage(1'000'001, 1)); });
+  EXPECT_EQ(wide.context().value, "1000001 x 1");
+  EXPECT_EQ(wide.context().bound, "at most 1000000 a side");
 }
 
 }  // namespace

@@ -11,6 +11,7 @@
 #include <thread>
 
 #include "libmap/view/scene_view.h"
+#include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -107,6 +108,31 @@ TEST_F(VirtualDisplayTest, AServerThatDoesNotComeUpIsAnError) {
   EXPECT_THAT(error.what(), HasSubstr("Xvfb did not come up"));
   EXPECT_EQ(variable("DISPLAY"), "(unset)");
   EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
+}
+
+TEST_F(VirtualDisplayTest, AServerWithoutOpenGlIsAnError) {
+  const auto folder = graspmap_test::scratch_folder();
+  const std::string path = variable("PATH");
+  graspmap_test::write_text(folder / "Xvfb",
+                            "#!/bin/sh\nPATH='" + path + "'\nexec Xvfb \"$@\" -extension GLX\n");
+  std::filesystem::permissions(folder / "Xvfb", std::filesystem::perms::owner_all);
+  setenv("PATH", (folder.string() + ":" + path).c_str(), 1);
+  const Error error = error_of([] { const VirtualDisplay display; });
+  setenv("PATH", path.c_str(), 1);
+  EXPECT_EQ(error.kind(), ErrorKind::failed);
+  EXPECT_THAT(error.what(), HasSubstr("Xvfb answers without OpenGL"));
+  EXPECT_EQ(variable("DISPLAY"), "(unset)");
+  EXPECT_EQ(waitpid(-1, nullptr, WNOHANG), -1);
+}
+
+TEST_F(VirtualDisplayTest, WithoutAFileLeftToOpenItIsAnError) {
+  const Error error = error_of([] {
+    const graspmap_test::LowerLimit no_file(RLIMIT_NOFILE, 0);
+    const VirtualDisplay display;
+  });
+  EXPECT_EQ(error.kind(), ErrorKind::failed);
+  EXPECT_THAT(error.what(), HasSubstr("no pipe to Xvfb: Too many open files"));
+  EXPECT_EQ(variable("LIBGL_ALWAYS_SOFTWARE"), "(unset)");
 }
 
 // A program that is killed cannot end its server: the server must notice.
