@@ -8,7 +8,9 @@
 #include <cerrno>
 #include <csignal>
 #include <cstring>
+#include <future>
 #include <thread>
+#include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/unfinished_outputs.h"
@@ -42,7 +44,8 @@ extern "C" void tell(int signal) {
   _exit(128 + signal);
 }
 
-void wait_for_a_signal(int end) {
+void wait_for_a_signal(int end, std::promise<void> begun) {
+  begun.set_value();
   unsigned char number = 0;
   while (read(end, &number, 1) != 1) {
     if (errno != EINTR) return;
@@ -69,7 +72,11 @@ void end_cleanly_on_signals() {
     throw libmap::Error(std::string("no pipe for signals: ") + std::strerror(errno), {},
                         libmap::ErrorKind::failed);
   told_end = ends[1];
-  std::thread(wait_for_a_signal, ends[0]).detach();
+  // A process that is forked while a thread begins inherits what that thread has locked, for ever.
+  std::promise<void> begun;
+  const std::future<void> has_begun = begun.get_future();
+  std::thread(wait_for_a_signal, ends[0], std::move(begun)).detach();
+  has_begun.wait();
   for (const int signal : {SIGHUP, SIGINT, SIGTERM}) take(signal);
   std::signal(SIGXFSZ, SIG_IGN);
 }

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <optional>
 #include <set>
 #include <vector>
 
@@ -66,6 +68,42 @@ rosbag::CompressionType to_rosbag(BagCompression compression) {
   return rosbag::compression::Uncompressed;
 }
 
+// librosbag looks for plugins of encryption by rospack, which keeps what it finds in the user's
+// folder, and complains where it cannot. While this lives it keeps that in a folder of its own.
+class PluginSearch {
+ public:
+  PluginSearch() {
+    std::error_code code;
+    std::string folder = (fs::temp_directory_path(code) / "graspmap-XXXXXX").string();
+    if (code || mkdtemp(folder.data()) == nullptr) return;
+    folder_ = folder;
+    if (const char* const before = std::getenv(variable)) before_ = before;
+    setenv(variable, folder.c_str(), 1);
+  }
+  ~PluginSearch() {
+    if (folder_.empty()) return;
+    if (before_)
+      setenv(variable, before_->c_str(), 1);
+    else
+      unsetenv(variable);
+    std::error_code code;
+    fs::remove_all(folder_, code);
+  }
+  PluginSearch(const PluginSearch&) = delete;
+  PluginSearch& operator=(const PluginSearch&) = delete;
+
+ private:
+  static constexpr const char* variable = "ROS_HOME";
+
+  fs::path folder_;
+  std::optional<std::string> before_;
+};
+
+std::unique_ptr<rosbag::Bag> new_bag() {
+  const PluginSearch search;
+  return std::make_unique<rosbag::Bag>();
+}
+
 // A bag in the making.
 class BagFile {
  public:
@@ -104,7 +142,7 @@ class BagFile {
   void close() { bag_->close(); }
 
  private:
-  std::unique_ptr<rosbag::Bag> bag_ = std::make_unique<rosbag::Bag>();
+  std::unique_ptr<rosbag::Bag> bag_ = new_bag();
 };
 
 // librosbag's exceptions as Errors: only the disk can fail it, and the system knows how.

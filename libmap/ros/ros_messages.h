@@ -111,7 +111,9 @@ void read_serialized(std::string_view bytes, const Read& read) {
   // name, 48 for 13.
   const std::size_t before = allocation_budget;
   allocation_budget = 4 * bytes.size() + 1024;
-  // IStream reads alone, but takes no constant bytes.
+  // IStream adds to its pointer before it looks at the end, even for a message without bytes.
+  if (bytes.empty()) bytes = "";
+  // It reads alone, but takes no constant bytes.
   ros::serialization::IStream stream(
       reinterpret_cast<std::uint8_t*>(const_cast<char*>(bytes.data())),
       static_cast<std::uint32_t>(bytes.size()));

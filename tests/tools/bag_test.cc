@@ -209,6 +209,20 @@ TEST(BagCommand, FramesAreTiedTogether) {
   }
 }
 
+TEST(BagCommand, LeavesNothingInTheUsersFolder) {
+  REQUIRE_ROS();
+  write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
+  fs::create_directory(scratch("home"));
+  fs::create_directory(scratch("temporary"));
+  const std::map<std::string, std::string> environment = {
+      {"HOME", scratch("home").string()}, {"TMPDIR", scratch("temporary").string()}};
+  const ProgramResult written = graspmap({"bag", "map.csv", "-o", "map.bag"}, environment);
+  EXPECT_EQ(written.standard_error, "graspmap bag: info: 2 clouds and 0 footholds at 1.000000 s\n");
+  EXPECT_TRUE(succeeded(graspmap({"bag", "map.bag", "--list"}, environment)));
+  EXPECT_TRUE(fs::is_empty(scratch("home")));
+  EXPECT_TRUE(fs::is_empty(scratch("temporary")));
+}
+
 TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   REQUIRE_ROS();
   graspmap_test::write_terrain();
