@@ -139,6 +139,10 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshWriteOptions& options) {
   require_mesh_format(path);
   mesh.check();
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
+    if (!mesh.vertices[n].allFinite())
+      throw Error("a vertex is not finite",
+                  {.file = path.string(), .field = "vertex", .value = std::to_string(n)});
   write_geometry_file(path,
                       [&](std::ostream& out) { encode(format_of(path), mesh, options, out); });
 }

@@ -46,7 +46,7 @@ MeshReadResult read_mesh(const std::filesystem::path& path);
 
 // Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
 // temporary path. What a format cannot keep (the table above) is left out. Throws Error: unknown
-// extension, an index out of range, a failed write (ErrorKind::failed).
+// extension, a vertex not finite, an index out of range, a failed write (ErrorKind::failed).
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshWriteOptions& options = {});
 

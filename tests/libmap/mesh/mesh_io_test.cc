@@ -229,6 +229,13 @@ TEST_P(MeshFormat, IndicesOutOfRangeAreNotWritten) {
   EXPECT_THROW(write_sample(GetParam(), mesh), Error);
 }
 
+TEST_P(MeshFormat, VerticesThatAreNotFiniteAreNotWritten) {
+  TriangleMesh mesh = sheet(3);
+  mesh.vertices[4].y() = std::numeric_limits<double>::quiet_NaN();
+  const Error error = error_of([&] { write_sample(GetParam(), mesh); });
+  EXPECT_THAT(error.what(), HasSubstr("vertex is 4: a vertex is not finite"));
+}
+
 TEST(MeshFiles, PolygonsBecomeTrianglesWithTheirFields) {
   const MeshReadResult read = read_as(
       ".ply",
