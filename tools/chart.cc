@@ -178,15 +178,15 @@ libmap::Chart chart_of(const libmap::Table& table, const ChartOptions& options) 
   if (chart.curves.empty())
     throw libmap::Error("no row with numbers in both columns",
                         {.file = table.file, .field = options.x + ", " + options.y});
+  chart.x_axis.range = range_of(options.x_min, options.x_max, "--x-min", "--x-max",
+                                [&](const auto& ends) { return x_range(chart, ends); });
+  chart.y_axis.range = range_of(options.y_min, options.y_max, "--y-min", "--y-max",
+                                [&](const auto& ends) { return y_range(chart, ends); });
   try {
     chart.check();
   } catch (const libmap::Error& error) {
     throw error.in_file(table.file);
   }
-  chart.x_axis.range = range_of(options.x_min, options.x_max, "--x-min", "--x-max",
-                                [&](const auto& ends) { return x_range(chart, ends); });
-  chart.y_axis.range = range_of(options.y_min, options.y_max, "--y-min", "--y-max",
-                                [&](const auto& ends) { return y_range(chart, ends); });
   return chart;
 }
 

@@ -105,8 +105,7 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
 }
 
 // Single precision in some shares' files and double in others would meet in the whole.
-void restore_full_precision(const libmap::Manifest& part, const std::string& name,
-                            libmap::PointCloud& whole) {
+void restore_full_precision(const libmap::Manifest& part, libmap::PointCloud& whole) {
   libgtd::TileStoreIndex index;
   const auto lattice = libgtd::facts_of(part).lattice;
   if (!lattice) return;
@@ -119,11 +118,7 @@ void restore_full_precision(const libmap::Manifest& part, const std::string& nam
       index.lattice.voxel_size_m = static_cast<float>(index.lattice.voxel_size_m);
   index.frame = part.frame == "input" ? libgtd::MapFrame::input : libgtd::MapFrame::terrain;
   index.manifest.transforms = part.transforms;
-  try {
-    libgtd::restore_positions(index, whole);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(name);
-  }
+  libgtd::restore_positions(index, whole);
 }
 
 // Points whose flag is set.
@@ -243,7 +238,7 @@ void merge(const MergeOptions& options, Run& run) {
   std::vector<libmap::PointCloud> parts;
   for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
   libmap::PointCloud whole = joined(parts, options.tiles.front());
-  restore_full_precision(manifests.front(), options.tiles.front(), whole);
+  restore_full_precision(manifests.front(), whole);
   copy_common_facts(manifests.front(), run.manifest());
   // The terrain and the gripper that the parts were made from, then the parts.
   run.manifest().inputs = manifests.front().inputs;

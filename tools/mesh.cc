@@ -12,6 +12,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/normals.h"
 #include "libmap/core/error.h"
+#include "libmap/core/text.h"
 #include "libmap/mesh/mesh_cleaning.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_report.h"
@@ -128,9 +129,14 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
   add_timings("reconstruction", made.timings_s, run);
   run.say(fmt::format("{} points, cells of {:.4g} m -> {} triangles", cloud.size(),
                       made.cell_size_m, made.mesh.triangles.size()));
-  if (made.mesh.triangles.empty())
-    throw libmap::Error("no surface was found: the cloud is too thin", {.file = options.cloud});
-  return std::move(made.mesh);
+  if (!made.mesh.triangles.empty()) return std::move(made.mesh);
+  if (made.trimmed_triangles == 0)
+    throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
+                        {.file = options.cloud});
+  throw libmap::Error("no surface lies so near the points",
+                      {.file = options.cloud,
+                       .field = "trim_distance_cells",
+                       .value = libmap::to_text(options.reconstruction.trim_distance_cells)});
 }
 
 libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleMesh& mesh,

@@ -156,7 +156,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
       run.timed("read", [&] { return read_views(rig, images, moment, options.strict, run); });
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
-  if (views.empty() && moment.seen() > 0)
+  if (views.empty())
     throw libmap::Error("no image of the moment can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
   add_results(rig, moment, result, views, run.manifest());

@@ -1,6 +1,7 @@
 // graspmap simulate cameras: what the depth cameras of a robot see from one place.
 #include <fmt/format.h>
 
+#include <cmath>
 #include <string>
 #include <utility>
 #include <vector>
@@ -62,10 +63,10 @@ libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
   for (const libmap::RigCamera& camera : rig.cameras) {
     // 16 bits hold no more; 65535 stands for saturated pixels.
     constexpr double largest = 65534;
-    if (camera.far_m / camera.depth_scale_m > largest)
-      throw libmap::Error("16-bit images cannot hold what this camera measures",
-                          {.file = file.string(),
-                           .field = "depth_scale_m of " + camera.name,
+    if (std::round(camera.far_m / camera.depth_scale_m) > largest)
+      throw libmap::Error("16-bit images cannot hold what camera " + camera.name + " measures",
+                          {.file = options.depth_scale_m > 0 ? "" : file.string(),
+                           .field = "depth_scale_m",
                            .value = libmap::to_text(camera.depth_scale_m),
                            .bound = ">= far_m / 65534, " +
                                     libmap::to_text(static_cast<float>(camera.far_m / largest))});

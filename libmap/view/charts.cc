@@ -73,10 +73,10 @@ void check_numbers(const std::vector<double>& values, const std::string& field) 
 void check_axis(const ChartAxis& axis, const std::string& field) {
   if (!axis.range) return;
   const auto [low, high] = *axis.range;
-  if (!std::isfinite(low) || !std::isfinite(high) || !(low < high))
+  if (!std::isfinite(high - low) || !(low < high))
     throw Error("cannot be drawn", {.field = field,
                                     .value = to_text(low) + " to " + to_text(high),
-                                    .bound = "finite and ascending"});
+                                    .bound = "finite, its width too, and ascending"});
 }
 
 // Low and high of what is drawn, widened to round numbers; 0 to 1 where nothing is.

@@ -149,25 +149,29 @@ void run(const std::filesystem::path& folder) {
     for (const PoseSource source :
          {PoseSource::ground_truth, PoseSource::stored, PoseSource::odometry}) {
       const libmap::Trajectory poses = trajectory_of(scan->graph(), source);
-      Pose mesh_from_world = mesh_from_truth();
-      if (source != PoseSource::ground_truth)
-        mesh_from_world =
-            mesh_from_world * absolute_trajectory_error(poses, true_poses).truth_from_estimate;
+      // By the poses that a cloud was made with.
+      const auto mesh_from = [&](const libmap::Trajectory& used) {
+        if (source == PoseSource::ground_truth) return mesh_from_truth();
+        return Pose(mesh_from_truth() *
+                    absolute_trajectory_error(used, true_poses).truth_from_estimate);
+      };
+      const Pose mesh_from_given = mesh_from(poses);
       const std::string poses_name = to_text(source);
       const Baselines baselines = make_baselines(*scan, poses);
       print_row(name, poses_name, "voxel means of each frame (RTAB-Map)", baselines.each_frame,
-                mesh_from_world, truth);
+                mesh_from_given, truth);
       print_row(name, poses_name, "voxel means of all frames", baselines.all_frames,
-                mesh_from_world, truth);
+                mesh_from_given, truth);
       const auto start = std::chrono::steady_clock::now();
       const libmap::DepthFusionResult fused = fuse_depth(*scan, poses);
       const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
-      print_row(name, poses_name, "fuse_depth", fused.cloud.positions, mesh_from_world, truth,
+      const Pose mesh_from_fused = mesh_from(fused.poses);
+      print_row(name, poses_name, "fuse_depth", fused.cloud.positions, mesh_from_fused, truth,
                 taken.count());
       const auto meshing = std::chrono::steady_clock::now();
       const Points surface = surface_of(fused.cloud);
       const std::chrono::duration<double> meshed = std::chrono::steady_clock::now() - meshing;
-      print_row(name, poses_name, "surface of it", surface, mesh_from_world, truth, meshed.count());
+      print_row(name, poses_name, "surface of it", surface, mesh_from_fused, truth, meshed.count());
     }
   }
 }

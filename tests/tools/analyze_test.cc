@@ -138,6 +138,8 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
                         {"terrain.pcd", "score"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--stride", "0"}),
                         {"--stride is 0", "> 0"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--height-bin", "1e-9"}),
+                        {"map.pcd: height_bin_m is 1e-09: too narrow", ">= "}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--start", "1,2"}),
                         {"--start", "X,Y,Z"}));
   EXPECT_TRUE(bad_input(

@@ -118,6 +118,28 @@ TEST(BagCommand, PythonsBagsAreReadAlike) {
   expect_same_panorama("back");
 }
 
+TEST(BagCommand, AnImageThatCannotBeUsedIsAWarningOrStrictlyAnError) {
+  REQUIRE_ROS();
+  write_run();
+  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag"})));
+  std::string bag = content("run.bag");
+  // The text's length, the text, a byte of the bytes' order, the bytes of a row.
+  const std::size_t encoding = bag.find(std::string("\5\0\0\0", 4) + "16UC1");
+  ASSERT_NE(encoding, std::string::npos);
+  bag.replace(encoding + 10, 4, std::string("\7\0\0\0", 4));
+  write_text(scratch("run.bag"), bag);
+  const std::string fault =
+      "/depth/image_raw: 1 images cannot be used: step is 7: shorter than a row of 96 pixels";
+  EXPECT_TRUE(bad_input(graspmap({"bag", "run.bag", "-o", "strict", "--strict"}),
+                        {"error: run.bag: /", fault, ">= 192"}));
+  EXPECT_FALSE(fs::exists(scratch("strict")));
+  const ProgramResult result = graspmap({"bag", "run.bag", "-o", "back"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find(fault), std::string::npos) << result.standard_error;
+  EXPECT_EQ(json_of("back.json")["results"]["images_broken"], 1);
+  EXPECT_EQ(json_of("back.json")["results"]["images"], 5);
+}
+
 // A small map with curvature, its terrain and its footholds.
 void write_map_parts() {
   graspmap_test::write_terrain();
@@ -240,6 +262,8 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "--topic"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
        {"did you mean '/graspability_map'"});
+  says({"good.bag", "-o", "out.pcd", "--topic", "/graspability_map", "--topic", "/curvature_map"},
+       {"--topic: a cloud comes from one topic"});
   says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
   says({"good.bag", "-o", "out.bag"}, {"something else than a bag"});
   says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});

@@ -151,6 +151,12 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_TRUE(bad_input(run({"cut.png"}), {"cut.png"}));
   graspmap_test::write_text(scratch("small.png"), libmap::encode_png(libmap::GrayImage(64, 48)));
   EXPECT_TRUE(bad_input(run({"shots/00.png", "small.png"}), {"small.png", "64 x 48", "320 x 240"}));
+  graspmap_test::write_text(scratch("large.png"),
+                            libmap::encode_png(libmap::GrayImage(4097, 4096)));
+  EXPECT_TRUE(bad_input(run({"large.png"}),
+                        {"large.png: image size is 4097 x 4096: too large", "<= 16777216 pixels"}));
+  EXPECT_TRUE(bad_input(graspmap({"calibrate", "shots", "-o", "camera.txt"}),
+                        {"camera.txt: a camera is written as YAML", "a name.yaml"}));
   // The same picture again and again tells nothing more.
   EXPECT_TRUE(bad_input(run({"shots/00.png", "shots/00.png", "shots/00.png", "shots/00.png"}),
                         {"pictures is 1", "places of its own"}));

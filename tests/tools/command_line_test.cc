@@ -206,6 +206,25 @@ TEST(CommandLine, AFileThatGrowsBeyondItsLimitIsAnError) {
   EXPECT_EQ(graspmap_test::names_in_scratch(), names);
 }
 
+TEST(CommandLine, AFileOfAFolderThatGrowsBeyondItsLimitIsNamed) {
+  const ProgramResult result =
+      in_shell("ulimit -f 512; ",
+               "simulate terrain --size 1.5 --piece 1.5 --spacing 0.008 -o pieces --quiet");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.standard_error,
+            "graspmap simulate terrain: error: pieces/piece_0_0.pcd: cannot be written: File too "
+            "large\n");
+  EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{});
+}
+
+TEST(CommandLine, AFolderThatCannotBeMadeIsAnError) {
+  write_text(scratch("t.csv"), "graspable,score\n1,0.9\n0,0.2\n");
+  const ProgramResult result = graspmap({"evaluate", "t.csv", "-o", "t.csv/inner/out"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.standard_error,
+            "graspmap evaluate: error: t.csv/inner: cannot be made: Not a directory\n");
+}
+
 TEST(CommandLine, WhatStandsInAFileReachesTheTerminalAsPlainText) {
   write_text(scratch("a.csv"), "x,y,z\n\x1b[2J\xff\r\xc3\xa9\xc2\x9b,0,0\n");
   EXPECT_TRUE(bad_input(graspmap({"lookup", "a.csv", "a.csv", "-o", "b.csv"}),

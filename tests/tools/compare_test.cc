@@ -333,6 +333,9 @@ TEST(Compare, BadInput) {
   EXPECT_TRUE(bad_input(run({"--within", "0"}), {"--within"}));
   EXPECT_TRUE(bad_input(run({"-o", "square.ply"}), {"square.ply"}));
   EXPECT_TRUE(bad_input(graspmap({"compare", "none.ply", "square.ply"}), {"none.ply"}));
+  libmap::write_cloud(scratch("empty.ply"), {});
+  EXPECT_TRUE(bad_input(graspmap({"compare", "points.ply", "empty.ply"}),
+                        {"empty.ply: the cloud has no points"}));
 }
 
 }  // namespace

@@ -350,6 +350,20 @@ TEST(ExtractBundler, BadInput) {
   EXPECT_NE(strict.standard_error.find("error: scan.db: node 5: image"), std::string::npos);
 }
 
+TEST(ExtractBundler, AScanWithoutColour) {
+  ExampleScan scan = graspmap_test::example_scan();
+  for (auto& [node, frame] : scan.frames) frame.color = {};
+  graspmap_test::write_database(scratch("scan.db"), scan);
+  for (const char* kind : {"--bundler", "--colmap"}) {
+    const auto result = graspmap({"extract", "scan.db", kind, "out", "--poses", "odometry"});
+    EXPECT_EQ(result.exit_code, 3);
+    EXPECT_TRUE(result.standard_error.ends_with(
+        "error: scan.db: no frame has a pose, a calibration and a colour image\n"))
+        << result.standard_error;
+  }
+  EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
+}
+
 TEST(Extract, TakesEveryRealScan) {
   GRASPMAP_REQUIRE_DATA();
   for (const char* name : {"site_killed", "site_tiny", "site_tiny_q", "site_tiny_v0160",

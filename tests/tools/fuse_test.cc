@@ -195,6 +195,9 @@ TEST(Fuse, BadInput) {
   EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.obj"}), {"cloud.obj"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply", "--voxel-size", "0"}),
                         {"--voxel-size", "> 0"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", "text.db", "-o", "cloud.ply", "--corrected-poses", "poses.csv"}),
+                {"--corrected-poses is poses.csv: not a format of poses", ".tum, .kitti, .g2o"}));
   EXPECT_TRUE(graspmap_test::names_in_scratch() == std::vector<std::string>{"text.db"});
 }
 

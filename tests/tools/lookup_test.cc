@@ -281,6 +281,8 @@ TEST_F(LookupBadInput, MapsThatCannotBe) {
                         {"none.pcd: no such file"}));
   EXPECT_TRUE(bad_input(graspmap({"lookup", "map.csv", "none.csv", "-o", "out.csv"}),
                         {"none.csv: no such file"}));
+  EXPECT_TRUE(bad_input(graspmap({"lookup", "map.csv", "points.csv", "-o", "out.pcd"}),
+                        {"out.pcd: look-ups are written as .csv"}));
   EXPECT_TRUE(bad_input(graspmap({"lookup", "empty.csv", "points.csv", "-o", "out.csv"}),
                         {"empty.csv", "no points"}));
   write_text(scratch("map.csv.json"), "{broken");

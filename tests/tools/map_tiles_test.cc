@@ -175,6 +175,26 @@ TEST(MapTiles, DamageIsNamed) {
                         {"map.tiles", "by itself"}));
 }
 
+// Its positions are made from its voxels.
+TEST(MapTiles, ATileWithoutVoxelsFarFromTheOrigin) {
+  libmap::write_cloud(
+      scratch("terrain.pcd"),
+      libmap::transform_cloud(graspmap_test::bumpy_terrain(0.2),
+                              libmap::make_pose_from_rpy({5000, -300, 0}, {0, 0, 0})));
+  ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "--plane", "none", "-o", "map.tiles"})));
+  for (const auto& entry : fs::directory_iterator(scratch("map.tiles/tiles"))) {
+    std::string tile = graspmap_test::read_text(entry.path());
+    const std::size_t fields = tile.find(" i j k");
+    ASSERT_NE(fields, std::string::npos);
+    write_text(entry.path(), tile.replace(fields, 6, " i j m"));
+  }
+  write_points(3);
+  for (const Words& words : {Words{"lookup", "map.tiles", "points.csv", "-o", "answers.csv"},
+                             Words{"render", "map.tiles", "-o", "map.png"}})
+    EXPECT_TRUE(
+        bad_input(graspmap(words), {"map.tiles/tiles/", ".pcd: k: not a graspability map"}));
+}
+
 TEST(MapTiles, AnUnfinishedStoreIsNamed) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(succeeded(graspmap(

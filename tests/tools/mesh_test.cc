@@ -122,6 +122,23 @@ TEST(Mesh, CloudsThatAreTooThin) {
   EXPECT_FALSE(std::filesystem::exists(scratch("mesh.ply")));
 }
 
+TEST(Mesh, CloudsWithoutASurface) {
+  libmap::PointCloud sheet;
+  for (const double x : {0.0, 0.01})
+    for (const double y : {0.0, 0.01}) sheet.positions.emplace_back(x, y, 0);
+  sheet.normals.assign(4, Eigen::Vector3f::UnitZ());
+  libmap::write_cloud(scratch("sheet.ply"), sheet);
+  EXPECT_TRUE(bad_input(
+      graspmap({"mesh", "sheet.ply", "-o", "mesh.ply", "--quiet", "--trim-distance-cells", "0.1"}),
+      {"sheet.ply: trim_distance_cells is 0.1: no surface lies so near"}));
+  sheet.positions.insert(sheet.positions.end(), sheet.positions.begin(), sheet.positions.end());
+  sheet.normals.insert(sheet.normals.end(), 4, -Eigen::Vector3f::UnitZ());
+  libmap::write_cloud(scratch("both.ply"), sheet);
+  EXPECT_TRUE(bad_input(graspmap({"mesh", "both.ply", "-o", "mesh.ply", "--quiet"}),
+                        {"both.ply: no surface was found", "cancel"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("mesh.ply")));
+}
+
 TEST(Mesh, BadOptions) {
   write_ball(ball(true));
   EXPECT_TRUE(bad_input(graspmap({"mesh", "ball.ply", "-o", "mesh.pcd"}), {"mesh.pcd"}));

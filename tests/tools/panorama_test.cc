@@ -150,6 +150,21 @@ TEST(PanoramaCommand, BrokenImageCostsItsCameraAlone) {
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("cameras_seen"), 5);
 }
 
+TEST(PanoramaCommand, BrokenImagesOfAllCamerasAreAnError) {
+  write_run();
+  for (int n = 0; n < 6; ++n)
+    graspmap_test::write_text(
+        scratch("run") / libmap::rig_image_name("camera_" + std::to_string(n), 12.0 + 0.003 * n),
+        "no image");
+  const graspmap_test::ProgramResult result = graspmap({"panorama", "run", "-o", "cloud.pcd"});
+  EXPECT_EQ(result.exit_code, 3);
+  EXPECT_NE(result.standard_error.find("camera_5 is left out\n"), std::string::npos);
+  EXPECT_TRUE(result.standard_error.ends_with(
+      "graspmap panorama: error: run: no image of the moment can be read\n"))
+      << result.standard_error;
+  EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
+}
+
 TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
   write_run();
   const auto run = [](const std::string& folder) {

@@ -1,6 +1,8 @@
 #include <gtest/gtest.h>
 
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/mesh/mesh_io.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace {
@@ -88,6 +90,11 @@ TEST(Render, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--points", "points.csv",
                                   "--verdict", "graspable"}),
                         {"points.csv", "maybe"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", "-o", "a.png", "--zero-plane", "low"}),
+                        {"--zero-plane is low: not a height", "auto, none or a number"}));
+  libmap::write_mesh(scratch("square.ply"), graspmap_test::square_mesh(0.0));
+  EXPECT_TRUE(bad_input(graspmap({"render", "square.ply", "-o", "a.png", "--box", "0,0,1,1"}),
+                        {"square.ply: --box: only clouds and maps are cut"}));
   EXPECT_TRUE(wrong_usage(graspmap({"render", "terrain.pcd", "-o", "a.png", "--wdith", "3"}),
                           {"--wdith", "--width"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("a.png")));

@@ -160,6 +160,11 @@ TEST_F(Merge, MissingShare) {
 TEST_F(Merge, ShareTwice) {
   EXPECT_TRUE(bad_input(merge({"a.pcd", "a.pcd"}), {"a.pcd", "two files hold this share"}));
   EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd", "b.pcd"}), {"b.pcd"}));
+  // By another name.
+  std::filesystem::copy_file(scratch("a.pcd"), scratch("b.pcd"),
+                             std::filesystem::copy_options::overwrite_existing);
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}),
+                        {"a.pcd: i, j, k is ", "two parts hold the same voxel"}));
 }
 
 TEST_F(Merge, SharesOfDifferentScenarios) {

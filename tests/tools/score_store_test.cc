@@ -480,9 +480,12 @@ TEST(ScoreStoreAppend, OnlyWhereOldTilesStayAsTheyAre) {
 TEST(ScoreStoreBadInput, LeavesNoFolderBehind) {
   graspmap_test::write_text(scratch("empty.csv"), "x,y,z\n");
   graspmap_test::write_text(scratch("bad.pcd"), "no cloud");
+  graspmap_test::write_text(scratch("line.csv"), "x,y,z\n0,0,0\n1,0,0\n2,0,0\n");
   const Words before = graspmap_test::names_in_scratch();
   EXPECT_TRUE(graspmap_test::bad_input(score("empty.csv", "m.tiles"), {"empty.csv", "no points"}));
   EXPECT_TRUE(graspmap_test::bad_input(score("bad.pcd", "m.tiles"), {"bad.pcd"}));
+  EXPECT_TRUE(
+      bad_input(score("line.csv", "m.tiles"), {"error: line.csv: all points lie on a line"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 

@@ -3,6 +3,7 @@
 
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
+#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
 #include "libmap/scan/image_codec.h"
 #include "tests/tools/tool_test_support.h"
@@ -84,7 +85,22 @@ TEST(Summarize, BadInputIsOneLine) {
       bad_input(graspmap({"summarize", "a.pcd", "-o", "sum", "--expected", "e.csv"}), {"e.csv"}));
   EXPECT_TRUE(bad_input(graspmap({"summarize", "a.pcd", "-o", "sum", "--cutoff", "high"}),
                         {"--cutoff", "high"}));
+  EXPECT_TRUE(bad_input(graspmap({"summarize", "a.pcd", "-o", "sum", "--names", "a|b"}),
+                        {"--names is 2: more names than maps (must be <= 1)"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("sum")));
+}
+
+TEST(Summarize, PairsThatLieApartAreNamed) {
+  write_map("a.pcd", "corrected");
+  libmap::PointCloud far = graspmap_test::bumpy_terrain();
+  for (Eigen::Vector3d& point : far.positions) point.x() += 8.0;
+  libmap::write_cloud(scratch("far.pcd"), far);
+  ASSERT_TRUE(succeeded(graspmap({"score", "far.pcd", "-o", "b.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"summarize", "a.pcd", "b.pcd", "-o", "sum"})));
+  const graspmap_test::ProgramResult result = graspmap(
+      {"summarize", "a.pcd", "b.pcd", "-o", "pairs", "--names", "|far", "--pairs", "--quiet"});
+  EXPECT_TRUE(bad_input(result, {"error: a.pcd and far: the maps have no voxel in common"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("pairs")));
 }
 
 TEST(Chart, CurvesOfATable) {
@@ -125,6 +141,20 @@ TEST(Chart, OneEndOfAnAxis) {
   }
   EXPECT_TRUE(bad_input(chart("t.csv", {"--x-min", "9", "--x-max", "2"}), {"--x-max is 2", "> 9"}));
   EXPECT_TRUE(bad_input(chart("t.csv", {"--y-max", "inf"}), {"--y-max is inf"}));
+}
+
+TEST(Chart, TablesWithNothingToDraw) {
+  graspmap_test::write_text(scratch("t.csv"), "x,y\n1,\n,2\n");
+  const auto chart = [](const std::string& table, const std::string& y) {
+    return graspmap({"chart", table, "-o", "c.svg", "--x", "x", "--y", y});
+  };
+  for (const char* none : {"", " , "})
+    EXPECT_TRUE(bad_input(chart("t.csv", none), {"--y: no column is named", "of the table"}));
+  EXPECT_TRUE(bad_input(chart("t.csv", "y"), {"t.csv: x, y: no row with numbers in both columns"}));
+  graspmap_test::write_text(scratch("far.csv"), "x,y\n1.7e308,1\n");
+  EXPECT_TRUE(bad_input(chart("far.csv", "y"), {"far.csv: x axis range is", "cannot be drawn",
+                                                "finite, its width too, and ascending"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("c.svg")));
 }
 
 bool near(const libmap::Color& a, const libmap::Color& b) {

@@ -223,4 +223,15 @@ TEST(EndedBySignal, AnIgnoredSignalStaysIgnored) {
   EXPECT_TRUE(fs::exists(scratch("o.pcd")));
 }
 
+// Signals come through a pipe: without one nothing is begun.
+TEST(Signals, NoFileLeftToOpenForThem) {
+  const std::string program = (graspmap_test::build_folder() / "graspmap").string();
+  const ProgramResult result = graspmap_test::run_program(
+      {"/bin/sh", "-c", "exec 3>&-; ulimit -n 4; exec \"$0\" \"$@\"", program, "info", "none.pcd"},
+      {.folder = scratch("")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_EQ(result.standard_error,
+            "graspmap info: error: no pipe for signals: Too many open files\n");
+}
+
 }  // namespace

@@ -114,6 +114,28 @@ TEST(SimulateCamerasCommand, AnotherRunLeavesNothingOfTheFirst) {
   EXPECT_EQ(content("rig/front.png"), first);
 }
 
+TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
+  write_ground();
+  libmap::CameraRig rig;
+  libmap::RigCamera& camera = rig.cameras.emplace_back();
+  camera.name = "front";
+  camera.camera = {.width = 32, .height = 24, .fx = 30, .fy = 30, .cx = 15.5, .cy = 11.5};
+  camera.depth_scale_m = 0.00001;
+  camera.far_m = 1.5;
+  write_text(scratch("far.yaml"), to_yaml(rig));
+  const auto run = [](std::vector<std::string> more) {
+    more.insert(more.begin(), {"-o", "rig", "--rig", "far.yaml"});
+    return graspmap(cameras(more));
+  };
+  EXPECT_TRUE(bad_input(run({}), {"error: far.yaml: depth_scale_m is 1e-05: 16-bit images cannot "
+                                  "hold what camera front measures",
+                                  "(must be >= far_m / 65534, 2.2888882e-05)"}));
+  EXPECT_TRUE(bad_input(run({"--depth-scale", "0.00002"}),
+                        {"error: depth_scale_m is 2e-05: 16-bit images"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("rig")));
+  EXPECT_TRUE(succeeded(run({"--depth-scale", "2.2888882e-05"})));
+}
+
 TEST(SimulateCamerasCommand, BadInputIsOneLine) {
   write_ground();
   EXPECT_TRUE(

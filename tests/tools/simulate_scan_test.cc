@@ -134,6 +134,8 @@ TEST(SimulateScanCommand, BadInputIsOneLineAndLeavesNothing) {
       graspmap(scan({"-o", "a.db", "--frames", "2", "--radius", "50", "--last-radius", "50"})),
       {"site.ply", "no frame sees"}));
   EXPECT_TRUE(bad_input(graspmap(scan({"-o", "site.ply"})), {"is the input"}));
+  EXPECT_TRUE(bad_input(graspmap(scan({"-o", "a.bag"})),
+                        {"a.bag: a scan is written as a database (must be a name.db)"}));
   EXPECT_TRUE(
       bad_input(graspmap(scan({"-o", "a.db", "--flying-pixels", "0.9"})), {"flying_pixels"}));
   EXPECT_TRUE(wrong_usage(graspmap(scan({"-o", "a.db", "--frmaes", "2"})), {"--frames"}));

@@ -14,6 +14,8 @@
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/image_codec.h"
 #include "libmap/scan/scan_source.h"
+#include "tests/libmap/mesh/mesh_samples.h"
+#include "tests/libmap/scan/sample_database.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace {
@@ -197,6 +199,28 @@ TEST(Texture, BadInput) {
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
   ASSERT_TRUE(succeeded(graspmap(texture_words("m.obj") + Words{"--dry-run"})));
   EXPECT_EQ(names_in_scratch(), (Words{"far.tum", "site.ply", "six.tum"}));
+}
+
+TEST(Texture, PosesThatTheScanLacksAreNamed) {
+  libmap::write_mesh(scratch("site.ply"), graspmap_test::square_mesh(0.0));
+  const std::filesystem::path scan = scratch("scan.db");
+  graspmap_test::write_sample(scan);
+  const auto texture = [](const Words& more) {
+    return graspmap(Words{"texture", "site.ply", "--scan", "scan.db", "-o", "m.glb"} + more);
+  };
+  graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL WHERE id = 1");
+  EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
+                      {"error: scan.db: common poses is 2: too few poses", "(must be >= 3)"}));
+  graspmap_test::execute(scan, "UPDATE Node SET ground_truth_pose = NULL");
+  EXPECT_TRUE(refused(texture({"--frame", "ground-truth"}),
+                      {"error: scan.db: --frame is ground-truth: the scan has no ground truth"}));
+  graspmap_test::execute(scan, "UPDATE Node SET pose = x'01' WHERE id = 1");
+  EXPECT_TRUE(
+      refused(texture({"--strict"}), {"error: scan.db: node 1: pose: '1 bytes'", "(must be 48)"}));
+  graspmap_test::execute(scan, "UPDATE Node SET pose = NULL");
+  graspmap_test::execute(scan, "UPDATE Admin SET opt_ids = NULL, opt_poses = NULL");
+  EXPECT_TRUE(refused(texture({}), {"error: scan.db: the scan has no poses", "--poses"}));
+  EXPECT_EQ(names_in_scratch(), (Words{"scan.db", "site.ply"}));
 }
 
 TEST(Texture, RemembersThatTheMeshComesFromTheTrueFrame) {

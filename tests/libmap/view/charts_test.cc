@@ -349,6 +349,10 @@ TEST_F(Charts, WhatCannotBeDrawnIsNamed) {
   EXPECT_EQ(error_with([](Chart& c) { c.curves[0].x.pop_back(); }).value, "1 and 2");
   EXPECT_EQ(error_with([](Chart& c) { c.curves[0].y[1] = nan_value; }).field, "curve 'map', y");
   EXPECT_EQ(error_with([](Chart& c) { c.x_axis.range = {1.0, 1.0}; }).field, "x axis range");
+  EXPECT_EQ(error_with([](Chart& c) {
+              c.y_axis.range = {-1.7e308, 1.7e308};
+            }).field,
+            "y axis range");
   EXPECT_EQ(error_with([](Chart& c) { c.y_axis.range = {0.0, nan_value}; }).field, "y axis range");
   EXPECT_EQ(error_with([](Chart& c) {
               c.histograms.emplace_back();
