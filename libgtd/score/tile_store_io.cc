@@ -68,7 +68,7 @@ TileStoreIndex finish_tile_store(const fs::path& store) {
 }
 
 fs::path tile_path(const fs::path& store, const StoredTile& tile) {
-  const fs::path path = store / tile.file;
+  fs::path path = store / tile.file;
   libmap::require_readable_file(path);
   const std::uint64_t bytes = fs::file_size(path);
   if (bytes != tile.bytes)
@@ -82,7 +82,7 @@ fs::path tile_path(const fs::path& store, const StoredTile& tile) {
 }
 
 fs::path checked_tile_path(const fs::path& store, const StoredTile& tile) {
-  const fs::path path = tile_path(store, tile);
+  fs::path path = tile_path(store, tile);
   if (libmap::sha256_of_file(path) != tile.sha256)
     throw libmap::Error(
         "is not the tile that the index lists: `graspmap score` once more makes it again",
