@@ -80,6 +80,7 @@ double area_of_cells(const std::vector<Vector3d>& points, const Box& box, double
   const double rows = std::floor(box.max_y / cell) - row + 1;
   if (!(columns * rows < 0x1p52)) {  // more than whole numbers tell apart
     std::vector<std::pair<double, double>> cells;
+    cells.reserve(points.size());
     for (const Vector3d& p : points)
       cells.emplace_back(std::floor(p.x() / cell), std::floor(p.y() / cell));
     std::sort(cells.begin(), cells.end());

@@ -88,7 +88,7 @@ Indices in_rounds(const Indices& members) {
   Indices rounds;
   rounds.reserve(members.size());
   std::size_t step = 1;
-  while (8 * 4 * step < members.size()) step *= 4;
+  while (32 * step < members.size()) step *= 4;
   for (bool first = true; step > 0; step /= 4, first = false)
     for (std::size_t n = 0; n < members.size(); n += step)
       if (first || n % (4 * step) != 0) rounds.push_back(members[n]);

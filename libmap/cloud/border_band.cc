@@ -152,6 +152,7 @@ std::vector<double> peaks_of(const Axis& axis) {
   peaks.resize(std::min(peaks.size(), most_lines));
   std::sort(peaks.begin(), peaks.end());
   std::vector<double> places;
+  places.reserve(peaks.size());
   for (const std::size_t n : peaks)
     places.push_back(axis.first + (static_cast<double>(n) + 0.5) * axis.bin);
   return places;
@@ -190,6 +191,7 @@ Frame best_frame(const std::vector<Vector2d>& white, double yaw_deg, double bin,
                  const BorderBandOptions& options) {
   const Eigen::Rotation2Dd turn(-yaw_deg * std::numbers::pi / 180.0);
   std::vector<Vector2d> places;
+  places.reserve(white.size());
   for (const Vector2d& place : white) places.push_back(turn * place);
   const Axis x = make_axis(places, 0, bin);
   const Axis y = make_axis(places, 1, bin);
@@ -232,9 +234,8 @@ Frame find_frame(const Picture& picture, double white_level, const BorderBandOpt
     for (std::size_t n = begin; n < end; ++n)
       frames[n] = best_frame(white, 0.5 * static_cast<double>(n) - 45.0, bin, options);
   });
-  const Frame best =
-      *std::max_element(frames.begin(), frames.end(),
-                        [](const Frame& a, const Frame& b) { return a.score < b.score; });
+  Frame best = *std::max_element(frames.begin(), frames.end(),
+                                 [](const Frame& a, const Frame& b) { return a.score < b.score; });
   if (!(best.score > 0.0))
     throw Error("no white band with four sides lies on the ground",
                 {.field = "white along the shortest-seen side",
@@ -292,10 +293,12 @@ Vector2d fit_line(const std::vector<Vector2d>& edges) {
       slopes.push_back((edges[b].y() - edges[a].y()) / (edges[b].x() - edges[a].x()));
   Vector2d line(0.0, median_of(slopes));
   std::vector<double> offsets;
+  offsets.reserve(edges.size());
   for (const Vector2d& edge : edges) offsets.push_back(edge.y() - line[1] * edge.x());
   line[0] = median_of(offsets);
   for (int round = 0; round < 20; ++round) {
     std::vector<double> deviations;
+    deviations.reserve(edges.size());
     for (const Vector2d& edge : edges)
       deviations.push_back(std::abs(edge.y() - line[0] - line[1] * edge.x()));
     const double limit = std::max(4.685 * 1.4826 * median_of(deviations), 1e-6);

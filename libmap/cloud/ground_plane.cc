@@ -350,7 +350,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
 }
 
 Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals) {
-  const Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();
   // From wide to narrow: walls and rocks fall away, the ground stays.
   for (const double within_deg : {180.0, 60.0, 45.0, 30.0, 30.0}) {

@@ -161,7 +161,8 @@ PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
   for (const PanoramaView& view : views) {
     check(view);
     const ViewProjection projection(view, checked);
-    const auto rows = static_cast<std::size_t>((view.depth.height - 1) / checked.stride_px + 1);
+    const int rows_in_steps = (view.depth.height - 1) / checked.stride_px + 1;
+    const auto rows = static_cast<std::size_t>(rows_in_steps);
     Part part = parallel_reduce(
         rows, rows_a_chunk, Part{},
         [&](std::size_t first, std::size_t last) { return projection.rows(first, last); },

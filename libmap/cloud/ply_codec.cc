@@ -331,8 +331,10 @@ GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes) {
   Cursor cursor{bytes, header.data_begin, TextRows(*bytes, header.data_begin, header.data_line)};
   for (const PlyElement& element : header.elements) {
     ColumnSet set = read_element(element, header, cursor, content);
-    if (element.name == "vertex") content.vertices = std::move(set);
-    if (element.name == "face") content.faces = std::move(set);
+    if (element.name == "vertex")
+      content.vertices = std::move(set);
+    else if (element.name == "face")
+      content.faces = std::move(set);
   }
   return content;
 }

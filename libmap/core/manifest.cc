@@ -90,9 +90,9 @@ Pose from_numbers(const std::vector<double>& numbers) {
     throw Error("a transform has 12 numbers",
                 {.field = "transforms", .value = std::to_string(numbers.size()) + " numbers long"});
   Pose pose = Pose::Identity();
+  std::size_t n = 0;
   for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column)
-      pose.matrix()(row, column) = numbers[static_cast<std::size_t>(row * 4 + column)];
+    for (int column = 0; column < 4; ++column) pose.matrix()(row, column) = numbers[n++];
   return pose;
 }
 

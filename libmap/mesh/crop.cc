@@ -71,6 +71,7 @@ double yaw_of(const std::vector<Vector2d>& corners) {
 
 std::vector<Vector2d> moved(const std::vector<Vector2d>& corners, const Pose& pose) {
   std::vector<Vector2d> result;
+  result.reserve(corners.size());
   for (const Vector2d& corner : corners)
     result.emplace_back((pose * Vector3d(corner.x(), corner.y(), 0.0)).head<2>());
   return result;

@@ -1,6 +1,7 @@
 // Commands that a signal tells to end: they leave nothing half made, their earlier outputs whole,
 // no process behind, and the status that the signal gives. A run that is done before the signal
 // comes is as good.
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <unistd.h>
@@ -230,8 +231,10 @@ TEST(Signals, NoFileLeftToOpenForThem) {
       {"/bin/sh", "-c", "exec 3>&-; ulimit -n 4; exec \"$0\" \"$@\"", program, "info", "none.pcd"},
       {.folder = scratch("")});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_EQ(result.standard_error,
-            "graspmap info: error: no pipe for signals: Too many open files\n");
+  // A sanitizer may then say that it lacks files as well.
+  EXPECT_THAT(
+      result.standard_error,
+      testing::StartsWith("graspmap info: error: no pipe for signals: Too many open files\n"));
 }
 
 }  // namespace
