@@ -103,7 +103,7 @@ SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
     if (!any) break;
     std::vector<Triangle> triangles;
     std::vector<std::uint32_t> source;
-    for (std::uint32_t t = 0; t < fine.triangles.size(); ++t)
+    for (std::size_t t = 0; t < fine.triangles.size(); ++t)
       for (const Triangle& part : parts_of(
                fine, fine.triangles[t], {middles[3 * t], middles[3 * t + 1], middles[3 * t + 2]})) {
         triangles.push_back(part);

@@ -57,7 +57,7 @@ struct ReferenceSurface::MeshShape : Shape {
         const Eigen::Vector3d& corner = at(t, k);
         vertex_normals[triangles[t][k]] +=
             angle_between(at(t, (k + 1) % 3) - corner, at(t, (k + 2) % 3) - corner) * normal;
-        if (opposite[3 * t + k] != open_edge) continue;
+        if (opposite[3 * std::size_t{t} + k] != open_edge) continue;
         is_border_vertex[triangles[t][k]] = 1;
         is_border_vertex[triangles[t][(k + 1) % 3]] = 1;
       }
@@ -103,7 +103,7 @@ struct ReferenceSurface::MeshShape : Shape {
       place.normal = normal_of(t);
     } else if (zeros == 1) {
       // The edge from the next corner to the one after it.
-      const HalfEdge other = opposite[3 * t + (zero + 1) % 3];
+      const HalfEdge other = opposite[3 * std::size_t{t} + (zero + 1) % 3];
       place.on_border = other == open_edge;
       place.normal = normal_of(t);
       if (is_joined(other)) place.normal += normal_of(other / 3);
