@@ -28,10 +28,10 @@ struct TextureAtlasOptions {
 
 // A place of a page with the colours of some triangles.
 struct TextureChart {
-  std::uint32_t photo = 0;
   std::vector<std::uint32_t> triangles;              // ascending
   double scale = 1.0;                                // texels a pixel of the photograph
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // pixel of the photograph at texel (0, 0)
+  std::uint32_t photo = 0;
   std::int32_t page = 0;
   int column = 0;  // of its top left texel, padding included
   int row = 0;

@@ -234,8 +234,10 @@ void ChartPainter::paint_triangle(std::int32_t local, std::span<const std::uint3
     const int row = static_cast<int>(texel) / chart_->width;
     Eigen::Vector3f color = Eigen::Vector3f::Zero();
     for (int s = 0; s < samples * samples; ++s) {
-      const Eigen::Vector2d place(column + (s % samples + 0.5) / samples - 0.5,
-                                  row + (s / samples + 0.5) / samples - 0.5);
+      const int sample_column = s % samples;
+      const int sample_row = s / samples;
+      const Eigen::Vector2d place(column + (sample_column + 0.5) / samples - 0.5,
+                                  row + (sample_row + 0.5) / samples - 0.5);
       Eigen::Vector3d weights = plane.weights(place).cwiseMax(0.0);
       weights /= weights.sum();
       color += color_at(triangle, weights);

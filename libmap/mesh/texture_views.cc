@@ -147,8 +147,9 @@ void ViewFinder::fill_cells() {
   parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
     const auto columns = static_cast<std::size_t>(cell_columns_);
     for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector2d cell(static_cast<double>(i % columns),
-                                 static_cast<double>(i / columns));
+      const std::size_t column = i % columns;
+      const std::size_t row = i / columns;
+      const Eigen::Vector2d cell(static_cast<double>(column), static_cast<double>(row));
       const auto ray = pixel_to_ray(camera, (side * cell).array() + (side - 1) / 2.0);
       cell_rays_[i] = ray ? projector_->to_world(ray->homogeneous()) : Eigen::Vector3d::Zero();
     }
@@ -166,7 +167,8 @@ bool ViewFinder::is_beside_occluder(std::size_t t) const {
        row <= std::min(cell_rows_ - 1, cell / cell_columns_ + 1); ++row)
     for (int column = std::max(0, cell % cell_columns_ - 1);
          column <= std::min(cell_columns_ - 1, cell % cell_columns_ + 1); ++column) {
-      const auto i = static_cast<std::size_t>(row * cell_columns_ + column);
+      const int index = row * cell_columns_ + column;
+      const auto i = static_cast<std::size_t>(index);
       if (!std::isfinite(cell_z_[i])) continue;
       // Both are negative below the camera.
       if (normal.dot(cell_rays_[i]) * static_cast<double>(cell_z_[i]) - height > gap) return true;
