@@ -10,6 +10,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/folder_output.h"
+#include "libmap/core/named_output.h"
 #include "libmap/core/unfinished_outputs.h"
 #include "tools/message_text.h"
 
@@ -48,30 +49,9 @@ void require_other_than_inputs(const fs::path& output, const std::vector<std::st
       throw libmap::Error("is the input: the output needs another name", {.file = output.string()});
 }
 
-libmap::Error naming(const libmap::Error& error, const std::string& file) {
-  libmap::ErrorContext context = error.context();
-  context.file = file;
-  return libmap::Error(error.reason(), context, error.kind());
-}
-
-// The user knows an output, or a file in it, by its own name.
-void write_named(const fs::path& temporary, const fs::path& output,
-                 const std::function<void(const fs::path&)>& writer) {
-  try {
-    writer(temporary);
-  } catch (const libmap::Error& error) {
-    const std::string& file = error.context().file;
-    const std::string within = temporary.string() + "/";
-    if (file == temporary.string()) throw naming(error, output.string());
-    if (file.starts_with(within))
-      throw naming(error, (output / file.substr(within.size())).string());
-    throw;
-  }
-}
-
 void write_named(const libmap::OutputFile& output,
                  const std::function<void(const fs::path&)>& writer) {
-  write_named(output.temporary_path(), output.final_path(), writer);
+  libmap::write_named(output.temporary_path(), output.final_path(), writer);
 }
 
 // What a killed run has left is none.
@@ -146,7 +126,7 @@ void Run::claim_manifest(const fs::path& output) {
     claimed_manifests_.try_emplace(output.string(), libmap::manifest_path(output));
   } catch (const libmap::Error& error) {
     if (error.kind() != libmap::ErrorKind::failed) throw;
-    throw naming(error, output.string());
+    throw libmap::naming(error, output);
   }
 }
 
@@ -256,7 +236,7 @@ void Run::write_output_tree(const fs::path& given, const std::vector<std::string
   const fs::path folder = without_trailing_slash(given);
   libmap::OutputFile manifest = begin_manifest(folder);
   libmap::OutputFolder output(folder, names);
-  timed("write", [&] { write_named(output.temporary_path(), folder, writer); });
+  timed("write", [&] { libmap::write_named(output.temporary_path(), folder, writer); });
   write_named(manifest, manifest_writer());
   const libmap::OutputsInStep step;
   manifest.commit();

@@ -17,6 +17,7 @@
 #include "libmap/cloud/point_spool.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/named_output.h"
 #include "libmap/core/parallel.h"
 #include "tools/map_frame.h"
 #include "tools/plane_report.h"
@@ -406,7 +407,9 @@ class StoreScoring {
     map.voxels = std::move(tile.voxels);
     stored.file = libgtd::tile_file_of(tile.number);
     libmap::OutputFile file(progress_.store() / stored.file);
-    libmap::write_cloud(file.temporary_path(), libgtd::to_cloud(map, options_.frame));
+    libmap::write_named(file.temporary_path(), file.final_path(), [&](const auto& temporary) {
+      libmap::write_cloud(temporary, libgtd::to_cloud(map, options_.frame));
+    });
     stored.bytes = fs::file_size(file.temporary_path());
     stored.sha256 = libmap::sha256_of_file(file.temporary_path());
     file.commit();

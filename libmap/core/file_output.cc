@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/named_output.h"
 #include "libmap/core/output_lock.h"
 #include "libmap/core/unfinished_outputs.h"
 
@@ -75,7 +76,8 @@ void write_text(const fs::path& path, std::string_view content) {
 
 void write_whole_file(const fs::path& path, std::string_view content) {
   OutputFile output(path);
-  write_text(output.temporary_path(), content);
+  write_named(output.temporary_path(), path,
+              [&](const fs::path& temporary) { write_text(temporary, content); });
   output.commit();
 }
 

@@ -147,7 +147,8 @@ std::string feature_key(const RgbdFrame& frame, const FeatureOptions& options) {
   FeatureOptions copy = options;
   ParameterTable table;
   bind(table, copy);
-  for (const auto& [key, value] : table.values()) bytes += "\n" + key + "=" + value;
+  for (const auto& [key, value] : table.values())
+    bytes.append("\n").append(key).append("=").append(value);
   for (const double number : {options.planes.min_pair_share, options.planes.max_incidence_deg})
     append(bytes, number);
   append(bytes, options.planes.radius_px);

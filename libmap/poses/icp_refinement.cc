@@ -131,6 +131,7 @@ std::vector<std::size_t> Alignment::candidates_of(const PoseNeighbors& neighbors
   std::sort(ranked.begin(), ranked.end());
   ranked.resize(std::min(ranked.size(), most_candidates));
   std::vector<std::size_t> candidates;
+  candidates.reserve(ranked.size());
   for (const auto& [measure, other] : ranked) candidates.push_back(other);
   return candidates;
 }

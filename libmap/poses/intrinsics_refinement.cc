@@ -111,6 +111,7 @@ IntrinsicsEstimate estimate_intrinsics(const std::vector<FrameFeatures>& frames,
 
 std::vector<IntrinsicsStep> reversed(const std::vector<IntrinsicsStep>& steps) {
   std::vector<IntrinsicsStep> back;
+  back.reserve(steps.size());
   for (const IntrinsicsStep& step : steps)
     back.push_back({1.0 / (1.0 + step.fx_share) - 1.0, 1.0 / (1.0 + step.fy_share) - 1.0,
                     -step.cx_px, -step.cy_px});

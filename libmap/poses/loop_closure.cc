@@ -31,6 +31,7 @@ FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::m
 void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
                     const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
   std::vector<Eigen::Vector3d> places;
+  places.reserve(members.size());
   for (const std::size_t f : members) places.emplace_back(poses[f]->translation());
   const PoseNeighbors neighbors(std::move(places));
   const auto wanted = static_cast<std::size_t>(options.near_candidates);
@@ -253,6 +254,7 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
 void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,
                          const LoopClosureDetectionOptions& options, RejectionCounts& counts) {
   std::vector<std::pair<int, int>> pairs;
+  pairs.reserve(links.size());
   for (const FeatureLink& link : links) pairs.emplace_back(link.link.from, link.link.to);
   const GraphCovariance covariance(graph, pairs);
   const Matrix6d slack = slack_of(options);

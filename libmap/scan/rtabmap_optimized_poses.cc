@@ -219,8 +219,7 @@ void copy_with_optimized_poses(const fs::path& source, const fs::path& target,
     add_links(copy, links, source.string());
     transaction.commit();
   } catch (const SQLite::Exception& error) {
-    throw Error(std::string("cannot be written: ") + error.what(), {.file = target.string()},
-                ErrorKind::failed);
+    throw copy_error(source, target, error);
   }
 }
 

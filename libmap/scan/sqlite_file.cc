@@ -169,8 +169,7 @@ void SqliteFile::copy_to(const fs::path& target) const {
     // The copy of a file in WAL mode would call for a -wal of its own.
     copy.exec("PRAGMA locking_mode = EXCLUSIVE; PRAGMA journal_mode = DELETE;");
   } catch (const SQLite::Exception& error) {
-    throw Error(std::string("cannot be written: ") + error.what(), {.file = target.string()},
-                ErrorKind::failed);
+    throw copy_error(path_, target, error);
   }
 }
 
@@ -191,5 +190,11 @@ std::set<std::string> SqliteFile::columns(const std::string& table) const {
 }
 
 bool is_sqlite_file(const fs::path& path) { return read_header(path).starts_with(signature); }
+
+Error copy_error(const fs::path& source, const fs::path& target, const SQLite::Exception& error) {
+  if (error.getErrorCode() == SQLITE_CORRUPT) return read_error(source, error);
+  return Error(std::string("cannot be written: ") + error.what(), {.file = target.string()},
+               ErrorKind::failed);
+}
 
 }  // namespace libmap

@@ -9,7 +9,13 @@
 #include <string>
 #include <vector>
 
+namespace SQLite {
+class Exception;
+}
+
 namespace libmap {
+
+class Error;
 
 // One row of a query; columns count from 0.
 class SqliteRow {
@@ -65,5 +71,10 @@ class SqliteFile {
 
 // Whether the file begins as every SQLite file does.
 bool is_sqlite_file(const std::filesystem::path& path);
+
+// Why a copy of `source` could not be made, or not be changed: what SQLite finds broken in it came
+// from the source (bad input); all else is a failed write of `target`.
+Error copy_error(const std::filesystem::path& source, const std::filesystem::path& target,
+                 const SQLite::Exception& error);
 
 }  // namespace libmap

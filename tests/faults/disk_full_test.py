@@ -177,6 +177,8 @@ class Test:
             if (free == 0 and "out.tiles" not in line) or run.returncode != 0:
                 self.refused += 1
                 self.expect_clear_error(title, run)
+            if "--force" in line and "out.tiles" in line:
+                continue  # a store begun anew: it is emptied first, since two may not fit where one does
             after = snapshot(self.disk.folder)
             for difference in differences(before, after):
                 self.expect(False, title, difference, run)

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include <fstream>
 #include <limits>
 #include <map>
 #include <string>
@@ -218,6 +219,19 @@ TEST(CopyWithOptimizedPoses, RefusesWhatHasNoPlaceForThem) {
     });
     EXPECT_NE(std::string(error.what()).find(reason), std::string::npos) << error.what();
   }
+}
+
+// Pages that can be read and not be written: what SQLite then says is the source's fault.
+TEST(CopyWithOptimizedPoses, ABrokenSourceIsNamed) {
+  write_database(scratch("a.db"), graspmap_test::example_scan());
+  std::fstream file(scratch("a.db"), std::ios::in | std::ios::out | std::ios::binary);
+  file.seekp(20).put('\xff');  // bytes of each page that are not used
+  file.close();
+  const libmap::Error error = graspmap_test::error_of([&] {
+    libmap::copy_with_optimized_poses(scratch("a.db"), scratch("b.db"), {{1, Pose::Identity()}});
+  });
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
+  EXPECT_EQ(error.context().file, scratch("a.db").string());
 }
 
 TEST(CopyWithOptimizedPoses, RefusesPosesAndLinksThatCannotBe) {
