@@ -127,8 +127,9 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape
                                    Check& check, Run& run) {
   if (!options.truth.empty()) {
     check.ground = options.truth;
+    const libmap::TriangleMesh truth = read_truth(options);
     run.add_input(options.truth);
-    return libmap::heights_of(read_truth(options));
+    return libmap::heights_of(truth);
   }
   const bool zero =
       options.ground == Ground::zero ||
