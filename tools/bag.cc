@@ -8,6 +8,7 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/scan/rig_io.h"
@@ -64,6 +65,7 @@ void write_bag(const BagCommandOptions& options, Run& run) {
     refuse(options, {"--stamp"}, "is not for a rig's folder: --stamp-offset moves its stamps");
   } else {
     refuse(options, {"--topic", "--rig"}, "is not for a map");
+    libmap::require_readable_file(options.input);
   }
   try {
     return rig ? graspmap_tools::write_rig_folder_bag(options, run)

@@ -281,6 +281,7 @@ std::vector<std::size_t> Tracker::candidates_of(std::size_t frame) {
 bool Tracker::relocalize(std::size_t frame) {
   std::vector<FramePair> pairs;
   const std::vector<std::size_t> candidates = candidates_of(frame);
+  pairs.reserve(candidates.size());
   for (const std::size_t other : candidates) pairs.push_back(std::minmax(frame, other));
   verify(pairs);
   std::vector<Sighting> sightings;

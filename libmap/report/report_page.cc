@@ -283,6 +283,7 @@ FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std:
   each_picture(content.items, pictures);
   each_picture(content.sections, pictures);
   std::vector<ReportPicture> originals;
+  originals.reserve(pictures.size());
   for (const ReportPicture* picture : pictures) originals.push_back(*picture);
   FittedPage page;
   for (page.picture_level = 0; page.picture_level <= max_picture_level; ++page.picture_level) {

@@ -71,7 +71,7 @@ USES = [
     use(f"score {{x}} {SCORE} -o out.pcd", "cloud", "terrain.pcd", main=True),
     use("score {x} --method thesis --voxel-size 0.03 -o out.vtp", "cloud", "terrain.pcd"),
     use(f"score {{x}} {SCORE} --plane none --interpolation -o out.csv", "cloud", "terrain.pcd"),
-    use(f"score {{x}} {SCORE} --tile-size 0.2 --points-at-once 1000 --force -o out.tiles", "cloud", "terrain.pcd"),
+    use(f"score {{x}} {SCORE} --tile-size 0.2 --points-at-once 1000 --force -o out.tiles", "cloud", "terrain.pcd", main=True),
     use("score {good}/terrain.pcd --config {x} -o out.pcd", "scenario", "scenario.yaml", main=True),
     use(f"score {{good}}/terrain.pcd {SCORE} --gripper {{x}} -o out.pcd", "gripper", "gripper.yaml", main=True),
     use("mask --gripper {x} -o out.txt", "gripper", "gripper.yaml", main=True),

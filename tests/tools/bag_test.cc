@@ -257,6 +257,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
     EXPECT_TRUE(bad_input(graspmap(words), parts));
   };
   says({"none.bag", "--list"}, {"none.bag: no such file"});
+  says({"none", "-o", "out.bag"}, {"none: no such file"});
   says({"good.bag"}, {"--output", "is missing"});
   says({"good.bag", "-o", "out"}, {"good.bag: topics of images is none"});
   says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "--topic"});
