@@ -88,14 +88,20 @@ function(graspmap_command name)
   set_property(GLOBAL APPEND PROPERTY graspmap_commands ${target})
 endfunction()
 
+# Of tests that render: leaks are not looked for, since Mesa's driver keeps memory until its library
+# is gone.
+set(graspmap_drawing_environment "")
+if(GRASPMAP_SANITIZE)
+  set(graspmap_drawing_environment ASAN_OPTIONS=detect_leaks=0:protect_shadow_gap=0)
+endif()
+
 # graspmap_test(NAME SOURCES FILE... [LINK TARGET...] [INCLUDE DIR...] [DRAWS]): a GoogleTest
-# program test_NAME whose cases ctest runs one by one. DRAWS: it renders, and leaks are not looked
-# for, since Mesa's driver keeps memory until its library is gone.
+# program test_NAME whose cases ctest runs one by one. DRAWS: it renders.
 function(graspmap_test name)
   cmake_parse_arguments(ARG "DRAWS" "" "SOURCES;LINK;INCLUDE" ${ARGN})
   set(environment "")
-  if(ARG_DRAWS AND GRASPMAP_SANITIZE)
-    set(environment ENVIRONMENT ASAN_OPTIONS=detect_leaks=0:protect_shadow_gap=0)
+  if(ARG_DRAWS AND graspmap_drawing_environment)
+    set(environment ENVIRONMENT ${graspmap_drawing_environment})
   endif()
   set(target test_${name})
   add_executable(${target} ${ARG_SOURCES})

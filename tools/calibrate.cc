@@ -352,6 +352,7 @@ int main(int argc, char** argv) {
   std::vector<std::string> words(argv, argv + argc);
   drop_unit_of_square(words);
   std::vector<char*> arguments;
+  arguments.reserve(words.size());
   for (std::string& word : words) arguments.push_back(word.data());
   CalibrateOptions options;
   graspmap_tools::Command command(

@@ -312,7 +312,7 @@ fs::path find_data_file(const std::string& kind, const std::string& name) {
     return name;
   }
   const fs::path folder = toolkit_data_folder() / kind;
-  const fs::path file = folder / (name + ".yaml");
+  fs::path file = folder / (name + ".yaml");
   if (fs::is_regular_file(file)) return file;
   std::vector<std::string> known;
   if (fs::is_directory(folder))

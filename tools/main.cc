@@ -83,7 +83,7 @@ fs::path find_program(const std::string& command) {
   std::error_code code;
   const fs::path folder = fs::read_symlink("/proc/self/exe", code).parent_path();
   for (const char* place : {"libexec/graspmap", "../libexec/graspmap"}) {
-    const fs::path program = folder / place / ("graspmap-" + command);
+    fs::path program = folder / place / ("graspmap-" + command);
     if (fs::exists(program)) return program;
   }
   return folder / "libexec/graspmap" / ("graspmap-" + command);

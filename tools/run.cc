@@ -76,7 +76,7 @@ fs::path toolkit_data_folder() {
   // Installed, beside the program; in the build folder, in the source tree.
   std::error_code code;
   const fs::path program = fs::read_symlink("/proc/self/exe", code);
-  const fs::path installed = (program.parent_path() / "../../share/graspmap").lexically_normal();
+  fs::path installed = (program.parent_path() / "../../share/graspmap").lexically_normal();
   if (!code && fs::is_directory(installed)) return installed;
   return GRASPMAP_SOURCE_DATA;
 }

@@ -40,6 +40,7 @@ void parse_size(const std::string& text, libmap::TerrainPiecesOptions& options) 
 std::vector<std::string> folder_names(const fs::path& folder,
                                       const std::vector<libmap::TerrainPiece>& pieces) {
   std::vector<std::string> names;
+  names.reserve(pieces.size());
   for (const libmap::TerrainPiece& piece : pieces) names.push_back(libmap::piece_file_name(piece));
   if (!fs::is_directory(folder)) return names;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {

@@ -1,7 +1,5 @@
 #include "libmap/cloud/cloud_io.h"
 
-#include <unistd.h>
-
 #include <algorithm>
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
@@ -17,6 +15,7 @@
 #include "libmap/cloud/vtp_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/file_size.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -86,10 +85,7 @@ std::string format_of(const std::filesystem::path& path) {
 }
 
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path) {
-  // More than the machine's memory would end the program, not the reading.
-  const auto memory = static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
-                      static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
-  auto bytes = std::make_shared<const std::string>(read_whole_file(path, memory));
+  auto bytes = std::make_shared<const std::string>(read_whole_file(path, machine_memory()));
   if (bytes->empty()) throw Error("is empty", {.file = path.string()});
   return bytes;
 }

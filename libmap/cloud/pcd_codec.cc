@@ -54,8 +54,12 @@ std::uint64_t header_count(const std::string& key, const std::string& word, std:
   return static_cast<std::uint64_t>(*value);
 }
 
+// More than any header: in a file without line breaks nobody looks for one to the end.
+constexpr std::size_t max_header_bytes = 1U << 20U;
+
 // The lines up to DATA by their key; sets where the data begin.
-HeaderLines read_lines(std::string_view text, PcdHeader& header) {
+HeaderLines read_lines(std::string_view file, PcdHeader& header) {
+  const std::string_view text = file.substr(0, max_header_bytes);
   constexpr std::array<std::string_view, 10> known = {"VERSION",   "FIELDS", "COLUMNS", "SIZE",
                                                       "TYPE",      "COUNT",  "WIDTH",   "HEIGHT",
                                                       "VIEWPOINT", "POINTS"};

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/file_size.h"
 #include "libmap/core/named_output.h"
 #include "libmap/core/output_lock.h"
 #include "libmap/core/unfinished_outputs.h"
@@ -97,12 +98,8 @@ void require_readable_file(const fs::path& path) {
 
 std::string read_whole_file(const fs::path& path, std::uint64_t max_bytes) {
   require_readable_file(path);
+  require_file_size(path, max_bytes);
   const std::uint64_t bytes = fs::file_size(path);
-  if (bytes > max_bytes)
-    throw Error("too large to be read whole", {.file = path.string(),
-                                               .field = "size",
-                                               .value = std::to_string(bytes) + " bytes",
-                                               .bound = "<= " + std::to_string(max_bytes)});
   std::string content(bytes, '\0');
   std::ifstream file(path, std::ios::binary);
   file.read(content.data(), static_cast<std::streamsize>(bytes));

@@ -7,6 +7,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/file_size.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/assimp_codec.h"
 #include "libmap/mesh/mesh_io.h"
@@ -215,6 +216,7 @@ void write_textured_mesh(const fs::path& path, const TexturedMesh& model,
 TexturedMesh read_textured_mesh(const fs::path& path) {
   require_textured_format(path);
   require_readable_file(path);
+  require_file_size(path, machine_memory());
   try {
     DecodedModel decoded = decode_model_by_assimp(path, format_of(path).substr(1));
     if (decoded.model.mesh.triangles.empty()) throw Error("holds no triangle");

@@ -196,6 +196,7 @@ void send_listing(const rosbag::Bag& bag, Sender& sender) {
 void send_messages(const rosbag::Bag& bag, const std::vector<BagRequest>& requests,
                    Sender& sender) {
   std::vector<std::string> names;
+  names.reserve(requests.size());
   for (const BagRequest& request : requests) names.push_back(request.topic);
   rosbag::View view(bag, rosbag::TopicQuery(names));
   const Topics topics = topics_of(view);

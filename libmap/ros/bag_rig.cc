@@ -98,6 +98,7 @@ std::vector<std::string> parts_of(const std::string& topic) {
 // The parts of each topic in which they differ, joined by '_'; its first part if it is alone.
 std::vector<std::string> names_by_difference(const std::vector<SurveyedImages>& images) {
   std::vector<std::vector<std::string>> parts;
+  parts.reserve(images.size());
   for (const SurveyedImages& one : images)
     parts.push_back(parts_of(namespace_of_image(one.topic, one.compressed)));
   std::size_t shortest = parts.front().size();
@@ -264,6 +265,7 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   const BagListing listing = list_bag(bag);
   std::vector<Choice> choices = choices_of(listing, options);
   std::vector<std::pair<std::string, bool>> topics;
+  topics.reserve(choices.size());
   for (const Choice& choice : choices) topics.emplace_back(choice.topic, choice.compressed);
   BagSurvey survey = survey_bag(bag, topics, options.rig ? "" : options.transform_topic);
   const std::string found = topics_with_encodings(survey);

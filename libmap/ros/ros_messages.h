@@ -139,8 +139,8 @@ inline std::int64_t nanoseconds_of(const ros::Time& time) {
   return std::int64_t{time.sec} * 1'000'000'000 + time.nsec;
 }
 inline double seconds_of(std::int64_t nanoseconds) {
-  return static_cast<double>(nanoseconds / 1'000'000'000) +
-         static_cast<double>(nanoseconds % 1'000'000'000) * 1e-9;
+  const std::int64_t seconds = nanoseconds / 1'000'000'000;
+  return static_cast<double>(seconds) + static_cast<double>(nanoseconds % 1'000'000'000) * 1e-9;
 }
 
 }  // namespace libmap::ros_message

@@ -31,8 +31,10 @@ std::size_t corner_count(const Chessboard& board) {
 
 Eigen::Vector3d corner_on_board(const Chessboard& board, std::size_t n) {
   const auto columns = static_cast<std::size_t>(board.columns);
-  return {static_cast<double>(n % columns) * board.square_mm * 1e-3,
-          static_cast<double>(n / columns) * board.square_mm * 1e-3, 0.0};
+  const std::size_t row = n / columns;
+  const std::size_t column = n % columns;
+  return {static_cast<double>(column) * board.square_mm * 1e-3,
+          static_cast<double>(row) * board.square_mm * 1e-3, 0.0};
 }
 
 std::size_t lens_terms(LensModel lens) {

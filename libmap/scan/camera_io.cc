@@ -133,7 +133,8 @@ Pose pose_of(const YAML::Node& node, const std::string& field) {
   Pose pose = Pose::Identity();
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column)
-      pose.matrix()(row, column) = m[static_cast<std::size_t>(4 * row + column)];
+      pose.matrix()(row, column) =
+          m[4 * static_cast<std::size_t>(row) + static_cast<std::size_t>(column)];
   const Eigen::Matrix3d written = pose.linear();
   const Eigen::Matrix3d rotation = nearest_rotation(written);
   const double deviation = (rotation - written).cwiseAbs().maxCoeff();

@@ -51,7 +51,7 @@ bool is_smooth(const DepthImage& depth, const DepthPixel& pixel, double toleranc
 std::optional<Eigen::Vector2d> observe(const CameraView& view, const Eigen::Vector3d& point,
                                        double tolerance) {
   const Camera& camera = view.color_camera;
-  const auto pixel = project_point(camera, point);
+  auto pixel = project_point(camera, point);
   if (!pixel || !holds(camera, *pixel)) return std::nullopt;
   const Eigen::Vector2d ray = point.head<2>() / point.z();
   const DepthPixel place = depth_pixel(view, ray);
@@ -123,8 +123,8 @@ void ColmapBuilder::observe_points(int id, const CameraView& view, GrayImage& ta
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (!seen[i]) continue;
     add_observation(id, known[i].first, *seen[i]);
-    taken.at(static_cast<int>(seen[i]->x() + 0.5) / options_.point_spacing_px,
-             static_cast<int>(seen[i]->y() + 0.5) / options_.point_spacing_px) = 1;
+    taken.at(static_cast<int>(std::floor(seen[i]->x() + 0.5)) / options_.point_spacing_px,
+             static_cast<int>(std::floor(seen[i]->y() + 0.5)) / options_.point_spacing_px) = 1;
   }
 }
 

@@ -76,8 +76,6 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
       info.channels = 2;
       break;
     case PNG_COLOR_TYPE_RGB:
-      info.channels = 3;
-      break;
     case PNG_COLOR_TYPE_PALETTE:
       info.channels = 3;
       break;

@@ -188,6 +188,7 @@ RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t ca
                              double tolerance_s) {
   if (images.empty()) throw Error("there are no images to choose a moment from");
   std::vector<double> stamps;
+  stamps.reserve(images.size());
   for (const RigImage& image : images) stamps.push_back(image.stamp_s);
   std::sort(stamps.begin(), stamps.end());
   stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());

@@ -22,10 +22,8 @@ std::string to_bytes(const std::array<T, N>& numbers) {
 
 std::string to_blob(const Pose& pose) {
   PoseFloats floats{};
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column)
-      floats[static_cast<std::size_t>(4 * row + column)] =
-          static_cast<float>(pose.matrix()(row, column));
+  using RowMajor = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
+  Eigen::Map<RowMajor>(floats.data()) = pose.matrix().topRows<3>().cast<float>();
   return to_bytes(floats);
 }
 
@@ -33,9 +31,8 @@ std::string null_pose_blob() { return to_bytes(PoseFloats{}); }
 
 std::string to_blob(const Matrix6d& information) {
   std::array<double, 36> numbers{};
-  for (int row = 0; row < 6; ++row)
-    for (int column = 0; column < 6; ++column)
-      numbers[static_cast<std::size_t>(6 * row + column)] = information(row, column);
+  using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
+  Eigen::Map<RowMajor>(numbers.data()) = information;
   return to_bytes(numbers);
 }
 

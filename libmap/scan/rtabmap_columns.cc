@@ -105,7 +105,8 @@ std::vector<std::string> RtabmapColumns::unknown() const {
       continue;
     }
     for (const std::string& column : columns)
-      if (!known->second.contains(column)) names.push_back(table + "." + column);
+      if (!known->second.contains(column))
+        names.push_back(std::string(table).append(".").append(column));
   }
   return names;
 }

@@ -280,7 +280,7 @@ std::optional<Pose> decode_pose(std::string_view bytes) {
 Matrix6d decode_information(std::string_view bytes) {
   const auto numbers = numbers_of<double, 36>(bytes, "information matrix");
   using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-  const Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
+  Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
   if (!information.allFinite()) throw Error("information matrix that is not finite");
   return information;
 }

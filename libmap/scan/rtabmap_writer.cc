@@ -134,7 +134,8 @@ std::string join_parameters(const std::map<std::string, std::string>& parameters
         value.find(';') != std::string::npos)
       throw Error("cannot be stored: ':' ends a key and ';' a value",
                   {.field = "parameter " + key, .value = value});
-    text += (text.empty() ? "" : ";") + key + ":" + value;
+    if (!text.empty()) text += ';';
+    text.append(key).append(":").append(value);
   }
   return text;
 }

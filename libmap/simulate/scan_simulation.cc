@@ -58,6 +58,7 @@ std::vector<std::size_t> closures_of(const Trajectory& truth, std::size_t last,
   if (found.size() > static_cast<std::size_t>(options.closures_a_node))
     found.resize(static_cast<std::size_t>(options.closures_a_node));
   std::vector<std::size_t> nodes;
+  nodes.reserve(found.size());
   for (const auto& [distance, node] : found) nodes.push_back(node);
   return nodes;
 }

@@ -317,6 +317,7 @@ Color parse_color(std::string_view text, const std::string& field) {
               static_cast<std::uint8_t>(value)};
   }
   std::vector<std::string> known;
+  known.reserve(named_colors.size());
   for (const NamedColor& named : named_colors) known.emplace_back(named.name);
   std::string bound = "#rrggbb or one of";
   for (const std::string& name : known) bound += " " + name;

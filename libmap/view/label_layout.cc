@@ -47,6 +47,7 @@ double covered_area(const PixelRect& box, const std::vector<PixelRect>& taken,
 std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
                                     double point_radius_px, const PixelRect& bounds) {
   std::vector<PixelRect> taken;
+  taken.reserve(2 * requests.size());
   for (const LabelRequest& request : requests)
     taken.push_back({request.anchor.x() - point_radius_px, request.anchor.y() - point_radius_px,
                      2.0 * point_radius_px, 2.0 * point_radius_px});

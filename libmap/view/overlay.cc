@@ -69,7 +69,7 @@ std::string shortened_text(const std::string& text, const TextStyle& style, doub
   while (!kept.empty()) {
     drop_last(kept);
     while (!kept.empty() && kept.back() == ' ') kept.pop_back();
-    const std::string candidate = kept + "...";
+    std::string candidate = kept + "...";
     if (text_size(candidate, style).x() <= width_px) return candidate;
   }
   return {};

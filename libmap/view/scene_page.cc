@@ -204,6 +204,7 @@ ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& 
 
 std::vector<std::string> tick_texts(const std::vector<double>& ticks) {
   std::vector<std::string> texts;
+  texts.reserve(ticks.size());
   const double step = ticks.size() > 1 ? std::abs(ticks[1] - ticks[0]) : 1.0;
   const auto is_round = [](double value) { return std::abs(value - std::round(value)) < 1e-6; };
   int decimals = 0;

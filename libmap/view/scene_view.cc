@@ -96,6 +96,7 @@ Setup gather(const Scene& scene) {
 
 std::vector<Eigen::Vector3d> corners_of(const Bounds3d& box) {
   std::vector<Eigen::Vector3d> corners;
+  corners.reserve(8);
   for (int corner = 0; corner < 8; ++corner)
     corners.emplace_back((corner & 1) != 0 ? box.max.x() : box.min.x(),
                          (corner & 2) != 0 ? box.max.y() : box.min.y(),
@@ -167,10 +168,10 @@ vtkSmartPointer<vtkActor> actor_of(const ColoredTriangles& triangles) {
   }
   vtkNew<vtkTypeInt64Array> offsets;
   vtkNew<vtkTypeInt64Array> corners;
-  offsets->SetNumberOfValues(static_cast<vtkIdType>(triangles.triangles.size() + 1));
-  corners->SetNumberOfValues(static_cast<vtkIdType>(3 * triangles.triangles.size()));
-  for (std::size_t t = 0; t <= triangles.triangles.size(); ++t)
-    offsets->SetValue(static_cast<vtkIdType>(t), static_cast<vtkTypeInt64>(3 * t));
+  const auto count = static_cast<vtkIdType>(triangles.triangles.size());
+  offsets->SetNumberOfValues(count + 1);
+  corners->SetNumberOfValues(3 * count);
+  for (vtkIdType t = 0; t <= count; ++t) offsets->SetValue(t, 3 * t);
   vtkTypeInt64* corner = corners->GetPointer(0);
   for (const Triangle& triangle : triangles.triangles)
     for (const std::uint32_t index : triangle) *corner++ = index;

@@ -1,6 +1,7 @@
 // The other steps of a detection, and the command as a whole, on the clouds in GRASPMAP_DATA.
 #include <spawn.h>
 #include <sys/wait.h>
+#include <unistd.h>
 
 #include <string>
 
@@ -11,8 +12,6 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "tests/benchmarks/benchmark_table.h"
-
-extern char** environ;
 
 namespace {
 

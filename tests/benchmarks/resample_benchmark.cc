@@ -34,7 +34,7 @@ void sample_by_count(benchmark::State& state) {
   libmap::PoissonDiskOptions options;
   options.count = static_cast<std::uint64_t>(state.range(0));
   libmap::PoissonDiskResult result;
-  for (auto _ : state) result = libmap::sample_poisson_disk(mesh, options);
+  while (state.KeepRunning()) result = libmap::sample_poisson_disk(mesh, options);
   state.counters["points"] = static_cast<double>(result.cloud.size());
   state.counters["relative_radius"] = result.relative_radius;
   state.counters["points/s"] = benchmark::Counter(static_cast<double>(result.cloud.size()),

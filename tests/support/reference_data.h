@@ -38,7 +38,8 @@ struct ReferenceMask {
   std::vector<std::uint8_t> cells;  // z outermost, then x, then y: 0 or 1
 
   std::uint8_t at(int x, int y, int z) const {
-    return cells[static_cast<std::size_t>((z * dims[0] + x) * dims[1] + y)];
+    const int cell = (z * dims[0] + x) * dims[1] + y;
+    return cells[static_cast<std::size_t>(cell)];
   }
 };
 ReferenceMask read_mask(const std::filesystem::path& path);

@@ -9,6 +9,7 @@
 #include <chrono>
 #include <cmath>
 #include <fstream>
+#include <ostream>
 #include <thread>
 
 #include "libgtd/score/tile_store_io.h"
@@ -119,6 +120,8 @@ struct Case {
   bool strips = true;
   int shares = 1;
 };
+
+void PrintTo(const Case& given, std::ostream* out) { *out << given.name; }
 
 class ScoreStore : public testing::TestWithParam<Case> {};
 

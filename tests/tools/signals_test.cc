@@ -9,6 +9,7 @@
 #include <chrono>
 #include <fstream>
 #include <map>
+#include <ostream>
 #include <thread>
 
 #include "libmap/cloud/cloud_io.h"
@@ -155,6 +156,8 @@ struct Case {
   void (*make_inputs)();
   Words words;
 };
+
+void PrintTo(const Case& given, std::ostream* out) { *out << given.name; }
 
 class EndedBySignal : public testing::TestWithParam<Case> {};
 

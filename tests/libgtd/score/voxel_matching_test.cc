@@ -178,8 +178,8 @@ GripperMask random_mask(int side, int layers, double share, bool counts_all) {
   mask.layers = mask.solid_layers = layers;
   mask.pivot_xy = static_cast<int>(uniform(0, side));
   mask.pivot_z = static_cast<int>(uniform(0, layers));
-  const auto size = static_cast<std::size_t>(side * side * layers);
-  for (std::size_t n = 0; n < size; ++n) {
+  const int size = side * side * layers;
+  for (int n = 0; n < size; ++n) {
     mask.solid.push_back(uniform(0, 1) < share ? 1 : 0);
     mask.counted.push_back(counts_all || uniform(0, 1) < share ? 1 : 0);
   }

@@ -4,8 +4,9 @@
 
 #include <Eigen/Dense>
 #include <algorithm>
+#include <bit>
 #include <cmath>
-#include <cstring>
+#include <cstdint>
 #include <limits>
 #include <numbers>
 
@@ -317,13 +318,14 @@ TEST(Curvature, PointsThatAreNotFiniteAreNobodysNeighbours) {
   }
 }
 
+std::uint32_t bits_of(float number) { return std::bit_cast<std::uint32_t>(number); }
+
 TEST(Curvature, SameBitsWithAnyThreadsAndAnyQueries) {
   const PointCloud cloud = surface(4000, 0.6, [](double x, double y) {
     return 0.1 * std::sin(8 * x) + 0.05 * std::cos(11 * y);
   });
   const auto same = [](const Curvature& a, const Curvature& b) {
-    return std::memcmp(&a.k1, &b.k1, sizeof a.k1) == 0 &&
-           std::memcmp(&a.k2, &b.k2, sizeof a.k2) == 0 && a.normal == b.normal;
+    return bits_of(a.k1) == bits_of(b.k1) && bits_of(a.k2) == bits_of(b.k2) && a.normal == b.normal;
   };
   for (const auto method : {CurvatureMethod::corrected, CurvatureMethod::thesis}) {
     const CurvatureOptions options = within(0.09, method);
@@ -362,8 +364,8 @@ TEST(Curvature, SameBitsFromThePointsNearbyAlone) {
   for (std::size_t n = 0; n < nearby.size(); ++n) {
     if (!inside(cloud.positions[nearby[n]], 0)) continue;
     const Curvature& one = whole.points[nearby[n]];
-    EXPECT_EQ(std::memcmp(&one.k1, &part.points[n].k1, sizeof one.k1), 0);
-    EXPECT_EQ(std::memcmp(&one.k2, &part.points[n].k2, sizeof one.k2), 0);
+    EXPECT_EQ(bits_of(one.k1), bits_of(part.points[n].k1));
+    EXPECT_EQ(bits_of(one.k2), bits_of(part.points[n].k2));
     ++compared;
   }
   EXPECT_GT(compared, 200u);

@@ -197,6 +197,10 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   EXPECT_EQ(error_of([&] { libmap::write_textured_mesh(folder / "m.ply", model); }).context().bound,
             ".obj or .glb");
   EXPECT_THROW(libmap::read_textured_mesh(folder / "none.obj"), libmap::Error);
+  graspmap_test::write_text(folder / "endless.obj", "v 0 0 0\n");
+  std::filesystem::resize_file(folder / "endless.obj", std::uintmax_t{1} << 43U);
+  EXPECT_EQ(error_of([&] { libmap::read_textured_mesh(folder / "endless.obj"); }).context().field,
+            "size");
   libmap::write_textured_mesh(folder / "m.obj", model);
   std::filesystem::remove(folder / "m_1.png");
   EXPECT_NE(std::string(error_of([&] { libmap::read_textured_mesh(folder / "m.obj"); }).what())
