@@ -6,7 +6,7 @@
 
 namespace libmap {
 
-// The machine's memory in bytes: to read a larger file whole would end the program, not the reading.
+// Bytes of memory: to read a larger file whole would end the program, not the reading.
 std::uint64_t machine_memory();
 
 // Throws Error if the file `path` is larger than `max_bytes`, or not there.

@@ -76,7 +76,8 @@ TEST(Panorama, PointsLieWhereTheyWereSeen) {
     const std::vector<double>& camera = result.cloud.find_field("camera")->values;
     for (std::size_t n = 0; n < result.cloud.size(); ++n) {
       ASSERT_NEAR(result.cloud.positions[n].norm(), 2.0, 1e-6);
-      ASSERT_EQ(camera[n], static_cast<double>(n / (64 * 36)));
+      const std::size_t view = n / (64 * 36);
+      ASSERT_EQ(camera[n], static_cast<double>(view));
     }
     // The pixel goes back to itself.
     const Eigen::Vector3d point = views[2].camera.base_from_camera.inverse() *

@@ -33,8 +33,7 @@ TEST(TableTest, ByteOrderMarkAndLineEndings) {
   const Rows rows = {{"1", "2"}, {"3", "4"}};
   for (const std::string& text :
        std::initializer_list<std::string>{"a,b\n1,2\n3,4\n", "a,b\r\n1,2\r\n3,4\r\n",
-                                          "\xEF\xBB\xBF"
-                                          "a,b\n1,2\n3,4",
+                                          std::string("\xEF\xBB\xBF") + "a,b\n1,2\n3,4",
                                           "a,b\r\n1,2\n3,4\r\n", "a , b\n1,2\n\n\r\n3,4\n\n"}) {
     const Table table = parse_csv(text, "");
     EXPECT_EQ(table.columns, (Cells{"a", "b"})) << text;

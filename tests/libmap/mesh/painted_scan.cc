@@ -23,8 +23,9 @@ libmap::ColorImage photograph(const libmap::RayCaster& caster, const Paint& pain
     for (int x = 0; x < camera.width; ++x) {
       Eigen::Vector3d sum = Eigen::Vector3d::Zero();
       for (int s = 0; s < samples * samples; ++s) {
+        const int row = s / samples;
         const Eigen::Vector2d pixel(x + (s % samples + 0.5) / samples - 0.5,
-                                    y + (s / samples + 0.5) / samples - 0.5);
+                                    y + (row + 0.5) / samples - 0.5);
         const auto ray = libmap::pixel_to_ray(camera, pixel);
         if (!ray) continue;
         const Eigen::Vector3d direction = pose.linear() * ray->homogeneous();

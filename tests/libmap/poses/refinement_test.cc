@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "libmap/core/parallel.h"
 #include "libmap/scan/trajectory_text.h"
 #include "tests/libmap/poses/synthetic_features.h"
@@ -229,7 +231,7 @@ TEST(Features, StandWhereTheBlobsAre) {
       double value = 60.0;
       for (const Eigen::Vector2d& centre : centres)
         value += 150.0 * std::exp(-(Eigen::Vector2d(x, y) - centre).squaredNorm() / 18.0);
-      const auto gray = static_cast<std::uint8_t>(value + 0.5);
+      const auto gray = static_cast<std::uint8_t>(std::lround(value));
       color.at(x, y) = {gray, gray, gray};
     }
   const auto found = libmap::find_features(scan, {1}, {});

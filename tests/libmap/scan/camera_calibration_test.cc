@@ -139,7 +139,8 @@ TEST(CameraCalibration, DeviationsAreOpenCvsButForTheNumberOfMeasurements) {
   std::vector<std::vector<cv::Point2f>> corners(pictures.size());
   for (std::size_t n = 0; n < pictures.size(); ++n)
     for (int k = 0; k < 48; ++k) {
-      boards[n].emplace_back(static_cast<float>(k % 8) * 0.03F, static_cast<float>(k / 8) * 0.03F,
+      const int row = k / 8;
+      boards[n].emplace_back(static_cast<float>(k % 8) * 0.03F, static_cast<float>(row) * 0.03F,
                              0.0F);
       const Eigen::Vector2f corner = pictures[n].corners[static_cast<std::size_t>(k)].cast<float>();
       corners[n].emplace_back(corner.x(), corner.y());

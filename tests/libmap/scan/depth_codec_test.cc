@@ -4,6 +4,7 @@
 
 #include <bit>
 #include <cmath>
+#include <cstdint>
 #include <cstring>
 #include <limits>
 #include <vector>
@@ -190,7 +191,9 @@ TEST(DepthCodec, FloatsKeepTheirBits) {
                   2.5F};
   const std::string bytes = libmap::encode_float_png(depth);
   const DepthImage raw = libmap::decode_float_png(bytes);
-  EXPECT_EQ(0, std::memcmp(raw.pixels.data(), depth.pixels.data(), 12 * sizeof(float)));
+  for (std::size_t n = 0; n < 12; ++n)
+    EXPECT_EQ(std::bit_cast<std::uint32_t>(raw.pixels[n]),
+              std::bit_cast<std::uint32_t>(depth.pixels[n]));
   const DepthImage clean = libmap::decode_depth(bytes);
   for (const std::size_t invalid : {5U, 6U, 7U, 8U, 10U}) EXPECT_EQ(clean.pixels[invalid], 0.0F);
   EXPECT_EQ(clean.pixels[1], 1.2345678F);
