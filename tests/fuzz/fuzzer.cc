@@ -8,6 +8,7 @@
 #include "tests/fuzz/fuzz_targets.h"
 
 // Third-party readers that give up on a broken file leave some of their own memory behind.
+// NOLINTNEXTLINE(bugprone-reserved-identifier): the name that LeakSanitizer looks for.
 extern "C" const char* __lsan_default_suppressions() { return "leak:libvtk"; }
 
 namespace {
