@@ -78,7 +78,7 @@ std::pair<int, int> run_through_axis(const GripperMask& mask, int z) {
   const int y = mask.pivot_xy;
   const bool solid = mask.is_solid(mask.pivot_xy, y, z);
   int first = mask.pivot_xy;
-  int last = mask.pivot_xy;
+  int last = first;
   while (first > 0 && mask.is_solid(first - 1, y, z) == solid) --first;
   while (last + 1 < mask.side && mask.is_solid(last + 1, y, z) == solid) ++last;
   return {first, last - first + 1};

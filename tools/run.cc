@@ -138,7 +138,9 @@ Run::Writer Run::manifest_writer() const {
 
 libmap::OutputFile Run::begin_manifest(const fs::path& output) {
   claim_manifest(output);
-  return std::move(claimed_manifests_.extract(output.string()).mapped());
+  auto claimed = claimed_manifests_.extract(output.string());
+  libmap::OutputFile manifest = std::move(claimed.mapped());
+  return manifest;
 }
 
 void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {

@@ -49,7 +49,6 @@ void stitch(const Ring& upper, const Ring& lower, std::vector<Triangle>& triangl
         j == lower_steps ||
         (i < upper_steps && std::uint64_t{i + 1} * lower.size <= std::uint64_t{j + 1} * upper.size);
     if (step_upper) {
-      // cppcheck-suppress cppcheckError ; its analysis of i and j goes in a circle
       triangles.push_back({at(upper, i), at(lower, j), at(upper, i + 1)});
       ++i;
     } else {

@@ -14,10 +14,9 @@ namespace {
 // In memory where the machine has such a folder: fuzzers write thousands of files a second.
 class ScratchFolder {
  public:
-  ScratchFolder() {
-    const fs::path memory = "/dev/shm";
-    path = (fs::is_directory(memory) ? memory : fs::temp_directory_path()) /
-           ("graspmap-fuzz-" + std::to_string(getpid()));
+  ScratchFolder()
+      : path((fs::is_directory("/dev/shm") ? "/dev/shm" : fs::temp_directory_path()) /
+             ("graspmap-fuzz-" + std::to_string(getpid()))) {
     fs::create_directories(path);
   }
   ~ScratchFolder() {

@@ -359,10 +359,11 @@ TEST(SurfaceOrientation, AllInstructionSetsYieldTheSame) {
       for (int b = 0; b < 3; ++b) lattice.axes[a][b] = tilted_axes(normal)(b, a);
     std::vector<std::vector<int>> found;
     for (const auto instructions : graspmap_test::instruction_sets()) {
-      std::vector<int>& cells = found.emplace_back(count + TiltedLoops::lanes);
+      std::vector<int> cells(count + TiltedLoops::lanes);
       cells.resize(
           tilted_loops_of(instructions).find_cells(axes, count, lattice, box, cells.data()));
-      EXPECT_EQ(cells, found.front());
+      found.push_back(std::move(cells));
+      EXPECT_EQ(found.back(), found.front());
     }
     EXPECT_GT(found.front().size(), 5U);
   }
