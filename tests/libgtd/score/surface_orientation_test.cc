@@ -7,6 +7,7 @@
 #include <map>
 #include <numbers>
 #include <set>
+#include <utility>
 
 #include "libgtd/detect.h"
 #include "libgtd/score/tilted_cells.h"
