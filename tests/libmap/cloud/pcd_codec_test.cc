@@ -3,8 +3,6 @@
 
 #include <gmock/gmock.h>
 
-#include <filesystem>
-#include <fstream>
 #include <sstream>
 #include <string>
 
@@ -131,11 +129,10 @@ TEST(PcdFiles, HeadersThatLie) {
   for (const char* const points : {"-1", "1e3", "99999999999999999999", "x", ""})
     error_as(".pcd", pcd_header(points, "binary") + ten);
   error_as(".pcd", pcd_header("10", "zip") + ten);
-  // A terabyte without a line break: not looked through.
-  const fs::path endless = scratch_folder() / "endless.pcd";
-  std::ofstream(endless) << "# .PCD v0.7\nVERSION 0.7\n";
-  fs::resize_file(endless, std::uintmax_t{1} << 40U);
-  EXPECT_THAT(std::string(error_of([&] { read_cloud(endless); }).what()),
+  // Nobody looks for a header's end beyond its first MiB.
+  const std::string whole = pcd_header("10", "binary") + ten;
+  EXPECT_EQ(read_as(".pcd", "# " + std::string(1000, 'x') + "\n" + whole).cloud.size(), 10U);
+  EXPECT_THAT(error_as(".pcd", "# " + std::string(std::size_t{1} << 20U, 'x') + "\n" + whole),
               HasSubstr("no DATA line"));
 }
 
