@@ -153,6 +153,10 @@ std::pair<double, double> range_of(const std::string& low_text, const std::strin
   if (low && high && !(*low < *high))
     throw libmap::Error("the axis ends before it begins",
                         {.field = high_name, .value = high_text, .bound = "> " + low_text});
+  if (low && high && !std::isfinite(*high - *low))
+    throw libmap::Error(
+        "the axis is too wide to be drawn",
+        {.field = high_name, .value = high_text, .bound = "less than 1.8e308 beyond " + low_text});
   std::vector<double> ends;
   if (low) ends.push_back(*low);
   if (high) ends.push_back(*high);

@@ -141,6 +141,8 @@ TEST(Chart, OneEndOfAnAxis) {
   }
   EXPECT_TRUE(bad_input(chart("t.csv", {"--x-min", "9", "--x-max", "2"}), {"--x-max is 2", "> 9"}));
   EXPECT_TRUE(bad_input(chart("t.csv", {"--y-max", "inf"}), {"--y-max is inf"}));
+  EXPECT_TRUE(bad_input(chart("t.csv", {"--y-min", "-1e308", "--y-max", "1e308"}),
+                        {"too wide", "--y-max is 1e308", "beyond -1e308"}));
 }
 
 TEST(Chart, TablesWithNothingToDraw) {
