@@ -1,11 +1,13 @@
 // Every fuzz target on its seeds, on cut and changed copies of them, and on the inputs that
 // fuzzing found faults with (tests/fuzz/findings/TARGET): none of them may do more than be refused.
 #include <algorithm>
+#include <fstream>
 #include <string>
 #include <vector>
 
 #include "libmap/core/file_output.h"
 #include "tests/fuzz/fuzz_targets.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
 namespace {
@@ -66,10 +68,27 @@ TEST_P(Fuzz, NothingAndNoise) {
   }
 }
 
+// The most addresses that this process ever had, kB.
+std::uint64_t peak_kilobytes() {
+  std::ifstream status("/proc/self/status");
+  for (std::string word; status >> word;)
+    if (word == "VmPeak:") {
+      std::uint64_t kilobytes = 0;
+      status >> kilobytes;
+      return kilobytes;
+    }
+  ADD_FAILURE() << "no VmPeak";
+  return 0;
+}
+
 TEST_P(Fuzz, EarlierFindings) {
+  const std::uint64_t before = peak_kilobytes();
   for (const std::string& bytes :
        contents_of(graspmap_test::source_folder() / "tests/fuzz/findings" / GetParam().name))
     GetParam().run(bytes);
+  // As under the fuzzer; asked for and never touched counts too.
+  if (!graspmap_test::memory_can_be_limited) return;
+  EXPECT_LT(peak_kilobytes(), before + 600'000);
 }
 
 INSTANTIATE_TEST_SUITE_P(Targets, Fuzz, testing::ValuesIn(graspmap_fuzz::fuzz_targets()),

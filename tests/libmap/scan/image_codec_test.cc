@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <boost/crc.hpp>
 #include <cmath>
 #include <cstdlib>
 
@@ -81,6 +82,34 @@ TEST(ImageCodec, HeadersSayTheSizeOfAPrefix) {
   EXPECT_EQ(libmap::read_image_info(encode_png(libmap::Image<std::uint16_t>(3, 2)))->bits, 16);
   error_of([] { libmap::read_image_info("GIF89a"); });
   error_of([] { libmap::read_image_info(""); });
+}
+
+// `png` with one chunk more after its header (PNG specification, 5.3).
+std::string with_chunk(const std::string& png, const std::string& type_and_data) {
+  boost::crc_32_type sum;
+  sum.process_bytes(type_and_data.data(), type_and_data.size());
+  std::string chunk = std::string(4, '\0') + type_and_data + std::string(4, '\0');
+  set_big_endian(chunk, 0, static_cast<std::uint32_t>(type_and_data.size() - 4), 4);
+  set_big_endian(chunk, chunk.size() - 4, sum.checksum(), 4);
+  return std::string(png).insert(33, chunk);
+}
+
+TEST(ImageCodec, ChunksBesideThePixelsChangeNothing) {
+  const ColorImage image = sample_color(1);
+  const std::string png = encode_png(image);
+  const std::string gamma("gAMA\0\0\xb1\x8f", 8);
+  const std::string exif("eXIfII*\0\x8\0\0\0\0\0", 14);
+  const std::string text("tEXtComment\0rocks", 17);
+  std::string long_text = text;
+  long_text.resize(20'000'000, 'x');
+  for (const std::string& chunk : {gamma, exif, text, long_text, std::string("grAsp")})
+    EXPECT_EQ(libmap::decode_color(with_chunk(png, chunk)), image) << chunk.substr(0, 4);
+  for (const std::string& chunk : {exif, text}) {
+    std::string endless = with_chunk(png, chunk);
+    set_big_endian(endless, 33, 0x7ffffff0, 4);
+    EXPECT_EQ(error_of([&] { libmap::decode_color(endless); }).reason(),
+              "PNG is broken: ends too early");
+  }
 }
 
 TEST(ImageCodec, EveryTruncationIsAnError) {
