@@ -19,9 +19,9 @@ namespace {
 
 constexpr std::size_t max_block_bytes = std::size_t{1} << 22;
 
-// The file's first MiB: more than any header.
-std::string read_head(std::ifstream& file) {
-  std::string head(1 << 20, '\0');
+// The first MiB, more than any header, of a file of so many bytes.
+std::string read_head(std::ifstream& file, std::uint64_t bytes) {
+  std::string head(std::min<std::uint64_t>(bytes, 1 << 20), '\0');
   file.read(head.data(), static_cast<std::streamsize>(head.size()));
   head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
   file.clear();
@@ -59,12 +59,13 @@ struct CloudBlockReader::State {
     const std::string format = format_of(path);
     if (format != ".pcd" && format != ".ply") return false;
     file.open(path, std::ios::binary);
-    const std::string head = read_head(file);
-    block.resize(max_block_bytes);
     const std::uint64_t bytes = fs::file_size(path);
+    const std::string head = read_head(file, bytes);
+    // Thousands of small pieces are opened, each more than once.
+    block.resize(std::min<std::uint64_t>(bytes, max_block_bytes));
     const auto records = format == ".pcd" ? pcd_records(head, bytes, block.data())
                                           : ply_records(head, bytes, block.data());
-    if (!records || records->bytes == 0 || records->bytes > max_block_bytes) {
+    if (!records || records->bytes == 0 || records->bytes > block.size()) {
       std::vector<std::byte>().swap(block);
       return false;
     }

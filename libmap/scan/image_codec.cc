@@ -206,8 +206,8 @@ bool decode_png_rows(PngSource& source, PngWanted wanted, std::uint8_t* target,
                      std::size_t row_bytes, png_structp png, png_infop info) {
   if (setjmp(source.jump) != 0) return false;
   png_set_read_fn(png, &source, read_bytes);
-  // No pixel depends on them, and libpng takes the memory that an eXIf promises before it reads it,
-  // whatever png_set_chunk_malloc_max says (1.6.39: too large a chunk is a warning).
+  // No pixel depends on them, and libpng takes the memory that a text or an eXIf promises before it
+  // reads it, whatever png_set_chunk_malloc_max says (1.6.39: too large a chunk is a warning).
   png_set_keep_unknown_chunks(png, PNG_HANDLE_CHUNK_NEVER, nullptr, -1);
   png_read_info(png, info);
   if (wanted == PngWanted::color || wanted == PngWanted::gray) {
