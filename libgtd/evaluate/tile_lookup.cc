@@ -16,7 +16,6 @@ namespace libgtd {
 namespace {
 
 constexpr std::size_t points_at_once = std::size_t{1} << 16U;
-constexpr std::int64_t widest_tile = 1 << 24;  // columns
 // Files hold positions to 1e-5 m.
 constexpr double rounding_m = 4e-5;
 // Far more than any lattice, and no overflow.
@@ -40,20 +39,11 @@ class TilePoints {
   explicit TilePoints(libmap::PointCloud tile)
       : tile_(std::move(tile)), voxels_(VoxelFields(tile_).all()) {
     if (tile_.empty()) throw libmap::Error("a tile has no points");
-    first_i_ = voxel(0).i;
-    rows_.assign(1, 0);
+    rows_.push_back({voxel(0).i, 0});
     for (std::size_t n = 1; n < tile_.size(); ++n) {
-      const Voxel here = voxel(n);
-      const Voxel before = voxel(n - 1);
-      if (here <= before) throw libmap::Error("a tile's points are not in order");
-      if (std::int64_t{here.i} - first_i_ > widest_tile)
-        throw libmap::Error("a tile is wider than any can be",
-                            {.field = "i",
-                             .value = std::to_string(here.i),
-                             .bound = "<= " + std::to_string(first_i_ + widest_tile)});
-      if (here.i != before.i) rows_.resize(static_cast<std::size_t>(here.i - first_i_) + 1, n);
+      if (voxel(n) <= voxel(n - 1)) throw libmap::Error("a tile's points are not in order");
+      if (voxel(n).i != voxel(n - 1).i) rows_.push_back({voxel(n).i, n});
     }
-    rows_.push_back(tile_.size());
   }
 
   TilePoints(const TilePoints&) = delete;
@@ -71,15 +61,14 @@ class TilePoints {
   // Returns whether these are all points.
   template <typename Visit>
   bool visit_around(const Voxel& middle, std::int64_t reach, const Visit& visit) const {
-    const auto last_row = static_cast<std::int64_t>(rows_.size()) - 2;
-    const std::int64_t row = std::int64_t{middle.i} - first_i_;
     std::size_t visited = 0;
-    for (std::int64_t r = std::max<std::int64_t>(0, row - reach);
-         r <= std::min(last_row, row + reach); ++r) {
-      const auto begin =
-          voxels_.begin() + static_cast<std::ptrdiff_t>(rows_[static_cast<std::size_t>(r)]);
+    const auto first = std::lower_bound(rows_.begin(), rows_.end(), middle.i - reach,
+                                        [](const Row& row, std::int64_t i) { return row.i < i; });
+    for (auto row = first; row != rows_.end() && row->i <= middle.i + reach; ++row) {
+      const bool is_last = row + 1 == rows_.end();
+      const auto begin = voxels_.begin() + static_cast<std::ptrdiff_t>(row->begin);
       const auto end =
-          voxels_.begin() + static_cast<std::ptrdiff_t>(rows_[static_cast<std::size_t>(r) + 1]);
+          is_last ? voxels_.end() : voxels_.begin() + static_cast<std::ptrdiff_t>((row + 1)->begin);
       auto at = std::lower_bound(begin, end, middle.j - reach,
                                  [](const Voxel& voxel, std::int64_t j) { return voxel.j < j; });
       for (; at != end && at->j <= middle.j + reach; ++at) {
@@ -91,10 +80,15 @@ class TilePoints {
   }
 
  private:
+  // The points of one i. Of those i alone that have any: two points may lie far apart.
+  struct Row {
+    int i = 0;
+    std::size_t begin = 0;
+  };
+
   libmap::PointCloud tile_;
   std::vector<Voxel> voxels_;
-  int first_i_ = 0;
-  std::vector<std::size_t> rows_;  // where each i begins, and the end
+  std::vector<Row> rows_;  // ascending
 };
 
 struct Place {
