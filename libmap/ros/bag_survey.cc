@@ -8,6 +8,7 @@
 #include "libmap/ros/bag_reader.h"
 #include "libmap/ros/depth_message.h"
 #include "libmap/ros/ros_messages.h"
+#include "libmap/ros/transform_message.h"
 
 namespace libmap {
 
@@ -58,17 +59,12 @@ void take_info(const BagMessage& message, SurveyedImages& images) {
 }
 
 void take_transforms(const BagMessage& message, TransformTree& tree) {
-  const auto transforms = ros_message::decode<ros_message::TFMessage>(message.bytes);
-  for (const ros_message::TransformStamped& transform : transforms.transforms) {
-    const auto& t = transform.transform.translation;
-    const auto& q = transform.transform.rotation;
-    const Eigen::Quaterniond rotation(q.w, q.x, q.y, q.z);
-    const std::string child = ros_message::from_ros(transform.child_frame_id);
-    if (!(std::abs(rotation.norm() - 1.0) < 0.01))
-      throw Error("is no rotation",
-                  {.file = {}, .field = message.topic.name + ": quaternion of frame " + child});
-    tree.add(ros_message::from_ros(transform.header.frame_id), child,
-             make_pose({t.x, t.y, t.z}, rotation));
+  try {
+    add_transforms(message.bytes, tree);
+  } catch (const Error& error) {
+    ErrorContext context = error.context();
+    context.field = message.topic.name + (context.field.empty() ? "" : ": " + context.field);
+    throw Error(error.reason(), context, error.kind());
   }
 }
 

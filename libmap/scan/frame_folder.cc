@@ -8,6 +8,7 @@
 #include <initializer_list>
 #include <limits>
 #include <optional>
+#include <system_error>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
@@ -214,7 +215,8 @@ std::size_t FrameFolder::add_camera(const std::string& name) {
   const auto known = camera_of_name_.find(name);
   if (known != camera_of_name_.end()) return known->second;
   const fs::path file = path_ / name;
-  if (!fs::exists(file))
+  std::error_code code;  // a list may hold names that no file can have
+  if (!fs::exists(file, code))
     throw Error(
         "no such file: the scan needs its camera's intrinsics, as `graspmap calibrate` "
         "writes them; the key calibration of scan.yaml names another file",
@@ -266,7 +268,8 @@ void FrameFolder::read_images() {
     // Both orders are in use.
     bool depth_first = false;
     for (std::size_t i = 0; i < first.names.size(); ++i) {
-      if (!fs::is_regular_file(path_ / first.names[i])) continue;
+      std::error_code code;
+      if (!fs::is_regular_file(path_ / first.names[i], code)) continue;
       depth_first = is_depth_image(path_ / first.names[i]);
       break;
     }

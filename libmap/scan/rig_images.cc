@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <numeric>
 #include <optional>
+#include <system_error>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
@@ -117,9 +118,11 @@ std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& r
   if (fs::exists(folder / rig_images_file_name)) {
     images = images_of_table(folder, rig);
   } else {
-    for (std::size_t n = 0; n < rig.cameras.size(); ++n)
-      if (fs::is_directory(folder / rig.cameras[n].name))
+    for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
+      std::error_code code;  // a camera may have a name that no folder can have
+      if (fs::is_directory(folder / rig.cameras[n].name, code))
         append_folder(folder / rig.cameras[n].name, n, images);
+    }
   }
   if (images.empty())
     throw Error("holds no image of any of the rig's cameras", {.file = folder.string()});

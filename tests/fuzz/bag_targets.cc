@@ -5,6 +5,7 @@
 #include "libmap/ros/cloud_message.h"
 #include "libmap/ros/depth_message.h"
 #include "libmap/ros/message_encoding.h"
+#include "libmap/ros/transform_message.h"
 #include "libmap/scan/image_codec.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
@@ -93,6 +94,28 @@ Seeds bag_message_seeds() {
           with_choice(4, serialized(graspmap_test::sample_info("front", 1.0)))};
 }
 
+// Ways between frames are looked for in what a broken message leaves too.
+bool run_bag_transforms(std::string_view bytes) {
+  libmap::TransformTree tree;
+  const bool is_whole = accepts([&] { libmap::add_transforms(bytes, tree); });
+  const std::vector<std::string> frames = tree.frames();
+  for (const std::string& frame : frames) {
+    accepts([&] { tree.root_of(frame); });
+    accepts([&] { tree.target_from_source(frames.front(), frame); });
+  }
+  return is_whole;
+}
+
+Seeds bag_transforms_seeds() {
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.translation().x() = 0.5;
+  rm::TFMessage message;
+  for (const auto& [parent, child] :
+       {std::pair{"/map", "base_link"}, {"base_link", "front"}, {"front", "front_optical"}})
+    message.transforms.push_back(graspmap_test::sample_transform(parent, child, pose));
+  return {serialized(message)};
+}
+
 }  // namespace
 
 std::vector<FuzzTarget> bag_targets() {
@@ -100,6 +123,7 @@ std::vector<FuzzTarget> bag_targets() {
       {"bag", "bags of ROS 1", run_bag, bag_seeds},
       {"bag_message", "clouds, depth images and calibrations out of bags", run_bag_message,
        bag_message_seeds},
+      {"bag_transforms", "transforms out of bags", run_bag_transforms, bag_transforms_seeds},
   };
 }
 

@@ -4,6 +4,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
+#include "tests/fuzz/vtp_samples.h"
 
 namespace graspmap_fuzz {
 
@@ -81,6 +82,12 @@ Seeds cloud_and_mesh_seeds() {
   return seeds;
 }
 
+Seeds vtp_seeds() {
+  Seeds seeds = cloud_and_mesh_seeds<vtp>();
+  for (std::string& sample : vtp_samples()) seeds.push_back(std::move(sample));
+  return seeds;
+}
+
 }  // namespace
 
 std::vector<FuzzTarget> cloud_targets() {
@@ -88,7 +95,7 @@ std::vector<FuzzTarget> cloud_targets() {
       {"cloud_csv", "clouds as CSV", run_cloud<csv>, cloud_seeds<csv>},
       {"pcd", "PCD clouds", run_cloud<pcd>, cloud_seeds<pcd>},
       {"ply", "PLY clouds and meshes", run_cloud_or_mesh<ply>, cloud_and_mesh_seeds<ply>},
-      {"vtp", "VTP clouds and meshes", run_cloud_or_mesh<vtp>, cloud_and_mesh_seeds<vtp>},
+      {"vtp", "VTP clouds and meshes", run_cloud_or_mesh<vtp>, vtp_seeds},
   };
 }
 

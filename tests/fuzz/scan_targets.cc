@@ -1,4 +1,6 @@
 // Scans: databases, their blobs, folders of images, and what else gives poses.
+#include <set>
+
 #include "libmap/core/file_output.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/calibration_codec.h"
@@ -95,11 +97,14 @@ bool read_database(const fs::path& path) {
     const libmap::RtabmapDatabase database(path);
     accepts([&] { database.parameters(); });
     accepts([&] { database.stored_map(); });
+    accepts([&] { database.word_count(); });
+    accepts([&] { database.feature_count(); });
     accepts([&] { database.each_content([](const libmap::NodeContent&) {}); });
     for (const auto& node : database.graph().nodes) {
       accepts([&, id = node.id] { database.read_frame(id); });
       accepts([&, id = node.id] { database.features(id); });
       accepts([&, id = node.id] { database.laser_scan(id); });
+      accepts([&, id = node.id] { database.calibration(id); });
     }
     libmap::verify_scan(database);
   });
@@ -135,29 +140,82 @@ Seeds database_blob_seeds() {
   return seeds;
 }
 
+libmap::CameraFile small_camera() {
+  libmap::CameraFile camera;
+  camera.camera.width = 32;
+  camera.camera.height = 24;
+  camera.camera.fx = camera.camera.fy = 30.0;
+  return camera;
+}
+
+// Opens the folder and reads all frames. It holds a camera and an image of either kind.
+bool read_frames(const fs::path& path) {
+  static std::set<fs::path> prepared;
+  if (prepared.insert(path).second) {
+    libmap::write_text(path / "calibration.yaml", libmap::to_yaml(small_camera()));
+    libmap::write_text(path / "c.png", libmap::encode_png(graspmap_test::sample_color(1)));
+    libmap::write_text(path / "g.png",
+                       libmap::encode_png(libmap::Image<std::uint8_t>(32, 24, 100)));
+    libmap::write_text(path / "d.png", libmap::encode_png(graspmap_test::sample_depth(1)));
+  }
+  return accepts([&] {
+    const libmap::FrameFolder folder(path);
+    for (const auto& node : folder.graph().nodes)
+      accepts([&, id = node.id] { folder.read_frame(id); });
+    libmap::verify_scan(folder);
+  });
+}
+
 // The lists of a folder's images and poses.
 bool run_frame_list(std::string_view bytes) {
-  static const ScratchFile calibration("frames/calibration.yaml");
   static const ScratchFile colors("frames/rgb.txt");
   static const ScratchFile depths("frames/depth.txt");
   static const ScratchFile poses("frames/groundtruth.txt");
-  libmap::CameraFile camera;
-  camera.camera.width = camera.camera.height = 8;
-  camera.camera.fx = camera.camera.fy = 8.0;
-  calibration.write(libmap::to_yaml(camera));
   for (const ScratchFile* file : {&colors, &depths, &poses}) file->write(take_file(bytes));
-  return accepts([&] {
-    const libmap::FrameFolder folder(colors.path().parent_path());
-    for (const auto& node : folder.graph().nodes)
-      accepts([&, id = node.id] { folder.read_frame(id); });
-  });
+  return read_frames(colors.path().parent_path());
 }
 
 Seeds frame_list_seeds() {
   return {
-      "# stamp file\n1.0 rgb/1.png\n2.0 rgb/2.png\n\f"
-      "1.0 depth/1.png\n2.01 depth/2.png\n\f"
+      "# stamp file\n1.0 c.png\n2.0 c.png\n\f"
+      "1.0 d.png\n2.01 d.png\n\f"
       "1.0 0 0 0 0 0 0 1\n2.0 0.5 0 0 0 0 0 1\n"};
+}
+
+// The same in one list, of which neither column is known to be the depth.
+bool run_frame_pairs(std::string_view bytes) {
+  static const ScratchFile file("pairs/associations.txt");
+  file.write(bytes);
+  return read_frames(file.path().parent_path());
+}
+
+Seeds frame_pairs_seeds() {
+  return {"1.0 c.png 1.01 d.png\n2.0 c.png 2.0 d.png\n", "# depth first\n1.0 d.png 1.01 c.png\n"};
+}
+
+// The table of a folder's nodes, with its options, poses and links.
+bool run_frame_table(std::string_view bytes) {
+  static const ScratchFile options("table/scan.yaml");
+  static const ScratchFile nodes("table/nodes.csv");
+  static const ScratchFile poses("table/poses.tum");
+  static const ScratchFile stored("table/poses_stored.tum");
+  static const ScratchFile links("table/links.g2o");
+  for (const ScratchFile* file : {&options, &nodes, &poses, &stored, &links})
+    file->write(take_file(bytes));
+  return read_frames(options.path().parent_path());
+}
+
+Seeds frame_table_seeds() {
+  const std::string columns =
+      "node,session,weight,stamp_s,label,color,depth,right,calibration,baseline_m,velocity,gps\n";
+  return {"depth_unit_m: 0.001\npose_frame: base\n\f" + columns +
+              "1,0,0,1.5,,c.png,d.png,,calibration.yaml,,,\n"
+              "2,0,3,2.5,here,c.png,,g.png,calibration.yaml calibration.yaml,0.07,1 2 3 4 5 6,"
+              "1 2 3 4 5 6\n\f"
+              "# node in the last column\n1.5 0 0 0 0 0 0 1 1\n2.5 1 0 0 0 0 0 1 2\n\f"
+              "1.5 0 0 0 0 0 0 1\n\f" +
+              libmap::to_g2o({}, {{.from = 1, .to = 2}}),
+          "pairing_tolerance_s: 0.1\n\f" + columns + "7,1,-1,,,,d.png,,,,,\n\f\f\f"};
 }
 
 // The table of a rig's images.
@@ -181,6 +239,25 @@ Seeds rig_images_seeds() {
       "front,2,\"b,b.png\"\nrear,2.5e0,c.png\n"};
 }
 
+libmap::Trajectory small_trajectory() {
+  libmap::Trajectory trajectory;
+  for (int node = 1; node <= 3; ++node)
+    trajectory.push_back({node, 100.25 + node, graspmap_test::sample_pose(node)});
+  return trajectory;
+}
+
+// The nodes of that trajectory.
+libmap::PoseGraph small_graph() {
+  libmap::PoseGraph graph;
+  for (const libmap::TrajectoryPose& pose : small_trajectory()) {
+    graph.nodes.emplace_back();
+    graph.nodes.back().id = pose.node;
+    graph.nodes.back().stamp_s = pose.stamp_s;
+    graph.optimized_map_from_base.emplace(pose.node, pose.world_from_base);
+  }
+  return graph;
+}
+
 bool run_poses(std::string_view bytes) {
   static const std::vector<libmap::TrajectoryFormat> formats = [] {
     std::vector<libmap::TrajectoryFormat> all;
@@ -190,14 +267,10 @@ bool run_poses(std::string_view bytes) {
   static const ScratchFile file("poses.txt");
   const libmap::TrajectoryFormat format = formats[take_choice(bytes, formats.size())];
   file.write(bytes);
-  return accepts([&] { libmap::read_trajectory(file.path(), format); });
-}
-
-libmap::Trajectory small_trajectory() {
-  libmap::Trajectory trajectory;
-  for (int node = 1; node <= 3; ++node)
-    trajectory.push_back({node, 100.25 + node, graspmap_test::sample_pose(node)});
-  return trajectory;
+  return accepts([&] {
+    const libmap::TrajectoryFile read = libmap::read_trajectory(file.path(), format);
+    libmap::assign_nodes(read.poses, small_graph());
+  });
 }
 
 Seeds pose_seeds() {
@@ -240,6 +313,8 @@ std::vector<FuzzTarget> scan_targets() {
       {"database_blob", "any blob of a scan database", run_database_blob, database_blob_seeds},
       {"depth", "depth images: RVL, PNG, float PNG", run_depth, depth_seeds},
       {"frame_list", "lists of a folder of images", run_frame_list, frame_list_seeds},
+      {"frame_pairs", "lists of pairs of images", run_frame_pairs, frame_pairs_seeds},
+      {"frame_table", "tables of a folder of images", run_frame_table, frame_table_seeds},
       {"image", "colour and grey images", run_image, image_seeds},
       {"laser_scan", "laser scans", run_laser_scan, laser_scan_seeds},
       {"matrix", "compressed matrices and texts", run_matrix, matrix_seeds},

@@ -3,6 +3,8 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include "libmap/core/file_output.h"
+#include "libmap/scan/image_codec.h"
+#include "libmap/scan/matrix_codec.h"
 #include "tests/libmap/scan/sample_database.h"
 
 namespace graspmap_fuzz {
@@ -16,11 +18,38 @@ std::vector<std::string> texts(SQLite::Database& database, const std::string& qu
   return list;
 }
 
+// What RTAB-Map keeps of its last map.
+void store_map(const std::filesystem::path& path) {
+  using libmap::MatrixElement;
+  const auto matrix = [](int rows, int columns, int channels, MatrixElement element,
+                         const std::string& bytes) {
+    return libmap::encode_matrix({rows, columns, channels, element, bytes});
+  };
+  // Two triangles of one material.
+  const std::vector<std::int32_t> polygons = {2, 0, 1, 2, 0, 2, 3};
+  const std::string picture = libmap::encode_png(graspmap_test::sample_color(1));
+  const std::vector<std::pair<std::string, std::string>> blobs = {
+      {"opt_map", matrix(2, 3, 1, MatrixElement::int8, std::string(6, '\x64'))},
+      {"opt_cloud", matrix(1, 4, 3, MatrixElement::float32, std::string(48, '\0'))},
+      {"opt_polygons", matrix(1, 7, 1, MatrixElement::int32, graspmap_test::bytes_of(polygons))},
+      {"opt_tex_materials", picture},
+      {"preview_image", picture},
+      {"opt_last_localization", graspmap_test::pose_bytes(libmap::Pose::Identity())}};
+  SQLite::Database database(path.string(), SQLite::OPEN_READWRITE);
+  database.exec("UPDATE Admin SET opt_polygons_size = 3, opt_map_resolution = 0.05");
+  for (const auto& [column, bytes] : blobs) {
+    SQLite::Statement update(database, "UPDATE Admin SET " + column + " = ?");
+    update.bind(1, bytes.data(), static_cast<int>(bytes.size()));
+    update.exec();
+  }
+}
+
 }  // namespace
 
 StoredBlobs::StoredBlobs() {
   std::filesystem::remove(file_.path());
   graspmap_test::write_sample(file_.path());
+  store_map(file_.path());
   sample_ = libmap::read_whole_file(file_.path(), 1U << 26U);
   SQLite::Database database(file_.path().string(), SQLite::OPEN_READONLY);
   for (const std::string& table :

@@ -53,9 +53,31 @@ Seeds yaml_seeds() {
   add_data(seeds, 0, "grippers");
   add_data(seeds, 1, "scenarios");
   add_data(seeds, 2, "rigs");
-  seeds.push_back(with_choice(3,
-                              "image_width: 8\nimage_height: 8\ncamera_matrix: {rows: 3, cols: 3, "
-                              "data: [8, 0, 4, 0, 8, 4, 0, 0, 1]}\n"));
+  const std::string size =
+      "image_width: 8\nimage_height: 8\n"
+      "camera_matrix: {rows: 3, cols: 3, data: [8, 0, 4, 0, 8, 4, 0, 0, 1]}\n";
+  const std::string pose = "[[1, 0, 0, 0.5], [0, 1, 0, 0], [0, 0, 1, 0.25]]\n";
+  seeds.push_back(with_choice(3, size));
+  seeds.push_back(
+      with_choice(3, size +
+                         "distortion_model: plumb_bob\n"
+                         "distortion_coefficients: {rows: 1, cols: 5, data: [0.1, -0.2, "
+                         "0.001, 0.002, 0.03]}\nlocal_transform: " +
+                         pose));
+  seeds.push_back(with_choice(3, size +
+                                     "fisheye_model: 1\ndistortion_coefficients: [0.1, 0.2, 0, 0, "
+                                     "0.3, 0.4]\n"));
+  seeds.push_back(
+      with_choice(3, size + "distortion_model: rational_polynomial\n"
+                            "distortion_coefficients: [1, 2, 3, 4, 5, 6, 7, 8, 0, 0, 0, 0, "
+                            "0, 0]\n"));
+  seeds.push_back(with_choice(2,
+                              "cameras:\n  - name: a\n    image_width: 8\n    image_height: 8\n"
+                              "    camera_matrix: [8, 0, 4, 0, 8, 4, 0, 0, 1]\n"
+                              "    distortion_model: equidistant\n"
+                              "    distortion_coefficients: [0.1, 0.2, 0.3, 0.4]\n"
+                              "    robot_from_camera: " +
+                                  pose));
   add_data(seeds, 4, "scenes");
   add_data(seeds, 5, "sites");
   return seeds;

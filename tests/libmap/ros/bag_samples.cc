@@ -22,6 +22,12 @@ SampleBag& SampleBag::camera(const std::string& topic, const std::vector<double>
 SampleBag& SampleBag::transform(const std::string& parent, const std::string& child,
                                 const libmap::Pose& parent_from_child, const std::string& topic) {
   rm::TFMessage message;
+  message.transforms.push_back(sample_transform(parent, child, parent_from_child));
+  return write(topic, 1.0, message);
+}
+
+rm::TransformStamped sample_transform(const std::string& parent, const std::string& child,
+                                      const libmap::Pose& parent_from_child) {
   rm::TransformStamped transform;
   transform.header = sample_header(parent, 1.0);
   transform.child_frame_id = rm::to_ros(child);
@@ -34,8 +40,7 @@ SampleBag& SampleBag::transform(const std::string& parent, const std::string& ch
   transform.transform.rotation.y = q.y();
   transform.transform.rotation.z = q.z();
   transform.transform.rotation.w = q.w();
-  message.transforms.push_back(transform);
-  return write(topic, 1.0, message);
+  return transform;
 }
 
 rm::Header sample_header(const std::string& frame, double stamp_s) {

@@ -38,6 +38,8 @@ class SampleBag {
   rosbag::Bag bag_;
 };
 
+rm::TransformStamped sample_transform(const std::string& parent, const std::string& child,
+                                      const libmap::Pose& parent_from_child);
 rm::Header sample_header(const std::string& frame, double stamp_s);
 // Rows of `bytes` one after the other, `step` bytes each.
 rm::Image sample_image(const std::string& frame, double stamp_s, const std::string& encoding,
