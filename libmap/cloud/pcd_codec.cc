@@ -314,7 +314,8 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
     for (std::size_t i = 0; i < field.count; ++i) {
       Target target{&field, nullptr, nullptr};
       if (field.is_packed_color() && set.find("red") == nullptr) {
-        auto packed = std::make_shared<std::vector<std::uint32_t>>(header.points);
+        // Without points too there is an address to count from.
+        auto packed = std::make_shared<std::vector<std::uint32_t>>(header.points + 1);
         target.packed = packed->data();
         set.storage.push_back(packed);
         add_columns(field, reinterpret_cast<const std::byte*>(packed->data()), 4, set);
