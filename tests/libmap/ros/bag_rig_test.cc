@@ -403,7 +403,7 @@ TEST(BagRig, WhatIsMissingIsNamed) {
     message.transforms[0].child_frame_id = rm::to_ros("a_optical");
     made.camera("/a", {1.0}).write("/tf_static", 1.0, message);
   });
-  EXPECT_THAT(refusal(), HasSubstr("is no rotation"));
+  EXPECT_THAT(refusal(), HasSubstr("/tf_static: quaternion of frame a_optical: is no rotation"));
 }
 
 }  // namespace
