@@ -40,7 +40,7 @@ bool is_bag(const std::string& path) { return libmap::format_of(path) == ".bag";
 
 void require_output(const BagCommandOptions& options) {
   if (options.output.empty())
-    throw libmap::Error("is missing (or --list)", {.file = {}, .field = "--output"});
+    throw graspmap_tools::UsageError("is missing (or --list)", {.file = {}, .field = "--output"});
 }
 
 // Options that what is asked for would ignore.

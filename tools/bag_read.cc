@@ -11,6 +11,7 @@
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
 #include "tools/bag_commands.h"
+#include "tools/bag_json.h"
 #include "tools/result_counts.h"
 
 namespace graspmap_tools {
@@ -18,21 +19,7 @@ namespace graspmap_tools {
 namespace {
 
 namespace fs = std::filesystem;
-
-void print_json(const libmap::BagListing& listing) {
-  nlohmann::ordered_json json;
-  json["messages"] = listing.messages;
-  json["start_s"] = listing.start_s;
-  json["end_s"] = listing.end_s;
-  json["topics"] = nlohmann::ordered_json::array();
-  for (const libmap::BagTopic& topic : listing.topics)
-    json["topics"].push_back({{"name", topic.name},
-                              {"type", topic.type},
-                              {"md5sum", topic.md5sum},
-                              {"messages", topic.messages},
-                              {"latching", topic.latching}});
-  std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
-}
+using Json = nlohmann::ordered_json;
 
 void print_text(const libmap::BagListing& listing) {
   std::size_t name = 5;
@@ -89,7 +76,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
 void list_bag_topics(const BagCommandOptions& options) {
   const libmap::BagListing listing = libmap::list_bag(options.input);
   if (options.json)
-    print_json(listing);
+    std::cout << bag_json(listing).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
   else
     print_text(listing);
 }

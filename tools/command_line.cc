@@ -121,8 +121,11 @@ void Command::flag(const std::string& name, bool& value, const std::string& desc
 }
 
 void Command::option(const std::string& name, const std::string& value_name, std::string& value,
-                     const std::string& description) {
-  parts_->app.add_option(name, value, description)->type_name(value_name)->capture_default_str();
+                     const std::string& description, bool required) {
+  parts_->app.add_option(name, value, description)
+      ->type_name(value_name)
+      ->capture_default_str()
+      ->required(required);
 }
 
 void Command::option(const std::string& name, const std::string& value_name,
@@ -288,6 +291,8 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
     if (const auto exit_code = parts_->parse(argc, argv)) return *exit_code;
     parts_->work(body);
     return 0;
+  } catch (const UsageError& error) {
+    return parts_->usage_error(error.what());
   } catch (const libmap::Error& error) {
     return report(name, parts_->placed(error).what(),
                   error.kind() == libmap::ErrorKind::bad_input ? exit_bad_input : exit_failed);

@@ -17,10 +17,17 @@
 #include <string>
 #include <vector>
 
+#include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
 #include "tools/run.h"
 
 namespace graspmap_tools {
+
+// What the command line lacks before any file is looked at: exit code 2.
+class UsageError : public libmap::Error {
+ public:
+  using Error::Error;
+};
 
 class Command {
  public:
@@ -39,7 +46,7 @@ class Command {
   // Flags and options that are no parameters of a stage, such as --json or --tile.
   void flag(const std::string& name, bool& value, const std::string& description);
   void option(const std::string& name, const std::string& value_name, std::string& value,
-              const std::string& description);
+              const std::string& description, bool required = false);
   void option(const std::string& name, const std::string& value_name,
               std::vector<std::string>& values, const std::string& description);
 

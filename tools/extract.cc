@@ -181,7 +181,7 @@ void extract(ExtractOptions& options, Run& run) {
   refuse_ignored(options);
   const bool pictures = options.pictures.wanted();
   if (options.output.empty() && !pictures)
-    throw libmap::Error("nothing to write: -o, --bundler or --colmap names a folder");
+    throw graspmap_tools::UsageError("nothing to write: -o, --bundler or --colmap names a folder");
   if (!options.output.empty())
     run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
   if (pictures) graspmap_tools::claim_picture_folders(options.pictures, options.scan, run);

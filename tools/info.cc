@@ -1,4 +1,4 @@
-// graspmap info: what a scan, a cloud, a mesh or a map holds.
+// graspmap info: what a scan, a cloud, a mesh, a map or a bag holds.
 #include <fmt/format.h>
 
 #include <cmath>
@@ -13,6 +13,8 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_report.h"
+#include "libmap/ros/bag_reader.h"
+#include "tools/bag_json.h"
 #include "tools/command_line.h"
 #include "tools/info_scan.h"
 #include "tools/info_tiles.h"
@@ -234,6 +236,11 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
   if (options.verify)
     throw libmap::Error("only scans and tile stores are verified",
                         {.file = options.file, .field = "--verify"});
+  if (libmap::format_of(options.file) == ".bag") {
+    Json json = {{"kind", "bag of ROS 1"}};
+    json.update(graspmap_tools::bag_json(libmap::list_bag(options.file)));
+    return json;
+  }
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
                                                                    : cloud_json(options.file);
 }
@@ -281,9 +288,9 @@ void info(InfoOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   InfoOptions options;
-  graspmap_tools::Command command("info",
-                                  "What a scan, a cloud, a mesh or a graspability map holds.");
-  command.input("FILE", options.file, "scan, cloud, mesh, map or tile store (.tiles)");
+  graspmap_tools::Command command(
+      "info", "What a scan, a cloud, a mesh, a graspability map or a bag holds.");
+  command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or ROS 1 bag");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify,
                "read all that a scan or a tile store holds and list what is broken");

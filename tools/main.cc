@@ -47,7 +47,7 @@ constexpr CommandEntry commands[] = {
     {"spot-check", "height errors at places along the edges of a site"},
     {"compare", "how far one cloud or mesh lies from another, and how much of it it covers"},
     {"report", "one HTML file of a whole run"},
-    {"info", "what a scan, a cloud, a mesh or a map holds"},
+    {"info", "what a scan, a cloud, a mesh, a map or a bag holds"},
     {"convert", "any format to any other"},
 };
 

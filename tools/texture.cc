@@ -178,7 +178,6 @@ std::vector<fs::path> pages_of_earlier_run(const fs::path& output) {
 void texture(TextureCommandOptions options, Run& run) {
   libmap::require_textured_format(options.output);
   libmap::require_mesh_format(options.mesh);
-  if (options.scan.empty()) throw libmap::Error("no scan: --scan names one");
   std::vector<std::string> inputs = graspmap_tools::scan_inputs(options.scan, options.poses);
   inputs.push_back(options.mesh);
   run.claim_output(options.output, inputs);
@@ -210,7 +209,7 @@ int main(int argc, char** argv) {
   command.output(options.output,
                  "textured mesh (.glb; .obj: with STEM.mtl and a picture a page, STEM_0.png ...)");
   command.option("--scan", "SCAN", options.scan,
-                 "scan with the photographs: a database of RTAB-Map, or a folder of images");
+                 "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
   graspmap_tools::add_poses_option(command, options.poses);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { texture(options, run); });

@@ -19,6 +19,7 @@ using graspmap_test::ProgramResult;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using graspmap_test::write_text;
+using graspmap_test::wrong_usage;
 
 // Builds without ROS's packages have the command too.
 bool has_ros() {
@@ -210,6 +211,12 @@ TEST(BagCommand, SameBytesOnEveryRunAndMapsComeBack) {
   EXPECT_EQ(listing["messages"], 6);
   EXPECT_EQ(listing["topics"][1]["name"], "/merged_pcd");
   EXPECT_EQ(listing["topics"][1]["type"], "sensor_msgs/PointCloud2");
+  const ProgramResult info = graspmap({"info", "a.bag", "--json"});
+  ASSERT_TRUE(succeeded(info));
+  nlohmann::json same = nlohmann::json::parse(info.standard_output);
+  EXPECT_EQ(same["kind"], "bag of ROS 1");
+  EXPECT_EQ(same["made_by"].get<std::string>().substr(0, 13), "graspmap bag ");
+  for (const auto& [name, value] : listing.items()) EXPECT_EQ(same[name], value) << name;
 }
 
 // A map in the terrain's frame and the panorama in the robot's: RViz needs to know how they lie.
@@ -258,7 +265,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   };
   says({"none.bag", "--list"}, {"none.bag: no such file"});
   says({"none", "-o", "out.bag"}, {"none: no such file"});
-  says({"good.bag"}, {"--output", "is missing"});
+  EXPECT_TRUE(wrong_usage(graspmap({"bag", "good.bag"}), {"--output", "is missing"}));
   says({"good.bag", "-o", "out"}, {"good.bag: topics of images is none"});
   says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "--topic"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
@@ -284,6 +291,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   fs::remove(scratch("rig"));
   write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
   says({"cut.bag", "--list"}, {"cut.bag: is broken or cut off"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is broken or cut off"}));
   fs::remove(scratch("cut.bag"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }

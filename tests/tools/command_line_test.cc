@@ -63,6 +63,10 @@ TEST(CommandLine, UnknownCommandsAndFlags) {
 TEST(CommandLine, MissingAndSurplusArguments) {
   EXPECT_TRUE(wrong_usage(graspmap({"score", "t.pcd"}), {"--output", "required"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "-o", "m.pcd"}), {"TERRAIN", "required"}));
+  EXPECT_TRUE(
+      wrong_usage(graspmap({"texture", "m.ply", "-o", "m.glb"}), {"--scan", "is required"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"extract", "s.db"}),
+                          {"nothing to write", "-o, --bundler or --colmap"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "b", "-o", "m.pcd"}), {"too many: b"}));
   EXPECT_TRUE(wrong_usage(graspmap({"score", "a", "-o", "m.pcd", "--method"}), {"--method"}));
   EXPECT_TRUE(wrong_usage(graspmap({"convert", "a"}), {"OUT", "required"}));

@@ -329,7 +329,6 @@ TEST(ExtractBundler, BesideTheWholeScan) {
 
 TEST(ExtractBundler, BadInput) {
   write_example();
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db"}), {"-o, --bundler or --colmap"}));
   EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--angle", "181"}),
                         {"--angle is 181"}));
   EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--poses", "stord"}),

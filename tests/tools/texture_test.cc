@@ -180,7 +180,6 @@ TEST(Texture, BadInput) {
   GRASPMAP_REQUIRE_DATA();
   write_site_part("site.ply");
   EXPECT_TRUE(refused(graspmap(texture_words("m.ply")), {"m.ply", ".obj or .glb"}));
-  EXPECT_TRUE(refused(graspmap({"texture", "site.ply", "-o", "m.obj"}), {"--scan"}));
   EXPECT_TRUE(
       refused(graspmap({"texture", "none.ply", "--scan", scan_file(), "-o", "m.obj", "--quiet"}),
               {"none.ply"}));
