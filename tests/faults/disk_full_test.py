@@ -75,7 +75,7 @@ def mounted_disks():
 
 def enter_namespace():
     probe = ["sh", "-c", "mount -t tmpfs -o size=64k none /mnt"]
-    # The first needs namespaces of users, which a chroot does not have; the second needs root.
+    # The first needs namespaces of users, the second root.
     for line in (["unshare", "--mount", "--map-root-user"], ["unshare", "--mount"]):
         if shutil.which("unshare") and subprocess.run(line + probe, capture_output=True, check=False).returncode == 0:
             os.environ["GRASPMAP_TEST_MOUNTS"] = "1"
