@@ -247,7 +247,11 @@ void merge(const MergeOptions& options, Run& run) {
   run.manifest().results.emplace_back("edge_voxels", count_of(whole, "edge"));
   run.manifest().results.emplace_back("graspable_voxels", count_of(whole, "graspable"));
   run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
-  judge_obstacles(manifests.front(), whole, run);
+  try {
+    judge_obstacles(manifests.front(), whole, run);
+  } catch (const libmap::Error& error) {
+    throw error.in_file(libmap::manifest_path(options.tiles.front()).string());
+  }
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
 }

@@ -41,12 +41,12 @@ std::optional<Voxel> lattice_offset(const VoxelMap& map, const VoxelMap& other,
                                 (corner & 2) != 0 ? high.y() : low.y(),
                                 (corner & 4) != 0 ? high.z() : low.z());
     const Eigen::Vector3d cell = map.lattice.cell_of(map_from_other * point);
-    if (!(cell.cwiseAbs().maxCoeff() < 0x1p30)) return std::nullopt;
+    if (!(cell.cwiseAbs().array() < 0x1p30).all()) return std::nullopt;
     const Voxel here = map.lattice.voxel_of(map_from_other * point);
     const Voxel there = other.lattice.voxel_of(point);
     const Eigen::Vector3d off_center =
         cell - Eigen::Vector3d(here.i + 0.5, here.j + 0.5, here.k + 0.5);
-    if (off_center.cwiseAbs().maxCoeff() > lattice_tolerance_voxels) return std::nullopt;
+    if (!(off_center.cwiseAbs().array() <= lattice_tolerance_voxels).all()) return std::nullopt;
     const Voxel step{here.i - there.i, here.j - there.j, here.k - there.k};
     if (offset && *offset != step) return std::nullopt;
     offset = step;

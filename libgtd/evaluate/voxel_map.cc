@@ -78,7 +78,7 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
   for (std::size_t n = 0; n < kept.size(); ++n) {
     const Eigen::Vector3d center = result.lattice.center_of(voxels[n]);
     const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
-    if (!((point - center).cwiseAbs().maxCoeff() <= bound_m))
+    if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
           "points do not lie at the centres of the map's voxels",
           {.field = "point " + std::to_string(kept[n] + 1),
@@ -151,8 +151,12 @@ MapFacts facts_of(const libmap::Manifest& manifest) {
   const std::optional<double> size_m = number_of(manifest.find_parameter("voxel_size_m"));
   const libmap::ManifestValue* value = manifest.find_result("lattice_origin_m");
   const auto* origin = value == nullptr ? nullptr : std::get_if<std::vector<double>>(value);
-  if (size_m && *size_m > 0.0 && origin != nullptr && origin->size() == 3)
+  if (size_m && *size_m > 0.0 && origin != nullptr && origin->size() == 3) {
     facts.lattice = VoxelLattice{{(*origin)[0], (*origin)[1], (*origin)[2]}, *size_m};
+    if (!facts.lattice->origin_m.allFinite() || !std::isfinite(*size_m))
+      throw libmap::Error("not finite in the map's manifest",
+                          {.field = "lattice_origin_m or voxel_size_m"});
+  }
   if (const libmap::Pose* pose = manifest.find_transform("terrain_from_input");
       pose != nullptr && manifest.frame == "input")
     facts.terrain_from_map = *pose;
@@ -182,7 +186,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {
     for (const std::uint32_t n : kept) {
       const Eigen::Vector3d cell =
           result.lattice.cell_of(result.terrain_from_map * map.positions[n]);
-      if (!(cell.cwiseAbs().maxCoeff() <= index_bound))
+      if (!(cell.cwiseAbs().array() <= index_bound).all())
         throw libmap::Error("a point lies too far off for voxels of this size",
                             {.field = "point " + std::to_string(n + 1)});
       voxels.push_back(result.lattice.voxel_of(result.terrain_from_map * map.positions[n]));

@@ -5,9 +5,12 @@
 #include <limits>
 #include <numeric>
 #include <string>
+#include <string_view>
+#include <utility>
 
 #include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/error.h"
+#include "libmap/core/text.h"
 
 namespace libgtd {
 
@@ -97,6 +100,11 @@ std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
   const double square = radius_voxels * radius_voxels;
   // No further than any two voxels are apart: a radius may be larger than an int can be.
   const double reach = std::min(radius_voxels, static_cast<double>(extent_of(voxels)));
+  constexpr double max_reach = 1e5;
+  if (reach > max_reach)
+    throw libmap::Error("spans too many voxels", {.field = "normal_radius_m",
+                                                  .value = libmap::to_text(reach) + " voxels",
+                                                  .bound = "<= 100000 voxels"});
   for_each_pair(voxels, static_cast<int>(reach), [&](std::size_t n, std::size_t m) {
     if (is_steep[n] == 0 && is_steep[m] == 0) return;
     const double di = voxels[m].i - voxels[n].i, dj = voxels[m].j - voxels[n].j,
@@ -125,6 +133,14 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
                                      const std::vector<float>& slopes_deg, double voxel_size_m,
                                      const ObstacleOptions& options) {
   check(voxels, slopes_deg);
+  for (const auto& [name, value] : {std::pair("voxel_size_m", voxel_size_m),
+                                    {"obstacle_height_m", options.height_m},
+                                    {"normal_radius_m", options.normal_radius_m}})
+    if (!(value >= 0.0) || !std::isfinite(value) || !(voxel_size_m > 0.0))
+      throw libmap::Error("obstacles cannot be judged by it",
+                          {.field = name,
+                           .value = libmap::to_text(value),
+                           .bound = name == std::string_view("voxel_size_m") ? "> 0" : ">= 0"});
   // A hair less, so that a rise of exactly the limit does not depend on the last bit.
   const double limit = options.height_m / voxel_size_m * (1.0 + 1e-9);
   std::vector<std::uint8_t> is_steep(voxels.size(), 0);

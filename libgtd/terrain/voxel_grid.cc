@@ -24,7 +24,7 @@ void require_voxel_size(double voxel_size_m) {
 template <typename Vector>
 void require_room(const Vector& extent_in_voxels, double voxel_size_m) {
   const Eigen::Vector3d extent = extent_in_voxels.template cast<double>();
-  if (extent.cwiseAbs().maxCoeff() < 0x1p29) return;
+  if ((extent.cwiseAbs().array() < 0x1p29).all()) return;
   const double gigabytes = (extent.cwiseAbs().array() + 1.0).prod() / 8.0 / 0x1p30;
   throw libmap::Error("too small for this cloud: the grid would take " +
                           libmap::to_text(static_cast<float>(gigabytes)) + " GiB at a bit a voxel",

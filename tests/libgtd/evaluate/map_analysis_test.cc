@@ -116,6 +116,25 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   EXPECT_EQ(map.graspable[1990], 0);
 }
 
+// A null in a manifest is no number; a comparison with one coordinate of three does not see it.
+TEST(VoxelMap, LatticesThatAreNotFinite) {
+  PointCloud map = graded_floor();
+  std::erase_if(map.fields, [](const auto& field) { return field.name.size() == 1; });  // i, j, k
+  for (int axis = 0; axis < 3; ++axis) {
+    std::vector<double> origin = {0.0, 0.0, 0.0};
+    origin[static_cast<std::size_t>(axis)] = std::nan("");
+    libmap::Manifest manifest;
+    manifest.parameters = {{"voxel_size_m", 0.01}};
+    manifest.results = {{"lattice_origin_m", origin}};
+    EXPECT_EQ(error_of([&] { libgtd::facts_of(manifest); }).reason(),
+              "not finite in the map's manifest");
+    MapFacts facts;
+    facts.lattice = libgtd::VoxelLattice{{origin[0], origin[1], origin[2]}, 0.01};
+    EXPECT_EQ(error_of([&] { libgtd::voxel_map_of(map, facts); }).reason(),
+              "a point lies too far off for voxels of this size");
+  }
+}
+
 TEST(MapAnalysis, CountsAndAreasByHand) {
   PointCloud cloud = graded_floor();
   for (std::size_t n = 0; n < cloud.size(); ++n) {

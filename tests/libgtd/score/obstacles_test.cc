@@ -254,5 +254,24 @@ TEST(Obstacles, NeedAMapInOrder) {
   error_of([] { find_obstacles({{1, 0, 0}}, {}, 0.01, {}); });
 }
 
+// As the manifests of shares of a map may say.
+TEST(Obstacles, NeedPossibleLengths) {
+  const std::vector<Voxel> far = {{0, 0, 0}, {300'000'000, 0, 0}};
+  const std::vector<float> slopes = {80.0F, 80.0F};
+  const auto field_of = [&](double voxel_size_m, double height_m, double radius_m) {
+    return error_of([&] {
+             find_obstacles(far, slopes, voxel_size_m,
+                            {.slope_deg = 45.0, .height_m = height_m, .normal_radius_m = radius_m});
+           })
+        .context()
+        .field;
+  };
+  EXPECT_EQ(field_of(0.0, 0.1, 0.1), "voxel_size_m");
+  EXPECT_EQ(field_of(NAN, 0.1, 0.1), "voxel_size_m");
+  EXPECT_EQ(field_of(0.01, -1.0, 0.1), "obstacle_height_m");
+  EXPECT_EQ(field_of(0.01, 0.1, -5.0), "normal_radius_m");
+  EXPECT_EQ(field_of(0.01, 0.1, 1e9), "normal_radius_m");
+}
+
 }  // namespace
 }  // namespace libgtd
