@@ -64,7 +64,8 @@ class Optimization {
 
  private:
   bool has_ends(const PoseLink& link) const {
-    return result_.map_from_base.contains(link.from) && result_.map_from_base.contains(link.to);
+    return result_.map_from_base.contains(link.from) && result_.map_from_base.contains(link.to) &&
+           (link.from != link.to || is_absolute(link));
   }
   ceres::LossFunction* new_loss() const {
     return options_.robust_scale > 0.0 ? new ceres::CauchyLoss(options_.robust_scale) : nullptr;

@@ -93,6 +93,10 @@ GraphNode node_in(const Table& table, std::size_t row) {
   node.session = integer_in(table, row, "session", 0);
   node.weight = integer_in(table, row, "weight", 0);
   node.stamp_s = table.optional_number(row, table.column("stamp_s")).value_or(0.0);
+  if (!std::isfinite(node.stamp_s))
+    throw Error("not a number of seconds", {.file = table.file,
+                                            .field = field_of(row, "stamp_s"),
+                                            .value = cell_of(table, row, "stamp_s")});
   node.label = cell_of(table, row, "label");
   node.velocity = six_in(table, row, "velocity");
   if (const auto gps = six_in(table, row, "gps")) {
@@ -372,17 +376,24 @@ void FrameFolder::read_links() {
     return;
   }
   std::size_t dangling = 0;
+  std::size_t to_itself = 0;
   for (PoseLink& link : parse_g2o(read_whole_file(file), file.string()).links) {
     const bool is_landmark = link.to < 0;
     if (graph_.find_node(link.from) == nullptr ||
         (!is_landmark && graph_.find_node(link.to) == nullptr))
       ++dangling;
+    else if (link.from == link.to && link.type != LinkType::pose_prior &&
+             link.type != LinkType::gravity)
+      ++to_itself;
     else
       graph_.links.push_back(std::move(link));
   }
   if (dangling > 0)
     warnings_.push_back(std::string(files::links) + ": " + count_of(dangling, "link") +
                         " of nodes that are not there");
+  if (to_itself > 0)
+    warnings_.push_back(std::string(files::links) + ": " + count_of(to_itself, "link") +
+                        " of a node to itself");
 }
 
 std::string FrameFolder::image_name(int node) const {

@@ -38,6 +38,8 @@ Eigen::Vector2d inner_reach(const Camera& camera) {
 int centered_size(double half_extent, double principal_point) {
   constexpr double rounding = 1e-9;
   const bool odd = std::llround(2.0 * principal_point) % 2 == 0;
+  // More than any image has.
+  half_extent = std::min(half_extent, 1e8);
   return odd ? 2 * static_cast<int>(std::floor(half_extent + rounding)) + 1
              : 2 * static_cast<int>(std::floor(half_extent + 0.5 + rounding));
 }

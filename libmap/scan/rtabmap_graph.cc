@@ -92,6 +92,7 @@ GraphNode node_in(const SqliteRow& row, int id, Warnings& warnings) {
   node.stamp_s = row.is_null(3) ? 0.0 : row.real(3);
   if (!std::isfinite(node.stamp_s)) node.stamp_s = 0.0;
   node.label = row.bytes(4);
+  node.label.resize(std::min(node.label.find('\0'), node.label.size()));
   node.odometry_from_base = pose_in(row, 5, what + ": pose", warnings);
   node.truth_from_base = pose_in(row, 6, what + ": ground_truth_pose", warnings);
   if (const std::string bytes = row.bytes(7); !bytes.empty())
@@ -109,22 +110,34 @@ void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph
     list += ", " + columns.or_null("Node", name);
   file.each_row("SELECT " + list + " FROM Node ORDER BY id", {}, [&](const SqliteRow& row) {
     const std::optional<int> id = as_id(row.integer(0));
-    if (!id || *id <= 0) {
+    if (!id || *id <= 0)
       warnings.add(node_text(row.integer(0)) + ": is left out: ids begin at 1");
-    } else if (!graph.nodes.empty() && graph.nodes.back().id == *id) {
-      warnings.add(node_text(*id) + ": is there more than once; the first is taken");
-    } else {
+    else
       graph.nodes.push_back(node_in(row, *id, warnings));
-    }
   });
+  // SQLite's order is another one where the column holds texts.
+  std::stable_sort(graph.nodes.begin(), graph.nodes.end(),
+                   [](const GraphNode& a, const GraphNode& b) { return a.id < b.id; });
+  const auto is_again = [&](const GraphNode& a, const GraphNode& b) {
+    if (a.id != b.id) return false;
+    warnings.add(node_text(a.id) + ": is there more than once; the first is taken");
+    return true;
+  };
+  graph.nodes.erase(std::unique(graph.nodes.begin(), graph.nodes.end(), is_again),
+                    graph.nodes.end());
 }
 
 // ------------------------------------------------------------------------------------------ links
+
+// Formats that halve angles multiply it by 4.
+constexpr double max_information = 1e300;
 
 Matrix6d information_of(double rotation_variance, double translation_variance) {
   if (!(rotation_variance > 0) || !(translation_variance > 0) ||
       !std::isfinite(rotation_variance) || !std::isfinite(translation_variance))
     throw Error("variance that is not above 0");
+  if (1 / translation_variance > max_information || 1 / rotation_variance > max_information)
+    throw Error("variance so small that its reciprocal is beyond 1e300");
   Matrix6d information = Matrix6d::Zero();
   information.diagonal() << Eigen::Vector3d::Constant(1 / translation_variance),
       Eigen::Vector3d::Constant(1 / rotation_variance);
@@ -269,6 +282,10 @@ std::optional<Pose> decode_pose(std::string_view bytes) {
   const Eigen::Matrix<double, 3, 4> stored =
       Eigen::Map<const RowMajor>(numbers.data()).cast<double>();
   if (!stored.allFinite()) throw Error("pose that is not finite");
+  // As far as poses in text files may lie.
+  constexpr double farthest_m = 1e8;
+  if (stored.col(3).cwiseAbs().maxCoeff() > farthest_m)
+    throw Error("pose that lies beyond 1e8 m of the origin");
   Pose pose = Pose::Identity();
   pose.linear() = nearest_rotation(stored.leftCols<3>());
   pose.translation() = stored.col(3);
@@ -281,7 +298,8 @@ Matrix6d decode_information(std::string_view bytes) {
   const auto numbers = numbers_of<double, 36>(bytes, "information matrix");
   using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
   Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
-  if (!information.allFinite()) throw Error("information matrix that is not finite");
+  if (!(information.cwiseAbs().array() <= max_information).all())
+    throw Error("information matrix that is not finite, or beyond 1e300");
   return information;
 }
 

@@ -58,7 +58,7 @@ ImageColumns image_columns(const RtabmapColumns& columns) {
   };
   return {.from = has_depth ? "Image LEFT OUTER JOIN Depth ON Image.id = Depth.id" : "Image",
           .id = "Image.id",
-          .image = "Image.data",
+          .image = columns.has("Image", "data") ? "Image.data" : "NULL",
           .depth = depth_column("data"),
           .calibration = "NULL",
           .focal_length_x = depth_column("fx"),
@@ -282,7 +282,7 @@ namespace {
 
 std::size_t count_rows(const SqliteFile& file, const std::string& table) {
   std::size_t count = 0;
-  file.each_row("SELECT count(*) FROM " + table, {}, [&](const SqliteRow& row) {
+  file.each_row("SELECT count(1) FROM " + table, {}, [&](const SqliteRow& row) {
     count = static_cast<std::size_t>(std::max<std::int64_t>(row.integer(0), 0));
   });
   return count;

@@ -93,6 +93,9 @@ std::string information_to_words(const GraphFormat& format, const Matrix6d& info
   return text;
 }
 
+// What is read can be written in each of the formats, whose factors differ.
+constexpr double max_information = 1e300;
+
 Matrix6d information_from_words(const GraphFormat& format, const TextLine& line, std::size_t first,
                                 const std::string& file) {
   const std::vector<double> numbers = numbers_of(line, first, triangle_size, file);
@@ -101,6 +104,10 @@ Matrix6d information_from_words(const GraphFormat& format, const TextLine& line,
   for (int row = 0; row < 6; ++row) {
     for (int column = row; column < 6; ++column) {
       const double value = numbers[next++] / factor_of(format, row, column);
+      if (!(std::abs(value) <= max_information))
+        throw Error(
+            "no information of a link",
+            {.file = file, .field = name_of(line), .value = to_text(value), .bound = "<= 1e300"});
       information(row, column) = value;
       information(column, row) = value;
     }
@@ -138,7 +145,8 @@ bool is_edge(const PoseLink& link) { return link.from != link.to && link.from > 
 void guess_type(PoseLink& link, const std::set<int>& vertices) {
   const auto [low, high] = std::minmax(link.from, link.to);
   const auto next = vertices.upper_bound(low);
-  const bool follows = vertices.empty() ? high == low + 1 : next != vertices.end() && *next == high;
+  const bool follows =
+      vertices.empty() ? high > low && high - 1 == low : next != vertices.end() && *next == high;
   link.type = follows ? LinkType::neighbor : LinkType::global_closure;
 }
 

@@ -315,6 +315,7 @@ TEST_F(TumFolder, NamesTheCellThatIsNoNumber) {
       {"node,stamp_s,baseline_m\n1,5,0.1 x\n", "row 1, column baseline_m is 0.1 x: not a number"},
       {"node,stamp_s,gps\n1,5,1 2 3 4 5 inf\n", "row 1, column gps is 1 2 3 4 5 inf: not a number"},
       {"node,stamp_s\n7,5\n0,6\n", "row 2, column node is 0: no number of a node (must be > 0)"},
+      {"node,stamp_s\n1,nan\n", "row 1, column stamp_s is nan: not a number of seconds"},
       {"node,stamp_s,session\n1,5,2147483648\n",
        "row 1, column session is 2147483648: not a whole number (must be of 32 bits)"},
       {"node,stamp_s,session\n1,5,-9223372036854775808\n",
@@ -337,6 +338,17 @@ TEST_F(TumFolder, DropsLinksOfMissingNodes) {
   EXPECT_EQ(read.graph().links.size(), 1U);
   EXPECT_EQ(read.warnings(),
             std::vector<std::string>{"links.g2o: 1 link of nodes that are not there"});
+}
+
+TEST_F(TumFolder, DropsLinksOfANodeToItself) {
+  write_pair();
+  write_text(folder_ / "nodes.csv", "node,stamp_s\n3,1\n4,2\n");
+  const std::string rest = " 0 0 0 0 0 0 1 1 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  write_text(folder_ / "links.g2o", "EDGE_SE3:QUAT 3 4" + rest + "EDGE_SE3:QUAT 4 4" + rest);
+  write_text(folder_ / "scan.yaml", "pose_frame: base\n");
+  const FrameFolder read(folder_);
+  EXPECT_EQ(read.graph().links.size(), 1U);
+  EXPECT_EQ(read.warnings(), std::vector<std::string>{"links.g2o: 1 link of a node to itself"});
 }
 
 TEST(FrameFolderError, OfFoldersThatAreNoScan) {

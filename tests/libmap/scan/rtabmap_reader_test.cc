@@ -110,6 +110,45 @@ TEST(RtabmapReader, NodesThatAreThereTwice) {
   EXPECT_NE(scan.warnings()[0].find("more than once"), std::string::npos);
 }
 
+// SQLite sorts texts by their letters: 1, 10, 2.
+TEST(RtabmapReader, NodesWhoseNumbersAreTexts) {
+  const fs::path file = scratch_folder() / "a.db";
+  execute(file, "CREATE TABLE Node (id TEXT, label TEXT)");
+  execute(file, "INSERT INTO Node VALUES ('10', 'ten'), ('2', 'two' || char(0) || 'x'), ('1', '')");
+  const RtabmapDatabase scan(file);
+  ASSERT_EQ(scan.graph().nodes.size(), 3U);
+  for (const int id : {1, 2, 10}) EXPECT_NE(scan.graph().find_node(id), nullptr) << id;
+  EXPECT_EQ(scan.graph().find_node(10)->label, "ten");
+  EXPECT_EQ(scan.graph().find_node(2)->label, "two");  // a table could not hold the rest
+}
+
+// Of a schema before 0.10: every image with every depth image, 9 million rows in 50 kB.
+TEST(RtabmapReader, RowsWithoutEndAreRefused) {
+  const fs::path file = scratch_folder() / "a.db";
+  execute(file, "CREATE TABLE Node (id INTEGER)");
+  for (const std::string table : {"Image", "Depth"}) {
+    execute(file, "CREATE TABLE " + table + " (id INTEGER, data BLOB)");
+    execute(file,
+            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
+            "INSERT INTO " +
+                table + " SELECT 1, NULL FROM n");
+  }
+  const RtabmapDatabase scan(file);
+  const libmap::Error error = error_of([&] { scan.each_content([](const auto&) {}); });
+  EXPECT_EQ(error.context().file, file);
+  EXPECT_NE(error.reason().find("more rows than a file of its size can hold"), std::string::npos);
+}
+
+TEST(RtabmapReader, ValuesThatASchemaMakesUpAreNotRead) {
+  const fs::path file = scratch_folder() / "a.db";
+  execute(file, "CREATE TABLE Node (id INTEGER, label BLOB AS (zeroblob(900000000)))");
+  execute(file, "INSERT INTO Node (id) VALUES (1)");
+  execute(file, "CREATE TABLE Image (id INTEGER, data BLOB AS (zeroblob(900000000)))");
+  execute(file, "INSERT INTO Image (id) VALUES (1)");
+  const RtabmapDatabase scan(file);
+  EXPECT_TRUE(scan.read_frame(1).color.pixels.empty());
+}
+
 TEST(RtabmapReader, WarningsAreBounded) {
   const fs::path file = sample_file();
   execute(file,
