@@ -20,6 +20,9 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
+// 256 MB. A telephone's focus gives each of its images a lens of its own.
+constexpr std::size_t max_pixels = std::size_t{1} << 25U;
+
 }  // namespace
 
 PixelRays pixel_rays(const Camera& camera) {
@@ -49,6 +52,11 @@ std::shared_ptr<const PixelRays> PixelRayCache::rays_of(const Camera& camera) {
   for (const auto& [lens, rays] : known_)
     if (same_lens(lens, camera)) return rays;
   known_.emplace_back(camera, std::make_shared<const PixelRays>(pixel_rays(camera)));
+  pixels_ += known_.back().second->x.size();
+  while (pixels_ > max_pixels && known_.size() > 1) {
+    pixels_ -= known_.front().second->x.size();
+    known_.erase(known_.begin());
+  }
   return known_.back().second;
 }
 

@@ -30,12 +30,13 @@ PixelRays pixel_rays(const Camera& camera);
 // The rays of each lens once. May be used from several threads.
 class PixelRayCache {
  public:
-  // Computed at the first call for this camera.
+  // Computed at the first call for this camera, kept while there are not too many others.
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera);
 
  private:
   std::mutex mutex_;
-  std::vector<std::pair<Camera, std::shared_ptr<const PixelRays>>> known_;
+  std::vector<std::pair<Camera, std::shared_ptr<const PixelRays>>> known_;  // the oldest first
+  std::size_t pixels_ = 0;
 };
 
 // Every measurement with min_depth_m <= z <= max_depth_m as a point of the camera's optical frame:

@@ -112,10 +112,14 @@ std::optional<bool> parse_bool(std::string_view text) {
 
 std::optional<std::string> nearest_name(std::string_view name,
                                         const std::vector<std::string>& candidates) {
+  // The distance takes as many steps as the product of the lengths; longer names are no slips.
+  constexpr std::size_t longest = 200;
+  if (name.size() > longest) return std::nullopt;
   const std::string wanted = lower_case(name);
   std::optional<std::string> nearest;
   std::size_t best = wanted.size() / 2 + 1;
   for (const std::string& candidate : candidates) {
+    if (candidate.size() > longest) continue;
     const std::size_t distance = edit_distance(wanted, lower_case(candidate));
     if (distance < best) {
       best = distance;

@@ -128,6 +128,13 @@ TEST(TextTest, NearestNameNeverChangesMoreThanHalf) {
   EXPECT_EQ(nearest_name("ab", {"ab1", "ab", "b"}), "ab") << "the nearest and not the first";
 }
 
+// Of 100,000 letters each it would take minutes.
+TEST(TextTest, NearestNameOfVeryLongOnesIsNone) {
+  const std::string name(100'000, 'a');
+  EXPECT_EQ(libmap::nearest_name(name, {name + "b"}), std::nullopt);
+  EXPECT_EQ(libmap::nearest_name("slope", {name, "slop"}), "slop");
+}
+
 TEST(TextTest, DidYouMean) {
   EXPECT_EQ(libmap::did_you_mean("scor", {"score"}), " (did you mean 'score'?)");
   EXPECT_EQ(libmap::did_you_mean("xyz", {"score"}), "");
