@@ -33,16 +33,33 @@ std::vector<double> values_of(const libmap::PointCloud& map, std::size_t point) 
   return values;
 }
 
+// The tree rounds the distances of its boxes: it is asked for a little more.
+double with_margin(double squared) {
+  constexpr double margin = 1e-9;
+  return std::nextafter(squared * (1.0 + margin), HUGE_VAL);
+}
+
+// Of the nearest points the first. It keeps no list: from far off all of them are nearly as near.
+struct FirstOfNearest {
+  std::size_t index = 0;
+  double squared = HUGE_VAL;
+
+  bool addPoint(double distance, std::size_t n) {  // NOLINT: nanoflann's names from here on
+    if (distance < squared || (distance == squared && n < index))
+      std::tie(index, squared) = std::pair(n, distance);
+    return true;
+  }
+  double worstDist() const { return with_margin(squared); }
+  bool full() const { return true; }
+};
+
 // The points with a squared distance of at most `squared`, by index, so that a mean does not depend
 // on the tree's order.
 std::vector<std::pair<std::size_t, double>> points_within(const Tree& tree,
                                                           const Eigen::Vector3d& point,
                                                           double squared) {
   std::vector<std::pair<std::size_t, double>> matches;
-  // The tree rounds the distances of its boxes: it is asked for a little more.
-  constexpr double margin = 1e-9;
-  const double reach = std::nextafter(squared * (1.0 + margin), HUGE_VAL);
-  tree.radiusSearch(point.data(), reach, matches, nanoflann::SearchParams());
+  tree.radiusSearch(point.data(), with_margin(squared), matches, nanoflann::SearchParams());
   std::erase_if(matches, [&](const auto& match) { return match.second > squared; });
   std::sort(matches.begin(), matches.end());
   return matches;
@@ -82,13 +99,10 @@ LookupAnswer answer_of(const libmap::PointCloud& map, const Tree& tree, const Ei
     answer.distance_m = HUGE_VAL;
     return answer;
   }
-  double squared = 0.0;
-  tree.knnSearch(at.data(), 1, &answer.map_point, &squared);
-  // Of equals the first.
-  for (const auto& [index, distance] : points_within(tree, at, squared))
-    if (distance < squared || (distance == squared && index < answer.map_point))
-      std::tie(answer.map_point, squared) = std::pair(index, distance);
-  answer.distance_m = std::sqrt(squared);
+  FirstOfNearest nearest;
+  tree.findNeighbors(nearest, at.data(), nanoflann::SearchParams());
+  answer.map_point = nearest.index;
+  answer.distance_m = std::sqrt(nearest.squared);
   if (options.mode == LookupMode::nearest) {
     answer.found = answer.distance_m <= options.max_distance_m;
     if (!answer.found) return answer;

@@ -134,6 +134,8 @@ std::vector<PcdField> read_fields(const HeaderLines& lines) {
   const auto types = field_words(lines, "TYPE", count, "F");
   const auto counts = field_words(lines, "COUNT", count, "1");
   constexpr std::uint64_t max_record_bytes = 1 << 20;
+  constexpr std::size_t max_columns = 10'000;
+  std::size_t columns = 0;
   std::vector<PcdField> fields;
   std::uint64_t record = 0;
   for (std::size_t i = 0; i < count; ++i) {
@@ -143,6 +145,8 @@ std::vector<PcdField> read_fields(const HeaderLines& lines) {
     if (fields.back().count > max_record_bytes ||
         (record += fields.back().size()) > max_record_bytes)
       throw bad_header("a point would take more than a MiB", "COUNT", counts[i]);
+    if ((columns += fields.back().is_padding() ? 1 : fields.back().count) > max_columns)
+      throw bad_header("more than 10000 columns", "FIELDS");
   }
   return fields;
 }

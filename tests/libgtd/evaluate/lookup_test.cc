@@ -126,6 +126,21 @@ TEST(Lookup, AnswersEveryPointAlsoWithNothingThere) {
   EXPECT_TRUE(libgtd::look_up(map, {}).empty());
 }
 
+// From 10^12 m a map of a metre is all as near; squared, 10^200 m are beyond any number.
+TEST(Lookup, FromVeryFarTheFirstOfTheNearest) {
+  PointCloud map;
+  map.positions.assign(30'000, {1, 2, 3});
+  std::vector<Eigen::Vector3d> places(20'000, {1e12, 0, 0});
+  places.back() = {1, 2, 3.25};
+  places.emplace_back(1e200, 0, 0);
+  const auto answers = libgtd::look_up(map, places);
+  EXPECT_EQ(answers.front().map_point, 0U);
+  EXPECT_EQ(answers[places.size() - 2].map_point, 0U);
+  EXPECT_EQ(answers[places.size() - 2].distance_m, 0.25);
+  EXPECT_FALSE(answers.back().found);
+  EXPECT_EQ(answers.back().distance_m, HUGE_VAL);
+}
+
 TEST(Lookup, BadInputIsAnError) {
   PointCloud map;
   error_of([&] { libgtd::look_up(map, {{0, 0, 0}}); });

@@ -207,4 +207,13 @@ TEST(PcdFiles, FieldNameWithBlankIsRefused) {
 }
 
 }  // namespace
+TEST(PcdFiles, VeryManyColumns) {
+  const std::string rest = "\nPOINTS 0\nDATA ascii\n";
+  std::string names;
+  for (int n = 0; n < 10'001; ++n) names += " f" + std::to_string(n);
+  EXPECT_THAT(error_as(".pcd", "FIELDS" + names + rest), HasSubstr("more than 10000 columns"));
+  EXPECT_THAT(error_as(".pcd", "FIELDS x y z a\nCOUNT 1 1 1 10000" + rest),
+              HasSubstr("more than 10000 columns"));
+}
+
 }  // namespace libmap

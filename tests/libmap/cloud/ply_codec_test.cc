@@ -95,6 +95,19 @@ TEST(PlyFiles, HeaderLinesThatDoNotFit) {
               HasSubstr("PLY header line 5 is vertex: this element stands twice"));
 }
 
+// Names are compared with all before them.
+TEST(PlyFiles, VeryManyElementsOrProperties) {
+  std::string elements = "ply\nformat ascii 1.0\n";
+  std::string properties = elements + "element vertex 1\n";
+  for (int n = 0; n < 10'001; ++n) {
+    elements += "element e" + std::to_string(n) + " 0\n";
+    properties += "property float p" + std::to_string(n) + "\n";
+  }
+  EXPECT_THAT(error_as(".ply", elements + "end_header\n"), HasSubstr("more than 1000 elements"));
+  EXPECT_THAT(error_as(".ply", properties + "end_header\n"),
+              HasSubstr("more than 10000 properties"));
+}
+
 // All rows are one number in memory.
 TEST(PlyFiles, MoreVerticesThanAMeshCanName) {
   const float number = 1.0F;
