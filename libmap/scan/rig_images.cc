@@ -85,22 +85,49 @@ bool is_fuller(const RigMoment& moment, const RigMoment& best) {
   return sum_of_offsets(moment) < sum_of_offsets(best);
 }
 
-// Of each camera the image nearest to `stamp_s` among `candidates`, ascending in time; but the
-// first candidate comes before any other of its camera.
-RigMoment moment_of(const std::vector<RigImage>& images, const std::vector<std::size_t>& candidates,
-                    std::size_t camera_count, double stamp_s, double reach_s) {
+// Of each camera its images among `candidates`, which ascend in time.
+using ImagesByCamera = std::vector<std::vector<std::size_t>>;
+ImagesByCamera by_camera(const std::vector<RigImage>& images,
+                         const std::vector<std::size_t>& candidates, std::size_t camera_count) {
+  ImagesByCamera result(camera_count);
+  for (const std::size_t n : candidates) result.at(images[n].camera).push_back(n);
+  return result;
+}
+
+std::vector<std::size_t> in_order_of_time(const std::vector<RigImage>& images) {
+  std::vector<std::size_t> order(images.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return images[a].stamp_s < images[b].stamp_s;
+  });
+  return order;
+}
+
+// The first of those nearest to `stamp_s`; of none, none.
+std::optional<std::size_t> nearest_of(const std::vector<RigImage>& images,
+                                      const std::vector<std::size_t>& of_camera, double stamp_s) {
+  const auto first_from = [&](double stamp) {
+    return std::lower_bound(of_camera.begin(), of_camera.end(), stamp,
+                            [&](std::size_t n, double s) { return images[n].stamp_s < s; });
+  };
+  const auto offset = [&](auto image) { return std::abs(images[*image].stamp_s - stamp_s); };
+  const auto after = first_from(stamp_s);
+  if (after == of_camera.begin())
+    return of_camera.empty() ? std::nullopt : std::optional(of_camera.front());
+  const auto before = first_from(images[*std::prev(after)].stamp_s);
+  return after == of_camera.end() || offset(before) <= offset(after) ? *before : *after;
+}
+
+// Of each camera the image nearest to `stamp_s` within the reach.
+RigMoment moment_of(const std::vector<RigImage>& images, const ImagesByCamera& candidates,
+                    double stamp_s, double reach_s) {
   RigMoment moment;
   moment.stamp_s = stamp_s;
-  moment.cameras.resize(camera_count);
-  const std::size_t first_camera = images[candidates.front()].camera;
-  for (const std::size_t n : candidates) {
-    RigMoment::Camera& camera = moment.cameras.at(images[n].camera);
-    const double offset = images[n].stamp_s - stamp_s;
-    const bool seen = camera.state == State::seen;
-    if (std::abs(offset) > reach_s || (seen && images[n].camera == first_camera) ||
-        (seen && std::abs(offset) >= std::abs(camera.offset_s)))
-      continue;
-    camera = {State::seen, n, offset};
+  moment.cameras.resize(candidates.size());
+  for (std::size_t camera = 0; camera < candidates.size(); ++camera) {
+    const std::optional<std::size_t> n = nearest_of(images, candidates[camera], stamp_s);
+    if (!n || std::abs(images[*n].stamp_s - stamp_s) > reach_s) continue;
+    moment.cameras[camera] = {State::seen, *n, images[*n].stamp_s - stamp_s};
   }
   return moment;
 }
@@ -190,26 +217,19 @@ RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_
 RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t camera_count,
                              double tolerance_s) {
   if (images.empty()) throw Error("there are no images to choose a moment from");
-  std::vector<double> stamps;
-  stamps.reserve(images.size());
-  for (const RigImage& image : images) stamps.push_back(image.stamp_s);
-  std::sort(stamps.begin(), stamps.end());
-  stamps.erase(std::unique(stamps.begin(), stamps.end()), stamps.end());
+  const std::vector<std::size_t> order = in_order_of_time(images);
+  const ImagesByCamera all = by_camera(images, order, camera_count);
   RigMoment best;
-  for (const double stamp : stamps) {
-    RigMoment moment = rig_moment_at(images, camera_count, stamp, tolerance_s);
+  for (const std::size_t n : order) {
+    RigMoment moment = moment_of(images, all, images[n].stamp_s, tolerance_s + stamp_rounding_s);
     if (is_fuller(moment, best)) best = std::move(moment);
   }
-  return best;
+  return rig_moment_at(images, camera_count, best.stamp_s, tolerance_s);
 }
 
 std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::size_t camera_count,
                                    double tolerance_s) {
-  std::vector<std::size_t> waiting(images.size());  // by stamp
-  std::iota(waiting.begin(), waiting.end(), std::size_t{0});
-  std::stable_sort(waiting.begin(), waiting.end(), [&](std::size_t a, std::size_t b) {
-    return images[a].stamp_s < images[b].stamp_s;
-  });
+  const std::vector<std::size_t> waiting = in_order_of_time(images);
   std::vector<bool> taken(images.size(), false);
   std::vector<RigMoment> moments;
   for (std::size_t first = 0; first < waiting.size(); ++first) {
@@ -221,11 +241,14 @@ std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::siz
       if (images[waiting[n]].stamp_s > start + 2 * reach) break;
       if (!taken[waiting[n]]) near.push_back(waiting[n]);
     }
+    // The first image belongs to the moment, whatever others its camera took.
+    ImagesByCamera candidates = by_camera(images, near, camera_count);
+    candidates[images[near.front()].camera].resize(1);
     RigMoment best;
     for (const std::size_t middle : near) {
       const double stamp = images[middle].stamp_s;
       if (stamp > start + reach) break;
-      RigMoment moment = moment_of(images, near, camera_count, stamp, reach);
+      RigMoment moment = moment_of(images, candidates, stamp, reach);
       if (is_fuller(moment, best)) best = std::move(moment);
     }
     for (const RigMoment::Camera& camera : best.cameras)

@@ -4,6 +4,8 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
+#include <set>
 
 #include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
@@ -125,6 +127,46 @@ TEST(RigMoments, FullestThenTightestThenEarliest) {
   for (const RigImage& image : images)
     EXPECT_LE(rig_moment_at(images, 3, image.stamp_s, 0.02).seen(), 3U);
   EXPECT_THROW(fullest_rig_moment({}, 3, 0.02), libmap::Error);
+}
+
+TEST(RigMoments, FullestAgreesWithLookingAtEveryStamp) {
+  for (int round = 0; round < 200; ++round) {
+    std::vector<RigImage> images;
+    // Stamps that many images share, and ties to both sides.
+    for (int n = 0; n < 40; ++n)
+      images.push_back({static_cast<std::size_t>(graspmap_test::uniform(0, 3.99)),
+                        0.25 * std::floor(graspmap_test::uniform(0, 60)),
+                        {}});
+    std::set<double> stamps;
+    for (const RigImage& image : images) stamps.insert(image.stamp_s);
+    RigMoment best;
+    double least = HUGE_VAL;
+    for (const double stamp : stamps) {
+      const RigMoment moment = rig_moment_at(images, 4, stamp, 0.5);
+      double sum = 0.0;
+      for (const RigMoment::Camera& camera : moment.cameras)
+        sum += camera.state == State::seen ? std::abs(camera.offset_s) : 0.0;
+      if (!best.cameras.empty() && moment.seen() < best.seen()) continue;
+      if (!best.cameras.empty() && moment.seen() == best.seen() && sum >= least) continue;
+      best = moment;
+      least = sum;
+    }
+    const RigMoment found = fullest_rig_moment(images, 4, 0.5);
+    EXPECT_EQ(found.stamp_s, best.stamp_s);
+    for (std::size_t camera = 0; camera < 4; ++camera) {
+      EXPECT_EQ(found.cameras[camera].state, best.cameras[camera].state);
+      EXPECT_EQ(found.cameras[camera].image, best.cameras[camera].image);
+    }
+  }
+}
+
+// As many as a bag of 100 kB may hold, all within the tolerance: minutes in cubic time.
+TEST(RigMoments, OfVeryManyImagesOfOneMoment) {
+  std::vector<RigImage> images;
+  for (std::size_t n = 0; n < 3'000; ++n)
+    images.push_back({n % 2, 1e-6 * static_cast<double>(n), {}});
+  EXPECT_EQ(libmap::rig_moments(images, 2, 0.02).size(), 1'500U);
+  EXPECT_EQ(fullest_rig_moment(images, 2, 0.02).seen(), 2U);
 }
 
 TEST(RigDepth, UnitsBecomeMetres) {
