@@ -115,71 +115,89 @@ Pose best_move(const std::vector<Bridge>& bridges) {
   return bridges[best].move;
 }
 
+// Carries parts to where the links say: each whole grows from the largest part that is left.
+class PartJoiner {
+ public:
+  PartJoiner(std::map<int, Pose>& poses, std::vector<std::vector<int>> parts,
+             const std::vector<PoseLink>& links)
+      : poses_(poses), parts_(std::move(parts)) {
+    std::stable_sort(parts_.begin(), parts_.end(),
+                     [](const auto& a, const auto& b) { return a.size() > b.size(); });
+    for (std::size_t part = 0; part < parts_.size(); ++part)
+      for (const int node : parts_[part]) part_of_.emplace(node, part);
+    leaving_.resize(parts_.size());
+    whole_of_.assign(parts_.size(), none);
+    for (const PoseLink& link : links) add(link);
+  }
+
+  std::vector<std::vector<int>> run() {
+    for (std::size_t first = 0; first < parts_.size(); ++first) {
+      if (whole_of_[first] != none) continue;
+      std::vector<int> whole;
+      for (near_ = {first}; !near_.empty();) {
+        const std::size_t part = *near_.begin();
+        if (part != first) move(part);
+        whole.insert(whole.end(), parts_[part].begin(), parts_[part].end());
+        whole_of_[part] = joined_.size();
+        look_around(part);
+      }
+      std::sort(whole.begin(), whole.end());
+      joined_.push_back(std::move(whole));
+    }
+    return std::move(joined_);
+  }
+
+ private:
+  static constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+
+  void add(const PoseLink& link) {
+    if (!is_between_nodes(link)) return;
+    const auto from = part_of_.find(link.from);
+    const auto to = part_of_.find(link.to);
+    if (from == part_of_.end() || to == part_of_.end() || from->second == to->second) return;
+    leaving_[from->second].push_back(&link);
+    leaving_[to->second].push_back(&link);
+  }
+
+  // To where its links with the present whole say.
+  void move(std::size_t part) {
+    std::vector<Bridge> bridges;
+    for (const PoseLink* link : leaving_[part]) {
+      const bool leads_here = part_of_.at(link->to) == part;
+      const int inside = leads_here ? link->from : link->to;
+      const int outside = leads_here ? link->to : link->from;
+      if (whole_of_[part_of_.at(inside)] != joined_.size()) continue;
+      const Pose inside_from_outside =
+          leads_here ? link->from_from_to : Pose(link->from_from_to.inverse());
+      bridges.push_back({poses_.at(inside) * inside_from_outside * poses_.at(outside).inverse(),
+                         poses_.at(outside)});
+    }
+    const Pose move = best_move(bridges);
+    for (const int node : parts_[part]) poses_.at(node) = move * poses_.at(node);
+  }
+
+  void look_around(std::size_t part) {
+    near_.erase(part);
+    for (const PoseLink* link : leaving_[part])
+      for (const int node : {link->from, link->to})
+        if (whole_of_[part_of_.at(node)] == none) near_.insert(part_of_.at(node));
+  }
+
+  std::map<int, Pose>& poses_;
+  std::vector<std::vector<int>> parts_;  // the largest first
+  std::map<int, std::size_t> part_of_;
+  std::vector<std::vector<const PoseLink*>> leaving_;  // links of a part that lead to another one
+  std::vector<std::size_t> whole_of_;                  // the place of a part's whole in joined_
+  std::set<std::size_t> near_;  // parts that a link ties to the present whole
+  std::vector<std::vector<int>> joined_;
+};
+
 }  // namespace
 
 std::vector<std::vector<int>> join_parts(std::map<int, Pose>& poses,
                                          const std::vector<std::vector<int>>& parts,
                                          const std::vector<PoseLink>& links) {
-  std::vector<std::vector<int>> sorted = parts;
-  std::stable_sort(sorted.begin(), sorted.end(),
-                   [](const auto& a, const auto& b) { return a.size() > b.size(); });
-  std::map<int, std::size_t> part_of;
-  for (std::size_t part = 0; part < sorted.size(); ++part)
-    for (const int node : sorted[part]) part_of.emplace(node, part);
-  // The links of a part that lead to another one.
-  std::vector<std::vector<const PoseLink*>> leaving(sorted.size());
-  for (const PoseLink& link : links) {
-    if (!is_between_nodes(link)) continue;
-    const auto from = part_of.find(link.from);
-    const auto to = part_of.find(link.to);
-    if (from == part_of.end() || to == part_of.end() || from->second == to->second) continue;
-    leaving[from->second].push_back(&link);
-    leaving[to->second].push_back(&link);
-  }
-  constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
-  std::vector<std::size_t> whole_of(sorted.size(), none);  // which of `joined` a part belongs to
-  std::vector<std::vector<int>> joined;
-  // How `part` must move to fit to the whole that is being joined.
-  const auto bridges_of = [&](std::size_t part) {
-    std::vector<Bridge> bridges;
-    for (const PoseLink* link : leaving[part]) {
-      const bool leads_here = part_of.at(link->to) == part;
-      const int inside = leads_here ? link->from : link->to;
-      const int outside = leads_here ? link->to : link->from;
-      if (whole_of[part_of.at(inside)] != joined.size()) continue;
-      const Pose inside_from_outside =
-          leads_here ? link->from_from_to : Pose(link->from_from_to.inverse());
-      bridges.push_back({poses.at(inside) * inside_from_outside * poses.at(outside).inverse(),
-                         poses.at(outside)});
-    }
-    return bridges;
-  };
-  for (std::size_t first = 0; first < sorted.size(); ++first) {
-    if (whole_of[first] != none) continue;
-    whole_of[first] = joined.size();
-    std::vector<int> whole = sorted[first];
-    std::set<std::size_t> near;  // parts that a link ties to the whole
-    const auto look_around = [&](std::size_t part) {
-      near.erase(part);
-      for (const PoseLink* link : leaving[part])
-        for (const int node : {link->from, link->to})
-          if (whole_of[part_of.at(node)] == none) near.insert(part_of.at(node));
-    };
-    look_around(first);
-    while (!near.empty()) {
-      const std::size_t part = *near.begin();
-      const Pose move = best_move(bridges_of(part));
-      for (const int node : sorted[part]) {
-        poses.at(node) = move * poses.at(node);
-        whole.push_back(node);
-      }
-      whole_of[part] = joined.size();
-      look_around(part);
-    }
-    std::sort(whole.begin(), whole.end());
-    joined.push_back(std::move(whole));
-  }
-  return joined;
+  return PartJoiner(poses, parts, links).run();
 }
 
 InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
