@@ -5,8 +5,6 @@
 #include <limits>
 #include <numeric>
 #include <string>
-#include <string_view>
-#include <utility>
 
 #include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/error.h"
@@ -90,6 +88,17 @@ void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_de
       throw libmap::Error("the voxels do not ascend", {.field = "i, j, k"});
 }
 
+void check(double voxel_size_m, const ObstacleOptions& options) {
+  const auto require = [](bool sound, const char* name, double value, const char* bound) {
+    if (!sound || !std::isfinite(value))
+      throw libmap::Error("obstacles cannot be judged by it",
+                          {.field = name, .value = libmap::to_text(value), .bound = bound});
+  };
+  require(voxel_size_m > 0.0, "voxel_size_m", voxel_size_m, "> 0");
+  require(options.height_m >= 0.0, "obstacle_height_m", options.height_m, ">= 0");
+  require(options.normal_radius_m >= 0.0, "normal_radius_m", options.normal_radius_m, ">= 0");
+}
+
 // The foot and top of each face, at its first voxel.
 std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
                                 const std::vector<std::uint8_t>& is_steep, VoxelSets& faces,
@@ -133,14 +142,7 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
                                      const std::vector<float>& slopes_deg, double voxel_size_m,
                                      const ObstacleOptions& options) {
   check(voxels, slopes_deg);
-  for (const auto& [name, value] : {std::pair("voxel_size_m", voxel_size_m),
-                                    {"obstacle_height_m", options.height_m},
-                                    {"normal_radius_m", options.normal_radius_m}})
-    if (!(value >= 0.0) || !std::isfinite(value) || !(voxel_size_m > 0.0))
-      throw libmap::Error("obstacles cannot be judged by it",
-                          {.field = name,
-                           .value = libmap::to_text(value),
-                           .bound = name == std::string_view("voxel_size_m") ? "> 0" : ">= 0"});
+  check(voxel_size_m, options);
   // A hair less, so that a rise of exactly the limit does not depend on the last bit.
   const double limit = options.height_m / voxel_size_m * (1.0 + 1e-9);
   std::vector<std::uint8_t> is_steep(voxels.size(), 0);

@@ -20,9 +20,6 @@ std::string size_text(int width, int height) {
   return std::to_string(width) + " x " + std::to_string(height);
 }
 
-// 256 MB. A telephone's focus gives each of its images a lens of its own.
-constexpr std::size_t max_pixels = std::size_t{1} << 25U;
-
 }  // namespace
 
 PixelRays pixel_rays(const Camera& camera) {
@@ -53,7 +50,7 @@ std::shared_ptr<const PixelRays> PixelRayCache::rays_of(const Camera& camera) {
     if (same_lens(lens, camera)) return rays;
   known_.emplace_back(camera, std::make_shared<const PixelRays>(pixel_rays(camera)));
   pixels_ += known_.back().second->x.size();
-  while (pixels_ > max_pixels && known_.size() > 1) {
+  while (pixels_ > max_pixels_ && known_.size() > 1) {
     pixels_ -= known_.front().second->x.size();
     known_.erase(known_.begin());
   }

@@ -30,12 +30,18 @@ PixelRays pixel_rays(const Camera& camera);
 // The rays of each lens once. May be used from several threads.
 class PixelRayCache {
  public:
-  // Computed at the first call for this camera, kept while there are not too many others.
+  // Keeps the lenses that came last, of so many pixels in all (256 MB): a telephone's focus gives
+  // each of its images a lens of its own.
+  explicit PixelRayCache(std::size_t max_pixels = std::size_t{1} << 25U)
+      : max_pixels_(max_pixels) {}
+
+  // Computed at the first call for this camera.
   std::shared_ptr<const PixelRays> rays_of(const Camera& camera);
 
  private:
   std::mutex mutex_;
   std::vector<std::pair<Camera, std::shared_ptr<const PixelRays>>> known_;  // the oldest first
+  std::size_t max_pixels_;
   std::size_t pixels_ = 0;
 };
 

@@ -30,6 +30,10 @@ std::string to_text(LinkType type) {
   return "type " + std::to_string(static_cast<int>(type));
 }
 
+bool is_absolute(const PoseLink& link) {
+  return link.type == LinkType::pose_prior || link.type == LinkType::gravity;
+}
+
 std::string to_text(PoseSource source) {
   switch (source) {
     case PoseSource::odometry:

@@ -39,6 +39,13 @@ struct PoseLink {
   // Inverse covariance in the order x y z roll pitch yaw, m and rad.
   Matrix6d information = Matrix6d::Identity();
 };
+// Says where a pose lies by itself: priors, gravity. No other link binds a node to itself.
+bool is_absolute(const PoseLink& link);
+
+// What readers accept, so that every format can be written and read again: coordinates of poses,
+// and entries of information matrices, which formats of halved angles multiply by 4.
+inline constexpr double max_position_m = 1e8;
+inline constexpr double max_information = 1e300;
 
 struct GpsFix {
   double stamp_s = 0.0;

@@ -16,10 +16,6 @@ constexpr int invalid_weight = -9;
 
 }  // namespace
 
-bool is_absolute(const PoseLink& link) {
-  return link.type == LinkType::pose_prior || link.type == LinkType::gravity;
-}
-
 void require_usable(const PoseLink& link) {
   const Matrix6d& information = link.information;
   const std::string field = "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);

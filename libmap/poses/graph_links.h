@@ -15,9 +15,6 @@ struct GraphLink {
   bool may_be_rejected = false;  // a closure; odometry is down-weighted only
 };
 
-// Says where a pose lies by itself: priors, gravity.
-bool is_absolute(const PoseLink& link);
-
 // Throws Error: a motion or an information matrix that is not finite, or one that is not positive.
 void require_usable(const PoseLink& link);
 

@@ -382,8 +382,7 @@ void FrameFolder::read_links() {
     if (graph_.find_node(link.from) == nullptr ||
         (!is_landmark && graph_.find_node(link.to) == nullptr))
       ++dangling;
-    else if (link.from == link.to && link.type != LinkType::pose_prior &&
-             link.type != LinkType::gravity)
+    else if (link.from == link.to && !is_absolute(link))
       ++to_itself;
     else
       graph_.links.push_back(std::move(link));

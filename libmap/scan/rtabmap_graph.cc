@@ -129,9 +129,6 @@ void read_nodes(const SqliteFile& file, const RtabmapColumns& columns, PoseGraph
 
 // ------------------------------------------------------------------------------------------ links
 
-// Formats that halve angles multiply it by 4.
-constexpr double max_information = 1e300;
-
 Matrix6d information_of(double rotation_variance, double translation_variance) {
   if (!(rotation_variance > 0) || !(translation_variance > 0) ||
       !std::isfinite(rotation_variance) || !std::isfinite(translation_variance))
@@ -142,10 +139,6 @@ Matrix6d information_of(double rotation_variance, double translation_variance) {
   information.diagonal() << Eigen::Vector3d::Constant(1 / translation_variance),
       Eigen::Vector3d::Constant(1 / rotation_variance);
   return information;
-}
-
-bool may_link_to_itself(LinkType type) {
-  return type == LinkType::pose_prior || type == LinkType::gravity;
 }
 
 enum class InformationForm { matrix, two_variances, one_variance, none };
@@ -210,7 +203,7 @@ class LinkReader {
     if (graph_.find_node(link.from) == nullptr) throw Error(node_text(link.from) + " is not there");
     if (link.type != LinkType::landmark && graph_.find_node(link.to) == nullptr)
       throw Error(node_text(link.to) + " is not there");
-    if (link.from == link.to && !may_link_to_itself(link.type))
+    if (link.from == link.to && !is_absolute(link))
       throw Error("a " + to_text(link.type) + " link to itself");
   }
 
@@ -282,9 +275,7 @@ std::optional<Pose> decode_pose(std::string_view bytes) {
   const Eigen::Matrix<double, 3, 4> stored =
       Eigen::Map<const RowMajor>(numbers.data()).cast<double>();
   if (!stored.allFinite()) throw Error("pose that is not finite");
-  // As far as poses in text files may lie.
-  constexpr double farthest_m = 1e8;
-  if (stored.col(3).cwiseAbs().maxCoeff() > farthest_m)
+  if (stored.col(3).cwiseAbs().maxCoeff() > max_position_m)
     throw Error("pose that lies beyond 1e8 m of the origin");
   Pose pose = Pose::Identity();
   pose.linear() = nearest_rotation(stored.leftCols<3>());

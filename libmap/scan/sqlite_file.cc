@@ -161,11 +161,12 @@ SqliteFile::SqliteFile(const fs::path& path) : path_(path) {
   // SQLite opens them too, and a pipe would never open.
   for (const char* suffix : {"-journal", "-wal", "-shm"}) {
     const fs::path companion = beside(path, suffix);
-    std::error_code unreadable;
-    const fs::file_status status = fs::status(companion, unreadable);
+    std::error_code gone;  // a program that writes makes and removes them
+    const fs::file_status status = fs::status(companion, gone);
     if (fs::exists(status) && !fs::is_regular_file(status))
       throw Error("is no file, and SQLite would read it", {.file = companion.string()});
-    if (fs::is_regular_file(status)) bytes += fs::file_size(companion);
+    const std::uintmax_t size = fs::file_size(companion, gone);
+    if (!gone) bytes += size;
   }
   try {
     connection_ = std::make_unique<Connection>(open_mode(path, header), bytes);

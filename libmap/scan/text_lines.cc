@@ -6,6 +6,7 @@
 #include <optional>
 
 #include "libmap/core/error.h"
+#include "libmap/core/pose_graph.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -93,7 +94,6 @@ int integer_of(const TextLine& line, std::size_t word, const std::string& file) 
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file) {
   constexpr double length_tolerance = 0.05;
-  constexpr double farthest_m = 1e8;
   const double length = rotation.norm();
   if (!(std::abs(length - 1.0) <= length_tolerance))
     throw Error("no rotation", {.file = file,
@@ -101,7 +101,7 @@ Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
                                 .value = to_text(length),
                                 .bound = "a quaternion of length 1"});
   const double distance = translation.cwiseAbs().maxCoeff();
-  if (!(distance <= farthest_m))
+  if (!(distance <= max_position_m))
     throw Error(
         "no position",
         {.file = file, .field = name_of(line), .value = to_text(distance), .bound = "<= 1e8 m"});

@@ -93,9 +93,6 @@ std::string information_to_words(const GraphFormat& format, const Matrix6d& info
   return text;
 }
 
-// What is read can be written in each of the formats, whose factors differ.
-constexpr double max_information = 1e300;
-
 Matrix6d information_from_words(const GraphFormat& format, const TextLine& line, std::size_t first,
                                 const std::string& file) {
   const std::vector<double> numbers = numbers_of(line, first, triangle_size, file);

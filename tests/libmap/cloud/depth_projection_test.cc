@@ -106,5 +106,20 @@ TEST(DepthProjection, EachLensIsWorkedOutOnce) {
   EXPECT_NE(first, cache.rays_of(bent_camera()));
 }
 
+TEST(DepthProjection, ManyLensesAreNotAllKept) {
+  const Camera camera = small_camera();
+  const auto pixels = static_cast<std::size_t>(camera.width * camera.height) + 4;
+  PixelRayCache cache(3 * pixels);
+  std::vector<std::weak_ptr<const PixelRays>> rays;
+  for (int n = 0; n < 5; ++n) {
+    Camera focused = camera;
+    focused.fx += n;
+    rays.push_back(cache.rays_of(focused));
+  }
+  for (std::size_t n = 0; n < rays.size(); ++n) EXPECT_EQ(rays[n].expired(), n < 2) << n;
+  PixelRayCache least(1);
+  EXPECT_EQ(least.rays_of(camera), least.rays_of(camera)) << "one is kept whatever its size";
+}
+
 }  // namespace
 }  // namespace libmap

@@ -282,6 +282,11 @@ TEST(PoseGraphOptimization, BrokenLinksAreErrors) {
   const PoseGraphResult result =
       libmap::optimize_pose_graph(poses, {link(1, 99, Pose::Identity(), random_information())}, {});
   EXPECT_EQ(result.without_links.size(), 3U);
+  // So is one of a node to itself that says nothing of where it lies.
+  EXPECT_EQ(
+      libmap::optimize_pose_graph(poses, {link(2, 2, Pose::Identity(), random_information())}, {})
+          .without_links.size(),
+      3U);
 }
 
 // The dense inverse of the information, its derivatives by differences.

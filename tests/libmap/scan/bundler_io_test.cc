@@ -189,6 +189,18 @@ TEST(PinholeImage, PixelsThatOnlyMoveAreKept) {
   }
 }
 
+// The greater focal length stretches the image's extent along the other axis beyond any int.
+TEST(PinholeImage, PixelsFarFromSquareTakeNoMoreThanTheImageHas) {
+  Camera camera;
+  camera.width = camera.height = 64;
+  camera.fx = 1;
+  camera.fy = 1e12;
+  camera.cx = camera.cy = 31.5;
+  const Camera pinhole = centered_pinhole(camera);
+  EXPECT_EQ(pinhole.width, 2 * camera.width + 1);
+  EXPECT_LE(pinhole.height, 2 * camera.height + 1);
+}
+
 TEST(PinholeImage, CamerasWithoutAnAxisInTheirImage) {
   Camera camera = some_camera();
   camera.cx = -20;

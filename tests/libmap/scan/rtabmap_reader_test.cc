@@ -7,6 +7,7 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/scan_verification.h"
 #include "tests/libmap/scan/sample_checks.h"
 #include "tests/libmap/scan/sample_database.h"
@@ -82,6 +83,9 @@ TEST(RtabmapReader, LinksWithoutAVarianceAreNamed) {
   EXPECT_EQ(scan.warnings(),
             (std::vector<std::string>{"link 1 -> 2: is left out: variance that is not above 0",
                                       "link 2 -> 1: is left out: variance that is not above 0"}));
+  execute(file, "UPDATE Link SET rot_variance = 1e-310 WHERE from_id = 1 AND to_id = 2");
+  EXPECT_EQ(RtabmapDatabase(file).warnings().front(),
+            "link 1 -> 2: is left out: variance so small that its reciprocal is beyond 1e300");
 }
 
 TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
@@ -99,11 +103,16 @@ TEST(RtabmapReader, NodesThatCannotBeUsedAreNamed) {
   EXPECT_EQ(scan.warnings().size(), 4U);  // a null pose is none
 }
 
-TEST(RtabmapReader, NodesThatAreThereTwice) {
+fs::path database_of(const std::vector<std::string>& statements) {
   const fs::path file = scratch_folder() / "a.db";
-  execute(file, "CREATE TABLE Node (id INTEGER, map_id INTEGER, weight INTEGER, stamp FLOAT)");
-  execute(file, "INSERT INTO Node VALUES (3, 0, 5, 1), (3, 0, 6, 2), (1, 0, 7, 3)");
-  const RtabmapDatabase scan(file);
+  for (const std::string& statement : statements) execute(file, statement);
+  return file;
+}
+
+TEST(RtabmapReader, NodesThatAreThereTwice) {
+  const RtabmapDatabase scan(
+      database_of({"CREATE TABLE Node (id INTEGER, map_id INTEGER, weight INTEGER, stamp FLOAT)",
+                   "INSERT INTO Node VALUES (3, 0, 5, 1), (3, 0, 6, 2), (1, 0, 7, 3)"}));
   ASSERT_EQ(scan.graph().nodes.size(), 2U);
   EXPECT_EQ(scan.graph().nodes[0].id, 1);
   EXPECT_EQ(scan.graph().nodes[1].weight, 5);
@@ -112,10 +121,9 @@ TEST(RtabmapReader, NodesThatAreThereTwice) {
 
 // SQLite sorts texts by their letters: 1, 10, 2.
 TEST(RtabmapReader, NodesWhoseNumbersAreTexts) {
-  const fs::path file = scratch_folder() / "a.db";
-  execute(file, "CREATE TABLE Node (id TEXT, label TEXT)");
-  execute(file, "INSERT INTO Node VALUES ('10', 'ten'), ('2', 'two' || char(0) || 'x'), ('1', '')");
-  const RtabmapDatabase scan(file);
+  const RtabmapDatabase scan(database_of(
+      {"CREATE TABLE Node (id TEXT, label TEXT)",
+       "INSERT INTO Node VALUES ('10', 'ten'), ('2', 'two' || char(0) || 'x'), ('1', '')"}));
   ASSERT_EQ(scan.graph().nodes.size(), 3U);
   for (const int id : {1, 2, 10}) EXPECT_NE(scan.graph().find_node(id), nullptr) << id;
   EXPECT_EQ(scan.graph().find_node(10)->label, "ten");
@@ -124,15 +132,13 @@ TEST(RtabmapReader, NodesWhoseNumbersAreTexts) {
 
 // Of a schema before 0.10: every image with every depth image, 9 million rows in 50 kB.
 TEST(RtabmapReader, RowsWithoutEndAreRefused) {
-  const fs::path file = scratch_folder() / "a.db";
-  execute(file, "CREATE TABLE Node (id INTEGER)");
-  for (const std::string table : {"Image", "Depth"}) {
-    execute(file, "CREATE TABLE " + table + " (id INTEGER, data BLOB)");
-    execute(file,
-            "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
-            "INSERT INTO " +
-                table + " SELECT 1, NULL FROM n");
-  }
+  const std::string rows =
+      " WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
+      "SELECT 1, NULL FROM n";
+  const fs::path file =
+      database_of({"CREATE TABLE Node (id INTEGER)", "CREATE TABLE Image (id INTEGER, data BLOB)",
+                   "CREATE TABLE Depth (id INTEGER, data BLOB)", "INSERT INTO Image" + rows,
+                   "INSERT INTO Depth" + rows});
   const RtabmapDatabase scan(file);
   const libmap::Error error = error_of([&] { scan.each_content([](const auto&) {}); });
   EXPECT_EQ(error.context().file, file);
@@ -140,13 +146,26 @@ TEST(RtabmapReader, RowsWithoutEndAreRefused) {
 }
 
 TEST(RtabmapReader, ValuesThatASchemaMakesUpAreNotRead) {
-  const fs::path file = scratch_folder() / "a.db";
-  execute(file, "CREATE TABLE Node (id INTEGER, label BLOB AS (zeroblob(900000000)))");
-  execute(file, "INSERT INTO Node (id) VALUES (1)");
-  execute(file, "CREATE TABLE Image (id INTEGER, data BLOB AS (zeroblob(900000000)))");
-  execute(file, "INSERT INTO Image (id) VALUES (1)");
-  const RtabmapDatabase scan(file);
+  const std::string made_up = " BLOB AS (zeroblob(900000000)))";
+  const RtabmapDatabase scan(database_of(
+      {"CREATE TABLE Node (id INTEGER, label" + made_up, "INSERT INTO Node (id) VALUES (1)",
+       "CREATE TABLE Image (id INTEGER, data" + made_up, "INSERT INTO Image (id) VALUES (1)"}));
   EXPECT_TRUE(scan.read_frame(1).color.pixels.empty());
+}
+
+// What no file of poses or links could give back.
+TEST(RtabmapReader, PosesAndInformationBeyondAllBounds) {
+  std::vector<float> pose = {1, 0, 0, 3e38F, 0, 1, 0, 0, 0, 0, 1, 0};
+  EXPECT_EQ(error_of([&] { libmap::decode_pose(bytes_of(pose)); }).reason(),
+            "pose that lies beyond 1e8 m of the origin");
+  pose[3] = 9e7F;
+  EXPECT_TRUE(libmap::decode_pose(bytes_of(pose)));
+  for (const double entry : {1e308, -1e308, static_cast<double>(NAN)}) {
+    std::vector<double> information(36, 0.0);
+    information[20] = entry;
+    EXPECT_EQ(error_of([&] { libmap::decode_information(bytes_of(information)); }).reason(),
+              "information matrix that is not finite, or beyond 1e300");
+  }
 }
 
 TEST(RtabmapReader, WarningsAreBounded) {

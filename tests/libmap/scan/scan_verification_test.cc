@@ -52,7 +52,7 @@ TEST(ScanVerification, ListsEveryBrokenPart) {
         "substr(ground_cells, 3) WHERE id = 2",
         "UPDATE Link SET transform = substr(transform, 5) WHERE from_id = 2 AND to_id = 3",
         "UPDATE Feature SET descriptor_size = 33 WHERE word_id = 1",
-        "UPDATE Word SET descriptor_size = -1 WHERE id = 2",
+        "UPDATE Word SET descriptor_size = 9223372036854775807 WHERE id = 2",
         "UPDATE Admin SET opt_poses = substr(opt_poses, 2), preview_image = x'ffd8ff0102'",
         "INSERT INTO GlobalDescriptor VALUES (3, 0, NULL, x'0102030405060708090a0b0c0d0e')",
         "INSERT INTO Statistics (id, data) VALUES (3, x'0102030405060708090a0b0c0d0e')"})

@@ -207,6 +207,20 @@ TEST(G2oText, HoldsOtherProgramsFromLinksThatAreNoEdges) {
   EXPECT_EQ(edges, 10U);
 }
 
+TEST(G2oText, NumbersAtTheEndsOfTheirRange) {
+  const std::string pose = " 0 0 0 0 0 0 1 ";
+  const std::string rest = " 0 0 0 0 0 1 0 0 0 0 1 0 0 0 1 0 0 1 0 1\n";
+  const auto links = [&](const std::string& ends, const std::string& entry) {
+    return libmap::parse_g2o("EDGE_SE3:QUAT " + ends + pose + entry + rest, "a.g2o").links;
+  };
+  // Without vertices, edges of numbers that follow each other are odometry.
+  EXPECT_EQ(links("2147483646 2147483647", "1").front().type, LinkType::neighbor);
+  EXPECT_EQ(links("2147483647 2147483647", "1").front().type, LinkType::global_closure);
+  const libmap::Error error = graspmap_test::error_of([&] { links("1 2", "1e308"); });
+  EXPECT_EQ(error.reason(), "no information of a link");
+  EXPECT_EQ(error.context().bound, "<= 1e300");
+}
+
 // The cost of a small error is the same in both conventions: e' Omega e with e = (t, angles) here,
 // (t, vector part of the quaternion) there.
 TEST(G2oText, WritesInformationOfHalfAngles) {
