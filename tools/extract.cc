@@ -12,6 +12,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/scan/depth_codec.h"
+#include "libmap/scan/frame_batch.h"
 #include "libmap/scan/frame_folder_writer.h"
 #include "libmap/scan/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
@@ -92,17 +93,20 @@ NodeImages read_images(const libmap::ScanSource& scan, int node) {
 // Nothing is written without a writer.
 Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter* writer,
                       const ExtractOptions& options, Run& run) {
-  // So many frames are in memory at a time.
-  constexpr std::size_t batch_size = 8;
   const std::vector<libmap::GraphNode>& nodes = scan.graph().nodes;
   Counts counts;
   run.progress().begin("frames", nodes.size());
-  for (std::size_t first = 0; first < nodes.size(); first += batch_size) {
-    std::vector<NodeImages> batch(std::min(batch_size, nodes.size() - first));
+  std::vector<NodeImages> batch(1);
+  std::size_t most_pixels = 0;
+  for (std::size_t first = 0; first < nodes.size(); first += batch.size()) {
+    // The first by itself: it tells how large they are.
+    const std::size_t count = first == 0 ? 1 : libmap::frames_in_batch(most_pixels);
+    batch = std::vector<NodeImages>(std::min(count, nodes.size() - first));
     libmap::parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) batch[i] = read_images(scan, nodes[first + i].id);
     });
     for (const NodeImages& images : batch) {
+      most_pixels = std::max(most_pixels, libmap::image_pixels(images.frame));
       if (images.error && options.strict) throw libmap::Error(*images.error);
       if (images.error) {
         run.warn(std::string(images.error->what()) + "; its images are left out");

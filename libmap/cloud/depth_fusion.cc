@@ -13,16 +13,20 @@
 #include "libmap/cloud/surface_refinement.h"
 #include "libmap/cloud/surface_voxels.h"
 #include "libmap/core/error.h"
+#include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
+#include "libmap/scan/frame_batch.h"
 #include "libmap/scan/stereo_depth.h"
 
 namespace libmap {
 
 namespace {
 
-// Frames in memory at a time; not the number of threads, which results must not depend on.
+// Frames whose coarse surfaces are made side by side.
 constexpr std::size_t frames_in_flight = 8;
+// What one pixel takes while its frame is made into a coarse surface.
+constexpr std::uint64_t coarse_pixel_bytes = 60;
 // Elements, about, by which frames are registered.
 constexpr std::size_t registration_elements = 20000;
 // By which frames may lie off the coarse surface when they are first registered.
@@ -71,6 +75,7 @@ struct FusedFrame {
 struct CoarseFrame {
   SurfaceVoxels voxels;
   DepthPixelCounts pixels;
+  std::size_t image_pixels = 0;
   std::string fault;  // empty: it can be used
 };
 
@@ -118,8 +123,9 @@ class Fusion {
   // use(views) of some frames at a time, in their order.
   template <typename Use>
   void each_view_group(bool color, const Use& use) const {
-    for (std::size_t first = 0; first < used_.size(); first += frames_in_flight) {
-      const std::size_t count = std::min(frames_in_flight, used_.size() - first);
+    const std::size_t group = frames_in_batch(most_image_pixels_);
+    for (std::size_t first = 0; first < used_.size(); first += group) {
+      const std::size_t count = std::min(group, used_.size() - first);
       std::vector<std::vector<RefinementView>> frames(count);
       parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
         for (std::size_t n = begin; n < end; ++n)
@@ -144,6 +150,8 @@ class Fusion {
   const DepthFusionOptions& options_;
   Progress& progress_;
   mutable PixelRayCache rays_;
+  mutable MemoryBudget memory_;
+  std::size_t most_image_pixels_ = 0;  // of the frames used
   // The grid's origin is a corner of the world's own voxels near the first camera: single precision
   // is enough about it, wherever the scan lies.
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
@@ -225,6 +233,8 @@ CoarseFrame Fusion::coarse_frame(const FusedFrame& frame) const {
     const RgbdFrame images = read_frame(frame.node, false);
     if (images.cameras.empty())
       throw Error("node " + std::to_string(frame.node) + ": it has no calibration");
+    coarse.image_pixels = image_pixels(images);
+    const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * images.depth.pixels.size());
     for (const CameraView& view : camera_views(images)) {
       view.depth_camera.check();
       const auto rays = rays_.rays_of(view.depth_camera);
@@ -248,6 +258,7 @@ void Fusion::merge_coarse(std::span<const FusedFrame> frames, std::span<const Co
     }
     voxels_.merge_frame(coarse[n].voxels);
     result_.pixels += coarse[n].pixels;
+    most_image_pixels_ = std::max(most_image_pixels_, coarse[n].image_pixels);
     used_.push_back(frames[n]);
   }
 }

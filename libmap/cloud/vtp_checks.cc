@@ -141,7 +141,8 @@ std::string_view appended_data(std::string_view bytes, bool& base64) {
 // The XML part's arrays, one after another, with what their place says of them.
 class ArrayChecks {
  public:
-  ArrayChecks(std::string_view bytes, std::string_view xml) : xml_(xml) {
+  ArrayChecks(std::string_view bytes, std::string_view xml)
+      : xml_(xml), free_bytes_(free_memory_bytes + memory_of_file * bytes.size()) {
     appended_.data = appended_data(bytes, appended_.base64);
   }
 
@@ -174,6 +175,9 @@ class ArrayChecks {
         part_ == "Verts" || part_ == "Lines" || part_ == "Strips" || part_ == "Polys";
     const bool is_offsets = is_cells && array.attribute("Name") == "offsets";
     const bool is_corners = is_cells && array.attribute("Name") == "connectivity";
+    // VTK's cells are numbers of 8 bytes.
+    const std::uint64_t memory_bytes = is_cells ? 8 : number_bytes;
+    take_memory(promised_numbers(array, is_offsets), memory_bytes);
     if (array.attribute("format") == "ascii") {
       if (!is_offsets && !is_corners) return;
       const std::vector<double> numbers = numbers_of_text(text_behind(behind));
@@ -187,6 +191,7 @@ class ArrayChecks {
     if (is_inline && place.data.empty() && is_empty(array)) return;
     const std::uint64_t length = block_length(place, layout_, number_bytes);
     if (length == 0 && !is_empty(array)) throw Error("an array holds no data");
+    take_memory(length / number_bytes, memory_bytes);
     if (is_corners) corners_ = length / number_bytes;
     if (is_offsets) last_offset_ = last_of(numbers_of_block(place, type));
   }
@@ -212,6 +217,20 @@ class ArrayChecks {
   }
 
  private:
+  // Few bytes can stand for many, and many arrays for the same.
+  void take_memory(std::uint64_t numbers, std::uint64_t number_bytes) {
+    if (numbers > free_bytes_ / number_bytes)
+      throw Error("the arrays take more memory than those of a file of this size do");
+    free_bytes_ -= numbers * number_bytes;
+  }
+  // For what VTK takes memory before it reads an array.
+  std::uint64_t promised_numbers(const XmlTag& array, bool is_offsets) const {
+    const std::uint64_t parts = std::max<std::uint64_t>(1, count_of(array, "NumberOfComponents"));
+    if (part_ == "Points") return points_of_piece() * parts;
+    if (part_ == "PointData" || part_ == "CellData") return rows_of_part() * parts;
+    if (part_ == "FieldData") return count_of(array, "NumberOfTuples") * parts;
+    return is_offsets ? count_of(piece_, "NumberOf" + std::string(part_)) : 0;
+  }
   static std::uint64_t count_of(const XmlTag& tag, std::string_view count) {
     return static_cast<std::uint64_t>(
         std::max<std::int64_t>(0, parse_integer(tag.attribute(count)).value_or(0)));
@@ -242,7 +261,7 @@ class ArrayChecks {
     return is_zero("NumberOf" + std::string(part_));
   }
   // VTK reads on behind the last byte until it has found as many texts as there are to be.
-  void require_texts(const XmlTag& array, std::size_t behind) const {
+  void require_texts(const XmlTag& array, std::size_t behind) {
     const bool is_data = part_ == "PointData" || part_ == "CellData";
     require_sane(is_data || part_ == "FieldData", array, "type");
     const std::uint64_t rows = is_data ? rows_of_part() : count_of(array, "NumberOfTuples");
@@ -259,11 +278,14 @@ class ArrayChecks {
                    .bound = std::to_string(texts)});
   }
   // Each text ends with a zero.
-  std::string bytes_of_texts(const XmlTag& array, std::size_t behind) const {
-    if (array.attribute("format") == "binary")
-      return unpack_block({text_behind(behind), true}, layout_, 1);
-    if (array.attribute("format") == "appended")
-      return unpack_block(appended_place(array), layout_, 1);
+  std::string bytes_of_texts(const XmlTag& array, std::size_t behind) {
+    if (array.attribute("format") != "ascii") {
+      const BlockPlace place = array.attribute("format") == "binary"
+                                   ? BlockPlace{text_behind(behind), true}
+                                   : appended_place(array);
+      take_memory(block_length(place, layout_, 1), 1);
+      return unpack_block(place, layout_, 1);
+    }
     std::string bytes;
     std::vector<std::string_view> words;
     TextRows rows(text_behind(behind), 0, 1);
@@ -322,7 +344,13 @@ class ArrayChecks {
     return static_cast<std::uint64_t>(last);
   }
 
+  // What all arrays of a file may take as it is read and as VTK keeps them: 256 MB, and 64 times
+  // its own bytes.
+  static constexpr std::uint64_t free_memory_bytes = std::uint64_t{1} << 28;
+  static constexpr std::uint64_t memory_of_file = 64;
+
   std::string_view xml_;
+  std::uint64_t free_bytes_;
   BlockPlace appended_;
   BlockLayout layout_;
   XmlTag piece_;

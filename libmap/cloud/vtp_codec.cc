@@ -27,9 +27,7 @@
 #include <locale>
 #include <memory>
 #include <mutex>
-#include <new>
 #include <optional>
-#include <stdexcept>
 #include <string_view>
 #include <utility>
 
@@ -226,28 +224,22 @@ void require_cells(vtkCellArray* cells, vtkIdType points, const std::string& wha
 }
 
 vtkSmartPointer<vtkPolyData> read_poly_data(const std::string& bytes) {
-  try {
-    const VtkMessages messages;
-    const std::uint64_t points = require_sane_vtp(bytes);
-    vtkNew<vtkXMLPolyDataReader> reader;
-    reader->ReadFromInputStringOn();
-    reader->SetInputString(bytes);
-    reader->Update();
-    messages.require_none();
-    vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
-    if (data == nullptr || reader->GetErrorCode() != 0) throw Error("VTK cannot read it");
-    // Of some files VTK reads nothing, without a word.
-    if (static_cast<std::uint64_t>(data->GetNumberOfPoints()) != points)
-      throw Error("VTK cannot read all of it", {.file = {},
-                                                .field = "points",
-                                                .value = std::to_string(data->GetNumberOfPoints()),
-                                                .bound = std::to_string(points)});
-    return data;
-  } catch (const std::bad_alloc&) {
-    throw Error("a block of data claims more than the memory holds");
-  } catch (const std::length_error&) {
-    throw Error("a block of data claims more than the memory holds");
-  }
+  const VtkMessages messages;
+  const std::uint64_t points = require_sane_vtp(bytes);
+  vtkNew<vtkXMLPolyDataReader> reader;
+  reader->ReadFromInputStringOn();
+  reader->SetInputString(bytes);
+  reader->Update();
+  messages.require_none();
+  vtkSmartPointer<vtkPolyData> data = reader->GetOutput();
+  if (data == nullptr || reader->GetErrorCode() != 0) throw Error("VTK cannot read it");
+  // Of some files VTK reads nothing, without a word.
+  if (static_cast<std::uint64_t>(data->GetNumberOfPoints()) != points)
+    throw Error("VTK cannot read all of it", {.file = {},
+                                              .field = "points",
+                                              .value = std::to_string(data->GetNumberOfPoints()),
+                                              .bound = std::to_string(points)});
+  return data;
 }
 
 void require_sane_data(vtkPolyData& data) {

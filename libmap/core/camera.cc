@@ -7,11 +7,17 @@
 #include <string>
 
 #include "libmap/core/error.h"
+#include "libmap/core/pose_graph.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
 
 namespace {
+
+// Far beyond all lenses; within them no ray, and no product of two, leaves the range of doubles.
+constexpr double min_focal_px = 1e-6;
+constexpr double max_pixels = 1e9;
+constexpr double max_distortion = 1e12;
 
 using Matrix2 = Eigen::Matrix2d;
 
@@ -94,14 +100,18 @@ bool Camera::is_distorted() const {
 void Camera::check() const {
   if (width <= 0) refuse("width", width, "> 0");
   if (height <= 0) refuse("height", height, "> 0");
-  if (!(fx > 0) || !std::isfinite(fx)) refuse("fx", fx, "> 0");
-  if (!(fy > 0) || !std::isfinite(fy)) refuse("fy", fy, "> 0");
-  if (!std::isfinite(cx)) refuse("cx", cx, "finite");
-  if (!std::isfinite(cy)) refuse("cy", cy, "finite");
+  const auto require_within = [](const char* field, double value, double low, double high) {
+    if (!(value >= low && value <= high))
+      refuse(field, value, to_text(low) + " to " + to_text(high));
+  };
+  require_within("fx", fx, min_focal_px, max_pixels);
+  require_within("fy", fy, min_focal_px, max_pixels);
+  require_within("cx", cx, -max_pixels, max_pixels);
+  require_within("cy", cy, -max_pixels, max_pixels);
   for (const double term : distortion)
-    if (!std::isfinite(term)) refuse("distortion", term, "finite");
-  if (!base_from_camera.matrix().allFinite())
-    refuse("base_from_camera", std::numeric_limits<double>::quiet_NaN(), "finite");
+    require_within("distortion", term, -max_distortion, max_distortion);
+  for (const double number : base_from_camera.matrix().reshaped())
+    require_within("base_from_camera", number, -max_position_m, max_position_m);
   const std::size_t n = distortion.size();
   if (distortion_model == DistortionModel::equidistant && n != 4)
     refuse("number of distortion terms", static_cast<double>(n), "4");

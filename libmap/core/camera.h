@@ -31,8 +31,9 @@ struct Camera {
   Pose base_from_camera = optical_to_body_rotation();
 
   bool is_distorted() const;  // whether any term of the distortion is not 0
-  // Throws Error naming the field, its value and its bound: sizes and focal lengths > 0, all
-  // finite, a known number of distortion terms.
+  // Throws Error naming the field, its value and its bound: sizes > 0, focal lengths of 1e-6 to
+  // 1e9 pixels, a principal point within 1e9 of them, a known number of distortion terms up to
+  // 1e12, a position within 1e8 m.
   void check() const;
 };
 

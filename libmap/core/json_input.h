@@ -2,21 +2,29 @@
 // number to any other, and walks through what is nested without a bound.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "libmap/core/error.h"
 
 namespace libmap {
 
-// Throws Error where arrays and objects are nested deeper than 64 levels, and what Json::parse
-// throws.
+// Throws Error where arrays and objects are nested deeper than 64 levels, or an object has more
+// than 10,000 members (which ordered_json finds one by one), and what Json::parse throws.
 template <typename Json>
 Json parse_json(const std::string& text) {
   constexpr int max_depth = 64;
-  return Json::parse(text, [](int depth, auto, auto&) {
+  constexpr std::size_t max_members = 10'000;
+  std::vector<std::size_t> members;  // of the objects around
+  return Json::parse(text, [&](int depth, typename Json::parse_event_t event, auto&) {
     if (depth > max_depth) throw Error("is nested deeper than 64 levels");
+    if (event == Json::parse_event_t::object_start) members.push_back(0);
+    if (event == Json::parse_event_t::object_end) members.pop_back();
+    if (event == Json::parse_event_t::key && ++members.back() > max_members)
+      throw Error("holds an object of more than 10000 members");
     return true;
   });
 }

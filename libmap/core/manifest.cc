@@ -7,16 +7,21 @@
 #include <limits>
 #include <memory>
 #include <nlohmann/json.hpp>
+#include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/json_input.h"
+#include "libmap/core/pose_graph.h"
 
 namespace libmap {
 
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+// Of a matrix that is written as a rotation, by Frobenius' norm.
+constexpr double max_rotation_error = 1e-3;
 
 class Sha256 {
  public:
@@ -53,8 +58,10 @@ double from_json_number(const Json& json) {
 
 ManifestValue from_json_value(const Json& json) {
   if (json.is_boolean()) return json.get<bool>();
-  if (json.is_number_integer() && json <= std::numeric_limits<std::int64_t>::max())
-    return json.get<std::int64_t>();
+  // Compared as json they would become signed first.
+  const bool is_large =
+      json.is_number_unsigned() && !std::in_range<std::int64_t>(json.get<std::uint64_t>());
+  if (json.is_number_integer() && !is_large) return json.get<std::int64_t>();
   if (json.is_number() || json.is_null()) return from_json_number(json);
   if (json.is_array()) {
     std::vector<double> numbers;
@@ -93,6 +100,10 @@ Pose from_numbers(const std::vector<double>& numbers) {
   std::size_t n = 0;
   for (int row = 0; row < 3; ++row)
     for (int column = 0; column < 4; ++column) pose.matrix()(row, column) = numbers[n++];
+  const double error = (nearest_rotation(pose.linear()) - pose.linear()).norm();
+  if (!(error <= max_rotation_error) ||
+      !(pose.translation().cwiseAbs().maxCoeff() <= max_position_m))
+    throw Error("a transform is a rotation and a shift of at most 1e8 m", {.field = "transforms"});
   return pose;
 }
 

@@ -11,20 +11,36 @@ namespace libmap {
 
 namespace {
 
-class Unheard : public YAML::EventHandler {
+// A node of yaml-cpp takes some 250 bytes, a comma and a letter of the file two.
+constexpr std::size_t max_nodes = 500'000;
+
+// Counts nodes, and keeps none.
+class NodeCount : public YAML::EventHandler {
  public:
   void OnDocumentStart(const YAML::Mark&) override {}
   void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override {}
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override {}
+  void OnNull(const YAML::Mark&, YAML::anchor_t) override { add(); }
+  void OnAlias(const YAML::Mark&, YAML::anchor_t) override { add(); }
   void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                const std::string&) override {}
+                const std::string&) override {
+    add();
+  }
   void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                       YAML::EmitterStyle::value) override {}
+                       YAML::EmitterStyle::value) override {
+    add();
+  }
   void OnSequenceEnd() override {}
   void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
-                  YAML::EmitterStyle::value) override {}
+                  YAML::EmitterStyle::value) override {
+    add();
+  }
   void OnMapEnd() override {}
+
+ private:
+  void add() {
+    if (++count_ > max_nodes) throw Error("holds more than 500000 values");
+  }
+  std::size_t count_ = 0;
 };
 
 // YAML::LoadAll would take memory without end where something stands that belongs to no document:
@@ -32,7 +48,7 @@ class Unheard : public YAML::EventHandler {
 bool has_second_document(const std::string& text) {
   std::istringstream stream(text);
   YAML::Parser parser(stream);
-  Unheard events;
+  NodeCount events;
   return parser.HandleNextDocument(events) && parser.HandleNextDocument(events);
 }
 

@@ -7,6 +7,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "libmap/core/error.h"
+#include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/poses/feature_cache.h"
 
@@ -21,6 +22,12 @@ constexpr double sift_scale = 512.0;  // square-rooted SIFT of unit length in by
 // OpenCV's SIFT doubles the picture about its corner, not about its first pixel's centre, and
 // halves the places of features again: they lie a quarter of a pixel too far right and down.
 constexpr float sift_offset_px = 0.25F;
+
+// Features are found in pictures of at most 4 megapixels: SIFT, which doubles them first, takes
+// some 240 bytes for each pixel. Larger ones are halved, and give the octaves that are left.
+constexpr std::size_t max_detection_pixels = std::size_t{1} << 22;
+constexpr std::uint64_t detection_bytes = 240;
+constexpr std::uint64_t frame_bytes = 40;  // a pixel's share of the planes, and of the gray picture
 
 // OpenCV runs on our threads alone while this lives.
 class SingleThreadedOpenCv {
@@ -46,8 +53,8 @@ cv::Mat gray_of(const ColorImage& color) {
   return gray;
 }
 
-void detect(const cv::Mat& gray, const FeatureOptions& options, std::vector<cv::KeyPoint>& points,
-            cv::Mat& descriptors) {
+void detect_in(const cv::Mat& gray, const FeatureOptions& options,
+               std::vector<cv::KeyPoint>& points, cv::Mat& descriptors) {
   if (options.type == FeatureType::sift) {
     const auto sift = cv::SIFT::create(options.max_features, 3, options.min_contrast, 10, 1.6);
     sift->detectAndCompute(gray, cv::noArray(), points, descriptors);
@@ -60,6 +67,32 @@ void detect(const cv::Mat& gray, const FeatureOptions& options, std::vector<cv::
         cv::ORB::create(options.max_features, 1.2F, 8, 15, 0, 2, cv::ORB::HARRIS_SCORE, 31, 10);
     orb->detectAndCompute(gray, cv::noArray(), points, descriptors);
   }
+}
+
+struct Detection {
+  std::vector<cv::KeyPoint> points;  // in the picture as it came
+  cv::Mat descriptors;
+  double scale = 1.0;  // of the picture to the one in which they were found
+};
+
+Detection detect(const cv::Mat& gray, const FeatureOptions& options) {
+  cv::Mat halved = gray;
+  while (halved.total() > max_detection_pixels && halved.cols > 1 && halved.rows > 1)
+    cv::resize(halved, halved, {halved.cols / 2, halved.rows / 2}, 0.0, 0.0, cv::INTER_AREA);
+  Detection found;
+  detect_in(halved, options, found.points, found.descriptors);
+  if (halved.size() == gray.size()) return found;
+  // An odd row or column more makes pixels of a little more than 2.
+  const float x_scale = static_cast<float>(gray.cols) / static_cast<float>(halved.cols);
+  const float y_scale = static_cast<float>(gray.rows) / static_cast<float>(halved.rows);
+  const float scale = std::sqrt(x_scale * y_scale);
+  for (cv::KeyPoint& point : found.points) {
+    point.pt.x = (point.pt.x + 0.5F) * x_scale - 0.5F;
+    point.pt.y = (point.pt.y + 0.5F) * y_scale - 0.5F;
+    point.size *= scale;
+  }
+  found.scale = static_cast<double>(scale);
+  return found;
 }
 
 void append_descriptor(const cv::Mat& descriptors, int row, FrameFeatures& frame) {
@@ -127,13 +160,19 @@ void check(const FeatureOptions& options) {
                 "max_depth_m");
 }
 
+std::uint64_t bytes_to_find(const CameraView& view) {
+  const std::uint64_t pixels = std::max(view.color.pixels.size(), view.depth.pixels.size());
+  return frame_bytes * pixels +
+         detection_bytes * std::min<std::uint64_t>(pixels, max_detection_pixels);
+}
+
 struct FoundFeatures {
   FrameFeatures frame;
   bool from_cache = false;
 };
 
 FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions& options,
-                          PixelRayCache& rays, const FeatureCache& cache) {
+                          PixelRayCache& rays, const FeatureCache& cache, MemoryBudget& memory) {
   const RgbdFrame read = scan.read_frame(node);
   if (read.depth.empty()) throw Error("has no depth");
   FoundFeatures result;
@@ -154,6 +193,7 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
   for (const CameraView& view : views) {
     frame.cameras.push_back(view.color_camera);
     if (result.from_cache) continue;
+    const MemoryBudget::Share share = memory.take(bytes_to_find(view));
     const DepthPlanes planes =
         fit_depth_planes(view.depth, *rays.rays_of(view.depth_camera), options.planes);
     frame.surfaces.emplace_back(planes, view.depth_camera, options.planes.noise,
@@ -198,9 +238,8 @@ Eigen::Vector3d FrameFeatures::point_in_base(std::size_t n) const {
 
 void add_features(const CameraView& view, const DepthPlanes& planes, const FeatureOptions& options,
                   FrameFeatures& frame) {
-  std::vector<cv::KeyPoint> points;
-  cv::Mat descriptors;
-  detect(gray_of(view.color), options, points, descriptors);
+  const Detection found = detect(gray_of(view.color), options);
+  const std::vector<cv::KeyPoint>& points = found.points;
   const auto camera = static_cast<std::uint16_t>(frame.cameras.size() - 1);
   for (std::size_t n = 0; n < points.size(); ++n) {
     const auto ray = pixel_to_ray(
@@ -212,8 +251,9 @@ void add_features(const CameraView& view, const DepthPlanes& planes, const Featu
       ++frame.without_depth;
       continue;
     }
-    const double pixel_noise = std::hypot(
-        options.pixel_noise_px, options.scale_noise * static_cast<double>(points[n].size));
+    const double pixel_noise =
+        std::hypot(options.pixel_noise_px * found.scale,
+                   options.scale_noise * static_cast<double>(points[n].size));
     const double axial = options.planes.noise.axial_at(depth.depth_m) /
                          std::sqrt(static_cast<double>(depth.support));
     Feature feature;
@@ -225,7 +265,7 @@ void add_features(const CameraView& view, const DepthPlanes& planes, const Featu
     feature.pixel_noise_px = static_cast<float>(pixel_noise);
     feature.camera = camera;
     frame.features.push_back(feature);
-    append_descriptor(descriptors, static_cast<int>(n), frame);
+    append_descriptor(found.descriptors, static_cast<int>(n), frame);
   }
 }
 
@@ -238,11 +278,13 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
   std::vector<FoundFeatures> frames(nodes.size());
   std::vector<std::string> faults(nodes.size());
   PixelRayCache rays;
+  MemoryBudget memory;
   progress.begin("features", nodes.size());
   parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       try {
-        frames[n] = features_of(scan, nodes[n], options, rays, cache != nullptr ? *cache : none);
+        frames[n] =
+            features_of(scan, nodes[n], options, rays, cache != nullptr ? *cache : none, memory);
       } catch (const Error& error) {
         faults[n] = error.what();
       }

@@ -113,8 +113,9 @@ std::vector<double>* add_field(PointCloud& cloud, int place, const char* name) {
   return place < 0 ? nullptr : &cloud.add_field(name, ScalarType::float32).values;
 }
 
-void add_point(PointCloud& cloud, const Channels& layout, const float* point,
+void add_point(PointCloud& cloud, const Channels& layout, const std::array<float, 7>& numbers,
                const Columns& columns) {
+  const float* point = numbers.data();
   const auto number = [&](int place) { return static_cast<double>(point[place]); };
   cloud.positions.emplace_back(number(0), number(1), layout.z < 0 ? 0.0 : number(layout.z));
   if (layout.normal >= 0)
@@ -132,6 +133,9 @@ void add_point(PointCloud& cloud, const Channels& layout, const float* point,
 
 void read_points(LaserScan& scan, const StoredMatrix& matrix) {
   const Channels& layout = channels(scan.format);
+  const auto step = static_cast<std::size_t>(layout.count);
+  const std::size_t count = matrix.bytes.size() / (step * sizeof(float));
+  scan.points.positions.reserve(count);
   // Fields are made first: a later one may move the earlier.
   add_field(scan.points, layout.intensity, "intensity");
   add_field(scan.points, layout.ring, "ring");
@@ -141,10 +145,9 @@ void read_points(LaserScan& scan, const StoredMatrix& matrix) {
     return field == nullptr ? nullptr : &field->values;
   };
   const Columns columns{values_of("intensity"), values_of("ring"), values_of("time")};
-  const std::vector<float> numbers = matrix.values<float>();
-  const auto step = static_cast<std::size_t>(layout.count);
-  for (std::size_t at = 0; at + step <= numbers.size(); at += step) {
-    const float* point = numbers.data() + at;
+  std::array<float, 7> point{};
+  for (std::size_t n = 0; n < count; ++n) {
+    std::memcpy(point.data(), matrix.bytes.data() + n * step * sizeof(float), step * sizeof(float));
     const bool is_finite = std::isfinite(point[0]) && std::isfinite(point[1]) &&
                            (layout.z < 0 || std::isfinite(point[layout.z]));
     if (is_finite)

@@ -2,7 +2,9 @@
 
 #include <zlib.h>
 
+#include <algorithm>
 #include <array>
+#include <functional>
 #include <limits>
 
 #include "libmap/core/error.h"
@@ -12,7 +14,7 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t trailer_bytes = 12;
-constexpr std::uint64_t max_bytes = std::uint64_t{1} << 28;
+constexpr std::size_t piece_bytes = std::size_t{1} << 16;
 // deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
 constexpr std::uint64_t deflate_ratio = 1032;
 constexpr int max_channels = 512;  // OpenCV's
@@ -21,22 +23,38 @@ void append_int32(std::string& bytes, std::int32_t value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
+std::string size_text(const StoredMatrix& matrix) {
+  return std::to_string(matrix.rows) + " x " + std::to_string(matrix.columns) + " x " +
+         std::to_string(static_cast<std::size_t>(matrix.channels) * bytes_of(matrix.element)) +
+         " bytes";
+}
+
 std::uint64_t checked_bytes(const StoredMatrix& matrix, std::uint64_t stream_bytes) {
+  const std::uint64_t most = stream_bytes * deflate_ratio;
   const std::uint64_t cells =
       static_cast<std::uint64_t>(matrix.rows) * static_cast<std::uint64_t>(matrix.columns);
   const std::uint64_t cell_bytes =
       static_cast<std::uint64_t>(matrix.channels) * bytes_of(matrix.element);
-  const std::string size = std::to_string(matrix.rows) + " x " + std::to_string(matrix.columns) +
-                           " x " + std::to_string(cell_bytes) + " bytes";
-  if (cells > max_bytes / cell_bytes)
-    throw Error("compressed matrix too large",
-                {.value = size, .bound = "<= " + std::to_string(max_bytes) + " bytes"});
-  if (cells * cell_bytes > stream_bytes * deflate_ratio)
+  if (cells > most / cell_bytes)
     throw Error(
         "compressed matrix of more than its " + std::to_string(stream_bytes) + " bytes can hold",
-        {.value = size});
+        {.value = size_text(matrix)});
   return cells * cell_bytes;
 }
+
+struct InflateStream {
+  explicit InflateStream(std::string_view bytes) {
+    // zlib does not write to its input, and counts it in 32 bits, as SQLite does.
+    stream.next_in = reinterpret_cast<Bytef*>(const_cast<char*>(bytes.data()));
+    stream.avail_in = static_cast<uInt>(bytes.size());
+    if (inflateInit(&stream) != Z_OK) throw Error("zlib cannot be used", {}, ErrorKind::failed);
+  }
+  ~InflateStream() { inflateEnd(&stream); }
+  InflateStream(const InflateStream&) = delete;
+  InflateStream& operator=(const InflateStream&) = delete;
+
+  z_stream stream{};
+};
 
 }  // namespace
 
@@ -64,22 +82,42 @@ StoredMatrix read_matrix_header(std::string_view blob) {
           .bytes = {}};
 }
 
+void each_matrix_piece(std::string_view blob,
+                       const std::function<void(std::string_view bytes)>& use) {
+  const StoredMatrix matrix = read_matrix_header(blob);
+  const std::string_view packed = blob.substr(0, blob.size() - trailer_bytes);
+  const std::uint64_t wanted = checked_bytes(matrix, packed.size());
+  InflateStream inflating(packed);
+  z_stream& stream = inflating.stream;
+  std::string piece(piece_bytes, '\0');
+  std::uint64_t done = 0;
+  for (int result = Z_OK; result != Z_STREAM_END;) {
+    stream.next_out = reinterpret_cast<Bytef*>(piece.data());
+    stream.avail_out = static_cast<uInt>(piece.size());
+    result = inflate(&stream, Z_NO_FLUSH);
+    const std::size_t bytes = piece.size() - stream.avail_out;
+    done += bytes;
+    if (done > wanted)
+      throw Error("compressed matrix is longer than its size", {.value = size_text(matrix)});
+    const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
+    if (is_at_end || (result == Z_STREAM_END && done < wanted))
+      throw Error("compressed matrix is broken: ends after " + std::to_string(done) + " of " +
+                  std::to_string(wanted) + " bytes");
+    if (result != Z_OK && result != Z_STREAM_END)
+      throw Error("compressed matrix is broken: " + std::string(zError(result)));
+    if (bytes > 0) use(std::string_view(piece).substr(0, bytes));
+  }
+}
+
 StoredMatrix decode_matrix(std::string_view blob) {
   StoredMatrix matrix = read_matrix_header(blob);
-  const std::string_view stream = blob.substr(0, blob.size() - trailer_bytes);
-  const std::uint64_t wanted = checked_bytes(matrix, stream.size());
-  matrix.bytes.resize(wanted);
-  char nothing = 0;
-  uLongf inflated = static_cast<uLongf>(wanted);
-  uLong read = static_cast<uLong>(stream.size());
-  const int result =
-      uncompress2(reinterpret_cast<Bytef*>(wanted == 0 ? &nothing : matrix.bytes.data()), &inflated,
-                  reinterpret_cast<const Bytef*>(stream.data()), &read);
-  if (result != Z_OK || inflated != wanted)
-    throw Error("compressed matrix is broken: " +
-                (result == Z_OK ? "ends after " + std::to_string(inflated) + " of " +
-                                      std::to_string(wanted) + " bytes"
-                                : std::string(zError(result))));
+  const std::uint64_t wanted = checked_bytes(matrix, blob.size() - trailer_bytes);
+  if (wanted > max_matrix_bytes)
+    throw Error(
+        "compressed matrix too large",
+        {.value = size_text(matrix), .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
+  matrix.bytes.reserve(wanted);
+  each_matrix_piece(blob, [&](std::string_view bytes) { matrix.bytes += bytes; });
   return matrix;
 }
 

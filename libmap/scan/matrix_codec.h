@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -44,9 +45,15 @@ struct StoredMatrix {
 // Sizes and type from a blob's end, without its bytes. Throws Error if they are none.
 StoredMatrix read_matrix_header(std::string_view blob);
 
-// Sizes are checked before memory is taken: at most 2^30 bytes, and no more than the stream can
-// hold. Throws Error for a broken stream or one of another length than its sizes say.
+// The most that decode_matrix takes: 16 million float32, ten turns of a lidar of 128 x 2048 points.
+inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
+
+// Sizes are checked before memory is taken: at most max_matrix_bytes, and no more than the stream
+// can hold. Throws Error for a broken stream or one of another length than its sizes say.
 StoredMatrix decode_matrix(std::string_view blob);
+// The same bytes, of any number, in pieces of a multiple of 8 bytes but the last: memory for one.
+void each_matrix_piece(std::string_view blob,
+                       const std::function<void(std::string_view bytes)>& use);
 std::string encode_matrix(const StoredMatrix& matrix);
 
 // A text as a matrix of one row of int8 that ends with NUL.

@@ -224,23 +224,24 @@ class LinkReader {
 // ---------------------------------------------------------------------------------- optimised
 // poses
 
+std::uint64_t elements_of(const StoredMatrix& matrix) {
+  return static_cast<std::uint64_t>(matrix.rows) * static_cast<std::uint64_t>(matrix.columns) *
+         static_cast<std::uint64_t>(matrix.channels);
+}
+
 std::map<int, Pose> decode_optimized_poses(const std::string& ids_blob,
-                                           const std::string& poses_blob, Warnings& warnings) {
-  const StoredMatrix ids = decode_matrix(ids_blob);
+                                           const std::string& poses_blob, const PoseGraph& graph,
+                                           Warnings& warnings) {
+  require_optimized_poses(ids_blob, poses_blob);
+  const auto list = decode_matrix(ids_blob).values<std::int32_t>();
   const StoredMatrix poses = decode_matrix(poses_blob);
-  if (ids.element != MatrixElement::int32 || poses.element != MatrixElement::float32)
-    throw Error("matrices of other types than int32 and float32");
-  const auto list = ids.values<std::int32_t>();
-  if (poses.bytes.size() != list.size() * pose_bytes)
-    throw Error("other numbers of ids and poses",
-                {.value = std::to_string(list.size()) + " and " +
-                          std::to_string(poses.bytes.size() / pose_bytes)});
   std::map<int, Pose> map_from_base;
   for (std::size_t i = 0; i < list.size(); ++i) {
     const auto pose = warnings.attempt(node_text(list[i]) + ": Admin.opt_poses", [&] {
       return decode_pose(std::string_view(poses.bytes).substr(i * pose_bytes, pose_bytes));
     });
-    if (pose) map_from_base.emplace(list[i], *pose);
+    // Others are landmarks, and nodes that were deleted since.
+    if (pose && graph.find_node(list[i]) != nullptr) map_from_base.emplace(list[i], *pose);
   }
   return map_from_base;
 }
@@ -256,16 +257,26 @@ void read_optimized_poses(const SqliteFile& file, const RtabmapColumns& columns,
   });
   if (ids.size() <= absent_bytes || poses.size() <= absent_bytes) return;
   try {
-    graph.optimized_map_from_base = decode_optimized_poses(ids, poses, warnings);
+    graph.optimized_map_from_base = decode_optimized_poses(ids, poses, graph, warnings);
   } catch (const Error& error) {
     warnings.add(std::string("Admin.opt_poses: ") + error.what());
   }
-  // Landmarks, and nodes that were deleted since.
-  std::erase_if(graph.optimized_map_from_base,
-                [&](const auto& entry) { return graph.find_node(entry.first) == nullptr; });
 }
 
 }  // namespace
+
+void require_optimized_poses(const std::string& ids_blob, const std::string& poses_blob) {
+  const StoredMatrix ids = read_matrix_header(ids_blob);
+  const StoredMatrix poses = read_matrix_header(poses_blob);
+  if (ids.element != MatrixElement::int32 || poses.element != MatrixElement::float32)
+    throw Error("matrices of other types than int32 and float32");
+  constexpr std::uint64_t pose_numbers = pose_bytes / sizeof(float);
+  if (elements_of(poses) % pose_numbers != 0 ||
+      elements_of(poses) / pose_numbers != elements_of(ids))
+    throw Error("other numbers of ids and poses",
+                {.value = std::to_string(elements_of(ids)) + " and " +
+                          std::to_string(elements_of(poses) / pose_numbers)});
+}
 
 std::optional<Pose> decode_pose(std::string_view bytes) {
   const auto numbers = numbers_of<float, 12>(bytes, "pose");

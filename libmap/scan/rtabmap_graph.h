@@ -22,6 +22,9 @@ Matrix6d decode_information(std::string_view bytes);
 std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes);
 // 48 bytes of float64; nothing for all zeros.
 std::optional<GpsFix> decode_gps(std::string_view bytes);
+// Throws Error unless Admin.opt_ids and Admin.opt_poses are matrices of int32 and of 12 float32 for
+// each of them. Goes by what the blobs say of themselves: neither is inflated.
+void require_optimized_poses(const std::string& ids_blob, const std::string& poses_blob);
 
 struct RtabmapGraph {
   PoseGraph graph;

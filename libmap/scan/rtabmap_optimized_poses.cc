@@ -56,9 +56,12 @@ StoredPoses stored_poses(SQLite::Database& database) {
   try {
     StoredPoses stored;
     stored.localization = blob_of(row.getColumn(2));
-    stored.ids = decode_matrix(blob_of(row.getColumn(0))).values<int>();
-    stored.poses = decode_matrix(blob_of(row.getColumn(1))).bytes;
-    if (stored.poses.size() == stored.ids.size() * null_pose_blob().size()) return stored;
+    const std::string ids = blob_of(row.getColumn(0));
+    const std::string poses = blob_of(row.getColumn(1));
+    require_optimized_poses(ids, poses);
+    stored.ids = decode_matrix(ids).values<int>();
+    stored.poses = decode_matrix(poses).bytes;
+    return stored;
   } catch (const Error&) {
   }
   return {};
@@ -75,22 +78,20 @@ std::optional<int> node_of_localization(const StoredPoses& stored) {
 // Landmarks (ids below 0) among the stored poses move with the first node that sees them.
 std::map<int, Pose> with_landmarks(const StoredPoses& stored, const std::vector<PoseLink>& links,
                                    std::map<int, Pose> map_from_base) {
+  std::map<int, std::size_t> places;
+  for (std::size_t n = 0; n < stored.ids.size(); ++n) places.emplace(stored.ids[n], n);
   const auto earlier = [&](int id) -> std::optional<Pose> {
-    const auto place = std::find(stored.ids.begin(), stored.ids.end(), id);
-    if (place == stored.ids.end()) return std::nullopt;
-    return decode_pose(stored.pose(static_cast<std::size_t>(place - stored.ids.begin())));
+    const auto place = places.find(id);
+    return place == places.end() ? std::nullopt : decode_pose(stored.pose(place->second));
   };
-  for (const int id : stored.ids) {
-    if (id > 0 || map_from_base.contains(id)) continue;
-    for (const PoseLink& link : links) {
-      const auto now = map_from_base.find(link.from);
-      if (link.to != id || now == map_from_base.end()) continue;
-      const auto before = earlier(link.from);
-      const auto landmark = earlier(id);
-      if (!before || !landmark) continue;
-      map_from_base.emplace(id, now->second * before->inverse() * *landmark);
-      break;
-    }
+  for (const PoseLink& link : links) {
+    if (link.to > 0 || map_from_base.contains(link.to)) continue;
+    const auto now = map_from_base.find(link.from);
+    if (now == map_from_base.end()) continue;
+    const auto before = earlier(link.from);
+    const auto landmark = earlier(link.to);
+    if (before && landmark)
+      map_from_base.emplace(link.to, now->second * before->inverse() * *landmark);
   }
   return map_from_base;
 }

@@ -112,6 +112,20 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
       refuse(std::string("its table ") + table + " has no column id");
 }
 
+// Without a key each look-up of a node goes through all of them: hours for a long scan.
+void require_key(const SqliteFile& file, const RtabmapColumns& columns, std::size_t nodes) {
+  constexpr std::size_t few_nodes = 1000;
+  if (nodes <= few_nodes || !(columns.has_table("Data") || columns.has_table("Image"))) return;
+  const ImageColumns of = image_columns(columns);
+  constexpr int detail = 3;
+  file.each_row("EXPLAIN QUERY PLAN SELECT 1 FROM " + of.from + " WHERE " + of.id + " = 1", {},
+                [&](const SqliteRow& row) {
+                  if (row.bytes(detail).starts_with("SCAN"))
+                    throw Error("a table of images has no key to the nodes",
+                                {.file = file.path().string()});
+                });
+}
+
 std::string joined(const std::string& place, const std::string& field) {
   return place.empty() || field.empty() ? place + field : place + ": " + field;
 }
@@ -169,6 +183,7 @@ RtabmapDatabase::RtabmapDatabase(const fs::path& path)
   RtabmapGraph read = read_rtabmap_graph(*file_, columns_);
   graph_ = std::move(read.graph);
   warnings_ = std::move(read.warnings);
+  require_key(*file_, columns_, graph_.nodes.size());
   if (!columns_.has_table("Data") && !columns_.has_table("Image"))
     warnings_.push_back("it has no table Data: there are no images");
   for (const std::string& name : columns_.unknown()) warnings_.push_back(name + unknown_part);
@@ -416,17 +431,23 @@ namespace {
 
 // Materials one after the other: the number of polygons, then their indices.
 std::size_t count_polygons(const std::string& blob, std::int64_t corners) {
-  const auto numbers = decode_matrix(blob).values<std::int32_t>();
   std::size_t count = 0;
-  for (std::size_t at = 0; at < numbers.size();) {
-    if (numbers[at] < 0 || corners < 1) throw Error("mesh of no valid size");
-    const auto polygons = static_cast<std::size_t>(numbers[at]);
-    const std::size_t left = numbers.size() - at - 1;
-    if (polygons > left / static_cast<std::size_t>(corners))
-      throw Error("mesh ends before its last polygon");
-    count += polygons;
-    at += 1 + polygons * static_cast<std::size_t>(corners);
-  }
+  std::uint64_t left = 0;  // indices of the material
+  each_matrix_piece(blob, [&](std::string_view bytes) {
+    for (; bytes.size() >= sizeof(std::int32_t); bytes.remove_prefix(sizeof(std::int32_t))) {
+      if (left > 0) {
+        --left;
+        continue;
+      }
+      std::int32_t polygons = 0;
+      std::memcpy(&polygons, bytes.data(), sizeof polygons);
+      if (polygons < 0 || corners < 1 || corners > std::numeric_limits<std::int32_t>::max())
+        throw Error("mesh of no valid size");
+      count += static_cast<std::size_t>(polygons);
+      left = static_cast<std::uint64_t>(polygons) * static_cast<std::uint64_t>(corners);
+    }
+  });
+  if (left > 0) throw Error("mesh ends before its last polygon");
   return count;
 }
 

@@ -173,6 +173,14 @@ TEST(CameraTest, WhatCannotBeACameraIsNamed) {
   EXPECT_EQ(field_of([](Camera& c) { c.base_from_camera.translation().x() = std::nan(""); }),
             "base_from_camera");
   EXPECT_EQ(field_of([](Camera& c) { c.distortion = {std::nan("")}; }), "distortion");
+  // Rays and products of them would leave the range of doubles.
+  EXPECT_EQ(field_of([](Camera& c) { c.fx = 1e-300; }), "fx");
+  EXPECT_EQ(field_of([](Camera& c) { c.fy = 1e300; }), "fy");
+  EXPECT_EQ(field_of([](Camera& c) { c.cx = -1e300; }), "cx");
+  EXPECT_EQ(field_of([](Camera& c) { c.cy = 1e10; }), "cy");
+  EXPECT_EQ(field_of([](Camera& c) { c.distortion = {0, 0, 0, 1e100}; }), "distortion");
+  EXPECT_EQ(field_of([](Camera& c) { c.base_from_camera.translation().z() = 1e308; }),
+            "base_from_camera");
   EXPECT_EQ(field_of([](Camera& c) {
               c.distortion_model = DistortionModel::radial_tangential;
               c.distortion = {0.1, 0.2, 0.3};

@@ -157,6 +157,41 @@ TEST(ManifestTest, BrokenJsonNamesTheFile) {
   }
 }
 
+TEST(ManifestTest, WholeNumbersBeyondInt64AreReal) {
+  std::string json = libmap::to_json(sample());
+  const std::string number = "72080";
+  json.replace(json.find(number), number.size(), "9223372036854775808");
+  const auto read = libmap::read_manifest_of(written(json));
+  EXPECT_EQ(*read->find_result("points"), ManifestValue(9223372036854775808.0));
+}
+
+TEST(ManifestTest, TransformsThatAreNone) {
+  Manifest manifest = sample();
+  for (const double number : {2.0, 1e308}) {
+    manifest.transforms[0].second = libmap::Pose::Identity();
+    manifest.transforms[0].second.linear()(1, 1) = number;
+    EXPECT_EQ(error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); })
+                  .context()
+                  .field,
+              "transforms");
+  }
+  manifest.transforms[0].second = libmap::Pose(Eigen::Translation3d(0, 0, -2e8));
+  EXPECT_EQ(
+      error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }).reason(),
+      "a transform is a rotation and a shift of at most 1e8 m");
+}
+
+TEST(ManifestTest, ObjectsWithoutABoundAreRefused) {
+  Manifest manifest = sample();
+  for (int n = 0; n < 9'999; ++n) manifest.timings_s.emplace_back("step " + std::to_string(n), 1.0);
+  EXPECT_EQ(libmap::read_manifest_of(written(libmap::to_json(manifest)))->timings_s.size(),
+            10'000U);
+  manifest.timings_s.emplace_back("one more", 1.0);
+  EXPECT_EQ(
+      error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }).reason(),
+      "holds an object of more than 10000 members");
+}
+
 TEST(ManifestTest, NumbersThatAreNotFiniteStayReadable) {
   Manifest manifest = sample();
   manifest.results = {{"auc", std::nan("")}, {"origin_m", std::vector<double>{1, std::nan(""), 2}}};

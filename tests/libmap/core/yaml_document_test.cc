@@ -44,6 +44,13 @@ TEST(YamlDocument, WhatBelongsToNoDocumentIsRefused) {
     EXPECT_EQ(fault_of(text), "given.yaml: holds more than one YAML document") << text;
 }
 
+// Each takes a hundred times its letters as a node.
+TEST(YamlDocument, NodesAreCounted) {
+  std::string list = "a: [1";
+  for (int n = 0; n < 500'000; ++n) list += ",1";
+  EXPECT_EQ(fault_of(list + "]\n"), "given.yaml: holds more than 500000 values");
+}
+
 // What has no place in the text has no line.
 TEST(YamlDocument, FaultsWithoutAPlace) {
   const std::string fault = fault_of("b: 1\n");

@@ -66,18 +66,40 @@ TEST(MatrixCodec, SizesThatDoNotFit) {
   error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, 7)); });
   error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, -1)); });
   error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10, 10, 1 << 30)); });
-  EXPECT_EQ(
-      error_of([&] { libmap::decode_matrix(with_trailer(matrix, 0x7fffffff, 1, 6)); }).reason(),
-      "compressed matrix too large");
   // 100 MB out of 111 bytes: more than deflate can.
-  EXPECT_NE(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 10000, 10000, 0)); })
-                .reason()
-                .find("can hold"),
-            std::string::npos);
-  EXPECT_EQ(error_of([&] {
-              libmap::decode_matrix(with_trailer(matrix, 0x7fffffff, 0x7fffffff, 8 * 511 + 6));
-            }).reason(),
-            "compressed matrix too large");
+  for (const auto& [rows, columns, type] :
+       {std::tuple{0x7fffffff, 1, 6}, {10000, 10000, 0}, {0x7fffffff, 0x7fffffff, 8 * 511 + 6}})
+    EXPECT_EQ(error_of([&, rows = rows, columns = columns, type = type] {
+                libmap::decode_matrix(with_trailer(matrix, rows, columns, type));
+              }).reason(),
+              "compressed matrix of more than its 111 bytes can hold");
+}
+
+TEST(MatrixCodec, WhatIsTooLargeToBeHeldCanBeGoneThrough) {
+  StoredMatrix matrix{.rows = 1, .columns = (1 << 26) + 1, .channels = 1, .bytes = {}};
+  matrix.bytes.assign(static_cast<std::size_t>(matrix.columns), '\3');
+  const std::string blob = encode_matrix(matrix);
+  EXPECT_EQ(error_of([&] { libmap::decode_matrix(blob); }).reason(), "compressed matrix too large");
+  std::size_t bytes = 0;
+  std::size_t others = 0;
+  libmap::each_matrix_piece(blob, [&](std::string_view piece) {
+    EXPECT_LE(piece.size(), 1U << 16);
+    bytes += piece.size();
+    if (piece.find_first_not_of('\3') != std::string_view::npos) ++others;
+  });
+  EXPECT_EQ(bytes, matrix.bytes.size());
+  EXPECT_EQ(others, 0U);
+}
+
+TEST(MatrixCodec, StreamsOfAnotherLengthThanTheirSize) {
+  StoredMatrix matrix = example(MatrixElement::uint8, 300, 300, 1);
+  for (const int rows : {0, 1, 299}) {
+    EXPECT_EQ(
+        error_of([&, rows] { libmap::decode_matrix(with_trailer(matrix, rows, 300, 0)); }).reason(),
+        "compressed matrix is longer than its size");
+  }
+  EXPECT_EQ(error_of([&] { libmap::decode_matrix(with_trailer(matrix, 301, 300, 0)); }).reason(),
+            "compressed matrix is broken: ends after 90000 of 90300 bytes");
 }
 
 TEST(MatrixCodec, BytesThatDoNotFitTheSizeAreNotWritten) {

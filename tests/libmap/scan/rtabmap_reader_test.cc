@@ -353,6 +353,60 @@ TEST(RtabmapReader, StoredMap) {
   EXPECT_EQ(map.preview->width, 32);
 }
 
+// Inflated, they would take gigabytes.
+TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
+  const fs::path file = sample_file();
+  const auto claims = [](std::int32_t columns, std::int32_t type) {
+    return std::string(40, '\x78') + bytes_of(std::vector<std::int32_t>{1, columns, type});
+  };
+  for (const auto& [ids, poses, reason] :
+       {std::tuple{claims(1000, 4), claims(11999, 5),
+                   "'1000 and 999': other numbers of ids and poses"},
+        {claims(1000, 4), claims(12001, 5), "'1000 and 1000': other numbers of ids and poses"},
+        {claims(1000, 5), claims(12000, 5), "matrices of other types than int32 and float32"}}) {
+    execute(file, "UPDATE Admin SET opt_ids = ?, opt_poses = ?", {ids, poses});
+    const RtabmapDatabase scan(file);
+    EXPECT_EQ(scan.warnings(),
+              (std::vector<std::string>{std::string("Admin.opt_poses: ") + reason}));
+  }
+}
+
+TEST(RtabmapReader, ImagesOfManyNodesHaveAKey) {
+  const fs::path file = sample_file();
+  execute(file,
+          "INSERT INTO Node (id, map_id, weight, stamp, pose) "
+          "WITH RECURSIVE n(i) AS (SELECT 100 UNION ALL SELECT i + 1 FROM n WHERE i < 1100) "
+          "SELECT i, 0, 0, i, (SELECT pose FROM Node WHERE id = 1) FROM n");
+  EXPECT_EQ(RtabmapDatabase(file).graph().nodes.size(), 1004U);
+  execute(file, "ALTER TABLE Data RENAME TO Keyed");
+  execute(file, "CREATE TABLE Data AS SELECT * FROM Keyed");
+  EXPECT_EQ(error_of([&] { RtabmapDatabase{file}; }).reason(),
+            "a table of images has no key to the nodes");
+  execute(file, "DELETE FROM Node WHERE id > 1000");
+  EXPECT_FALSE(RtabmapDatabase(file).read_frame(1).color.empty());
+}
+
+TEST(RtabmapReader, PolygonsOfSeveralMaterials) {
+  const fs::path file = sample_file();
+  const auto polygons = [&](const std::vector<std::int32_t>& numbers, int corners) {
+    execute(
+        file,
+        "UPDATE Admin SET opt_polygons_size = " + std::to_string(corners) + ", opt_polygons = ?",
+        {encode_matrix(libmap::StoredMatrix{1, static_cast<int>(numbers.size()), 1,
+                                            libmap::MatrixElement::int32, bytes_of(numbers)})});
+    return RtabmapDatabase(file).stored_map().polygons;
+  };
+  EXPECT_EQ(polygons({1, 0, 1, 2, 0, 2, 3, 4, 5, 6, 7, 8}, 3), 3U);
+  // More than a piece of what is inflated at a time.
+  std::vector<std::int32_t> many(1 + 3 * 30000, 7);
+  many[0] = 30000;
+  EXPECT_EQ(polygons(many, 3), 30000U);
+  EXPECT_EQ(polygons({0, 0, 0}, 3), 0U);
+  for (const auto& [numbers, corners] :
+       {std::pair{std::vector<std::int32_t>{2, 0, 1, 2, 3, 4}, 3}, {{-1}, 3}, {{1, 0, 1, 2}, 0}})
+    error_of([&, &numbers = numbers, corners = corners] { polygons(numbers, corners); });
+}
+
 // -------------------------------------------------------------------------------------- real files
 
 struct RealFile {

@@ -1,0 +1,27 @@
+#include "libmap/core/memory_budget.h"
+
+#include <algorithm>
+
+#include "libmap/core/file_size.h"
+
+namespace libmap {
+
+MemoryBudget::MemoryBudget() : MemoryBudget(machine_memory() / 8) {}
+
+MemoryBudget::Share MemoryBudget::take(std::uint64_t bytes) {
+  const std::uint64_t share = std::min(bytes, bytes_);
+  std::unique_lock lock(mutex_);
+  returned_.wait(lock, [&] { return share <= free_; });
+  free_ -= share;
+  return {*this, share};
+}
+
+MemoryBudget::Share::~Share() {
+  {
+    const std::lock_guard lock(budget_.mutex_);
+    budget_.free_ += bytes_;
+  }
+  budget_.returned_.notify_all();
+}
+
+}  // namespace libmap
