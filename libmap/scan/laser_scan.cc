@@ -113,9 +113,8 @@ std::vector<double>* add_field(PointCloud& cloud, int place, const char* name) {
   return place < 0 ? nullptr : &cloud.add_field(name, ScalarType::float32).values;
 }
 
-void add_point(PointCloud& cloud, const Channels& layout, const std::array<float, 7>& numbers,
+void add_point(PointCloud& cloud, const Channels& layout, const float* point,
                const Columns& columns) {
-  const float* point = numbers.data();
   const auto number = [&](int place) { return static_cast<double>(point[place]); };
   cloud.positions.emplace_back(number(0), number(1), layout.z < 0 ? 0.0 : number(layout.z));
   if (layout.normal >= 0)
@@ -145,9 +144,11 @@ void read_points(LaserScan& scan, const StoredMatrix& matrix) {
     return field == nullptr ? nullptr : &field->values;
   };
   const Columns columns{values_of("intensity"), values_of("ring"), values_of("time")};
-  std::array<float, 7> point{};
+  std::array<float, 7> numbers{};
+  const float* point = numbers.data();
   for (std::size_t n = 0; n < count; ++n) {
-    std::memcpy(point.data(), matrix.bytes.data() + n * step * sizeof(float), step * sizeof(float));
+    std::memcpy(numbers.data(), matrix.bytes.data() + n * step * sizeof(float),
+                step * sizeof(float));
     const bool is_finite = std::isfinite(point[0]) && std::isfinite(point[1]) &&
                            (layout.z < 0 || std::isfinite(point[layout.z]));
     if (is_finite)
