@@ -14,6 +14,10 @@ namespace {
 
 using libmap::PointCloud;
 
+constexpr std::size_t most_stored_tiles = std::size_t{1} << 20U;
+// However few points they have: each takes some memory while it is worked on.
+constexpr std::size_t most_tiles_at_once = std::size_t{1} << 14U;
+
 TileBounds cut(const TileBounds& a, const TileBounds& b) {
   return {std::max(a.i_begin, b.i_begin), std::min(a.i_end, b.i_end),
           std::max(a.j_begin, b.j_begin), std::min(a.j_end, b.j_end)};
@@ -47,7 +51,8 @@ class StreamedDetection {
            const std::function<void(std::vector<StreamedTile>)>& visit,
            libmap::Progress& progress) {
     const Block block = block_of(std::move(tiles));
-    if (block.tiles.size() > 1 && !is_small(block.columns)) {
+    if (block.tiles.size() > 1 &&
+        (block.tiles.size() > most_tiles_at_once || !is_small(block.columns))) {
       auto [first, second] = halves(block);
       run(std::move(first), visit, progress);
       run(std::move(second), visit, progress);
@@ -208,7 +213,17 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
   box.max = frame.max;
   box.voxels = {frame.min, frame.max};
   std::vector<TileNumber> numbers;
-  for (const TileBounds& tile : share_of(make_tiles(box, tile_voxels), share))
+  std::vector<TileBounds> all = make_tiles(box, tile_voxels);
+  // Each is a line of a journal, and a file if it has voxels.
+  if (all.size() > most_stored_tiles)
+    throw libmap::Error(
+        "too small: the tile store would have " + std::to_string(all.size()) + " tiles",
+        {.field = "tile_size_m",
+         .value = libmap::to_text(tile_voxels * frame.lattice.voxel_size_m),
+         .bound = "at most " + std::to_string(most_stored_tiles) + " tiles"});
+  const std::vector<TileBounds> tiles = share_of(std::move(all), share);
+  numbers.reserve(tiles.size());
+  for (const TileBounds& tile : tiles)
     numbers.push_back(tile_of({tile.i_begin, tile.j_begin, 0}, tile_voxels));
   return numbers;
 }

@@ -31,7 +31,8 @@ void require_streamable(const DetectionOptions& options);
 TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options);
 libmap::PointCloud to_terrain(const libmap::PointCloud& block, const TerrainFrame& frame);
 
-// The tiles of the box, ascending, and a share of them.
+// The tiles of the box, ascending, and a share of them. Throws Error naming tile_size_m for more
+// than 2^20 tiles in all.
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
                                  const TileShare& share = {});
 

@@ -43,8 +43,9 @@ int columns_a_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
   double points = 0.0;
   for (const SeenTile& one : seen)
     points += one.share * static_cast<double>(tiles.index().tiles[one.tile].voxels);
-  return std::max(1,
-                  static_cast<int>(std::ceil(std::sqrt(points / static_cast<double>(max_points)))));
+  const double columns = std::ceil(std::sqrt(points / static_cast<double>(max_points)));
+  // The counts are the index's word; no map has more points than 2^40.
+  return columns >= 1.0 ? static_cast<int>(std::min(columns, 0x1p20)) : 1;
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -20,6 +19,7 @@
 #include "libmap/core/named_output.h"
 #include "libmap/core/parallel.h"
 #include "tools/map_frame.h"
+#include "tools/needed_tiles.h"
 #include "tools/plane_report.h"
 
 namespace graspmap_tools {
@@ -196,6 +196,7 @@ class StoreScoring {
           fmt::format("{}: {} points without a position were dropped", options_.terrain, dropped));
     try {
       frame_ = libgtd::frame_terrain(stream, options_.detection);
+      libgtd::tiles_of(frame_, tile_voxels_);  // too many show before anything is kept
     } catch (const libmap::Error& error) {
       throw error.in_file(options_.terrain);
     }
@@ -226,6 +227,7 @@ class StoreScoring {
   }
 
   void restore_frame() {
+    require_same_tiles(plan_);
     frame_.lattice = plan_.index.lattice;
     frame_.min = plan_.index.min;
     frame_.max = plan_.index.max;
@@ -233,6 +235,21 @@ class StoreScoring {
     frame_.plane = libgtd::RegressionPlane{};
     frame_.plane->centroid = plan_.centroid;
     frame_.plane->terrain_from_input = plan_.index.terrain_from_input();
+  }
+
+  void require_same_tiles(const TilePlan& earlier) const {
+    const libgtd::VoxelLattice& lattice = earlier.index.lattice;
+    if (earlier.index.tile_voxels != tile_voxels_ ||
+        lattice.voxel_size_m != scenario_.voxel_size_m ||
+        lattice.origin_m != libgtd::VoxelLattice{}.origin_m)
+      throw not_of_this_terrain("tile_voxels and lattice");
+  }
+
+  // The key is right, but something else was changed.
+  libmap::Error not_of_this_terrain(const std::string& field) const {
+    return libmap::Error(
+        "is not of this terrain and these parameters: --force begins anew",
+        {.file = (progress_.store() / "progress" / "plan.json").string(), .field = field});
   }
 
   // Throws unless `plan` is `earlier` with more pieces, and tiles far from these stay as they are.
@@ -264,6 +281,7 @@ class StoreScoring {
       refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
     if (scenario_.method != libgtd::Method::corrected)
       refuse("--append needs --method corrected: others leave out the terrain's border");
+    require_same_tiles(earlier);
   }
 
   // Those that no point of a new piece can change.
@@ -329,11 +347,9 @@ class StoreScoring {
 
   // The points on which the wanted tiles depend.
   void fill(libmap::PointSpool& spool, const std::vector<TileNumber>& wanted) const {
-    const int reach = (halo_ + 1) / tile_voxels_ + 1;
-    std::set<TileNumber> needed;
-    for (const TileNumber& tile : wanted)
-      for (int i = -reach; i <= reach; ++i)
-        for (int j = -reach; j <= reach; ++j) needed.insert({tile.i + i, tile.j + j});
+    const NeededTiles needed(libgtd::tile_of(frame_.min, tile_voxels_),
+                             libgtd::tile_of(frame_.max, tile_voxels_),
+                             (halo_ + 1) / tile_voxels_ + 1, wanted);
     std::vector<fs::path> files;
     for (const TerrainPiece& piece : plan_.pieces)
       if (touches(piece, needed)) files.emplace_back(piece.input.path);
@@ -343,12 +359,13 @@ class StoreScoring {
     const auto all = libmap::PointStream::Need::positions_and_normals;
     libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
       const libmap::PointCloud terrain = libgtd::to_terrain(block, frame_);
+      require_in_frame(terrain);
       if (are_all) return spool.add(terrain);
       std::vector<std::size_t> near;
       for (std::size_t n = 0; n < terrain.size(); ++n) {
         const TileNumber tile =
             libgtd::tile_of(frame_.lattice.voxel_of(terrain.positions[n]), tile_voxels_);
-        if (tile != last) is_needed = needed.contains(tile);
+        if (tile != last) is_needed = needed.hold(tile);
         last = tile;
         if (is_needed) near.push_back(n);
       }
@@ -357,7 +374,17 @@ class StoreScoring {
     spool.finish();
   }
 
-  bool touches(const TerrainPiece& piece, const std::set<TileNumber>& needed) const {
+  // A voxel more, against rounding.
+  void require_in_frame(const libmap::PointCloud& terrain) const {
+    const Eigen::Array3d low(frame_.min.i - 1.0, frame_.min.j - 1.0, frame_.min.k - 1.0);
+    const Eigen::Array3d high(frame_.max.i + 2.0, frame_.max.j + 2.0, frame_.max.k + 2.0);
+    for (const Eigen::Vector3d& point : terrain.positions) {
+      const Eigen::Array3d cell = frame_.lattice.cell_of(point);
+      if (!(cell >= low).all() || !(cell <= high).all()) throw not_of_this_terrain("min and max");
+    }
+  }
+
+  bool touches(const TerrainPiece& piece, const NeededTiles& needed) const {
     if (piece.points == 0) return false;
     libmap::PointCloud corners;
     for (int n = 0; n < 8; ++n)
@@ -367,12 +394,8 @@ class StoreScoring {
     const libmap::Bounds3d box = libmap::bounds_of(libgtd::to_terrain(corners, frame_).positions);
     // A voxel more, against rounding.
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(scenario_.voxel_size_m);
-    const TileNumber low = libgtd::tile_of(frame_.lattice.voxel_of(box.min - margin), tile_voxels_);
-    const TileNumber high =
-        libgtd::tile_of(frame_.lattice.voxel_of(box.max + margin), tile_voxels_);
-    for (auto at = needed.lower_bound(low); at != needed.end() && at->i <= high.i; ++at)
-      if (at->j >= low.j && at->j <= high.j) return true;
-    return false;
+    return needed.hold_any(tile_near(frame_.lattice, box.min - margin, tile_voxels_),
+                           tile_near(frame_.lattice, box.max + margin, tile_voxels_));
   }
 
   std::vector<StoredTile> write(std::vector<libgtd::StreamedTile>& tiles) const {

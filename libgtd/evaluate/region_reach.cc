@@ -27,6 +27,7 @@ using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS
 constexpr std::size_t most_links = 10'000'000;
 // Distances of voxels are multiples of their size: rounding shall not part them from the stride.
 constexpr double tolerance = 1.0 + 1e-9;
+constexpr double farthest_m = std::numeric_limits<double>::max();
 
 void check(const RegionReachOptions& options) {
   RegionReachOptions copy = options;
@@ -76,7 +77,7 @@ Box box_of(const Bounds3d& bounds, double margin) {
 class NearestPairs {
  public:
   NearestPairs(const std::vector<PointSet>& sets, double reach_m)
-      : sets_(sets), given_reach_m_(reach_m), reach_m_(reach_m * tolerance) {
+      : sets_(sets), given_reach_m_(reach_m), reach_m_(std::min(reach_m * tolerance, farthest_m)) {
     std::vector<std::pair<Box, std::uint32_t>> boxes;
     for (std::uint32_t s = 0; s < sets.size(); ++s) boxes.emplace_back(box_of(sets[s].box, 0.0), s);
     tree_ = BoxTree(boxes);
@@ -225,6 +226,10 @@ std::vector<RegionLink> spanning_tree(const VoxelMap& map, const MapRegionResult
       tree.push_back(link);
     }
     const Components components = components_of(graph);
+    if (components.count == sets.size() && !(reach_m < farthest_m))
+      throw libmap::Error(
+          "the regions lie too far apart: their distances are no numbers",
+          {.field = "voxel_size_m", .value = libmap::to_text(map.lattice.voxel_size_m)});
     if (components.count < sets.size()) sets = joined(map, sets, components);
     reach_m = std::max(2.0 * reach_m, map.lattice.voxel_size_m);
     links = NearestPairs(sets, reach_m).find();

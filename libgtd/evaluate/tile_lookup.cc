@@ -353,8 +353,9 @@ std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileL
   std::vector<std::pair<TileNumber, std::size_t>> order;  // of the points, by their tiles
   for (std::size_t n = 0; n < points.size(); ++n) {
     answers[n].distance_m = HUGE_VAL;
-    if (points[n].allFinite())
-      order.emplace_back(lookup.number_of({points[n], terrain_from_map * points[n]}), n);
+    const Place place{points[n], terrain_from_map * points[n]};
+    if (place.in_map.allFinite() && place.in_terrain.allFinite())
+      order.emplace_back(lookup.number_of(place), n);
   }
   std::sort(order.begin(), order.end());
   progress.begin("look-up", order.size());

@@ -72,6 +72,22 @@ VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_f
   return {mean_point - size_m * (mean_voxel.array() + 0.5).matrix(), size_m};
 }
 
+// Squares of distances on the lattice are numbers.
+void require_measurable(const VoxelLattice& lattice) {
+  constexpr double least_m = 1e-100;
+  constexpr double most_m = 1e100;
+  const auto refuse = [](const char* field, double value, const std::string& bound) {
+    throw libmap::Error("out of range",
+                        {.field = field, .value = libmap::to_text(value), .bound = bound});
+  };
+  if (!(lattice.voxel_size_m >= least_m && lattice.voxel_size_m <= most_m))
+    refuse("voxel_size_m", lattice.voxel_size_m,
+           libmap::to_text(least_m) + " to " + libmap::to_text(most_m));
+  const double farthest_m = lattice.origin_m.cwiseAbs().maxCoeff();
+  if (farthest_m > most_m)
+    refuse("lattice_origin_m", farthest_m, "within +-" + libmap::to_text(most_m));
+}
+
 void require_on_lattice(const PointCloud& map, const VoxelMap& result,
                         const std::vector<std::uint32_t>& kept, const std::vector<Voxel>& voxels) {
   const double bound_m = max_offset * result.lattice.voxel_size_m;
@@ -182,6 +198,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {
   if (!facts.lattice || map.find_field("i") != nullptr) voxels = voxels_of_fields(map, kept);
   result.lattice =
       facts.lattice ? *facts.lattice : fitted_lattice(map, result.terrain_from_map, kept, voxels);
+  require_measurable(result.lattice);
   if (voxels.empty())
     for (const std::uint32_t n : kept) {
       const Eigen::Vector3d cell =

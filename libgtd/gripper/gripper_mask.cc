@@ -29,6 +29,14 @@ libmap::Error too_small(double voxel_size_m, double mask_voxels) {
                        {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
 }
 
+// A number of voxels along one side. Measures far apart make masks that are thin and endless.
+int whole_voxels(double voxels, const GripperMaskOptions& options) {
+  if (voxels >= 0.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
+  throw libmap::Error("the gripper's mask would be " + libmap::to_text(static_cast<float>(voxels)) +
+                          " voxels wide or high, more than 2^20",
+                      {.field = "voxel_size_m", .value = libmap::to_text(options.voxel_size_m)});
+}
+
 void allocate(GripperMask& mask) {
   const double voxels = static_cast<double>(mask.side) * mask.side * mask.layers;
   if (mask.side < 3 || mask.solid_layers < 2)
@@ -75,7 +83,7 @@ VoxelMeasures measure(const Gripper& gripper, const GripperMaskOptions& options)
       exact_palm ? m.in_voxels(gripper.top_solid_margin_mm) : rounded(gripper.top_solid_margin_mm);
   m.half = rounded(gripper.finger_joint_diameter_mm) / 2.0 + rounded(gripper.finger_length_mm) +
            rounded(gripper.spine_length_mm);
-  m.H = static_cast<int>(rounded(gripper.closing_height_mm));
+  m.H = whole_voxels(rounded(gripper.closing_height_mm), options);
   const double L = std::floor(2.0 * m.half) + (options.method == Method::climblab ? 1.0 : 0.0);
   m.RT = std::round((P + mt) / 2.0);
   m.Hcl = std::round((L - P) / 2.0 * tan_deg(90.0 - gripper.opening_angle_deg));
@@ -84,14 +92,14 @@ VoxelMeasures measure(const Gripper& gripper, const GripperMaskOptions& options)
   return m;
 }
 
-GripperMask empty_mask(const GripperMaskOptions& options, int side, int solid_layers) {
+GripperMask empty_mask(const GripperMaskOptions& options, double side, int solid_layers) {
   GripperMask mask;
   mask.method = options.method;
   mask.voxel_size_m = options.voxel_size_m;
-  mask.side = side;
+  mask.side = whole_voxels(side, options);
   mask.solid_layers = solid_layers;
   mask.layers = solid_layers + options.extra_void_layers;
-  mask.pivot_xy = side / 2;
+  mask.pivot_xy = mask.side / 2;
   mask.pivot_z = solid_layers;
   allocate(mask);
   return mask;
@@ -99,7 +107,7 @@ GripperMask empty_mask(const GripperMaskOptions& options, int side, int solid_la
 
 GripperMask make_thesis(const Gripper& gripper, const GripperMaskOptions& options) {
   const VoxelMeasures m = measure(gripper, options);
-  GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half), m.H);
+  GripperMask mask = empty_mask(options, 2.0 * m.half, m.H);
   const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
   fill(mask, [&](int x, int y, int s) {
     const float d = distance(m.half, x, y);
@@ -115,7 +123,7 @@ GripperMask make_thesis(const Gripper& gripper, const GripperMaskOptions& option
 // Eq. 5-1, 5-2 and the counted volume of 5.1.2.
 GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& options) {
   const VoxelMeasures m = measure(gripper, options);
-  GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half), m.H);
+  GripperMask mask = empty_mask(options, 2.0 * m.half, m.H);
   const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
   const double cos_closed = cos_deg(gripper.closing_angle_deg);
   // As in `thesis`, the ring has two parts, below Hcl and below H - RB: with RB > H (HubRobo) the
@@ -147,7 +155,7 @@ GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& opti
 GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   options.extra_void_layers = 0;
   const VoxelMeasures m = measure(gripper, options);
-  GripperMask mask = empty_mask(options, static_cast<int>(2.0 * m.half) + 1, m.H);
+  GripperMask mask = empty_mask(options, std::floor(2.0 * m.half) + 1.0, m.H);
   // One beyond the centre: MATLAB's index (L + 1) / 2 counts from 1, the window from 0.
   mask.pivot_xy = (mask.side + 1) / 2;
   mask.pivot_z = m.H - 1;
@@ -176,8 +184,7 @@ GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& opt
   const double slack = 1e-9;
   const double rings = std::floor(half / voxel_mm + slack);
   const double depth_layers = std::ceil(gripper.closing_height_mm / voxel_mm - slack);
-  GripperMask mask =
-      empty_mask(options, 2 * static_cast<int>(rings) + 1, static_cast<int>(depth_layers));
+  GripperMask mask = empty_mask(options, 2.0 * rings + 1.0, whole_voxels(depth_layers, options));
   mask.pivot_z = mask.solid_layers - 1;
   const double cone = tan_deg(90.0 - gripper.opening_angle_deg);
   const double RT = (gripper.palm_diameter_mm + gripper.top_solid_margin_mm) / 2.0;

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "libgtd/shape/curvature.h"
+#include "libgtd/shape/place_order.h"
 #include "libgtd/shape/point_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -91,7 +92,9 @@ class FootholdSearch {
     const std::vector<double>* edge = options_.edges ? nullptr : &values_of(map_, "edge");
     std::vector<Foothold> candidates;
     for (std::size_t n = 0; n < map_.size(); ++n) {
-      if (!map_.positions[n].allFinite() || !(scores_[n] >= options_.min_score)) continue;
+      if (!map_.positions[n].allFinite() || !std::isfinite(scores_[n]) ||
+          !(scores_[n] >= options_.min_score))
+        continue;
       if (options_.graspable_only && (*graspable)[n] == 0.0) continue;
       if (edge != nullptr && (*edge)[n] != 0.0) {
         ++at_edges;
@@ -102,11 +105,31 @@ class FootholdSearch {
       candidate.score = scores_[n];
       candidate.approach = approach_at(n);
     }
+    // Those in one place follow each other and have the same surroundings, however many they are.
+    std::vector<std::size_t> order(candidates.size());
+    std::iota(order.begin(), order.end(), std::size_t{0});
+    const auto is_before = [&](std::size_t a, std::size_t b) {
+      return is_place_before(place_of(candidates[a]), place_of(candidates[b]));
+    };
+    std::sort(order.begin(), order.end(), is_before);
     libmap::parallel_for(candidates.size(), 256, [&](std::size_t begin, std::size_t end) {
       std::vector<PointGrid::Range> runs;
-      for (std::size_t c = begin; c < end; ++c) look_around(candidates[c], graspable, runs);
+      for (std::size_t n = begin; n < end; ++n) {
+        Foothold& candidate = candidates[order[n]];
+        const Foothold* last = n == begin ? nullptr : &candidates[order[n - 1]];
+        if (last != nullptr && is_same_place(place_of(candidate), place_of(*last))) {
+          candidate.mean_score = last->mean_score;
+          candidate.graspable_points = last->graspable_points;
+        } else {
+          look_around(candidate, graspable, runs);
+        }
+      }
     });
     return candidates;
+  }
+
+  const Eigen::Vector3d& place_of(const Foothold& foothold) const {
+    return map_.positions[foothold.map_point];
   }
 
   // Against the axis of the mask that was matched. From zero, so that no component is -0.
@@ -130,7 +153,8 @@ class FootholdSearch {
       weights += 1.0 - share;
       if (graspable != nullptr && (*graspable)[point] != 0.0) ++foothold.graspable_points;
     });
-    foothold.mean_score = sum / weights;
+    // A separation whose square is nothing weighs no point.
+    foothold.mean_score = weights > 0.0 ? sum / weights : foothold.score;
   }
 
   void describe_surface(std::vector<Foothold>& footholds) const {

@@ -54,6 +54,11 @@ TerrainPiece piece_from(const Json& json) {
   piece.dropped_points = libmap::integer_at<std::uint64_t>(json, "dropped_points");
   piece.box.min = vector_from(json.at("min"));
   piece.box.max = vector_from(json.at("max"));
+  if (piece.points > 0 && !(piece.box.min.array() <= piece.box.max.array()).all())
+    throw libmap::Error("is no box",
+                        {.field = "min and max of piece " + piece.input.path,
+                         .value = Json(json.at("min")).dump() + ", " + Json(json.at("max")).dump(),
+                         .bound = "min <= max"});
   return piece;
 }
 
@@ -81,7 +86,7 @@ void read_journal(const fs::path& path, const TilePlan& plan,
     try {
       const auto json = libmap::parse_json<Json>(line);
       if (json.at("key") != plan.key) continue;
-      const StoredTile tile = tile_from(json, plan.index.tile_voxels);
+      const StoredTile tile = tile_from(json, plan.index);
       done[tile.number] = tile;
     } catch (const nlohmann::json::exception&) {
       continue;
@@ -125,17 +130,20 @@ std::size_t count_tiles(const TileStoreIndex& index) {
 
 // Of all tiles, those without a scored voxel too.
 void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& index) {
-  std::int64_t occupied = 0, edge = 0, graspable = 0;
+  std::uint64_t occupied = 0, edge = 0, graspable = 0;
   for (const auto& [number, tile] : tiles) {
-    occupied += static_cast<std::int64_t>(tile.occupied_voxels);
-    edge += static_cast<std::int64_t>(tile.edge_voxels);
-    graspable += static_cast<std::int64_t>(tile.graspable_voxels);
+    occupied += tile.occupied_voxels;
+    edge += tile.edge_voxels;
+    graspable += tile.graspable_voxels;
   }
   auto& results = index.manifest.results;
-  results.emplace_back("occupied_voxels", occupied);
-  results.emplace_back("scored_voxels", static_cast<std::int64_t>(index.voxels()));
-  results.emplace_back("edge_voxels", edge);
-  results.emplace_back("graspable_voxels", graspable);
+  const auto add = [&](const char* name, std::uint64_t count) {
+    results.emplace_back(name, static_cast<std::int64_t>(count));
+  };
+  add("occupied_voxels", occupied);
+  add("scored_voxels", index.voxels());
+  add("edge_voxels", edge);
+  add("graspable_voxels", graspable);
 }
 
 }  // namespace

@@ -38,6 +38,17 @@ libmap::Error not_complete(const fs::path& store) {
                        {.file = store.string()});
 }
 
+// A plan knows tiles without voxels, an index does not: they have no file to be read.
+TileStoreIndex listed(TileStoreIndex index) {
+  for (const StoredTile& tile : index.tiles)
+    if (tile.voxels == 0)
+      throw libmap::Error(
+          "lists a tile without voxels",
+          {.field = "tiles",
+           .value = std::to_string(tile.number.i) + ", " + std::to_string(tile.number.j)});
+  return index;
+}
+
 }  // namespace
 
 bool is_tile_store_name(const fs::path& path) {
@@ -50,7 +61,7 @@ TileStoreIndex read_tile_store(const fs::path& store) {
   if (!fs::exists(path)) throw not_complete(store);
   const std::string text = libmap::read_whole_file(path, max_index_bytes);
   return read_json(text, path.string(), "index of a tile store",
-                   [&](const Json& json) { return index_from(json, path.string()); });
+                   [&](const Json& json) { return listed(index_from(json, path.string())); });
 }
 
 TileStoreIndex finish_tile_store(const fs::path& store) {

@@ -30,6 +30,21 @@ void require_room(const Voxel& voxel, const char* field) {
             "within +-2^29");
 }
 
+// Far more than memory holds, and sums over tiles do not overflow.
+std::uint64_t voxel_count_at(const Json& json, const char* key) {
+  const auto count = libmap::integer_at<std::uint64_t>(json, key);
+  require(count <= std::uint64_t{1} << 36U, key, std::to_string(count), "<= 2^36");
+  return count;
+}
+
+void require_within(const TileNumber& tile, const TileStoreIndex& index) {
+  const TileNumber low = tile_of(index.min, index.tile_voxels);
+  const TileNumber high = tile_of(index.max, index.tile_voxels);
+  require(tile.i >= low.i && tile.i <= high.i && tile.j >= low.j && tile.j <= high.j,
+          "number of a tile", std::to_string(tile.i) + ", " + std::to_string(tile.j),
+          "within min and max of the map");
+}
+
 }  // namespace
 
 Json json_of(const Voxel& voxel) { return {voxel.i, voxel.j, voxel.k}; }
@@ -57,23 +72,28 @@ Json json_of(const StoredTile& tile) {
   return json;
 }
 
-StoredTile tile_from(const Json& json, int tile_voxels) {
+StoredTile tile_from(const Json& json, const TileStoreIndex& index) {
+  const int tile_voxels = index.tile_voxels;
   StoredTile tile;
   tile.number = {libmap::integer_at<int>(json, "i"), libmap::integer_at<int>(json, "j")};
   tile.min = voxel_from(json.at("min"));
   tile.max = voxel_from(json.at("max"));
-  tile.voxels = libmap::integer_at<std::uint64_t>(json, "voxels");
-  tile.occupied_voxels = libmap::integer_at<std::uint64_t>(json, "occupied_voxels");
-  tile.edge_voxels = libmap::integer_at<std::uint64_t>(json, "edge_voxels");
-  tile.graspable_voxels = libmap::integer_at<std::uint64_t>(json, "graspable_voxels");
+  tile.voxels = voxel_count_at(json, "voxels");
+  tile.occupied_voxels = voxel_count_at(json, "occupied_voxels");
+  tile.edge_voxels = voxel_count_at(json, "edge_voxels");
+  tile.graspable_voxels = voxel_count_at(json, "graspable_voxels");
   tile.file = json.at("file").get<std::string>();
   tile.bytes = libmap::integer_at<std::uint64_t>(json, "bytes");
   tile.sha256 = json.at("sha256").get<std::string>();
   for (const int number : {tile.number.i, tile.number.j})
     require(std::abs(static_cast<double>(number) * tile_voxels) <= 0x1p30, "number of a tile",
             std::to_string(number), "columns within +-2^30");
-  if (tile.voxels == 0) return tile;
+  require_within(tile.number, index);
   const std::string name = std::to_string(tile.number.i) + ", " + std::to_string(tile.number.j);
+  if (tile.voxels == 0) {
+    require(tile.file.empty(), "file of tile " + name, tile.file, "empty: it has no voxels");
+    return tile;
+  }
   // 64 bits: the numbers may be anything.
   const auto is_between = [&](std::int64_t first, std::int64_t low, std::int64_t high) {
     return low >= first * tile_voxels && high < (first + 1) * tile_voxels && low <= high;
@@ -126,10 +146,12 @@ TileStoreIndex index_from(const Json& json, const std::string& file) {
   index.max = voxel_from(json.at("max"));
   require_room(index.min, "min");
   require_room(index.max, "max");
+  require(index.min.i <= index.max.i && index.min.j <= index.max.j && index.min.k <= index.max.k,
+          "min", Json(json.at("min")).dump(), "<= max, " + Json(json.at("max")).dump());
   index.manifest = libmap::parse_manifest(json.at("map").dump(), file);
   index.frame = index.manifest.frame == "input" ? MapFrame::input : MapFrame::terrain;
   for (const Json& one : json.at("tiles")) {
-    const StoredTile tile = tile_from(one, index.tile_voxels);
+    const StoredTile tile = tile_from(one, index);
     if (!index.tiles.empty() && !(index.tiles.back().number < tile.number))
       throw libmap::Error("tiles do not ascend", {.field = "tiles", .value = tile.file});
     index.tiles.push_back(tile);

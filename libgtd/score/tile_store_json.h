@@ -16,8 +16,8 @@ Json json_of(const StoredTile& tile);
 Json json_of(const TileStoreIndex& index);  // ends in "tiles"
 
 // Throw nlohmann's exceptions for keys that are missing or of another type, and Error for values
-// that cannot be.
-StoredTile tile_from(const Json& json, int tile_voxels);
+// that cannot be. `index` tells the tiles' width and the map's box.
+StoredTile tile_from(const Json& json, const TileStoreIndex& index);
 // `file` is named in Errors; with its tiles, if `json` has any.
 TileStoreIndex index_from(const Json& json, const std::string& file);
 

@@ -1,6 +1,8 @@
 #include "libgtd/score/tiling.h"
 
 #include <algorithm>
+#include <map>
+#include <utility>
 
 #include "libgtd/score/scanned_area.h"
 #include "libgtd/score/scoring.h"
@@ -36,6 +38,23 @@ std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& 
   return flags;
 }
 
+// Positions in `pivots`, ascending, of those that lie in one block of columns. A wide tile with few
+// voxels takes memory where they are, not for its whole width.
+std::vector<std::vector<std::size_t>> blocks_of(const VoxelGrid& grid, const TileBounds& tile,
+                                                const std::vector<std::size_t>& pivots) {
+  constexpr int block_columns = 1024;
+  std::map<std::pair<int, int>, std::vector<std::size_t>> blocks;
+  for (std::size_t n = 0; n < pivots.size(); ++n) {
+    const Voxel& voxel = grid.voxels[pivots[n]];
+    blocks[{(voxel.i - tile.i_begin) / block_columns, (voxel.j - tile.j_begin) / block_columns}]
+        .push_back(n);
+  }
+  std::vector<std::vector<std::size_t>> listed;
+  listed.reserve(blocks.size());
+  for (auto& [place, members] : blocks) listed.push_back(std::move(members));
+  return listed;
+}
+
 }  // namespace
 
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
@@ -50,6 +69,7 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
                         {.field = "tile_size_m",
                          .value = libmap::to_text(tile_voxels * grid.lattice.voxel_size_m)});
   std::vector<TileBounds> tiles;
+  tiles.reserve(static_cast<std::size_t>(count));
   for (int i = i_first; i <= i_last; ++i)
     for (int j = j_first; j <= j_last; ++j)
       // Cut to the grid: a tile takes no more memory than the grid's columns do.
@@ -59,7 +79,7 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
   return tiles;
 }
 
-std::vector<TileBounds> share_of(const std::vector<TileBounds>& tiles, const TileShare& share) {
+std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare& share) {
   if (share.count < 1 || share.number < 1 || share.number > share.count)
     throw libmap::Error("no such share",
                         {.field = "--tile",
@@ -69,23 +89,31 @@ std::vector<TileBounds> share_of(const std::vector<TileBounds>& tiles, const Til
   const auto count = static_cast<std::size_t>(share.count);
   const auto first = static_cast<std::ptrdiff_t>(tiles.size() * (number - 1) / count);
   const auto last = static_cast<std::ptrdiff_t>(tiles.size() * number / count);
-  return {tiles.begin() + first, tiles.begin() + last};
+  tiles.erase(tiles.begin() + last, tiles.end());
+  tiles.erase(tiles.begin(), tiles.begin() + first);
+  return tiles;
 }
 
 std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
                                      const TileBounds& tile,
                                      const std::vector<std::size_t>& pivots) {
-  if (pivots.empty()) return {};
   const int below = mask.pivot_xy;
   const int above = mask.side - mask.pivot_xy - 1;
-  const ColumnSums unscanned = unscanned_columns(grid, grown(tile, below, above));
-  std::vector<std::uint8_t> edges;
-  edges.reserve(pivots.size());
-  for (const std::size_t at : pivots)
-    edges.push_back(
-        unscanned.count(columns_around(grid.voxels[at].i, grid.voxels[at].j, below, above)) != 0
-            ? 1
-            : 0);
+  std::vector<std::uint8_t> edges(pivots.size(), 0);
+  for (const std::vector<std::size_t>& block : blocks_of(grid, tile, pivots)) {
+    TileBounds columns = columns_around(grid.voxels[pivots[block.front()]].i,
+                                        grid.voxels[pivots[block.front()]].j, 0, 0);
+    for (const std::size_t n : block) {
+      const Voxel& voxel = grid.voxels[pivots[n]];
+      columns = {std::min(columns.i_begin, voxel.i), std::max(columns.i_end, voxel.i + 1),
+                 std::min(columns.j_begin, voxel.j), std::max(columns.j_end, voxel.j + 1)};
+    }
+    const ColumnSums unscanned = unscanned_columns(grid, grown(columns, below, above));
+    for (const std::size_t n : block) {
+      const Voxel& voxel = grid.voxels[pivots[n]];
+      edges[n] = unscanned.count(columns_around(voxel.i, voxel.j, below, above)) != 0 ? 1 : 0;
+    }
+  }
   return edges;
 }
 

@@ -23,7 +23,7 @@ struct TileShare {
   int number = 1;
   int count = 1;
 };
-std::vector<TileBounds> share_of(const std::vector<TileBounds>& tiles, const TileShare& share);
+std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare& share);
 
 struct ScoredVoxel {
   Voxel voxel;

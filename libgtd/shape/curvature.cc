@@ -5,10 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <string>
 
 #include "libgtd/shape/cell_surroundings.h"
 #include "libgtd/shape/neighbor_loops.h"
+#include "libgtd/shape/place_order.h"
 #include "libgtd/shape/point_grid.h"
 #include "libgtd/shape/thesis_curvature.h"
 #include "libmap/core/error.h"
@@ -123,51 +125,74 @@ class QuadricFitter {
   void enter(const PointGrid::Cell& cell) {
     candidates_.enter(cell, 2);
     neighbors_.make_room(candidates_.count());
+    is_fitted_ = false;
   }
 
   // At a point of the cell that was entered last.
   Curvature fit(std::size_t point) {
-    const NeighborLoops::Places neighbors = neighbors_.places();
-    const std::size_t count = loops_.select(candidates_.places(), candidates_.count(),
-                                            cloud_.positions[point].data(), radius_, neighbors);
-    Matrix3d frame;
-    Matrix6d matrix;
-    Vector6d right, quadric;
-    if (count < min_neighbors || !tangent_frame(covariance_of(loops_, neighbors, count), frame))
-      return {};
-    normal_equations(loops_, neighbors, count, frame, matrix, right);
-    if (!solve(matrix, right, quadric)) return {};
-    const Vector3d normal = (frame * Vector3d(-quadric[1], -quadric[2], 1)).normalized();
-    const int side = side_of(normal, cloud_, point, up_);
+    const Vector3d& place = cloud_.positions[point];
+    if (!is_fitted_ || !is_same_place(place, place_)) {
+      surface_ = fit_at(place);
+      place_ = place;
+      is_fitted_ = true;
+    }
+    if (!surface_) return {};
+    const int side = side_of(surface_->normal, cloud_, point, up_);
     if (side == 0) return {};
-    const auto [toward, away] = bending(quadric);
+    const auto [toward, away] = surface_->bending;
     Curvature result;
     result.k1 = static_cast<float>((side > 0 ? -away : toward) / radius_);
     result.k2 = static_cast<float>((side > 0 ? -toward : away) / radius_);
-    result.normal = (side * normal).cast<float>();
+    result.normal = (side * surface_->normal).cast<float>();
     result.valid = std::isfinite(result.k1) && std::isfinite(result.k2);
     return result.valid ? result : Curvature{};
   }
 
  private:
+  // As the neighbours tell it, before it is known which side is outside.
+  struct Surface {
+    Vector3d normal;
+    std::array<double, 2> bending;
+  };
+
+  std::optional<Surface> fit_at(const Vector3d& place) {
+    const NeighborLoops::Places neighbors = neighbors_.places();
+    const std::size_t count =
+        loops_.select(candidates_.places(), candidates_.count(), place.data(), radius_, neighbors);
+    Matrix3d frame;
+    Matrix6d matrix;
+    Vector6d right, quadric;
+    if (count < min_neighbors || !tangent_frame(covariance_of(loops_, neighbors, count), frame))
+      return std::nullopt;
+    normal_equations(loops_, neighbors, count, frame, matrix, right);
+    if (!solve(matrix, right, quadric)) return std::nullopt;
+    const Vector3d normal = (frame * Vector3d(-quadric[1], -quadric[2], 1)).normalized();
+    return Surface{normal, bending(quadric)};
+  }
+
   const libmap::PointCloud& cloud_;
   CellSurroundings candidates_;
   double radius_;
   Vector3d up_;
   const NeighborLoops& loops_ = neighbor_loops_of(best_instruction_set());
   CoordinateRows neighbors_;
+  // The last fit: points in one place share it, however many there are.
+  bool is_fitted_ = false;
+  Vector3d place_ = Vector3d::Zero();
+  std::optional<Surface> surface_;
 };
 
-// The queries of each cell of the grid, so that a cell's surroundings are gathered once.
+// The queries of each cell of the grid, so that a cell's surroundings are gathered once; those in
+// one place follow each other.
 struct QueriesByCell {
   std::vector<std::size_t> queries;  // positions in the list of queries, cell after cell
   std::vector<std::size_t> begins;   // of each cell, and the end
 };
 
-QueriesByCell queries_by_cell(const PointGrid& grid, std::size_t points,
+QueriesByCell queries_by_cell(const PointGrid& grid, const std::vector<Vector3d>& positions,
                               const std::vector<std::size_t>& queries) {
   const std::size_t nowhere = grid.cells().size();
-  std::vector<std::size_t> cell_of_point(points, nowhere);
+  std::vector<std::size_t> cell_of_point(positions.size(), nowhere);
   for (std::size_t c = 0; c < grid.cells().size(); ++c)
     for (std::uint32_t k = grid.ranges()[c].first; k < grid.ranges()[c].last; ++k)
       cell_of_point[grid.order()[k]] = c;
@@ -179,6 +204,13 @@ QueriesByCell queries_by_cell(const PointGrid& grid, std::size_t points,
   std::vector<std::size_t> at = sorted.begins;
   for (std::size_t q = 0; q < queries.size(); ++q)
     sorted.queries[at[cell_of_point[queries[q]]]++] = q;
+  const auto begin_of = [&](std::size_t c) {
+    return sorted.queries.begin() + static_cast<std::ptrdiff_t>(sorted.begins[c]);
+  };
+  for (std::size_t c = 0; c < nowhere; ++c)
+    std::sort(begin_of(c), begin_of(c + 1), [&](std::size_t a, std::size_t b) {
+      return is_place_before(positions[queries[a]], positions[queries[b]]);
+    });
   return sorted;
 }
 
@@ -188,7 +220,7 @@ std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
   // Half the radius, a little more against rounding at the cells' borders.
   const PointGrid grid(cloud.positions, options.radius_m * (0.5 + 1e-6));
   const std::vector<Vector3d> in_order = in_order_of(grid, cloud.positions);
-  const QueriesByCell groups = queries_by_cell(grid, cloud.size(), queries);
+  const QueriesByCell groups = queries_by_cell(grid, cloud.positions, queries);
   std::vector<Curvature> results(queries.size());
   libmap::parallel_for(grid.cells().size(), 16, [&](std::size_t begin, std::size_t end) {
     QuadricFitter fitter(cloud, grid, in_order, options.radius_m, options.up);

@@ -3,12 +3,15 @@
 #include <pcl/common/eigen.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <bit>
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
+#include <utility>
 
 #include "libgtd/shape/neighbor_loops.h"
 #include "libgtd/shape/point_grid.h"
@@ -22,6 +25,7 @@ using Eigen::Matrix3f;
 using Eigen::Vector3f;
 
 constexpr std::size_t cells_at_once = 16;
+constexpr std::uint32_t most_inserted = 32;  // of a bucket that insertion sorts
 // Neighbours are found once and kept for the second pass while there is room for them.
 constexpr std::size_t max_kept_neighbors = std::size_t{1} << 26;
 
@@ -101,7 +105,8 @@ class NeighborSearch {
     return static_cast<std::uint32_t>(key >> 32);
   }
 
-  // Squared distances to points of a surface are spread evenly: buckets leave little to sort.
+  // Squared distances to points of a surface are spread evenly: buckets leave little to sort. Where
+  // a radius is far larger than the cloud, one bucket holds them all.
   void sort(std::size_t count) {
     constexpr std::size_t buckets = 256;
     std::uint32_t begin_of[buckets + 1] = {};
@@ -113,6 +118,11 @@ class NeighborSearch {
     for (std::size_t n = 0; n < count; ++n) ++begin_of[bucket_of(keys_[n]) + 1];
     for (std::size_t b = 1; b < buckets; ++b) begin_of[b] += begin_of[b - 1];
     for (std::size_t n = 0; n < count; ++n) sorted_[begin_of[bucket_of(keys_[n])]++] = keys_[n];
+    const auto is_before = [&](std::uint64_t a, std::uint64_t b) { return comes_before(a, b); };
+    for (std::size_t b = 0, begin = 0; b < buckets; begin = begin_of[b++])
+      if (begin_of[b] - begin > most_inserted)
+        std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(begin),
+                  sorted_.begin() + static_cast<std::ptrdiff_t>(begin_of[b]), is_before);
     for (std::size_t n = 1; n < count; ++n) {
       const std::uint64_t key = sorted_[n];
       std::size_t to = n;
@@ -203,7 +213,7 @@ Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
   return result.valid ? result : Curvature{};
 }
 
-// The neighbours of the points of a run of cells, one list after the other.
+// The neighbours of the places of a run of cells, one list after the other.
 struct KeptNeighbors {
   bool complete = false;
   Numbers lists;
@@ -265,10 +275,24 @@ class CurvatureEstimation {
                          });
   }
 
+  using Place = std::array<std::uint32_t, 3>;
+  Place place_of(std::uint32_t point) const {
+    const Quad& at = places_[point];
+    return {std::bit_cast<std::uint32_t>(at[0]), std::bit_cast<std::uint32_t>(at[1]),
+            std::bit_cast<std::uint32_t>(at[2])};
+  }
+
+  // Calls visit(point, twin): points in one place follow each other, and `twin` says whether this
+  // one lies where the last one did, so that it has the same neighbours.
   template <typename Visit>
   void for_each_point(std::size_t cell, const Visit& visit) const {
     const PointGrid::Range range = grid_.ranges()[cell];
-    for (std::uint32_t k = range.first; k < range.last; ++k) visit(grid_.order()[k]);
+    Numbers points(grid_.order().begin() + range.first, grid_.order().begin() + range.last);
+    std::sort(points.begin(), points.end(), [&](std::uint32_t a, std::uint32_t b) {
+      return std::pair(place_of(a), a) < std::pair(place_of(b), b);
+    });
+    for (std::size_t n = 0; n < points.size(); ++n)
+      visit(points[n], n > 0 && place_of(points[n]) == place_of(points[n - 1]));
   }
 
   static void numbers_of(std::span<const std::uint64_t> keys, Numbers& numbers) {
@@ -283,10 +307,15 @@ class CurvatureEstimation {
     const bool keep = kept_count_ < max_kept_neighbors;
     for (std::size_t c = run.begin; c < run.end; ++c) {
       search.enter(grid_.cells()[c]);
-      for_each_point(c, [&](std::uint32_t point) {
+      Quad found{};
+      for_each_point(c, [&](std::uint32_t point, bool twin) {
+        if (twin) {
+          normals[point] = found;
+          return;
+        }
         numbers_of(search.find(places_[point]), neighbors);
         const Vector3f normal = normal_of(search.near(), places_[point], neighbors);
-        normals[point] = quad(normal[0], normal[1], normal[2]);
+        normals[point] = found = quad(normal[0], normal[1], normal[2]);
         if (!keep) return;
         run.kept.lists.insert(run.kept.lists.end(), neighbors.begin(), neighbors.end());
         run.kept.ends.push_back(run.kept.lists.size());
@@ -317,12 +346,18 @@ class CurvatureEstimation {
         search.enter(grid_.cells()[c]);
       near_normals.clear();
       for (const std::uint32_t point : search.candidates()) near_normals.push_back(normals[point]);
-      for_each_point(c, [&](std::uint32_t point) {
-        find(point);
+      std::optional<Curvature> found;
+      for_each_point(c, [&](std::uint32_t point, bool twin) {
+        if (!twin) {
+          find(point);
+          found.reset();
+        }
+        if (wanted[point] == 0) return;
         const Quad& normal = normals[point];
-        if (wanted[point] != 0)
-          results[point] =
+        if (!found)
+          found =
               curvature_of({normal[0], normal[1], normal[2]}, near_normals, neighbors, projected);
+        results[point] = *found;
       });
     }
   }

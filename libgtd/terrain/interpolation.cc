@@ -112,6 +112,14 @@ double thesis_spacing(std::size_t count, const Box& box) {
   return 1 / (std::round(std::sqrt(density) * 10000) / 10000);
 }
 
+std::size_t most_nodes(std::size_t points, const InterpolationOptions& options) {
+  constexpr double always = 1e6;
+  const double most =
+      always + static_cast<double>(options.max_nodes_a_point) * static_cast<double>(points);
+  return most < static_cast<double>(options.max_nodes) ? static_cast<std::size_t>(most)
+                                                       : options.max_nodes;
+}
+
 void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
   const double columns = (box.max_x - box.min_x) / spacing + 1;
   const double rows = (box.max_y - box.min_y) / spacing + 1;
@@ -347,7 +355,7 @@ HeightGrid make_grid(const std::vector<Vector3d>& points, const Box& box,
   if (options.method == InterpolationMethod::thesis) {
     result.area_m2 = box.area();
     const double spacing = result.grid_spacing_m = thesis_spacing(points.size(), box);
-    check_grid(box, spacing, options.max_nodes);
+    check_grid(box, spacing, most_nodes(points.size(), options));
     return {repeated_addition(box.min_x, box.max_x, spacing),
             repeated_addition(box.min_y, box.max_y, spacing), spacing};
   }
@@ -357,7 +365,7 @@ HeightGrid make_grid(const std::vector<Vector3d>& points, const Box& box,
                                               : 1 / std::sqrt(density * 5 / 3);  // eq. 3-5
   if (options.max_grid_spacing_m > 0) spacing = std::min(spacing, options.max_grid_spacing_m);
   result.grid_spacing_m = spacing;
-  check_grid(box, spacing, options.max_nodes);
+  check_grid(box, spacing, most_nodes(points.size(), options));
   return {lattice(box.min_x, box.max_x, spacing), lattice(box.min_y, box.max_y, spacing), spacing};
 }
 

@@ -28,6 +28,9 @@ struct InterpolationOptions {
   double area_cell_m = 0;
   // More nodes than this are an error: a pitch or a stray point that is wrong, not a terrain.
   std::size_t max_nodes = 100'000'000;
+  // So are more than this for each finite point, beyond the first million: a few points that lie
+  // far apart are none either.
+  std::size_t max_nodes_a_point = 100;
 };
 
 struct InterpolationResult {

@@ -158,7 +158,8 @@ DistanceStatistics distance_statistics(std::vector<double> distances_m) {
 
 std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
                                             std::uint64_t seed) {
-  constexpr double most = 1e8;
+  // Each takes some hundred bytes of those who work with them: many of a mesh that is large itself.
+  const double most = std::clamp(100.0 * static_cast<double>(mesh.triangles.size()), 4e6, 1e8);
   std::vector<double> area_before;
   double area = 0.0;
   for (const Triangle& triangle : mesh.triangles) {
@@ -173,7 +174,8 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
         {.file = {},
          .field = "samples",
          .value = to_text(per_m2) + " on each of " + to_text(static_cast<float>(area)) + " m2",
-         .bound = "<= 100000000 in all"});
+         .bound = "<= " + std::to_string(static_cast<std::size_t>(most)) + " in all for " +
+                  std::to_string(mesh.triangles.size()) + " triangles"});
   const auto count = static_cast<std::size_t>(wanted);
   std::mt19937_64 engine(seed);
   // Not a distribution of the standard library: those differ between libraries.

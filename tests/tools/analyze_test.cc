@@ -128,6 +128,21 @@ TEST(Analyze, PlacesFarFromTheOriginAreExact) {
   EXPECT_NEAR(regions.number(0, regions.column("y")), 5334567.215, 1e-3);
 }
 
+TEST(Analyze, VoxelsTooLargeForTheirDistances) {
+  std::string map = "x,y,z,score,graspable,edge\n";
+  for (const char* x : {"5e199", "2.5e200", "4.5e200"})
+    map += std::string(x) + ",5e199,5e199,0.5,1,0\n";
+  graspmap_test::write_text(scratch("map.csv"), map);
+  graspmap_test::write_text(
+      scratch("map.csv.json"),
+      R"({"made_by": "graspmap", "version": "0.1.0", "command": "score", "inputs": [],
+          "parameters": {"voxel_size_m": 1e200, "zero_plane_m": 0.0}, "frame": "terrain",
+          "transforms": {}, "results": {"lattice_origin_m": [0, 0, 0]}})");
+  EXPECT_TRUE(
+      bad_input(graspmap({"analyze", "map.csv", "-o", "out", "--no-pictures"}),
+                {"map.csv: voxel_size_m is 1e+200: out of range (must be 1e-100 to 1e+100)"}));
+}
+
 TEST(Analyze, BadInputIsSaidInOneLine) {
   write_terrain();
   EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "out"}),

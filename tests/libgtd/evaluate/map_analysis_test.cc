@@ -135,6 +135,25 @@ TEST(VoxelMap, LatticesThatAreNotFinite) {
   }
 }
 
+// Squares of their distances would not be numbers.
+TEST(VoxelMap, LatticesOutOfRange) {
+  PointCloud map = graded_floor();
+  for (const double size_m : {1e200, 1e-200}) {
+    const libmap::Error error = error_of([&] {
+      libgtd::voxel_map_of(map, {.lattice = libgtd::VoxelLattice{Eigen::Vector3d::Zero(), size_m}});
+    });
+    EXPECT_EQ(error.context().field, "voxel_size_m");
+    EXPECT_EQ(error.context().bound, "1e-100 to 1e+100");
+  }
+  const libmap::Error far = error_of([&] {
+    libgtd::voxel_map_of(map, {.lattice = libgtd::VoxelLattice{{0.0, -1e200, 0.0}, 0.01}});
+  });
+  EXPECT_EQ(far.context().field, "lattice_origin_m");
+  // As the fields i, j and k tell it.
+  for (Eigen::Vector3d& position : map.positions) position *= 1e150;
+  EXPECT_EQ(error_of([&] { libgtd::voxel_map_of(map); }).context().field, "voxel_size_m");
+}
+
 TEST(MapAnalysis, CountsAndAreasByHand) {
   PointCloud cloud = graded_floor();
   for (std::size_t n = 0; n < cloud.size(); ++n) {

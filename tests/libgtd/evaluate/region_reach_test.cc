@@ -274,6 +274,20 @@ TEST(RegionReach, OptionsOutOfBounds) {
             "the surface is of another map");
 }
 
+// Squares of their distances are infinite: no reach joins them.
+TEST(RegionReach, TooFarApartForDistances) {
+  VoxelMap map = map_of({{0, 0}, {4, 0}});
+  const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
+  map.lattice.voxel_size_m = 1e200;
+  const libmap::Error error = error_of([&] { libgtd::find_reach(map, regions); });
+  EXPECT_EQ(error.reason(), "the regions lie too far apart: their distances are no numbers");
+  EXPECT_EQ(error.context().field, "voxel_size_m");
+  map.lattice.voxel_size_m = 0.01;
+  const RegionReach reach =
+      libgtd::find_reach(map, regions, {.stride_m = std::numeric_limits<double>::max()});
+  EXPECT_EQ(reach.reachable_regions, 2U);
+}
+
 TEST(RegionReach, TooManyPairsWithinAStride) {
   std::vector<Patch> patches;
   for (int i = 0; i < 68; ++i)

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
@@ -318,6 +319,51 @@ TEST(Roc, BootstrapIsTheSameAtAnyThreadCountAndDiffersWithTheSeed) {
   EXPECT_NE(other.low, intervals.front().low);
   EXPECT_NEAR(other.low, intervals.front().low, 0.02);
   EXPECT_NEAR(other.high, intervals.front().high, 0.02);
+}
+
+// The bootstrap written down straight: the library's engine, and a draw a location.
+std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicates,
+                                   std::uint32_t seed) {
+  std::vector<double> positives, negatives;
+  for (std::size_t i = 0; i < sample.labels.size(); ++i)
+    if (sample.scores[i]) (*sample.labels[i] ? positives : negatives).push_back(*sample.scores[i]);
+  std::sort(positives.begin(), positives.end());
+  std::sort(negatives.begin(), negatives.end());
+  std::vector<double> areas;
+  for (std::uint32_t replicate = 0; replicate < replicates; ++replicate) {
+    std::seed_seq sequence{seed, 0U, replicate, 0U};
+    std::mt19937_64 engine(sequence);
+    const auto draw = [&](const std::vector<double>& of) {
+      std::vector<double> drawn;
+      for (std::size_t i = 0; i < of.size(); ++i) drawn.push_back(of[engine() % of.size()]);
+      return drawn;
+    };
+    const std::vector<double> drawn_positives = draw(positives);
+    const std::vector<double> drawn_negatives = draw(negatives);
+    std::uint64_t twice = 0;
+    for (const double p : drawn_positives)
+      for (const double n : drawn_negatives) twice += p > n ? 2U : p == n ? 1U : 0U;
+    areas.push_back(static_cast<double>(twice) / (2.0 * static_cast<double>(positives.size()) *
+                                                  static_cast<double>(negatives.size())));
+  }
+  std::sort(areas.begin(), areas.end());
+  return areas;
+}
+
+TEST(Roc, BootstrapIsTheDefinitionToTheBit) {
+  // Of 41 replicates the 0.025th and 0.975th part of the way are the second and the last but one.
+  constexpr std::uint64_t replicates = 41;
+  for (const std::size_t size : {2U, 3U, 77U, 900U}) {
+    const Sample sample = random_sample(size, 50);
+    RocOptions options;
+    options.bootstrap_replicates = replicates;
+    options.bootstrap_seed = 7;
+    const auto interval =
+        *evaluate_roc(sample.labels, sample.scores, options).area->trapezoid_bootstrap_95;
+    const std::vector<double> areas = slow_bootstrap(sample, replicates, 7);
+    EXPECT_EQ(interval.low, areas[1]) << size;
+    EXPECT_EQ(interval.high, areas[39]) << size;
+  }
 }
 
 TEST(Roc, BootstrapAgreesWithTheNormalApproximationOnManyLocations) {

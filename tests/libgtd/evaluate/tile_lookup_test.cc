@@ -189,6 +189,17 @@ TEST(TileLookupLoads, ThreadsChangeNothing) {
   for (std::size_t n = 0; n < points.size(); ++n) EXPECT_EQ(alone[n].values, many[n].values);
 }
 
+// By a transform that is none: nothing lies at a place that is no number.
+TEST(TileLookup, PlacesThatTheTransformLoses) {
+  const TiledMap map(MapFrame::input);
+  TileStoreIndex index = map.index();
+  index.manifest.transforms.front().second.linear().setConstant(1e308);
+  const std::vector<Eigen::Vector3d> points = {map.whole().positions[3], {10, -10, 10}};
+  const auto answers = libgtd::look_up_tiles(
+      index, [&](std::size_t tile) { return map.load(tile); }, points, {.max_distance_m = 1e9});
+  for (const LookupAnswer& answer : answers) EXPECT_FALSE(answer.found);
+}
+
 TEST(TileLookupErrors, MapsThatCannotBeAsked) {
   const TiledMap map;
   const std::vector<Eigen::Vector3d> points = {{0, 0, 0}};

@@ -50,6 +50,32 @@ TEST_P(ReferenceMask, EveryVoxelAgrees) {
   EXPECT_EQ(differences, 0);
 }
 
+// Few voxels in all, but more than an integer holds along one side.
+TEST(GripperMask, MeasuresFarApart) {
+  Gripper flat = gripper_named("scar-e");
+  flat.closing_height_mm = 1e-300;
+  flat.finger_length_mm = 1e30;
+  for (const auto& [name, method] : libgtd::method_names()) {
+    const libmap::Error error = graspmap_test::error_of([&, method = method] {
+      libgtd::make_gripper_mask(flat, {.method = method, .voxel_size_m = 0.01});
+    });
+    EXPECT_EQ(error.context().field, "voxel_size_m") << name;
+    EXPECT_NE(error.reason().find("e+29 voxels wide or high, more than 2^20"), std::string::npos)
+        << error.what();
+  }
+  // Its voxels a millimetre are infinite in single precision.
+  Gripper tiny = gripper_named("scar-e");
+  for (double* measure :
+       {&tiny.palm_diameter_mm, &tiny.finger_joint_diameter_mm, &tiny.finger_length_mm,
+        &tiny.spine_length_mm, &tiny.closing_height_mm, &tiny.opening_spine_radius_mm})
+    *measure = 1e-40;
+  for (const Method method : {Method::thesis, Method::envelope, Method::climblab}) {
+    const libmap::Error error = graspmap_test::error_of(
+        [&] { libgtd::make_gripper_mask(tiny, {.method = method, .voxel_size_m = 1e-44}); });
+    EXPECT_NE(error.reason().find("more than 2^20"), std::string::npos) << error.what();
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(All, ReferenceMask,
                          testing::Values(MaskCase{"gtd/mask.thesis.scar-e.10mm.txt", "scar-e", 85,
                                                   Method::thesis, 0.01, 1, false},

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <limits>
 
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
@@ -104,6 +105,39 @@ TEST(Footholds, AreThoseOfTheDefinition) {
   for (const Foothold& one : result.footholds) found.push_back(one.map_point);
   EXPECT_EQ(found, slow_footholds(map, 0.13));
   EXPECT_GT(found.size(), 20U);
+}
+
+// Several points in one place: the definition does not mind.
+TEST(Footholds, OfPointsInOnePlaceToo) {
+  PointCloud map = random_map();
+  std::vector<std::size_t> points(map.size());
+  for (std::size_t n = 0; n < points.size(); ++n) points[n] = n % 3 == 2 ? n / 300 : n;
+  map = libmap::select_points(map, points);
+  for (double& score : map.find_field("score")->values) score = std::round(uniform(8, 10)) / 10.0;
+  map.find_field("graspable")->values.assign(map.size(), 1.0);
+  const FootholdResult result = libgtd::find_footholds(map, {.separation_m = 0.13});
+  std::vector<std::size_t> found;
+  for (const Foothold& one : result.footholds) found.push_back(one.map_point);
+  EXPECT_EQ(found, slow_footholds(map, 0.13));
+}
+
+TEST(Footholds, ScoresThatAreNotFinite) {
+  PointCloud map = random_map();
+  std::vector<double>& scores = map.find_field("score")->values;
+  for (std::size_t n = 0; n < map.size(); n += 7)
+    scores[n] = n % 2 == 0 ? NAN : std::numeric_limits<double>::infinity();
+  const FootholdResult result = libgtd::find_footholds(map, {.separation_m = 0.005});
+  EXPECT_GT(result.footholds.size(), 1000U);
+  for (const Foothold& one : result.footholds) {
+    EXPECT_TRUE(std::isfinite(one.score));
+    EXPECT_TRUE(std::isfinite(one.mean_score));
+  }
+  // The square of the separation is nothing.
+  map = libmap::select_points(map, {1});
+  map.positions[0].setZero();
+  const auto alone = libgtd::find_footholds(map, {.separation_m = 1e-200, .graspable_only = false});
+  ASSERT_EQ(alone.footholds.size(), 1U);
+  EXPECT_EQ(alone.footholds[0].mean_score, alone.footholds[0].score);
 }
 
 TEST(Footholds, OptionsLeaveOut) {

@@ -153,6 +153,35 @@ TEST(TileProgress, PlanOfAnotherVersion) {
   EXPECT_EQ(error.context().bound, "\"graspmap tile store progress\", 1");
 }
 
+TEST(TileProgress, ABoxThatIsNone) {
+  const TileProgress progress(scratch_folder() / "m.tiles");
+  progress.open();
+  TilePlan plan = small_plan();
+  plan.pieces[0].points = 5;
+  progress.set_plan(plan);
+  EXPECT_TRUE(progress.plan());
+  plan.pieces[0].box.min.y() = 1.0;
+  progress.set_plan(plan);
+  const libmap::Error error = error_of([&] { progress.plan(); });
+  EXPECT_EQ(error.context().field, "min and max of piece a b.pcd");
+  EXPECT_EQ(error.context().bound, "min <= max");
+}
+
+// Lines of a journal that no run writes do not count.
+TEST(TileProgress, TilesThatCannotBe) {
+  const fs::path store = scratch_folder() / "m.tiles";
+  const TileProgress progress(store);
+  progress.open();
+  const TilePlan plan = small_plan();
+  progress.set_plan(plan);
+  StoredTile elsewhere = tile(0, 0, 0);
+  elsewhere.file = "../../x";
+  StoredTile many = tile(0, 1, 5);
+  many.occupied_voxels = ~std::uint64_t{0} / 2;
+  libgtd::TileJournal(store, {1, 1}, "key").add({elsewhere, many, tile(-1, 0, 3), tile(5, 5, 1)});
+  EXPECT_EQ(progress.complete(plan).done, 1u);
+}
+
 // Each change of a good index is refused in one line that names the file and what is wrong.
 TEST(TileStore, HostileIndex) {
   const fs::path store = scratch_folder() / "m.tiles";
@@ -184,6 +213,13 @@ TEST(TileStore, HostileIndex) {
   expect_error("\"i\": 0", "\"i\": -1", "tile");
   expect_error("\"i\": 0", "\"i\": 1e300", "i is 1e+300");
   expect_error("\"j\": 0", "\"j\": 214748364", "number of a tile is 214748364");
+  expect_error("\"min\": [\n  -9", "\"min\": [\n  10", "min is [10,2,-3]: out of range");
+  expect_error("\"max\": [\n  9", "\"max\": [\n  -5", "number of a tile is 0, 0");
+  expect_error("\"voxels\": 3", "\"voxels\": 0", "file of tile -1, 0 is tiles/-1_0.pcd");
+  for (const char* count : {"voxels", "occupied_voxels", "edge_voxels", "graspable_voxels"}) {
+    const std::string key = "\"" + std::string(count) + "\": ";
+    expect_error(key, key + "1844674407370955161", std::string(count) + " is 1844674407370955161");
+  }
   expect_error("\"map\": {",
                "\"map\": {\"a\": " + std::string(1000, '[') + std::string(1000, ']') + ",",
                "nested deeper than 64 levels");
@@ -191,6 +227,11 @@ TEST(TileStore, HostileIndex) {
     write_text(store / "index.json", text.substr(0, size));
     error_of([&] { libgtd::read_tile_store(store); });
   }
+  good.tiles = {tile(-1, 0, 3), tile(0, 0, 0)};
+  progress.write_index(good, good.manifest);
+  const libmap::Error empty = error_of([&] { libgtd::read_tile_store(store); });
+  EXPECT_EQ(empty.reason(), "lists a tile without voxels");
+  EXPECT_EQ(empty.context().value, "0, 0");
   for (const std::vector<StoredTile>& tiles :
        {std::vector{tile(0, 0, 7), tile(-1, 0, 3)}, std::vector{tile(0, 0, 7), tile(0, 0, 7)}}) {
     good.tiles = tiles;

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 
+#include "libgtd/streamed_detection.h"
 #include "libmap/core/parallel.h"
 #include "tests/libgtd/score/score_test_support.h"
 
@@ -129,6 +130,71 @@ TEST(Edges, AgreeWithThePlainClosing) {
   }
   EXPECT_GT(flagged, 100U);
   EXPECT_LT(flagged, pivots.size() - 100);
+}
+
+// Of a tile that is far wider than its ground, as of one table over all of it.
+TEST(Edges, OfAWideTileWithLittleGround) {
+  std::vector<Voxel> voxels;
+  for (const Voxel& corner : {Voxel{0, 0, 0}, Voxel{2000, 5, 0}, Voxel{1010, 1015, 0}})
+    for (int i = 0; i < 40; ++i)
+      for (int j = 0; j < 40; ++j)
+        if (graspmap_test::uniform(0, 1) < 0.7)
+          voxels.push_back({corner.i + i, corner.j + j, corner.k});
+  const VoxelGrid grid = grid_of(voxels);
+  const GripperMask mask = make_gripper_mask(gripper_named("scar-e"), {Method::corrected, 0.02, 1});
+  const TileBounds box = graspmap_test::whole_box(grid);
+  const auto pivots = pivots_in(grid, mask, box);
+  const auto edges = find_edges(grid, mask, box, pivots);
+  const ColumnSums unscanned =
+      unscanned_columns(grid, grown(box, mask.pivot_xy, mask.side - mask.pivot_xy - 1));
+  ASSERT_EQ(edges.size(), pivots.size());
+  std::size_t flagged = 0;
+  for (std::size_t n = 0; n < pivots.size(); ++n) {
+    const Voxel& pivot = grid.voxels[pivots[n]];
+    const auto window =
+        columns_around(pivot.i, pivot.j, mask.pivot_xy, mask.side - mask.pivot_xy - 1);
+    EXPECT_EQ(edges[n] != 0, unscanned.count(window) != 0);
+    flagged += edges[n];
+  }
+  EXPECT_GT(flagged, 100U);
+  EXPECT_LT(flagged, pivots.size() - 100);
+}
+
+TEST(StoredTiles, TooManyAreAnError) {
+  TerrainFrame frame;
+  frame.max = {1023, 1023, 0};
+  EXPECT_EQ(tiles_of(frame, 1).size(), std::size_t{1} << 20U);
+  frame.max.j = 1024;
+  const libmap::Error error = graspmap_test::error_of([&] { tiles_of(frame, 1); });
+  EXPECT_EQ(error.context().field, "tile_size_m");
+  EXPECT_EQ(error.reason(), "too small: the tile store would have 1049600 tiles");
+}
+
+class NoPoints : public NearbyPoints {
+ public:
+  libmap::PointCloud points_in(const Eigen::Vector2d&, const Eigen::Vector2d&) const override {
+    return {};
+  }
+  std::size_t count_in(const Eigen::Vector2d&, const Eigen::Vector2d&) const override { return 0; }
+};
+
+// However few points they have, tiles are worked on in parts.
+TEST(StoredTiles, NotAllAtOnce) {
+  TerrainFrame frame;
+  frame.max = {14999, 14999, 0};
+  DetectionOptions options;
+  options.gripper = gripper_named("scar-e");
+  const std::vector<TileNumber> wanted = tiles_of(frame, 100);
+  ASSERT_EQ(wanted.size(), 22500U);
+  std::vector<TileNumber> visited;
+  std::size_t most = 0;
+  detect_streamed(frame, NoPoints(), wanted, options, [&](std::vector<StreamedTile> tiles) {
+    most = std::max(most, tiles.size());
+    for (const StreamedTile& tile : tiles) visited.push_back(tile.number);
+  });
+  std::sort(visited.begin(), visited.end());
+  EXPECT_EQ(visited, wanted);
+  EXPECT_LE(most, 16384U);
 }
 
 }  // namespace

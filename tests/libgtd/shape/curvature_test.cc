@@ -256,6 +256,29 @@ TEST(Curvature, DuplicatesOfAllPointsChangeNothing) {
   EXPECT_NEAR(once.k2, often.k2, 1e-5);
 }
 
+// Each by itself knows of no other in its place.
+TEST(Curvature, OfManyPointsInOnePlaceEachAsByItself) {
+  PointCloud places = surface(200, 0.2, [](double x, double y) { return x * x - 2 * x * y; });
+  PointCloud cloud;
+  for (std::size_t n = 0; n < 800; ++n) {
+    cloud.positions.push_back(places.positions[n < 400 ? n / 2 : n % 200]);
+    const float side = n % 3 == 0 ? -1.0F : 1.0F;
+    cloud.normals.emplace_back(0.0F, n % 7 == 0 ? side : 0.0F, n % 7 == 0 ? 0.0F : side);
+  }
+  cloud.positions[5] = Vector3d(0.0, -0.0, 0.0);
+  cloud.positions[6] = Vector3d(0.0, 0.0, 0.0);
+  const CurvatureResult together = estimate_curvature(cloud, within(0.09));
+  EXPECT_GT(together.valid_count, 500U);
+  for (std::size_t n = 0; n < cloud.size(); ++n) {
+    const Curvature alone = estimate_curvature(cloud, within(0.09), std::vector{n}).points.at(0);
+    ASSERT_EQ(together.points[n].valid, alone.valid) << n;
+    if (!alone.valid) continue;
+    ASSERT_EQ(together.points[n].k1, alone.k1) << n;
+    ASSERT_EQ(together.points[n].k2, alone.k2) << n;
+    ASSERT_EQ(together.points[n].normal, alone.normal) << n;
+  }
+}
+
 void expect_no_value(const PointCloud& cloud, const CurvatureOptions& options) {
   const CurvatureResult result = estimate_curvature(cloud, options);
   EXPECT_EQ(result.valid_count, 0u);

@@ -79,6 +79,23 @@ TEST(ThesisCurvature, IsPclsOwnOnARegularGrid) {
   expect_pcls_own(cloud, 0.0625);
 }
 
+// All squared distances are nothing against that of the radius.
+TEST(ThesisCurvature, IsPclsOwnWhereTheRadiusIsFarLargerThanTheCloud) {
+  libmap::PointCloud cloud = random_surface(150);
+  for (int i = 0; i < 7; ++i)
+    for (int j = 0; j < 7; ++j) cloud.positions.emplace_back(i / 8.0, j / 8.0, 0.25);
+  expect_pcls_own(cloud, 100.0);
+}
+
+// A few places with many points each, one after the other and mixed.
+TEST(ThesisCurvature, IsPclsOwnOfManyPointsInFewPlaces) {
+  libmap::PointCloud places = random_surface(60);
+  libmap::PointCloud cloud;
+  for (std::size_t n = 0; n < 600; ++n)
+    cloud.positions.push_back(places.positions[n < 300 ? n / 5 : n % 60]);
+  expect_pcls_own(cloud, 0.3);
+}
+
 TEST(ThesisCurvature, IsPclsOwnOnClimbingHolds) {
   GRASPMAP_REQUIRE_DATA();
   const auto file = graspmap_test::data_folder() / "clouds" / "leaning_bouldering_holds.pcd";

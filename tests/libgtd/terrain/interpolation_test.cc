@@ -363,6 +363,19 @@ TEST(InterpolationErrors, TooManyNodesOrTooFarAway) {
   EXPECT_THAT(error_of([&] { interpolate(cloud, spacing(10)); }).what(), HasSubstr("origin"));
 }
 
+// Four points 89 m apart asked for a node in each voxel of 1 cm.
+TEST(InterpolationErrors, TooManyNodesForSoFewPoints) {
+  PointCloud cloud;
+  cloud.positions = {{0, 0, 0}, {89, 0, 0}, {0, 89, 0.5}, {89, 89, 0}};
+  InterpolationOptions options;
+  options.max_grid_spacing_m = 0.009;
+  const libmap::Error error = error_of([&] { interpolate(cloud, options); });
+  EXPECT_EQ(error.reason(), "the grid would have too many nodes");
+  EXPECT_EQ(error.context().bound, "at most 1000400 nodes over the points' x and y");
+  options.max_nodes = 5000;
+  EXPECT_THAT(error_of([&] { interpolate(cloud, options); }).what(), HasSubstr("at most 5000"));
+}
+
 TEST(Interpolation, SlopesSceneHasThePitchOfEquation3_5) {
   GRASPMAP_REQUIRE_DATA();
   const auto path = graspmap_test::data_folder() / "clouds" / "simulated_cloud_pre-scan.pcd";

@@ -385,6 +385,12 @@ TEST(PoissonDisk, BadInput) {
     EXPECT_EQ(error_of([&] { by_radius(mesh, radius); }).context().field, "radius_m");
   EXPECT_EQ(error_of([&] { by_radius(mesh, 1e-7); }).context().field, "radius_m");
   EXPECT_EQ(error_of([&] { by_count(mesh, 100000001); }).context().field, "count");
+  // A few large triangles.
+  TriangleMesh wide = mesh;
+  for (Eigen::Vector3d& vertex : wide.vertices) vertex *= 10.0;
+  const Error many = error_of([&] { by_radius(wide, 0.005); });
+  EXPECT_EQ(many.reason(), "too many samples");
+  EXPECT_EQ(many.context().field, "radius_m");
 
   const auto reason = [](const TriangleMesh& bad) {
     return error_of([&] { by_radius(bad, 0.1); }).reason();

@@ -152,6 +152,21 @@ TEST(SurfaceDistance, SamplesAreSpreadByArea) {
   EXPECT_THAT(error_of([&] { sample_surface(mesh, 10, 1); }).what(), HasSubstr("no area"));
 }
 
+// A few large triangles do not ask for what memory does not hold; a large mesh may have more.
+TEST(SurfaceDistance, SamplesOfFewTriangles) {
+  TriangleMesh mesh = unit_square();
+  for (Eigen::Vector3d& vertex : mesh.vertices) vertex *= 60.0;
+  const auto bound_of = [&] {
+    return error_of([&] { sample_triangles(mesh, 1e9, 1); }).context().bound;
+  };
+  EXPECT_THAT(error_of([&] { sample_triangles(mesh, 20000, 1); }).what(), HasSubstr("too many"));
+  EXPECT_EQ(bound_of(), "<= 4000000 in all for 2 triangles");
+  mesh.triangles.resize(50000, mesh.triangles.front());
+  EXPECT_EQ(bound_of(), "<= 5000000 in all for 50000 triangles");
+  mesh.triangles.resize(1500000, mesh.triangles.front());
+  EXPECT_EQ(bound_of(), "<= 100000000 in all for 1500000 triangles");
+}
+
 TEST(SurfaceDistance, CoverageAgreesWithASearchOfAllPoints) {
   std::vector<Eigen::Vector3d> samples;
   std::vector<Eigen::Vector3d> points;

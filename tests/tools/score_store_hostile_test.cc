@@ -1,0 +1,129 @@
+// What `graspmap score` makes of a store whose plan was changed by hand, and of tiles without end.
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+
+#include "libgtd/score/tile_store_io.h"
+#include "tests/tools/tool_test_support.h"
+#include "tools/needed_tiles.h"
+
+namespace {
+
+namespace fs = std::filesystem;
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::ProgramResult;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using graspmap_test::uniform;
+using graspmap_test::write_text;
+using graspmap_tools::NeededTiles;
+using libgtd::TileNumber;
+using Words = std::vector<std::string>;
+
+TEST(NeededTiles, AreThoseOfTheDefinition) {
+  for (const int reach : {0, 1, 3, 20}) {
+    std::vector<TileNumber> wanted;
+    for (int n = 0; n < 4; ++n)
+      wanted.push_back({static_cast<int>(uniform(-7, 9)), static_cast<int>(uniform(-3, 12))});
+    const NeededTiles needed({-7, -3}, {9, 12}, reach, wanted);
+    const auto is_needed = [&](const TileNumber& tile) {
+      return std::any_of(wanted.begin(), wanted.end(), [&](const TileNumber& one) {
+        return std::abs(one.i - tile.i) <= reach && std::abs(one.j - tile.j) <= reach;
+      });
+    };
+    for (int i = -40; i < 40; ++i)
+      for (int j = -40; j < 40; ++j) {
+        EXPECT_EQ(needed.hold({i, j}), is_needed({i, j})) << i << ' ' << j << ' ' << reach;
+        EXPECT_EQ(needed.hold_any({i, j}, {i + 1, j + 2}),
+                  is_needed({i, j}) || is_needed({i, j + 1}) || is_needed({i, j + 2}) ||
+                      is_needed({i + 1, j}) || is_needed({i + 1, j + 1}) ||
+                      is_needed({i + 1, j + 2}));
+      }
+  }
+  const NeededTiles all({0, 0}, {1, 1}, 1 << 28, {{0, 0}});
+  EXPECT_TRUE(all.hold({1 << 28, -(1 << 28)}));
+  EXPECT_FALSE(all.hold({1 << 29, 0}));
+}
+
+TEST(NeededTiles, BoxesThatReachAnywhere) {
+  const libgtd::VoxelLattice lattice;
+  EXPECT_EQ(graspmap_tools::tile_near(lattice, {0.095, -0.005, 1e300}, 10), (TileNumber{0, -1}));
+  const int farthest = 1 << 29;
+  EXPECT_EQ(graspmap_tools::tile_near(lattice, {1e300, -1e300, 0}, 1),
+            (TileNumber{farthest, -farthest}));
+  EXPECT_EQ(graspmap_tools::tile_near(lattice, {INFINITY, std::nan(""), 0}, 1),
+            (TileNumber{farthest, -farthest}));
+}
+
+class ScoreStoreHostile : public testing::Test {
+ protected:
+  void SetUp() override {
+    graspmap_test::write_terrain();
+    ASSERT_TRUE(succeeded(score()));
+  }
+
+  static ProgramResult score(const Words& more = {}) {
+    Words words = {"score",        "terrain.pcd", "-o",          "m.tiles",
+                   "--zero-plane", "-0.1",        "--tile-size", "0.2"};
+    words.insert(words.end(), more.begin(), more.end());
+    return graspmap(words);
+  }
+
+  // Loses a tile, and changes the plan.
+  static void change_plan(const std::function<void(nlohmann::json& plan)>& change) {
+    const libgtd::TileStoreIndex index = libgtd::read_tile_store(scratch("m.tiles"));
+    fs::remove(scratch("m.tiles") / index.tiles[4].file);
+    nlohmann::json plan = nlohmann::json::parse(content("m.tiles/progress/plan.json"));
+    change(plan);
+    write_text(scratch("m.tiles/progress/plan.json"), plan.dump());
+  }
+};
+
+TEST_F(ScoreStoreHostile, ABoxThatReachesAnywhere) {
+  const std::string file = libgtd::read_tile_store(scratch("m.tiles")).tiles[4].file;
+  const std::string tile = content("m.tiles/" + file);
+  change_plan([](nlohmann::json& plan) {
+    plan.at("pieces").at(0).at("min") = {-1e300, -1e300, -1e300};
+    plan.at("pieces").at(0).at("max") = {1e300, 1e300, 1e300};
+  });
+  ASSERT_TRUE(succeeded(score()));
+  EXPECT_TRUE(content("m.tiles/" + file) == tile);
+}
+
+TEST_F(ScoreStoreHostile, APlanOfOtherTiles) {
+  const auto expect_refused = [](const std::function<void(nlohmann::json & index)>& change) {
+    const std::string plan = content("m.tiles/progress/plan.json");
+    change_plan([&](nlohmann::json& json) { change(json.at("index")); });
+    EXPECT_TRUE(bad_input(
+        score(), {"m.tiles/progress/plan.json: tile_voxels and lattice", "--force begins anew"}));
+    write_text(scratch("m.tiles/progress/plan.json"), plan);
+  };
+  expect_refused([](nlohmann::json& index) { index.at("tile_voxels") = 21; });
+  expect_refused([](nlohmann::json& index) { index.at("lattice").at("voxel_size_m") = 1e-300; });
+  expect_refused([](nlohmann::json& index) { index.at("lattice").at("origin_m").at(0) = 1e300; });
+}
+
+TEST_F(ScoreStoreHostile, APlanOfAnotherPlace) {
+  change_plan([](nlohmann::json& plan) {
+    nlohmann::json& x_m = plan.at("plane_centroid_m").at(0);
+    x_m = x_m.get<double>() + 0.1;
+  });
+  EXPECT_TRUE(bad_input(score(), {"m.tiles/progress/plan.json: min and max"}));
+}
+
+TEST(ScoreStoreTiles, TooManyLeaveNothingBehind) {
+  write_text(scratch("far.csv"), "x,y,z\n0,0,0\n4000,0,0\n0,4000,0.5\n");
+  const Words before = graspmap_test::names_in_scratch();
+  EXPECT_TRUE(bad_input(graspmap({"score", "far.csv", "--plane", "none", "-o", "m.tiles"}),
+                        {"far.csv: tile_size_m is 1: too small: the tile store would have "
+                         "16008001 tiles"}));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), before);
+}
+
+}  // namespace
