@@ -27,6 +27,20 @@ struct PointList {
 using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, PointList>,
                                                  PointList, 3, std::size_t>;
 
+// The nearest point, the first of them found. At no distance nothing is nearer: without a stop
+// there, a search among points in one place would go through all of them.
+struct NearestPoint {
+  NeighborPoint neighbor{0, std::numeric_limits<double>::infinity()};
+
+  bool full() const { return true; }
+  double worstDist() const { return neighbor.square_m2; }
+  // Whether to search on.
+  bool addPoint(double square_m2, std::size_t index) {
+    if (square_m2 < neighbor.square_m2) neighbor = {index, square_m2};
+    return neighbor.square_m2 > 0.0;
+  }
+};
+
 }  // namespace
 
 struct PointTree::Index {
@@ -54,9 +68,9 @@ std::vector<NeighborPoint> PointTree::nearest(const Eigen::Vector3d& point,
 }
 
 NeighborPoint PointTree::nearest(const Eigen::Vector3d& point) const {
-  NeighborPoint neighbor{0, std::numeric_limits<double>::infinity()};
-  index_->tree.knnSearch(point.data(), 1, &neighbor.index, &neighbor.square_m2);
-  return neighbor;
+  NearestPoint result;
+  index_->tree.findNeighbors(result, point.data(), nanoflann::SearchParams());
+  return result.neighbor;
 }
 
 std::vector<NeighborPoint> PointTree::within(const Eigen::Vector3d& point, double radius_m) const {

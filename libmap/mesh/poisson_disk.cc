@@ -56,7 +56,7 @@ void require_sense(const SampledSurface& surface, const PoissonDiskOptions& opti
   // By a radius that is small against the mesh, a small file asks for as many as a large one: not
   // more than some for each triangle.
   const double most =
-      std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 4e6, most_samples);
+      std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 2.5e6, most_samples);
   const double least = std::sqrt(saturation_density * surface.area_m2 / most);
   if (!(options.radius_m >= least))
     throw Error("too many samples", {.file = {},

@@ -45,7 +45,8 @@ struct PoissonDiskResult {
 // smaller and smaller triangles until a disc covers each (after Ebeida et al. 2012). The same bytes
 // for any number of threads; `count` of less than 100 is met exactly, where some radius yields it.
 // Throws Error: options out of their ranges, a mesh without area or with a vertex that is not
-// finite, a radius or a count that asks for more than 10^8 samples.
+// finite, a count of more than 10^8 samples, or a radius that asks for more than 100 a triangle
+// or 2.5 million, whichever is more, or than 10^8.
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
                                       Progress& progress = no_progress());
 

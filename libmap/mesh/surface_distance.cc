@@ -159,7 +159,7 @@ DistanceStatistics distance_statistics(std::vector<double> distances_m) {
 std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
                                             std::uint64_t seed) {
   // Each takes some hundred bytes of those who work with them: many of a mesh that is large itself.
-  const double most = std::clamp(100.0 * static_cast<double>(mesh.triangles.size()), 4e6, 1e8);
+  const double most = std::clamp(100.0 * static_cast<double>(mesh.triangles.size()), 2.5e6, 1e8);
   std::vector<double> area_before;
   double area = 0.0;
   for (const Triangle& triangle : mesh.triangles) {

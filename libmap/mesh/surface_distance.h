@@ -57,7 +57,8 @@ struct DistanceStatistics {
 DistanceStatistics distance_statistics(std::vector<double> distances_m);
 
 // Points of the surface, `per_m2` on each square metre on the mean, drawn with `seed`: the same for
-// any number of threads. Throws Error if the mesh has no area or more than 10^8 were asked for.
+// any number of threads. Throws Error if the mesh has no area, or if more were asked for than 100 a
+// triangle or 2.5 million, whichever is more, or than 10^8.
 std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,
                                             std::uint64_t seed);
 std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2,

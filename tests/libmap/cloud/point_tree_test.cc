@@ -42,6 +42,25 @@ TEST(PointTree, AgreesWithASearchOfAllPoints) {
   }
 }
 
+// Where several lie at the same distance, and at none, the search for one finds the first of those
+// that the search for a list finds.
+TEST(PointTree, TheNearestAmongPointsInOnePlace) {
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 600; ++n)
+    points.emplace_back(0.25 * (n % 4), 0.25 * (n / 4 % 3), n < 300 ? 0.0 : 0.5);
+  const PointTree tree(points);
+  std::vector<Eigen::Vector3d> places = random_points(50);
+  places.insert(places.end(), points.begin(), points.end());
+  places.emplace_back(0.125, 0.125, 0.25);
+  for (const Eigen::Vector3d& at : places) {
+    const NeighborPoint one = tree.nearest(at);
+    const std::vector<NeighborPoint> list = tree.nearest(at, 1);
+    ASSERT_EQ(list.size(), 1U);
+    EXPECT_EQ(one.index, list[0].index);
+    EXPECT_EQ(one.square_m2, list[0].square_m2);
+  }
+}
+
 TEST(PointTree, AsksForMoreThanThereIs) {
   const std::vector<Eigen::Vector3d> points = {{0, 0, 0}, {1, 0, 0}};
   EXPECT_EQ(PointTree(points).nearest({0.2, 0, 0}, 9).size(), 2U);

@@ -160,7 +160,7 @@ TEST(SurfaceDistance, SamplesOfFewTriangles) {
     return error_of([&] { sample_triangles(mesh, 1e9, 1); }).context().bound;
   };
   EXPECT_THAT(error_of([&] { sample_triangles(mesh, 20000, 1); }).what(), HasSubstr("too many"));
-  EXPECT_EQ(bound_of(), "<= 4000000 in all for 2 triangles");
+  EXPECT_EQ(bound_of(), "<= 2500000 in all for 2 triangles");
   mesh.triangles.resize(50000, mesh.triangles.front());
   EXPECT_EQ(bound_of(), "<= 5000000 in all for 50000 triangles");
   mesh.triangles.resize(1500000, mesh.triangles.front());
