@@ -100,6 +100,7 @@ void add_curves(const libmap::Table& table, const ChartOptions& options, const s
   std::vector<std::size_t> series;
   for (const std::string& name : libmap::split_list(options.series))
     series.push_back(table.column(name));
+  const std::string& asked = options.series.empty() ? options.y : options.series;
   std::vector<std::string> names;
   std::map<std::string, std::size_t> places;  // in `names`
   std::vector<std::vector<std::pair<double, double>>> points;
@@ -109,11 +110,11 @@ void add_curves(const libmap::Table& table, const ChartOptions& options, const s
     if (!x || !value) continue;
     const auto [at, is_new] = places.emplace(series_of(table, row, series), names.size());
     if (is_new) {
-      if (names.size() == most_curves)
+      if (chart.curves.size() + names.size() == most_curves)
         throw libmap::Error("makes more curves than a chart can show",
                             {.file = table.file,
-                             .field = "--series",
-                             .value = options.series,
+                             .field = options.series.empty() ? "--y" : "--series",
+                             .value = asked.substr(0, 80),
                              .bound = "<= " + std::to_string(most_curves)});
       names.push_back(at->first);
       points.emplace_back();

@@ -3,7 +3,10 @@
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
+#include <map>
 #include <sstream>
+#include <utility>
+#include <vector>
 
 #include "libmap/core/error.h"
 
@@ -14,33 +17,52 @@ namespace {
 // A node of yaml-cpp takes some 250 bytes, a comma and a letter of the file two.
 constexpr std::size_t max_nodes = 500'000;
 
-// Counts nodes, and keeps none.
+// Counts nodes, and keeps none. An alias counts as all that it stands for: who reads the document
+// walks through it each time.
 class NodeCount : public YAML::EventHandler {
  public:
-  void OnDocumentStart(const YAML::Mark&) override {}
+  void OnDocumentStart(const YAML::Mark&) override { sizes_.clear(); }
   void OnDocumentEnd() override {}
-  void OnNull(const YAML::Mark&, YAML::anchor_t) override { add(); }
-  void OnAlias(const YAML::Mark&, YAML::anchor_t) override { add(); }
-  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t,
+  void OnNull(const YAML::Mark&, YAML::anchor_t anchor) override { leaf(anchor); }
+  void OnAlias(const YAML::Mark&, YAML::anchor_t anchor) override { add(sizes_[anchor]); }
+  void OnScalar(const YAML::Mark&, const std::string&, YAML::anchor_t anchor,
                 const std::string&) override {
-    add();
+    leaf(anchor);
   }
-  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+  void OnSequenceStart(const YAML::Mark&, const std::string&, YAML::anchor_t anchor,
                        YAML::EmitterStyle::value) override {
-    add();
+    open(anchor);
   }
-  void OnSequenceEnd() override {}
-  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t,
+  void OnSequenceEnd() override { close(); }
+  void OnMapStart(const YAML::Mark&, const std::string&, YAML::anchor_t anchor,
                   YAML::EmitterStyle::value) override {
-    add();
+    open(anchor);
   }
-  void OnMapEnd() override {}
+  void OnMapEnd() override { close(); }
 
  private:
-  void add() {
-    if (++count_ > max_nodes) throw Error("holds more than 500000 values");
+  void add(std::size_t nodes) {
+    count_ += nodes;
+    if (count_ > max_nodes) throw Error("holds more than 500000 values");
   }
+  void leaf(YAML::anchor_t anchor) {
+    add(1);
+    sizes_[anchor] = 1;
+  }
+  void open(YAML::anchor_t anchor) {
+    open_.emplace_back(anchor, count_);
+    // Within itself: yaml-cpp makes a circle of it, through which a reader would walk without end.
+    sizes_[anchor] = max_nodes;
+    add(1);
+  }
+  void close() {
+    sizes_[open_.back().first] = count_ - open_.back().second;
+    open_.pop_back();
+  }
+
   std::size_t count_ = 0;
+  std::map<YAML::anchor_t, std::size_t> sizes_;
+  std::vector<std::pair<YAML::anchor_t, std::size_t>> open_;  // anchors, and the count before
 };
 
 // YAML::LoadAll would take memory without end where something stands that belongs to no document:

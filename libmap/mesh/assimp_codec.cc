@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
 #include <memory>
 #include <new>
 #include <numeric>
@@ -21,6 +22,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/text.h"
 #include "libmap/mesh/guarded_model.h"
 
 namespace libmap {
@@ -318,7 +320,9 @@ std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial&
     aiString path;
     if (material.GetTexture(type, 0, &path) != aiReturn_SUCCESS) continue;
     const aiTexture* const embedded = scene.GetEmbeddedTexture(path.C_Str());
-    if (embedded == nullptr) return TexturePicture{{}, path.C_Str()};
+    // However it is named, a picture is read once.
+    if (embedded == nullptr)
+      return TexturePicture{{}, std::filesystem::path(path.C_Str()).lexically_normal().string()};
     // Compressed pictures have no height; their width counts bytes.
     if (embedded->mHeight != 0) continue;
     return TexturePicture{
@@ -421,6 +425,18 @@ DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std
   const auto read = [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); };
   return decode_guarded(std::filesystem::file_size(path),
                         [&] { return decode(format, read, model_of); });
+}
+
+void require_single_precision(const TriangleMesh& mesh, const std::string& format) {
+  constexpr auto most = static_cast<double>(std::numeric_limits<float>::max());
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+    const double farthest = mesh.vertices[n].cwiseAbs().maxCoeff();
+    if (!(farthest <= most))
+      throw Error("too far away for " + format, {.file = {},
+                                                 .field = "vertex " + std::to_string(n),
+                                                 .value = to_text(farthest) + " m",
+                                                 .bound = "<= " + to_text(most)});
+  }
 }
 
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {

@@ -2,11 +2,14 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstdint>
 #include <functional>
 #include <numbers>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_cutting.h"
@@ -22,6 +25,7 @@ using Eigen::Vector3d;
 
 constexpr double ground_samples = 100000.0;  // of a mesh
 constexpr double most_view_samples = 4e6;
+constexpr double most_side_samples = 2e6;  // of few triangles
 
 Pose turn_about(const Vector2d& place, double yaw_deg) {
   const Vector3d pivot(place.x(), place.y(), 0.0);
@@ -210,36 +214,82 @@ Error nothing_inside(const std::vector<Vector3d>& positions, const char* what) {
                text(bounds.min) + " to " + text(bounds.max));
 }
 
+// A triangle seen from above, by its first corner and the sides to the two others.
+struct FlatTriangle {
+  Vector2d a, ab, ac;
+
+  double length() const { return ab.norm() + ac.norm() + (ac - ab).norm(); }
+  // Where it begins and ends along x at the height `y` over its first corner.
+  std::array<double, 2> reach_at(double y) const {
+    std::array<double, 2> reach = {HUGE_VAL, -HUGE_VAL};
+    const std::array<Vector2d, 3> corners = {Vector2d::Zero(), ab, ac};
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vector2d& p = corners[k];
+      const Vector2d& q = corners[(k + 1) % 3];
+      if (y < std::min(p.y(), q.y()) || y > std::max(p.y(), q.y())) continue;
+      const double share = p.y() == q.y() ? 0.0 : (y - p.y()) / (q.y() - p.y());
+      const double x = p.x() + share * (q.x() - p.x());
+      reach = {std::min(reach[0], x), std::max(reach[1], x)};
+    }
+    return reach;
+  }
+};
+
+FlatTriangle flat(const TriangleMesh& mesh, const Triangle& corners) {
+  const Vector2d a = mesh.vertices[corners[0]].head<2>();
+  return {a, mesh.vertices[corners[1]].head<2>() - a, mesh.vertices[corners[2]].head<2>() - a};
+}
+
+void view_sides(const FlatTriangle& triangle, std::uint32_t n, double cell,
+                std::vector<TrianglePoint>& samples) {
+  const auto sides = [&](double length) { return std::clamp(std::ceil(length / cell), 1.0, 1e6); };
+  const double on_ab = sides(triangle.ab.norm());
+  const double on_ac = sides(triangle.ac.norm());
+  const double on_bc = sides((triangle.ac - triangle.ab).norm());
+  for (double k = 0.0; k < on_ab; ++k) samples.push_back({n, k / on_ab, 0.0});
+  for (double k = 0.0; k < on_bc; ++k) samples.push_back({n, 1.0 - k / on_bc, k / on_bc});
+  for (double k = 0.0; k < on_ac; ++k) samples.push_back({n, 0.0, 1.0 - k / on_ac});
+}
+
+// Row by row, and in each only where the triangle is: one aslant fills little of its box. Steps are
+// counted from its corner, since far from the origin a step may not change a coordinate.
+void view_inside(const FlatTriangle& triangle, std::uint32_t n, double cell,
+                 std::vector<TrianglePoint>& samples) {
+  const auto& [a, ab, ac] = triangle;
+  const double twice = ab.x() * ac.y() - ab.y() * ac.x();
+  if (!(std::abs(twice) > cell * cell)) return;
+  const double low = std::floor((a.y() + std::min({ab.y(), ac.y(), 0.0})) / cell);
+  const double high = (a.y() + std::max({ab.y(), ac.y(), 0.0})) / cell;
+  for (double row = 0.0; row <= high - low; ++row) {
+    const double y = cell * (row + 0.5) + (cell * low - a.y());
+    const std::array<double, 2> reach = triangle.reach_at(y);
+    const double first = std::floor((a.x() + reach[0]) / cell) - 1.0;
+    const double last = (a.x() + reach[1]) / cell + 1.0;
+    for (double column = 0.0; column <= last - first; ++column) {
+      const double x = cell * (column + 0.5) + (cell * first - a.x());
+      const double u = (x * ac.y() - y * ac.x()) / twice;
+      const double v = (ab.x() * y - ab.y() * x) / twice;
+      if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) samples.push_back({n, u, v});
+    }
+  }
+}
+
 // The surface seen from above: a sample in each cell that a triangle covers, its corners, and its
-// sides, which are all that is seen of an upright one.
+// sides, which are all that is seen of an upright one. Cells are larger where those were too many.
 PointCloud view_of(const TriangleMesh& mesh, double cell) {
   std::vector<TrianglePoint> samples;
   double area = 0.0;
-  for (const Triangle& triangle : mesh.triangles) area += std::abs(area_normal(mesh, triangle).z());
-  cell = std::max(cell, std::sqrt(area / 2.0 / most_view_samples));
+  double length = 0.0;
+  for (const Triangle& triangle : mesh.triangles) {
+    area += std::abs(area_normal(mesh, triangle).z());
+    length += flat(mesh, triangle).length();
+  }
+  const double most_on_sides = most_side_samples + 3.0 * static_cast<double>(mesh.triangles.size());
+  cell = std::max({cell, std::sqrt(area / 2.0 / most_view_samples), length / most_on_sides});
   for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {
-    const Triangle& corners = mesh.triangles[n];
-    const Vector2d a = mesh.vertices[corners[0]].head<2>();
-    const Vector2d ab = mesh.vertices[corners[1]].head<2>() - a;
-    const Vector2d ac = mesh.vertices[corners[2]].head<2>() - a;
-    const auto sides = [&](double length) { return std::min(std::ceil(length / cell), 1e6); };
-    const double on_ab = std::max(sides(ab.norm()), 1.0);
-    const double on_ac = std::max(sides(ac.norm()), 1.0);
-    const double on_bc = std::max(sides((ac - ab).norm()), 1.0);
-    for (double k = 0.0; k < on_ab; ++k) samples.push_back({n, k / on_ab, 0.0});
-    for (double k = 0.0; k < on_bc; ++k) samples.push_back({n, 1.0 - k / on_bc, k / on_bc});
-    for (double k = 0.0; k < on_ac; ++k) samples.push_back({n, 0.0, 1.0 - k / on_ac});
-    const double twice = ab.x() * ac.y() - ab.y() * ac.x();
-    if (!(std::abs(twice) > cell * cell)) continue;
-    const Vector2d low = (a + ab.cwiseMin(ac).cwiseMin(0.0)) / cell;
-    const Vector2d high = (a + ab.cwiseMax(ac).cwiseMax(0.0)) / cell;
-    for (double y = std::floor(low.y()); y <= high.y(); ++y)
-      for (double x = std::floor(low.x()); x <= high.x(); ++x) {
-        const Vector2d offset = cell * Vector2d(x + 0.5, y + 0.5) - a;
-        const double u = (offset.x() * ac.y() - offset.y() * ac.x()) / twice;
-        const double v = (ab.x() * offset.y() - ab.y() * offset.x()) / twice;
-        if (u >= 0.0 && v >= 0.0 && u + v <= 1.0) samples.push_back({n, u, v});
-      }
+    const FlatTriangle triangle = flat(mesh, mesh.triangles[n]);
+    view_sides(triangle, n, cell, samples);
+    view_inside(triangle, n, cell, samples);
   }
   return points_on_surface(mesh, samples);
 }

@@ -143,8 +143,14 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
     if (!mesh.vertices[n].allFinite())
       throw Error("a vertex is not finite",
                   {.file = path.string(), .field = "vertex", .value = std::to_string(n)});
-  write_geometry_file(path,
-                      [&](std::ostream& out) { encode(format_of(path), mesh, options, out); });
+  const std::string format = format_of(path);
+  try {
+    if (format == ".obj" || format == ".stl" || format == ".glb")
+      require_single_precision(mesh, format);
+  } catch (const Error& error) {
+    throw error.in_file(path.string());
+  }
+  write_geometry_file(path, [&](std::ostream& out) { encode(format, mesh, options, out); });
 }
 
 FileKind file_kind(const std::filesystem::path& path) {

@@ -185,6 +185,7 @@ std::vector<ModelFile> textured_mesh_files(const fs::path& path, const TexturedM
   require_textured_format(path);
   model.check();
   if (model.mesh.triangles.empty()) throw Error("a mesh without triangles cannot be textured");
+  require_single_precision(model.mesh, format_of(path));
   std::vector<ModelFile> files;
   if (format_of(path) == ".glb") {
     files.push_back({path, [&model, options](const fs::path& temporary) {

@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -23,13 +24,16 @@ constexpr std::uint32_t none = 0xffffffff;
 constexpr std::size_t max_cap_passes = 1000;
 constexpr double max_coordinate = 1e30;  // its powers that areas and volumes need are finite
 
+// A coordinate counts a finite number of them.
+constexpr double least_cell = 1e-270;
+
 // Kept vertices by cells four distances wide: most searches look into one or two of them.
 class VertexGrid {
  public:
   VertexGrid(const std::vector<Eigen::Vector3d>& vertices, double distance)
       : vertices_(vertices),
         distance_(distance),
-        cells_per_m_(distance > 0.0 ? 1.0 / (4.0 * distance) : 1.0),
+        cells_per_m_(distance > 0.0 ? 1.0 / std::max(4.0 * distance, least_cell) : 1.0),
         next_(vertices.size(), none) {
     first_.reserve(vertices.size());
   }
@@ -70,8 +74,8 @@ class VertexGrid {
   static std::uint64_t key(const Eigen::Array3d& cell) {
     std::uint64_t mixed = 0;
     for (int axis = 0; axis < 3; ++axis) {
-      const auto number = static_cast<std::int64_t>(std::fmod(cell[axis], 0x1p62));
-      mixed = (mixed ^ static_cast<std::uint64_t>(number)) * 0x9e3779b97f4a7c15ULL;
+      // Of numbers of any size, unlike those of an integer. Adding 0 makes -0 equal to 0.
+      mixed = (mixed ^ std::bit_cast<std::uint64_t>(cell[axis] + 0.0)) * 0x9e3779b97f4a7c15ULL;
       mixed ^= mixed >> 29U;
     }
     return mixed;

@@ -3,7 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <map>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <utility>
+#include <vector>
 
 #include "libmap/core/text.h"
 #include "libmap/report/html.h"
@@ -82,35 +86,50 @@ std::string manifest_html(const Manifest& manifest) {
 Values all_values(const Manifest& manifest) {
   Values values = {{"command", manifest.command}, {"version", manifest.version}};
   values.insert(values.end(), manifest.parameters.begin(), manifest.parameters.end());
+  std::unordered_set<std::string> known;
+  for (const auto& [name, value] : manifest.parameters) known.insert(name);
   for (const auto& [name, value] : manifest.results)
-    if (manifest.find_parameter(name) == nullptr) values.emplace_back(name, value);
+    if (!known.contains(name)) values.emplace_back(name, value);
   return values;
 }
 
-const ManifestValue* find(const Values& values, const std::string& name) {
-  for (const auto& [key, value] : values)
-    if (key == name) return &value;
-  return nullptr;
-}
+// The values of several manifests, and their places by name.
+struct Columns {
+  std::vector<Values> values;
+  std::vector<std::unordered_map<std::string, std::size_t>> places;
+  std::vector<std::string> names;  // of all, in the order in which they first appear
+
+  explicit Columns(const ReportParameters& parameters) {
+    std::unordered_set<std::string> known;
+    for (const auto& [head, manifest] : parameters.outputs) {
+      Values own = all_values(manifest);
+      std::unordered_map<std::string, std::size_t> place_of;
+      for (std::size_t n = 0; n < own.size(); ++n) {
+        place_of.emplace(own[n].first, n);
+        if (known.insert(own[n].first).second) names.push_back(own[n].first);
+      }
+      values.push_back(std::move(own));
+      places.push_back(std::move(place_of));
+    }
+  }
+  const ManifestValue* find(std::size_t column, const std::string& name) const {
+    const auto found = places[column].find(name);
+    return found == places[column].end() ? nullptr : &values[column][found->second].second;
+  }
+};
 
 std::string side_by_side(const ReportParameters& parameters) {
-  std::vector<Values> columns;
-  std::vector<std::string> names;
-  for (const auto& [head, manifest] : parameters.outputs) {
-    columns.push_back(all_values(manifest));
-    for (const auto& [name, value] : columns.back())
-      if (std::find(names.begin(), names.end(), name) == names.end()) names.push_back(name);
-  }
+  const Columns columns(parameters);
   std::string differ;
   Values same;
-  for (const std::string& name : names) {
+  for (const std::string& name : columns.names) {
     std::vector<Value> cells;
-    for (const Values& column : columns) {
-      const ManifestValue* value = find(column, name);
+    for (std::size_t n = 0; n < columns.values.size(); ++n) {
+      const ManifestValue* value = columns.find(n, name);
       cells.push_back(value == nullptr ? Value{} : to_value(*value));
     }
     if (std::all_of(cells.begin(), cells.end(), [&](const Value& c) { return c == cells[0]; })) {
-      same.emplace_back(name, *find(columns.front(), name));
+      same.emplace_back(name, *columns.find(0, name));
       continue;
     }
     differ += "<tr><th scope=\"row\">" + escape_html(name) + "</th>";

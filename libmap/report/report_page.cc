@@ -297,6 +297,7 @@ FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std:
           pictures.begin(), pictures.end(), [](const auto* one) { return !one->change.empty(); }));
       return page;
     }
+    if (pictures.empty()) break;  // none that could be smaller
   }
   throw Error("the report is too large, even with small pictures",
               {.field = "size",

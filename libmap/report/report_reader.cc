@@ -42,6 +42,25 @@ std::string text_of(const nlohmann::ordered_json& json) {
   return json.dump(-1, ' ', false, nlohmann::ordered_json::error_handler_t::replace);
 }
 
+// The file's next line, cut behind `most` letters: what is no text may have no end of a line.
+bool next_line(std::istream& stream, std::size_t most, std::string& line) {
+  line.clear();
+  bool any = false;
+  std::array<char, 4096> part{};
+  for (;;) {
+    stream.getline(part.data(), static_cast<std::streamsize>(part.size()));
+    const auto read = static_cast<std::size_t>(stream.gcount());
+    any = any || read > 0;
+    const bool goes_on = stream.fail() && read > 0 && !stream.eof();
+    // An end of the line counts as read.
+    const std::size_t letters =
+        goes_on || stream.eof() ? read : read - std::min<std::size_t>(read, 1);
+    line.append(part.data(), std::min(letters, most - std::min(most, line.size())));
+    if (!goes_on) return any;
+    stream.clear();
+  }
+}
+
 class Reader {
  public:
   Reader(const ReportReadOptions& options, const MapLoader& load_map)
@@ -325,7 +344,7 @@ class Reader {
       ReportListing listing;
       std::size_t lines = 0;
       constexpr std::size_t max_line = 400;
-      for (std::string line; std::getline(stream, line); ++lines) {
+      for (std::string line; next_line(stream, max_line + 1, line); ++lines) {
         if (lines >= options_.max_lines) continue;
         listing.text += line.size() > max_line ? line.substr(0, max_line) + " ..." : line;
         listing.text += '\n';

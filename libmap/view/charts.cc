@@ -63,6 +63,14 @@ std::string tick_text(double value, double largest) {
   return std::string(buffer.data(), end.ptr);
 }
 
+// More letters than any chart has room for; VTK draws all, in seconds where there are thousands.
+std::string shown(const std::string& text) {
+  std::size_t most = 400;
+  if (text.size() <= most) return text;
+  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0U) == 0x80U) --most;
+  return text.substr(0, most) + "...";
+}
+
 void check_numbers(const std::vector<double>& values, const std::string& field) {
   for (const double value : values)
     if (!std::isfinite(value))
@@ -141,7 +149,7 @@ struct PixelAxis {
 void set_axis(vtkAxis* axis, const std::string& title, const PixelAxis& range) {
   axis->SetBehavior(vtkAxis::FIXED);
   axis->SetRange(range.from_px, range.to_px);
-  axis->SetTitle(title);
+  axis->SetTitle(shown(title));
   vtkNew<vtkDoubleArray> positions;
   vtkNew<vtkStringArray> labels;
   const std::vector<double> ticks = round_ticks(range.low, range.high, 10);
@@ -166,7 +174,7 @@ vtkNew<vtkDoubleArray> column_of(const char* name, const std::vector<double>& va
 }
 
 // The legend writes its text against its symbol.
-std::string legend_text(const std::string& name) { return " " + name; }
+std::string legend_text(const std::string& name) { return " " + shown(name); }
 
 void add_line(vtkChartXY* chart, std::vector<double> x_px, std::vector<double> y_px,
               const ChartCurve& look, const Color& color) {
@@ -254,7 +262,7 @@ vtkNew<vtkChartXY> build(const Chart& chart, const ChartSize& size) {
                           static_cast<float>(x_axis.to_px - x_axis.from_px),
                           static_cast<float>(y_axis.to_px - y_axis.from_px)));
   // The second line lifts the title off the frame.
-  if (!chart.title.empty()) built->SetTitle(chart.title + "\n ");
+  if (!chart.title.empty()) built->SetTitle(shown(chart.title) + "\n ");
   built->GetTitleProperties()->SetFontSize(23);
   set_axis(built->GetAxis(vtkAxis::BOTTOM), chart.x_axis.title, x_axis);
   set_axis(built->GetAxis(vtkAxis::LEFT), chart.y_axis.title, y_axis);
@@ -468,7 +476,8 @@ std::vector<double> round_ticks(double low, double high, int most) {
   }
   const double step = scaled(multiple);
   // Numbers this close together have no short texts, and may not even differ by a step.
-  if (step < 1e-12 * std::max(std::abs(low), std::abs(high))) return ticks;
+  // Nor have steps so small that their power of ten is not finite.
+  if (!(step > 0.0) || step < 1e-12 * std::max(std::abs(low), std::abs(high))) return ticks;
   const double slack = 1e-9;
   const double first = std::ceil(low / step - slack);
   const int count = static_cast<int>(std::floor(high / step + slack) - first) + 1;

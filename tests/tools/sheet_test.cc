@@ -122,6 +122,10 @@ TEST(Chart, CurvesOfATable) {
   EXPECT_TRUE(bad_input(
       graspmap({"chart", "many.csv", "-o", "d.png", "--x", "x", "--y", "y", "--series", "id"}),
       {"many.csv", "--series is id", "<= 500"}));
+  std::string columns = "y";
+  for (int n = 0; n < 500; ++n) columns += ",y";
+  EXPECT_TRUE(bad_input(graspmap({"chart", "t.csv", "-o", "d.png", "--x", "x", "--y", columns}),
+                        {"t.csv", "--y is y,y", "<= 500"}));
 }
 
 TEST(Chart, OneEndOfAnAxis) {

@@ -51,6 +51,25 @@ TEST(YamlDocument, NodesAreCounted) {
   EXPECT_EQ(fault_of(list + "]\n"), "given.yaml: holds more than 500000 values");
 }
 
+// Who reads them walks through what they stand for, each time.
+TEST(YamlDocument, AliasesCountAsWhatTheyStandFor) {
+  std::string bomb = "l0: &l0 [1, 1, 1, 1, 1, 1, 1, 1, 1, 1]\n";
+  const auto add_level = [&](int level) {
+    const std::string below = "*l" + std::to_string(level - 1);
+    bomb += "l" + std::to_string(level) + ": &l" + std::to_string(level) + " [" + below;
+    for (int n = 0; n < 9; ++n) bomb += ", " + below;
+    bomb += "]\n";
+  };
+  for (int level = 1; level <= 4; ++level) add_level(level);
+  double value = 0.0;
+  libmap::read_yaml(bomb + "a: 1.5\n", "given.yaml",
+                    [&](const YAML::Node& root) { value = root["a"].as<double>(); });
+  EXPECT_EQ(value, 1.5);
+  add_level(5);
+  EXPECT_EQ(fault_of(bomb), "given.yaml: holds more than 500000 values");
+  EXPECT_EQ(fault_of("a: &a [1, *a]\n"), "given.yaml: holds more than 500000 values");
+}
+
 // What has no place in the text has no line.
 TEST(YamlDocument, FaultsWithoutAPlace) {
   const std::string fault = fault_of("b: 1\n");

@@ -14,6 +14,8 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "tests/libmap/mesh/mesh_samples.h"
+#include "tests/support/lower_limit.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -260,6 +262,29 @@ TEST(Crop, WhatCannotBe) {
   one.vertices = {{0, 0, 1}, {1, 0, 1}, {0, 1, 1}};
   one.triangles = {{0, 1, 2}};
   EXPECT_NEAR(crop_mesh(one, {}).mesh.vertices[1].z(), 0, 1e-9);
+}
+
+// Aslant over kilometres, upright ones of kilometres, and far from where a step of a cell is none.
+TEST(Crop, TrianglesOfAnyShapeAreSeenByFewSamples) {
+  CropOptions options;
+  options.level = false;
+  options.region = CropRegion::size;
+  options.size_m = {1, 1};
+  const auto message = [&](const std::vector<Vector3d>& corners, std::uint32_t copies) {
+    TriangleMesh mesh;
+    mesh.vertices = corners;
+    mesh.triangles.assign(copies, {0, 1, 2});
+    return std::string(error_of([&] { crop_mesh(mesh, options); }).what());
+  };
+  const graspmap_test::LowerLimit limit(
+      graspmap_test::memory_can_be_limited ? RLIMIT_DATA : RLIMIT_CORE, std::uint64_t{1} << 30U);
+  EXPECT_NE(message({{0, 0, 0}, {1e3, 1e3, 0}, {1e3, 1e3 + 0.01, 0}}, 50).find("too far"),
+            std::string::npos);
+  EXPECT_NE(message({{0, 0, 0}, {1e3, 1e3, 0}, {0, 0, 1}}, 1000).find("too far"),
+            std::string::npos);
+  EXPECT_NE(
+      message({{1e20, 1e20, 0}, {1e20 + 2e4, 1e20, 0}, {1e20, 1e20 + 2e4, 0}}, 1).find("too far"),
+      std::string::npos);
 }
 
 TEST(Crop, ThreadsMakeNoDifference) {

@@ -338,6 +338,23 @@ TEST(MeshFiles, WhatAssimpRefusesIsSaid) {
   EXPECT_THAT(error_as(".glb", bytes), HasSubstr("vertex 2: position is not finite"));
 }
 
+TEST(MeshFiles, WhatSinglePrecisionCannotHoldIsNotWritten) {
+  TriangleMesh mesh = sheet(3);
+  mesh.vertices[4].y() = -1e39;
+  for (const char* extension : {".obj", ".stl", ".glb"}) {
+    const fs::path path = scratch_folder() / (std::string("far") + extension);
+    const Error error = error_of([&] { write_mesh(path, mesh); });
+    EXPECT_THAT(error.what(), HasSubstr(std::string("far") + extension +
+                                        ": vertex 4 is 1e+39 m: too far away for " + extension));
+    EXPECT_FALSE(fs::exists(path));
+  }
+  for (const char* extension : {".ply", ".vtp", ".off"}) {
+    const fs::path path = scratch_folder() / (std::string("far") + extension);
+    write_mesh(path, mesh);
+    EXPECT_EQ(read_mesh(path).mesh.vertices, mesh.vertices);
+  }
+}
+
 TEST(MeshFiles, NoTriangleIsNotWrittenByAssimp) {
   for (const std::string format : {"stl", "glb"})
     EXPECT_EQ(error_of([&] { write_mesh(scratch_folder() / ("mesh." + format), {}); }).reason(),

@@ -11,6 +11,7 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/mesh_report.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/mesh/triangle_repair.h"
 #include "tests/libmap/mesh/cleaning_checks.h"
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/support/test_support.h"
@@ -270,6 +271,16 @@ TEST(MeshRepair, CrossingBallsAreParted) {
   ASSERT_GT(report_mesh(mesh).self_intersections, 50U);
   const MeshCleaningResult result = cleaned(mesh, repairs());
   EXPECT_EQ(result.remaining_intersecting_triangles, 0U);
+}
+
+// Cells of such a size would have no finite number, and all vertices one list.
+TEST(MeshRepair, VerticesAreJoinedWithinDistancesOfAnySize) {
+  TriangleMesh mesh;
+  for (int n = 0; n < 60000; ++n) mesh.vertices.emplace_back(n + 1.0, -2.0 * n, 1e30);
+  mesh.vertices.push_back(mesh.vertices[5]);
+  mesh.triangles = {{5, 6, 7}, {60000, 1, 2}};
+  EXPECT_EQ(libmap::weld_vertices(mesh, 1e-310), 1U);
+  EXPECT_EQ(mesh.triangles[1][0], 5U);
 }
 
 }  // namespace

@@ -239,4 +239,34 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   EXPECT_THROW(libmap::write_textured_mesh(folder / "w.glb", TexturedMesh{}), libmap::Error);
 }
 
+TEST(TexturedMesh, APictureOfManyNamesIsOnePage) {
+  const auto folder = scratch_folder();
+  graspmap_test::write_text(folder / "a.png", libmap::encode_png(libmap::ColorImage(4, 4)));
+  std::string materials;
+  std::string model = "mtllib m.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\n";
+  for (int n = 0; n < 30; ++n) {
+    const std::string name = "m" + std::to_string(n);
+    materials += "newmtl " + name + "\nmap_Kd ";
+    for (int k = 0; k < n; ++k) materials += "./";
+    materials += "a.png\n";
+    model += "usemtl " + name + "\nf 1/1 2/2 3/3\n";
+  }
+  graspmap_test::write_text(folder / "m.mtl", materials);
+  graspmap_test::write_text(folder / "m.obj", model);
+  const TexturedMesh read = libmap::read_textured_mesh(folder / "m.obj");
+  EXPECT_EQ(read.pages.size(), 1U);
+  EXPECT_EQ(read.page_of_triangle, std::vector<std::int32_t>(30, 0));
+}
+
+TEST(TexturedMesh, WhatSinglePrecisionCannotHoldIsNotWritten) {
+  TexturedMesh model = random_model(false);
+  model.mesh.vertices[2].x() = 1e39;
+  for (const char* name : {"far.obj", "far.glb"}) {
+    const auto path = scratch_folder() / name;
+    EXPECT_EQ(error_of([&] { libmap::write_textured_mesh(path, model); }).context().field,
+              "vertex 2");
+    EXPECT_FALSE(std::filesystem::exists(path));
+  }
+}
+
 }  // namespace

@@ -6,6 +6,8 @@
 #include "libmap/report/found_outline.h"
 #include "libmap/report/outline_io.h"
 #include "libmap/scan/image_codec.h"
+#include "tests/support/lower_limit.h"
+#include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
 namespace {
@@ -96,6 +98,21 @@ TEST(ReportReader, WhatIsBrokenSaysWhy) {
   EXPECT_EQ(content.items[4].gaps.size(), 2U);
   ASSERT_EQ(content.sources.size(), 1U);
   EXPECT_NE(content.sources[0].error, "");
+}
+
+TEST(ReportReader, ListingsOfLongLines) {
+  const std::string long_line(9000, 'n');
+  put("a.txt", "first\n\n" + long_line + "\n" + std::string(4095, 'm') + "\nlast");
+  const auto text_of = [](const std::string& file) {
+    return std::get<libmap::ReportListing>(read("  - listing: " + file + "\n").items[0].body);
+  };
+  EXPECT_EQ(text_of("a.txt").text, "first\n\n" + std::string(400, 'n') + " ...\n" +
+                                       std::string(400, 'm') + " ...\nlast\n");
+  put("endless.txt", "a");
+  fs::resize_file(scratch_folder() / "endless.txt", std::uintmax_t{160} << 20U);
+  const graspmap_test::LowerLimit limit(
+      graspmap_test::memory_can_be_limited ? RLIMIT_DATA : RLIMIT_CORE, std::uint64_t{1} << 28U);
+  EXPECT_EQ(text_of("endless.txt").text.substr(0, 1), "a");
 }
 
 TEST(ReportReader, ValuesAndTimesOfManifests) {

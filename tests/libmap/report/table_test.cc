@@ -166,6 +166,41 @@ TEST(Timings, EachStepByEachCase) {
   EXPECT_NE(html.find(">2375.0</td>"), std::string::npos);
 }
 
+// What each search through all of them would take minutes for.
+TEST(Timings, ManySteps) {
+  std::vector<libmap::TimingCase> cases;
+  for (int n = 0; n < 10; ++n) {
+    std::vector<std::pair<std::string, double>> steps;
+    for (int step = 0; step < 10000; ++step)
+      steps.emplace_back("step " + std::to_string(step) + " of " + std::to_string(n), 1.0);
+    cases.push_back({std::to_string(n), {manifest_of("score", steps)}});
+  }
+  const libmap::TimingTable table = libmap::timing_table(cases);
+  ASSERT_EQ(table.rows.size(), 100'000U);
+  EXPECT_EQ(table.rows[10'001].step, "step 1 of 1");
+  EXPECT_EQ(libmap::total_seconds(table, 9), 10'000.0);
+}
+
+TEST(Parameters, ManyOfSeveralOutputs) {
+  libmap::ReportParameters parameters;
+  for (std::int64_t n = 0; n < 10; ++n) {
+    Manifest manifest;
+    manifest.parameters.emplace_back("command", "one more of this name");
+    for (std::int64_t k = 0; k < 5000; ++k) {
+      manifest.parameters.emplace_back("p" + std::to_string(5000 * n + k), k);
+      manifest.results.emplace_back("r" + std::to_string(k), k);
+    }
+    parameters.outputs.emplace_back("output " + std::to_string(n), manifest);
+  }
+  const std::string html = libmap::parameters_html(parameters);
+  const std::size_t row = html.find("<th scope=\"row\">p49999</th>");
+  ASSERT_NE(row, std::string::npos);
+  EXPECT_NE(html.substr(row, html.find("</tr>", row) - row).find(">4999</td>"), std::string::npos);
+  const std::size_t same = html.find("The same in all");
+  ASSERT_NE(same, std::string::npos);
+  EXPECT_GT(html.find("<th scope=\"row\">r4999</th>"), same);
+}
+
 TEST(Folder, NaturalOrder) {
   EXPECT_TRUE(libmap::natural_less("2_slopes", "10_walls"));
   EXPECT_FALSE(libmap::natural_less("10_walls", "2_slopes"));

@@ -378,6 +378,19 @@ TEST(RoundTicks, AreRoundAndInside) {
   EXPECT_THAT(libmap::round_ticks(0, std::numeric_limits<double>::infinity(), 5), ElementsAre());
   EXPECT_THAT(libmap::round_ticks(1, std::nextafter(1.0, 2.0), 5), ElementsAre());
   EXPECT_THAT(libmap::round_ticks(nan_value, 1, 5), ElementsAre());
+  EXPECT_THAT(libmap::round_ticks(5e-324, 3e-320, 10), ElementsAre());
+}
+
+TEST_F(Charts, NamesOfAnyLengthTakeAChartsRoom) {
+  Chart chart = unit_chart();
+  chart.legend = libmap::LegendCorner::top_left;
+  std::string name;
+  while (name.size() < 5000) name += "\xC3\xA4";
+  chart.title = chart.x_axis.title = chart.y_axis.title = name;
+  libmap::ChartCurve& curve = chart.curves.emplace_back();
+  curve.name = name;
+  curve.x = curve.y = {0, 1};
+  EXPECT_LT(svg_of(chart).text.size(), 2'000'000U);
 }
 
 TEST(RoundTicks, ManyRandomRanges) {
