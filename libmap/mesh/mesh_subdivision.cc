@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <cstddef>
+#include <utility>
 
+#include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 
@@ -13,45 +14,73 @@ namespace libmap {
 namespace {
 
 constexpr std::uint32_t no_vertex = 0xffffffff;
+constexpr std::size_t grain = 1024;
+// Of the largest coordinate: shorter sides are not halved, for their middles were rounded.
+constexpr double least_side = 1e-12;
+
+double largest_coordinate(const TriangleMesh& mesh) {
+  double largest = 0.0;
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    largest = std::max(largest, vertex.cwiseAbs().maxCoeff());
+  return largest;
+}
 
 double squared_length(const TriangleMesh& mesh, HalfEdge h) {
   return (mesh.vertices[source_of(mesh.triangles, h)] - mesh.vertices[target_of(mesh.triangles, h)])
       .squaredNorm();
 }
 
-double longest_side(const TriangleMesh& mesh, std::uint32_t t) {
-  return std::sqrt(std::max({squared_length(mesh, 3 * t), squared_length(mesh, 3 * t + 1),
-                             squared_length(mesh, 3 * t + 2)}));
+bool is_long(const TriangleMesh& mesh, HalfEdge h, double max_side_m) {
+  return squared_length(mesh, h) > max_side_m * max_side_m;
 }
 
-// A side that some 3/4 (longest / side)^2 triangles of each triangle are not too many for.
-double affordable_side(const TriangleMesh& mesh, double max_side_m, std::uint64_t most_triangles) {
-  for (;; max_side_m *= 1.25) {
-    double count = 0.0;
-    for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-      const double ratio = longest_side(mesh, t) / max_side_m;
-      count += ratio > 1.0 ? 2.0 * ratio * ratio : 1.0;
+// Parts of a triangle that needs no cutting need none: `open` says which triangles still may.
+void close_triangles(const TriangleMesh& mesh, double max_side_m, const NeedsCutting& needs_cutting,
+                     std::vector<std::uint8_t>& open) {
+  parallel_for(open.size(), grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      if (open[t] == 0) continue;
+      const auto h = static_cast<HalfEdge>(3 * t);
+      const bool any_long = is_long(mesh, h, max_side_m) || is_long(mesh, h + 1, max_side_m) ||
+                            is_long(mesh, h + 2, max_side_m);
+      if (!any_long || !needs_cutting(mesh, mesh.triangles[t])) open[t] = 0;
     }
-    if (count <=
-        static_cast<double>(std::max<std::uint64_t>(most_triangles, 2 * mesh.triangles.size() + 1)))
-      return max_side_m;
-  }
+  });
 }
 
-// The vertex in the middle of each half-edge that is too long.
-std::vector<std::uint32_t> add_middles(TriangleMesh& mesh, double max_side_m, bool& any) {
-  const MeshEdges edges = edges_of(mesh.triangles, mesh.vertices.size());
+// The long edges of open triangles.
+std::vector<std::uint32_t> edges_to_halve(const TriangleMesh& mesh, const MeshEdges& edges,
+                                          double max_side_m,
+                                          const std::vector<std::uint8_t>& open) {
+  std::vector<std::uint32_t> found;
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto first = edges.half_edges.begin() + edges.first[e];
+    if (is_long(mesh, *first, max_side_m) &&
+        std::any_of(first, edges.half_edges.begin() + edges.first[e + 1],
+                    [&open](HalfEdge h) { return open[h / 3] != 0; }))
+      found.push_back(e);
+  }
+  return found;
+}
+
+// Each middle of a triangle's side makes one more triangle.
+std::uint64_t new_triangles(const MeshEdges& edges, const std::vector<std::uint32_t>& halved) {
+  std::uint64_t count = 0;
+  for (const std::uint32_t e : halved) count += edges.count(e);
+  return count;
+}
+
+// The vertex in the middle of each half-edge that is halved.
+std::vector<std::uint32_t> add_middles(TriangleMesh& mesh, const MeshEdges& edges,
+                                       const std::vector<std::uint32_t>& halved) {
   std::vector<std::uint32_t> middles(3 * mesh.triangles.size(), no_vertex);
-  any = false;
-  for (std::size_t e = 0; e < edges.size(); ++e) {
+  for (const std::uint32_t e : halved) {
     const HalfEdge h = edges.half_edges[edges.first[e]];
-    if (!(squared_length(mesh, h) > max_side_m * max_side_m)) continue;
     const std::uint32_t a = source_of(mesh.triangles, h);
     const std::uint32_t b = target_of(mesh.triangles, h);
     const std::uint32_t middle = append_vertex_between(mesh, std::min(a, b), std::max(a, b), 0.5);
     for (std::size_t i = edges.first[e]; i < edges.first[e + 1]; ++i)
       middles[edges.half_edges[i]] = middle;
-    any = true;
   }
   return middles;
 }
@@ -87,30 +116,47 @@ std::vector<Triangle> parts_of(const TriangleMesh& mesh, Triangle t,
   return {tip, {t[0], middles[0], t[2]}, {middles[0], middles[1], t[2]}};
 }
 
+void cut(SubdivisionResult& result, std::vector<std::uint8_t>& open,
+         const std::vector<std::uint32_t>& middles) {
+  TriangleMesh& fine = result.mesh;
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> source;
+  std::vector<std::uint8_t> open_parts;
+  for (std::size_t t = 0; t < fine.triangles.size(); ++t)
+    for (const Triangle& part : parts_of(
+             fine, fine.triangles[t], {middles[3 * t], middles[3 * t + 1], middles[3 * t + 2]})) {
+      triangles.push_back(part);
+      source.push_back(result.source[t]);
+      open_parts.push_back(open[t]);
+    }
+  fine.triangles = std::move(triangles);
+  result.source = std::move(source);
+  open = std::move(open_parts);
+}
+
 }  // namespace
 
 SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
-                                   std::uint64_t most_triangles) {
+                                   std::uint64_t most_triangles,
+                                   const NeedsCutting& needs_cutting) {
   SubdivisionResult result;
   result.mesh = mesh;
-  result.max_side_m = affordable_side(mesh, max_side_m, most_triangles);
+  result.max_side_m = std::max(max_side_m, least_side * largest_coordinate(mesh));
   result.source.resize(mesh.triangles.size());
   for (std::uint32_t t = 0; t < result.source.size(); ++t) result.source[t] = t;
   TriangleMesh& fine = result.mesh;
+  const std::uint64_t most = std::max<std::uint64_t>(most_triangles, 2 * mesh.triangles.size());
+  std::vector<std::uint8_t> open(mesh.triangles.size(), 1);
   for (;;) {
-    bool any = false;
-    const std::vector<std::uint32_t> middles = add_middles(fine, result.max_side_m, any);
-    if (!any) break;
-    std::vector<Triangle> triangles;
-    std::vector<std::uint32_t> source;
-    for (std::size_t t = 0; t < fine.triangles.size(); ++t)
-      for (const Triangle& part : parts_of(
-               fine, fine.triangles[t], {middles[3 * t], middles[3 * t + 1], middles[3 * t + 2]})) {
-        triangles.push_back(part);
-        source.push_back(result.source[t]);
-      }
-    fine.triangles = std::move(triangles);
-    result.source = std::move(source);
+    close_triangles(fine, result.max_side_m, needs_cutting, open);
+    const MeshEdges edges = edges_of(fine.triangles, fine.vertices.size());
+    std::vector<std::uint32_t> halved = edges_to_halve(fine, edges, result.max_side_m, open);
+    while (fine.triangles.size() + new_triangles(edges, halved) > most) {
+      result.max_side_m *= 1.25;
+      halved = edges_to_halve(fine, edges, result.max_side_m, open);
+    }
+    if (halved.empty()) break;
+    cut(result, open, add_middles(fine, edges, halved));
   }
   for (std::size_t f = 0; f < fine.face_fields.size(); ++f) {
     std::vector<double> values;

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "libmap/core/triangle_mesh.h"
@@ -10,14 +11,19 @@ namespace libmap {
 
 struct SubdivisionResult {
   TriangleMesh mesh;
-  double max_side_m = 0.0;            // what was aimed at
+  double max_side_m = 0.0;            // what was aimed at in the end
   std::vector<std::uint32_t> source;  // of each triangle: the one that it is a part of
 };
 
-// Halves sides longer than `max_side_m`, on both of their triangles, until there are none; vertices
-// that there were keep their places. Where that would make more than `most_triangles` a longer side
-// is aimed at. Values at new vertices are interpolated, parts of a triangle have its fields.
-SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
-                                   std::uint64_t most_triangles = 10'000'000);
+// Whether a triangle with a long side, or parts of it, need to be cut. Asked from several threads.
+using NeedsCutting = std::function<bool(const TriangleMesh& mesh, const Triangle& triangle)>;
+
+// Halves sides longer than `max_side_m`, on all of their triangles, until no triangle that needs it
+// has one; vertices that there were keep their places. Where that would make more than
+// `most_triangles`, and more than twice those of the mesh, a longer side is aimed at. Values at new
+// vertices are interpolated, parts of a triangle have its fields.
+SubdivisionResult split_long_sides(
+    const TriangleMesh& mesh, double max_side_m, std::uint64_t most_triangles,
+    const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });
 
 }  // namespace libmap

@@ -1,6 +1,8 @@
 #include "libmap/mesh/texture_model.h"
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <memory>
 
 #include "libmap/core/error.h"
@@ -16,6 +18,9 @@ namespace {
 
 // Views of a triangle among which one is chosen.
 constexpr std::size_t views_a_triangle = 12;
+// Triangles that all photographs show smaller are not cut; nor are any where more would come out.
+constexpr double least_cut_px = 16.0;
+constexpr std::uint64_t most_cut_triangles = 2'500'000;
 
 constexpr Range size_range{64, 16384};
 constexpr Range padding_range{1, 64};
@@ -47,6 +52,21 @@ void check(const TextureOptions& options) {
   require(options.max_side_m, not_negative, "max_side_m");
 }
 
+// Whether any photograph may show the triangle, or a part of it, so large that cutting it matters.
+bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& photos) {
+  const Eigen::Vector3d centre =
+      (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
+  double radius = 0.0;
+  double longest = 0.0;
+  for (std::size_t k = 0; k < 3; ++k) {
+    radius = std::max(radius, (mesh.vertices[t[k]] - centre).norm());
+    longest = std::max(longest, (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
+  }
+  for (std::size_t i = 0; i < photos.size(); ++i)
+    if (photos[i].projector.most_pixels(centre, radius, longest) > least_cut_px) return true;
+  return false;
+}
+
 class Texturing {
  public:
   Texturing(const TextureOptions& options, Progress& progress)
@@ -60,7 +80,7 @@ class Texturing {
   auto timed(const char* name, const Step& step) {
     return libmap::timed(result_.timings_s, name, step);
   }
-  TriangleMesh cut_finely(const TriangleMesh& input);
+  TriangleMesh cut_finely(const TriangleMesh& input, const TexturePhotos& photos);
   void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);
   void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh,
                     const TexturePhotos& photos);
@@ -70,9 +90,11 @@ class Texturing {
   TextureResult result_;
 };
 
-TriangleMesh Texturing::cut_finely(const TriangleMesh& input) {
+TriangleMesh Texturing::cut_finely(const TriangleMesh& input, const TexturePhotos& photos) {
   if (!(options_.max_side_m > 0.0)) return input;
-  SubdivisionResult fine = split_long_sides(input, options_.max_side_m);
+  SubdivisionResult fine = split_long_sides(
+      input, options_.max_side_m, most_cut_triangles,
+      [&photos](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, photos); });
   result_.cut_triangles = fine.mesh.triangles.size() - input.triangles.size();
   return std::move(fine.mesh);
 }
@@ -112,12 +134,12 @@ TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
   check(options_);
   input.check();
   if (input.triangles.empty()) throw Error("the mesh has no triangles");
-  const TriangleMesh mesh = timed("cutting", [&] { return cut_finely(input); });
   const auto photos = timed("photographs", [&] {
     return std::make_unique<TexturePhotos>(scan, world_from_base, options_.strict, progress_);
   });
   result_.photos = photos->size();
   result_.skipped = photos->skipped();
+  const TriangleMesh mesh = timed("cutting", [&] { return cut_finely(input, *photos); });
   const TextureViews views = timed("views", [&] {
     return find_texture_views(mesh, *photos, options_.views, views_a_triangle,
                               static_cast<std::size_t>(options_.blend_views) + 1, progress_);
@@ -179,7 +201,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
   table.add("exposure", options.exposure.gains, "even out the brightness of the photographs");
   table.add("vignetting", options.exposure.vignetting, "even out darkening towards their corners");
   table.add("max_side_m", options.max_side_m, not_negative,
-            "triangles with longer sides are cut, m; 0: none");
+            "triangles with longer sides are cut where a photograph may show them, m; 0: none");
   table.add("strict", options.strict, "a frame that cannot be used is an error");
 }
 

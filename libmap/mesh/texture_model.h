@@ -33,8 +33,9 @@ struct TextureOptions {
   int blend_views = 3;
   // >= 0: how much the better of them count for more.
   double blend_exponent = 1.0;
-  // Triangles with longer sides are cut, so that photographs see each of them whole or not; 0:
-  // none.
+  // Triangles with longer sides are cut where photographs may show them, so that each of these sees
+  // them whole or not; 0: none. Longer ones stay where that would make more than 2.5 million
+  // triangles, and more than twice those of the mesh.
   double max_side_m = 0.05;
   Color unseen_color{128, 128, 128};
   bool strict = false;  // a frame that cannot be used is an Error

@@ -15,6 +15,8 @@ namespace {
 
 // Frames in memory at a time; not the number of threads, which results must not depend on.
 constexpr std::size_t frames_in_flight = 8;
+// Of a lens: its picture of an angle over the pinhole's.
+constexpr double most_distortion = 2.0;
 constexpr std::size_t most_kept_bytes = std::size_t{400} << 20;
 
 std::size_t bytes_of(const ColorImage& image) { return image.pixels.size() * sizeof(Color); }
@@ -45,7 +47,7 @@ PhotoProjector::PhotoProjector(const Camera& camera, const Pose& world_from_came
       camera_from_world_(world_from_camera.linear().transpose()),
       position_(world_from_camera.translation()),
       distorted_(camera.is_distorted()),
-      max_ray_(distorted_ ? largest_ray(camera) : 0.0) {}
+      max_ray_(largest_ray(camera)) {}
 
 Eigen::Vector3d PhotoProjector::project(const Eigen::Vector3d& point_in_world) const {
   const Eigen::Vector3d p = camera_from_world_ * (point_in_world - position_);
@@ -53,9 +55,23 @@ Eigen::Vector3d PhotoProjector::project(const Eigen::Vector3d& point_in_world) c
   const Eigen::Vector2d ray(p.x() / p.z(), p.y() / p.z());
   if (!distorted_)
     return {camera_.fx * ray.x() + camera_.cx, camera_.fy * ray.y() + camera_.cy, p.z()};
+  // Beyond it the lens's polynomial means nothing.
   if (ray.norm() > max_ray_) return Eigen::Vector3d::Zero();
   const Eigen::Vector2d pixel = distort_to_pixel(camera_, ray);
   return {pixel.x(), pixel.y(), p.z()};
+}
+
+double PhotoProjector::most_pixels(const Eigen::Vector3d& centre, double radius_m,
+                                   double length_m) const {
+  const Eigen::Vector3d p = camera_from_world_ * (centre - position_);
+  if (p.z() + radius_m <= 0.0) return 0.0;
+  const double nearest = p.norm() - radius_m;
+  if (!std::isfinite(max_ray_) || nearest <= 0.0) return std::numeric_limits<double>::infinity();
+  // Distance from the cone around the axis that holds all of the image's rays.
+  const double stretch = 1.0 + max_ray_ * max_ray_;
+  if ((p.head<2>().norm() - max_ray_ * p.z()) / std::sqrt(stretch) > radius_m) return 0.0;
+  // A pinhole shows an angle largest along the radius: f / cos^2.
+  return most_distortion * std::max(camera_.fx, camera_.fy) * stretch * length_m / nearest;
 }
 
 Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y) {

@@ -35,12 +35,16 @@ class PhotoProjector {
   // may lie outside the image.
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
+  // No length of so many metres within the ball takes more pixels; 0 only where no part of the ball
+  // is in the photograph.
+  double most_pixels(const Eigen::Vector3d& centre, double radius_m, double length_m) const;
+
  private:
   Camera camera_;
   Eigen::Matrix3d camera_from_world_;
   Eigen::Vector3d position_;
   bool distorted_ = false;
-  double max_ray_ = 0.0;  // beyond it a lens's polynomial means nothing
+  double max_ray_ = 0.0;  // no x/z, y/z radius of the image is larger; infinite if not known
 };
 
 // One camera of one frame.

@@ -299,6 +299,16 @@ TEST(TextureModel, OneTriangleAndLargeOnes) {
   EXPECT_GT(libmap::texture_mesh(ground, scan, scan.poses()).seen_m2, 0.9);
 }
 
+TEST(TextureModel, GroundThatNoPhotographShowsStaysInLargeTriangles) {
+  const PaintedScan scan(grid_mesh(2, 1.2, 0.0), marks, small_camera(),
+                         circle_of_cameras(4, 0.4, 0.9));
+  const double seen_m2 = libmap::texture_mesh(grid_mesh(2, 1.2, 0.0), scan, scan.poses()).seen_m2;
+  const TextureResult wide = libmap::texture_mesh(grid_mesh(2, 2000.0, 0.0), scan, scan.poses());
+  EXPECT_LT(wide.cut_triangles, 100000U) << "10^9 and more of 5 cm";
+  EXPECT_GT(wide.seen_m2, 0.95 * seen_m2);
+  EXPECT_LT(wide.texel_size_m, 0.01);
+}
+
 TEST(TextureModel, SameForAnyThreadsAndOrderOfFrames) {
   const TriangleMesh mesh = ground_and_plate();
   const PaintedScan scan(mesh, red_plate, small_camera(), circle_of_cameras(5, 0.6, 1.0));

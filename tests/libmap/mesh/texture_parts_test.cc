@@ -12,6 +12,7 @@
 #include "libmap/mesh/texture_exposure.h"
 #include "libmap/mesh/texture_labelling.h"
 #include "libmap/mesh/texture_painting.h"
+#include "libmap/mesh/texture_photos.h"
 #include "libmap/mesh/texture_views.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/mesh/painted_scan.h"
@@ -328,6 +329,7 @@ std::pair<std::size_t, std::size_t> edge_uses(const TriangleMesh& mesh) {
 }
 
 TEST(SplitLongSides, SameSurfaceWithoutGaps) {
+  constexpr std::uint64_t most = 10'000'000;
   TriangleMesh ball = graspmap_test::ball_mesh(6, 8, {0, 0, 0});
   ball.vertex_colors.resize(ball.vertices.size());
   for (std::size_t v = 0; v < ball.vertices.size(); ++v)
@@ -336,7 +338,7 @@ TEST(SplitLongSides, SameSurfaceWithoutGaps) {
   for (std::size_t t = 0; t < ball.triangles.size(); ++t)
     ball.face_fields[0].values.push_back(static_cast<double>(t));
   for (const double side : {2.0, 0.3, 0.1}) {
-    const libmap::SubdivisionResult fine = libmap::split_long_sides(ball, side);
+    const libmap::SubdivisionResult fine = libmap::split_long_sides(ball, side, most);
     fine.mesh.check();
     EXPECT_NEAR(libmap::surface_area(fine.mesh), libmap::surface_area(ball), 1e-9);
     EXPECT_NEAR(libmap::signed_volume(fine.mesh), libmap::signed_volume(ball), 1e-9);
@@ -356,12 +358,110 @@ TEST(SplitLongSides, SameSurfaceWithoutGaps) {
           1e-6);
     }
   }
-  EXPECT_EQ(libmap::split_long_sides(ball, 2.0).mesh.triangles, ball.triangles);
+  EXPECT_EQ(libmap::split_long_sides(ball, 2.0, most).mesh.triangles, ball.triangles);
   // Kilometres are not cut into centimetres.
   const TriangleMesh wide = graspmap_test::square_mesh(0.0, 5000.0);
   const libmap::SubdivisionResult bounded = libmap::split_long_sides(wide, 0.05, 10000);
   EXPECT_LT(bounded.mesh.triangles.size(), 10001U);
   EXPECT_GT(bounded.max_side_m, 50.0);
+}
+
+TEST(SplitLongSides, OnlyWhereItIsNeeded) {
+  const TriangleMesh wide = graspmap_test::square_mesh(0.0, 100.0);
+  const Eigen::Vector3d place(20, 30, 0);
+  const auto is_near = [&place](const TriangleMesh& mesh, const libmap::Triangle& t) {
+    const Eigen::Vector3d centre =
+        (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
+    double radius = 0.0;
+    for (const std::uint32_t corner : t)
+      radius = std::max(radius, (mesh.vertices[corner] - centre).norm());
+    return (centre - place).norm() <= radius + 1.0;
+  };
+  const libmap::SubdivisionResult fine = libmap::split_long_sides(wide, 0.1, 10'000'000, is_near);
+  EXPECT_EQ(fine.max_side_m, 0.1);
+  EXPECT_LT(fine.mesh.triangles.size(), 10000U) << "some 10^7 of them without a bound";
+  EXPECT_NEAR(libmap::surface_area(fine.mesh), libmap::surface_area(wide), 1e-6);
+  EXPECT_EQ(edge_uses(fine.mesh).second, 0U);
+  int near = 0;
+  for (const libmap::Triangle& t : fine.mesh.triangles) {
+    if ((fine.mesh.vertices[t[0]] - place).norm() > 1.0) continue;
+    ++near;
+    for (std::size_t k = 0; k < 3; ++k)
+      ASSERT_LE((fine.mesh.vertices[t[k]] - fine.mesh.vertices[t[(k + 1) % 3]]).norm(), 0.1);
+  }
+  EXPECT_GT(near, 500);
+  // Without gaps: each side inside the square has a triangle on both of its sides.
+  const libmap::MeshEdges edges = libmap::edges_of(fine.mesh.triangles, fine.mesh.vertices.size());
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    if (edges.count(e) == 2) continue;
+    const libmap::HalfEdge h = edges.half_edges[edges.first[e]];
+    const Eigen::Vector3d middle = (fine.mesh.vertices[libmap::source_of(fine.mesh.triangles, h)] +
+                                    fine.mesh.vertices[libmap::target_of(fine.mesh.triangles, h)]) /
+                                   2.0;
+    ASSERT_EQ(middle.cwiseAbs().maxCoeff(), wide.vertices[0].cwiseAbs().maxCoeff());
+  }
+}
+
+TEST(SplitLongSides, EndsWhereSidesAreRounded) {
+  TriangleMesh far = graspmap_test::square_mesh(0.0, 2.0);
+  for (Eigen::Vector3d& vertex : far.vertices) vertex += Eigen::Vector3d(1e15, 0, 0);
+  EXPECT_GT(libmap::split_long_sides(far, 0.05, 1'000'000).max_side_m, 100.0);
+}
+
+libmap::Camera any_camera(int kind) {
+  libmap::Camera camera = graspmap_test::small_camera();
+  camera.fy = camera.fx * uniform(0.5, 2.0);
+  if (kind == 1) {
+    camera.distortion_model = libmap::DistortionModel::radial_tangential;
+    camera.distortion = {uniform(-0.1, 0.1), uniform(-0.02, 0.02), 1e-3, -1e-3};
+  }
+  if (kind == 2) {
+    camera.distortion_model = libmap::DistortionModel::equidistant;
+    camera.distortion = {uniform(-0.05, 0.05), 1e-3, 0.0, 0.0};
+  }
+  return camera;
+}
+
+TEST(PhotoProjector, NoLengthInABallTakesMorePixels) {
+  int shown = 0;
+  int hidden = 0;
+  for (int round = 0; round < 3000; ++round) {
+    const libmap::Camera camera = any_camera(round % 3);
+    libmap::Pose pose = libmap::Pose::Identity();
+    pose.linear() = Eigen::Quaterniond(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1), 1.0)
+                        .normalized()
+                        .toRotationMatrix();
+    pose.translation() = Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
+    const libmap::PhotoProjector projector(camera, pose);
+    const Eigen::Vector3d centre(uniform(-3, 3), uniform(-3, 3), uniform(-3, 3));
+    const double radius = std::pow(10.0, uniform(-3, 0.5));
+    const auto in_ball = [&] {
+      return Eigen::Vector3d(
+          centre +
+          radius * uniform(0, 1) *
+              Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized());
+    };
+    const auto in_image = [&camera](const Eigen::Vector3d& seen) {
+      return seen.z() > 0.0 && seen.x() >= -0.5 && seen.y() >= -0.5 &&
+             seen.x() <= camera.width - 0.5 && seen.y() <= camera.height - 0.5;
+    };
+    bool any = false;
+    for (int i = 0; i < 30; ++i) {
+      const Eigen::Vector3d a = in_ball();
+      const Eigen::Vector3d b = in_ball();
+      const Eigen::Vector3d at = projector.project(a);
+      const Eigen::Vector3d bt = projector.project(b);
+      any = any || in_image(at);
+      if (!in_image(at) || !in_image(bt)) continue;
+      ASSERT_LE((at - bt).head<2>().norm(), projector.most_pixels(centre, radius, (a - b).norm()));
+    }
+    const double most = projector.most_pixels(centre, radius, 1.0);
+    ASSERT_TRUE(most > 0.0 || !any);
+    shown += most > 0.0 ? 1 : 0;
+    hidden += most > 0.0 ? 0 : 1;
+  }
+  EXPECT_GT(shown, 500);
+  EXPECT_GT(hidden, 500);
 }
 
 }  // namespace
