@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <optional>
 #include <set>
 #include <string>
@@ -19,14 +20,6 @@ namespace fs = std::filesystem;
 namespace {
 
 constexpr int max_depth = 12;
-
-std::optional<Manifest> manifest_of(const fs::path& output) {
-  try {
-    return read_manifest_of(output);
-  } catch (const Error&) {
-    return std::nullopt;
-  }
-}
 
 bool is_picture(const fs::path& file) {
   constexpr std::array<const char*, 4> extensions = {".png", ".jpg", ".jpeg", ".svg"};
@@ -65,6 +58,7 @@ class Finder {
     add_pictures(listing, section);
     add_tables(listing, section);
     add_texts(listing, section);
+    manifests_.clear();
     if (depth == max_depth) return section;
     for (const fs::path& inner : listing.folders) {
       if (is_folder_of_tiles(inner)) continue;
@@ -109,9 +103,21 @@ class Finder {
   }
 
  private:
-  std::ptrdiff_t maps_in(const fs::path& folder) const {
-    return std::count_if(maps_.begin(), maps_.end(),
-                         [&](const fs::path& map) { return map.parent_path() == folder; });
+  int maps_in(const fs::path& folder) const {
+    const auto found = maps_in_.find(folder);
+    return found == maps_in_.end() ? 0 : found->second;
+  }
+
+  // Read once: each map is compared with what lies beside it.
+  const std::optional<Manifest>& manifest_of(const fs::path& output) {
+    const auto [place, added] = manifests_.try_emplace(output);
+    if (!added) return place->second;
+    try {
+      place->second = read_manifest_of(output);
+    } catch (const Error&) {
+      place->second.reset();  // such an output has none
+    }
+    return place->second;
   }
 
   // The nearest folder around `output` that has a map.
@@ -141,6 +147,7 @@ class Finder {
     });
     for (const fs::path& file : candidates) {
       maps_.push_back(file);
+      ++maps_in_[file.parent_path()];
       OutlineItem item{.kind = ItemKind::map, .files = {file.filename().string()}};
       item.lookup = lookup_of(file, listing);
       if (!item.lookup.empty()) item.columns = columns_of(file.parent_path() / item.lookup);
@@ -150,10 +157,10 @@ class Finder {
   }
 
   // The looked-up points whose manifest names this map.
-  static std::string lookup_of(const fs::path& map, const FolderListing& listing) {
+  std::string lookup_of(const fs::path& map, const FolderListing& listing) {
     for (const fs::path& file : listing.files) {
       if (file.extension() != ".csv") continue;
-      const auto manifest = manifest_of(file);
+      const auto& manifest = manifest_of(file);
       if (manifest && manifest->command == "lookup" && !manifest->inputs.empty() &&
           fs::path(manifest->inputs.front().path).filename() == map.filename())
         return file.filename().string();
@@ -183,9 +190,9 @@ class Finder {
 
   // One that was made from this map, as its manifest says; a folder's only map is what one without
   // a manifest shows.
-  static std::string still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
+  std::string still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
     const auto shows = [&](const fs::path& picture) {
-      const auto manifest = manifest_of(picture);
+      const auto& manifest = manifest_of(picture);
       if (!manifest || manifest->inputs.empty()) return only_map;
       return fs::path(manifest->inputs.front().path).stem() == map.stem();
     };
@@ -257,6 +264,8 @@ class Finder {
 
   fs::path root_;
   std::vector<fs::path> maps_;
+  std::map<fs::path, int> maps_in_;
+  std::map<fs::path, std::optional<Manifest>> manifests_;  // of the folder at hand
 };
 
 }  // namespace
