@@ -15,7 +15,7 @@ namespace {
 
 // Frames in memory at a time; not the number of threads, which results must not depend on.
 constexpr std::size_t frames_in_flight = 8;
-// Of a lens: its picture of an angle over the pinhole's.
+// How much more than a pinhole a lens may enlarge.
 constexpr double most_distortion = 2.0;
 constexpr std::size_t most_kept_bytes = std::size_t{400} << 20;
 

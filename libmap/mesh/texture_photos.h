@@ -35,8 +35,9 @@ class PhotoProjector {
   // may lie outside the image.
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
-  // No length of so many metres within the ball takes more pixels; 0 only where no part of the ball
-  // is in the photograph.
+  // No length of so many metres within the ball takes more pixels in the photograph, if its lens
+  // nowhere enlarges more than twice what a pinhole does; 0 only where it shows no part of the
+  // ball.
   double most_pixels(const Eigen::Vector3d& centre, double radius_m, double length_m) const;
 
  private:
