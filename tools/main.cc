@@ -109,6 +109,7 @@ int main(int argc, char** argv) {
   const fs::path program = find_program(first);
   execv(program.c_str(), argv + 1);
   std::cerr << "graspmap " << first << ": error: cannot start " << program.string() << ": "
-            << std::strerror(errno) << "\n";
+            << std::strerror(errno)
+            << (errno == ENOENT ? "; scripts/build builds all commands" : "") << "\n";
   return 1;
 }

@@ -50,7 +50,7 @@ int columns_a_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
 
 }  // namespace
 
-std::optional<Eigen::AlignedBox2d> parse_box(const std::string& text) {
+std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text) {
   if (text.empty()) return std::nullopt;
   std::vector<double> numbers;
   std::size_t begin = 0;

@@ -12,7 +12,7 @@
 namespace graspmap_tools {
 
 // "X0,Y0,X1,Y1" in metres, or nothing for an empty text. Throws Error naming --box.
-std::optional<Eigen::AlignedBox2d> parse_box(const std::string& text);
+std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text);
 
 // The points within the box, level, in the cloud's own frame.
 libmap::PointCloud points_in_box(const libmap::PointCloud& cloud, const Eigen::AlignedBox2d& box);

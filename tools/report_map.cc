@@ -38,15 +38,10 @@ libmap::Pose terrain_from_map(const std::optional<libmap::Manifest>& manifest) {
 }
 
 void set_zero_plane(const std::optional<libmap::Manifest>& manifest, ThinnedMap& map) {
-  const libmap::ManifestValue* value =
-      manifest ? manifest->find_parameter("zero_plane_m") : nullptr;
-  if (value == nullptr) return;
-  if (const auto* number = std::get_if<double>(value))
-    map.options.zero_plane_m = *number;
-  else if (const auto* whole = std::get_if<std::int64_t>(value))
-    map.options.zero_plane_m = static_cast<double>(*whole);
-  else
-    return;
+  const std::optional<double> height =
+      manifest ? libmap::number_of(manifest->find_parameter("zero_plane_m")) : std::nullopt;
+  if (!height) return;
+  map.options.zero_plane_m = *height;
   map.options.has_zero_plane = true;
 }
 

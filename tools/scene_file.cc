@@ -60,12 +60,8 @@ double zero_plane_of(const SceneFileOptions& options, const libmap::Manifest* ma
         "not a height",
         {.field = "--zero-plane", .value = options.zero_plane, .bound = "auto, none or a number"});
   }
-  const libmap::ManifestValue* value =
-      manifest == nullptr ? nullptr : manifest->find_parameter("zero_plane_m");
-  if (value == nullptr) return none;
-  if (const auto* number = std::get_if<double>(value)) return *number;
-  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
-  return none;
+  if (manifest == nullptr) return none;
+  return libmap::number_of(manifest->find_parameter("zero_plane_m")).value_or(none);
 }
 
 // About z and along x and y alone: the input's x axis comes to lie above x, its origin above 0.
@@ -94,7 +90,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   SceneFile read;
   libmap::Scene& scene = read.scene;
   libmap::SceneLayer layer;
-  const auto box = parse_box(options.box);
+  const auto box = parse_rectangle(options.box);
   if (is_tile_store(file)) {
     MapWindow window = read_window(MapTiles(file), box, options.max_points);
     read.columns_a_point = static_cast<std::int64_t>(window.columns_a_point);

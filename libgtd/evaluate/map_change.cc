@@ -17,7 +17,7 @@ namespace {
 
 constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 constexpr double lattice_tolerance_voxels = 0.01;
-constexpr std::size_t grain = 1 << 14;
+constexpr std::size_t places_per_chunk = 1 << 14;
 
 void check(const MapChangeOptions& options) {
   MapChangeOptions copy = options;
@@ -73,7 +73,7 @@ std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& po
                                           double reach_m) {
   const PointGrid grid(points, reach_m);
   std::vector<std::uint32_t> nearest(places.size(), none);
-  libmap::parallel_for(places.size(), grain, [&](std::size_t begin, std::size_t end) {
+  libmap::parallel_for(places.size(), places_per_chunk, [&](std::size_t begin, std::size_t end) {
     std::vector<PointGrid::Range> runs;
     for (std::size_t n = begin; n < end; ++n) {
       if (!grid.reaches(places[n])) continue;

@@ -49,13 +49,6 @@ std::string text_of(const libmap::ManifestValue* value) {
       *value);
 }
 
-std::optional<double> number_of(const libmap::ManifestValue* value) {
-  if (value == nullptr) return std::nullopt;
-  if (const auto* real = std::get_if<double>(value)) return *real;
-  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
-  return std::nullopt;
-}
-
 std::vector<double> quantiles_of(std::vector<double> values) {
   std::vector<double> result;
   if (values.empty()) return result;
@@ -177,9 +170,11 @@ MapSummary summarize_map(const libmap::PointCloud& map, const VoxelMap& voxels,
 
 MapSummaryOptions summary_options(const libmap::Manifest& manifest) {
   MapSummaryOptions options;
-  options.graspability_threshold = number_of(manifest.find_parameter("graspability_threshold"))
-                                       .value_or(options.graspability_threshold);
-  options.solid_voxel_threshold = number_of(manifest.find_parameter("solid_voxel_threshold"));
+  options.graspability_threshold =
+      libmap::number_of(manifest.find_parameter("graspability_threshold"))
+          .value_or(options.graspability_threshold);
+  options.solid_voxel_threshold =
+      libmap::number_of(manifest.find_parameter("solid_voxel_threshold"));
   return options;
 }
 

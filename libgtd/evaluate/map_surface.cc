@@ -20,7 +20,7 @@ using Eigen::Vector3d;
 using std::numbers::pi;
 
 constexpr double default_radius_voxels = 6.0;
-constexpr std::size_t grain = 1 << 12;
+constexpr std::size_t map_voxels_per_chunk = 1 << 12;
 
 // Only the line of a normal counts here. A direction that no lattice plane contains sees a side of
 // every surface that voxels make, walls along z too.
@@ -134,7 +134,7 @@ MapSurface measure_surface(const VoxelMap& map, const MapSurfaceOptions& options
   const AreaCounter counter(centers.positions, surface.radius_m, size_m);
   surface.slope_deg.assign(map.size(), std::numeric_limits<float>::quiet_NaN());
   surface.area_m2.assign(map.size(), static_cast<float>(size_m * size_m));
-  libmap::parallel_for(map.size(), grain, [&](std::size_t begin, std::size_t end) {
+  libmap::parallel_for(map.size(), map_voxels_per_chunk, [&](std::size_t begin, std::size_t end) {
     std::vector<PointGrid::Range> runs;
     for (std::size_t n = begin; n < end; ++n) {
       if (!shape.points[n].valid) continue;

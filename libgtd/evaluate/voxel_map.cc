@@ -19,7 +19,7 @@ using libmap::ScalarField;
 constexpr double index_bound = 0x1p29;
 // Of a voxel's edge: positions in files are rounded to single precision.
 constexpr double max_offset = 0.25;
-constexpr std::size_t grain = 1 << 16;
+constexpr std::size_t voxels_per_chunk = 1 << 16;
 
 const std::vector<double>& values_of(const PointCloud& map, const char* name) {
   if (const ScalarField* field = map.find_field(name)) return field->values;
@@ -137,7 +137,7 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
   result.graspable.resize(count);
   result.edge.resize(count);
   result.obstacle.resize(count);
-  libmap::parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
+  libmap::parallel_for(count, voxels_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const std::uint32_t point = result.map_points[n];
       const bool scored = std::isfinite(score[point]);
@@ -151,20 +151,13 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
   });
 }
 
-std::optional<double> number_of(const libmap::ManifestValue* value) {
-  if (value == nullptr) return std::nullopt;
-  if (const auto* number = std::get_if<double>(value)) return *number;
-  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
-  return std::nullopt;
-}
-
 }  // namespace
 
 MapFacts facts_of(const libmap::Manifest& manifest) {
   MapFacts facts;
   facts.zero_plane_m =
-      number_of(manifest.find_parameter("zero_plane_m")).value_or(facts.zero_plane_m);
-  const std::optional<double> size_m = number_of(manifest.find_parameter("voxel_size_m"));
+      libmap::number_of(manifest.find_parameter("zero_plane_m")).value_or(facts.zero_plane_m);
+  const std::optional<double> size_m = libmap::number_of(manifest.find_parameter("voxel_size_m"));
   const libmap::ManifestValue* value = manifest.find_result("lattice_origin_m");
   const auto* origin = value == nullptr ? nullptr : std::get_if<std::vector<double>>(value);
   if (size_m && *size_m > 0.0 && origin != nullptr && origin->size() == 3) {

@@ -12,7 +12,7 @@ namespace libgtd {
 
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t tilted_pivots_per_chunk = 4096;
 
 std::vector<TiltedPivot> tilt(const std::vector<Voxel>& voxels,
                               const std::vector<SurfaceNormal>& normals,
@@ -96,14 +96,15 @@ std::vector<ScoredVoxel> score_on_surface(const std::vector<Voxel>& voxels,
   if (mask.method == Method::corrected)
     edges = find_tilted_edges(voxels, pivots, terrain, grid, mask, tiles);
   std::vector<ScoredVoxel> scored(voxels.size());
-  libmap::parallel_for(voxels.size(), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      scored[n] = {
-          .voxel = voxels[n],
-          .counts = counts[n],
-          .score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0,
-          .edge = edges[n] != 0};
-  });
+  libmap::parallel_for(
+      voxels.size(), tilted_pivots_per_chunk, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+          scored[n] = {
+              .voxel = voxels[n],
+              .counts = counts[n],
+              .score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0,
+              .edge = edges[n] != 0};
+      });
   return scored;
 }
 

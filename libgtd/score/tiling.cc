@@ -14,7 +14,7 @@ namespace libgtd {
 
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t pivots_per_chunk = 4096;
 
 constexpr std::uint8_t is_pivot = 1;
 constexpr std::uint8_t is_edge = 2;
@@ -128,7 +128,7 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
   const std::vector<VoxelCounts> counts =
       match_voxels(grid, mask, pivots, options.instructions, progress);
   std::vector<ScoredVoxel> scored(pivots.size());
-  libmap::parallel_for(pivots.size(), grain, [&](std::size_t begin, std::size_t end) {
+  libmap::parallel_for(pivots.size(), pivots_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       ScoredVoxel& one = scored[n];
       one.voxel = grid.voxels[pivots[n]];

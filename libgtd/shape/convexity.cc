@@ -13,7 +13,7 @@ namespace libgtd {
 
 namespace {
 
-constexpr std::size_t grain = 1024;
+constexpr std::size_t positions_per_chunk = 1024;
 
 constexpr double default_bend = 0.1;  // curvature times radius
 
@@ -87,10 +87,12 @@ std::vector<std::uint8_t> mark_near_convex(const std::vector<Eigen::Vector3d>& p
   const PointGrid grid(convex_points, distance_m * (1 + 1e-6));
   std::vector<std::uint8_t> near(positions.size(), 0);
   if (grid.cells().empty()) return near;
-  libmap::parallel_for(positions.size(), grain, [&](std::size_t begin, std::size_t end) {
-    NearSearch search(convex_points, grid, distance_m);
-    for (std::size_t i = begin; i < end; ++i) near[i] = search.is_near(positions[i]) ? 1 : 0;
-  });
+  libmap::parallel_for(positions.size(), positions_per_chunk,
+                       [&](std::size_t begin, std::size_t end) {
+                         NearSearch search(convex_points, grid, distance_m);
+                         for (std::size_t i = begin; i < end; ++i)
+                           near[i] = search.is_near(positions[i]) ? 1 : 0;
+                       });
   return near;
 }
 

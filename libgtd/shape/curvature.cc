@@ -12,6 +12,7 @@
 #include "libgtd/shape/neighbor_loops.h"
 #include "libgtd/shape/place_order.h"
 #include "libgtd/shape/point_grid.h"
+#include "libgtd/shape/surface_normal.h"
 #include "libgtd/shape/thesis_curvature.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -27,23 +28,15 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 
 constexpr std::size_t min_neighbors = 6;  // a quadric has six coefficients
-// Squares of widths relative to each other: below the first a neighbourhood is a line, above the
-// second it is a lump in which no plane is tangent.
-constexpr double min_width_ratio = 1e-6;
-constexpr double max_lump_ratio = 0.8;
 // What must be left of a column of the normal equations after the ones before it are taken out.
 constexpr double min_pivot = 1e-6;
-// A surface this near to being along `up` (0.06 deg) has no known outside.
-constexpr double min_side_cosine = 1e-3;
 
 // Columns u, v, w: the neighbourhood's widest, second and thinnest direction. False if it is a line
 // or a lump.
 bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
   solver.computeDirect(covariance);
-  const Vector3d& widths = solver.eigenvalues();
-  if (!(widths[1] > min_width_ratio * widths[2]) || widths[0] > max_lump_ratio * widths[1])
-    return false;
+  if (!determines_plane(solver.eigenvalues())) return false;
   const Vector3d w = solver.eigenvectors().col(0).normalized();
   const Vector3d wide = solver.eigenvectors().col(2);
   const Vector3d u = (wide - wide.dot(w) * w).normalized();

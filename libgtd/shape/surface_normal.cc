@@ -17,13 +17,6 @@ namespace {
 
 using Eigen::Vector3d;
 
-// Squares of widths relative to each other: below the first the points are a line, above the second
-// they are a lump that no plane fits better than another.
-constexpr double min_width_ratio = 1e-6;
-constexpr double max_lump_ratio = 0.8;
-// A surface this near to being along a direction (0.06 deg) does not face it.
-constexpr double min_side_cosine = 1e-3;
-
 double side_of(const Vector3d& normal, const Vector3d& outside) {
   if (!outside.allFinite() || !(outside.norm() > 0)) return 0;
   const double cosine = normal.dot(outside.normalized());
@@ -60,9 +53,7 @@ class PlaneFitter {
     if (count < 3) return {};
     Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver;
     solver.computeDirect(covariance_of(loops_, neighbors, count));
-    const Vector3d& widths = solver.eigenvalues();
-    if (!(widths[1] > min_width_ratio * widths[2]) || widths[0] > max_lump_ratio * widths[1])
-      return {};
+    if (!determines_plane(solver.eigenvalues())) return {};
     const Vector3d normal = solver.eigenvectors().col(0).normalized();
     return normal.allFinite() ? facing(normal, outside, up_) : SurfaceNormal{};
   }

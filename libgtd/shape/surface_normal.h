@@ -26,6 +26,18 @@ struct SurfaceNormal {
   float slope_deg = nan;
 };
 
+// A surface this near to being along a direction (0.06 deg) does not face it.
+inline constexpr double min_side_cosine = 1e-3;
+
+// Whether points determine a plane, by the eigenvalues of their covariance in ascending order: they
+// are neither a line nor a lump that no plane fits better than another.
+inline bool determines_plane(const Eigen::Vector3d& variances) {
+  constexpr double min_width_ratio = 1e-6;
+  constexpr double max_lump_ratio = 0.8;
+  return variances[1] > min_width_ratio * variances[2] &&
+         !(variances[0] > max_lump_ratio * variances[1]);
+}
+
 // The normal of the regression plane (eq. 2-13..2-15) of the cloud's points within the radius, at
 // each of `places`. It faces `outsides` there, directions of any length, as many as there are
 // places or none; where that is zero, not finite or along the surface, it faces `up`. Nothing

@@ -27,7 +27,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_2;
 using Eigen::Vector3d;
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t triangles_per_chunk = 4096;
 constexpr std::size_t columns_at_once = 16;  // of the grid that one thread fills
 
 // Where the grid's nodes stand along one axis, in increasing order.
@@ -334,13 +334,14 @@ void fill_triangles(const std::vector<Vector3d>& points, const std::vector<Corne
     return t;
   };
   std::vector<Placement> placements(triangles.size());
-  libmap::parallel_for(triangles.size(), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const Triangle t = triangle_at(n);
-      placements[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
-      grid.place(placements[n], t);
-    }
-  });
+  libmap::parallel_for(
+      triangles.size(), triangles_per_chunk, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n) {
+          const Triangle t = triangle_at(n);
+          placements[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
+          grid.place(placements[n], t);
+        }
+      });
   result.triangles = triangles.size();
   result.refused_triangles = static_cast<std::size_t>(std::count_if(
       placements.begin(), placements.end(), [](const Placement& one) { return one.refused; }));

@@ -1,12 +1,12 @@
 #include "libgtd/terrain/regression_plane.h"
 
-#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 
 namespace libgtd {
 
@@ -17,7 +17,7 @@ using Eigen::Vector3d;
 using libmap::PointCloud;
 using libmap::PointStream;
 
-constexpr std::size_t grain = 8192;
+constexpr std::size_t points_per_chunk = 8192;
 // The input's z axis decides only where it is within 75 deg of the normal.
 constexpr double min_cosine_of_frame_z = 0.2588190451025207;
 // Below these sines two directions count as parallel.
@@ -38,9 +38,9 @@ struct Moments {
 // at once.
 template <typename T, typename Add>
 void add_block(const PointCloud& block, const T& zero, const Add& add, T& total) {
-  static_assert(PointStream::block_points % grain == 0);
+  static_assert(PointStream::block_points % points_per_chunk == 0);
   total = libmap::parallel_reduce(
-      block.size(), grain, total,
+      block.size(), points_per_chunk, total,
       [&](std::size_t begin, std::size_t end) {
         T sum = zero;
         for (std::size_t i = begin; i < end; ++i)
@@ -141,9 +141,9 @@ Matrix3d principal_axes(const PointStream& points, const Vector3d& centroid, std
   // Scaled, so that neither tiny nor huge clouds leave the numbers' range.
   const double scale = covariance.trace();
   if (scale > 0) covariance /= scale;
-  const Eigen::SelfAdjointEigenSolver<Matrix3d> solver(covariance);
-  variances = solver.eigenvalues().cwiseMax(0.0) * scale;
-  return solver.eigenvectors();
+  const libmap::SymmetricEigen<3> eigen = libmap::symmetric_eigen(covariance);
+  variances = eigen.values.cwiseMax(0.0) * scale;
+  return eigen.vectors;
 }
 
 void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size_t count) {

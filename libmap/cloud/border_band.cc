@@ -12,6 +12,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/image.h"
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 
 namespace libmap {
@@ -21,7 +22,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double unseen = -1.0;
-constexpr double most_cells = 4e6;
+constexpr double max_band_cells = 4e6;
 constexpr double least_contrast = 40.0;  // of 255, of white from what is usual
 constexpr std::size_t most_lines = 10;   // white lines in one direction
 
@@ -74,7 +75,7 @@ Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) 
   const Vector2d size = high - low;
   picture.corner = low;
   picture.cell = std::max(
-      {options.cell_m, std::sqrt(size.x() * size.y() / most_cells), size.maxCoeff() / 20000.0});
+      {options.cell_m, std::sqrt(size.x() * size.y() / max_band_cells), size.maxCoeff() / 20000.0});
   picture.levels = Image<double>(static_cast<int>(size.x() / picture.cell) + 1,
                                  static_cast<int>(size.y() / picture.cell) + 1, 0.0);
   Image<int> counts(picture.levels.width, picture.levels.height);
@@ -278,12 +279,6 @@ std::optional<double> inner_edge(const Picture& picture, const Side& side, doubl
   return step * (n + (white - white_level) / (white - dark));
 }
 
-double median_of(std::vector<double> values) {
-  std::nth_element(values.begin(), values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
-
 // across = result[0] + result[1] * along: Theil (1950) and Sen (1968), then least squares with
 // Tukey's weights.
 Vector2d fit_line(const std::vector<Vector2d>& edges) {
@@ -291,17 +286,17 @@ Vector2d fit_line(const std::vector<Vector2d>& edges) {
   for (std::size_t a = 0; a < edges.size(); ++a)
     for (std::size_t b = a + 1; b < edges.size(); ++b)
       slopes.push_back((edges[b].y() - edges[a].y()) / (edges[b].x() - edges[a].x()));
-  Vector2d line(0.0, median_of(slopes));
+  Vector2d line(0.0, median(slopes));
   std::vector<double> offsets;
   offsets.reserve(edges.size());
   for (const Vector2d& edge : edges) offsets.push_back(edge.y() - line[1] * edge.x());
-  line[0] = median_of(offsets);
+  line[0] = median(offsets);
   for (int round = 0; round < 20; ++round) {
     std::vector<double> deviations;
     deviations.reserve(edges.size());
     for (const Vector2d& edge : edges)
       deviations.push_back(std::abs(edge.y() - line[0] - line[1] * edge.x()));
-    const double limit = std::max(4.685 * 1.4826 * median_of(deviations), 1e-6);
+    const double limit = std::max(4.685 * 1.4826 * median(deviations), 1e-6);
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Vector2d right = Vector2d::Zero();
     for (std::size_t n = 0; n < edges.size(); ++n) {

@@ -1,6 +1,5 @@
 #include "libmap/cloud/ground_plane.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,7 +9,9 @@
 #include <string>
 
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 
 namespace libmap {
 
@@ -68,9 +69,9 @@ Spread spread_of(const Moments& moments) {
   spread.centre = moments.first / moments.weight;
   const Eigen::Matrix3d covariance =
       moments.second / moments.weight - spread.centre * spread.centre.transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(covariance);
-  spread.variances = solver.eigenvalues();
-  spread.axes = solver.eigenvectors();
+  const SymmetricEigen<3> eigen = symmetric_eigen(covariance);
+  spread.variances = eigen.values;
+  spread.axes = eigen.vectors;
   return spread;
 }
 
@@ -208,12 +209,6 @@ bool lies_under(const Candidate& other, const Candidate& ground, const Eigen::Ve
   return up.dot(ground.plane.centre - other.plane.centre) > tolerance;
 }
 
-double median_of(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 // Iterated least squares with Tukey's biweight (Beaton and Tukey 1974); its scale is that of the
 // inliers' median deviation.
 Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up, double tolerance) {
@@ -230,7 +225,7 @@ Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up,
       if (height <= tolerance) deviations.push_back(height);
     }
     if (deviations.size() < 3) return plane;
-    const double limit = std::clamp(4.685 * 1.4826 * median_of(deviations),
+    const double limit = std::clamp(4.685 * 1.4826 * median(std::move(deviations)),
                                     std::min(100.0 * exact, tolerance), tolerance);
     const Spread spread = weighted_spread(near, plane.centre, [&](const Eigen::Vector3d& point) {
       const double ratio = plane.height(point) / limit;
@@ -374,10 +369,8 @@ Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals) {
 Pose level_from_map(const GroundPlane& plane) {
   const Eigen::Vector3d pivot =
       plane.centre - (plane.normal.dot(plane.centre) - plane.offset_m) * plane.normal;
-  const Eigen::Quaterniond turn =
-      Eigen::Quaterniond::FromTwoVectors(plane.normal, Eigen::Vector3d::UnitZ());
   Pose level = Pose::Identity();
-  level.linear() = turn.toRotationMatrix();
+  level.linear() = shortest_rotation(plane.normal, Eigen::Vector3d::UnitZ());
   level.translation() = Eigen::Vector3d(pivot.x(), pivot.y(), 0.0) - level.linear() * pivot;
   return level;
 }

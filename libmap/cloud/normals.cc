@@ -1,6 +1,5 @@
 #include "libmap/cloud/normals.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +13,7 @@
 #include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 
 namespace libmap {
 
@@ -40,10 +40,9 @@ Eigen::Vector3f plane_normal(const std::vector<Eigen::Vector3d>& positions,
   }
   const auto count = static_cast<double>(neighbors.size());
   moments -= mean * mean.transpose() / count;
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d> solver(moments);
-  const Eigen::Vector3d& spread = solver.eigenvalues();
-  if (!(spread[1] > least_spread * spread[2])) return Eigen::Vector3f::Zero();
-  return solver.eigenvectors().col(0).cast<float>().normalized();
+  const SymmetricEigen<3> spread = symmetric_eigen(moments);
+  if (!(spread.values[1] > least_spread * spread.values[2])) return Eigen::Vector3f::Zero();
+  return spread.vectors.col(0).cast<float>().normalized();
 }
 
 void turn_to(const std::vector<Eigen::Vector3d>& positions,

@@ -16,7 +16,7 @@ namespace {
 constexpr float least_agreement = 0.7F;
 // Second eigenvalue of the neighbours' covariance, in squared radii, below which they lie on a
 // line.
-constexpr float least_spread = 0.02F;
+constexpr float min_spread_ratio = 0.02F;
 
 // What a fit needs of a point, lengths in radii.
 struct Neighbour {
@@ -109,7 +109,7 @@ Eigen::Vector3f fitted_normal(const Neighbour& point, const std::vector<Neighbou
       products.z(), products.y(), squares.z();
   Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
   solver.computeDirect(moments / weights - mean * mean.transpose());
-  if (!(solver.eigenvalues()[1] >= least_spread)) return point.normal;
+  if (!(solver.eigenvalues()[1] >= min_spread_ratio)) return point.normal;
   const Eigen::Vector3f normal = solver.eigenvectors().col(0).normalized();
   return normal.dot(point.normal) < 0.0F ? Eigen::Vector3f(-normal) : normal;
 }

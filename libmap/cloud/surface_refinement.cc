@@ -15,7 +15,7 @@ namespace {
 
 constexpr std::size_t chunk_size = 128;
 // Measurements further off than this many standard deviations have no weight (Tukey's biweight).
-constexpr float gate_sigmas = 4.0F;
+constexpr float refinement_gate_sigmas = 4.0F;
 // Frames' worth of belief in the noise model against the scatter between frames.
 constexpr float prior_frames = 4.0F;
 // Smallest cosine of a pixel's ray and the plane's normal that is computed with.
@@ -165,7 +165,7 @@ class ViewGather {
     seen.sigma = static_cast<float>(options_.noise.axial_at(p.z()));
     seen.information =
         1.0F / (seen.sigma * seen.sigma * square + lateral * lateral * (1.0F - square));
-    seen.gate = gate_sigmas * seen.sigma +
+    seen.gate = refinement_gate_sigmas * seen.sigma +
                 static_cast<float>(options_.search_m) / std::max(seen.cosine, 0.2F);
     // At least the pixel's own footprint: a disc without a pixel says nothing.
     seen.radius = std::max(static_cast<float>(options_.disc_radius_m), 1.5F * pixel_pitch_ * z);

@@ -135,6 +135,13 @@ void Manifest::add_input(const std::filesystem::path& path) {
 const ManifestValue* Manifest::find_parameter(std::string_view name) const {
   return find_in(parameters, name);
 }
+std::optional<double> number_of(const ManifestValue* value) {
+  if (value == nullptr) return std::nullopt;
+  if (const auto* real = std::get_if<double>(value)) return *real;
+  if (const auto* whole = std::get_if<std::int64_t>(value)) return static_cast<double>(*whole);
+  return std::nullopt;
+}
+
 const ManifestValue* Manifest::find_result(std::string_view name) const {
   return find_in(results, name);
 }

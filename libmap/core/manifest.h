@@ -17,6 +17,9 @@ namespace libmap {
 
 using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
 
+// A real or whole number; nothing for another type and for no value.
+std::optional<double> number_of(const ManifestValue* value);
+
 struct ManifestInput {
   std::string path;    // as the user named it
   std::string sha256;  // 64 hexadecimal digits

@@ -37,6 +37,29 @@ Eigen::Vector3d roll_pitch_yaw_deg(const Pose& pose) {
   return Eigen::Vector3d(roll, pitch, yaw) * (180.0 / std::numbers::pi);
 }
 
+Eigen::Matrix4d align_points(const Eigen::Matrix3Xd& source, const Eigen::Matrix3Xd& target,
+                             bool with_scale) {
+  return Eigen::umeyama(source, target, with_scale);
+}
+
+// As Eigen::Quaterniond::FromTwoVectors, without its singular value decomposition for directions
+// that are opposite.
+Eigen::Matrix3d shortest_rotation(const Eigen::Vector3d& from, const Eigen::Vector3d& to) {
+  const Eigen::Vector3d a = from.normalized();
+  const Eigen::Vector3d b = to.normalized();
+  const double cosine = b.dot(a);
+  Eigen::Quaterniond turn;
+  if (cosine < -1.0 + Eigen::NumTraits<double>::dummy_precision()) {
+    turn.w() = 0.0;
+    turn.vec() = a.unitOrthogonal();
+  } else {
+    const double s = std::sqrt((1.0 + cosine) * 2.0);
+    turn.vec() = a.cross(b) * (1.0 / s);
+    turn.w() = s * 0.5;
+  }
+  return turn.toRotationMatrix();
+}
+
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& matrix) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(matrix, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Vector3d signs = Eigen::Vector3d::Ones();

@@ -58,6 +58,8 @@ struct GpsFix {
 
 // One place at which the scan was recorded.
 struct GraphNode {
+  static constexpr int invalid_weight = -9;  // RTAB-Map's, of nodes without a usable signature
+
   int id = 0;       // > 0
   int session = 0;  // odometry does not connect different sessions
   int weight = 0;   // >= 0 normal, -1 intermediate, -9 invalid

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
 
@@ -28,6 +29,10 @@ class RandomStream {
   // In [0, 1).
   double uniform() { return unit_noise(++count_, key_); }
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
+  // A whole number in [0, count).
+  std::size_t below(std::size_t count) {
+    return static_cast<std::size_t>(uniform() * static_cast<double>(count));
+  }
   // Mean 0, standard deviation 1 (Box and Muller 1958).
   double normal() {
     if (has_spare_) {

@@ -1,6 +1,7 @@
 // A text of YAML, with errors that name file and line.
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <string>
 
@@ -9,6 +10,9 @@ class Node;
 }
 
 namespace libmap {
+
+// Of a file of YAML that is read whole.
+inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 
 // Gives the one document in `text` to `read`, a null node where there is none. Throws Error naming
 // `file` where the text is no YAML or holds more documents, and names `file` in what `read` throws.

@@ -21,7 +21,7 @@ constexpr double piece_size = 4.0;
 constexpr double first_gap_size = 1.0 / 3.0;
 constexpr double smallest_gap = 1e-3;
 
-constexpr std::size_t grain = 256;
+constexpr std::size_t gaps_per_chunk = 256;
 constexpr double samples_a_part = 131072.0;
 constexpr std::size_t most_pieces = 30'000'000;
 
@@ -237,7 +237,8 @@ class Sampler {
   // darts fall evenly.
   std::vector<Candidate> darts_into(const std::vector<Fragment>& gaps, std::uint64_t round) const {
     return collect<Candidate>(
-        gaps.size(), grain, [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
+        gaps.size(), gaps_per_chunk,
+        [&](std::size_t begin, std::size_t end, std::vector<Candidate>& found) {
           Candidate candidate{};
           for (std::size_t n = begin; n < end; ++n) {
             RandomStream random(mix_bits(seed_, round), n);
@@ -278,7 +279,7 @@ class Sampler {
   std::vector<Fragment> remaining(const std::vector<Fragment>& gaps) const {
     // Rounding may carry every dart into a smaller gap out of it.
     const double smallest_m = std::max(smallest_gap * radius_m_, surface_.rounding_m);
-    return collect<Fragment>(gaps.size(), grain,
+    return collect<Fragment>(gaps.size(), gaps_per_chunk,
                              [&](std::size_t begin, std::size_t end, std::vector<Fragment>& found) {
                                GapSearch search(samples_, radius_m_);
                                for (std::size_t n = begin; n < end; ++n) {
@@ -314,7 +315,7 @@ double smallest_distance(const std::vector<Eigen::Vector3d>& positions, double e
     for (const Eigen::Vector3d& position : positions) grid.add(position);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(reach);
     const double least = parallel_reduce(
-        positions.size(), grain, std::numeric_limits<double>::infinity(),
+        positions.size(), gaps_per_chunk, std::numeric_limits<double>::infinity(),
         [&](std::size_t begin, std::size_t end) {
           double square = std::numeric_limits<double>::infinity();
           for (std::size_t n = begin; n < end; ++n)

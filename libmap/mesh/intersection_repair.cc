@@ -27,10 +27,6 @@ constexpr std::string_view component_field = "\x01component";
 // `filled` while this works: what was marked before keeps apart from what is put in now.
 constexpr double filled_before = 2.0;
 
-std::size_t count_of(const std::vector<bool>& marks) {
-  return static_cast<std::size_t>(std::count(marks.begin(), marks.end(), true));
-}
-
 ScalarField& field_named(std::vector<ScalarField>& fields, std::string_view name) {
   return *std::find_if(fields.begin(), fields.end(),
                        [&](const ScalarField& field) { return field.name == name; });

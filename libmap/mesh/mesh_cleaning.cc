@@ -24,10 +24,6 @@ namespace {
 // Of the mesh's size: the tolerance for vertices that are one.
 constexpr double merge_share = 1e-7;
 
-std::size_t count_of(const std::vector<bool>& marks) {
-  return static_cast<std::size_t>(std::count(marks.begin(), marks.end(), true));
-}
-
 std::vector<bool> inverse(std::vector<bool> marks) {
   marks.flip();
   return marks;

@@ -92,6 +92,10 @@ struct DisjointSets {
 
 }  // namespace
 
+std::size_t count_of(const std::vector<bool>& marks) {
+  return static_cast<std::size_t>(std::count(marks.begin(), marks.end(), true));
+}
+
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle) {
   if (keep_triangle.size() != mesh.triangles.size())
     throw Error("marks do not fit the mesh", {.field = "marked triangles",

@@ -10,6 +10,9 @@
 
 namespace libmap {
 
+// How many are marked.
+std::size_t count_of(const std::vector<bool>& marks);
+
 // The triangles that are marked, in their order, and the vertices that they use, in theirs.
 // `keep_triangle` is one a triangle.
 TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>& keep_triangle);

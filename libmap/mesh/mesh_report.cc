@@ -13,10 +13,6 @@ namespace libmap {
 
 namespace {
 
-std::size_t count_of(const std::vector<bool>& marks) {
-  return static_cast<std::size_t>(std::count(marks.begin(), marks.end(), true));
-}
-
 double length_of(const TriangleMesh& mesh, HalfEdge h) {
   return (mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)])
       .norm();

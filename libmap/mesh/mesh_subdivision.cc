@@ -14,7 +14,7 @@ namespace libmap {
 namespace {
 
 constexpr std::uint32_t no_vertex = 0xffffffff;
-constexpr std::size_t grain = 1024;
+constexpr std::size_t edges_per_chunk = 1024;
 // Of the largest coordinate: shorter sides are not halved, for their middles were rounded.
 constexpr double least_side = 1e-12;
 
@@ -37,7 +37,7 @@ bool is_long(const TriangleMesh& mesh, HalfEdge h, double max_side_m) {
 // Parts of a triangle that needs no cutting need none: `open` says which triangles still may.
 void close_triangles(const TriangleMesh& mesh, double max_side_m, const NeedsCutting& needs_cutting,
                      std::vector<std::uint8_t>& open) {
-  parallel_for(open.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(open.size(), edges_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) {
       if (open[t] == 0) continue;
       const auto h = static_cast<HalfEdge>(3 * t);

@@ -1,6 +1,5 @@
 #include "libmap/mesh/poisson_reconstruction.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -9,7 +8,9 @@
 
 #include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/cloud_values.h"
 #include "libmap/mesh/mesh_parts.h"
@@ -152,8 +153,7 @@ void Reconstruction::choose_cell_size() {
     const Eigen::Vector3d arm = place - places.front() - mean;
     moments += arm * arm.transpose();
   }
-  const Eigen::Vector3d spread =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(moments, Eigen::EigenvaluesOnly).eigenvalues();
+  const Eigen::Vector3d spread = symmetric_eigen(moments).values;
   if (!(spread[1] > least_width * least_width * spread[2]))
     throw too_thin("the points lie on a line: there is no surface through them");
   result_.spacing_m = median_spacing(places);
@@ -201,9 +201,7 @@ void Reconstruction::make_samples() {
     if (errors.empty()) {
       errors_ = nullptr;
     } else {
-      const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-      std::nth_element(errors.begin(), middle, errors.end());
-      median_error_m_ = *middle;
+      median_error_m_ = median(std::move(errors));
     }
   }
   std::vector<UsedPoint> points;

@@ -27,7 +27,7 @@ struct ReferenceSurface::Shape {
 
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t points_per_chunk = 4096;
 
 double angle_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b));
@@ -174,7 +174,7 @@ NearestPlace ReferenceSurface::nearest(const Eigen::Vector3d& point) const {
 PointDistances distances_to(const ReferenceSurface& surface,
                             const std::vector<Eigen::Vector3d>& points) {
   PointDistances distances{std::vector<double>(points.size()), std::vector<double>(points.size())};
-  parallel_for(points.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(points.size(), points_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const NearestPlace place = surface.nearest(points[n]);
       distances.distance_m[n] = place.distance_m;

@@ -1,6 +1,5 @@
 #include "libmap/mesh/surface_alignment.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -8,8 +7,10 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/pose_graph.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -30,7 +31,7 @@ void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
 namespace {
 
 using Vector6d = Eigen::Matrix<double, 6, 1>;
-constexpr std::size_t grain = 512;
+constexpr std::size_t distances_per_chunk = 512;
 
 void check(SurfaceAlignmentOptions options) {
   ParameterTable table;
@@ -57,7 +58,7 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
                            const ReferenceSurface& surface,
                            const SurfaceAlignmentOptions& options) {
   std::vector<Pair> pairs(points.size());
-  parallel_for(points.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(points.size(), distances_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       pairs[n].point = moved * points[n];
       pairs[n].place = surface.nearest(pairs[n].point);
@@ -85,9 +86,7 @@ std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
   std::vector<double> distances;
   distances.reserve(pairs.size());
   for (const Pair& pair : pairs) distances.push_back(pair.place.distance_m);
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  const double reach = std::max(floor_m, efficient * normal_median * *middle);
+  const double reach = std::max(floor_m, efficient * normal_median * median(std::move(distances)));
   std::size_t inliers = 0;
   for (Pair& pair : pairs) {
     const double share = pair.place.distance_m / reach;
@@ -138,20 +137,20 @@ struct Step {
 };
 
 Step solve(const NormalEquations& equations, double min_curvature) {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(equations.matrix);
-  const double greatest = solver.eigenvalues()[5];
+  const SymmetricEigen<6> eigen = symmetric_eigen(equations.matrix);
+  const double greatest = eigen.values[5];
   Step step;
   Vector6d motion = Vector6d::Zero();
   for (Eigen::Index n = 5; n >= 0; --n) {
-    const double curvature = solver.eigenvalues()[n] / greatest;
+    const double curvature = eigen.values[n] / greatest;
     // Rounding leaves some 1e-16 where there is nothing.
     if (!(curvature >= std::max(min_curvature, 1e-13))) {
       ++step.free_motions;
       continue;
     }
     step.curvature = curvature;
-    const Vector6d direction = solver.eigenvectors().col(n);
-    motion += direction.dot(equations.right) / solver.eigenvalues()[n] * direction;
+    const Vector6d direction = eigen.vectors.col(n);
+    motion += direction.dot(equations.right) / eigen.values[n] * direction;
   }
   const Eigen::Vector3d turn = motion.head<3>() / equations.radius_m;
   step.length_m = motion.norm();

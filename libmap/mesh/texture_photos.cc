@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/scan/image_sharpness.h"
 
@@ -188,10 +189,9 @@ TexturePhotos::TexturePhotos(const ScanSource& scan, const Trajectory& world_fro
 
   std::vector<double> all;
   for (const TexturePhoto& photo : photos_) all.push_back(photo.sharpness);
-  const auto middle = all.begin() + static_cast<std::ptrdiff_t>(all.size() / 2);
-  std::nth_element(all.begin(), middle, all.end());
+  const double middle = median(std::move(all));
   for (TexturePhoto& photo : photos_)
-    photo.sharpness = *middle > 0.0 ? photo.sharpness / *middle : 1.0;
+    photo.sharpness = middle > 0.0 ? photo.sharpness / middle : 1.0;
 }
 
 void TexturePhotos::keep(std::size_t photo, std::shared_ptr<const ColorImage> image) const {

@@ -13,7 +13,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t grain = 4096;
+constexpr std::size_t vertices_per_chunk = 4096;
 // Of a photograph's smaller side: within it, towards the border, a view counts less and less.
 constexpr double border_band = 0.15;
 constexpr double least_border_share = 0.05;
@@ -115,7 +115,7 @@ class ViewFinder {
 void ViewFinder::project_vertices() {
   const Camera& camera = projector_->camera();
   const double border = options_.border_px;
-  parallel_for(vertices_.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(vertices_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       const Eigen::Vector3d seen = projector_->project(mesh_.vertices[v]);
       SeenVertex& vertex = vertices_[v];
@@ -144,7 +144,7 @@ void ViewFinder::fill_cells() {
     z = std::min(z, vertex.z);
   }
   cell_rays_.resize(count);
-  parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(count, vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     const auto columns = static_cast<std::size_t>(cell_columns_);
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t column = i % columns;
@@ -178,7 +178,7 @@ bool ViewFinder::is_beside_occluder(std::size_t t) const {
 
 void ViewFinder::devalue_occluded_edges() {
   if (options_.occlusion_margin_px == 0) return;
-  parallel_for(qualities_.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t)
       if (qualities_[t] > 0.0F && is_beside_occluder(t)) qualities_[t] *= beside_occluder;
   });
@@ -210,7 +210,7 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
 }
 
 void ViewFinder::rate_triangles(double sharpness) {
-  parallel_for(qualities_.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t) qualities_[t] = rate(t, sharpness);
   });
 }
@@ -218,7 +218,7 @@ void ViewFinder::rate_triangles(double sharpness) {
 std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points) const {
   const Eigen::Vector3d& origin = projector_->position();
   std::vector<std::uint8_t> flags(points.size(), 0);
-  parallel_for(points.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(points.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     std::vector<Eigen::Vector3d> directions;
     directions.reserve(end - begin);
     // Rays end before the surface itself.
@@ -291,11 +291,11 @@ float ViewFinder::quality_at(std::uint32_t v) const {
 }
 
 void ViewFinder::keep(std::uint32_t photo) {
-  parallel_for(qualities_.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t t = begin; t < end; ++t)
       if (qualities_[t] > 0.0F) views_.of_triangles.insert(t, {photo, qualities_[t]});
   });
-  parallel_for(vertices_.size(), grain, [&](std::size_t begin, std::size_t end) {
+  parallel_for(vertices_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       const float quality = quality_at(static_cast<std::uint32_t>(v));
       if (quality > 0.0F) views_.of_vertices.insert(v, {photo, quality});

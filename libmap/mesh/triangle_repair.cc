@@ -19,7 +19,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::uint32_t none = 0xffffffff;
+constexpr std::uint32_t no_vertex = 0xffffffff;
 // A row of caps may wait for its last one.
 constexpr std::size_t max_cap_passes = 1000;
 constexpr double max_coordinate = 1e30;  // its powers that areas and volumes need are finite
@@ -34,7 +34,7 @@ class VertexGrid {
       : vertices_(vertices),
         distance_(distance),
         cells_per_m_(distance > 0.0 ? 1.0 / std::max(4.0 * distance, least_cell) : 1.0),
-        next_(vertices.size(), none) {
+        next_(vertices.size(), no_vertex) {
     first_.reserve(vertices.size());
   }
 
@@ -43,7 +43,7 @@ class VertexGrid {
     const Eigen::Array3d at = vertices_[v].array();
     const Eigen::Array3d low = cell_of(at - distance_);
     const Eigen::Array3d high = cell_of(at + distance_);
-    std::uint32_t found = none;
+    std::uint32_t found = no_vertex;
     for (int corner = 0; corner < 8; ++corner) {
       const std::array<bool, 3> upper = {(corner & 1) != 0, (corner & 2) != 0, (corner & 4) != 0};
       if ((upper[0] && low.x() == high.x()) || (upper[1] && low.y() == high.y()) ||
@@ -53,7 +53,7 @@ class VertexGrid {
           first_.find(key({upper[0] ? high.x() : low.x(), upper[1] ? high.y() : low.y(),
                            upper[2] ? high.z() : low.z()}));
       if (cell == first_.end()) continue;
-      for (std::uint32_t n = cell->second; n != none; n = next_[n])
+      for (std::uint32_t n = cell->second; n != no_vertex; n = next_[n])
         if (n < found && (vertices_[n] - vertices_[v]).norm() <= distance_) found = n;
     }
     return found;
@@ -240,8 +240,8 @@ std::size_t weld_vertices(TriangleMesh& mesh, double distance_m) {
   std::size_t joined = 0;
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
     const std::uint32_t found = grid.find(v);
-    kept_of[v] = found == none ? v : found;
-    if (found == none)
+    kept_of[v] = found == no_vertex ? v : found;
+    if (found == no_vertex)
       grid.keep(v);
     else
       ++joined;

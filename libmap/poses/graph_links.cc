@@ -1,28 +1,24 @@
 #include "libmap/poses/graph_links.h"
 
-#include <Eigen/Eigenvalues>
 #include <cstddef>
 #include <string>
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/poses/rigid_motion.h"
 
 namespace libmap {
 
-namespace {
-
-constexpr int invalid_weight = -9;
-
-}  // namespace
+namespace {}  // namespace
 
 void require_usable(const PoseLink& link) {
   const Matrix6d& information = link.information;
   const std::string field = "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);
   if (!information.allFinite() || !link.from_from_to.matrix().allFinite())
     throw Error("is not finite", {.field = field});
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information, Eigen::EigenvaluesOnly);
-  if (solver.eigenvalues()(5) <= 0.0 || solver.eigenvalues()(0) < -1e-9 * solver.eigenvalues()(5))
+  const Vector6d values = symmetric_eigen(information).values;
+  if (values[5] <= 0.0 || values[0] < -1e-9 * values[5])
     throw Error("its information matrix is not positive", {.field = field});
 }
 
@@ -56,7 +52,7 @@ std::vector<GraphLink> odometry_links(const PoseGraph& graph) {
   std::vector<GraphLink> links;
   const GraphNode* last = nullptr;
   for (const GraphNode& node : graph.nodes) {
-    if (!node.odometry_from_base || node.weight == invalid_weight) continue;
+    if (!node.odometry_from_base || node.weight == GraphNode::invalid_weight) continue;
     if (last != nullptr && last->session == node.session) {
       PoseLink link{last->id,
                     node.id,

@@ -1,6 +1,5 @@
 #include "libmap/poses/icp_refinement.h"
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -10,6 +9,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/poses/pose_neighbors.h"
 #include "libmap/poses/rigid_motion.h"
 #include "libmap/poses/surface_samples.h"
@@ -216,15 +216,15 @@ void Alignment::accumulate(std::size_t from, std::size_t onto, const Pose& onto_
 // the noise of normals says about them is not to be believed (Zhang, Kaess and Singh 2016).
 // Rotations count by the way that the surface moves at a metre.
 void Alignment::drop_degenerate(PairEquations& equations) const {
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(equations.information);
-  const double least = options_.degenerate * solver.eigenvalues()(5);
+  const SymmetricEigen<6> eigen = symmetric_eigen(equations.information);
+  const double least = options_.degenerate * eigen.values[5];
   Matrix6d kept = Matrix6d::Zero();
   for (int n = 0; n < 6; ++n) {
-    if (solver.eigenvalues()(n) < least || !(solver.eigenvalues()(n) > 0.0)) {
+    if (eigen.values[n] < least || !(eigen.values[n] > 0.0)) {
       ++equations.degenerate;
       continue;
     }
-    kept += solver.eigenvectors().col(n) * solver.eigenvectors().col(n).transpose();
+    kept += eigen.vectors.col(n) * eigen.vectors.col(n).transpose();
   }
   equations.information = kept * equations.information * kept;
   equations.side = kept * equations.side;

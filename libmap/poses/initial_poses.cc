@@ -15,7 +15,6 @@ namespace libmap {
 
 namespace {
 
-constexpr int invalid_weight = -9;
 constexpr double agreement_m = 0.1;
 constexpr double agreement_rad = 0.1;
 
@@ -207,7 +206,7 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   std::map<int, Pose> stored;
   std::map<int, int> session;
   for (const GraphNode& node : graph.nodes) {
-    if (node.weight == invalid_weight) continue;
+    if (node.weight == GraphNode::invalid_weight) continue;
     wanted.insert(node.id);
     session[node.id] = node.session;
     if (node.odometry_from_base) odometry[node.id] = *node.odometry_from_base;

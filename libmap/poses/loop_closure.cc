@@ -16,7 +16,7 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr std::size_t nearest_considered = 8;  // times as many as are taken, for their directions
+constexpr std::size_t considered_per_pair = 8;  // times as many as are taken, for their directions
 
 bool is_held_out(int feature, std::size_t frame, int every) {
   // Features stand by strength: numbers alone would pick like ones in every frame.
@@ -38,7 +38,7 @@ void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<c
   for (std::size_t n = 0; n < members.size(); ++n) {
     std::vector<std::pair<double, std::size_t>> ranked;
     for (const auto& [other, distance] :
-         neighbors.nearest(n, nearest_considered * wanted, options.radius_m)) {
+         neighbors.nearest(n, considered_per_pair * wanted, options.radius_m)) {
       const double angle = rotation_vector_of(poses[members[n]]->linear().transpose() *
                                               poses[members[other]]->linear())
                                .norm() /

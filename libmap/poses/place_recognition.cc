@@ -12,10 +12,6 @@ namespace libmap {
 
 namespace {
 
-std::size_t below(std::size_t count, RandomStream& random) {
-  return static_cast<std::size_t>(random.uniform() * static_cast<double>(count));
-}
-
 // The nearest column of `words` to each column of `vectors`; all of unit length.
 std::vector<int> quantize(const Eigen::MatrixXf& vectors, const Eigen::MatrixXf& words) {
   constexpr Eigen::Index block = 256;
@@ -38,7 +34,7 @@ Eigen::MatrixXf samples_of(const std::vector<FrameFeatures>& frames, std::size_t
   for (std::size_t f = 0; f < frames.size(); ++f)
     for (std::size_t n = 0; n < frames[f].features.size(); ++n) all.emplace_back(f, n);
   count = std::min(count, all.size());
-  for (std::size_t n = 0; n < count; ++n) std::swap(all[n], all[n + below(all.size() - n, random)]);
+  for (std::size_t n = 0; n < count; ++n) std::swap(all[n], all[n + random.below(all.size() - n)]);
   all.resize(count);
   std::sort(all.begin(), all.end());
   Eigen::MatrixXf samples;
@@ -63,7 +59,7 @@ Eigen::MatrixXf learn_words(const Eigen::MatrixXf& samples, const PlaceRecogniti
   Eigen::MatrixXf words(samples.rows(), count);
   for (Eigen::Index n = 0; n < count; ++n)
     words.col(n) = samples.col(
-        static_cast<Eigen::Index>(below(static_cast<std::size_t>(samples.cols()), random)));
+        static_cast<Eigen::Index>(random.below(static_cast<std::size_t>(samples.cols()))));
   for (int round = 0; round < options.training_rounds; ++round) {
     const std::vector<int> nearest = quantize(samples, words);
     Eigen::MatrixXf sums = Eigen::MatrixXf::Zero(words.rows(), words.cols());

@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/poses/graph_covariance.h"
 #include "libmap/poses/pose_residuals.h"
 
@@ -267,11 +267,8 @@ bool Optimization::reject() {
 // The variance of a group by its links' squares over their redundancies (Foerstner 1979), each link
 // apart, and of these the median: up to half of a group may be wrong. 0 where too few links can be
 // told by the others.
-double group_variance(std::vector<double>& ratios) {
-  if (ratios.size() < least_links) return 0.0;
-  const auto middle = ratios.begin() + static_cast<std::ptrdiff_t>(ratios.size() / 2);
-  std::nth_element(ratios.begin(), middle, ratios.end());
-  return *middle;
+double group_variance(const std::vector<double>& ratios) {
+  return ratios.size() < least_links ? 0.0 : median(ratios);
 }
 
 bool Optimization::recalibrate() {

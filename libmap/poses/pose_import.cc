@@ -18,8 +18,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double pairing_tolerance_s = 0.02;
-
 // One camera's pose in the file's own units.
 struct CameraPose {
   int node = 0;
@@ -183,7 +181,7 @@ double fitting_scale(const std::vector<CameraPose>& poses, const std::map<int, P
   };
   double scale = 0.0;
   if (given.size() >= 3) {
-    const Eigen::Matrix4d similarity = Eigen::umeyama(matrix_of(given), matrix_of(wanted), true);
+    const Eigen::Matrix4d similarity = align_points(matrix_of(given), matrix_of(wanted), true);
     scale = std::cbrt(similarity.topLeftCorner<3, 3>().determinant());
   }
   if (!(scale > 0.0) || !std::isfinite(scale))

@@ -4,12 +4,12 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <array>
 #include <cmath>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/poses/pose_blocks.h"
 
 namespace libmap {
@@ -39,9 +39,8 @@ inline Matrix6d whitening(const Matrix6d& information) {
   const Eigen::LLT<Matrix6d> root(information);
   if (root.info() == Eigen::Success) return root.matrixL().transpose();
   // Of a matrix that is only semidefinite.
-  const Eigen::SelfAdjointEigenSolver<Matrix6d> solver(information);
-  return solver.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal() *
-         solver.eigenvectors().transpose();
+  const SymmetricEigen<6> eigen = symmetric_eigen(information);
+  return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
 }
 
 // The step (rigid_motion.h) from the measured a_from_b to that of two poses, whitened.

@@ -1,7 +1,6 @@
 #include "libmap/poses/relative_pose.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -16,10 +15,6 @@ namespace libmap {
 namespace {
 
 constexpr int max_steps = 20;
-
-std::size_t below(std::size_t count, RandomStream& random) {
-  return static_cast<std::size_t>(random.uniform() * static_cast<double>(count));
-}
 
 // The best match of each column of `from` among those of `to`, or -1.
 std::vector<int> best_matches(const Eigen::MatrixXf& likeness, double max_ratio) {
@@ -61,8 +56,12 @@ Pose motion_of(const std::array<const PointPair*, 3>& pairs) {
     a.col(n) = pairs[static_cast<std::size_t>(n)]->a;
     b.col(n) = pairs[static_cast<std::size_t>(n)]->b;
   }
+  const Eigen::Vector3d middle_a = a.rowwise().mean();
+  const Eigen::Vector3d middle_b = b.rowwise().mean();
   Pose motion = Pose::Identity();
-  motion.matrix() = Eigen::umeyama(b, a, false);
+  motion.linear() =
+      nearest_rotation((a.colwise() - middle_a) * (b.colwise() - middle_b).transpose());
+  motion.translation() = middle_a - motion.linear() * middle_b;
   return motion;
 }
 
@@ -143,7 +142,7 @@ bool RelativePoseEstimate::sample(std::uint64_t seed) {
        ++iteration) {
     std::array<const PointPair*, 3> three{};
     for (int attempt = 0; attempt < 50; ++attempt) {
-      for (auto& pair : three) pair = &pairs[below(pairs.size(), random)];
+      for (auto& pair : three) pair = &pairs[random.below(pairs.size())];
       if (is_congruent(three, slack_m)) break;
       three[0] = nullptr;
     }
@@ -216,8 +215,9 @@ double RelativePoseEstimate::spread() const {
     const Eigen::Vector2d offset = ray(n) - mean;
     scatter += offset * offset.transpose() / count;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(scatter);
-  return 2.0 * std::sqrt(std::max(0.0, solver.eigenvalues()(0)));
+  const double least_variance =
+      scatter.trace() / 2.0 - std::hypot((scatter(0, 0) - scatter(1, 1)) / 2.0, scatter(0, 1));
+  return 2.0 * std::sqrt(std::max(0.0, least_variance));
 }
 
 }  // namespace

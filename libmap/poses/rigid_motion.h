@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <cmath>
 
 #include "libmap/core/pose.h"
 #include "libmap/core/pose_graph.h"

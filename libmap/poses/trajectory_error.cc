@@ -1,6 +1,5 @@
 #include "libmap/poses/trajectory_error.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -11,13 +10,12 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/scan/stamp_pairing.h"
 
 namespace libmap {
 
 namespace {
-
-constexpr double pairing_tolerance_s = 0.02;
 
 struct PosePair {
   Pose estimate;
@@ -90,9 +88,7 @@ bool is_straight(const Eigen::Matrix3Xd& positions) {
   constexpr double least_width = 0.05;  // of the length
   const Eigen::Matrix3Xd centred = positions.colwise() - positions.rowwise().mean();
   const Eigen::Vector3d spreads =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(Eigen::Matrix3d(centred * centred.transpose()),
-                                                     Eigen::EigenvaluesOnly)
-          .eigenvalues();
+      symmetric_eigen(Eigen::Matrix3d(centred * centred.transpose())).values;
   return spreads[1] <= least_width * least_width * spreads[2];
 }
 
@@ -108,7 +104,7 @@ Pose best_alignment(const std::vector<PosePair>& pairs) {
   }
   Pose alignment = Pose::Identity();
   if (!is_straight(from) && !is_straight(to)) {
-    alignment.matrix() = Eigen::umeyama(from, to, false);
+    alignment.matrix() = align_points(from, to, false);
     return alignment;
   }
   // Positions on a line leave the turn about it open: the rotations tell it.

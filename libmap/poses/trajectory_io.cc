@@ -21,8 +21,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr double pairing_tolerance_s = 0.02;
-constexpr int invalid_weight = -9;
 constexpr std::array<std::pair<const char*, TrajectoryFormat>, 4> extensions = {{
     {".tum", TrajectoryFormat::tum},
     {".kitti", TrajectoryFormat::kitti},
@@ -43,7 +41,7 @@ std::string extension_of(const fs::path& path) {
 std::vector<const GraphNode*> valid_nodes(const PoseGraph& graph) {
   std::vector<const GraphNode*> nodes;
   for (const GraphNode& node : graph.nodes)
-    if (node.weight != invalid_weight) nodes.push_back(&node);
+    if (node.weight != GraphNode::invalid_weight) nodes.push_back(&node);
   return nodes;
 }
 
@@ -53,7 +51,7 @@ NodePairs pair_by_node(const Trajectory& trajectory, const PoseGraph& graph) {
   NodePairs pairs;
   for (const TrajectoryPose& pose : trajectory)
     if (const GraphNode* node = graph.find_node(pose.node);
-        node != nullptr && node->weight != invalid_weight)
+        node != nullptr && node->weight != GraphNode::invalid_weight)
       pairs.emplace_back(node, &pose);
   return pairs;
 }

@@ -16,10 +16,10 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t none = static_cast<std::size_t>(-1);
-constexpr std::size_t longest_gap = 4;   // frames that one match alone may bridge
-constexpr std::size_t longest_run = 16;  // pairs that are verified at once
-constexpr double agreement_m = 0.1;      // of two motions to one place
-constexpr double agreement_rad = 5.0 * std::numbers::pi / 180.0;
+constexpr std::size_t longest_gap = 4;      // frames that one match alone may bridge
+constexpr std::size_t longest_run = 16;     // pairs that are verified at once
+constexpr double motion_agreement_m = 0.1;  // of two motions to one place
+constexpr double motion_agreement_rad = 5.0 * std::numbers::pi / 180.0;
 
 constexpr double least_factor = 1e-3;  // of variances: rounding, where nothing is noisy
 
@@ -292,8 +292,8 @@ bool Tracker::relocalize(std::size_t frame) {
   }
   const auto agree = [&](const Sighting& a, const Sighting& b) {
     const Vector6d apart = step_between(a.map_from_base, b.map_from_base);
-    return part_[a.frame] == part_[b.frame] && apart.head<3>().norm() < agreement_m &&
-           apart.tail<3>().norm() < agreement_rad;
+    return part_[a.frame] == part_[b.frame] && apart.head<3>().norm() < motion_agreement_m &&
+           apart.tail<3>().norm() < motion_agreement_rad;
   };
   const Sighting* best = nullptr;
   std::pair<std::size_t, std::size_t> most{1, 0};  // sightings that agree, inliers

@@ -19,8 +19,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int max_depth = 12;
-
 bool is_picture(const fs::path& file) {
   constexpr std::array<const char*, 4> extensions = {".png", ".jpg", ".jpeg", ".svg"};
   return std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end();
@@ -59,7 +57,7 @@ class Finder {
     add_tables(listing, section);
     add_texts(listing, section);
     manifests_.clear();
-    if (depth == max_depth) return section;
+    if (depth == max_folder_depth) return section;
     for (const fs::path& inner : listing.folders) {
       if (is_folder_of_tiles(inner)) continue;
       OutlineSection part = section_of(inner, depth + 1);

@@ -15,7 +15,7 @@ namespace libmap {
 
 namespace {
 
-constexpr int max_depth = 12;
+constexpr int max_outline_depth = 12;
 
 [[noreturn]] void fail(const YAML::Node& node, const std::string& field,
                        const std::string& reason) {
@@ -233,7 +233,7 @@ OutlineItem parse_item(const YAML::Node& node) {
 }
 
 OutlineSection parse_section(const YAML::Node& node, int depth) {
-  if (depth > max_depth) fail(node, "sections", "lie deeper than 12 levels");
+  if (depth > max_outline_depth) fail(node, "sections", "lie deeper than 12 levels");
   Keys keys(node, "section");
   OutlineSection section;
   section.heading = keys.required_text("heading");

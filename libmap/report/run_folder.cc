@@ -11,8 +11,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr int max_depth = 12;
-
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
 // The run of digits at `at`, without leading zeros; `at` moves behind it.
@@ -40,7 +38,7 @@ void add_manifests(const fs::path& folder, bool shares, int depth,
       source.error = error.reason();
     }
   }
-  if (depth == max_depth) return;
+  if (depth == max_folder_depth) return;
   for (const fs::path& inner : listing.folders)
     if (inner.extension() != ".tiles" && (shares || !is_folder_of_tiles(inner)))
       add_manifests(inner, shares, depth + 1, sources);

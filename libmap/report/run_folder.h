@@ -14,6 +14,8 @@ namespace libmap {
 // "2_slopes" before "10_walls": runs of digits are compared as numbers.
 bool natural_less(std::string_view a, std::string_view b);
 
+inline constexpr int max_folder_depth = 12;  // below a run's folder
+
 struct FolderListing {
   std::vector<std::filesystem::path> files;
   std::vector<std::filesystem::path> folders;

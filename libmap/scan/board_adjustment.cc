@@ -1,11 +1,12 @@
 #include "libmap/scan/board_adjustment.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <utility>
+
+#include "libmap/core/symmetric_eigen.h"
 
 namespace libmap {
 
@@ -184,11 +185,10 @@ Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners
   // Pixels and lens terms differ by many orders of magnitude.
   const Eigen::VectorXd scale = reduced.diagonal().cwiseSqrt().cwiseInverse();
   const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced * scale.asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> solver(scaled);
-  if (!(solver.eigenvalues().minCoeff() > 0)) return {};
-  const Eigen::MatrixXd inverse = solver.eigenvectors() *
-                                  solver.eigenvalues().cwiseInverse().asDiagonal() *
-                                  solver.eigenvectors().transpose();
+  const SymmetricEigen<Eigen::Dynamic> eigen = symmetric_eigen(scaled);
+  if (!(eigen.values.minCoeff() > 0)) return {};
+  const Eigen::MatrixXd inverse =
+      eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
   return scale.asDiagonal() * inverse * scale.asDiagonal();
 }
 

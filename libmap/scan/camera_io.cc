@@ -19,7 +19,6 @@ namespace libmap {
 
 namespace {
 
-constexpr std::uint64_t max_file_bytes = std::uint64_t{16} << 20;
 constexpr double max_image_side = 65536;
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
@@ -196,7 +195,7 @@ CameraFile parse_camera(const std::string& text, const std::string& file) {
 }
 
 CameraFile read_camera(const std::filesystem::path& path) {
-  return parse_camera(read_whole_file(path, max_file_bytes), path.string());
+  return parse_camera(read_whole_file(path, max_yaml_bytes), path.string());
 }
 
 std::string to_yaml(const CameraFile& file, const std::string& comment) {

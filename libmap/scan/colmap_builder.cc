@@ -12,8 +12,6 @@ namespace libmap {
 
 namespace {
 
-constexpr double pixel_offset = 0.5;  // of COLMAP's pixels against ours
-
 bool holds(const Camera& camera, const Eigen::Vector2d& pixel) {
   return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < camera.width - 0.5 &&
          pixel.y() < camera.height - 0.5;
@@ -107,7 +105,7 @@ void ColmapBuilder::add_image(const std::string& name, const CameraView& view,
 void ColmapBuilder::add_observation(int id, std::int64_t point, const Eigen::Vector2d& pixel) {
   ColmapImage& image = model_.images.at(id);
   model_.points.at(point).track.push_back({id, image.observations.size()});
-  image.observations.push_back({pixel + Eigen::Vector2d::Constant(pixel_offset), point});
+  image.observations.push_back({pixel + Eigen::Vector2d::Constant(colmap_pixel_offset), point});
 }
 
 void ColmapBuilder::observe_points(int id, const CameraView& view, GrayImage& taken) {

@@ -20,7 +20,6 @@ constexpr const char* cameras_file = "cameras.txt";
 constexpr const char* images_file = "images.txt";
 constexpr const char* points_file = "points3D.txt";
 // Of COLMAP's pixels against ours.
-constexpr double pixel_offset = 0.5;
 
 // Parameters are focal_lengths, the principal point and then the terms of the distortion, in the
 // order of Camera::distortion; those that a model does not have are 0.
@@ -53,10 +52,6 @@ const CameraModel& model_named(const std::string& name) {
   }
   throw Error("a model of cameras that is not known",
               {.field = "camera", .value = name, .bound = "one of" + known});
-}
-
-Error stands_twice(const TextLine& line, const std::string& what, const std::string& file) {
-  return Error("stands twice", {.file = file, .field = name_of(line), .value = what});
 }
 
 int positive_integer_of(const TextLine& line, std::size_t word, const std::string& file) {
@@ -124,8 +119,8 @@ Camera to_camera(const ColmapCamera& given) {
   camera.height = given.height;
   camera.fx = *parameter;
   camera.fy = model.focal_lengths == 2 ? *++parameter : camera.fx;
-  camera.cx = *++parameter - pixel_offset;
-  camera.cy = *++parameter - pixel_offset;
+  camera.cx = *++parameter - colmap_pixel_offset;
+  camera.cy = *++parameter - colmap_pixel_offset;
   camera.distortion_model = model.distortion;
   camera.distortion.assign(model.full_terms, 0.0);
   std::copy_n(++parameter, model.terms, camera.distortion.begin());
@@ -136,7 +131,8 @@ Camera to_camera(const ColmapCamera& given) {
 ColmapCamera to_colmap(const Camera& camera) {
   camera.check();
   ColmapCamera result{.model = "PINHOLE", .width = camera.width, .height = camera.height};
-  result.parameters = {camera.fx, camera.fy, camera.cx + pixel_offset, camera.cy + pixel_offset};
+  result.parameters = {camera.fx, camera.fy, camera.cx + colmap_pixel_offset,
+                       camera.cy + colmap_pixel_offset};
   if (!camera.is_distorted()) return result;
   std::vector<double> terms = camera.distortion;
   if (camera.distortion_model == equidistant) {
@@ -165,7 +161,7 @@ std::map<int, ColmapCamera> parse_colmap_cameras(std::string_view text, const st
     camera.model = std::string(line.words[1]);
     camera.parameters = numbers_of(line, 4, line.words.size() - 4, file);
     if (!cameras.emplace(id, std::move(camera)).second)
-      throw stands_twice(line, "camera " + std::to_string(id), file);
+      throw duplicate(line, "camera " + std::to_string(id), file);
   }
   return cameras;
 }
@@ -193,7 +189,7 @@ std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std:
     if (i + 1 < lines.size() && lines[i + 1].number == line.number + 1)
       image.observations = observations_of(lines[++i], file);
     if (!images.emplace(id, std::move(image)).second)
-      throw stands_twice(line, "image " + std::to_string(id), file);
+      throw duplicate(line, "image " + std::to_string(id), file);
   }
   return images;
 }
@@ -228,7 +224,7 @@ std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
       point.track.push_back({integer_of(line, word, file), static_cast<std::size_t>(observation)});
     }
     if (!points.emplace(id, std::move(point)).second)
-      throw stands_twice(line, "point " + std::to_string(id), file);
+      throw duplicate(line, "point " + std::to_string(id), file);
   }
   return points;
 }

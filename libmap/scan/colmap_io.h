@@ -18,6 +18,9 @@
 
 namespace libmap {
 
+// COLMAP's pixel coordinates minus ours.
+inline constexpr double colmap_pixel_offset = 0.5;
+
 // A line of cameras.txt: "CAMERA_ID MODEL WIDTH HEIGHT PARAMS[]".
 struct ColmapCamera {
   std::string model{};  // "PINHOLE", "OPENCV", ...

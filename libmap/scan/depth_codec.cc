@@ -16,8 +16,7 @@ namespace {
 constexpr std::string_view rvl_signature = "DEPTHRVL";
 constexpr std::size_t rvl_header_bytes = 16;
 // 4096 x 4096. A few bytes can stand for that many zeros.
-constexpr std::uint64_t max_pixels = std::uint64_t{1} << 24;
-constexpr std::uint16_t no_measurement = 65535;
+constexpr std::uint64_t max_depth_pixels = std::uint64_t{1} << 24;
 
 std::uint32_t uint32_at(std::string_view bytes, std::size_t at) {
   std::uint32_t value = 0;
@@ -96,14 +95,14 @@ class NibbleWriter {
 };
 
 void check_size(std::uint64_t columns, std::uint64_t rows) {
-  if (columns <= max_pixels && rows <= max_pixels && columns * rows <= max_pixels &&
-      (columns == 0) == (rows == 0))
+  if (columns <= max_depth_pixels && rows <= max_depth_pixels &&
+      columns * rows <= max_depth_pixels && (columns == 0) == (rows == 0))
     return;
   throw Error("depth image of no valid size",
               {.file = {},
                .field = "image size",
                .value = std::to_string(columns) + " x " + std::to_string(rows),
-               .bound = "<= " + std::to_string(max_pixels) + " pixels"});
+               .bound = "<= " + std::to_string(max_depth_pixels) + " pixels"});
 }
 
 DepthInfo rvl_info(std::string_view bytes) {
@@ -181,7 +180,7 @@ MillimetreImage decode_rvl(std::string_view bytes) {
     for (const std::uint64_t end = at + values; at < end; ++at) {
       const std::uint32_t zigzag = reader.number();
       previous += (zigzag >> 1) ^ (0U - (zigzag & 1));
-      if (previous > no_measurement) throw Error("RVL holds a depth of more than 16 bits");
+      if (previous > no_depth_mm) throw Error("RVL holds a depth of more than 16 bits");
       image.pixels[at] = static_cast<std::uint16_t>(previous);
     }
   }
@@ -236,7 +235,7 @@ MillimetreImage to_millimetres(const DepthImage& image) {
   MillimetreImage out(image.width, image.height);
   std::transform(image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](float depth) {
     const double millimetres = std::round(static_cast<double>(depth) * 1000);
-    const bool is_held = millimetres > 0 && millimetres < no_measurement;
+    const bool is_held = millimetres > 0 && millimetres < no_depth_mm;
     return static_cast<std::uint16_t>(is_held ? millimetres : 0);
   });
   return out;
@@ -246,7 +245,7 @@ DepthImage to_metres(const MillimetreImage& image) {
   DepthImage out(image.width, image.height);
   std::transform(
       image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](std::uint16_t millimetres) {
-        return millimetres == no_measurement ? 0.0F : static_cast<float>(millimetres) / 1000.0F;
+        return millimetres == no_depth_mm ? 0.0F : static_cast<float>(millimetres) / 1000.0F;
       });
   return out;
 }

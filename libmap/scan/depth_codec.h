@@ -12,6 +12,9 @@
 
 namespace libmap {
 
+// RTAB-Map's "no measurement" besides 0.
+inline constexpr std::uint16_t no_depth_mm = 65535;
+
 using MillimetreImage = Image<std::uint16_t>;  // 0 and 65535: nothing was measured
 
 enum class DepthFormat { rvl, png16, float_png };  // how a depth image is stored

@@ -29,7 +29,6 @@ namespace files = frame_folder_files;
 
 namespace {
 
-constexpr std::uint16_t no_measurement = 65535;
 constexpr double millimetre_m = 0.001;
 
 std::string cell_of(const Table& table, std::size_t row, const char* column) {
@@ -147,7 +146,7 @@ DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
   DepthImage depth(units.width, units.height);
   std::transform(units.pixels.begin(), units.pixels.end(), depth.pixels.begin(),
                  [&](std::uint16_t value) {
-                   return value == no_measurement ? 0.0F : static_cast<float>(value * depth_unit_m);
+                   return value == no_depth_mm ? 0.0F : static_cast<float>(value * depth_unit_m);
                  });
   return depth;
 }

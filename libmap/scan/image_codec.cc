@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/scan/matrix_codec.h"
 
 namespace libmap {
 
@@ -18,8 +19,6 @@ namespace {
 
 // A smaller image is never refused for its number of bytes.
 constexpr std::int64_t always_allowed_pixels = std::int64_t{1} << 18;
-// deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
-constexpr std::int64_t deflate_ratio = 1032;
 // A Huffman-coded JPEG spends at least one bit on each block of 8 x 8.
 constexpr std::int64_t jpeg_pixels_per_byte = 4096;
 constexpr std::string_view png_signature("\x89PNG\r\n\x1a\n", 8);
@@ -45,10 +44,11 @@ void check_size(const ImageInfo& info, std::size_t bytes, std::int64_t max_pixel
                                     .bound = "<= " + std::to_string(max_pixels) + " pixels"});
   if (pixels <= always_allowed_pixels) return;
   const std::int64_t held = static_cast<std::int64_t>(bytes);
-  const std::int64_t wanted =
-      info.format == ImageFormat::png
-          ? std::int64_t{info.height} * (std::int64_t{info.width} * info.bits / 8) / deflate_ratio
-          : pixels / jpeg_pixels_per_byte;
+  const std::int64_t wanted = info.format == ImageFormat::png
+                                  ? std::int64_t{info.height} *
+                                        (std::int64_t{info.width} * info.bits / 8) /
+                                        static_cast<std::int64_t>(deflate_ratio)
+                                  : pixels / jpeg_pixels_per_byte;
   if (wanted > held)
     throw Error("more than its " + std::to_string(held) + " bytes can hold",
                 {.file = {}, .field = "image size", .value = text});

@@ -15,8 +15,6 @@ namespace {
 
 constexpr std::size_t trailer_bytes = 12;
 constexpr std::size_t piece_bytes = std::size_t{1} << 16;
-// deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
-constexpr std::uint64_t deflate_ratio = 1032;
 constexpr int max_channels = 512;  // OpenCV's
 
 void append_int32(std::string& bytes, std::int32_t value) {

@@ -45,6 +45,9 @@ struct StoredMatrix {
 // Sizes and type from a blob's end, without its bytes. Throws Error if they are none.
 StoredMatrix read_matrix_header(std::string_view blob);
 
+// deflate packs at most 1032 bytes into one (RFC 1951: 258 bytes in two bits).
+inline constexpr std::uint64_t deflate_ratio = 1032;
+
 // The most that decode_matrix takes: 16 million float32, ten turns of a lidar of 128 x 2048 points.
 inline constexpr std::uint64_t max_matrix_bytes = std::uint64_t{1} << 26;
 

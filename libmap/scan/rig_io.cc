@@ -20,7 +20,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::uint64_t max_file_bytes = std::uint64_t{16} << 20;
 constexpr std::size_t max_cameras = 256;
 
 const std::vector<std::string> limit_keys = {"depth_scale_m", "near_m", "far_m"};
@@ -43,7 +42,7 @@ const std::vector<std::string> camera_keys = {"name",
                                               "near_m",
                                               "far_m"};
 
-double number_of(const YAML::Node& node, const std::string& field) {
+double rig_number(const YAML::Node& node, const std::string& field) {
   if (!node.IsScalar()) throw Error("not a single number", {.field = field});
   const std::optional<double> value = parse_double(node.Scalar());
   if (!value)
@@ -58,7 +57,7 @@ std::vector<double> numbers_of(const YAML::Node& node, const std::string& field,
     throw Error("not a list of " + std::to_string(count) + " numbers", {.field = field});
   std::vector<double> numbers;
   for (const YAML::Node& entry : node) {
-    numbers.push_back(number_of(entry, field));
+    numbers.push_back(rig_number(entry, field));
     if (!std::isfinite(numbers.back())) throw Error("not finite", {.field = field});
   }
   return numbers;
@@ -77,9 +76,10 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known) {
 }
 
 void read_limits(const YAML::Node& map, RigCamera& camera) {
-  if (map["depth_scale_m"]) camera.depth_scale_m = number_of(map["depth_scale_m"], "depth_scale_m");
-  if (map["near_m"]) camera.near_m = number_of(map["near_m"], "near_m");
-  if (map["far_m"]) camera.far_m = number_of(map["far_m"], "far_m");
+  if (map["depth_scale_m"])
+    camera.depth_scale_m = rig_number(map["depth_scale_m"], "depth_scale_m");
+  if (map["near_m"]) camera.near_m = rig_number(map["near_m"], "near_m");
+  if (map["far_m"]) camera.far_m = rig_number(map["far_m"], "far_m");
 }
 
 Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
@@ -234,7 +234,7 @@ CameraRig parse_rig(const std::string& text, const std::string& file) {
 }
 
 CameraRig read_rig(const fs::path& path) {
-  return parse_rig(read_whole_file(path, max_file_bytes), path.string());
+  return parse_rig(read_whole_file(path, max_yaml_bytes), path.string());
 }
 
 std::string to_yaml(const CameraRig& rig) {

@@ -2,12 +2,18 @@
 #pragma once
 
 #include <array>
+#include <cstddef>
 #include <map>
 #include <string>
+#include <string_view>
 
 #include "libmap/core/pose_graph.h"
 
 namespace libmap {
+
+// RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
+inline constexpr std::size_t absent_blob_bytes = 4;
+inline bool is_absent(std::string_view blob) { return blob.size() <= absent_blob_bytes; }
 
 // 12 float32, the rows of [R|t].
 std::string to_blob(const Pose& pose);

@@ -12,6 +12,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/sqlite_file.h"
 
 namespace libmap {
@@ -19,8 +20,6 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t pose_bytes = 48;
-// RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
-constexpr std::size_t absent_bytes = 4;
 constexpr std::size_t max_warnings = 100;
 // Of the nine numbers from the nearest rotation: float32 of old versions is off by 1e-4.
 constexpr double max_rotation_error = 0.05;
@@ -255,7 +254,7 @@ void read_optimized_poses(const SqliteFile& file, const RtabmapColumns& columns,
     ids = row.bytes(0);
     poses = row.bytes(1);
   });
-  if (ids.size() <= absent_bytes || poses.size() <= absent_bytes) return;
+  if (is_absent(ids) || is_absent(poses)) return;
   try {
     graph.optimized_map_from_base = decode_optimized_poses(ids, poses, graph, warnings);
   } catch (const Error& error) {

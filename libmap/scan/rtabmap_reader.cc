@@ -8,6 +8,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/sqlite_file.h"
 
@@ -17,13 +18,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// RTAB-Map takes shorter blobs for absent (DBDriverSqlite3.cpp).
-constexpr std::size_t absent_bytes = 4;
 constexpr const char* unknown_part = " is not known and is not read";
 // Enough for the frame header of a JPEG that cameras make.
 constexpr std::size_t header_bytes = 4096;
-
-bool is_absent(const std::string& blob) { return blob.size() <= absent_bytes; }
 
 std::string or_empty(std::string blob) { return is_absent(blob) ? std::string() : std::move(blob); }
 
@@ -413,7 +410,7 @@ void RtabmapDatabase::each_content(const std::function<void(const NodeContent&)>
                     if (graph_.find_node(content.node) == nullptr) return;
                     const auto bytes_in = [&](int column) {
                       const std::int64_t size = row.integer(column);
-                      return size > static_cast<std::int64_t>(absent_bytes)
+                      return size > static_cast<std::int64_t>(absent_blob_bytes)
                                  ? static_cast<std::size_t>(size)
                                  : 0;
                     };

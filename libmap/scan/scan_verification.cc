@@ -11,6 +11,7 @@
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/scan/matrix_codec.h"
+#include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
@@ -19,7 +20,6 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t absent_bytes = 4;
 // Of scans and frames that are decoded side by side.
 constexpr std::uint64_t decoded_bytes = std::uint64_t{1} << 28;
 
@@ -97,7 +97,7 @@ class Findings {
   // One blob of Data, where a few bytes mean none; whether it is sound.
   template <typename Check>
   bool check(int node, const std::string& part, const std::string& blob, const Check& use) {
-    return blob.size() <= absent_bytes || check_present(node, part, blob, use);
+    return is_absent(blob) || check_present(node, part, blob, use);
   }
   template <typename Check>
   bool check_present(int node, const std::string& part, const std::string& blob, const Check& use) {
@@ -264,7 +264,7 @@ class DatabaseVerification {
     if (blobs.size() < 7) return;
     findings_.check(node, "Data.scan", blobs[0], [&](const std::string& scan) {
       const MemoryBudget::Share share = memory_.take(scan_bytes(scan));
-      decode_laser_scan(scan, blobs[1].size() <= absent_bytes ? std::string() : blobs[1]);
+      decode_laser_scan(scan, is_absent(blobs[1]) ? std::string() : blobs[1]);
     });
     for (std::size_t i = 0; i < matrices.size(); ++i)
       findings_.check(node, part_of("Data", matrices[i]), blobs[2 + i], check_matrix);

@@ -7,6 +7,9 @@
 
 namespace libmap {
 
+// Between the clocks of one camera's images, s.
+inline constexpr double pairing_tolerance_s = 0.02;
+
 // Pairs (index in `a`, index in `b`) whose stamps differ by `tolerance_s` at most, by ascending
 // index in `a`. Each of `a` looks for the nearest of `b`; of several that find the same one the
 // nearest has it, the earlier one in `a` where they are equally near. Any order of stamps.

@@ -22,8 +22,8 @@ const std::vector<std::pair<std::string, StereoDirections>> direction_names = {
     {"five", StereoDirections::five},
     {"eight", StereoDirections::eight}};
 
-[[noreturn]] void refuse(const std::string& reason, const std::string& field,
-                         const std::string& value, const std::string& bound) {
+[[noreturn]] void refuse_pair(const std::string& reason, const std::string& field,
+                              const std::string& value, const std::string& bound) {
   throw Error(reason, {.file = {}, .field = field, .value = value, .bound = bound});
 }
 
@@ -33,8 +33,8 @@ std::string size_text(int width, int height) {
 
 void check(const GrayImage& image, const Camera& camera, const std::string& field) {
   if (image.width != camera.width || image.height != camera.height)
-    refuse("does not fit its calibration", field + " image", size_text(image.width, image.height),
-           size_text(camera.width, camera.height));
+    refuse_pair("does not fit its calibration", field + " image",
+                size_text(image.width, image.height), size_text(camera.width, camera.height));
   if (camera.is_distorted())
     throw Error("not rectified: the camera has lens distortion", {.field = field + " camera"});
 }
@@ -44,10 +44,10 @@ void check(const StereoCamera& cameras) {
   cameras.right.check();
   const double ratio = cameras.right.fx / cameras.left.fx;
   if (!(std::abs(ratio - 1) < 1e-3))
-    refuse("not rectified: the cameras' focal lengths differ", "right fx",
-           to_text(cameras.right.fx), "fx of the left, " + to_text(cameras.left.fx));
+    refuse_pair("not rectified: the cameras' focal lengths differ", "right fx",
+                to_text(cameras.right.fx), "fx of the left, " + to_text(cameras.left.fx));
   if (!(cameras.baseline_m > 0) || !std::isfinite(cameras.baseline_m))
-    refuse("no stereo pair", "baseline_m", to_text(cameras.baseline_m), "> 0");
+    refuse_pair("no stereo pair", "baseline_m", to_text(cameras.baseline_m), "> 0");
 }
 
 StereoDepthOptions checked(StereoDepthOptions options) {
@@ -55,7 +55,7 @@ StereoDepthOptions checked(StereoDepthOptions options) {
   bind(table, options);
   for (const auto& [key, value] : table.values()) table.set(key, value);
   if (options.block_px % 2 == 0)
-    refuse("out of range", "block_px", std::to_string(options.block_px), "odd");
+    refuse_pair("out of range", "block_px", std::to_string(options.block_px), "odd");
   options.disparities_px = (options.disparities_px + 15) / 16 * 16;
   return options;
 }
@@ -126,8 +126,8 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
   check(left, cameras.left, "left");
   check(right, cameras.right, "right");
   if (left.height != right.height || left.width != right.width)
-    refuse("images of a pair differ in size", "right image", size_text(right.width, right.height),
-           size_text(left.width, left.height));
+    refuse_pair("images of a pair differ in size", "right image",
+                size_text(right.width, right.height), size_text(left.width, left.height));
   const StereoDepthOptions in_force = checked(options);
   const int largest = in_force.min_disparity_px + in_force.disparities_px;
   const int border_left = std::max(0, largest);
@@ -167,9 +167,9 @@ DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& option
   const auto pairs = static_cast<int>(frame.stereo.size());
   if (frame.right.width % pairs != 0 || frame.color.width % pairs != 0 ||
       frame.color.height != frame.right.height || frame.color.width != frame.right.width)
-    refuse("left and right image do not fit each other", node + ": right image",
-           size_text(frame.right.width, frame.right.height),
-           size_text(frame.color.width, frame.color.height));
+    refuse_pair("left and right image do not fit each other", node + ": right image",
+                size_text(frame.right.width, frame.right.height),
+                size_text(frame.color.width, frame.color.height));
   const GrayImage left = luminance(frame.color);
   const int width = left.width / pairs;
   DepthImage depth(left.width, left.height);

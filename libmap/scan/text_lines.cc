@@ -91,6 +91,10 @@ int integer_of(const TextLine& line, std::size_t word, const std::string& file) 
   return static_cast<int>(*value);
 }
 
+Error duplicate(const TextLine& line, const std::string& record, const std::string& file) {
+  return Error("stands twice", {.file = file, .field = name_of(line), .value = record});
+}
+
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file) {
   constexpr double length_tolerance = 0.05;

@@ -7,6 +7,7 @@
 #include <string_view>
 #include <vector>
 
+#include "libmap/core/error.h"
 #include "libmap/core/pose.h"
 
 namespace libmap {
@@ -30,6 +31,9 @@ std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::siz
                                const std::string& file);
 int integer_of(const TextLine& line, std::size_t word, const std::string& file);
 std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file);
+
+// For a record that an earlier line already has.
+Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
 // A pose whose numbers stand in that line. Throws Error: the quaternion's length is off by more
 // than 5 %, the position lies more than 1e8 m away.

@@ -147,10 +147,6 @@ void guess_type(PoseLink& link, const std::set<int>& vertices) {
   link.type = follows ? LinkType::neighbor : LinkType::global_closure;
 }
 
-Error stands_twice(const TextLine& line, const std::string& file, const std::string& what) {
-  return Error("stands twice", {.file = file, .field = name_of(line), .value = what});
-}
-
 struct GraphReader {
   const GraphFormat& format;
   const std::string& file;
@@ -178,8 +174,7 @@ struct GraphReader {
     const std::string_view tag = line.words[0];
     if (tag == format.vertex_tag) {
       const int id = integer_of(line, 1, file);
-      if (!vertices.insert(id).second)
-        throw stands_twice(line, file, "vertex " + std::to_string(id));
+      if (!vertices.insert(id).second) throw duplicate(line, "vertex " + std::to_string(id), file);
       graph.poses.push_back({id, 0.0, format.pose_from(line, 2, file)});
     } else if (tag == format.edge_tag) {
       add_link(line, 1);
@@ -233,7 +228,7 @@ Trajectory parse_tum(std::string_view text, const std::string& file) {
     if (line.words.size() == 9) {
       pose.node = integer_of(line, 8, file);
       if (!nodes.insert(pose.node).second)
-        throw stands_twice(line, file, "node " + std::to_string(pose.node));
+        throw duplicate(line, "node " + std::to_string(pose.node), file);
     }
     trajectory.push_back(pose);
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/random_stream.h"
 
 namespace libmap {
@@ -208,9 +209,7 @@ double surrounding_ground_height(const TriangleMesh& mesh) {
     if (vertex.x() <= bounds.min.x() + inset.x() || vertex.x() >= bounds.max.x() - inset.x() ||
         vertex.y() <= bounds.min.y() + inset.y() || vertex.y() >= bounds.max.y() - inset.y())
       heights.push_back(vertex.z());
-  const auto middle = heights.begin() + static_cast<std::ptrdiff_t>(heights.size() / 2);
-  std::nth_element(heights.begin(), middle, heights.end());
-  return *middle;
+  return median(std::move(heights));
 }
 
 Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,

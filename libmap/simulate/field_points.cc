@@ -1,6 +1,5 @@
 #include "libmap/simulate/field_points.h"
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -99,8 +99,7 @@ void look_around(const Surface& surface, const TriangleMesh& mesh, std::uint32_t
   }
   if (area <= 0.0) return;
   point.normal = sum.normalized();
-  const Eigen::Vector3d shares =
-      Eigen::SelfAdjointEigenSolver<Eigen::Matrix3d>(spread / area).eigenvalues();
+  const Eigen::Vector3d shares = symmetric_eigen(Eigen::Matrix3d(spread / area)).values;
   if (hollow / area > hollow_share * radius_m)
     point.kind = PlaceKind::irregular;
   else if (shares[0] > tip_share)

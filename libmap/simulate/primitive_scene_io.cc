@@ -13,7 +13,6 @@ namespace libmap {
 
 namespace {
 
-constexpr std::uint64_t max_file_bytes = std::uint64_t{16} << 20;
 const std::set<std::string> optional_keys = {"name",     "x_m",       "y_m",     "z_m",
                                              "roll_deg", "pitch_deg", "yaw_deg", "profile"};
 
@@ -103,7 +102,7 @@ PrimitiveScene parse_scene(const std::string& text, const std::string& file) {
 }
 
 PrimitiveScene load_scene(const std::filesystem::path& path) {
-  return parse_scene(read_whole_file(path, max_file_bytes), path.string());
+  return parse_scene(read_whole_file(path, max_yaml_bytes), path.string());
 }
 
 std::string to_yaml(const PrimitiveScene& scene) {

@@ -5,8 +5,10 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <numbers>
 #include <utility>
 
+#include "libmap/core/angle.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/simulate/solid_noise.h"
 
@@ -14,8 +16,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double pi = M_PI;
-constexpr double radians = pi / 180.0;
+using std::numbers::pi;
 
 HalfSpace through(const Eigen::Vector3d& normal, const Eigen::Vector3d& point) {
   const Eigen::Vector3d unit = normal.normalized();
@@ -51,8 +52,9 @@ std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& 
   for (int n = 0; n < rock.sides; ++n) {
     const double heading = first + 2.0 * pi * (n + draw.uniform(-0.28, 0.28)) / rock.sides;
     const bool leans_out = n < overhanging;
-    const double rise = leans_out ? -rock.overhang_deg * radians * draw.uniform(0.75, 1.0)
-                                  : radians * draw.uniform(1.0, 13.0);
+    const double rise = leans_out
+                            ? -rock.overhang_deg * radians_per_degree * draw.uniform(0.75, 1.0)
+                            : radians_per_degree * draw.uniform(1.0, 13.0);
     const double distance = wall_distance(size.half, heading) * draw.uniform(0.86, 1.0);
     const double level = leans_out ? draw.uniform(0.55, 0.75) * size.top_m : 0.0;
     planes.push_back(through(direction(heading, rise), centre + distance * direction(heading, 0.0) +
@@ -64,10 +66,10 @@ std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& 
     const double heading = draw.uniform(0.0, 2.0 * pi);
     const double distance = wall_distance(size.half, heading) * draw.uniform(0.55, 0.85);
     planes.push_back(through(
-        direction(heading, radians * draw.uniform(25.0, 60.0)),
+        direction(heading, radians_per_degree * draw.uniform(25.0, 60.0)),
         centre + distance * direction(heading, 0.0) + Eigen::Vector3d(0.0, 0.0, size.top_m)));
   }
-  const double slope = radians * draw.uniform(0.5, 4.0);
+  const double slope = radians_per_degree * draw.uniform(0.5, 4.0);
   planes.push_back(through(direction(draw.uniform(0.0, 2.0 * pi), 0.5 * pi - slope),
                            centre + Eigen::Vector3d(0.0, 0.0, size.top_m)));
   planes.push_back({-Eigen::Vector3d::UnitZ(), -size.bottom_m});
@@ -102,9 +104,10 @@ void chip_edges(std::vector<HalfSpace>& planes, double chip_m, double bound_m, R
 // A wedge whose sharp edge runs into the rock `depth_m` below its top.
 std::vector<HalfSpace> cleft_half_spaces(const SiteRock& rock, RandomStream& draw) {
   const double heading = draw.uniform(0.0, 2.0 * pi);
-  const double opening = radians * draw.uniform(9.0, 16.0);  // of each flank to the vertical
-  const double lean = radians * draw.uniform(-12.0, 12.0);
-  const Eigen::Vector3d along = direction(heading, radians * draw.uniform(5.0, 25.0));
+  const double opening =
+      radians_per_degree * draw.uniform(9.0, 16.0);  // of each flank to the vertical
+  const double lean = radians_per_degree * draw.uniform(-12.0, 12.0);
+  const Eigen::Vector3d along = direction(heading, radians_per_degree * draw.uniform(5.0, 25.0));
   const Eigen::Vector3d across(-std::sin(heading), std::cos(heading), 0.0);
   const Eigen::Vector3d up = along.cross(across);
   const double reach = std::min(rock.width_m, rock.depth_m);

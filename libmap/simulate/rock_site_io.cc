@@ -15,7 +15,6 @@ namespace libmap {
 
 namespace {
 
-constexpr std::uint64_t max_file_bytes = std::uint64_t{16} << 20;
 constexpr std::size_t max_entries = 10'000;
 
 Error with_place(const Error& error, std::string place, const YAML::Node& node) {
@@ -162,7 +161,7 @@ RockSite parse_site(const std::string& text, const std::string& file,
 }
 
 RockSite load_site(const std::filesystem::path& path, std::optional<std::uint64_t> seed) {
-  return parse_site(read_whole_file(path, max_file_bytes), path.string(), seed);
+  return parse_site(read_whole_file(path, max_yaml_bytes), path.string(), seed);
 }
 
 std::string to_yaml(const RockSite& site) {

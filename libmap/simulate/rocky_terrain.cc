@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "libmap/core/angle.h"
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/simulate/rock_site.h"
@@ -12,8 +14,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double pi = M_PI;
-constexpr double radians = pi / 180.0;
+using std::numbers::pi;
 constexpr double rock_cell_m = 1.0;    // rocks are drawn cell by cell
 constexpr double bucket_m = 0.25;      // and found by buckets
 constexpr double power_index = 2.65;   // of heights (Michikami et al. 2019)
@@ -88,7 +89,7 @@ RockyTerrain::Rock RockyTerrain::draw_block(double height_m, std::uint64_t seed)
   const SiteRock form = draw_rock(RockShape::block, height_m, seed);
   RandomStream draw(seed, 2);
   Rock rock;
-  const double yaw = form.yaw_deg * radians;
+  const double yaw = form.yaw_deg * radians_per_degree;
   // z of the plane through a point at `distance` along `heading` and at `level`.
   const auto add = [&](double heading, double slope, double distance, double level) {
     const double steepness = std::tan(slope);
@@ -100,16 +101,16 @@ RockyTerrain::Rock RockyTerrain::draw_block(double height_m, std::uint64_t seed)
   };
   for (int n = 0; n < form.sides; ++n) {
     const double heading = 2.0 * pi * (n + draw.uniform(-0.2, 0.2)) / form.sides;
-    add(heading, radians * draw.uniform(66.0, 82.0), half_width(heading) * draw.uniform(0.86, 1.0),
-        0.0);
+    add(heading, radians_per_degree * draw.uniform(66.0, 82.0),
+        half_width(heading) * draw.uniform(0.86, 1.0), 0.0);
   }
   const int shoulders = 2 + static_cast<int>(draw.uniform(0.0, 3.0));
   for (int n = 0; n < shoulders; ++n) {
     const double heading = draw.uniform(0.0, 2.0 * pi);
-    add(heading, radians * draw.uniform(30.0, 65.0), half_width(heading) * draw.uniform(0.5, 0.8),
-        height_m);
+    add(heading, radians_per_degree * draw.uniform(30.0, 65.0),
+        half_width(heading) * draw.uniform(0.5, 0.8), height_m);
   }
-  add(draw.uniform(0.0, 2.0 * pi), radians * draw.uniform(0.5, 6.0), 0.0, height_m);
+  add(draw.uniform(0.0, 2.0 * pi), radians_per_degree * draw.uniform(0.5, 6.0), 0.0, height_m);
   rock.reach_m = 1.3 * std::max(form.width_m, form.depth_m);
   return rock;
 }
@@ -122,7 +123,7 @@ RockyTerrain::Rock RockyTerrain::draw_cobble(double height_m, std::uint64_t seed
   // Its outline on the ground lies at sqrt(3)/2 of the half-axes.
   const double root3 = std::sqrt(3.0);
   rock.unit_from_plan = Eigen::Vector2d(root3 / form.width_m, root3 / form.depth_m).asDiagonal() *
-                        Eigen::Rotation2Dd(-form.yaw_deg * radians).toRotationMatrix();
+                        Eigen::Rotation2Dd(-form.yaw_deg * radians_per_degree).toRotationMatrix();
   rock.reach_m = std::max(form.width_m, form.depth_m) / root3;
   return rock;
 }

@@ -20,8 +20,6 @@
 namespace libmap {
 namespace {
 
-constexpr int largest_side_px = 16384;
-constexpr int least_font_px = 10;
 constexpr double pixels_a_font = 30.0;  // of a cell's width
 constexpr double caption_height = 2.0;  // in font sizes, as all below
 constexpr double title_height = 2.6;
@@ -38,9 +36,9 @@ void check_whole(const char* field, int value, int low, int high) {
 void check(const std::vector<SheetCell>& cells, const PictureSheetOptions& options) {
   if (cells.empty()) throw Error("a sheet without pictures cannot be drawn");
   check_whole("columns", options.columns, 0, 1000);
-  check_whole("cell_width_px", options.cell_width_px, 16, largest_side_px);
+  check_whole("cell_width_px", options.cell_width_px, 16, max_side_px);
   if (options.cell_height_px != 0)
-    check_whole("cell_height_px", options.cell_height_px, 16, largest_side_px);
+    check_whole("cell_height_px", options.cell_height_px, 16, max_side_px);
   parse_color(options.background, "background");
 }
 
@@ -330,7 +328,7 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOp
   check_titles("column_titles", options.column_titles.size(), layout.columns);
   check_titles("row_titles", options.row_titles.size(), rows_of(cells.size(), layout.columns));
   layout.font_px =
-      std::clamp(static_cast<int>(options.cell_width_px / pixels_a_font), least_font_px, 40);
+      std::clamp(static_cast<int>(options.cell_width_px / pixels_a_font), min_font_px, 40);
   const double f = layout.font_px;
   double top = options.title.empty() ? std::round(gap * f) : std::round(title_height * f);
   const TextStyle head{.size_px = layout.font_px, .bold = true};
@@ -347,10 +345,10 @@ SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOp
   plan_legend(legends, left + layout.columns * step, top, bottom, layout);
   if (!options.title.empty())
     layout.title = PixelRect{0.0, 0.0, double(layout.width), std::round(title_height * f)};
-  if (layout.width > largest_side_px || layout.height > largest_side_px)
+  if (layout.width > max_side_px || layout.height > max_side_px)
     throw Error("the sheet would have " + std::to_string(layout.width) + " x " +
                     std::to_string(layout.height) + " pixels, more than " +
-                    std::to_string(largest_side_px) + " a side",
+                    std::to_string(max_side_px) + " a side",
                 {.field = "cell_width_px", .value = std::to_string(options.cell_width_px)});
   return layout;
 }

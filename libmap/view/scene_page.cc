@@ -16,7 +16,6 @@ namespace {
 constexpr Color ink{25, 28, 32};
 constexpr Color paper{255, 255, 255};
 constexpr Color frame_color{90, 96, 104};
-constexpr int least_font_px = 10;
 constexpr double row_height = 1.55;       // of the legend, in font sizes, as all below
 constexpr double title_row_height = 1.9;  // a legend's title
 constexpr double bar_height = 13.0;       // the scalar bar
@@ -69,7 +68,7 @@ ScenePage plan_with(const SceneViewOptions& options, const std::vector<Legend>& 
   ScenePage page;
   page.font_px = options.font_px > 0
                      ? options.font_px
-                     : std::clamp(std::min(options.width, options.height) / 48, least_font_px, 160);
+                     : std::clamp(std::min(options.width, options.height) / 48, min_font_px, 160);
   const double f = page.font_px;
   const double title_height = bands.title ? std::round(2.4 * f) : 0.0;
   const double bottom_height = bands.axes        ? std::round(4.8 * f)
@@ -239,7 +238,7 @@ void draw_title(const ScenePage& page, const std::string& title, Overlay& overla
   if (!page.title) return;
   TextStyle style{.size_px = static_cast<int>(1.3 * page.font_px), .bold = true};
   const double room = page.title->width - 1.6 * page.font_px;
-  while (style.size_px > least_font_px && text_size(title, style).x() > room) --style.size_px;
+  while (style.size_px > min_font_px && text_size(title, style).x() > room) --style.size_px;
   overlay.text({0.8 * page.font_px, page.title->height / 2.0}, shortened_text(title, style, room),
                style);
 }
@@ -353,7 +352,7 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
   const double f = page.font_px;
   const double radius = std::max(3.0, 0.32 * f);
   const double border = std::max(1.0, std::round(0.1 * f));
-  const TextStyle style{.size_px = std::max(least_font_px, static_cast<int>(0.85 * f)),
+  const TextStyle style{.size_px = std::max(min_font_px, static_cast<int>(0.85 * f)),
                         .align = TextAlign::center};
   std::vector<SeenMarker> seen = seen_markers(page, camera, markers);
   const bool labelled = have_room_for_labels(seen, page.plot, 1.3 * style.size_px);

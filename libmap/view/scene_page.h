@@ -13,6 +13,9 @@
 
 namespace libmap {
 
+inline constexpr int max_side_px = 16384;  // of a picture
+inline constexpr int min_font_px = 10;
+
 struct ScenePage {
   PixelRect plot;  // whole pixels
   std::optional<PixelRect> title;

@@ -33,16 +33,14 @@
 namespace libmap {
 namespace {
 
-constexpr int largest_side_px = 16384;
-
 void check(const SceneViewOptions& options) {
   const auto check_side = [](const char* name, int value) {
-    if (value < 1 || value > largest_side_px)
+    if (value < 1 || value > max_side_px)
       throw Error("no picture can have this size",
                   {.file = {},
                    .field = name,
                    .value = std::to_string(value),
-                   .bound = ">= 1 and <= " + std::to_string(largest_side_px)});
+                   .bound = ">= 1 and <= " + std::to_string(max_side_px)});
   };
   check_side("width", options.width);
   check_side("height", options.height);

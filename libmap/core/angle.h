@@ -1,0 +1,10 @@
+// Degrees and radians.
+#pragma once
+
+#include <numbers>
+
+namespace libmap {
+
+inline constexpr double radians_per_degree = std::numbers::pi / 180.0;
+
+}  // namespace libmap
