@@ -10,7 +10,7 @@
 #include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace replay_test {
 
 namespace fs = std::filesystem;
 using graspmap_fuzz::FuzzTarget;
@@ -94,4 +94,4 @@ TEST_P(Fuzz, EarlierFindings) {
 INSTANTIATE_TEST_SUITE_P(Targets, Fuzz, testing::ValuesIn(graspmap_fuzz::fuzz_targets()),
                          [](const auto& target) { return std::string(target.param.name); });
 
-}  // namespace
+}  // namespace replay_test

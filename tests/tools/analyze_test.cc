@@ -5,7 +5,7 @@
 #include "libmap/core/text.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace analyze_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -166,4 +166,4 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
   EXPECT_FALSE(std::filesystem::exists(scratch("out")));
 }
 
-}  // namespace
+}  // namespace analyze_test

@@ -8,7 +8,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace bag_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
@@ -296,4 +296,4 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
-}  // namespace
+}  // namespace bag_test

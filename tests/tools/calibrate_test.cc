@@ -8,7 +8,7 @@
 #include "tests/support/chessboard_picture.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace calibrate_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
@@ -164,4 +164,4 @@ TEST(Calibrate, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(scratch("camera.yaml")));
 }
 
-}  // namespace
+}  // namespace calibrate_test

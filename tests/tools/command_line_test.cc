@@ -4,7 +4,7 @@
 #include "libmap/core/manifest.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace command_line_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -319,4 +319,4 @@ TEST(CommandLine, ForeignLocaleChangesNothing) {
   }
 }
 
-}  // namespace
+}  // namespace command_line_test

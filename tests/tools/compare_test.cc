@@ -9,7 +9,7 @@
 #include "libmap/scan/image_codec.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace compare_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -338,4 +338,4 @@ TEST(Compare, BadInput) {
                         {"empty.ply: the cloud has no points"}));
 }
 
-}  // namespace
+}  // namespace compare_test

@@ -6,7 +6,7 @@
 #include "libmap/mesh/textured_mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace convert_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -167,4 +167,4 @@ TEST(Convert, BadInputLeavesNothing) {
   EXPECT_EQ(content("foreign.ply"), "precious");
 }
 
-}  // namespace
+}  // namespace convert_test

@@ -10,7 +10,7 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace crop_test {
 
 using Eigen::Vector3d;
 using graspmap_test::bad_input;
@@ -303,4 +303,4 @@ TEST(Crop, SiteAgainstTheMapItCameFrom) {
                 {"map.ply", "not cropped"}));
 }
 
-}  // namespace
+}  // namespace crop_test

@@ -4,7 +4,7 @@
 #include "tests/support/file_names.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace evaluate_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -125,4 +125,4 @@ TEST(Evaluate, PublishedFieldTest) {
       << "the published area is the upper sum";
 }
 
-}  // namespace
+}  // namespace evaluate_test

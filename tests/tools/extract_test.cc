@@ -15,7 +15,7 @@
 #include "tests/libmap/scan/example_scan.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace extract_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
@@ -380,4 +380,4 @@ TEST(Extract, TakesEveryRealScan) {
   }
 }
 
-}  // namespace
+}  // namespace extract_test

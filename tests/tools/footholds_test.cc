@@ -3,7 +3,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace footholds_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::graspmap;
@@ -55,4 +55,4 @@ TEST(Footholds, WhatIsNoMapIsSaid) {
   EXPECT_FALSE(std::filesystem::exists(scratch("f.csv")));
 }
 
-}  // namespace
+}  // namespace footholds_test

@@ -9,7 +9,7 @@
 #include "libmap/scan/scan_source.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace fuse_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -220,4 +220,4 @@ TEST(Fuse, DryRunWritesNothing) {
   EXPECT_TRUE(graspmap_test::names_in_scratch().empty());
 }
 
-}  // namespace
+}  // namespace fuse_test

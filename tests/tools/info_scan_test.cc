@@ -9,7 +9,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace info_scan_test {
 
 using namespace graspmap_test;
 using Json = nlohmann::json;
@@ -163,4 +163,4 @@ TEST(InfoScan, RealScan) {
   EXPECT_EQ(json.at("images"), (Json{{"JPEG 512 x 424, colour", 40}}));
 }
 
-}  // namespace
+}  // namespace info_scan_test

@@ -6,7 +6,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace info_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::graspmap;
@@ -154,4 +154,4 @@ TEST(Info, BadInput) {
   EXPECT_TRUE(bad_input(graspmap({"info", "."}), {}));
 }
 
-}  // namespace
+}  // namespace info_test

@@ -6,7 +6,7 @@
 #include "libmap/core/table.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace lookup_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::graspmap;
@@ -332,4 +332,4 @@ TEST(Lookup, NoPointsHaveNoAnswers) {
   EXPECT_TRUE(looked_up({}).rows.empty());
 }
 
-}  // namespace
+}  // namespace lookup_test

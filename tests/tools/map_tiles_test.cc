@@ -5,7 +5,7 @@
 #include "libmap/core/table.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace map_tiles_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
@@ -207,4 +207,4 @@ TEST(MapTiles, AnUnfinishedStoreIsNamed) {
     EXPECT_TRUE(bad_input(graspmap(words), {"map.tiles", "not complete"})) << words[0];
 }
 
-}  // namespace
+}  // namespace map_tiles_test

@@ -9,7 +9,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace mesh_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -176,4 +176,4 @@ TEST(Mesh, RealScanLiesNearTheTrueSurface) {
   EXPECT_LT(distances.at("median_m"), 0.0015);
 }
 
-}  // namespace
+}  // namespace mesh_test

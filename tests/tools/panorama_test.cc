@@ -7,7 +7,7 @@
 #include "libmap/scan/rig_images.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace panorama_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
@@ -193,4 +193,4 @@ TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
 }
 
-}  // namespace
+}  // namespace panorama_test

@@ -14,7 +14,7 @@
 #include "tests/libmap/scan/example_scan.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace poses_interchange_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::bad_input;
@@ -265,4 +265,4 @@ TEST(PosesOfFiles, OddOnesThatAreSound) {
   EXPECT_THAT(result.standard_error, HasSubstr("4 of 6 nodes have no pose"));
 }
 
-}  // namespace
+}  // namespace poses_interchange_test

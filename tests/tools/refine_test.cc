@@ -12,7 +12,7 @@
 #include "libmap/scan/scan_source.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace refine_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -258,4 +258,4 @@ TEST(Refine, BadInputIsOneLine) {
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
 }
 
-}  // namespace
+}  // namespace refine_test

@@ -5,7 +5,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace render_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -100,4 +100,4 @@ TEST(Render, BadInputIsOneLine) {
   EXPECT_FALSE(std::filesystem::exists(scratch("a.png")));
 }
 
-}  // namespace
+}  // namespace render_test

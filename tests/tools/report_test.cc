@@ -4,7 +4,7 @@
 
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace report_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -108,4 +108,4 @@ TEST(Report, BadInputIsSaid) {
   EXPECT_TRUE(succeeded(graspmap({"report", "empty"})));
 }
 
-}  // namespace
+}  // namespace report_test

@@ -8,7 +8,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace resample_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -154,4 +154,4 @@ TEST(Resample, BadInput) {
   EXPECT_EQ(names_in_scratch(), (Words{"line.ply", "ridge.ply"}));
 }
 
-}  // namespace
+}  // namespace resample_test

@@ -6,7 +6,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace score_bad_input_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::graspmap;
@@ -232,4 +232,4 @@ TEST_F(ScoreBadInput, OutputsThatCannotBe) {
   EXPECT_TRUE(bad_input(to("folder.pcd"), {"folder.pcd: is a folder"}));
 }
 
-}  // namespace
+}  // namespace score_bad_input_test

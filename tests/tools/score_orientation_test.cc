@@ -6,7 +6,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace score_orientation_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -146,4 +146,4 @@ TEST(ScoreOrientation, ACloudWithoutNormalsIsSaid) {
   EXPECT_NE(result.standard_error.find("has no normals"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace score_orientation_test

@@ -6,7 +6,7 @@
 #include "tests/support/reference_data.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace score_reference_test {
 
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
@@ -77,4 +77,4 @@ INSTANTIATE_TEST_SUITE_P(All, ScoreReference,
                            return std::string(one.param.set) + "_" + one.param.method;
                          });
 
-}  // namespace
+}  // namespace score_reference_test

@@ -8,7 +8,7 @@
 #include "libmap/core/pose.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace score_shares_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -210,4 +210,4 @@ TEST_F(Merge, CloudsThatAreNoShares) {
   EXPECT_TRUE(bad_input(graspmap({"merge", "a.pcd", "-o", "merged.xyz"}), {"merged.xyz"}));
 }
 
-}  // namespace
+}  // namespace score_shares_test

@@ -10,7 +10,7 @@
 #include "tests/tools/tool_test_support.h"
 #include "tools/needed_tiles.h"
 
-namespace {
+namespace score_store_hostile_test {
 
 namespace fs = std::filesystem;
 
@@ -126,4 +126,4 @@ TEST(ScoreStoreTiles, TooManyLeaveNothingBehind) {
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
-}  // namespace
+}  // namespace score_store_hostile_test

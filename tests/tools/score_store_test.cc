@@ -17,7 +17,7 @@
 #include "libmap/core/output_lock.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace score_store_test {
 
 namespace fs = std::filesystem;
 
@@ -492,4 +492,4 @@ TEST(ScoreStoreBadInput, LeavesNoFolderBehind) {
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
-}  // namespace
+}  // namespace score_store_test

@@ -11,7 +11,7 @@
 #include "libmap/core/score_color.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace score_test {
 
 using graspmap_test::content;
 using graspmap_test::graspmap;
@@ -212,4 +212,4 @@ TEST(Score, ReliefBelowThePlaneIsSaid) {
   EXPECT_THAT(said({"-o", "c.pcd"}), testing::Not(testing::HasSubstr("relief")));
 }
 
-}  // namespace
+}  // namespace score_test

@@ -8,7 +8,7 @@
 #include "libmap/scan/image_codec.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace sheet_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -243,4 +243,4 @@ TEST(Sheet, HowPlacesAreMarkedNeedsPlaces) {
                           {name, "--points"}));
 }
 
-}  // namespace
+}  // namespace sheet_test

@@ -16,7 +16,7 @@
 #include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace signals_test {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -240,4 +240,4 @@ TEST(Signals, NoFileLeftToOpenForThem) {
       testing::HasSubstr("graspmap info: error: no pipe for signals: Too many open files\n"));
 }
 
-}  // namespace
+}  // namespace signals_test

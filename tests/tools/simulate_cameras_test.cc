@@ -9,7 +9,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace simulate_cameras_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -150,4 +150,4 @@ TEST(SimulateCamerasCommand, BadInputIsOneLine) {
   EXPECT_NE(high.standard_error.find("nothing within its range"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace simulate_cameras_test

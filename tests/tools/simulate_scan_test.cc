@@ -8,7 +8,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace simulate_scan_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -144,4 +144,4 @@ TEST(SimulateScanCommand, BadInputIsOneLineAndLeavesNothing) {
   EXPECT_FALSE(std::filesystem::exists(scratch("a.db")));
 }
 
-}  // namespace
+}  // namespace simulate_scan_test

@@ -4,7 +4,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace simulate_site_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -87,4 +87,4 @@ TEST(SimulateSite, DryRunWritesNothing) {
   EXPECT_FALSE(std::filesystem::exists(scratch("site")));
 }
 
-}  // namespace
+}  // namespace simulate_site_test

@@ -3,7 +3,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace simulate_terrain_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -62,4 +62,4 @@ TEST(SimulateTerrain, BadOptionsAreNamed) {
   EXPECT_FALSE(std::filesystem::exists(scratch("dry")));
 }
 
-}  // namespace
+}  // namespace simulate_terrain_test

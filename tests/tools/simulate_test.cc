@@ -6,7 +6,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace simulate_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -104,4 +104,4 @@ TEST(Mask, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(graspmap({"mask", "-o", "mask.doc"}), {"mask.doc"}));
 }
 
-}  // namespace
+}  // namespace simulate_test

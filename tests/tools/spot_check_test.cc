@@ -8,7 +8,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace spot_check_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -187,4 +187,4 @@ TEST(SpotCheckCommand, TrueMeshOfTheTestSite) {
   EXPECT_EQ(json.at("published_mean_m"), 0.04);
 }
 
-}  // namespace
+}  // namespace spot_check_test

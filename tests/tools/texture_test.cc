@@ -18,7 +18,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace texture_test {
 
 using graspmap_test::bad_input;
 using graspmap_test::content;
@@ -282,4 +282,4 @@ TEST(Texture, CroppedSitesCarryThePosesWithThem) {
   EXPECT_LT(error / count, 3.0);
 }
 
-}  // namespace
+}  // namespace texture_test

@@ -13,7 +13,7 @@
 #include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 
-namespace {
+namespace two_runs_test {
 
 namespace fs = std::filesystem;
 using namespace std::chrono_literals;
@@ -159,4 +159,4 @@ TEST(TwoRuns, AFolderOfWhatAKilledRunLeftIsNobodys) {
   EXPECT_TRUE(graspmap_test::bad_input(graspmap(words), {"o: is not empty"}));
 }
 
-}  // namespace
+}  // namespace two_runs_test

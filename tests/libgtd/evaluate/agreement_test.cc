@@ -9,7 +9,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace agreement_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -151,4 +151,4 @@ TEST(Agreement, SeriesOfDifferentLengths) {
   EXPECT_EQ(error.context().bound, "4");
 }
 
-}  // namespace
+}  // namespace agreement_test

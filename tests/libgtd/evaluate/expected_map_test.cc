@@ -8,7 +8,7 @@
 #include "libgtd/evaluate/map_summary.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace expected_map_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -265,4 +265,4 @@ TEST(MapSummary, CountsByHand) {
   EXPECT_EQ(counted, 3U);
 }
 
-}  // namespace
+}  // namespace expected_map_test

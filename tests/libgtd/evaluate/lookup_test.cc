@@ -8,7 +8,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace lookup_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -153,4 +153,4 @@ TEST(Lookup, BadInputIsAnError) {
   EXPECT_EQ(error_of([&] { libgtd::look_up(map, {}, options); }).context().field, "score");
 }
 
-}  // namespace
+}  // namespace lookup_test

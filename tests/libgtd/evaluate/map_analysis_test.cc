@@ -10,7 +10,7 @@
 #include "tests/libgtd/evaluate/map_test_support.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace map_analysis_test {
 
 using graspmap_test::error_of;
 using graspmap_test::floor_voxels;
@@ -253,4 +253,4 @@ TEST(MapAnalysis, SurfaceOfAnotherMap) {
   }
 }
 
-}  // namespace
+}  // namespace map_analysis_test

@@ -9,7 +9,7 @@
 #include "tests/libgtd/evaluate/map_test_support.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace map_change_test {
 
 using graspmap_test::error_of;
 using graspmap_test::floor_voxels;
@@ -218,4 +218,4 @@ TEST(MapChange, MapsApartAndOptionsOutOfBounds) {
             "the surface is of another map");
 }
 
-}  // namespace
+}  // namespace map_change_test

@@ -10,7 +10,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace map_surface_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -159,4 +159,4 @@ TEST(MapSurface, RadiusOutOfBounds) {
               "surface_radius_m");
 }
 
-}  // namespace
+}  // namespace map_surface_test

@@ -11,7 +11,7 @@
 #include "tests/libgtd/evaluate/map_test_support.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace region_reach_test {
 
 using graspmap_test::error_of;
 using graspmap_test::floor_voxels;
@@ -302,4 +302,4 @@ TEST(RegionReach, TooManyPairsWithinAStride) {
   EXPECT_EQ(error.context().value, "2.5");
 }
 
-}  // namespace
+}  // namespace region_reach_test

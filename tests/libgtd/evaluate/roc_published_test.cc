@@ -10,7 +10,7 @@
 #include "libmap/core/text.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace roc_published_test {
 
 using libgtd::Confusion;
 using libgtd::RocOptions;
@@ -161,4 +161,4 @@ TEST(RocPublished, TheInterpolatedCaseNeedsAnotherCutoff) {
   EXPECT_EQ(tpr_at(0.8), "0.3000");
 }
 
-}  // namespace
+}  // namespace roc_published_test

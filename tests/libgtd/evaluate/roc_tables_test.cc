@@ -8,7 +8,7 @@
 #include "libmap/core/text.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace roc_tables_test {
 
 using graspmap_test::error_of;
 using libgtd::evaluate_table;
@@ -152,4 +152,4 @@ TEST(RocTables, WrongTablesNameFileRowAndColumn) {
               HasSubstr("did you mean 'score'"));
 }
 
-}  // namespace
+}  // namespace roc_tables_test

@@ -10,7 +10,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace roc_test {
 
 using graspmap_test::error_of;
 using libgtd::evaluate_roc;
@@ -421,4 +421,4 @@ TEST(Roc, WrongOptionsNameTheFieldAndTheBound) {
   EXPECT_EQ(error_of([] { evaluate_roc({true}, {}); }).context().field, "scores");
 }
 
-}  // namespace
+}  // namespace roc_test

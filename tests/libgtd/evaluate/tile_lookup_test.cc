@@ -12,7 +12,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace tile_lookup_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -266,4 +266,4 @@ TEST(TileLookup, ColumnsFarApart) {
   EXPECT_EQ(answers[1].values.front(), far_column);
 }
 
-}  // namespace
+}  // namespace tile_lookup_test

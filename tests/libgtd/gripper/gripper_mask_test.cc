@@ -7,7 +7,7 @@
 #include "tests/support/reference_data.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace gripper_mask_test {
 
 using libgtd::Gripper;
 using libgtd::GripperMask;
@@ -90,4 +90,4 @@ INSTANTIATE_TEST_SUITE_P(All, ReferenceMask,
                                          MaskCase{"climblab/mask.hubrobo.1mm.txt", "hubrobo", 75,
                                                   Method::climblab, 0.001, 0, true}));
 
-}  // namespace
+}  // namespace gripper_mask_test

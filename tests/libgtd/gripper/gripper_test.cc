@@ -6,7 +6,7 @@
 #include "libgtd/gripper/gripper_mask.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace gripper_test {
 
 using graspmap_test::error_of;
 using libgtd::Gripper;
@@ -122,4 +122,4 @@ TEST(GripperMask, TextHasALineForEachRow) {
       std::count(mask.solid.begin(), mask.solid.end(), 1) + 1);  // and the one of "z 1"
 }
 
-}  // namespace
+}  // namespace gripper_test

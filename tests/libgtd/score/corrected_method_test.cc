@@ -13,7 +13,7 @@
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
-namespace {
+namespace corrected_method_test {
 
 using graspmap_test::bumpy_cloud;
 using graspmap_test::grid_of;
@@ -267,5 +267,5 @@ TEST(Corrected, EachVoxelStandsOnceInTheMap) {
     EXPECT_LT(result.map.voxels[n - 1].voxel, result.map.voxels[n].voxel);
 }
 
-}  // namespace
+}  // namespace corrected_method_test
 }  // namespace libgtd

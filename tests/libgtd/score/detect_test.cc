@@ -8,7 +8,7 @@
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
-namespace {
+namespace detect_test {
 
 using graspmap_test::bumpy_cloud;
 using graspmap_test::error_of;
@@ -155,5 +155,5 @@ TEST(Detection, WhatLiesBelowTheZeroPlaneIsScoredButNoTarget) {
   EXPECT_GT(below, 100U);
 }
 
-}  // namespace
+}  // namespace detect_test
 }  // namespace libgtd

@@ -10,7 +10,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace footholds_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -221,4 +221,4 @@ TEST(Footholds, ErrorsNameTheField) {
   EXPECT_THROW(libgtd::find_footholds(PointCloud{}), libmap::Error);
 }
 
-}  // namespace
+}  // namespace footholds_test

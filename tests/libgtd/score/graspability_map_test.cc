@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libgtd {
-namespace {
+namespace graspability_map_test {
 
 using graspmap_test::error_of;
 using libmap::PointCloud;
@@ -102,5 +102,5 @@ TEST(Merge, OrdersByVoxelAndTakesEmptyParts) {
   EXPECT_EQ(merged.fields, cloud.fields);
 }
 
-}  // namespace
+}  // namespace graspability_map_test
 }  // namespace libgtd

@@ -6,7 +6,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace map_thinning_test {
 
 using graspmap_test::uniform;
 using libgtd::GraspabilityMap;
@@ -98,4 +98,4 @@ TEST(MapThinning, InCubesSteepFacesStay) {
   EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 1)), voxels_in(map));
 }
 
-}  // namespace
+}  // namespace map_thinning_test

@@ -11,7 +11,7 @@
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
-namespace {
+namespace obstacles_test {
 
 using graspmap_test::error_of;
 using graspmap_test::gripper_named;
@@ -273,5 +273,5 @@ TEST(Obstacles, NeedPossibleLengths) {
   EXPECT_EQ(field_of(0.01, 0.1, 1e9), "normal_radius_m");
 }
 
-}  // namespace
+}  // namespace obstacles_test
 }  // namespace libgtd

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace scoring_test {
 
 using libgtd::Method;
 using libgtd::score_percent;
@@ -46,4 +46,4 @@ TEST(Graspable, ByThresholdOrByClimbLabsRule) {
   EXPECT_FALSE(libgtd::meets_threshold({200, 199}, 0.995, Method::climblab, 120, 0.8));
 }
 
-}  // namespace
+}  // namespace scoring_test

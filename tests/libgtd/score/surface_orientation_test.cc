@@ -17,7 +17,7 @@
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
-namespace {
+namespace surface_orientation_test {
 
 using Eigen::Vector3d;
 using graspmap_test::bumpy_cloud;
@@ -380,5 +380,5 @@ TEST(SurfaceOrientation, MethodsOfTheProgramAreRefused) {
   }
 }
 
-}  // namespace
+}  // namespace surface_orientation_test
 }  // namespace libgtd

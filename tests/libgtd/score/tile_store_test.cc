@@ -9,7 +9,7 @@
 #include "libmap/core/error.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace tile_store_test {
 
 namespace fs = std::filesystem;
 
@@ -242,4 +242,4 @@ TEST(TileStore, HostileIndex) {
   }
 }
 
-}  // namespace
+}  // namespace tile_store_test

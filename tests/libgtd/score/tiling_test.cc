@@ -15,7 +15,7 @@ bool operator==(const ScoredVoxel& a, const ScoredVoxel& b) {
   return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.edge == b.edge;
 }
 
-namespace {
+namespace tiling_test {
 
 using graspmap_test::grid_of;
 using graspmap_test::gripper_named;
@@ -197,5 +197,5 @@ TEST(StoredTiles, NotAllAtOnce) {
   EXPECT_LE(most, 16384U);
 }
 
-}  // namespace
+}  // namespace tiling_test
 }  // namespace libgtd

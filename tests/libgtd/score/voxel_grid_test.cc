@@ -9,7 +9,7 @@
 
 #include "tests/libgtd/score/score_test_support.h"
 
-namespace {
+namespace voxel_grid_test {
 
 using graspmap_test::uniform;
 using libgtd::Voxel;
@@ -134,4 +134,4 @@ TEST(Voxelize, OfNothingIsNothing) {
   EXPECT_TRUE(libgtd::voxelize_thesis({}, 0.01).voxels.empty());
 }
 
-}  // namespace
+}  // namespace voxel_grid_test

@@ -12,7 +12,7 @@
 #include "tests/libgtd/score/score_test_support.h"
 #include "tests/support/reference_data.h"
 
-namespace {
+namespace voxel_matching_test {
 
 using graspmap_test::grid_of;
 using graspmap_test::gripper_named;
@@ -299,4 +299,4 @@ TEST(VoxelMatching, StrayVoxelsFarAway) {
   }
 }
 
-}  // namespace
+}  // namespace voxel_matching_test

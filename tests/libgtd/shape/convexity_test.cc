@@ -11,7 +11,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace convexity_test {
 
 using Eigen::Vector3d;
 using graspmap_test::error_of;
@@ -153,4 +153,4 @@ TEST(NearConvex, EmptyAndNotFinite) {
               testing::ElementsAre(1, 0, 0));
 }
 
-}  // namespace
+}  // namespace convexity_test

@@ -15,7 +15,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace curvature_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -432,4 +432,4 @@ TEST(CurvatureErrors, OptionsOutOfRange) {
             "query");
 }
 
-}  // namespace
+}  // namespace curvature_test

@@ -12,7 +12,7 @@
 #include "tests/libgtd/instruction_sets.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace neighbor_loops_test {
 
 using graspmap_test::uniform;
 using libgtd::InstructionSet;
@@ -148,4 +148,4 @@ TEST(NeighborLoops, RanksOrderByDistanceThenByNumber) {
   }
 }
 
-}  // namespace
+}  // namespace neighbor_loops_test

@@ -9,7 +9,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace point_grid_test {
 
 using Eigen::Vector3d;
 using graspmap_test::error_of;
@@ -147,4 +147,4 @@ TEST(PointGrid, RefusesCellsWithoutSizeOrTooMany) {
   error_of([&] { PointGrid({{-1e308, 0, 0}, {1e308, 0, 0}}, 1); });
 }
 
-}  // namespace
+}  // namespace point_grid_test

@@ -9,7 +9,7 @@
 #include "tests/support/test_support.h"
 
 namespace libgtd {
-namespace {
+namespace surface_normal_test {
 
 using Eigen::Vector3d;
 using Eigen::Vector3f;
@@ -106,5 +106,5 @@ TEST(SurfaceNormal, RefusesWhatItCannotUse) {
   error_of([&] { fit_surface_normals(cloud, {Vector3d::Zero()}, {{}, {}}, {}); });
 }
 
-}  // namespace
+}  // namespace surface_normal_test
 }  // namespace libgtd

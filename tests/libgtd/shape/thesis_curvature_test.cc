@@ -9,7 +9,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace thesis_curvature_test {
 
 using graspmap_test::uniform;
 
@@ -102,4 +102,4 @@ TEST(ThesisCurvature, IsPclsOwnOnClimbingHolds) {
   expect_pcls_own(libmap::read_cloud(file).cloud, 0.03);
 }
 
-}  // namespace
+}  // namespace thesis_curvature_test

@@ -18,7 +18,7 @@
 #include "tests/support/reference_data.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace interpolation_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -420,4 +420,4 @@ INSTANTIATE_TEST_SUITE_P(Sets, InterpolationReference,
                            return name;
                          });
 
-}  // namespace
+}  // namespace interpolation_test

@@ -10,7 +10,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace planar_delaunay_test {
 
 using Eigen::Vector3d;
 using graspmap_test::uniform;
@@ -182,4 +182,4 @@ TEST(PlanarDelaunay, RealTerrainInStrips) {
   }
 }
 
-}  // namespace
+}  // namespace planar_delaunay_test

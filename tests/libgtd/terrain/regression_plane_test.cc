@@ -17,7 +17,7 @@
 #include "tests/support/reference_data.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace regression_plane_test {
 
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
@@ -450,4 +450,4 @@ INSTANTIATE_TEST_SUITE_P(
       return name.substr(0, name.find('.'));
     });
 
-}  // namespace
+}  // namespace regression_plane_test

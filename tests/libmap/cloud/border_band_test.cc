@@ -14,7 +14,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace border_band_test {
 
 using Eigen::Vector2d;
 using graspmap_test::error_of;
@@ -187,5 +187,5 @@ TEST(BorderBand, ThreadsMakeNoDifference) {
   EXPECT_EQ(find_border_band(cloud).corners, a.corners);
 }
 
-}  // namespace
+}  // namespace border_band_test
 }  // namespace libmap

@@ -19,7 +19,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace cloud_io_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_as;
@@ -373,5 +373,5 @@ TEST(RealClouds, TheTestSiteIsAsDescribed) {
   EXPECT_NEAR(longest, 1.0F, 0.01F);
 }
 
-}  // namespace
+}  // namespace cloud_io_test
 }  // namespace libmap

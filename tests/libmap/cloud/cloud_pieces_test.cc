@@ -9,7 +9,7 @@
 #include "libmap/core/error.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace cloud_pieces_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
@@ -116,4 +116,4 @@ TEST(CloudPieces, BadFiles) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace cloud_pieces_test

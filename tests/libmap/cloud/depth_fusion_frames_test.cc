@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace depth_fusion_frames_test {
 
 using graspmap_test::error_of;
 using graspmap_test::looking;
@@ -158,5 +158,5 @@ TEST(DepthFusionFrames, OptionsOutOfTheirRangesAreNamed) {
               HasSubstr("poses lie too far apart"));
 }
 
-}  // namespace
+}  // namespace depth_fusion_frames_test
 }  // namespace libmap

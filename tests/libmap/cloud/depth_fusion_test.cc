@@ -14,7 +14,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace depth_fusion_test {
 
 using graspmap_test::box;
 using graspmap_test::distance_from_step;
@@ -337,5 +337,5 @@ TEST(DepthFusion, RealScanLiesOnItsTrueGround) {
   EXPECT_LT(rms(heights), 0.012);
 }
 
-}  // namespace
+}  // namespace depth_fusion_test
 }  // namespace libmap

@@ -9,7 +9,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace depth_planes_test {
 
 using graspmap_test::box;
 using graspmap_test::error_of;
@@ -158,5 +158,5 @@ TEST(DepthPlanes, TinyImages) {
   }
 }
 
-}  // namespace
+}  // namespace depth_planes_test
 }  // namespace libmap

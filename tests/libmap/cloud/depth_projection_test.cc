@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace depth_projection_test {
 
 using graspmap_test::error_of;
 using graspmap_test::plane_z;
@@ -121,5 +121,5 @@ TEST(DepthProjection, ManyLensesAreNotAllKept) {
   EXPECT_EQ(least.rays_of(camera), least.rays_of(camera)) << "one is kept whatever its size";
 }
 
-}  // namespace
+}  // namespace depth_projection_test
 }  // namespace libmap

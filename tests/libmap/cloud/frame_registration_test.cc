@@ -12,7 +12,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace frame_registration_test {
 
 using graspmap_test::box;
 using graspmap_test::DepthNoiseModel;
@@ -217,5 +217,5 @@ TEST(FrameRegistration, StoredPosesOfARealScanComeNearTheTruth) {
   EXPECT_LT(after.angle_deg, 0.2 * before.angle_deg);
 }
 
-}  // namespace
+}  // namespace frame_registration_test
 }  // namespace libmap

@@ -15,7 +15,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace ground_plane_test {
 
 using Eigen::Vector3d;
 using graspmap_test::error_of;
@@ -331,5 +331,5 @@ TEST(GroundPlane, RealSite) {
   EXPECT_LT(degrees_between(turned.normal, turn.linear() * plane.normal), 0.01);
 }
 
-}  // namespace
+}  // namespace ground_plane_test
 }  // namespace libmap

@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace normals_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -145,5 +145,5 @@ TEST(Normals, AreFittedToPointsThatHaveSome) {
   EXPECT_EQ(reason_with(cloud.size() - 1), reason);
 }
 
-}  // namespace
+}  // namespace normals_test
 }  // namespace libmap

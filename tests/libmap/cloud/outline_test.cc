@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace outline_test {
 
 using Eigen::Vector2d;
 using graspmap_test::error_of;
@@ -168,5 +168,5 @@ TEST(Outline, CloudsAreCutWithAllTheirFields) {
   EXPECT_EQ(cut_cloud(cloud, {}).size(), 25U);
 }
 
-}  // namespace
+}  // namespace outline_test
 }  // namespace libmap

@@ -8,7 +8,7 @@
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace panorama_test {
 
 using graspmap_test::error_of;
 using libmap::Camera;
@@ -207,4 +207,4 @@ TEST(Panorama, NoViewsAndWrongArguments) {
   EXPECT_THAT(error_of([&] { make_panorama({}, options); }).what(), HasSubstr("stride_px"));
 }
 
-}  // namespace
+}  // namespace panorama_test

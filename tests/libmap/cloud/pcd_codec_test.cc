@@ -12,7 +12,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace pcd_codec_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_as;
@@ -206,7 +206,6 @@ TEST(PcdFiles, FieldNameWithBlankIsRefused) {
   EXPECT_NE(read_cloud(scratch_folder() / "c.csv").cloud.find_field("two words"), nullptr);
 }
 
-}  // namespace
 TEST(PcdFiles, VeryManyColumns) {
   const std::string rest = "\nPOINTS 0\nDATA ascii\n";
   std::string names;
@@ -216,4 +215,5 @@ TEST(PcdFiles, VeryManyColumns) {
               HasSubstr("more than 10000 columns"));
 }
 
+}  // namespace pcd_codec_test
 }  // namespace libmap

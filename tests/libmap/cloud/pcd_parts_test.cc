@@ -7,7 +7,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace pcd_parts_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
@@ -78,5 +78,5 @@ TEST(PcdParts, KeepTheirPromise) {
             ErrorKind::failed);
 }
 
-}  // namespace
+}  // namespace pcd_parts_test
 }  // namespace libmap

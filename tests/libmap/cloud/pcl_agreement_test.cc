@@ -10,7 +10,7 @@
 #include "tests/libmap/cloud/cloud_samples.h"
 
 namespace libmap {
-namespace {
+namespace pcl_agreement_test {
 
 using Points = pcl::PointCloud<pcl::PointXYZRGBNormal>;
 
@@ -116,5 +116,5 @@ TEST(PclAgreement, RealCloudsReadTheSame) {
   }
 }
 
-}  // namespace
+}  // namespace pcl_agreement_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace ply_codec_test {
 
 using graspmap_test::error_as;
 using graspmap_test::error_of;
@@ -123,5 +123,5 @@ TEST(PlyFiles, MoreVerticesThanAMeshCanName) {
   EXPECT_EQ(error.context().value, "2147483648");
 }
 
-}  // namespace
+}  // namespace ply_codec_test
 }  // namespace libmap

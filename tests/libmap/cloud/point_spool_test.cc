@@ -5,7 +5,7 @@
 #include "libmap/core/error.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace point_spool_test {
 
 using Eigen::Vector2d;
 using graspmap_test::scratch_folder;
@@ -55,4 +55,4 @@ TEST(PointSpool, FolderThatIsNotThere) {
   EXPECT_THROW(PointSpool(scratch_folder() / "none", {}), libmap::Error);
 }
 
-}  // namespace
+}  // namespace point_spool_test

@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace point_tree_test {
 
 using graspmap_test::uniform;
 
@@ -85,5 +85,5 @@ TEST(PointTree, SpacingOfALattice) {
   EXPECT_EQ(median_spacing({}), 0.0);
 }
 
-}  // namespace
+}  // namespace point_tree_test
 }  // namespace libmap

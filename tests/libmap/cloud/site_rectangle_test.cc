@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace site_rectangle_test {
 
 using Eigen::Vector2d;
 using graspmap_test::error_of;
@@ -150,5 +150,5 @@ TEST(SiteRectangle, ThreadsMakeNoDifference) {
   EXPECT_EQ(a.yaw_deg, b.yaw_deg);
 }
 
-}  // namespace
+}  // namespace site_rectangle_test
 }  // namespace libmap

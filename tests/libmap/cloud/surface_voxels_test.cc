@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace surface_voxels_test {
 
 using graspmap_test::random_engine;
 using graspmap_test::uniform;
@@ -143,5 +143,5 @@ TEST(SurfaceVoxels, OrderDependsOnTheVoxelsAlone) {
   for (std::size_t n = 0; n < a.size(); ++n) EXPECT_EQ(a[n].position, b[n].position);
 }
 
-}  // namespace
+}  // namespace surface_voxels_test
 }  // namespace libmap

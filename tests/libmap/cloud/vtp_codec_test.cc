@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace vtp_codec_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_as;
@@ -240,5 +240,5 @@ TEST(VtpFiles, OneBlockManyTimes) {
   EXPECT_NO_THROW(read_as(".vtp", vtp(4, "Int64", 1U << 17)));
 }
 
-}  // namespace
+}  // namespace vtp_codec_test
 }  // namespace libmap

@@ -9,7 +9,7 @@
 #include "libmap/core/image.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace camera_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -202,4 +202,4 @@ TEST(ImageTest, ColumnsOfPicturesSideBySide) {
   EXPECT_EQ(right.pixels, (std::vector<float>{3, 4, 5, 13, 14, 15}));
 }
 
-}  // namespace
+}  // namespace camera_test

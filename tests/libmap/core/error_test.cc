@@ -4,7 +4,7 @@
 
 #include <type_traits>
 
-namespace {
+namespace error_test {
 
 using libmap::Error;
 using libmap::ErrorKind;
@@ -47,4 +47,4 @@ TEST(ErrorTest, InFileNamesAFileOnce) {
   EXPECT_STREQ(error.what(), "x: missing") << "the original stays as it was";
 }
 
-}  // namespace
+}  // namespace error_test

@@ -11,7 +11,7 @@
 #include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace file_output_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
@@ -223,4 +223,4 @@ TEST(FileOutputTest, WritingToNowhereFails) {
             ErrorKind::failed);
 }
 
-}  // namespace
+}  // namespace file_output_test

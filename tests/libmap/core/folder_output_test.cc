@@ -11,7 +11,7 @@
 #include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace folder_output_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::names_in;
@@ -124,4 +124,4 @@ TEST_F(OutputFolderTest, BelongsToOneAtATime) {
   EXPECT_NO_THROW(OutputFolder(folder_, names));
 }
 
-}  // namespace
+}  // namespace folder_output_test

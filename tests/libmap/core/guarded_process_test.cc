@@ -10,7 +10,7 @@
 #include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace guarded_process_test {
 
 using libmap::GuardedProcess;
 
@@ -57,4 +57,4 @@ TEST(GuardedProcess, NoneWithoutFiles) {
   EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
 }
 
-}  // namespace
+}  // namespace guarded_process_test

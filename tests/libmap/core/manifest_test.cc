@@ -8,7 +8,7 @@
 #include "libmap/core/error.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace manifest_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
@@ -233,4 +233,4 @@ TEST(ManifestTest, Sha256OfAFileIsThatOfItsBytes) {
   error_of([&] { libmap::sha256_of_file(scratch_folder()); });
 }
 
-}  // namespace
+}  // namespace manifest_test

@@ -7,7 +7,7 @@
 #include <thread>
 #include <vector>
 
-namespace {
+namespace memory_budget_test {
 
 using libmap::MemoryBudget;
 
@@ -58,4 +58,4 @@ TEST(MemoryBudgetTest, AllComeToTheirTurn) {
   EXPECT_EQ(turns, 2000);
 }
 
-}  // namespace
+}  // namespace memory_budget_test

@@ -14,7 +14,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace parallel_test {
 
 using libmap::parallel_for;
 using libmap::parallel_reduce;
@@ -131,4 +131,4 @@ TEST(ParallelTest, OneThreadMeansOneAtATime) {
   });
 }
 
-}  // namespace
+}  // namespace parallel_test

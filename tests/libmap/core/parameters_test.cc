@@ -4,7 +4,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace parameters_test {
 
 using graspmap_test::error_of;
 using libmap::ParameterTable;
@@ -152,4 +152,4 @@ TEST(ParameterFlags, UnitsAreLeftOut) {
   EXPECT_EQ(libmap::flag_of("max"), "--max");
 }
 
-}  // namespace
+}  // namespace parameters_test

@@ -3,7 +3,7 @@
 #include "libmap/core/parameters.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace parameters_yaml_test {
 
 using graspmap_test::error_of;
 using libmap::ParameterTable;
@@ -134,4 +134,4 @@ TEST_F(ParametersYaml, EachLineCarriesItsDescription) {
   EXPECT_NE(libmap::to_yaml(table).find("size_m: 0.01  # edge, m\n"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace parameters_yaml_test

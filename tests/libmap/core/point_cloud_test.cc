@@ -4,7 +4,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace point_cloud_test {
 
 using graspmap_test::error_of;
 using libmap::PointCloud;
@@ -146,4 +146,4 @@ TEST(PointCloudTest, Bounds) {
   EXPECT_EQ(libmap::bounds_of({}).max, Eigen::Vector3d(0, 0, 0));
 }
 
-}  // namespace
+}  // namespace point_cloud_test

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace pose_graph_test {
 
 using libmap::GraphNode;
 using libmap::Pose;
@@ -58,4 +58,4 @@ TEST(PoseGraphTest, NamesOfLinksAndPoses) {
   EXPECT_EQ(to_text(PoseSource::ground_truth), "ground-truth");
 }
 
-}  // namespace
+}  // namespace pose_graph_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace pose_test {
 
 using Eigen::Matrix3d;
 using Eigen::Quaterniond;
@@ -110,4 +110,4 @@ TEST(PoseTest, RollPitchYawGiveTheRotationBackEverywhere) {
   }
 }
 
-}  // namespace
+}  // namespace pose_test

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-namespace {
+namespace score_color_test {
 
 using libmap::score_classes;
 using libmap::score_color;
@@ -32,4 +32,4 @@ TEST(ScoreColorTest, NegativeIsRedAndNaNIsGrey) {
   EXPECT_EQ(score_color(std::nan("")), libmap::no_value_color);
 }
 
-}  // namespace
+}  // namespace score_color_test

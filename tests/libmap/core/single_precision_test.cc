@@ -7,7 +7,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace single_precision_test {
 
 float kept(double value) {
   const volatile float single = static_cast<float>(value);
@@ -29,5 +29,5 @@ TEST(SinglePrecision, EveryNumberIsRounded) {
   }
 }
 
-}  // namespace
+}  // namespace single_precision_test
 }  // namespace libmap

@@ -4,7 +4,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace table_test {
 
 using graspmap_test::error_of;
 using libmap::parse_csv;
@@ -132,4 +132,4 @@ TEST(TableTest, MoreColumnsThanATableHasAreAnError) {
   EXPECT_EQ(error.context().file, "t.csv");
 }
 
-}  // namespace
+}  // namespace table_test

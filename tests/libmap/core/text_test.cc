@@ -10,7 +10,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace text_test {
 
 using libmap::nearest_name;
 using libmap::parse_bool;
@@ -177,4 +177,4 @@ TEST_P(ForeignLocale, ChangesNothing) {
 INSTANTIATE_TEST_SUITE_P(TextTest, ForeignLocale, testing::Values("de_DE.UTF-8", "tr_TR.UTF-8"),
                          [](const auto& one) { return std::string(one.param).substr(0, 5); });
 
-}  // namespace
+}  // namespace text_test

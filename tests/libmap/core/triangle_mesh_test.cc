@@ -9,7 +9,7 @@
 #include "libmap/core/textured_mesh.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace triangle_mesh_test {
 
 using Eigen::Vector3d;
 using graspmap_test::error_of;
@@ -173,4 +173,4 @@ TEST(TexturedMeshTest, CoordinatesThatAreNotFinite) {
   EXPECT_EQ(error.context().field, "triangle 7");
 }
 
-}  // namespace
+}  // namespace triangle_mesh_test

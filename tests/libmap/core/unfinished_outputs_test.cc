@@ -16,7 +16,7 @@
 #include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace unfinished_outputs_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::names_in;
@@ -120,4 +120,4 @@ TEST_F(UnfinishedOutputs, WhatIsPutInPlaceAsOneStepComesAsAWhole) {
   EXPECT_EQ(names_in(folder_), (std::vector<std::string>{"a.csv", "b.csv"}));
 }
 
-}  // namespace
+}  // namespace unfinished_outputs_test

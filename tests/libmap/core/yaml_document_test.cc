@@ -5,7 +5,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace yaml_document_test {
 
 std::string fault_of(const std::string& text) {
   return graspmap_test::error_of([&] {
@@ -76,4 +76,4 @@ TEST(YamlDocument, FaultsWithoutAPlace) {
   EXPECT_EQ(fault.find("given.yaml: not valid YAML: "), 0U) << fault;
 }
 
-}  // namespace
+}  // namespace yaml_document_test

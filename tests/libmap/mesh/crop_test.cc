@@ -19,7 +19,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace crop_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -322,5 +322,5 @@ TEST(Crop, RealSiteTurned) {
   EXPECT_NEAR(site.report.rectangle->clearance_m, 0.1, 0.03);
 }
 
-}  // namespace
+}  // namespace crop_test
 }  // namespace libmap

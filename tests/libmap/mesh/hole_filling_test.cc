@@ -11,7 +11,7 @@
 #include "tests/libmap/mesh/cleaning_checks.h"
 #include "tests/libmap/mesh/surface_samples.h"
 
-namespace {
+namespace hole_filling_test {
 
 using graspmap_test::cleaned;
 using graspmap_test::field_of;
@@ -153,4 +153,4 @@ TEST(HoleFilling, PatchesMeetNothingElse) {
   EXPECT_GT(libmap::surface_area(result.mesh), area);
 }
 
-}  // namespace
+}  // namespace hole_filling_test

@@ -17,7 +17,7 @@
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace mesh_cleaning_test {
 
 using graspmap_test::cleaned;
 using graspmap_test::cubes_mesh;
@@ -245,4 +245,4 @@ TEST(MeshCleaning, TrueSiteWithTrianglesKnockedOut) {
   EXPECT_LT(distances.max_m, 0.02);
 }
 
-}  // namespace
+}  // namespace mesh_cleaning_test

@@ -16,7 +16,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace mesh_cutting_test {
 
 using Eigen::Vector2d;
 using Eigen::Vector3d;
@@ -343,5 +343,5 @@ TEST(MeshCutting, ThreadsMakeNoDifference) {
   EXPECT_EQ(a.triangles, b.triangles);
 }
 
-}  // namespace
+}  // namespace mesh_cutting_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace mesh_io_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::as_float;
@@ -453,5 +453,5 @@ TEST(RealMeshes, GroundTruthOfTheSite) {
   }
 }
 
-}  // namespace
+}  // namespace mesh_io_test
 }  // namespace libmap

@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace mesh_parts_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -199,5 +199,5 @@ TEST(MeshParts, MovedThereAndBack) {
   EXPECT_EQ(moved.face_fields, mesh.face_fields);
 }
 
-}  // namespace
+}  // namespace mesh_parts_test
 }  // namespace libmap

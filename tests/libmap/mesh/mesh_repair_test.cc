@@ -16,7 +16,7 @@
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace mesh_repair_test {
 
 using graspmap_test::cleaned;
 using graspmap_test::cubes_mesh;
@@ -283,4 +283,4 @@ TEST(MeshRepair, VerticesAreJoinedWithinDistancesOfAnySize) {
   EXPECT_EQ(mesh.triangles[1][0], 5U);
 }
 
-}  // namespace
+}  // namespace mesh_repair_test

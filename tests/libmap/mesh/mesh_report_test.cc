@@ -13,7 +13,7 @@
 #include "tests/libmap/simulate/mesh_topology.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace mesh_report_test {
 
 using graspmap_test::cubes_mesh;
 using graspmap_test::error_of;
@@ -295,4 +295,4 @@ TEST(SelfIntersections, OnlyOfMarkedTriangles) {
   EXPECT_EQ(libmap::find_self_intersections(mesh), all);
 }
 
-}  // namespace
+}  // namespace mesh_report_test

@@ -11,7 +11,7 @@
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace mesh_smoothing_test {
 
 using graspmap_test::expect_clean;
 using graspmap_test::field_of;
@@ -108,4 +108,4 @@ TEST(MeshDecimation, FlatGroundNeedsFewTriangles) {
   EXPECT_NEAR(libmap::surface_area(result.mesh), 1.0, 0.004);
 }
 
-}  // namespace
+}  // namespace mesh_smoothing_test

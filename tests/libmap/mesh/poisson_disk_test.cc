@@ -22,7 +22,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace poisson_disk_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -424,5 +424,5 @@ TEST(PoissonDisk, RealSite) {
   expect_maximal(mesh, result, 500000);
 }
 
-}  // namespace
+}  // namespace poisson_disk_test
 }  // namespace libmap

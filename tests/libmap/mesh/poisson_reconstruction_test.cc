@@ -18,7 +18,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace poisson_reconstruction_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -406,5 +406,5 @@ TEST(PoissonReconstruction, StandardOutputStaysClean) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
-}  // namespace
+}  // namespace poisson_reconstruction_test
 }  // namespace libmap

@@ -18,7 +18,7 @@
 #include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace ray_caster_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -268,4 +268,4 @@ TEST(RayCaster, SaysThatEmbreeCannotBuildTheScene) {
   EXPECT_TRUE(before.cast({0, 0, 1}, {0, 0, -1}));
 }
 
-}  // namespace
+}  // namespace ray_caster_test

@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace reference_surface_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -162,5 +162,5 @@ TEST(ReferenceSurface, WhatIsNoSurface) {
   EXPECT_NEAR(ReferenceSurface(cloud).nearest({3, 4, 0}).distance_m, 5.0, 1e-12);
 }
 
-}  // namespace
+}  // namespace reference_surface_test
 }  // namespace libmap

@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace spot_check_test {
 
 using graspmap_test::error_of;
 using graspmap_test::square_mesh;
@@ -164,5 +164,5 @@ TEST(SpotCheck, SitesThatCannotBe) {
               HasSubstr("inset_m"));
 }
 
-}  // namespace
+}  // namespace spot_check_test
 }  // namespace libmap

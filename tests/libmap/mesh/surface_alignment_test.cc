@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace surface_alignment_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -257,5 +257,5 @@ TEST(SurfaceAlignment, WhatCannotBeAligned) {
   EXPECT_THAT(error_of([&] { align_to_surface(broken, surface); }).what(), HasSubstr("not finite"));
 }
 
-}  // namespace
+}  // namespace surface_alignment_test
 }  // namespace libmap

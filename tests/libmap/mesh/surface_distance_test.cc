@@ -9,7 +9,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace surface_distance_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -222,5 +222,5 @@ TEST(SurfaceDistance, ThreadsMakeNoDifference) {
   EXPECT_EQ(results[0], results[2]);
 }
 
-}  // namespace
+}  // namespace surface_distance_test
 }  // namespace libmap

@@ -11,7 +11,7 @@
 #include "tests/libmap/mesh/painted_scan.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace texture_model_test {
 
 using graspmap_test::circle_of_cameras;
 using graspmap_test::error_of;
@@ -413,4 +413,4 @@ TEST(TextureModel, FarFromTheOrigin) {
             0.8);
 }
 
-}  // namespace
+}  // namespace texture_model_test

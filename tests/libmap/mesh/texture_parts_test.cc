@@ -18,7 +18,7 @@
 #include "tests/libmap/mesh/painted_scan.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace texture_parts_test {
 
 using graspmap_test::grid_mesh;
 using graspmap_test::random_engine;
@@ -464,4 +464,4 @@ TEST(PhotoProjector, NoLengthInABallTakesMorePixels) {
   EXPECT_GT(hidden, 500);
 }
 
-}  // namespace
+}  // namespace texture_parts_test

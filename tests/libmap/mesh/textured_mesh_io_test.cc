@@ -15,7 +15,7 @@
 #include "tests/libmap/mesh/painted_scan.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace textured_mesh_io_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
@@ -269,4 +269,4 @@ TEST(TexturedMesh, WhatSinglePrecisionCannotHoldIsNotWritten) {
   }
 }
 
-}  // namespace
+}  // namespace textured_mesh_io_test

@@ -13,7 +13,7 @@
 #include "tests/libmap/poses/textured_scan.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace feature_cache_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::boulders;
@@ -167,4 +167,4 @@ TEST(FeatureCache, WithoutAFolderNothingIsKept) {
   EXPECT_EQ(found(scan, cache).from_cache, 0U);
 }
 
-}  // namespace
+}  // namespace feature_cache_test

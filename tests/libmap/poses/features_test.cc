@@ -7,7 +7,7 @@
 
 #include "libmap/cloud/depth_projection.h"
 
-namespace {
+namespace features_test {
 
 using libmap::FeatureOptions;
 using libmap::FeatureType;
@@ -96,4 +96,4 @@ TEST(Features, PlacesInPicturesThatAreHalved) {
   }
 }
 
-}  // namespace
+}  // namespace features_test

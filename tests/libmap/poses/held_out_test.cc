@@ -10,7 +10,7 @@
 #include "tests/libmap/poses/synthetic_features.h"
 #include "tests/libmap/poses/textured_scan.h"
 
-namespace {
+namespace held_out_test {
 
 using graspmap_test::around;
 using graspmap_test::boulders;
@@ -106,4 +106,4 @@ TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
   EXPECT_GT(fewer.surfaces.count, 0U);
 }
 
-}  // namespace
+}  // namespace held_out_test

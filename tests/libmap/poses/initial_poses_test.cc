@@ -12,7 +12,7 @@
 #include "libmap/poses/rigid_motion.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace initial_poses_test {
 
 using libmap::Pose;
 using libmap::PoseGraph;
@@ -189,4 +189,4 @@ TEST(InitialPoses, OfManyNodesLinksAndParts) {
   EXPECT_EQ(libmap::initial_poses(islands, libmap::StartPoses::odometry).parts.size(), 2'999U);
 }
 
-}  // namespace
+}  // namespace initial_poses_test

@@ -10,7 +10,7 @@
 #include "libmap/poses/rigid_motion.h"
 #include "tests/libmap/poses/synthetic_features.h"
 
-namespace {
+namespace pose_graph_optimization_test {
 
 using graspmap_test::error_of;
 using graspmap_test::normal;
@@ -374,4 +374,4 @@ TEST(BlockSolver, SelectedInverseIsThatOfTheColumns) {
   }
 }
 
-}  // namespace
+}  // namespace pose_graph_optimization_test

@@ -12,7 +12,7 @@
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace pose_import_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
@@ -301,4 +301,4 @@ TEST(PoseImport, RealScanThroughEveryFormat) {
   }
 }
 
-}  // namespace
+}  // namespace pose_import_test

@@ -10,7 +10,7 @@
 #include "tests/libmap/poses/textured_scan.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace refinement_test {
 
 using graspmap_test::around;
 using graspmap_test::boulders;
@@ -270,4 +270,4 @@ TEST(PlaceRecognition, FramesOfOnePlaceLookAlike) {
   }
 }
 
-}  // namespace
+}  // namespace refinement_test

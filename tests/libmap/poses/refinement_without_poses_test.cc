@@ -14,7 +14,7 @@
 #include "tests/libmap/poses/synthetic_features.h"
 #include "tests/libmap/poses/textured_scan.h"
 
-namespace {
+namespace refinement_without_poses_test {
 
 using graspmap_test::around;
 using graspmap_test::beside;
@@ -169,4 +169,4 @@ TEST(InitialPoses, LinksAloneGiveParts) {
   EXPECT_THROW(libmap::initial_poses(graph, StartPoses::stored), libmap::Error);
 }
 
-}  // namespace
+}  // namespace refinement_without_poses_test

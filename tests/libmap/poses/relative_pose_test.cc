@@ -7,7 +7,7 @@
 #include "tests/libmap/poses/synthetic_features.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace relative_pose_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_points;
@@ -235,4 +235,4 @@ TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
   EXPECT_LT(error_of_poses(scene, free.map_from_base), error_of_poses(scene, held.map_from_base));
 }
 
-}  // namespace
+}  // namespace relative_pose_test

@@ -9,7 +9,7 @@
 #include "libmap/scan/scan_source.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace trajectory_error_test {
 
 using libmap::Pose;
 using libmap::Trajectory;
@@ -237,4 +237,4 @@ TEST(AbsoluteTrajectoryError, AgreesWithTheTableOfTheRealScans) {
   }
 }
 
-}  // namespace
+}  // namespace trajectory_error_test

@@ -8,7 +8,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace trajectory_io_test {
 
 namespace fs = std::filesystem;
 using libmap::Pose;
@@ -175,4 +175,4 @@ TEST(AssignNodes, RefusesPosesOfNoUse) {
   EXPECT_THROW(libmap::assign_nodes({}, graph_of_nodes()), libmap::Error);
 }
 
-}  // namespace
+}  // namespace trajectory_io_test

@@ -7,7 +7,7 @@
 #include "libmap/scan/trajectory_text.h"
 #include "tests/libmap/poses/synthetic_features.h"
 
-namespace {
+namespace visual_odometry_test {
 
 using graspmap_test::beside;
 using graspmap_test::feature_camera;
@@ -357,4 +357,4 @@ TEST(VisualOdometry, RefusesOptionsOutOfRange) {
 
 // The whole of refine where the scan says nothing about poses.
 
-}  // namespace
+}  // namespace visual_odometry_test

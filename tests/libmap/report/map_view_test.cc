@@ -9,7 +9,7 @@
 #include "libmap/report/map_html.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace map_view_test {
 
 using graspmap_test::error_of;
 using libmap::MapView;
@@ -112,4 +112,4 @@ TEST(MapView, LabelsCannotEndTheScript) {
   EXPECT_EQ(html.find("<script>"), std::string::npos);
 }
 
-}  // namespace
+}  // namespace map_view_test

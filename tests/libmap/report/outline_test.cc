@@ -3,7 +3,7 @@
 #include "libmap/report/outline_io.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace outline_test {
 
 using graspmap_test::error_of;
 using libmap::ItemKind;
@@ -104,4 +104,4 @@ TEST(OutlineFile, WhatIsWrongIsNamedWithItsLine) {
   EXPECT_FALSE(error(deep).empty());
 }
 
-}  // namespace
+}  // namespace outline_test

@@ -7,7 +7,7 @@
 #include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace page_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -153,4 +153,4 @@ TEST(Picture, BrokenOnesAreErrors) {
   EXPECT_EQ(libmap::fit_picture(drawing, libmap::max_picture_level).bytes, drawing.bytes);
 }
 
-}  // namespace
+}  // namespace page_test

@@ -10,7 +10,7 @@
 #include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace report_reader_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
@@ -239,4 +239,4 @@ TEST(FoundOutline, OfNothing) {
                libmap::Error);
 }
 
-}  // namespace
+}  // namespace report_reader_test

@@ -12,7 +12,7 @@
 #include "libmap/report/timing_table.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace table_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
@@ -210,4 +210,4 @@ TEST(Folder, NaturalOrder) {
   EXPECT_FALSE(libmap::natural_less("a1", "a1"));
 }
 
-}  // namespace
+}  // namespace table_test

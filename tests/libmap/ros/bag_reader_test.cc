@@ -9,7 +9,7 @@
 #include "tests/libmap/ros/bag_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace bag_reader_test {
 
 namespace fs = std::filesystem;
 namespace rm = libmap::ros_message;
@@ -203,4 +203,4 @@ TEST(BagReader, SeededCorruptionsAreErrorsOrRead) {
   EXPECT_GT(errors, 18U);
 }
 
-}  // namespace
+}  // namespace bag_reader_test

@@ -8,7 +8,7 @@
 #include "tests/libmap/ros/bag_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace bag_rig_test {
 
 namespace fs = std::filesystem;
 namespace rm = libmap::ros_message;
@@ -406,4 +406,4 @@ TEST(BagRig, WhatIsMissingIsNamed) {
   EXPECT_THAT(refusal(), HasSubstr("/tf_static: quaternion of frame a_optical: is no rotation"));
 }
 
-}  // namespace
+}  // namespace bag_rig_test

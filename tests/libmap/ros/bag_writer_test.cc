@@ -10,7 +10,7 @@
 #include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace bag_writer_test {
 
 namespace fs = std::filesystem;
 namespace rm = libmap::ros_message;
@@ -119,4 +119,4 @@ TEST(BagWriter, WhatRosCannotHoldIsSaid) {
   EXPECT_EQ(full.kind(), libmap::ErrorKind::failed);
 }
 
-}  // namespace
+}  // namespace bag_writer_test

@@ -9,7 +9,7 @@
 #include "tests/libmap/ros/bag_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace cloud_message_test {
 
 namespace fs = std::filesystem;
 namespace rm = libmap::ros_message;
@@ -181,4 +181,4 @@ TEST(CloudMessage, LayoutOfWrittenClouds) {
   EXPECT_FALSE(std::isnan(rgb));  // blue of 255 and all
 }
 
-}  // namespace
+}  // namespace cloud_message_test

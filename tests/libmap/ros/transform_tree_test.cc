@@ -5,7 +5,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace transform_tree_test {
 
 using graspmap_test::error_of;
 using libmap::make_pose_from_rpy;
@@ -73,4 +73,4 @@ TEST(TransformTree, FramesStandStill) {
   EXPECT_THROW(tree.add("", "d", Pose::Identity()), libmap::Error);
 }
 
-}  // namespace
+}  // namespace transform_tree_test

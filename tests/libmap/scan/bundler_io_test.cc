@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace bundler_io_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -286,5 +286,5 @@ TEST(ImageSharpness, BlurLowersItContrastDoesNot) {
   EXPECT_EQ(image_sharpness(ColorImage(4, 60)), 0.0);
 }
 
-}  // namespace
+}  // namespace bundler_io_test
 }  // namespace libmap

@@ -8,7 +8,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace calibration_codec_test {
 
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
@@ -295,4 +295,4 @@ TEST(CalibrationCodec, NumbersThatAreNoCamera) {
   error_of([] { only_camera(record({})); });
 }
 
-}  // namespace
+}  // namespace calibration_codec_test

@@ -11,7 +11,7 @@
 #include "tests/support/chessboard_picture.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace camera_calibration_test {
 
 using graspmap_test::board_poses;
 using graspmap_test::ChessboardPainter;
@@ -323,4 +323,4 @@ TEST(CameraCalibration, WrongArgumentsAreNamed) {
   EXPECT_THROW(find_chessboard(libmap::GrayImage(9, 9), {8, 6, -1.0}), libmap::Error);
 }
 
-}  // namespace
+}  // namespace camera_calibration_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace camera_io_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
@@ -216,4 +216,4 @@ TEST(CameraIo, HugeListsEndEarly) {
   EXPECT_THAT(error_of([&] { parse_camera(text + "]", "a"); }).what(), HasSubstr("more numbers"));
 }
 
-}  // namespace
+}  // namespace camera_io_test

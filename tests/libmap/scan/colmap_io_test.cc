@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace colmap_io_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
@@ -453,5 +453,5 @@ TEST(ColmapBuilder, SameForAnyNumberOfThreads) {
   EXPECT_EQ(text(1), text(4));
 }
 
-}  // namespace
+}  // namespace colmap_io_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace depth_codec_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -225,4 +225,4 @@ TEST(DepthCodec, HeadersTellTheFormats) {
   error_of([] { libmap::decode_depth("no image at all"); });
 }
 
-}  // namespace
+}  // namespace depth_codec_test

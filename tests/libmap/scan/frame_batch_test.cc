@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-namespace {
+namespace frame_batch_test {
 
 TEST(FrameBatch, FewerOfLargerFrames) {
   EXPECT_EQ(libmap::frames_in_batch(0), 8U);
@@ -24,4 +24,4 @@ TEST(FrameBatch, PixelsOfTheLargestImage) {
   EXPECT_EQ(libmap::image_pixels(frame), 40U);
 }
 
-}  // namespace
+}  // namespace frame_batch_test

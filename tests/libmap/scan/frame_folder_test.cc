@@ -17,7 +17,7 @@
 #include "tests/libmap/scan/example_scan.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace frame_folder_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::ExampleScan;
@@ -393,4 +393,4 @@ TEST(FrameFolder, HoldsARealScan) {
     graspmap_test::expect_same_frame(read->read_frame(node.id), database.read_frame(node.id));
 }
 
-}  // namespace
+}  // namespace frame_folder_test

@@ -9,7 +9,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace image_codec_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -181,4 +181,4 @@ TEST(ImageCodec, OnlyWhatWasAskedForIsTaken) {
             "jpeg_quality");
 }
 
-}  // namespace
+}  // namespace image_codec_test

@@ -9,7 +9,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace laser_scan_test {
 
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
@@ -130,4 +130,4 @@ TEST(LaserScan, WhatIsBroken) {
   error_of([&] { libmap::decode_laser_scan(scan_blob(9, std::vector<float>(9, 1.0F)), ""); });
 }
 
-}  // namespace
+}  // namespace laser_scan_test

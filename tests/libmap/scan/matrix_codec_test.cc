@@ -7,7 +7,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace matrix_codec_test {
 
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
@@ -124,4 +124,4 @@ TEST(MatrixCodec, TruncationsAndFlips) {
   }
 }
 
-}  // namespace
+}  // namespace matrix_codec_test

@@ -8,7 +8,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace picture_file_test {
 
 using namespace graspmap_test;
 using libmap::RtabmapDatabase;
@@ -43,4 +43,4 @@ TEST(PictureFile, NodesWithoutColourOrCalibrationAreNamed) {
   EXPECT_EQ(refusal_of(2), file.string() + ": node 2: it has no calibration");
 }
 
-}  // namespace
+}  // namespace picture_file_test

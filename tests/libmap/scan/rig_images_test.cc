@@ -10,7 +10,7 @@
 #include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace rig_images_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
@@ -225,4 +225,4 @@ TEST(RigMoments, EachImageIsInOneMoment) {
   EXPECT_TRUE(libmap::rig_moments({}, 4, 0.05).empty());
 }
 
-}  // namespace
+}  // namespace rig_images_test

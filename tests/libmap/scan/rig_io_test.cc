@@ -6,7 +6,7 @@
 #include "libmap/scan/camera_io.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace rig_io_test {
 
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
@@ -122,4 +122,4 @@ TEST(RigIo, BadFilesNameCameraAndKey) {
   }
 }
 
-}  // namespace
+}  // namespace rig_io_test

@@ -17,7 +17,7 @@
 #include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace rtabmap_optimized_poses_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::ExampleScan;
@@ -294,4 +294,4 @@ TEST(CopyWithOptimizedPoses, ReportsAFullDisk) {
   EXPECT_EQ(fs::file_size(scratch("b.db")), fs::file_size(scratch("a.db")));
 }
 
-}  // namespace
+}  // namespace rtabmap_optimized_poses_test

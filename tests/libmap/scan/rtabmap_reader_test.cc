@@ -13,7 +13,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace rtabmap_reader_test {
 
 namespace fs = std::filesystem;
 using libmap::LinkType;
@@ -459,4 +459,4 @@ TEST(RtabmapReader, RealRvlAndCalibrationsKeepTheirBytes) {
   }
 }
 
-}  // namespace
+}  // namespace rtabmap_reader_test

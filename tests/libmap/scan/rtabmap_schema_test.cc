@@ -10,7 +10,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace rtabmap_schema_test {
 
 namespace fs = std::filesystem;
 using libmap::LinkType;
@@ -195,4 +195,4 @@ TEST(RtabmapSchema, ImagesInTablesOfTheirOwn) {
   EXPECT_TRUE(libmap::verify_scan(scan).faults.empty());
 }
 
-}  // namespace
+}  // namespace rtabmap_schema_test

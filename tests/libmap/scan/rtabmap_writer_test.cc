@@ -18,7 +18,7 @@
 #include "tests/support/lower_limit.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace rtabmap_writer_test {
 
 namespace fs = std::filesystem;
 using graspmap_test::ExampleScan;
@@ -401,4 +401,4 @@ TEST_F(RtabmapWriterRefusal, OfParametersThatTheFormatCannotHold) {
   }
 }
 
-}  // namespace
+}  // namespace rtabmap_writer_test

@@ -16,7 +16,7 @@
 #include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace scan_verification_test {
 
 using namespace graspmap_test;
 using libmap::RtabmapDatabase;
@@ -325,4 +325,4 @@ TEST(HostileDatabase, SizesThatLieTakeNoMemory) {
   }
 }
 
-}  // namespace
+}  // namespace scan_verification_test

@@ -15,7 +15,7 @@
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace sqlite_file_test {
 
 using namespace graspmap_test;
 using libmap::RtabmapDatabase;
@@ -261,4 +261,4 @@ TEST(OpenScan, ADatabaseWithoutNodesOrWithoutData) {
   EXPECT_TRUE(libmap::open_scan(file)->read_frame(1).color.empty());
 }
 
-}  // namespace
+}  // namespace sqlite_file_test

@@ -10,7 +10,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace stamp_pairing_test {
 
 using Pairs = std::vector<std::pair<std::size_t, std::size_t>>;
 
@@ -66,4 +66,4 @@ TEST(StampPairing, AgreesWithComparingAllWithAll) {
   }
 }
 
-}  // namespace
+}  // namespace stamp_pairing_test

@@ -7,7 +7,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace {
+namespace stereo_depth_test {
 
 using graspmap_test::error_of;
 using libmap::DepthImage;
@@ -219,4 +219,4 @@ TEST(StereoDepth, WrongArgumentsAreNamed) {
   EXPECT_EQ(stereo_depth(image, image, pair_of_cameras(), options).width, width);
 }
 
-}  // namespace
+}  // namespace stereo_depth_test

@@ -11,7 +11,7 @@
 #include "libmap/core/text.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace trajectory_text_test {
 
 using libmap::LinkType;
 using libmap::Matrix6d;
@@ -410,4 +410,4 @@ TEST(RecognisePoses, ByTagOrColumns) {
   EXPECT_THROW(format(""), libmap::Error);
 }
 
-}  // namespace
+}  // namespace trajectory_text_test

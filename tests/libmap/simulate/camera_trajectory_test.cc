@@ -9,7 +9,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace camera_trajectory_test {
 
 using graspmap_test::error_of;
 using graspmap_test::square_mesh;
@@ -177,4 +177,4 @@ TEST(SurroundingGroundHeight, IsNotTiltedByRocks) {
   EXPECT_DOUBLE_EQ(libmap::surrounding_ground_height(mesh), -0.2);
 }
 
-}  // namespace
+}  // namespace camera_trajectory_test

@@ -12,7 +12,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace depth_camera_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -380,4 +380,4 @@ TEST(DepthCamera, InsideAClosedBallOnlyWhatIsNotTooNear) {
   EXPECT_EQ(libmap::measure_depth(view, rays, {}, 1).measured, 0U);
 }
 
-}  // namespace
+}  // namespace depth_camera_test

@@ -15,7 +15,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace field_points_test {
 
 using graspmap_test::error_of;
 
@@ -170,5 +170,5 @@ TEST(FieldPoints, TooFewPlacesIsAnError) {
   EXPECT_EQ(error_of([&] { choose_field_points(flat_site(1, 5), mesh); }).context().field, "rock");
 }
 
-}  // namespace
+}  // namespace field_points_test
 }  // namespace libmap

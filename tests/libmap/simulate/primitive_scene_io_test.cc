@@ -9,7 +9,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace primitive_scene_io_test {
 
 using graspmap_test::error_of;
 using graspmap_test::source_folder;
@@ -107,5 +107,5 @@ TEST(SceneYaml, a_file_that_is_not_there_is_an_error) {
   EXPECT_THAT(error_of([&] { load_scene(path); }).what(), HasSubstr("none.yaml"));
 }
 
-}  // namespace
+}  // namespace primitive_scene_io_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace primitive_scene_test {
 
 using graspmap_test::error_of;
 using graspmap_test::ground_plane;
@@ -283,5 +283,5 @@ TEST(SceneCheck, names_shape_parameter_value_and_bound) {
               testing::HasSubstr("at least one shape"));
 }
 
-}  // namespace
+}  // namespace primitive_scene_test
 }  // namespace libmap

@@ -11,7 +11,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace robot_cameras_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -147,4 +147,4 @@ TEST(GroundHeight, IsThatOfTheHighestSurface) {
   EXPECT_EQ(error_of([&] { libmap::ground_height(mesh, 3.0, 0.0); }).context().value, "3, 0");
 }
 
-}  // namespace
+}  // namespace robot_cameras_test

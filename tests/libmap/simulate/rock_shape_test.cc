@@ -9,7 +9,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace rock_shape_test {
 
 using graspmap_test::Topology;
 using graspmap_test::topology_of;
@@ -147,5 +147,5 @@ TEST(RockShape, FlatTopsAreFlat) {
   EXPECT_GT(flat, 0.15 * 0.6 * 0.5);
 }
 
-}  // namespace
+}  // namespace rock_shape_test
 }  // namespace libmap

@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace rock_site_io_test {
 
 using graspmap_test::error_of;
 
@@ -141,5 +141,5 @@ TEST(RockSiteIo, EmptyIsGroundAlone) {
   EXPECT_TRUE(parse("rocks:\nbumps:\n").rocks.empty());
 }
 
-}  // namespace
+}  // namespace rock_site_io_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace scan_simulation_test {
 
 using graspmap_test::ball_mesh;
 using graspmap_test::error_of;
@@ -286,4 +286,4 @@ TEST(SimulateScan, NothingToSeeIsAnError) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace scan_simulation_test

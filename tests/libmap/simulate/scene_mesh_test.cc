@@ -14,7 +14,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_mesh_test {
 
 using graspmap_test::error_of;
 using graspmap_test::ground_plane;
@@ -231,5 +231,5 @@ TEST(SceneMesh, is_the_same_on_every_run) {
   EXPECT_EQ(first.triangles, second.triangles);
 }
 
-}  // namespace
+}  // namespace scene_mesh_test
 }  // namespace libmap

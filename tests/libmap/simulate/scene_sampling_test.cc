@@ -15,7 +15,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_sampling_test {
 
 using graspmap_test::error_of;
 using graspmap_test::ground_plane;
@@ -359,5 +359,5 @@ TEST(SampleScene, refuses_what_it_cannot_do) {
   EXPECT_THROW(sample_scene(PrimitiveScene{}, {}), Error);
 }
 
-}  // namespace
+}  // namespace scene_sampling_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace site_mesh_test {
 
 using graspmap_test::error_of;
 using graspmap_test::self_intersections;
@@ -220,5 +220,5 @@ TEST(SiteMesh, BadOptionsAreErrors) {
             std::string::npos);
 }
 
-}  // namespace
+}  // namespace site_mesh_test
 }  // namespace libmap

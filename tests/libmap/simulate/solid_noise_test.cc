@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace solid_noise_test {
 
 using graspmap_test::uniform;
 
@@ -112,5 +112,5 @@ TEST(RockTexture, StonesDiffer) {
   EXPECT_GT(colors.size(), 15U);
 }
 
-}  // namespace
+}  // namespace solid_noise_test
 }  // namespace libmap

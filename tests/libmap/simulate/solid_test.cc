@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace solid_test {
 
 using graspmap_test::error_of;
 using graspmap_test::Topology;
@@ -226,5 +226,5 @@ TEST(Booleans, SplintersGoWithoutMovingTheSurface) {
   EXPECT_EQ(graspmap_test::self_intersections(clean.vertices, clean.triangles), 0U);
 }
 
-}  // namespace
+}  // namespace solid_test
 }  // namespace libmap

@@ -12,7 +12,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace terrain_pieces_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -222,5 +222,5 @@ TEST(TerrainPieces, ImpossibleOptionsAreNamed) {
   EXPECT_EQ(field_of([](auto& o) { o.terrain.rocks_per_m2 = -1; }), "rocks_per_m2");
 }
 
-}  // namespace
+}  // namespace terrain_pieces_test
 }  // namespace libmap

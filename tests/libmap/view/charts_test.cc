@@ -15,7 +15,7 @@
 #include "libmap/view/virtual_display.h"
 #include "tests/support/test_support.h"
 
-namespace {
+namespace charts_test {
 
 using graspmap_test::error_of;
 using libmap::Chart;
@@ -415,4 +415,4 @@ TEST(RoundTicks, ManyRandomRanges) {
   }
 }
 
-}  // namespace
+}  // namespace charts_test

@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace color_map_test {
 
 using graspmap_test::error_of;
 using ::testing::HasSubstr;
@@ -227,5 +227,5 @@ TEST(ParseColor, HexAndNames) {
     EXPECT_EQ(error_of([&] { parse_color(wrong, "c"); }).context().field, "c") << wrong;
 }
 
-}  // namespace
+}  // namespace color_map_test
 }  // namespace libmap

@@ -3,7 +3,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace label_layout_test {
 
 using graspmap_test::uniform;
 
@@ -59,5 +59,5 @@ TEST(PlaceLabels, ACrowdInOnePlaceGetsABoxEach) {
   for (const PixelRect& box : boxes) EXPECT_DOUBLE_EQ(box.height, 15.0);
 }
 
-}  // namespace
+}  // namespace label_layout_test
 }  // namespace libmap

@@ -6,7 +6,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace offscreen_test {
 
 using graspmap_test::error_of;
 
@@ -29,5 +29,5 @@ TEST(DrawOffscreen, APictureWithoutPixelsCannotBeReadBack) {
   EXPECT_STREQ(error.what(), "the picture could not be read back from OpenGL");
 }
 
-}  // namespace
+}  // namespace offscreen_test
 }  // namespace libmap

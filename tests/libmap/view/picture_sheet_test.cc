@@ -10,7 +10,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace picture_sheet_test {
 
 using graspmap_test::error_of;
 using ::testing::HasSubstr;
@@ -241,5 +241,5 @@ TEST(PictureSheet, WhatCannotBeDrawnIsAnError) {
   EXPECT_THAT(error_of([&] { draw_sheet(one, options); }).what(), HasSubstr("column_titles"));
 }
 
-}  // namespace
+}  // namespace picture_sheet_test
 }  // namespace libmap

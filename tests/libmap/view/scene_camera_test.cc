@@ -9,7 +9,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_camera_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -120,5 +120,5 @@ TEST(SceneCamera, RefusesCamerasThatCannotBe) {
   }
 }
 
-}  // namespace
+}  // namespace scene_camera_test
 }  // namespace libmap

@@ -7,7 +7,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_geometry_test {
 
 using graspmap_test::uniform;
 
@@ -137,5 +137,5 @@ TEST(TrianglesOf, CountsFromTheGivenOrigin) {
   EXPECT_NEAR(triangles.vertices[4].x() - triangles.vertices[0].x(), 0.001, 1e-8);
 }
 
-}  // namespace
+}  // namespace scene_geometry_test
 }  // namespace libmap

@@ -5,7 +5,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_page_test {
 
 using ::testing::ElementsAre;
 
@@ -103,5 +103,5 @@ TEST(Text, IsMeasuredAndShortened) {
   }
 }
 
-}  // namespace
+}  // namespace scene_page_test
 }  // namespace libmap

@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_texture_test {
 
 using graspmap_test::error_of;
 
@@ -129,5 +129,5 @@ TEST(SceneTexture, WhatHasNone) {
   EXPECT_THROW(prepare_layers(layer, Pose::Identity()), Error);
 }
 
-}  // namespace
+}  // namespace scene_texture_test
 }  // namespace libmap

@@ -13,7 +13,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace scene_view_test {
 
 using graspmap_test::error_of;
 using graspmap_test::uniform;
@@ -357,5 +357,5 @@ TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
   EXPECT_EQ(wide.context().bound, "at most 1000000 a side");
 }
 
-}  // namespace
+}  // namespace scene_view_test
 }  // namespace libmap

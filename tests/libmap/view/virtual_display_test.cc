@@ -16,7 +16,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace {
+namespace virtual_display_test {
 
 using graspmap_test::error_of;
 using ::testing::HasSubstr;
@@ -164,5 +164,5 @@ TEST_F(VirtualDisplayTest, TheServerEndsWithAKilledProgram) {
   EXPECT_FALSE(runs(server));
 }
 
-}  // namespace
+}  // namespace virtual_display_test
 }  // namespace libmap
