@@ -8,7 +8,7 @@ if [ -n "${FULL:-}" ]; then
   demo_with=${DEMO_WITH:-}
   runs='1:C 1:de_DE.UTF-8 2:tr_TR.UTF-8 2:C 8:de_DE.UTF-8 8:tr_TR.UTF-8'
 else
-  demo_with='FRAMES=8 EDGE=0.03 SPACING=0.02'
+  demo_with='FRAMES=8 EDGE=0.03 SPACING=0.02 MESH=--cell-size=0.02'
   runs='1:C 2:de_DE.UTF-8 8:tr_TR.UTF-8'
 fi
 

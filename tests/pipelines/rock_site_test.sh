@@ -6,7 +6,7 @@ out=$scratch/rocks
 
 run() {
   make --no-print-directory -f "$source/pipelines/rock_site.mk" OUT="$out" FRAMES=12 EDGE=0.02 \
-    SHARES=2 GRASPMAP="$graspmap" "$@"
+    MESH=--cell-size=0.02 SHARES=2 GRASPMAP="$graspmap" "$@"
 }
 
 run -j2 POSES=ground-truth
@@ -45,15 +45,17 @@ run POSES=ground-truth
 [ "$terrain" = "$(sha256sum <"$out/scan/terrain.pcd")" ] || fail "the samples made again differ"
 
 # Other poses and another seed are seen.
-run -j2 POSES=odometry TEXTURE=
+scan_to() {
+  make --no-print-directory -f "$source/pipelines/scan.mk" OUT="$out/scan" GRASPMAP="$graspmap" "$@"
+}
+scan_to SCAN="$out/scan.db" POSES=odometry "$out/scan/cloud.ply"
 [ "$cloud" != "$(sha256sum <"$out/scan/cloud.ply")" ] || fail "other poses were not seen"
-run -j2 POSES=odometry SEED=2 TEXTURE=
+run SEED=2 "$out/scan.db"
 [ "$scan" != "$(sha256sum <"$out/scan.db")" ] || fail "another seed was not seen"
 # So is another scan, older than what was made of the first.
 cp "$out/scan.db" "$scratch/other.db"
 touch -d 2001-01-01 "$scratch/other.db"
 before=$(listing "$out/scan" | grep '^scan.txt ')
-make --no-print-directory -f "$source/pipelines/scan.mk" SCAN="$scratch/other.db" OUT="$out/scan" \
-  GRASPMAP="$graspmap" "$out/scan/scan.txt"
+scan_to SCAN="$scratch/other.db" "$out/scan/scan.txt"
 [ "$before" != "$(listing "$out/scan" | grep '^scan.txt ')" ] || fail "an older scan was not seen"
 echo "passed"

@@ -1,0 +1,114 @@
+#!/usr/bin/python3
+"""Every installed header compiles alone, and includes nothing but the standard library, Eigen and this
+project.
+
+headers_test.py BUILD_FOLDER SOURCE_FOLDER EIGEN_INCLUDE_FOLDER COMPILER...
+
+A compiler takes up to a second for the standard library and Eigen in each header. So they are
+precompiled once, each header is compiled after them, which finds what it lacks of this project's, and
+the names std:: and Eigen:: are held against what the header and the project's headers below it include.
+"""
+
+import pathlib
+import re
+import subprocess
+import sys
+import tempfile
+from concurrent.futures import ThreadPoolExecutor
+
+INCLUDE = re.compile(r'^\s*#\s*include\s*[<"]([^>"]+)[>"]', re.MULTILINE)
+COMMENT_OR_TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\\n])*"', re.DOTALL)
+NAME = re.compile(r"\bstd::(\w+)")
+# Headers that define names of another spelling; any of them is enough.
+HEADERS = {
+    "cmath": "atan2 cos floor log sin sqrt",
+    "chrono": "chrono",
+    "cstdio": "FILE",
+    "cstdint": "int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t",
+    "cstring": "memcpy",
+    "algorithm": "copy lower_bound nth_element",
+    "bit": "bit_cast",
+    "exception": "exception",
+    "fstream": "ofstream",
+    "functional": "function",
+    "iterator": "iterator_traits",
+    "limits": "numeric_limits",
+    "memory": "allocator shared_ptr unique_ptr",
+    "mutex": "recursive_mutex unique_lock lock_guard",
+    "new": "bad_alloc",
+    "optional": "nullopt",
+    "stdexcept": "runtime_error",
+    "string": "basic_string char_traits to_string",
+    "type_traits": "is_same_v",
+    "utility": "in_range",
+    "variant": "monostate",
+}
+DEFINED_IN = {name: {header} for header, names in HEADERS.items() for name in names.split()}
+# The standard lets many headers define these; these do in every library.
+CONTAINERS = {"array", "deque", "list", "map", "set", "span", "string", "string_view", "vector"}
+DEFINED_IN |= {name: CONTAINERS | {"cstddef", "cstring"} for name in ("size_t", "ptrdiff_t", "byte")}
+DEFINED_IN |= {name: CONTAINERS | {"algorithm", "functional", "memory", "optional", "tuple", "utility",
+                                   "variant"} for name in ("pair", "move", "swap")}
+DEFINED_IN["ostream"] = {"ostream", "iosfwd", "fstream", "iostream", "sstream"}
+DEFINED_IN["exception"] |= {"stdexcept", "new"}
+
+
+def needed(name):
+    return DEFINED_IN.get(name, {name})  # std::vector is in <vector>
+
+
+def faults_of(header, includes, code):
+    """What the header uses of the standard library and Eigen without a header that defines it."""
+    below, open_ones = set(), {header}
+    while open_ones:
+        below |= open_ones
+        open_ones = {path for one in open_ones for path in includes[one] if path in includes} - below
+    there = {name for one in below for name in includes[one]}
+    for name in sorted(set(NAME.findall(code))):
+        if not needed(name) & there:
+            yield f"{header}: std::{name} without <{'> or <'.join(sorted(needed(name)))}>"
+    if "Eigen::" in code and not any(name.startswith("Eigen/") for name in there):
+        yield f"{header}: Eigen:: without <Eigen/...>"
+
+
+def main(build, source, eigen, *compiler):
+    faults = []
+    with tempfile.TemporaryDirectory() as scratch:
+        scratch = pathlib.Path(scratch)
+        subprocess.run(["cmake", "--install", build, "--prefix", scratch], check=True,
+                       stdout=subprocess.DEVNULL)
+        root = scratch / "include" / "graspmap"
+        texts = {str(path.relative_to(root)): path.read_text(encoding="utf-8")
+                 for path in sorted(root.rglob("*.h"))}
+        assert len(texts) >= 100, f"only {len(texts)} headers are installed"
+        includes = {header: set(INCLUDE.findall(text)) for header, text in texts.items()}
+        standard = set()
+        for header, names in includes.items():
+            for name in sorted(names - set(texts)):
+                if re.fullmatch(r"[a-z_]+", name):
+                    standard.add(name)
+                elif not name.startswith("Eigen/"):
+                    faults.append(f"{header}: shows {name}, a header of another library")
+            faults += faults_of(header, includes, COMMENT_OR_TEXT.sub(" ", texts[header]))
+
+        flags = ["-std=c++20", "-O0", "-Wall", "-Wextra", "-Werror", "-I", source, "-isystem", eigen]
+        first = scratch / "first.h"
+        first.write_text("".join(f"#include <{name}>\n" for name in sorted(standard) + ["Eigen/Geometry"]))
+        subprocess.run([*compiler, *flags, "-x", "c++-header", first, "-o", f"{first}.gch"], check=True)
+
+        def compile_alone(header):
+            unit = scratch / (header.replace("/", "_") + ".cc")
+            unit.write_text(f'#include "{header}"\n')
+            done = subprocess.run([*compiler, *flags, "-Winvalid-pch", "-include", first, "-fsyntax-only", unit],
+                                  stderr=subprocess.PIPE, text=True, check=False)
+            return [] if done.returncode == 0 else [f"{header} does not compile alone:\n{done.stderr}"]
+
+        with ThreadPoolExecutor(2) as threads:
+            for found in threads.map(compile_alone, texts):
+                faults += found
+    print("\n".join(faults) or f"{len(texts)} headers compile alone")
+    return 1 if faults else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main(*sys.argv[1:]))
