@@ -151,14 +151,11 @@ if(GRASPMAP_SANITIZE)
   set(graspmap_drawing_environment ASAN_OPTIONS=detect_leaks=0:protect_shadow_gap=0)
 endif()
 
-# graspmap_test(NAME SOURCES FILE... [LINK TARGET...] [INCLUDE DIR...] [DRAWS]): a GoogleTest
-# program test_NAME whose cases ctest runs one by one. DRAWS: it renders.
+# graspmap_test(NAME SOURCES FILE... [LINK TARGET...] [INCLUDE DIR...] [DRAWS] [SHARDS N]): a GoogleTest
+# program test_NAME, which ctest runs in N processes (1). A process per case would spend more time on
+# loading libraries than on most cases. DRAWS: it renders.
 function(graspmap_test name)
-  cmake_parse_arguments(ARG "DRAWS" "" "SOURCES;LINK;INCLUDE" ${ARGN})
-  set(environment "")
-  if(ARG_DRAWS AND graspmap_drawing_environment)
-    set(environment ENVIRONMENT ${graspmap_drawing_environment})
-  endif()
+  cmake_parse_arguments(ARG "DRAWS" "SHARDS" "SOURCES;LINK;INCLUDE" ${ARGN})
   set(target test_${name})
   add_executable(${target} ${ARG_SOURCES})
   graspmap_set_flags(${target})
@@ -168,6 +165,23 @@ function(graspmap_test name)
   target_link_libraries(${target} PRIVATE graspmap_test_support ${ARG_LINK})
   set_target_properties(${target} PROPERTIES
     RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/tests)
-  gtest_discover_tests(${target} TEST_PREFIX ${name}. DISCOVERY_MODE PRE_TEST
-    PROPERTIES TIMEOUT 600 ${environment})
+  set(environment "")
+  if(ARG_DRAWS)
+    set(environment ${graspmap_drawing_environment})
+  endif()
+  set(shards 1)
+  if(ARG_SHARDS)
+    set(shards ${ARG_SHARDS})
+  endif()
+  foreach(shard RANGE 1 ${shards})
+    set(test ${name})
+    if(shards GREATER 1)
+      set(test ${name}-${shard})
+    endif()
+    add_test(NAME ${test} COMMAND ${target})
+    math(EXPR index "${shard} - 1")
+    # 77: all of its cases were skipped.
+    set_tests_properties(${test} PROPERTIES TIMEOUT 1800 SKIP_RETURN_CODE 77
+      ENVIRONMENT "GTEST_TOTAL_SHARDS=${shards};GTEST_SHARD_INDEX=${index};${environment}")
+  endforeach()
 endfunction()

@@ -2,11 +2,13 @@
 """Every installed header compiles alone, and includes nothing but the standard library, Eigen and this
 project.
 
-headers_test.py BUILD_FOLDER SOURCE_FOLDER EIGEN_INCLUDE_FOLDER COMPILER...
+headers_test.py BUILD_FOLDER SOURCE_FOLDER EIGEN_INCLUDE_FOLDER COMPILER
 
 A compiler takes up to a second for the standard library and Eigen in each header. So they are
-precompiled once, each header is compiled after them, which finds what it lacks of this project's, and
-the names std:: and Eigen:: are held against what the header and the project's headers below it include.
+precompiled once (without Eigen for headers that need none: it loads faster) and each header is
+compiled after them, which finds missing includes of this project. Missing includes of the standard
+library and Eigen are found by comparing the names std:: and Eigen:: with what the header and the
+project's headers below it include.
 """
 
 import pathlib
@@ -57,21 +59,53 @@ def needed(name):
     return DEFINED_IN.get(name, {name})  # std::vector is in <vector>
 
 
-def faults_of(header, includes, code):
-    """What the header uses of the standard library and Eigen without a header that defines it."""
+def headers_below(header, includes):
+    """The header and all headers of this project that it includes, directly or not."""
     below, open_ones = set(), {header}
     while open_ones:
         below |= open_ones
         open_ones = {path for one in open_ones for path in includes[one] if path in includes} - below
-    there = {name for one in below for name in includes[one]}
+    return below
+
+
+def included(header, includes):
+    """All names that the header includes, directly or through headers of this project."""
+    return {name for one in headers_below(header, includes) for name in includes[one]}
+
+
+def chains(includes):
+    """The headers in lists, each header after those of its list that it includes.
+
+    A list is one compilation. It shows as much as one for each header: what stands before a header
+    is what it includes itself.
+    """
+    below = {header: headers_below(header, includes) for header in includes}
+    left = dict.fromkeys(sorted(includes, key=lambda header: (-len(below[header]), header)))
+    while left:
+        chain = [next(iter(left))]
+        while True:
+            del left[chain[-1]]
+            following = [name for name in left if name in below[chain[-1]]]
+            if not following:
+                break
+            chain.append(following[0])
+        yield chain[::-1]
+
+
+def shows_eigen(names):
+    return any(name.startswith("Eigen/") for name in names)
+
+
+def faults_of(header, there, code):
+    """What the header uses of the standard library and Eigen without a header that defines it."""
     for name in sorted(set(NAME.findall(code))):
         if not needed(name) & there:
             yield f"{header}: std::{name} without <{'> or <'.join(sorted(needed(name)))}>"
-    if "Eigen::" in code and not any(name.startswith("Eigen/") for name in there):
+    if "Eigen::" in code and not shows_eigen(there):
         yield f"{header}: Eigen:: without <Eigen/...>"
 
 
-def main(build, source, eigen, *compiler):
+def main(build, source, eigen, compiler):
     faults = []
     with tempfile.TemporaryDirectory() as scratch:
         scratch = pathlib.Path(scratch)
@@ -89,22 +123,28 @@ def main(build, source, eigen, *compiler):
                     standard.add(name)
                 elif not name.startswith("Eigen/"):
                     faults.append(f"{header}: shows {name}, a header of another library")
-            faults += faults_of(header, includes, COMMENT_OR_TEXT.sub(" ", texts[header]))
+            faults += faults_of(header, included(header, includes), COMMENT_OR_TEXT.sub(" ", texts[header]))
 
         flags = ["-std=c++20", "-O0", "-Wall", "-Wextra", "-Werror", "-I", source, "-isystem", eigen]
-        first = scratch / "first.h"
-        first.write_text("".join(f"#include <{name}>\n" for name in sorted(standard) + ["Eigen/Geometry"]))
-        subprocess.run([*compiler, *flags, "-x", "c++-header", first, "-o", f"{first}.gch"], check=True)
+        standard_only, with_eigen = scratch / "standard.h", scratch / "eigen.h"
+        lines = "".join(f"#include <{name}>\n" for name in sorted(standard))
+        standard_only.write_text(lines)
+        with_eigen.write_text(lines + "#include <Eigen/Geometry>\n")
 
-        def compile_alone(header):
-            unit = scratch / (header.replace("/", "_") + ".cc")
-            unit.write_text(f'#include "{header}"\n')
-            done = subprocess.run([*compiler, *flags, "-Winvalid-pch", "-include", first, "-fsyntax-only", unit],
+        def precompile(first):
+            subprocess.run([compiler, *flags, "-x", "c++-header", first, "-o", f"{first}.gch"], check=True)
+
+        def compile_chain(chain):
+            unit = scratch / (chain[-1].replace("/", "_") + ".cc")
+            unit.write_text("".join(f'#include "{header}"\n' for header in chain))
+            first = with_eigen if shows_eigen(included(chain[-1], includes)) else standard_only
+            done = subprocess.run([compiler, *flags, "-Winvalid-pch", "-include", first, "-fsyntax-only", unit],
                                   stderr=subprocess.PIPE, text=True, check=False)
-            return [] if done.returncode == 0 else [f"{header} does not compile alone:\n{done.stderr}"]
+            return [] if done.returncode == 0 else [f"one of {', '.join(chain)} does not compile alone:\n{done.stderr}"]
 
         with ThreadPoolExecutor(2) as threads:
-            for found in threads.map(compile_alone, texts):
+            list(threads.map(precompile, (standard_only, with_eigen)))
+            for found in threads.map(compile_chain, chains(includes)):
                 faults += found
     print("\n".join(faults) or f"{len(texts)} headers compile alone")
     return 1 if faults else 0

@@ -206,7 +206,7 @@ TEST_P(MeshFormat, SameBytesTwiceAndUnderAnyLocale) {
 TEST_P(MeshFormat, DamageIsAnErrorAndNeverACrash) {
   const std::string bytes = read_text(write_sample(GetParam(), sheet(3)));
   graspmap_test::expect_no_crash(
-      bytes, [&](const std::string& damaged) { read_as(GetParam().extension, damaged); }, 250);
+      bytes, [&](const std::string& damaged) { read_as(GetParam().extension, damaged); }, 60);
 }
 
 TEST_P(MeshFormat, FilesThatAreNone) {
