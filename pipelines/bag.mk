@@ -55,7 +55,7 @@ moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/map.bag $(OUT)/$(stamp)/top.p
 
 $(OUT)/%/panorama.pcd: $(OUT)/images.json
 	@mkdir -p $(@D)
-	@exec $(GRASPMAP) panorama $(OUT)/images --stamp $* -o $@
+	@exec $(GRASPMAP) fuse $(OUT)/images --stamp $* -o $@
 
 $(OUT)/%/map.pcd: $(OUT)/%/panorama.pcd $(OUT)/scored_with
 	@exec $(GRASPMAP) score $< -o $@ --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)

@@ -101,20 +101,16 @@ $(OUT)/$(1)/$(3)/%.pcd: $(2) $(OUT)/scored_with | $(OUT)/$(1)/$(3)
 	  $($(3)_mask) $($(3)_score) $(SCORE) --threads 1 --quiet
 
 $(OUT)/$(1)/$(3)/summary/pairs.csv $(OUT)/$(1)/$(3)/summary/maps.csv \
-$(OUT)/$(1)/$(3)/summary/histograms.csv &: $(call maps_of,$(1),$(3)) $(OUT)/shown_with
-	@exec $(GRASPMAP) summarize $(call maps_of,$(1),$(3)) -o $(OUT)/$(1)/$(3)/summary --pairs \
+$(OUT)/$(1)/$(3)/summary/histograms.csv $(OUT)/$(1)/$(3)/summary/histograms.png &: $(call maps_of,$(1),$(3)) $(OUT)/shown_with
+	@exec $(GRASPMAP) analyze $(call maps_of,$(1),$(3)) -o $(OUT)/$(1)/$(3)/summary --pairs \
 	  --names "$(call barred,$(METHODS))" --quiet
-
-$(OUT)/$(1)/$(3)/scores.png $(OUT)/$(1)/$(3)/scores.svg: $(OUT)/$(1)/$(3)/summary/histograms.csv
-	@exec $(GRASPMAP) chart $$< -o $$@ --x score --y share --series map --title '$(1), $(3)' \
-	  --y-title 'share of the judged voxels' --x-min 0 --x-max 1 --quiet
 endef
 $(foreach site,$(sites),$(foreach gripper,$(GRIPPERS),$(eval \
   $(call maps_and_tables,$(call name_of,$(site)),$(call cloud_of,$(site)),$(gripper)))))
 
 define sheet
 $(OUT)/$(1).png: $(foreach name,$(names),$(call maps_of,$(name),$(1))) $(OUT)/shown_with
-	@exec $(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(METHODS)) --quiet \
+	@exec $(GRASPMAP) render $$(filter %.pcd,$$^) -o $$@ --columns $(words $(METHODS)) --quiet \
 	  --cell-width $(CELL) --shared-view row --title '$(1)' \
 	  --column-titles "$(call barred,$(METHODS))" --row-titles "$(call barred,$(names))" \
 	  --captions "$(patsubst |%,%,$(no_captions))"

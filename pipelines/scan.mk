@@ -107,7 +107,7 @@ $(OUT)/texture.png: $(OUT)/$(TEXTURE)
 
 # Without a true mesh the ground is the plane that was found.
 $(OUT)/spot_check.txt: $(OUT)/site.ply $(TRUTH) $(OUT)/checked_with
-	@exec $(GRASPMAP) spot-check $< -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
+	@exec $(GRASPMAP) compare $< --edges -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
 	  --truth-frame map) > $@.partial
 	@mv $@.partial $@
 

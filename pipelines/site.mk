@@ -77,10 +77,10 @@ $(OUT)/tiles/%-of-$(SHARES).pcd: $(SITE) $(OUT)/scored_with $(scenario_file) $(g
 	@exec $(GRASPMAP) score $(SITE) -o $@ $(score_flags) --tile $*/$(SHARES) --threads 1 --quiet
 
 $(OUT)/map.pcd: $(tiles)
-	@exec $(GRASPMAP) merge $(tiles) -o $@
+	@exec $(GRASPMAP) convert $(tiles) -o $@
 
 $(OUT)/map.vtp: $(OUT)/map.pcd
-	@exec $(GRASPMAP) convert $< $@ --quiet
+	@exec $(GRASPMAP) convert $< -o $@ --quiet
 
 $(OUT)/lookup.csv: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
 	@exec $(GRASPMAP) lookup $< $(POINTS) --points-frame $(POINTS_FRAME) -o $@

@@ -80,23 +80,16 @@ $(OUT)/$(1)/%.pcd: $(terrain) $(OUT)/scored_with $(scenario_file) | $(OUT)/$(1)
 	  --solid-voxel-threshold $$(call tsv_of,$$*) --extra-void-layers $$(call hadd_of,$$*)
 
 $(OUT)/$(1).png: $(call maps_of,$(1)) $(OUT)/shown_with $(EXPECTED)
-	@exec $(GRASPMAP) sheet $$(filter %.pcd,$$^) -o $$@ --columns $(words $(TSV)) --quiet \
+	@exec $(GRASPMAP) render $$(filter %.pcd,$$^) -o $$@ --columns $(words $(TSV)) --quiet \
 	  --cell-width $(CELL) --captions "$(captions)" --title "$$$$TITLE: $(1)" \
 	  $(if $(EXPECTED),--points $(EXPECTED) --verdict graspable --label none)
 endef
 $(foreach method,$(METHODS),$(eval $(call score,$(method))))
 
 $(OUT)/thresholds.csv: $(maps) $(OUT)/shown_with $(EXPECTED)
-	@exec $(GRASPMAP) summarize $(maps) -o $(OUT)/summary $(if $(EXPECTED),--expected $(EXPECTED))
+	@exec $(GRASPMAP) analyze $(maps) -o $(OUT)/summary --varied solid_voxel_threshold \
+	  --series method,extra_void_layers $(if $(EXPECTED),--expected $(EXPECTED))
 	@cp $(OUT)/summary/maps.csv $@.partial && mv $@.partial $@
-
-chart = @exec $(GRASPMAP) chart $< -o $@ --x solid_voxel_threshold --y $(1) --series \
-  method,extra_void_layers --x-title 'solid-voxel threshold TSV' --y-title '$(2)' --title "$$TITLE" \
-  $(3) --quiet
-$(OUT)/graspable_share.%: $(OUT)/thresholds.csv
-	$(call chart,graspable_share,share of the judged voxels that can be held,)
-$(OUT)/voxel_youden.%: $(OUT)/thresholds.csv
-	$(call chart,voxel_youden,sensitivity + specificity - 1: voxels,--y-min 0 --y-max 1)
-$(OUT)/place_youden.%: $(OUT)/thresholds.csv
-	$(call chart,place_youden,sensitivity + specificity - 1: places,--y-min 0 --y-max 1)
+$(charts): $(OUT)/thresholds.csv
+	@ln -f $(OUT)/summary/$(@F) $@
 endif

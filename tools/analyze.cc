@@ -13,12 +13,13 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/view/virtual_display.h"
-#include "tools/analysis_pictures.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/map_tiles.h"
-#include "tools/placement.h"
-#include "tools/result_counts.h"
+#include "tools/support/analysis_pictures.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/map_table.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/placement.h"
+#include "tools/support/result_counts.h"
 
 namespace {
 
@@ -28,7 +29,8 @@ using graspmap_tools::Run;
 constexpr const char* no_start = "largest";
 
 struct AnalyzeOptions {
-  std::string map;
+  std::vector<std::string> maps;
+  std::string map;  // the only one
   std::string other;
   std::string folder;
   std::string start = no_start;
@@ -40,6 +42,7 @@ struct AnalyzeOptions {
   libgtd::MapRegionOptions regions;
   libgtd::RegionReachOptions reach;
   libgtd::MapChangeOptions change;
+  graspmap_tools::MapTableOptions table;
 };
 
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
@@ -51,13 +54,14 @@ void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
             "where the robot stands: X,Y,Z in the frame of --points-frame; largest: on the largest "
             "region");
   table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
-            "frame of the start: of the cloud that was scored, the terrain's, or the map's before "
-            "it was cropped");
+            "frame of the start or of the expected regions: of the cloud that was scored, the "
+            "terrain's, or the map's before it was cropped");
   bind(table, options.change);
   table.add("transform", options.transform,
             "carries OTHER's points to MAP's: auto: both were scored from clouds in one frame, or "
             "cropped from one map; X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file of it");
   table.add("pictures", options.pictures, "draw pictures and charts");
+  bind(table, options.table);
 }
 
 // A map as it was read, and on its lattice.
@@ -69,7 +73,7 @@ struct ReadMap {
 
 ReadMap read_map(const std::string& file, Run& run) {
   if (graspmap_tools::is_tile_store(file))
-    throw libmap::Error("is a tile store: `graspmap merge` makes one map of it first",
+    throw libmap::Error("is a tile store: `graspmap convert` makes one map of it first",
                         {.file = file});
   ReadMap map;
   map.cloud = libmap::read_cloud(file).cloud;
@@ -328,6 +332,20 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
 }
 
 void analyze(AnalyzeOptions& options, Run& run) {
+  if (options.maps.size() > 1 || !options.table.expected.empty()) {
+    if (!options.other.empty())
+      throw graspmap_tools::UsageError("--against takes one MAP; --pairs compares several");
+    options.table.points_frame = options.points_frame;
+    options.table.pictures = options.pictures;
+    return graspmap_tools::tabulate_maps(options.maps, options.folder, options.table, run);
+  }
+  const graspmap_tools::MapTableOptions unset;
+  for (const auto& [name, is_given] : {std::pair{"--cutoff", options.table.cutoff != unset.cutoff},
+                                       std::pair{"--names", options.table.names != unset.names},
+                                       std::pair{"--pairs", options.table.pairs},
+                                       std::pair{"--varied", options.table.varied != unset.varied}})
+    if (is_given) throw libmap::Error("is for several maps, or with --expected", {.field = name});
+  options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
     throw libmap::Error("is for comparing with OTHER, which is not given",
                         {.field = "--transform", .value = options.transform});
@@ -360,14 +378,17 @@ void analyze(AnalyzeOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   AnalyzeOptions options;
-  graspmap_tools::Command command(
-      "analyze", "How much of a map can be held, and where; what differs from another map.");
-  command.input("MAP", options.map, "graspability map");
-  command.optional_input("OTHER", options.other,
-                         "map of the same ground, against which MAP is compared");
+  graspmap_tools::Command command("analyze");
+  command.inputs("MAP", options.maps, "graspability map; several give one table");
+  command.option("--against", "OTHER", options.other,
+                 "map of the same ground, with which MAP is compared");
+  command.option("--expected", "EXPECTED.csv", options.table.expected,
+                 "regions of expected graspability for the table, e.g. "
+                 "data/expected/primitive_shapes.csv");
   command.output(options.folder,
                  "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
-                 "and, with OTHER, change");
+                 "and, with OTHER, change; of several maps, of maps.csv, histograms.csv and, if "
+                 "asked for, pairs.csv and regions.csv");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { analyze(options, run); });
 }

@@ -12,8 +12,8 @@
 #include "libmap/core/text.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/scan/rig_io.h"
-#include "tools/bag_commands.h"
-#include "tools/command_line.h"
+#include "tools/support/bag_commands.h"
+#include "tools/support/command_line.h"
 
 namespace {
 
@@ -111,10 +111,10 @@ libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& r
 
 int main(int argc, char** argv) {
   BagCommandOptions options;
-  graspmap_tools::Command command("bag", "ROS 1 bags in and out, offline.");
+  graspmap_tools::Command command("bag");
   command.input("IN", options.input,
                 "out of a bag: IN.bag; into one: a map (.pcd, .ply, .vtp, .csv), or a rig's folder "
-                "as `panorama` reads it");
+                "as `fuse` reads it");
   command.output(options.output,
                  "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
                  "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag",

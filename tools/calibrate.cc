@@ -13,9 +13,9 @@
 #include "libmap/scan/camera_calibration.h"
 #include "libmap/scan/camera_io.h"
 #include "libmap/scan/image_codec.h"
-#include "tools/calibration_charts.h"
-#include "tools/command_line.h"
-#include "tools/result_counts.h"
+#include "tools/support/calibration_charts.h"
+#include "tools/support/command_line.h"
+#include "tools/support/result_counts.h"
 
 namespace {
 
@@ -355,9 +355,7 @@ int main(int argc, char** argv) {
   arguments.reserve(words.size());
   for (std::string& word : words) arguments.push_back(word.data());
   CalibrateOptions options;
-  graspmap_tools::Command command(
-      "calibrate",
-      "Intrinsics and lens distortion of a colour or infrared camera by pictures of a chessboard.");
+  graspmap_tools::Command command("calibrate");
   command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
   command.output(options.output, "the camera (.yaml)");
   command.option("--report", "DIR", options.report,

@@ -1,6 +1,7 @@
 // graspmap compare: how far one cloud or mesh lies from another.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
@@ -21,9 +22,10 @@
 #include "libmap/mesh/surface_alignment.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/view/scene_view.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/placement.h"
+#include "tools/support/command_line.h"
+#include "tools/support/compare_edges.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/placement.h"
 
 namespace {
 
@@ -394,12 +396,9 @@ void compare(const CompareOptions& options, Run& run) {
   write_outputs(comparison, options, run);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int compare_surfaces(int argc, char** argv) {
   CompareOptions options;
-  graspmap_tools::Command command(
-      "compare", "How far a cloud or mesh A lies from B, and how much of B it covers.");
+  graspmap_tools::Command command("compare");
   command.input("A", options.a, "cloud or mesh (.pcd, .ply, .vtp, .csv, .obj, .stl, .off, .glb)");
   command.input("B", options.b, "the surface that A is measured by: a mesh, or a cloud");
   command.output(options.output,
@@ -415,4 +414,13 @@ int main(int argc, char** argv) {
   command.flag("--json", options.json, "as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { compare(options, run); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const bool edges =
+      std::any_of(argv, argv + argc, [](const std::string& word) { return word == "--edges"; });
+  return graspmap_tools::run_usage(argc, argv, edges, compare_surfaces,
+                                   graspmap_tools::compare_edges);
 }

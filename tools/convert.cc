@@ -13,7 +13,10 @@
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/textured_mesh_io.h"
 #include "libmap/poses/trajectory_io.h"
-#include "tools/command_line.h"
+#include "tools/support/command_line.h"
+#include "tools/support/convert_scan.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/merge_tiles.h"
 
 namespace {
 
@@ -22,7 +25,8 @@ using libmap::FileEncoding;
 using libmap::TrajectoryFormat;
 
 struct ConvertOptions {
-  std::string input;
+  std::vector<std::string> inputs;
+  std::string input;  // the only one, or the first of the shares of a map
   std::string output;
   FileEncoding encoding = FileEncoding::binary;
   bool big_endian = false;
@@ -203,7 +207,12 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   });
 }
 
-void convert(const ConvertOptions& options, Run& run) {
+void convert(ConvertOptions& options, Run& run) {
+  options.input = options.inputs.front();
+  if (options.inputs.size() > 1 || graspmap_tools::is_part_of_map(options.input)) {
+    refuse_ignored(options);
+    return graspmap_tools::merge_tiles(options.inputs, options.output, run);
+  }
   const bool poses = holds_poses(options);
   if (!poses) refuse_ignored(options);
   run.claim_output(options.output, {options.input});
@@ -215,17 +224,26 @@ void convert(const ConvertOptions& options, Run& run) {
     convert_cloud(options, run);
 }
 
-}  // namespace
+// A database, or a folder of frames.
+bool names_scan(int argc, char** argv) {
+  for (int n = 1; n < argc; ++n) {
+    const std::string word = argv[n];
+    const bool is_output =
+        n > 1 && (std::string(argv[n - 1]) == "-o" || std::string(argv[n - 1]) == "--output");
+    if (!is_output && !word.starts_with("-") && graspmap_tools::is_scan_path(word)) return true;
+  }
+  return false;
+}
 
-int main(int argc, char** argv) {
+int convert_file(int argc, char** argv) {
   ConvertOptions options;
-  graspmap_tools::Command command("convert",
-                                  "Any format of clouds, maps, meshes and poses to any other.");
-  command.input(
-      "IN", options.input,
-      "cloud (.pcd .ply .vtp .csv), mesh (.ply .obj .stl ...) or poses (.tum .kitti .g2o .toro "
-      "...)");
-  command.input("OUT", options.output, "the same in the format of this extension");
+  graspmap_tools::Command command("convert");
+  command.inputs("IN", options.inputs,
+                 "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), poses (.tum .kitti .g2o .toro "
+                 "...), tile store (.tiles), or all shares of a map");
+  command.output(options.output,
+                 "the same in the format of this extension; of tiles and shares the whole map, the "
+                 "same bytes as in one run");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
@@ -239,4 +257,11 @@ int main(int argc, char** argv) {
       "of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, "
       "1 tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return graspmap_tools::run_usage(argc, argv, names_scan(argc, argv), convert_file,
+                                   graspmap_tools::convert_scan);
 }

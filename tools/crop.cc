@@ -19,9 +19,9 @@
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/placement.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/placement.h"
 
 namespace {
 
@@ -278,7 +278,7 @@ void crop(CropCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   CropCommandOptions options;
-  graspmap_tools::Command command("crop", "A map levelled and cut to the test site.");
+  graspmap_tools::Command command("crop");
   command.input("MAP", options.input, "mesh (.ply .obj .stl ...) or cloud (.pcd .ply .vtp .csv)");
   command.output(options.output,
                  "the site, of the same kind; OUTPUT's stem + .site_from_map.txt is the transform");

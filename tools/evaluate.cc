@@ -11,7 +11,7 @@
 #include "libmap/view/charts.h"
 #include "libmap/view/image_io.h"
 #include "libmap/view/virtual_display.h"
-#include "tools/command_line.h"
+#include "tools/support/command_line.h"
 
 namespace {
 
@@ -122,8 +122,7 @@ void evaluate(EvaluateOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   EvaluateOptions options;
-  graspmap_tools::Command command(
-      "evaluate", "ROC curve, area under it and accuracy of scores against a field test");
+  graspmap_tools::Command command("evaluate");
   command.input("TABLE.csv", options.table, "labels and scores, one row a location");
   command.output(
       options.folder,

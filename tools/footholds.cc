@@ -8,8 +8,8 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/manifest.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
 
 namespace {
 
@@ -64,7 +64,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   FootholdsCommandOptions options;
-  graspmap_tools::Command command("footholds", "The best places of a map, for a planner of steps.");
+  graspmap_tools::Command command("footholds");
   command.input("MAP", options.map, "graspability map");
   command.output(options.output,
                  "the footholds, best first, with normals and directions of approach (.csv, .vtp, "

@@ -1,6 +1,7 @@
 // graspmap fuse: the depth images of a scan -> one oriented, coloured cloud.
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -11,10 +12,12 @@
 #include "libmap/cloud/depth_fusion.h"
 #include "libmap/core/error.h"
 #include "libmap/poses/trajectory_io.h"
+#include "libmap/scan/rig_images.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/command_line.h"
-#include "tools/result_counts.h"
-#include "tools/scan_poses.h"
+#include "tools/support/command_line.h"
+#include "tools/support/fuse_rig.h"
+#include "tools/support/result_counts.h"
+#include "tools/support/scan_poses.h"
 
 namespace {
 
@@ -131,12 +134,18 @@ void fuse(FuseOptions options, Run& run) {
   });
 }
 
-}  // namespace
+// A folder of a camera rig, or --rig, which names the rig.
+bool names_rig(int argc, char** argv) {
+  return std::any_of(argv + 1, argv + argc, [](const std::string& word) {
+    std::error_code code;
+    return word == "--rig" || word.starts_with("--rig=") ||
+           fs::exists(fs::path(word) / libmap::rig_file_name, code);
+  });
+}
 
-int main(int argc, char** argv) {
+int fuse_scan(int argc, char** argv) {
   FuseOptions options;
-  graspmap_tools::Command command("fuse",
-                                  "The depth images of a scan -> one oriented, coloured cloud.");
+  graspmap_tools::Command command("fuse");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
   graspmap_tools::add_poses_option(command, options.poses);
@@ -150,4 +159,11 @@ int main(int argc, char** argv) {
       "frame of the cloud; ground-truth: carried there by aligning the poses with the true ones");
   libmap::bind(command.parameters(), options.fusion);
   return command.run(argc, argv, [&](Run& run) { fuse(options, run); });
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  return graspmap_tools::run_usage(argc, argv, argc > 1 && names_rig(argc, argv), fuse_scan,
+                                   graspmap_tools::fuse_rig);
 }

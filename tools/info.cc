@@ -14,12 +14,12 @@
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_report.h"
 #include "libmap/ros/bag_reader.h"
-#include "tools/bag_json.h"
-#include "tools/command_line.h"
-#include "tools/info_scan.h"
-#include "tools/info_tiles.h"
-#include "tools/map_frame.h"
-#include "tools/map_tiles.h"
+#include "tools/support/bag_json.h"
+#include "tools/support/command_line.h"
+#include "tools/support/info_scan.h"
+#include "tools/support/info_tiles.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/map_tiles.h"
 
 namespace {
 
@@ -288,8 +288,7 @@ void info(InfoOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   InfoOptions options;
-  graspmap_tools::Command command(
-      "info", "What a scan, a cloud, a mesh, a graspability map or a bag holds.");
+  graspmap_tools::Command command("info");
   command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or ROS 1 bag");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify,

@@ -15,9 +15,9 @@
 #include "libmap/core/error.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/map_tiles.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/map_tiles.h"
 
 namespace {
 
@@ -239,7 +239,7 @@ void lookup(LookupCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   LookupCommandOptions options;
-  graspmap_tools::Command command("lookup", "The map's values at listed locations.");
+  graspmap_tools::Command command("lookup");
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
   command.input("POINTS", options.points, "CSV with the columns x, y, z in metres, and any others");
   command.output(options.output, "CSV: the points, each with the map's values there");

@@ -10,8 +10,8 @@
 #include "libmap/core/file_output.h"
 #include "libmap/view/picture_sheet.h"
 #include "libmap/view/scene_view.h"
-#include "tools/command_line.h"
-#include "tools/mask_sections.h"
+#include "tools/support/command_line.h"
+#include "tools/support/mask_sections.h"
 
 namespace {
 
@@ -119,7 +119,7 @@ void mask(const MaskOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   MaskOptions options;
-  graspmap_tools::Command command("mask", "A gripper's mask as text, cloud or picture.");
+  graspmap_tools::Command command("mask");
   command.output(options.output,
                  "layers as text (.txt), solid voxels as a cloud (.vtp .pcd .ply .csv), or .png");
   bind(command.parameters(), options);

@@ -18,8 +18,8 @@
 #include "libmap/mesh/mesh_report.h"
 #include "libmap/mesh/poisson_reconstruction.h"
 #include "libmap/mesh/surface_distance.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
 
 namespace {
 
@@ -253,7 +253,7 @@ void mesh(const MeshOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   MeshOptions options;
-  graspmap_tools::Command command("mesh", "A cloud of points -> a clean surface.");
+  graspmap_tools::Command command("mesh");
   command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .vtp, .csv)");
   command.output(options.output, "mesh (.ply, .vtp, .obj, .stl, .off, .glb)");
   command.flag("--report", options.report,

@@ -13,11 +13,11 @@
 #include "libmap/poses/refinement.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rtabmap_writer.h"
-#include "tools/command_line.h"
-#include "tools/poses_output.h"
-#include "tools/refine_report.h"
-#include "tools/result_counts.h"
-#include "tools/scan_poses.h"
+#include "tools/support/command_line.h"
+#include "tools/support/poses_output.h"
+#include "tools/support/refine_report.h"
+#include "tools/support/result_counts.h"
+#include "tools/support/scan_poses.h"
 
 namespace {
 
@@ -174,8 +174,7 @@ void refine(const RefineOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   RefineOptions options;
-  graspmap_tools::Command command(
-      "refine", "Poses of a scan by loop closures, pose graph, bundle adjustment and depth.");
+  graspmap_tools::Command command("refine");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
   command.option("--links", "LINKS.g2o", options.links, "poses and links as a pose graph");

@@ -13,10 +13,10 @@
 #include "libmap/report/outline_io.h"
 #include "libmap/report/report_page.h"
 #include "libmap/report/report_reader.h"
-#include "tools/command_line.h"
-#include "tools/map_tiles.h"
-#include "tools/report_map.h"
-#include "tools/result_counts.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/report_map.h"
+#include "tools/support/result_counts.h"
 
 namespace {
 
@@ -155,8 +155,7 @@ void make_report(ReportCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   ReportCommandOptions options;
-  graspmap_tools::Command command(
-      "report", "One HTML file of a whole run: tables, pictures, times, provenance, 3-D views.");
+  graspmap_tools::Command command("report");
   command.input("DIR", options.folder, "folder of the run");
   command.output(options.output, "report (.html); default: report.html in DIR", false);
   command.option("--outline", "OUTLINE", options.outline,

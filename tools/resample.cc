@@ -8,8 +8,8 @@
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/poisson_disk.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
 
 namespace {
 
@@ -75,8 +75,7 @@ void resample(const ResampleOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   ResampleOptions options;
-  graspmap_tools::Command command("resample",
-                                  "A surface -> points evenly over it (Poisson-disk samples).");
+  graspmap_tools::Command command("resample");
   command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb, .vtp)");
   command.output(options.output, "cloud with normals (.pcd, .ply, .vtp, .csv)");
   libmap::bind(command.parameters(), options.sampling);

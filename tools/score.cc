@@ -11,11 +11,11 @@
 #include "libmap/cloud/cloud_pieces.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/plane_report.h"
-#include "tools/result_counts.h"
-#include "tools/score_store.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/plane_report.h"
+#include "tools/support/result_counts.h"
+#include "tools/support/score_store.h"
 
 namespace {
 
@@ -117,7 +117,7 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
   if (result.map.content.obstacles)
     run.say(fmt::format("{} voxels are obstacles", result.obstacle_voxels));
   else if (result.map.content.slopes)
-    run.say("obstacles are judged when `graspmap merge` joins the shares");
+    run.say("obstacles are evaluated when `graspmap convert` merges the shares");
   if (result.map.voxels.empty() && options.detection.share.count == 1)
     run.warn("the terrain is smaller than the gripper mask: nothing was scored");
 }
@@ -199,13 +199,13 @@ void score(ScoreOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   ScoreOptions options;
-  graspmap_tools::Command command("score", "Graspability map of a terrain, tile by tile.");
+  graspmap_tools::Command command("score");
   command.input("TERRAIN", options.terrain,
                 "cloud of the terrain (.pcd, .ply, .vtp, .csv), or a folder of its pieces");
   command.output(options.output,
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,
-                 "score share K of N of the tiles alone; `graspmap merge` joins the shares");
+                 "score only share K of N of the tiles; `graspmap convert` merges the shares");
   command.option("--points-at-once", "N", options.points_at_once,
                  "into a tile store: how many points are in memory at once, about 250 bytes each; "
                  "the map is the same");

@@ -1,12 +1,12 @@
 // graspmap simulate WHAT: terrains and recordings whose truth is known.
-#include "tools/simulate_commands.h"
+#include "tools/support/simulate_commands.h"
 
 #include <iostream>
 #include <string>
 #include <vector>
 
 #include "libmap/core/text.h"
-#include "tools/standard_output.h"
+#include "tools/support/standard_output.h"
 
 namespace {
 

@@ -13,10 +13,10 @@
 #include "libmap/mesh/texture_model.h"
 #include "libmap/mesh/textured_mesh_io.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/result_counts.h"
-#include "tools/scan_poses.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/result_counts.h"
+#include "tools/support/scan_poses.h"
 
 namespace {
 
@@ -203,8 +203,7 @@ void texture(TextureCommandOptions options, Run& run) {
 
 int main(int argc, char** argv) {
   TextureCommandOptions options;
-  graspmap_tools::Command command("texture",
-                                  "A mesh and the photographs of a scan -> a textured mesh.");
+  graspmap_tools::Command command("texture");
   command.input("MESH", options.mesh, "mesh in the frame of the poses (.ply, .obj, ...)");
   command.output(options.output,
                  "textured mesh (.glb; .obj: with STEM.mtl and a picture a page, STEM_0.png ...)");

@@ -28,13 +28,11 @@ libmap::Error not_complete(const fs::path& store) {
     return libmap::Error("is no tile store: it has no index.json", {.file = store.string()});
   const TileProgress::Completion completion = progress.complete(*plan);
   if (completion.index)
-    return libmap::Error(
-        "has all its tiles but no index.json yet: `graspmap score` once more, or `graspmap merge`, "
-        "writes it",
-        {.file = store.string()});
+    return libmap::Error("has all its tiles but no index.json yet: scoring again writes it",
+                         {.file = store.string()});
   return libmap::Error("is not complete: " + std::to_string(completion.done) + " of " +
                            std::to_string(completion.tiles) +
-                           " tiles are there; the same `graspmap score` once more adds the others",
+                           " tiles are there; scoring again adds the others",
                        {.file = store.string()});
 }
 

@@ -31,7 +31,7 @@ class Program:
 
     def __init__(self, executable):
         self.executable = str(executable)
-        self.commands = self._names("Commands:", "--help")
+        self.commands = re.findall(r"^  ([a-z][\w-]*)  ", self._help("--help"), re.MULTILINE)
         self.kinds = {name: self._names("WHAT:", name, "--help") for name in self.commands}
         self._options = {}
 

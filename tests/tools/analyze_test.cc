@@ -60,8 +60,8 @@ TEST(Analyze, AgainstItselfInAnotherFrameNothingChanges) {
   write_terrain();
   score("map.pcd");
   score("input.pcd", {"--frame", "input"});
-  ASSERT_TRUE(succeeded(
-      graspmap({"analyze", "map.pcd", "input.pcd", "-o", "out", "--edges", "--no-pictures"})));
+  ASSERT_TRUE(succeeded(graspmap(
+      {"analyze", "map.pcd", "--against", "input.pcd", "-o", "out", "--edges", "--no-pictures"})));
   const auto change = json_of("out/summary.json").at("change");
   EXPECT_EQ(change.at("matching"), "lattice");
   EXPECT_EQ(change.at("judged").at("kappa").at("value"), 1.0);
@@ -81,8 +81,9 @@ TEST(Analyze, SameBytesForAnyNumberOfThreadsAndAnyOrderOfPoints) {
   libmap::write_cloud(scratch("turned.pcd"), libmap::select_points(map, order));
   std::filesystem::copy_file(scratch("map.pcd.json"), scratch("turned.pcd.json"));
   for (const auto& [file, threads] : {std::pair("map.pcd", "1"), std::pair("turned.pcd", "2")})
-    ASSERT_TRUE(succeeded(graspmap({"analyze", file, "map.pcd", "-o", "by_" + std::string(threads),
-                                    "--threads", threads, "--no-pictures", "--edges"})));
+    ASSERT_TRUE(succeeded(
+        graspmap({"analyze", file, "--against", "map.pcd", "-o", "by_" + std::string(threads),
+                  "--threads", threads, "--no-pictures", "--edges"})));
   for (const char* name : {"summary.json", "histogram.csv", "by_height.csv", "by_slope.csv",
                            "regions.csv", "region_links.csv", "change.csv", "change.pcd"})
     EXPECT_EQ(content("by_1/" + std::string(name)), content("by_2/" + std::string(name))) << name;
@@ -149,7 +150,7 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
                         {"terrain.pcd", "score", "no such field"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "none.pcd", "-o", "out"}), {"none.pcd"}));
   score("map.pcd");
-  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "terrain.pcd", "-o", "out"}),
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "--against", "terrain.pcd", "-o", "out"}),
                         {"terrain.pcd", "score"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--stride", "0"}),
                         {"--stride is 0", "> 0"}));
@@ -157,12 +158,12 @@ TEST(Analyze, BadInputIsSaidInOneLine) {
                         {"map.pcd: height_bin_m is 1e-09: too narrow", ">= "}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--start", "1,2"}),
                         {"--start", "X,Y,Z"}));
-  EXPECT_TRUE(bad_input(
-      graspmap({"analyze", "map.pcd", "map.pcd", "-o", "out", "--transform", "50,0,0,0,0,0"}),
-      {"map.pcd", "no voxel in common"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "--against", "map.pcd", "-o", "out",
+                                  "--transform", "50,0,0,0,0,0"}),
+                        {"map.pcd", "no voxel in common"}));
   EXPECT_TRUE(bad_input(graspmap({"analyze", "map.pcd", "-o", "out", "--transform", "bogus"}),
                         {"--transform is bogus", "OTHER"}));
-  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.tiles", "-o", "out"}), {"merge"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "map.tiles", "-o", "out"}), {"convert"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("out")));
 }
 

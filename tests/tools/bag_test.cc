@@ -71,8 +71,8 @@ void write_run(const std::string& stamp = "5", const std::string& scale = "0") {
 }
 
 void expect_same_panorama(const std::string& folder) {
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "direct.pcd"})));
-  ASSERT_TRUE(succeeded(graspmap({"panorama", folder, "-o", "back.pcd", "--strict"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "direct.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", folder, "-o", "back.pcd", "--strict"})));
   EXPECT_GT(libmap::read_cloud(scratch("direct.pcd")).cloud.size(), 5000U);
   EXPECT_TRUE(content("direct.pcd") == content("back.pcd"));
 }
@@ -223,7 +223,7 @@ TEST(BagCommand, SameBytesOnEveryRunAndMapsComeBack) {
 TEST(BagCommand, FramesAreTiedTogether) {
   REQUIRE_ROS();
   write_run();
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "p.pcd", "--stride", "1"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "p.pcd", "--stride", "1"})));
   for (const char* frame : {"terrain", "input"}) {
     ASSERT_TRUE(succeeded(
         graspmap({"score", "p.pcd", "-o", "map.pcd", "--up", "0,0,1", "--frame", frame})));

@@ -35,7 +35,7 @@ TEST(Convert, FieldsGoThroughEveryFormatAndBack) {
   libmap::write_cloud(scratch("a.pcd"), cloud);
   const Words chain = {"a.pcd", "b.ply", "c.vtp", "d.csv", "e.pcd"};
   for (std::size_t n = 0; n + 1 < chain.size(); ++n)
-    ASSERT_TRUE(succeeded(graspmap({"convert", chain[n], chain[n + 1]})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", chain[n], "-o", chain[n + 1]})));
   const PointCloud last = libmap::read_cloud(scratch("e.pcd")).cloud;
   EXPECT_EQ(last.positions, cloud.positions);
   EXPECT_EQ(last.normals, cloud.normals);
@@ -52,8 +52,8 @@ TEST(Convert, FieldsGoThroughEveryFormatAndBack) {
 TEST(Convert, ThereAndBackIsTheSameBytes) {
   libmap::write_cloud(scratch("a.pcd"), sample_map());
   for (const char* through : {"b.ply", "b.vtp"}) {
-    ASSERT_TRUE(succeeded(graspmap({"convert", "a.pcd", through})));
-    ASSERT_TRUE(succeeded(graspmap({"convert", through, "back.pcd"})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "a.pcd", "-o", through})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", through, "-o", "back.pcd"})));
     EXPECT_EQ(content("back.pcd"), content("a.pcd")) << through;
   }
 }
@@ -61,12 +61,12 @@ TEST(Convert, ThereAndBackIsTheSameBytes) {
 TEST(Convert, Encodings) {
   libmap::write_cloud(scratch("a.pcd"), sample_map());
   for (const char* encoding : {"ascii", "binary", "binary_compressed"}) {
-    ASSERT_TRUE(succeeded(graspmap({"convert", "a.pcd", "b.pcd", "--encoding", encoding})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "a.pcd", "-o", "b.pcd", "--encoding", encoding})));
     EXPECT_NE(content("b.pcd").find(std::string("DATA ") + encoding + "\n"), std::string::npos);
-    ASSERT_TRUE(succeeded(graspmap({"convert", "b.pcd", "back.pcd"})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "b.pcd", "-o", "back.pcd"})));
     EXPECT_EQ(content("back.pcd"), content("a.pcd")) << encoding;
   }
-  ASSERT_TRUE(succeeded(graspmap({"convert", "a.pcd", "big.ply", "--big-endian"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "a.pcd", "-o", "big.ply", "--big-endian"})));
   EXPECT_NE(content("big.ply").find("binary_big_endian"), std::string::npos);
 }
 
@@ -75,10 +75,10 @@ TEST(Convert, MeshToMeshAndToCloud) {
   mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {0, 0, 1}};
   mesh.triangles = {{0, 2, 1}, {0, 1, 3}, {0, 3, 2}, {1, 2, 3}};
   libmap::write_mesh(scratch("m.ply"), mesh);
-  ASSERT_TRUE(succeeded(graspmap({"convert", "m.ply", "m.stl"})));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "m.stl", "m2.obj"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "m.ply", "-o", "m.stl"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "m.stl", "-o", "m2.obj"})));
   EXPECT_NEAR(libmap::signed_volume(libmap::read_mesh(scratch("m2.obj")).mesh), 1.0 / 6, 1e-6);
-  ASSERT_TRUE(succeeded(graspmap({"convert", "m.ply", "m.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "m.ply", "-o", "m.pcd"})));
   EXPECT_EQ(libmap::read_cloud(scratch("m.pcd")).cloud.positions, mesh.vertices);
 }
 
@@ -86,7 +86,7 @@ TEST(Convert, ManifestOfAMapIsPassedOn) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(
       succeeded(graspmap({"score", "terrain.pcd", "--curvature-radius", "0", "-o", "map.pcd"})));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "map.vtp"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "map.vtp"})));
   const nlohmann::json from = graspmap_test::json_of("map.pcd.json");
   const nlohmann::json to = graspmap_test::json_of("map.vtp.json");
   EXPECT_EQ(to.at("frame"), from.at("frame"));
@@ -96,7 +96,8 @@ TEST(Convert, ManifestOfAMapIsPassedOn) {
   EXPECT_EQ(to.at("parameters").at("zero_plane_m"), from.at("parameters").at("zero_plane_m"));
   EXPECT_EQ(to.at("results").at("lattice_origin_m"), from.at("results").at("lattice_origin_m"));
   const auto judged = [](const char* map) {
-    EXPECT_TRUE(succeeded(graspmap({"summarize", map, "-o", "sum", "--names", "map", "--force"})));
+    EXPECT_TRUE(
+        succeeded(graspmap({"analyze", map, map, "-o", "sum", "--names", "map|map", "--force"})));
     return content("sum/maps.csv");
   };
   EXPECT_EQ(judged("map.vtp"), judged("map.pcd"));
@@ -110,7 +111,7 @@ TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
   mesh.vertex_fields.push_back({"seen", libmap::ScalarType::float32, {1, 2, 3}});
   libmap::write_mesh(scratch("m.ply"), mesh);
   const auto told = [](const char* output) {
-    const auto result = graspmap({"convert", "m.ply", output});
+    const auto result = graspmap({"convert", "m.ply", "-o", output});
     EXPECT_TRUE(succeeded(result));
     return result.standard_error;
   };
@@ -130,18 +131,18 @@ TEST(Convert, TexturesGoFromModelToModel) {
   model.page_of_triangle = {0};
   model.pages.emplace_back(4, 4, libmap::Color{200, 10, 30});
   libmap::write_textured_mesh(scratch("a.obj"), model);
-  ASSERT_TRUE(succeeded(graspmap({"convert", "a.obj", "b.glb"})));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "b.glb", "c.obj"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "a.obj", "-o", "b.glb"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "b.glb", "-o", "c.obj"})));
   const libmap::TexturedMesh read = libmap::read_textured_mesh(scratch("c.obj"));
   ASSERT_EQ(read.pages.size(), 1U);
   EXPECT_EQ(read.pages[0].pixels, model.pages[0].pixels);
   EXPECT_EQ(read.mesh.vertices, model.mesh.vertices);
   // Where there is no place for it, or its picture is gone, the shape alone goes on.
-  const auto plain = graspmap({"convert", "a.obj", "d.ply"});
+  const auto plain = graspmap({"convert", "a.obj", "-o", "d.ply"});
   ASSERT_TRUE(succeeded(plain));
   EXPECT_NE(plain.standard_error.find("texture is left out"), std::string::npos);
   std::filesystem::remove(scratch("a_0.png"));
-  const auto broken = graspmap({"convert", "a.obj", "e.glb"});
+  const auto broken = graspmap({"convert", "a.obj", "-o", "e.glb"});
   ASSERT_TRUE(succeeded(broken));
   EXPECT_NE(broken.standard_error.find("a_0.png"), std::string::npos) << broken.standard_error;
 }
@@ -150,18 +151,21 @@ TEST(Convert, BadInputLeavesNothing) {
   libmap::write_cloud(scratch("a.pcd"), sample_map());
   graspmap_test::write_text(scratch("foreign.ply"), "precious");
   const Words before = graspmap_test::names_in_scratch();
-  EXPECT_TRUE(bad_input(graspmap({"convert", "none.pcd", "b.ply"}), {"none.pcd: no such file"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.xyz"}), {"b.xyz"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b"}), {"error: b: "}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.stl"}), {"b.stl", "no faces"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.xyz", "b.pcd"}), {"a.xyz"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "foreign.ply", "b.pcd"}), {"foreign.ply"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "foreign.ply"}), {"foreign.ply", "--force"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.pcd", "--encoding", "asci"}),
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "none.pcd", "-o", "b.ply"}), {"none.pcd: no such file"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b.xyz"}), {"b.xyz"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b"}), {"error: b: "}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b.stl"}), {"b.stl", "no faces"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.xyz", "-o", "b.pcd"}), {"a.xyz"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "foreign.ply", "-o", "b.pcd"}), {"foreign.ply"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "a.pcd", "-o", "foreign.ply"}), {"foreign.ply", "--force"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b.pcd", "--encoding", "asci"}),
                         {"--encoding is asci", "did you mean 'ascii'"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.ply", "--encoding", "binary_compressed"}),
-                        {"b.ply", "--encoding"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "b.pcd", "--big-endian"}),
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "a.pcd", "-o", "b.ply", "--encoding", "binary_compressed"}),
+                {"b.ply", "--encoding"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b.pcd", "--big-endian"}),
                         {"b.pcd", "--big-endian"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
   EXPECT_EQ(content("foreign.ply"), "precious");

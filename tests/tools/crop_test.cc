@@ -226,7 +226,7 @@ TEST(Crop, PointsOfTheMapAreFoundOnTheScoredSite) {
   libmap::write_cloud(scratch("map.pcd"),
                       libmap::transform_cloud(graspmap_test::bumpy_terrain(), map_from_ground));
   ASSERT_TRUE(succeeded(graspmap({"crop", "map.pcd", "--size", "0.5x0.5", "-o", "site.pcd"})));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "site.pcd", "site.ply"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "site.pcd", "-o", "site.ply"})));
   EXPECT_EQ(transform_of("site.ply").matrix(), transform_of("site.pcd").matrix());
   // Three places on the ground as the map has them, one beside the site.
   std::ostringstream points;
@@ -295,12 +295,12 @@ TEST(Crop, SiteAgainstTheMapItCameFrom) {
             2e-6);
   EXPECT_TRUE(bad_input(graspmap({"compare", "map.ply", "map.ply", "--transform", "crop"}),
                         {"map.ply", "--transform", "neither A nor B was cropped"}));
-  const nlohmann::json check =
-      compared({"spot-check", "site.ply", "--truth", "map.ply", "--truth-frame", "map", "--json"});
+  const nlohmann::json check = compared(
+      {"compare", "--edges", "site.ply", "--truth", "map.ply", "--truth-frame", "map", "--json"});
   EXPECT_LT(check.at("max_m"), 2e-6);
-  EXPECT_TRUE(
-      bad_input(graspmap({"spot-check", "map.ply", "--truth", "map.ply", "--truth-frame", "map"}),
-                {"map.ply", "not cropped"}));
+  EXPECT_TRUE(bad_input(
+      graspmap({"compare", "--edges", "map.ply", "--truth", "map.ply", "--truth-frame", "map"}),
+      {"map.ply", "not cropped"}));
 }
 
 }  // namespace crop_test

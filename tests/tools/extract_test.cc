@@ -52,7 +52,7 @@ void expect_same_scan(const libmap::ScanSource& actual, const libmap::ScanSource
 
 TEST(Extract, GivesAFolderThatIsTheSameScan) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   const libmap::RtabmapDatabase database(scratch("scan.db"));
   expect_same_scan(*libmap::open_scan(scratch("out")), database);
   EXPECT_EQ(content("out/color/000009.jpg"), database.read_blobs(9).image);
@@ -66,8 +66,8 @@ TEST(Extract, GivesAFolderThatIsTheSameScan) {
 
 TEST(Extract, OfAFolderGivesTheSameFolder) {
   write_example({.color = libmap::ImageFormat::png});
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "one"})));
-  ASSERT_TRUE(succeeded(graspmap({"extract", "one", "-o", "two"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "one"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "one", "-o", "two"})));
   const auto one = files_in("one");
   const auto two = files_in("two");
   ASSERT_EQ(one.size(), two.size());
@@ -83,8 +83,8 @@ TEST(Extract, OfAFolderGivesTheSameFolder) {
 
 TEST(Extract, DoesNotDependOnTheNumberOfThreads) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "one", "--threads", "1"})));
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "two", "--threads", "2"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "one", "--threads", "1"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "two", "--threads", "2"})));
   EXPECT_TRUE(files_in("one") == files_in("two"));
 }
 
@@ -96,7 +96,7 @@ TEST(Extract, SaysThatFloatsWereRounded) {
   scan.frames.at(9).depth.pixels[7] = 70.0F;
   graspmap_test::write_database(scratch("scan.db"), scan,
                                 {.depth = libmap::DepthFormat::float_png});
-  const auto result = graspmap({"extract", "scan.db", "-o", "out"});
+  const auto result = graspmap({"convert", "scan.db", "-o", "out"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("2 depth images were rounded"), std::string::npos);
   EXPECT_NE(result.standard_error.find("1 depth pixels beyond 65.5 m"), std::string::npos);
@@ -110,13 +110,13 @@ TEST(Extract, OptionsOfPicturesNeedPictures) {
        {std::pair{"--poses", "odometry"}, std::pair{"--transform", "1,0,0,0,0,0"},
         std::pair{"--keep", "first"}})
     EXPECT_TRUE(
-        bad_input(graspmap({"extract", "scan.db", "-o", "out", name, value}), {name, "--bundler"}));
+        bad_input(graspmap({"convert", "scan.db", "-o", "out", name, value}), {name, "--bundler"}));
   EXPECT_FALSE(fs::exists(scratch("out")));
 }
 
 TEST(Extract, KeepsMillimetrePngsByteForByte) {
   write_example({.depth = libmap::DepthFormat::png16});
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   EXPECT_EQ(content("out/depth/000002.png"),
             libmap::RtabmapDatabase(scratch("scan.db")).read_blobs(2).depth);
 }
@@ -135,7 +135,7 @@ TEST(Extract, KeepsBothImagesOfAStereoPair) {
   libmap::RtabmapWriter writer(scratch("scan.db"));
   writer.add_node({.id = 3}, frame);
   writer.finish();
-  const auto result = graspmap({"extract", "scan.db", "-o", "out"});
+  const auto result = graspmap({"convert", "scan.db", "-o", "out"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("1 right images"), std::string::npos);
   const libmap::RtabmapDatabase database(scratch("scan.db"));
@@ -157,7 +157,7 @@ void break_frames() {
 TEST(Extract, LeavesBrokenFramesOutAndNamesThem) {
   const ExampleScan scan = write_example();
   break_frames();
-  const auto result = graspmap({"extract", "scan.db", "-o", "out"});
+  const auto result = graspmap({"convert", "scan.db", "-o", "out"});
   ASSERT_TRUE(succeeded(result));
   for (const char* part : {"node 2: depth", "node 5: image"})
     EXPECT_NE(result.standard_error.find(part), std::string::npos) << result.standard_error;
@@ -174,30 +174,30 @@ TEST(Extract, LeavesBrokenFramesOutAndNamesThem) {
 TEST(Extract, EndsAtABrokenFrameIfAskedAndLeavesNothing) {
   write_example();
   break_frames();
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "out", "--strict"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", "--strict"}),
                         {"scan.db", "node 2: depth"}));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
 }
 
 TEST(Extract, ReplacesItsFolderAsAWhole) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   const auto before = files_in("out");
   break_frames();
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "out", "--strict"}), {"node 2"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", "--strict"}), {"node 2"}));
   EXPECT_TRUE(files_in("out") == before);
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out/"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out/"})));
   EXPECT_EQ(files_in("out").count("color/000002.jpg"), 0U);
   // Something of the user's own stands in it.
   graspmap_test::write_text(scratch("out/notes.txt"), "mine");
   for (const std::string force : {"--quiet", "--force"})
-    EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "out", force}), {"notes.txt"}));
+    EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "out", force}), {"notes.txt"}));
   EXPECT_EQ(content("out/notes.txt"), "mine");
 }
 
 TEST(Extract, WritesNothingInADryRun) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out", "--dry-run"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
 }
 
@@ -207,24 +207,24 @@ TEST(Extract, RefusesWhatIsNoScanAndOutputsOfNoUse) {
   graspmap_test::write_text(scratch("text.db"), "this is no database\n");
   fs::create_directory(scratch("folder"));
   for (const char* name : {"missing.db", "empty.db", "text.db", "folder"})
-    EXPECT_TRUE(bad_input(graspmap({"extract", name, "-o", "out"}), {name}));
+    EXPECT_TRUE(bad_input(graspmap({"convert", name, "-o", "out"}), {name}));
   EXPECT_FALSE(fs::exists(scratch("out")));
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "text.db"}), {"text.db"}));
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
-  EXPECT_TRUE(bad_input(graspmap({"extract", "out", "-o", "out/"}), {"is the input"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "text.db"}), {"text.db"}));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "out", "-o", "out/"}), {"is the input"}));
 }
 
 TEST(Extract, FoldersOfOtherCommandsAreKept) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "out"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   ASSERT_TRUE(succeeded(graspmap({"simulate", "site", "-o", "site", "--edge-length", "0.1"})));
   const auto site = files_in("site");
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "-o", "site"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "site"}),
                         {"site", "holds what graspmap simulate site wrote"}));
   EXPECT_TRUE(files_in("site") == site);
   const auto before = files_in("out");
   EXPECT_TRUE(bad_input(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1"}),
-                        {"out", "holds what graspmap extract wrote", "--force"}));
+                        {"out", "holds what graspmap convert wrote", "--force"}));
   EXPECT_TRUE(files_in("out") == before);
   EXPECT_TRUE(
       succeeded(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1", "--force"})));
@@ -247,7 +247,7 @@ std::vector<std::vector<double>> bundle_cameras(const std::string& name) {
 
 TEST(ExtractBundler, CamerasAndPicturesOfEveryPose) {
   const ExampleScan scan = write_example({.color = libmap::ImageFormat::png});
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "--bundler", "out", "--radius", "0",
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--bundler", "out", "--radius", "0",
                                   "--poses", "odometry", "--transform", "1,2,3,0,0,90"})));
   const libmap::Trajectory poses = libmap::trajectory_of(scan.graph, libmap::PoseSource::odometry);
   const auto cameras = bundle_cameras("out/bundle.out");
@@ -302,7 +302,7 @@ TEST(ExtractBundler, KeepsOneOfPicturesThatLookTheSameWay) {
     writer.add_node(node, scan.frames.at(node.id));
   writer.finish();
   const auto kept = [&](const std::vector<std::string>& more) {
-    std::vector<std::string> words = {"extract", "scan.db", "--bundler",
+    std::vector<std::string> words = {"convert", "scan.db", "--bundler",
                                       "out",     "--poses", "odometry"};
     words.insert(words.end(), more.begin(), more.end());
     EXPECT_TRUE(succeeded(graspmap(words)));
@@ -320,7 +320,7 @@ TEST(ExtractBundler, KeepsOneOfPicturesThatLookTheSameWay) {
 
 TEST(ExtractBundler, BesideTheWholeScan) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "-o", "all", "--bundler", "pictures"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "all", "--bundler", "pictures"})));
   EXPECT_EQ(files_in("all").count("nodes.csv"), 1U);
   EXPECT_EQ(files_in("pictures").count("bundle.out"), 1U);
   EXPECT_FALSE(json_of("all.json")["results"].contains("kept_pictures"));
@@ -329,22 +329,22 @@ TEST(ExtractBundler, BesideTheWholeScan) {
 
 TEST(ExtractBundler, BadInput) {
   write_example();
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--angle", "181"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--angle", "181"}),
                         {"--angle is 181"}));
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--poses", "stord"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--poses", "stord"}),
                         {"--poses is stord", "did you mean 'stored'"}));
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--bundler", "out", "--transform", "1,2"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--transform", "1,2"}),
                         {"--transform is 1,2"}));
-  EXPECT_TRUE(succeeded(graspmap({"extract", "scan.db", "--bundler", "out", "--dry-run"})));
+  EXPECT_TRUE(succeeded(graspmap({"convert", "scan.db", "--bundler", "out", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});
   break_frames();
   const auto result =
-      graspmap({"extract", "scan.db", "--bundler", "out", "--radius", "0", "--poses", "odometry"});
+      graspmap({"convert", "scan.db", "--bundler", "out", "--radius", "0", "--poses", "odometry"});
   EXPECT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("node 5: image"), std::string::npos);
   EXPECT_EQ(files_in("out").count("images/000005.jpg"), 0U);
   const auto strict =
-      graspmap({"extract", "scan.db", "--bundler", "two", "--poses", "odometry", "--strict"});
+      graspmap({"convert", "scan.db", "--bundler", "two", "--poses", "odometry", "--strict"});
   EXPECT_EQ(strict.exit_code, 3);
   EXPECT_NE(strict.standard_error.find("error: scan.db: node 5: image"), std::string::npos);
 }
@@ -354,7 +354,7 @@ TEST(ExtractBundler, AScanWithoutColour) {
   for (auto& [node, frame] : scan.frames) frame.color = {};
   graspmap_test::write_database(scratch("scan.db"), scan);
   for (const char* kind : {"--bundler", "--colmap"}) {
-    const auto result = graspmap({"extract", "scan.db", kind, "out", "--poses", "odometry"});
+    const auto result = graspmap({"convert", "scan.db", kind, "out", "--poses", "odometry"});
     EXPECT_EQ(result.exit_code, 3);
     EXPECT_TRUE(result.standard_error.ends_with(
         "error: scan.db: no frame has a pose, a calibration and a colour image\n"))
@@ -369,7 +369,7 @@ TEST(Extract, TakesEveryRealScan) {
                            "site_tiny_v0180", "site_v0160", "site_drift", "site_full"}) {
     SCOPED_TRACE(name);
     const fs::path path = graspmap_test::data_folder() / "scans" / (std::string(name) + ".db");
-    const auto result = graspmap({"extract", path.string(), "-o", name});
+    const auto result = graspmap({"convert", path.string(), "-o", name});
     ASSERT_TRUE(succeeded(result));
     EXPECT_EQ(result.standard_error.find("warning"), std::string::npos) << result.standard_error;
     const auto scan = libmap::open_scan(path);

@@ -110,7 +110,7 @@ TEST(InfoScan, VerifyListsWhatTheGraphLeavesOut) {
 
 TEST(InfoScan, FolderWhoseFirstFrameIsBroken) {
   write_sample(scratch("a.db"));
-  ASSERT_TRUE(succeeded(graspmap({"extract", "a.db", "-o", "scan"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "a.db", "-o", "scan"})));
   std::filesystem::path first;
   for (const auto& entry : std::filesystem::directory_iterator(scratch("scan") / "color"))
     if (first.empty() || entry.path() < first) first = entry.path();

@@ -171,7 +171,7 @@ TEST(Lookup, ConvertedMapStillKnowsItsFrame) {
                                               libmap::make_pose_from_rpy({40, 0, 0}, {0, 0, 0})));
   ASSERT_TRUE(
       succeeded(graspmap({"score", "shifted.pcd", "--curvature-radius", "0", "-o", "scored.pcd"})));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "scored.pcd", "map.csv"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scored.pcd", "-o", "map.csv"})));
   write_text(scratch("points.csv"), "x,y,z\n40,0,0\n0,0,0\n");
   const Table answers = looked_up({});
   EXPECT_EQ(cell(answers, 0, "found"), "1");

@@ -59,7 +59,7 @@ bool verified_as_broken(const std::string& tile) {
 TEST(MapTiles, MergedIsTheMap) {
   for (const char* frame : {"terrain", "input"}) {
     score_both({"--frame", frame});
-    ASSERT_TRUE(succeeded(graspmap({"merge", "map.tiles", "-o", "merged.pcd"})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "map.tiles", "-o", "merged.pcd"})));
     EXPECT_TRUE(content("merged.pcd") == content("map.pcd"));
     const auto merged = json_of("merged.pcd.json");
     const auto map = json_of("map.pcd.json");
@@ -67,8 +67,8 @@ TEST(MapTiles, MergedIsTheMap) {
     EXPECT_EQ(merged.at("frame"), map.at("frame"));
     for (const char* count : {"scored_voxels", "edge_voxels", "graspable_voxels"})
       EXPECT_EQ(merged.at("results").at(count), map.at("results").at(count)) << count;
-    ASSERT_TRUE(succeeded(graspmap({"merge", "map.tiles/", "-o", "merged.csv"})));
-    ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "map.csv"})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "map.tiles/", "-o", "merged.csv"})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "map.csv"})));
     EXPECT_TRUE(content("merged.csv") == content("map.csv"));
   }
 }
@@ -81,7 +81,7 @@ TEST(MapTiles, FarFromTheOriginToo) {
   const Words score = {"score", "terrain.pcd", "--plane", "none", "--tile-size", "0.2"};
   ASSERT_TRUE(succeeded(graspmap(with(score, {"-o", "map.pcd"}))));
   ASSERT_TRUE(succeeded(graspmap(with(score, {"-o", "map.tiles"}))));
-  ASSERT_TRUE(succeeded(graspmap({"merge", "map.tiles", "-o", "merged.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.tiles", "-o", "merged.pcd"})));
   EXPECT_TRUE(content("merged.pcd") == content("map.pcd"));
   write_text(scratch("points.csv"), "x,y,z\n5000,-300,0\n5000.11,-299.9,0.01\n0,0,0\n");
   ASSERT_TRUE(succeeded(graspmap({"lookup", "map.pcd", "points.csv", "-o", "one.csv"})));
@@ -149,7 +149,7 @@ TEST(MapTiles, DamageIsNamed) {
   write_points(100);
   const std::string tile = first_tile();
   const std::string whole = content(tile);
-  const auto commands = {Words{"merge", "map.tiles", "-o", "merged.pcd"},
+  const auto commands = {Words{"convert", "map.tiles", "-o", "merged.pcd"},
                          Words{"lookup", "map.tiles", "points.csv", "-o", "answers.csv"},
                          Words{"render", "map.tiles", "-o", "map.png"}};
   const auto all_refuse = [&](const std::string& what) {
@@ -164,14 +164,14 @@ TEST(MapTiles, DamageIsNamed) {
   std::string changed = whole;
   changed[changed.size() - 30] = static_cast<char>(changed[changed.size() - 30] ^ 1);
   write_text(scratch(tile), changed);
-  EXPECT_TRUE(bad_input(graspmap({"merge", "map.tiles", "-o", "merged.pcd"}), {tile}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "-o", "merged.pcd"}), {tile}));
   EXPECT_TRUE(verified_as_broken(tile));
   write_text(scratch(tile), whole);
   EXPECT_TRUE(succeeded(graspmap({"info", "map.tiles", "--verify"})));
   write_text(scratch("map.tiles/index.json"), "{");
   EXPECT_TRUE(bad_input(graspmap({"info", "map.tiles"}), {"index.json"}));
   EXPECT_TRUE(bad_input(graspmap({"info", "none.tiles"}), {"none.tiles"}));
-  EXPECT_TRUE(bad_input(graspmap({"merge", "map.tiles", "map.pcd", "-o", "merged.pcd"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "map.tiles", "map.pcd", "-o", "merged.pcd"}),
                         {"map.tiles", "by itself"}));
 }
 
@@ -201,7 +201,7 @@ TEST(MapTiles, AnUnfinishedStoreIsNamed) {
       {"score", "terrain.pcd", "--tile-size", "0.2", "--tile", "1/2", "-o", "map.tiles"})));
   write_points(3);
   for (const Words& words :
-       {Words{"merge", "map.tiles", "-o", "merged.pcd"},
+       {Words{"convert", "map.tiles", "-o", "merged.pcd"},
         Words{"lookup", "map.tiles", "points.csv", "-o", "answers.csv"},
         Words{"render", "map.tiles", "-o", "map.png"}, Words{"info", "map.tiles"}})
     EXPECT_TRUE(bad_input(graspmap(words), {"map.tiles", "not complete"})) << words[0];

@@ -56,7 +56,7 @@ void write_run() {
 
 TEST(PanoramaCommand, WallsOfARoom) {
   write_run();
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "cloud.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "cloud.pcd"})));
   const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.pcd")).cloud;
   ASSERT_EQ(cloud.size(), 6U * width * height);
   const std::vector<double>& camera = cloud.find_field("camera")->values;
@@ -75,10 +75,8 @@ TEST(PanoramaCommand, WallsOfARoom) {
 
 TEST(PanoramaCommand, SameBytesForAnyThreads) {
   write_run();
-  ASSERT_TRUE(
-      succeeded(graspmap({"panorama", "run", "-o", "a.pcd", "--normals", "--threads", "1"})));
-  ASSERT_TRUE(
-      succeeded(graspmap({"panorama", "run", "-o", "b.pcd", "--normals", "--threads", "3"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "a.pcd", "--normals", "--threads", "1"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "b.pcd", "--normals", "--threads", "3"})));
   EXPECT_EQ(content("a.pcd"), content("b.pcd"));
 }
 
@@ -87,29 +85,29 @@ TEST(PanoramaCommand, LateAndMissingCamerasAreNamed) {
   fs::remove_all(scratch("run") / "camera_2");
   fs::remove_all(scratch("run") / "camera_4");
   write_image("camera_4", 12.055);
-  const auto result = graspmap({"panorama", "run", "-o", "cloud.pcd"});
+  const auto result = graspmap({"fuse", "run", "-o", "cloud.pcd"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("camera_2: no image"), std::string::npos);
   EXPECT_NE(result.standard_error.find("camera_4: its nearest image is"), std::string::npos);
   EXPECT_NE(result.standard_error.find("ms late"), std::string::npos);
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("camera_2.state"), "missing");
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "cloud.pcd", "--tolerance", "0.06"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "cloud.pcd", "--tolerance", "0.06"})));
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("cameras_seen"), 5);
-  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--strict"}),
-                        {"run: camera_2: no image"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--strict"}), {"run: camera_2: no image"}));
   EXPECT_FALSE(fs::exists(scratch("c.pcd")));
 }
 
 TEST(PanoramaCommand, MomentsAreChosen) {
   write_run();
   write_image("camera_0", 20.0, 2000);
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "-o", "cloud.pcd", "--stamp", "20.01"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "-o", "cloud.pcd", "--stamp", "20.01"})));
   const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.pcd")).cloud;
   ASSERT_EQ(cloud.size(), static_cast<std::size_t>(width * height));
   EXPECT_NEAR(cloud.positions[0].x(), 1.2, 1e-6);
-  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--stamp", "15"}),
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--stamp", "15"}),
                         {"--stamp is 15", "--tolerance"}));
-  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--stamp", "noon"}), {"noon"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--stamp", "noon"}), {"noon"}));
 }
 
 TEST(PanoramaCommand, OwnRigAndTable) {
@@ -118,7 +116,7 @@ TEST(PanoramaCommand, OwnRigAndTable) {
   fs::rename(scratch("run") / "camera_1", scratch("run") / "pictures");
   graspmap_test::write_text(scratch("run") / "images.csv",
                             "camera,stamp_s,file\ncamera_1,5,pictures/12.003000.png\n");
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "--rig", "own.yaml", "-o", "cloud.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "--rig", "own.yaml", "-o", "cloud.pcd"})));
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("stamp_s"), 5.0);
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("points"), width * height);
 }
@@ -131,12 +129,12 @@ TEST(PanoramaCommand, ShippedRigsGoByTheirNames) {
     graspmap_test::write_text(file,
                               libmap::encode_png(libmap::Image<std::uint16_t>(640, 360, 1000)));
   }
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "run", "--rig", "scar-e", "-o", "cloud.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "run", "--rig", "scar-e", "-o", "cloud.pcd"})));
   const nlohmann::json manifest = json_of("cloud.pcd.json");
   EXPECT_EQ(manifest.at("results").at("cameras"), 6);
   EXPECT_EQ(manifest.at("results").at("points"), 2 * 640 * 360);
   EXPECT_EQ(manifest.at("inputs").at(0).at("path"), "rigs/scar-e.yaml");
-  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "--rig", "scare", "-o", "c.pcd"}),
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "--rig", "scare", "-o", "c.pcd"}),
                         {"rig is scare", "did you mean 'scar-e'"}));
 }
 
@@ -144,7 +142,7 @@ TEST(PanoramaCommand, BrokenImageCostsItsCameraAlone) {
   write_run();
   const std::string image = "run/" + libmap::rig_image_name("camera_3", 12.009);
   graspmap_test::write_text(scratch(image), content(image).substr(0, 60));
-  const graspmap_test::ProgramResult result = graspmap({"panorama", "run", "-o", "cloud.pcd"});
+  const graspmap_test::ProgramResult result = graspmap({"fuse", "run", "-o", "cloud.pcd"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find(image), std::string::npos);
   EXPECT_EQ(json_of("cloud.pcd.json").at("results").at("cameras_seen"), 5);
@@ -156,11 +154,11 @@ TEST(PanoramaCommand, BrokenImagesOfAllCamerasAreAnError) {
     graspmap_test::write_text(
         scratch("run") / libmap::rig_image_name("camera_" + std::to_string(n), 12.0 + 0.003 * n),
         "no image");
-  const graspmap_test::ProgramResult result = graspmap({"panorama", "run", "-o", "cloud.pcd"});
+  const graspmap_test::ProgramResult result = graspmap({"fuse", "run", "-o", "cloud.pcd"});
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_NE(result.standard_error.find("camera_5 is left out\n"), std::string::npos);
   EXPECT_TRUE(result.standard_error.ends_with(
-      "graspmap panorama: error: run: no image of the moment can be read\n"))
+      "graspmap fuse: error: run: no image of the moment can be read\n"))
       << result.standard_error;
   EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
 }
@@ -168,15 +166,15 @@ TEST(PanoramaCommand, BrokenImagesOfAllCamerasAreAnError) {
 TEST(PanoramaCommand, BadInputIsOneLineAndLeavesNothing) {
   write_run();
   const auto run = [](const std::string& folder) {
-    return graspmap({"panorama", folder, "-o", "cloud.pcd"});
+    return graspmap({"fuse", folder, "-o", "cloud.pcd"});
   };
   const auto strict = [](const std::string& folder) {
-    return graspmap({"panorama", folder, "-o", "cloud.pcd", "--strict"});
+    return graspmap({"fuse", folder, "-o", "cloud.pcd", "--strict"});
   };
-  EXPECT_TRUE(bad_input(run("none"), {"none: no such folder"}));
-  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"is no folder"}));
-  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "cloud.xyz"}), {"cloud.xyz"}));
-  EXPECT_TRUE(bad_input(graspmap({"panorama", "run", "-o", "c.pcd", "--rig", "no.yaml"}),
+  EXPECT_TRUE(bad_input(run("none"), {"none: no such file"}));
+  EXPECT_TRUE(bad_input(run("run/rig.yaml"), {"run/rig.yaml: is no scan"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "cloud.xyz"}), {"cloud.xyz"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", "run", "-o", "c.pcd", "--rig", "no.yaml"}),
                         {"no.yaml: no such file"}));
   const std::string image = "run/" + libmap::rig_image_name("camera_3", 12.009);
   const std::string whole = content(image);

@@ -55,7 +55,7 @@ ExampleScan write_example() {
 
 TEST(ExtractColmap, CamerasPicturesAndPoints) {
   const ExampleScan scan = write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "--colmap", "out", "--transform",
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "out", "--transform",
                                   "1,2,3,0,0,90", "--point-spacing", "5"})));
   const libmap::ColmapModel model = libmap::read_colmap_model(scratch("out"));
   const libmap::RtabmapDatabase database(scratch("scan.db"));
@@ -89,7 +89,7 @@ TEST(ExtractColmap, CamerasPicturesAndPoints) {
   EXPECT_EQ(manifest["results"]["pictures"], 5);
   EXPECT_EQ(manifest["results"]["points"], model.points.size());
   EXPECT_EQ(manifest["parameters"]["poses"], "odometry");
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "--colmap", "again", "--transform",
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "again", "--transform",
                                   "1,2,3,0,0,90", "--point-spacing", "5", "--threads", "1"})));
   EXPECT_EQ(content("again/sparse/images.txt"), content("out/sparse/images.txt"));
   EXPECT_EQ(content("again/sparse/points3D.txt"), content("out/sparse/points3D.txt"));
@@ -98,8 +98,8 @@ TEST(ExtractColmap, CamerasPicturesAndPoints) {
 TEST(ExtractColmap, IsReadAsPosesAgain) {
   write_example();
   // Both cameras of node 5 speak for it.
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "--colmap", "one"})));
-  const auto result = graspmap({"extract", "scan.db", "--colmap", "two", "--poses", "one"});
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "one"})));
+  const auto result = graspmap({"convert", "scan.db", "--colmap", "two", "--poses", "one"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_THAT(result.standard_error, HasSubstr("5 of 5 poses belong to nodes"));
   const auto poses = [](const std::string& folder) {
@@ -114,16 +114,16 @@ TEST(ExtractColmap, IsReadAsPosesAgain) {
 
 TEST(ExtractColmap, BesideOthersAndInADryRun) {
   write_example();
-  ASSERT_TRUE(succeeded(graspmap({"extract", "scan.db", "--colmap", "out", "--dry-run"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "out", "--dry-run"})));
   EXPECT_THAT(graspmap_test::names_in_scratch(), ElementsAre("scan.db"));
   ASSERT_TRUE(succeeded(
-      graspmap({"extract", "scan.db", "-o", "all", "--bundler", "mesh", "--colmap", "model"})));
+      graspmap({"convert", "scan.db", "-o", "all", "--bundler", "mesh", "--colmap", "model"})));
   EXPECT_TRUE(json_of("mesh.json")["results"].contains("kept_pictures"));
   EXPECT_FALSE(json_of("model.json")["results"].contains("kept_pictures"));
   EXPECT_FALSE(json_of("mesh.json")["results"].contains("points"));
   write_text(scratch("model/notes.txt"), "mine");
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--colmap", "model"}), {"notes.txt"}));
-  EXPECT_TRUE(bad_input(graspmap({"extract", "scan.db", "--colmap", "x", "--point-spacing", "0"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--colmap", "model"}), {"notes.txt"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--colmap", "x", "--point-spacing", "0"}),
                         {"--point-spacing is 0"}));
 }
 
@@ -131,7 +131,7 @@ TEST(ExtractColmap, BesideOthersAndInADryRun) {
 TEST(PosesOfFiles, ColmapsScaleIsGivenOrFound) {
   GRASPMAP_REQUIRE_DATA();
   const std::string scan = scan_file("site_tiny_q.db");
-  ASSERT_TRUE(succeeded(graspmap({"extract", scan, "--colmap", "model", "--poses", "odometry"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", scan, "--colmap", "model", "--poses", "odometry"})));
   libmap::ColmapModel model = libmap::read_colmap_model(scratch("model"));
   for (auto& [id, image] : model.images) image.camera_from_world.translation() *= 2.5;
   libmap::write_colmap_model(scratch("model/sparse"), model);
@@ -167,9 +167,9 @@ TEST(PosesOfFiles, RefineWritesEveryFormatAndFuseTakesIt) {
   // A second run replaces its own folder.
   EXPECT_TRUE(succeeded(graspmap({"refine", scan, "-o", "r.colmap/"})));
   EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "r.txt"}), {".txt", ".toro .colmap"}));
-  EXPECT_TRUE(succeeded(graspmap({"extract", scan, "--bundler", "b", "--poses", "r.colmap"})));
+  EXPECT_TRUE(succeeded(graspmap({"convert", scan, "--bundler", "b", "--poses", "r.colmap"})));
   // Before the work: a folder has no database to copy.
-  ASSERT_TRUE(succeeded(graspmap({"extract", scan, "-o", "folder"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", scan, "-o", "folder"})));
   EXPECT_TRUE(bad_input(graspmap({"refine", "folder", "-o", "f.tum", "--write-database", "f.db"}),
                         {"--write-database is f.db", "folder"}));
   EXPECT_FALSE(fs::exists(scratch("f.tum")));
@@ -185,8 +185,10 @@ TEST(ConvertPoses, RtabmapsFormatsThereAndBack) {
        {"tum", "tum-motion-capture", "kitti", "kitti-optical", "toro", "g2o"}) {
     SCOPED_TRACE(format);
     const std::string there = format + ".txt";
-    ASSERT_TRUE(succeeded(graspmap({"convert", "a.g2o", there, "--output-poses-format", format})));
-    ASSERT_TRUE(succeeded(graspmap({"convert", there, format + ".g2o", "--poses-format", format})));
+    ASSERT_TRUE(
+        succeeded(graspmap({"convert", "a.g2o", "-o", there, "--output-poses-format", format})));
+    ASSERT_TRUE(
+        succeeded(graspmap({"convert", there, "-o", format + ".g2o", "--poses-format", format})));
     const libmap::TrajectoryFile back = libmap::read_trajectory(scratch(format + ".g2o"));
     ASSERT_EQ(back.poses.size(), 3U);
     EXPECT_EQ(back.links.size(), format == "toro" || format == "g2o" ? 1U : 0U);
@@ -198,11 +200,11 @@ TEST(ConvertPoses, RtabmapsFormatsThereAndBack) {
     EXPECT_EQ(json_of(there + ".json")["results"]["poses"], 3);
   }
   EXPECT_NE(content("kitti.txt"), content("kitti-optical.txt"));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.g2o", "b.xyz"}), {"b.xyz", ".toro"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.g2o", "-o", "b.xyz"}), {"b.xyz", ".toro"}));
   fs::create_directory(scratch("model"));
   libmap::write_colmap_model(scratch("model"), {.cameras = {{1, {"PINHOLE", 6, 4, {1, 1, 1, 1}}}},
                                                 .images = {{1, {1, "3.jpg"}}}});
-  EXPECT_TRUE(bad_input(graspmap({"convert", "model/images.txt", "b.tum"}), {"photographs"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "model/images.txt", "-o", "b.tum"}), {"photographs"}));
 }
 
 // Each is one line on stderr that names the file and, where there is one, the line.

@@ -90,7 +90,7 @@ TEST(Refine, SameBytesForThreadsAndSeed) {
 // A scan as a TUM RGB-D folder of pictures and depth, the truth beside it for the report alone.
 void extract_plain_folder(const std::string& scan, const std::string& folder) {
   namespace fs = std::filesystem;
-  ASSERT_TRUE(succeeded(graspmap({"extract", scan, "-o", "whole"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", scan, "-o", "whole"})));
   fs::create_directory(scratch(folder));
   for (const auto& [from, to] : {std::pair("color", "color"),
                                  {"depth", "depth"},

@@ -56,8 +56,8 @@ TEST(ScoreOrientation, SharesMergedAreTheWholeMap) {
     for (const char* number : {"1", "2", "3"})
       ASSERT_TRUE(succeeded(score("part" + std::string(number) + format,
                                   joined(both, {"--tile", std::string(number) + "/3"}))));
-    ASSERT_TRUE(succeeded(graspmap(
-        {"merge", "part2" + format, "part3" + format, "part1" + format, "-o", "merged" + format})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "part2" + format, "part3" + format, "part1" + format,
+                                    "-o", "merged" + format})));
     EXPECT_EQ(content("merged" + format), content("whole" + format));
     const auto whole = json_of("whole" + format + ".json").at("results");
     const auto merged = json_of("merged" + format + ".json").at("results");
@@ -76,7 +76,7 @@ TEST(ScoreOrientation, TileStoreHoldsTheSameMap) {
   const Words surface = {"--orientation", "surface"};
   ASSERT_TRUE(succeeded(score("whole.pcd", surface)));
   ASSERT_TRUE(succeeded(score("m.tiles", joined(surface, {"--points-at-once", "2000"}))));
-  ASSERT_TRUE(succeeded(graspmap({"merge", "m.tiles", "-o", "merged.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "m.tiles", "-o", "merged.pcd"})));
   EXPECT_EQ(content("merged.pcd"), content("whole.pcd"));
 }
 

@@ -52,13 +52,13 @@ TEST_P(ScoreShares, MergedAreTheWholeMap) {
   EXPECT_NE(content(file("part1")), content(file("whole")));
   // In any order.
   ASSERT_TRUE(succeeded(
-      graspmap({"merge", file("part3"), file("part1"), file("part2"), "-o", file("merged")})));
+      graspmap({"convert", file("part3"), file("part1"), file("part2"), "-o", file("merged")})));
   EXPECT_EQ(content(file("merged")), content(file("whole")));
 }
 
 TEST_P(ScoreShares, MoreSharesThanTilesAreTheWholeMap) {
   ASSERT_TRUE(succeeded(score("whole", {"--tile-size", "0.4"})));
-  Words merge = {"merge", "-o", file("merged")};
+  Words merge = {"convert", "-o", file("merged")};
   for (int number = 1; number <= 5; ++number) {
     const std::string part = "part" + std::to_string(number);
     ASSERT_TRUE(
@@ -103,7 +103,7 @@ class Merge : public testing::Test {
     return score_to(output, more);
   }
   static ProgramResult merge(Words parts) {
-    parts.insert(parts.begin(), "merge");
+    parts.insert(parts.begin(), "convert");
     parts.insert(parts.end(), {"-o", "merged.pcd"});
     const ProgramResult result = graspmap(parts);
     EXPECT_EQ(std::filesystem::exists(scratch("merged.pcd")), result.exit_code == 0);
@@ -116,7 +116,7 @@ TEST_F(Merge, KeepsWhatTheSharesHaveInCommon) {
   ASSERT_TRUE(succeeded(merge({"a.pcd", "b.pcd"})));
   const nlohmann::json part = graspmap_test::json_of("a.pcd.json");
   const nlohmann::json whole = graspmap_test::json_of("merged.pcd.json");
-  EXPECT_EQ(whole.at("command"), "merge");
+  EXPECT_EQ(whole.at("command"), "convert");
   EXPECT_EQ(whole.at("frame"), part.at("frame"));
   EXPECT_EQ(whole.at("transforms"), part.at("transforms"));
   EXPECT_EQ(whole.at("parameters").at("method"), "corrected");
@@ -140,7 +140,7 @@ TEST(MergeOfShares, AcrossTheBoundOfSinglePrecisionIsTheWholeMap) {
     for (const std::string method : {"corrected", "thesis", "envelope", "climblab"}) {
       const Words more = {"--plane", "none", "--method", method, "--curvature-radius", "0"};
       ASSERT_TRUE(succeeded(score_to("whole" + format, more)));
-      Words merge = {"merge", "-o", "merged" + format};
+      Words merge = {"convert", "-o", "merged" + format};
       for (const char* number : {"1", "2", "3", "4"}) {
         Words share = more;
         share.insert(share.end(), {"--tile", std::string(number) + "/4"});
@@ -186,7 +186,8 @@ TEST_F(Merge, SharesOfDifferentInputs) {
   graspmap_test::write_text(scratch("g.yaml"), gripper + "# changed\n");
   ASSERT_TRUE(succeeded(share("d.pcd", "2/2", {"--gripper", "g.yaml"})));
   EXPECT_TRUE(bad_input(merge({"c.pcd", "d.pcd"}), {"d.pcd", "other inputs"}));
-  ASSERT_TRUE(succeeded(graspmap({"convert", "terrain.pcd", "t2.pcd", "--encoding", "ascii"})));
+  ASSERT_TRUE(
+      succeeded(graspmap({"convert", "terrain.pcd", "-o", "t2.pcd", "--encoding", "ascii"})));
   std::filesystem::rename(scratch("t2.pcd"), scratch("terrain.pcd"));
   ASSERT_TRUE(succeeded(share("e.pcd", "2/2", {})));
   EXPECT_TRUE(bad_input(merge({"a.pcd", "e.pcd"}), {"e.pcd", "other inputs"}));
@@ -207,7 +208,7 @@ TEST_F(Merge, CloudsThatAreNoShares) {
   EXPECT_TRUE(bad_input(merge({"a.pcd", "terrain.pcd"}), {"terrain.pcd", "no manifest"}));
   graspmap_test::write_text(scratch("b.pcd.json"), "{");
   EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}), {"b.pcd.json"}));
-  EXPECT_TRUE(bad_input(graspmap({"merge", "a.pcd", "-o", "merged.xyz"}), {"merged.xyz"}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "merged.xyz"}), {"merged.xyz"}));
 }
 
 }  // namespace score_shares_test

@@ -8,7 +8,7 @@
 
 #include "libgtd/score/tile_store_io.h"
 #include "tests/tools/tool_test_support.h"
-#include "tools/needed_tiles.h"
+#include "tools/support/needed_tiles.h"
 
 namespace score_store_hostile_test {
 

@@ -1,4 +1,4 @@
-// sheet, chart, summarize and the sections of mask, as a user calls them.
+// Sheets of several files, tables of several maps and the sections of mask, as a user calls them.
 #include <gtest/gtest.h>
 
 #include "libgtd/gripper/gripper_io.h"
@@ -26,7 +26,7 @@ TEST(Sheet, MapsAndPicturesInOne) {
   write_map("b.pcd", "thesis");
   ASSERT_TRUE(succeeded(graspmap({"render", "a.pcd", "-o", "c.png", "--width", "200"})));
   for (const char* name : {"one.png", "two.png"})
-    ASSERT_TRUE(succeeded(graspmap({"sheet", "a.pcd", "b.pcd", "c.png", "-o", name, "--columns",
+    ASSERT_TRUE(succeeded(graspmap({"render", "a.pcd", "b.pcd", "c.png", "-o", name, "--columns",
                                     "3", "--cell-width", "120", "--captions", "corrected|thesis"},
                                    {{"DISPLAY", ""}})));
   EXPECT_EQ(content("one.png"), content("two.png"));
@@ -40,16 +40,16 @@ TEST(Sheet, MapsAndPicturesInOne) {
 TEST(Sheet, BadInputIsOneLine) {
   write_map("a.pcd", "corrected");
   graspmap_test::write_text(scratch("broken.png"), "\x89PNG and no more");
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "none.pcd", "-o", "s.png"}), {"none.pcd"}));
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "broken.png", "-o", "s.png"}), {"broken.png"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "none.pcd", "-o", "s.png"}), {"none.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "broken.png", "-o", "s.png"}), {"broken.png"}));
   graspmap_test::write_text(scratch("empty.csv"), "x,y,z\n");
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "empty.csv", "-o", "s.png"}), {"empty.csv"}));
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "-o", "s.jpg"}), {"s.jpg", ".png"}));
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "-o", "s.png", "--captions", "a|b"}),
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "empty.csv", "-o", "s.png"}), {"empty.csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.jpg"}), {"s.jpg", ".png"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--captions", "a|b"}),
                         {"--captions", "<= 1"}));
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "-o", "s.png", "--row-titles", "a|b"}),
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--row-titles", "a|b"}),
                         {"row_titles"}));
-  EXPECT_TRUE(bad_input(graspmap({"sheet", "a.pcd", "-o", "a.pcd"}), {"a.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "a.pcd"}), {"a.pcd"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("s.png")));
 }
 
@@ -59,7 +59,7 @@ TEST(Summarize, TablesOfTwoMaps) {
   graspmap_test::write_text(scratch("e.csv"),
                             "region,x,y,z,to_x,to_y,to_z,radius,graspable,why\n"
                             "left,-0.1,0,0,,,,0.05,1,\nright,0.1,0,0,,,,0.05,0,\n");
-  ASSERT_TRUE(succeeded(graspmap({"summarize", "a.pcd", "b.pcd", "a.pcd", "-o", "sum", "--names",
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "a.pcd", "b.pcd", "a.pcd", "-o", "sum", "--names",
                                   "a|b", "--pairs", "--expected", "e.csv"})));
   const libmap::Table maps = libmap::read_csv(scratch("sum/maps.csv"));
   ASSERT_EQ(maps.rows.size(), 3U);
@@ -80,14 +80,36 @@ TEST(Summarize, TablesOfTwoMaps) {
 TEST(Summarize, BadInputIsOneLine) {
   write_map("a.pcd", "corrected");
   graspmap_test::write_text(scratch("e.csv"), "region,x,y,z\n");
-  EXPECT_TRUE(bad_input(graspmap({"summarize", "terrain.pcd", "-o", "sum"}), {"terrain.pcd"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "terrain.pcd", "-o", "sum"}), {"terrain.pcd"}));
   EXPECT_TRUE(
-      bad_input(graspmap({"summarize", "a.pcd", "-o", "sum", "--expected", "e.csv"}), {"e.csv"}));
-  EXPECT_TRUE(bad_input(graspmap({"summarize", "a.pcd", "-o", "sum", "--cutoff", "high"}),
+      bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", "--expected", "e.csv"}), {"e.csv"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--cutoff", "high"}),
                         {"--cutoff", "high"}));
-  EXPECT_TRUE(bad_input(graspmap({"summarize", "a.pcd", "-o", "sum", "--names", "a|b"}),
-                        {"--names is 2: more names than maps (must be <= 1)"}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--names", "a|b|c"}),
+                        {"--names is 3: more names than maps (must be <= 2)"}));
+  for (const auto& [name, value] : {std::pair{"--cutoff", "0.5"}, std::pair{"--names", "a"},
+                                    std::pair{"--varied", "solid_voxel_threshold"}})
+    EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", name, value}), {name}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--varied", "none", "--quiet"}),
+                {"none"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("sum")));
+}
+
+TEST(Summarize, ChartsOfTheVariedParameter) {
+  write_map("a.pcd", "corrected");
+  write_map("b.pcd", "thesis");
+  graspmap_test::write_text(scratch("e.csv"),
+                            "region,x,y,z,to_x,to_y,to_z,radius,graspable,why\n"
+                            "left,-0.1,0,0,,,,0.05,1,\nright,0.1,0,0,,,,0.05,0,\n");
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "a.pcd", "b.pcd", "-o", "sum", "--expected", "e.csv",
+                                  "--varied", "solid_voxel_threshold", "--series", "method"})));
+  for (const char* name : {"histograms", "graspable_share", "voxel_youden", "place_youden"}) {
+    const std::string svg = content("sum/" + std::string(name) + ".svg");
+    const bool of_maps = name == std::string("histograms");
+    EXPECT_NE(svg.find(of_maps ? "a.pcd" : "corrected"), std::string::npos) << name;
+    EXPECT_FALSE(libmap::decode_color(content("sum/" + std::string(name) + ".png")).empty());
+  }
 }
 
 TEST(Summarize, PairsThatLieApartAreNamed) {
@@ -96,71 +118,11 @@ TEST(Summarize, PairsThatLieApartAreNamed) {
   for (Eigen::Vector3d& point : far.positions) point.x() += 8.0;
   libmap::write_cloud(scratch("far.pcd"), far);
   ASSERT_TRUE(succeeded(graspmap({"score", "far.pcd", "-o", "b.pcd"})));
-  ASSERT_TRUE(succeeded(graspmap({"summarize", "a.pcd", "b.pcd", "-o", "sum"})));
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "a.pcd", "b.pcd", "-o", "sum"})));
   const graspmap_test::ProgramResult result = graspmap(
-      {"summarize", "a.pcd", "b.pcd", "-o", "pairs", "--names", "|far", "--pairs", "--quiet"});
+      {"analyze", "a.pcd", "b.pcd", "-o", "pairs", "--names", "|far", "--pairs", "--quiet"});
   EXPECT_TRUE(bad_input(result, {"error: a.pcd and far: the maps have no voxel in common"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("pairs")));
-}
-
-TEST(Chart, CurvesOfATable) {
-  graspmap_test::write_text(scratch("t.csv"), "x,y,kind\n2,1,a\n1,3,a\n1,2,b\n3,,b\n");
-  for (const char* name : {"c.png", "c.svg"})
-    ASSERT_TRUE(succeeded(
-        graspmap({"chart", "t.csv", "-o", name, "--x", "x", "--y", "y", "--series", "kind"})));
-  EXPECT_NE(content("c.svg").find("<svg"), std::string::npos);
-  EXPECT_EQ(graspmap_test::json_of("c.png.json")["results"]["curves"], 2);
-  EXPECT_TRUE(bad_input(graspmap({"chart", "t.csv", "-o", "d.png", "--x", "x", "--y", "z"}),
-                        {"t.csv", "z"}));
-  EXPECT_TRUE(bad_input(graspmap({"chart", "t.csv", "-o", "d.png", "--x", "x", "--y", "kind"}),
-                        {"t.csv", "kind"}));
-  EXPECT_TRUE(
-      bad_input(graspmap({"chart", "t.csv", "-o", "d.jpg", "--x", "x", "--y", "y"}), {"d.jpg"}));
-  std::string many = "x,y,id\n";
-  for (int row = 0; row < 200'000; ++row) many += "1,2," + std::to_string(row) + "\n";
-  graspmap_test::write_text(scratch("many.csv"), many);
-  EXPECT_TRUE(bad_input(
-      graspmap({"chart", "many.csv", "-o", "d.png", "--x", "x", "--y", "y", "--series", "id"}),
-      {"many.csv", "--series is id", "<= 500"}));
-  std::string columns = "y";
-  for (int n = 0; n < 500; ++n) columns += ",y";
-  EXPECT_TRUE(bad_input(graspmap({"chart", "t.csv", "-o", "d.png", "--x", "x", "--y", columns}),
-                        {"t.csv", "--y is y,y", "<= 500"}));
-}
-
-TEST(Chart, OneEndOfAnAxis) {
-  graspmap_test::write_text(scratch("t.csv"), "x,y\n2,1\n1,3\n3,nan\n");
-  const auto chart = [](const char* table, std::vector<std::string> more) {
-    more.insert(more.begin(), {"chart", table, "-o", "c.svg", "--x", "x", "--y", "y", "--force"});
-    return graspmap(more);
-  };
-  EXPECT_TRUE(bad_input(chart("t.csv", {}), {"t.csv", "row 3, column 'y'", "nan"}));
-  graspmap_test::write_text(scratch("t.csv"), "x,y\n2,1\n1,3\n3,\n");
-  ASSERT_TRUE(succeeded(chart("t.csv", {})));
-  const std::string whole = content("c.svg");
-  for (const auto& [end, value] : {std::pair{"--x-min", "-5"}, std::pair{"--y-min", "-5"},
-                                   std::pair{"--x-max", "9"}, std::pair{"--y-max", "9"}}) {
-    ASSERT_TRUE(succeeded(chart("t.csv", {end, value})));
-    EXPECT_TRUE(content("c.svg") != whole) << end;
-  }
-  EXPECT_TRUE(bad_input(chart("t.csv", {"--x-min", "9", "--x-max", "2"}), {"--x-max is 2", "> 9"}));
-  EXPECT_TRUE(bad_input(chart("t.csv", {"--y-max", "inf"}), {"--y-max is inf"}));
-  EXPECT_TRUE(bad_input(chart("t.csv", {"--y-min", "-1e308", "--y-max", "1e308"}),
-                        {"too wide", "--y-max is 1e308", "beyond -1e308"}));
-}
-
-TEST(Chart, TablesWithNothingToDraw) {
-  graspmap_test::write_text(scratch("t.csv"), "x,y\n1,\n,2\n");
-  const auto chart = [](const std::string& table, const std::string& y) {
-    return graspmap({"chart", table, "-o", "c.svg", "--x", "x", "--y", y});
-  };
-  for (const char* none : {"", " , "})
-    EXPECT_TRUE(bad_input(chart("t.csv", none), {"--y: no column is named", "of the table"}));
-  EXPECT_TRUE(bad_input(chart("t.csv", "y"), {"t.csv: x, y: no row with numbers in both columns"}));
-  graspmap_test::write_text(scratch("far.csv"), "x,y\n1.7e308,1\n");
-  EXPECT_TRUE(bad_input(chart("far.csv", "y"), {"far.csv: x axis range is", "cannot be drawn",
-                                                "finite, its width too, and ascending"}));
-  EXPECT_FALSE(std::filesystem::exists(scratch("c.svg")));
 }
 
 bool near(const libmap::Color& a, const libmap::Color& b) {
@@ -239,7 +201,7 @@ TEST(Sheet, HowPlacesAreMarkedNeedsPlaces) {
   for (const auto& [name, value] :
        {std::pair{"--verdict", "graspable"}, std::pair{"--label", "none"},
         std::pair{"--points-frame", "map"}})
-    EXPECT_TRUE(bad_input(graspmap({"sheet", "terrain.pcd", name, value, "-o", "s.png"}),
+    EXPECT_TRUE(bad_input(graspmap({"render", "terrain.pcd", name, value, "-o", "s.png"}),
                           {name, "--points"}));
 }
 

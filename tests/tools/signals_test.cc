@@ -176,7 +176,7 @@ INSTANTIATE_TEST_SUITE_P(
         Case{"simulate_scan",
              make_mesh,
              {"simulate", "scan", "site/mesh.ply", "--frames", "4", "-o", "o.db", "--quiet"}},
-        Case{"extract", make_scan, {"extract", "s.db", "-o", "o", "--colmap", "o2"}},
+        Case{"convert", make_scan, {"convert", "s.db", "-o", "o", "--colmap", "o2"}},
         Case{"refine",
              make_scan,
              {"refine", "s.db", "-o", "o.tum", "--report", "o.txt", "--write-database", "o.db",
@@ -199,7 +199,7 @@ TEST(EndedBySignal, AStoreOfTilesIsGoneOnWith) {
   const Clock::time_point start = Clock::now();
   ASSERT_TRUE(succeeded(graspmap(words)));
   const Clock::duration undisturbed = Clock::now() - start;
-  ASSERT_TRUE(succeeded(graspmap({"merge", "o.tiles", "-o", "undisturbed.pcd", "--quiet"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "o.tiles", "-o", "undisturbed.pcd", "--quiet"})));
   fs::remove_all(scratch("o.tiles"));
   fs::remove(scratch("o.tiles.json"));
   for (const double moment : {0.4, 0.5, 0.6, 0.8}) {
@@ -209,7 +209,7 @@ TEST(EndedBySignal, AStoreOfTilesIsGoneOnWith) {
       EXPECT_EQ(name.find(".partial"), std::string::npos) << name;
   }
   ASSERT_TRUE(succeeded(graspmap(words)));
-  ASSERT_TRUE(succeeded(graspmap({"merge", "o.tiles", "-o", "told.pcd", "--quiet"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "o.tiles", "-o", "told.pcd", "--quiet"})));
   EXPECT_TRUE(graspmap_test::content("told.pcd") == graspmap_test::content("undisturbed.pcd"));
 }
 

@@ -38,7 +38,7 @@ TEST(SimulateCamerasCommand, PanoramaPutsTheImagesBackOnTheMesh) {
     ASSERT_TRUE(succeeded(graspmap(
         cameras({"-o", "rig", "--x", "0.1", "--y", "-0.2", "--z", "0.3", "--roll", "2", "--pitch",
                  "-4", "--yaw", "30", "--depth-scale", scale, "--stamp", "5"}))));
-    ASSERT_TRUE(succeeded(graspmap({"panorama", "rig", "-o", "cloud.ply", "--strict"})));
+    ASSERT_TRUE(succeeded(graspmap({"fuse", "rig", "-o", "cloud.ply", "--strict"})));
     libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.ply")).cloud;
     EXPECT_GT(cloud.size(), 300000U);
     const libmap::Pose body = libmap::make_pose_from_rpy({0.1, -0.2, 0.4}, {2, -4, 30});
@@ -77,7 +77,7 @@ TEST(SimulateCamerasCommand, PlacesOfTheMeshAreFoundOnTheRobotsMap) {
                                   "--level", "none", "-o", "site.ply"})));
   ASSERT_TRUE(succeeded(graspmap({"simulate", "cameras", "site.ply", "-o", "rig", "--x", "-0.2",
                                   "--z", "0.3", "--pitch", "25", "--yaw", "40"})));
-  ASSERT_TRUE(succeeded(graspmap({"panorama", "rig/", "-o", "cloud.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "rig/", "-o", "cloud.pcd"})));
   ASSERT_TRUE(succeeded(
       graspmap({"score", "cloud.pcd", "--curvature-radius", "0", "-o", "map.pcd", "--quiet"})));
   // On the ball, towards the robot, which stands about (-0.1, 0, 0.4); the ground; out of sight.

@@ -41,7 +41,7 @@ libmap::TriangleMesh site_mesh(double lift) {
 }
 
 nlohmann::json checked(Words words) {
-  words.insert(words.begin(), "spot-check");
+  words.insert(words.begin(), {"compare", "--edges"});
   words.emplace_back("--json");
   const auto result = graspmap(words);
   EXPECT_TRUE(succeeded(result));
@@ -50,7 +50,8 @@ nlohmann::json checked(Words words) {
 
 TEST(SpotCheckCommand, TableOfTheThesis) {
   libmap::write_cloud(scratch("site.ply"), site_cloud());
-  const auto result = graspmap({"spot-check", "site.ply", "--ground", "zero", "-o", "check.csv"});
+  const auto result =
+      graspmap({"compare", "--edges", "site.ply", "--ground", "zero", "-o", "check.csv"});
   ASSERT_TRUE(succeeded(result));
   const libmap::Table table = libmap::read_csv(scratch("check.csv"));
   EXPECT_EQ(table.columns,
@@ -110,8 +111,8 @@ TEST(SpotCheckCommand, PlacesWithoutDataAreCounted) {
   libmap::PointCloud cloud = site_cloud();
   std::erase_if(cloud.positions, [](const auto& p) { return p.x() > 0 && p.y() < 0; });
   libmap::write_cloud(scratch("site.ply"), cloud);
-  const auto result =
-      graspmap({"spot-check", "site.ply", "--ground", "zero", "--places", "4", "-o", "check.csv"});
+  const auto result = graspmap(
+      {"compare", "--edges", "site.ply", "--ground", "zero", "--places", "4", "-o", "check.csv"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_output.find("places without data: 4"), std::string::npos);
   const libmap::Table table = libmap::read_csv(scratch("check.csv"));
@@ -148,7 +149,7 @@ TEST(SpotCheckCommand, MeshBelowTheBoxHasNoHeight) {
   const Words words = {"mesh.ply", "--ground", "zero"};
   Words above = words;
   above.emplace_back("--box=-1.5,-1,-0.3,1.5,1,0.5");
-  above.insert(above.begin(), "spot-check");
+  above.insert(above.begin(), {"compare", "--edges"});
   EXPECT_TRUE(bad_input(graspmap(above), {"mesh.ply", "no place"}));
   Words around = words;
   around.emplace_back("--box=-1.5,-1,-1.3,1.5,1,0.5");
@@ -159,10 +160,10 @@ TEST(SpotCheckCommand, BadInput) {
   libmap::write_cloud(scratch("site.ply"), site_cloud());
   libmap::write_mesh(scratch("mesh.ply"), site_mesh(0.0));
   const auto run = [](Words more) {
-    more.insert(more.begin(), {"spot-check", "site.ply", "--quiet"});
+    more.insert(more.begin(), {"compare", "--edges", "site.ply", "--quiet"});
     return graspmap(more);
   };
-  EXPECT_TRUE(bad_input(graspmap({"spot-check", "none.ply"}), {"none.ply"}));
+  EXPECT_TRUE(bad_input(graspmap({"compare", "--edges", "none.ply"}), {"none.ply"}));
   EXPECT_TRUE(bad_input(run({"-o", "check.txt"}), {"check.txt", ".csv"}));
   EXPECT_TRUE(bad_input(run({"--places", "0"}), {"--places is 0"}));
   EXPECT_TRUE(bad_input(run({"--inset", "1"}), {"site.ply", "inset_m is 1"}));
@@ -173,7 +174,8 @@ TEST(SpotCheckCommand, BadInput) {
   EXPECT_TRUE(bad_input(run({"--truth", "mesh.ply", "--ground", "fit"}), {"--truth"}));
   EXPECT_TRUE(bad_input(run({"--truth", "site.ply"}), {"site.ply"}));
   libmap::write_cloud(scratch("empty.ply"), {});
-  EXPECT_TRUE(bad_input(graspmap({"spot-check", "empty.ply", "--ground", "zero"}), {"empty.ply"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"compare", "--edges", "empty.ply", "--ground", "zero"}), {"empty.ply"}));
   ASSERT_TRUE(succeeded(run({"--ground", "zero", "-o", "check.csv", "--dry-run"})));
   EXPECT_EQ(graspmap_test::names_in_scratch(), (Words{"empty.ply", "mesh.ply", "site.ply"}));
 }

@@ -2,7 +2,7 @@
 # that a flag can take are read off `graspmap --help` and `graspmap COMMAND --help`.
 
 _graspmap_commands() {
-  "$1" --help 2>/dev/null | sed -n '/^Commands:/,/^$/ s/^  \([a-z][a-z-]*\) .*/\1/p'
+  "$1" --help 2>/dev/null | sed -n "s/^  \([a-z][a-z-]*\) .*/\1/p"
 }
 
 # The words that `simulate` takes.

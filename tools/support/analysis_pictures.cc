@@ -1,4 +1,4 @@
-#include "tools/analysis_pictures.h"
+#include "tools/support/analysis_pictures.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 
 #include "libmap/ros/bag_rig.h"
 #include "libmap/ros/bag_writer.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

@@ -1,4 +1,4 @@
-#include "tools/bag_json.h"
+#include "tools/support/bag_json.h"
 
 namespace graspmap_tools {
 

@@ -10,9 +10,9 @@
 #include "libmap/core/text.h"
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
-#include "tools/bag_commands.h"
-#include "tools/bag_json.h"
-#include "tools/result_counts.h"
+#include "tools/support/bag_commands.h"
+#include "tools/support/bag_json.h"
+#include "tools/support/result_counts.h"
 
 namespace graspmap_tools {
 

@@ -13,8 +13,8 @@
 #include "libmap/core/score_color.h"
 #include "libmap/core/text.h"
 #include "libmap/view/color_map.h"
-#include "tools/bag_commands.h"
-#include "tools/map_frame.h"
+#include "tools/support/bag_commands.h"
+#include "tools/support/map_frame.h"
 
 namespace graspmap_tools {
 

@@ -1,4 +1,4 @@
-#include "tools/calibration_charts.h"
+#include "tools/support/calibration_charts.h"
 
 #include <algorithm>
 #include <cmath>

@@ -1,4 +1,4 @@
-#include "tools/command_line.h"
+#include "tools/support/command_line.h"
 
 #include <spdlog/sinks/stdout_color_sinks.h>
 #include <spdlog/spdlog.h>
@@ -13,10 +13,11 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
-#include "tools/end_signals.h"
-#include "tools/message_text.h"
-#include "tools/progress_output.h"
-#include "tools/standard_output.h"
+#include "tools/support/commands.h"
+#include "tools/support/end_signals.h"
+#include "tools/support/message_text.h"
+#include "tools/support/progress_output.h"
+#include "tools/support/standard_output.h"
 
 namespace graspmap_tools {
 
@@ -92,8 +93,20 @@ struct Command::Parts {
   int usage_error(const std::string& message) const;
 };
 
-Command::Command(std::string name, std::string summary)
-    : parts_(std::make_unique<Parts>(std::move(name), summary)) {}
+namespace {
+
+// "draw maps" -> "Draw maps."
+std::string sentence(std::string_view summary) {
+  std::string text(summary);
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(text[0]));
+  return text + ".";
+}
+
+}  // namespace
+
+Command::Command(const std::string& name, const std::string& description)
+    : parts_(std::make_unique<Parts>(
+          name, description.empty() ? sentence(summary_of(name)) : description)) {}
 Command::~Command() = default;
 
 void Command::input(const std::string& name, std::string& path, const std::string& description) {
@@ -309,6 +322,16 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   } catch (const std::exception& error) {
     return report(name, error.what(), exit_failed);
   }
+}
+
+int run_usage(int argc, char** argv, bool is_special, Usage& usual, Usage& special) {
+  if (is_special) return special(argc, argv);
+  const int exit_code = usual(argc, argv);
+  const bool asks_for_help = std::any_of(
+      argv, argv + argc, [](const std::string& word) { return word == "--help" || word == "-h"; });
+  if (!asks_for_help || exit_code != 0) return exit_code;
+  std::cout << "\n";
+  return special(argc, argv);
 }
 
 fs::path find_data_file(const std::string& kind, const std::string& name) {

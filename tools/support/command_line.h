@@ -3,7 +3,7 @@
 //
 //   int main(int argc, char** argv) {
 //     ScoreOptions options;
-//     Command command("score", "graspability map of a terrain");
+//     Command command("score");
 //     command.input("TERRAIN", options.terrain, "cloud of the terrain");
 //     command.output(options.map, "graspability map (.pcd, .ply, .vtp, .csv)");
 //     bind(command.parameters(), options);
@@ -19,7 +19,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 
@@ -31,7 +31,8 @@ class UsageError : public libmap::Error {
 
 class Command {
  public:
-  Command(std::string name, std::string summary);
+  // The description is that of commands.h, unless the command has several usages.
+  explicit Command(const std::string& name, const std::string& description = {});
   ~Command();
   Command(const Command&) = delete;
   Command& operator=(const Command&) = delete;
@@ -65,6 +66,11 @@ class Command {
   struct Parts;
   std::unique_ptr<Parts> parts_;
 };
+
+// A command of two usages, each with a Command and options of its own: runs `special` if it was
+// chosen, else `usual`. --help shows both.
+using Usage = int(int argc, char** argv);
+int run_usage(int argc, char** argv, bool is_special, Usage& usual, Usage& special);
 
 // A file of the toolkit's own data: a path as it stands if it has a '/' or the extension, else
 // DATA/KIND/NAME.yaml, e.g. ("grippers", "scar-e"). Throws Error naming the nearest known one.

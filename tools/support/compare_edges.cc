@@ -1,4 +1,5 @@
-// graspmap spot-check: how far the ground along the edges of a site lies from where it is.
+#include "tools/support/compare_edges.h"
+
 #include <fmt/format.h>
 
 #include <cmath>
@@ -20,9 +21,9 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/spot_check.h"
 #include "libmap/mesh/surface_distance.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/placement.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/placement.h"
 
 namespace {
 
@@ -73,7 +74,7 @@ void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
 }
 
 // A cloud, or a mesh.
-struct Shape {
+struct EdgeData {
   std::optional<libmap::TriangleMesh> mesh{};
   libmap::PointCloud cloud{};
 
@@ -82,8 +83,8 @@ struct Shape {
   }
 };
 
-Shape read_shape(const std::string& file) {
-  Shape shape;
+EdgeData read_edge_data(const std::string& file) {
+  EdgeData shape;
   if (libmap::file_kind(file) == libmap::FileKind::mesh)
     shape.mesh = libmap::read_mesh(file).mesh;
   else
@@ -110,7 +111,7 @@ libmap::TriangleMesh read_truth(const SpotCheckCommandOptions& options) {
 }
 
 // Points spread evenly, as the fit of a plane wants them.
-libmap::GroundPlane fit_ground(const Shape& shape, libmap::GroundPlaneOptions options) {
+libmap::GroundPlane fit_ground(const EdgeData& shape, libmap::GroundPlaneOptions options) {
   constexpr double samples = 100000;
   const libmap::PointCloud cloud =
       shape.mesh ? libmap::points_on_surface(
@@ -123,7 +124,7 @@ libmap::GroundPlane fit_ground(const Shape& shape, libmap::GroundPlaneOptions op
 }
 
 // What is known of the ground; a fitted plane becomes z = 0.
-libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape& shape,
+libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, EdgeData& shape,
                                    Check& check, Run& run) {
   if (!options.truth.empty()) {
     check.ground = options.truth;
@@ -150,7 +151,7 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, Shape
 }
 
 // Of the data in the box, where one is given.
-libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, Shape& shape,
+libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, EdgeData& shape,
                                   const SpotCheckCommandOptions& options) {
   if (!shape.mesh) {
     if (box)
@@ -168,7 +169,7 @@ libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, Sh
 }
 
 Check check_site(const SpotCheckCommandOptions& options, Run& run) {
-  Shape shape = read_shape(options.file);
+  EdgeData shape = read_edge_data(options.file);
   Check check;
   try {
     const libmap::HeightFunction ground = find_ground(options, shape, check, run);
@@ -207,7 +208,7 @@ libmap::Table table_of(const libmap::SpotCheckResult& result) {
 
 Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
 
-Json to_json(const Check& check, const SpotCheckCommandOptions& options) {
+Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
   const libmap::SpotCheckResult& result = check.result;
   Json edges = Json::array();
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
@@ -232,10 +233,10 @@ Json to_json(const Check& check, const SpotCheckCommandOptions& options) {
           {"max_m", result.max_size_m},   {"published_mean_m", published_mean_m}};
 }
 
-void print(const Check& check, const SpotCheckCommandOptions& options) {
+void print_check(const Check& check, const SpotCheckCommandOptions& options) {
   const libmap::SpotCheckResult& result = check.result;
   if (options.json) {
-    std::cout << to_json(check, options).dump(2, ' ', false, Json::error_handler_t::replace)
+    std::cout << check_json(check, options).dump(2, ' ', false, Json::error_handler_t::replace)
               << "\n";
     return;
   }
@@ -267,7 +268,7 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
   if (!options.truth.empty() && options.ground != Ground::automatic)
     throw libmap::Error("--truth gives the ground already", {.file = {}, .field = "--ground"});
   const Check check = check_site(options, run);
-  print(check, options);
+  print_check(check, options);
   if (options.output.empty()) return;
   run.add_input(options.file);
   libmap::Manifest& manifest = run.manifest();
@@ -290,12 +291,14 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int graspmap_tools::compare_edges(int argc, char** argv) {
   SpotCheckCommandOptions options;
+  bool edges = true;
   graspmap_tools::Command command(
-      "spot-check",
-      "Height errors at places along the four edges of a site: a (y = min), then "
+      "compare",
+      "With --edges: height errors at locations along the four edges of a site: a (y = min), then "
       "counter-clockwise b (x = max), c (y = max), d (x = min).");
+  command.flag("--edges", edges, "measure along the edges of one site");
   command.input("SITE", options.file, "cloud or mesh");
   command.output(options.output, "table: edge, e1_m, e2_m, ..., mean_m (.csv)", false);
   command.option("--truth", "MESH", options.truth,

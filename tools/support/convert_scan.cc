@@ -1,4 +1,5 @@
-// graspmap extract: a scan as plain files.
+#include "tools/support/convert_scan.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,16 +12,18 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/depth_codec.h"
 #include "libmap/scan/frame_batch.h"
 #include "libmap/scan/frame_folder_writer.h"
 #include "libmap/scan/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/command_line.h"
-#include "tools/extract_pictures.h"
-#include "tools/result_counts.h"
-#include "tools/scan_poses.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/result_counts.h"
+#include "tools/support/scan_pictures.h"
+#include "tools/support/scan_poses.h"
 
 namespace {
 
@@ -201,9 +204,17 @@ void extract(ExtractOptions& options, Run& run) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+bool graspmap_tools::is_scan_path(const std::string& path) {
+  std::error_code code;
+  if (!fs::is_directory(path, code)) return fs::path(path).extension() == ".db";
+  return !is_tile_store(path) && !libmap::is_trajectory_path(path);
+}
+
+int graspmap_tools::convert_scan(int argc, char** argv) {
   ExtractOptions options;
-  graspmap_tools::Command command("extract", "A scan as plain files: images, calibrations, poses.");
+  graspmap_tools::Command command(
+      "convert",
+      "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "folder of the whole scan, replaced as a whole", false);
   command.flag("--strict", options.strict, "end at a frame that is broken");

@@ -1,4 +1,4 @@
-#include "tools/end_signals.h"
+#include "tools/support/end_signals.h"
 
 #include <fcntl.h>
 #include <pthread.h>

@@ -1,5 +1,4 @@
-// graspmap panorama: depth images of a camera rig -> one cloud in the robot's frame.
-#include "libmap/cloud/panorama.h"
+#include "tools/support/fuse_rig.h"
 
 #include <fmt/format.h>
 
@@ -9,12 +8,13 @@
 #include <vector>
 
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/panorama.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "libmap/scan/rig_images.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/result_counts.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/result_counts.h"
 
 namespace {
 
@@ -77,9 +77,9 @@ void report_absent(const libmap::CameraRig& rig, const RigMoment& moment,
   }
 }
 
-void add_results(const libmap::CameraRig& rig, const RigMoment& moment,
-                 const libmap::PanoramaResult& result,
-                 const std::vector<libmap::PanoramaView>& views, libmap::Manifest& manifest) {
+void add_rig_results(const libmap::CameraRig& rig, const RigMoment& moment,
+                     const libmap::PanoramaResult& result,
+                     const std::vector<libmap::PanoramaView>& views, libmap::Manifest& manifest) {
   manifest.frame = "robot";
   const graspmap_tools::ResultCounts count(manifest);
   manifest.results.emplace_back("stamp_s", moment.stamp_s);
@@ -159,7 +159,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   if (views.empty())
     throw libmap::Error("no image of the moment can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
-  add_results(rig, moment, result, views, run.manifest());
+  add_rig_results(rig, moment, result, views, run.manifest());
   graspmap_tools::carry_transforms(options.folder, run);
   run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(),
                       cameras, libmap::to_text(moment.stamp_s)));
@@ -170,11 +170,14 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
 
 }  // namespace
 
-int main(int argc, char** argv) {
+int graspmap_tools::fuse_rig(int argc, char** argv) {
   PanoramaCommandOptions options;
   graspmap_tools::Command command(
-      "panorama", "One cloud in the robot's frame from the depth images of its cameras.");
-  command.input("DIR", options.folder, "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
+      "fuse",
+      "With the folder of a camera rig: one cloud in the robot's frame from the depth images that "
+      "its cameras took at one time.");
+  command.input("RIG_FOLDER", options.folder,
+                "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
   command.option(
       "--rig", "FILE|NAME", options.rig,

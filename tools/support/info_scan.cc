@@ -1,4 +1,4 @@
-#include "tools/info_scan.h"
+#include "tools/support/info_scan.h"
 
 #include <fmt/format.h>
 

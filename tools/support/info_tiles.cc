@@ -1,10 +1,10 @@
-#include "tools/info_tiles.h"
+#include "tools/support/info_tiles.h"
 
 #include <Eigen/Geometry>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "tools/map_tiles.h"
+#include "tools/support/map_tiles.h"
 
 namespace graspmap_tools {
 

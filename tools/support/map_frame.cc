@@ -1,4 +1,4 @@
-#include "tools/map_frame.h"
+#include "tools/support/map_frame.h"
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"

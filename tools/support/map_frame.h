@@ -9,7 +9,7 @@
 
 #include "libmap/core/pose.h"
 #include "libmap/core/table.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

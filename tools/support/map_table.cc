@@ -1,8 +1,11 @@
-// graspmap summarize: several maps in one table, a row each, and how they do where their
-// graspability is expected.
+#include "tools/support/map_table.h"
+
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,37 +15,31 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/text_list.h"
+#include "libmap/view/charts.h"
+#include "libmap/view/virtual_display.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/text_list.h"
+
+namespace graspmap_tools {
+
+void bind(libmap::ParameterTable& table, MapTableOptions& options) {
+  table.add("cutoff", options.cutoff,
+            "of several maps: score from which a voxel counts as graspable; auto: each map's own "
+            "threshold");
+  table.add("names", options.names,
+            "of several maps in the tables, in their order, with | between; default: their files");
+  table.add("pairs", options.pairs, "of several maps of one cloud: compare each with each");
+  table.add("varied", options.varied,
+            "of several maps: parameter that they differ in, a column of maps.csv; charts show the "
+            "graspable share and, with --expected, Youden's index against it");
+  table.add("series", options.series,
+            "of these charts: columns of maps.csv, with commas between; one curve per combination");
+}
 
 namespace {
 
-using graspmap_tools::Run;
-
-struct SummarizeOptions {
-  std::vector<std::string> maps;
-  std::string folder;
-  std::string expected;
-  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
-  std::string cutoff = "auto";
-  std::string names;  // with '|' between
-  bool pairs = false;
-};
-
-void bind(libmap::ParameterTable& table, SummarizeOptions& options) {
-  table.add("cutoff", options.cutoff,
-            "score from which a voxel counts as graspable; auto: each map's own threshold");
-  table.add(
-      "names", options.names,
-      "of the maps in the tables, in their order, with | between; the others' are their files");
-  table.add("pairs", options.pairs, "compare each map with each: they are of one cloud");
-  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
-            "frame of the expected regions: of the cloud that was scored, the terrain's, or the "
-            "map's before it was cropped");
-}
-
-double cutoff_of(const SummarizeOptions& options, const libgtd::MapSummaryOptions& own) {
+double cutoff_of(const MapTableOptions& options, const libgtd::MapSummaryOptions& own) {
   if (options.cutoff == "auto") return own.graspability_threshold;
   const auto value = libmap::parse_double(options.cutoff);
   if (value && std::isfinite(*value)) return *value;
@@ -55,7 +52,7 @@ struct ReadMap {
   libgtd::VoxelMap voxels;  // empty unless pairs are compared
 };
 
-ReadMap summarize_one(const std::string& file, const SummarizeOptions& options,
+ReadMap summarize_one(const std::string& file, const MapTableOptions& options,
                       const libgtd::ExpectedMap* expected, Run& run) {
   ReadMap read;
   libgtd::SummarizedMap& map = read.summarized;
@@ -70,9 +67,7 @@ ReadMap summarize_one(const std::string& file, const SummarizeOptions& options,
   map.summary = libgtd::summarize_map(cloud, read.voxels, own);
   if (expected != nullptr)
     map.expected = libgtd::evaluate_expected_map(
-        cloud,
-        libgtd::transformed(*expected,
-                            graspmap_tools::map_from_points(file, options.points_frame, run)),
+        cloud, libgtd::transformed(*expected, map_from_points(file, options.points_frame, run)),
         map.cutoff);
   if (!options.pairs) read.voxels = {};
   return read;
@@ -120,22 +115,92 @@ void say(const libgtd::SummarizedMap& map, Run& run) {
   run.say(text);
 }
 
-void summarize(const SummarizeOptions& options, Run& run) {
-  run.claim_output_folder(options.folder);
+// Rows without one of the two numbers are left out. The curves are in the order in which their
+// names first appear, their points by ascending x.
+libmap::Chart chart_of(const libmap::Table& table, const std::string& x, const std::string& y,
+                       const std::string& series) {
+  libmap::Chart chart;
+  chart.x_axis.title = x;
+  chart.y_axis.title = y;
+  std::vector<std::size_t> columns;
+  for (const std::string& name : libmap::split_list(series)) columns.push_back(table.column(name));
+  std::vector<std::vector<std::pair<double, double>>> points;
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    const auto at = table.optional_number(row, table.column(x));
+    const auto value = table.optional_number(row, table.column(y));
+    if (!at || !value || !std::isfinite(*at) || !std::isfinite(*value)) continue;
+    std::string name;
+    for (const std::size_t column : columns)
+      name += (name.empty() ? "" : ", ") + table.rows[row][column];
+    std::size_t n = 0;
+    while (n < chart.curves.size() && chart.curves[n].name != name) ++n;
+    if (n == chart.curves.size()) {
+      chart.curves.emplace_back().name = name;
+      points.emplace_back();
+    }
+    points[n].emplace_back(*at, *value);
+  }
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    std::stable_sort(points[n].begin(), points[n].end(),
+                     [](const auto& a, const auto& b) { return a.first < b.first; });
+    libmap::ChartCurve& curve = chart.curves[n];
+    curve.markers = true;
+    for (const auto& [at, value] : points[n]) {
+      curve.x.push_back(at);
+      curve.y.push_back(value);
+    }
+  }
+  return chart;
+}
+
+using Files = std::vector<std::pair<std::string, Run::Writer>>;
+
+void add_chart(Files& files, const std::string& name, const libmap::Chart& chart) {
+  if (chart.curves.empty()) return;
+  files.emplace_back(name + ".svg", [chart](const std::filesystem::path& temporary) {
+    libmap::write_chart_svg(temporary, chart);
+  });
+  files.emplace_back(name + ".png", [chart](const std::filesystem::path& temporary) {
+    libmap::write_text(temporary, libmap::to_png(libmap::draw_chart(chart)));
+  });
+}
+
+void add_charts(Files& files, const libmap::Table& maps, const libmap::Table& histograms,
+                const MapTableOptions& options) {
+  libmap::Chart scores = chart_of(histograms, "score", "share", "map");
+  scores.y_axis.title = "share of the evaluated voxels";
+  scores.x_axis.range = {0.0, 1.0};
+  add_chart(files, "histograms", scores);
+  if (options.varied.empty()) return;
+  add_chart(files, "graspable_share",
+            chart_of(maps, options.varied, "graspable_share", options.series));
+  if (options.expected.empty()) return;
+  for (const char* column : {"voxel_youden", "place_youden"}) {
+    libmap::Chart chart = chart_of(maps, options.varied, column, options.series);
+    chart.y_axis.range = {0.0, 1.0};
+    add_chart(files, column, chart);
+  }
+}
+
+}  // namespace
+
+void tabulate_maps(const std::vector<std::string>& map_files, const std::string& folder,
+                   const MapTableOptions& options, Run& run) {
+  run.claim_output_folder(folder);
   std::optional<libgtd::ExpectedMap> expected;
   if (!options.expected.empty()) {
     expected = libgtd::parse_expected_map(libmap::read_csv(options.expected));
     run.add_input(options.expected);
   }
-  const std::vector<std::string> names = graspmap_tools::split_texts(options.names);
-  if (names.size() > options.maps.size())
+  const std::vector<std::string> names = split_texts(options.names);
+  if (names.size() > map_files.size())
     throw libmap::Error("more names than maps",
                         {.field = "--names",
                          .value = std::to_string(names.size()),
-                         .bound = "<= " + std::to_string(options.maps.size())});
+                         .bound = "<= " + std::to_string(map_files.size())});
   std::vector<libgtd::SummarizedMap> maps;
   std::vector<libgtd::VoxelMap> voxels;
-  for (const std::string& file : options.maps) {
+  for (const std::string& file : map_files) {
     try {
       ReadMap read = summarize_one(file, options, expected ? &*expected : nullptr, run);
       if (maps.size() < names.size() && !names[maps.size()].empty())
@@ -153,28 +218,24 @@ void summarize(const SummarizeOptions& options, Run& run) {
       libmap::write_text(temporary, text);
     };
   };
-  std::vector<std::pair<std::string, Run::Writer>> files = {
-      {"maps.csv", table(libgtd::summary_table(maps))},
-      {"histograms.csv", table(libgtd::histogram_table(maps))}};
+  const libmap::Table rows = libgtd::summary_table(maps);
+  const libmap::Table histograms = libgtd::histogram_table(maps);
+  Files files = {{"maps.csv", table(rows)}, {"histograms.csv", table(histograms)}};
   if (options.pairs)
     files.emplace_back("pairs.csv", table(libgtd::pair_table(maps, run.timed("pairs", [&] {
                          return compare_all(maps, voxels);
                        }))));
   if (expected) files.emplace_back("regions.csv", table(libgtd::region_table(maps, *expected)));
-  run.write_output_folder(options.folder, files);
+  std::optional<libmap::VirtualDisplay> display;
+  if (options.pictures) {
+    try {
+      add_charts(files, rows, histograms, options);
+    } catch (const libmap::Error& error) {
+      throw libmap::Error(error.reason(), {.file = "maps.csv", .field = error.context().field});
+    }
+    if (!run.options().dry_run) display.emplace();
+  }
+  run.write_output_folder(folder, files);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
-  SummarizeOptions options;
-  graspmap_tools::Command command(
-      "summarize", "Several maps in one table, also against places of expected graspability.");
-  command.inputs("MAP", options.maps, "graspability maps");
-  command.output(options.folder,
-                 "folder of maps.csv, histograms.csv and, if asked for, pairs.csv and regions.csv");
-  command.option("--expected", "EXPECTED.csv", options.expected,
-                 "regions of expected graspability, e.g. data/expected/primitive_shapes.csv");
-  bind(command.parameters(), options);
-  return command.run(argc, argv, [&](Run& run) { summarize(options, run); });
-}
+}  // namespace graspmap_tools

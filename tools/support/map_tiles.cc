@@ -1,4 +1,4 @@
-#include "tools/map_tiles.h"
+#include "tools/support/map_tiles.h"
 
 #include <algorithm>
 #include <utility>

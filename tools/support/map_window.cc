@@ -1,4 +1,4 @@
-#include "tools/map_window.h"
+#include "tools/support/map_window.h"
 
 #include <algorithm>
 #include <cmath>

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "libmap/core/point_cloud.h"
-#include "tools/map_tiles.h"
+#include "tools/support/map_tiles.h"
 
 namespace graspmap_tools {
 

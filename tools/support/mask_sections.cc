@@ -1,4 +1,4 @@
-#include "tools/mask_sections.h"
+#include "tools/support/mask_sections.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,5 @@
-// graspmap merge: the tiles of a map into one map.
+#include "tools/support/merge_tiles.h"
+
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -15,18 +16,13 @@
 #include "libmap/cloud/pcd_parts.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "tools/command_line.h"
-#include "tools/map_tiles.h"
-#include "tools/result_counts.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/result_counts.h"
 
 namespace {
 
 using graspmap_tools::Run;
-
-struct MergeOptions {
-  std::vector<std::string> tiles;
-  std::string output;
-};
 
 libmap::Manifest manifest_of(const std::string& tile) {
   const auto manifest = libmap::read_manifest_of(tile);
@@ -197,8 +193,8 @@ void write_store(const graspmap_tools::MapTiles& tiles, const std::string& store
   run.progress().end();
 }
 
-void merge_store(const MergeOptions& options, Run& run) {
-  const graspmap_tools::MapTiles tiles(options.tiles.front());
+void merge_store(const std::string& store, const std::string& output, Run& run) {
+  const graspmap_tools::MapTiles tiles(store);
   const libgtd::TileStoreIndex& index = tiles.index();
   std::uint64_t edge = 0;
   std::uint64_t graspable = 0;
@@ -208,41 +204,48 @@ void merge_store(const MergeOptions& options, Run& run) {
   }
   copy_common_facts(index.manifest, run.manifest());
   run.manifest().inputs = index.manifest.inputs;
-  run.add_input(graspmap_tools::store_index_path(options.tiles.front()));
+  run.add_input(graspmap_tools::store_index_path(store));
   const graspmap_tools::ResultCounts count(run.manifest());
   count("scored_voxels", index.voxels());
   count("edge_voxels", edge);
   count("graspable_voxels", graspable);
-  run.write_output(options.output, [&](const auto& temporary) {
-    write_store(tiles, options.tiles.front(), temporary, run);
-  });
+  run.write_output(output,
+                   [&](const auto& temporary) { write_store(tiles, store, temporary, run); });
   run.say(fmt::format("{} scored voxels from {} tiles", index.voxels(), index.tiles.size()));
 }
 
-void merge(const MergeOptions& options, Run& run) {
-  libmap::require_cloud_format(options.output);
-  run.claim_output(options.output, options.tiles);
-  const auto store =
-      std::find_if(options.tiles.begin(), options.tiles.end(), graspmap_tools::is_tile_store);
-  if (store != options.tiles.end()) {
-    if (options.tiles.size() > 1)
-      throw libmap::Error("a tile store is merged by itself", {.file = *store});
-    return merge_store(options, run);
+}  // namespace
+
+bool graspmap_tools::is_part_of_map(const std::string& file) {
+  if (is_tile_store(file)) return true;
+  const auto manifest = libmap::read_manifest_of(file);
+  const libmap::ManifestValue* tile = manifest ? manifest->find_parameter("tile") : nullptr;
+  return tile != nullptr && *tile != libmap::ManifestValue(std::string());
+}
+
+void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
+                                 Run& run) {
+  libmap::require_cloud_format(output);
+  run.claim_output(output, tiles);
+  const auto store = std::find_if(tiles.begin(), tiles.end(), graspmap_tools::is_tile_store);
+  if (store != tiles.end()) {
+    if (tiles.size() > 1) throw libmap::Error("a tile store is merged by itself", {.file = *store});
+    return merge_store(*store, output, run);
   }
   std::vector<libmap::Manifest> manifests;
-  for (const std::string& tile : options.tiles) {
+  for (const std::string& tile : tiles) {
     manifests.push_back(manifest_of(tile));
-    require_same_map(manifests.front(), manifests.back(), options.tiles.front(), tile);
+    require_same_map(manifests.front(), manifests.back(), tiles.front(), tile);
   }
-  require_all_shares(manifests, options.tiles);
+  require_all_shares(manifests, tiles);
   std::vector<libmap::PointCloud> parts;
-  for (const std::string& tile : options.tiles) parts.push_back(libmap::read_cloud(tile).cloud);
-  libmap::PointCloud whole = joined(parts, options.tiles.front());
+  for (const std::string& tile : tiles) parts.push_back(libmap::read_cloud(tile).cloud);
+  libmap::PointCloud whole = joined(parts, tiles.front());
   restore_full_precision(manifests.front(), whole);
   copy_common_facts(manifests.front(), run.manifest());
   // The terrain and the gripper that the parts were made from, then the parts.
   run.manifest().inputs = manifests.front().inputs;
-  for (const std::string& tile : options.tiles) run.add_input(tile);
+  for (const std::string& tile : tiles) run.add_input(tile);
   run.manifest().results.emplace_back("scored_voxels", static_cast<std::int64_t>(whole.size()));
   run.manifest().results.emplace_back("edge_voxels", count_of(whole, "edge"));
   run.manifest().results.emplace_back("graspable_voxels", count_of(whole, "graspable"));
@@ -250,20 +253,7 @@ void merge(const MergeOptions& options, Run& run) {
   try {
     judge_obstacles(manifests.front(), whole, run);
   } catch (const libmap::Error& error) {
-    throw error.in_file(libmap::manifest_path(options.tiles.front()).string());
+    throw error.in_file(libmap::manifest_path(tiles.front()).string());
   }
-  run.write_output(options.output,
-                   [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
-}
-
-}  // namespace
-
-int main(int argc, char** argv) {
-  MergeOptions options;
-  graspmap_tools::Command command("merge", "The tiles of a map into one map.");
-  command.inputs(
-      "TILE", options.tiles,
-      "a tile store (.tiles), or the maps that `graspmap score --tile K/N` wrote, all N");
-  command.output(options.output, "the whole map, the same bytes as without --tile");
-  return command.run(argc, argv, [&](Run& run) { merge(options, run); });
+  run.write_output(output, [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
 }

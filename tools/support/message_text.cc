@@ -1,4 +1,4 @@
-#include "tools/message_text.h"
+#include "tools/support/message_text.h"
 
 #include <fmt/format.h>
 

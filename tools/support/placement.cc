@@ -1,4 +1,4 @@
-#include "tools/placement.h"
+#include "tools/support/placement.h"
 
 #include <cmath>
 #include <filesystem>

@@ -1,4 +1,4 @@
-#include "tools/plane_report.h"
+#include "tools/support/plane_report.h"
 
 #include <fmt/format.h>
 

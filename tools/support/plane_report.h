@@ -4,7 +4,7 @@
 #include <string>
 
 #include "libgtd/terrain/regression_plane.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

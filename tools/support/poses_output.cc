@@ -1,4 +1,4 @@
-#include "tools/poses_output.h"
+#include "tools/support/poses_output.h"
 
 #include <fmt/format.h>
 

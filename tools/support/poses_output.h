@@ -7,7 +7,7 @@
 
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

@@ -1,4 +1,4 @@
-#include "tools/progress_output.h"
+#include "tools/support/progress_output.h"
 
 #include <fmt/format.h>
 #include <unistd.h>

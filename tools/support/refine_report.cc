@@ -1,4 +1,4 @@
-#include "tools/refine_report.h"
+#include "tools/support/refine_report.h"
 
 #include <fmt/format.h>
 

@@ -1,4 +1,4 @@
-#include "tools/report_map.h"
+#include "tools/support/report_map.h"
 
 #include <algorithm>
 #include <cmath>
@@ -14,8 +14,8 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
-#include "tools/map_frame.h"
-#include "tools/map_tiles.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/map_tiles.h"
 
 namespace graspmap_tools {
 

@@ -6,7 +6,7 @@
 #include <optional>
 
 #include "libmap/report/map_view.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

@@ -1,4 +1,4 @@
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -12,7 +12,7 @@
 #include "libmap/core/folder_output.h"
 #include "libmap/core/named_output.h"
 #include "libmap/core/unfinished_outputs.h"
-#include "tools/message_text.h"
+#include "tools/support/message_text.h"
 
 namespace graspmap_tools {
 

@@ -1,5 +1,5 @@
-#include "tools/extract_pictures.h"
-#include "tools/result_counts.h"
+#include "tools/support/scan_pictures.h"
+#include "tools/support/result_counts.h"
 
 #include <fmt/format.h>
 
@@ -17,7 +17,7 @@
 #include "libmap/scan/image_sharpness.h"
 #include "libmap/scan/picture_file.h"
 #include "libmap/scan/pinhole_image.h"
-#include "tools/placement.h"
+#include "tools/support/placement.h"
 
 namespace graspmap_tools {
 

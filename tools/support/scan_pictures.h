@@ -1,4 +1,4 @@
-// `graspmap extract --bundler` and `--colmap`: the pictures of a scan and their cameras, for
+// `graspmap convert SCAN --bundler` and `--colmap`: the pictures of a scan and their cameras, for
 // MeshLab and for COLMAP.
 #pragma once
 
@@ -7,9 +7,9 @@
 #include "libmap/scan/colmap_builder.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/scan/view_selection.h"
-#include "tools/command_line.h"
-#include "tools/run.h"
-#include "tools/scan_poses.h"
+#include "tools/support/command_line.h"
+#include "tools/support/run.h"
+#include "tools/support/scan_poses.h"
 
 namespace graspmap_tools {
 

@@ -1,4 +1,4 @@
-#include "tools/scan_poses.h"
+#include "tools/support/scan_poses.h"
 
 #include <fmt/format.h>
 
@@ -13,7 +13,7 @@
 #include "libmap/poses/trajectory_error.h"
 #include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rtabmap_reader.h"
-#include "tools/map_frame.h"
+#include "tools/support/map_frame.h"
 
 namespace graspmap_tools {
 

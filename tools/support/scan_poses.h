@@ -8,8 +8,8 @@
 #include "libmap/core/pose_graph.h"
 #include "libmap/poses/pose_import.h"
 #include "libmap/scan/scan_source.h"
-#include "tools/command_line.h"
-#include "tools/run.h"
+#include "tools/support/command_line.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

@@ -1,4 +1,4 @@
-#include "tools/scene_file.h"
+#include "tools/support/scene_file.h"
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -11,8 +11,8 @@
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/textured_mesh_io.h"
-#include "tools/map_tiles.h"
-#include "tools/map_window.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/map_window.h"
 
 namespace graspmap_tools {
 namespace {
@@ -138,7 +138,9 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
 
 const std::vector<std::pair<std::string, MapHeading>>& map_heading_names() {
   static const std::vector<std::pair<std::string, MapHeading>> names = {
-      {"terrain", MapHeading::terrain}, {"input", MapHeading::input}};
+      {"auto", MapHeading::automatic},
+      {"terrain", MapHeading::terrain},
+      {"input", MapHeading::input}};
   return names;
 }
 

@@ -1,4 +1,4 @@
-// What `render` and `sheet` show of a file, as the user asks for it.
+// What `render` shows of a file, as the user asks for it.
 #pragma once
 
 #include <cstdint>
@@ -9,14 +9,15 @@
 
 #include "libmap/core/parameters.h"
 #include "libmap/view/scene_view.h"
-#include "tools/map_frame.h"
-#include "tools/run.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 
 // How a map lies in the picture. terrain: as in its terrain frame. input: turned about z and moved
 // level, so that x and y are those of the cloud that was scored; heights stay the terrain's.
-enum class MapHeading { terrain, input };
+// automatic: terrain for one file, input for several.
+enum class MapHeading { automatic, terrain, input };
 const std::vector<std::pair<std::string, MapHeading>>& map_heading_names();
 
 // One file as a scene, with listed places on it.
@@ -32,7 +33,7 @@ struct SceneFileOptions {
   libmap::Coloring coloring;
   libmap::PointShape point_shape = libmap::PointShape::automatic;
   libmap::Shading shading = libmap::Shading::automatic;
-  MapHeading heading = MapHeading::terrain;
+  MapHeading heading = MapHeading::automatic;
 };
 
 // All but `points`, which is an option of its own.

@@ -1,4 +1,4 @@
-#include "tools/score_store.h"
+#include "tools/support/score_store.h"
 
 #include <fmt/format.h>
 
@@ -18,9 +18,9 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/named_output.h"
 #include "libmap/core/parallel.h"
-#include "tools/map_frame.h"
-#include "tools/needed_tiles.h"
-#include "tools/plane_report.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/needed_tiles.h"
+#include "tools/support/plane_report.h"
 
 namespace graspmap_tools {
 

@@ -6,7 +6,7 @@
 
 #include "libgtd/detect.h"
 #include "libgtd/score/graspability_map.h"
-#include "tools/run.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

@@ -14,9 +14,9 @@
 #include "libmap/scan/rig_images.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/simulate/robot_cameras.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/simulate_commands.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/simulate_commands.h"
 
 namespace {
 

@@ -11,10 +11,10 @@
 #include "libmap/scan/camera_io.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/simulate/scan_simulation.h"
-#include "tools/command_line.h"
-#include "tools/map_frame.h"
-#include "tools/result_counts.h"
-#include "tools/simulate_commands.h"
+#include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
+#include "tools/support/result_counts.h"
+#include "tools/support/simulate_commands.h"
 
 namespace {
 

@@ -9,8 +9,8 @@
 #include "libmap/simulate/primitive_scene_io.h"
 #include "libmap/simulate/scene_mesh.h"
 #include "libmap/simulate/scene_sampling.h"
-#include "tools/command_line.h"
-#include "tools/simulate_commands.h"
+#include "tools/support/command_line.h"
+#include "tools/support/simulate_commands.h"
 
 namespace {
 

@@ -11,8 +11,8 @@
 #include "libmap/simulate/field_points.h"
 #include "libmap/simulate/rock_site_io.h"
 #include "libmap/simulate/site_mesh.h"
-#include "tools/command_line.h"
-#include "tools/simulate_commands.h"
+#include "tools/support/command_line.h"
+#include "tools/support/simulate_commands.h"
 
 namespace {
 

@@ -10,8 +10,8 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 #include "libmap/simulate/terrain_pieces.h"
-#include "tools/command_line.h"
-#include "tools/simulate_commands.h"
+#include "tools/support/command_line.h"
+#include "tools/support/simulate_commands.h"
 
 namespace {
 

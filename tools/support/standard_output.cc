@@ -1,4 +1,4 @@
-#include "tools/standard_output.h"
+#include "tools/support/standard_output.h"
 
 #include <cerrno>
 #include <cstdio>

@@ -1,4 +1,4 @@
-#include "tools/text_list.h"
+#include "tools/support/text_list.h"
 
 #include "libmap/core/text.h"
 

@@ -1,4 +1,4 @@
-#include "tools/version_text.h"
+#include "tools/support/version_text.h"
 
 #include <CGAL/version.h>
 #include <assimp/version.h>

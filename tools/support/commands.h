@@ -1,0 +1,45 @@
+// The commands of graspmap: the one place that describes them. `graspmap --help`, each command's own
+// --help, completion, man pages and the manual's table come from here.
+#pragma once
+
+#include <string_view>
+
+namespace graspmap_tools {
+
+struct CommandEntry {
+  std::string_view group;
+  std::string_view name;
+  std::string_view summary;
+};
+
+constexpr CommandEntry commands[] = {
+    {"Scan", "simulate", "simulate terrains, sites, scans and robot cameras with known truth"},
+    {"Scan", "calibrate", "calibrate a camera from pictures of a chessboard"},
+    {"Scan", "refine", "refine the poses of a scan: loop closures, pose graph, bundle adjustment"},
+    {"Scan", "fuse", "fuse the depth images of a scan or a camera rig into one cloud"},
+    {"Scan", "bag", "read and write ROS 1 bags without ROS"},
+    {"Surface", "mesh", "reconstruct a surface from a cloud"},
+    {"Surface", "texture", "texture a mesh with the photographs of its scan"},
+    {"Surface", "crop", "level a cloud or mesh and crop it to the test site"},
+    {"Surface", "resample", "sample a surface evenly (Poisson disk)"},
+    {"Surface", "compare", "measure distances between surfaces, or heights along a site's edges"},
+    {"Map", "mask", "write the mask of a gripper as text, cloud or picture"},
+    {"Map", "score", "compute the graspability map of a terrain, tile by tile"},
+    {"Map", "analyze", "analyze a map, compare it with another, or tabulate several maps"},
+    {"Map", "footholds", "list the best footholds of a map for a step planner"},
+    {"Field test", "lookup", "look up a map's values at listed locations"},
+    {"Field test", "evaluate", "evaluate looked-up scores against a field test: ROC, AUC, accuracy"},
+    {"Pictures and files", "render", "draw clouds, meshes and maps, one or several side by side"},
+    {"Pictures and files", "report", "write one HTML report of a whole run"},
+    {"Pictures and files", "info", "describe a scan, a cloud, a mesh, a map or a bag"},
+    {"Pictures and files", "convert", "convert scans, poses, clouds, meshes and maps; merge tiles"},
+};
+
+// The command's summary; empty if there is none of this name.
+constexpr std::string_view summary_of(std::string_view name) {
+  for (const CommandEntry& command : commands)
+    if (command.name == name) return command.summary;
+  return {};
+}
+
+}  // namespace graspmap_tools
