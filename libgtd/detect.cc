@@ -2,6 +2,7 @@
 
 #include <utility>
 
+#include "libgtd/gripper/gripper_io.h"
 #include "libgtd/terrain/interpolation.h"
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
@@ -115,6 +116,12 @@ const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names() {
   return names;
 }
 
+Gripper gripper_of(const DetectionOptions& options) {
+  const Scenario& scenario = options.scenario;
+  return options.gripper ? *options.gripper
+                         : find_gripper(scenario.gripper, scenario.gripper_overrides);
+}
+
 DetectionResult detect(const PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress) {
   const Scenario& scenario = options.scenario;
@@ -124,7 +131,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.points = terrain.size();
   // Before any work: a voxel size that does not suit the gripper shows here.
   result.mask = make_gripper_mask(
-      options.gripper, {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
+      gripper_of(options), {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
   const int voxels_a_tile = tile_voxels(scenario);
   const PointCloud in_frame = prepare_terrain(terrain, options, result);
   const PointCloud filled =

@@ -24,7 +24,7 @@ const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names();
 
 struct DetectionOptions {
   Scenario scenario;
-  Gripper gripper;
+  std::optional<Gripper> gripper;  // default: the one that the scenario names
   PlaneSource plane = PlaneSource::fit;
   std::optional<Eigen::Vector3d> up;  // in the cloud's frame: which side of the plane is outside
   TileShare share;                    // score only these tiles
@@ -50,6 +50,9 @@ struct DetectionResult {
   std::size_t obstacle_voxels = 0;    // of the whole map alone, not of a share
   libmap::StageTimings timings_s;     // wall time of each step
 };
+
+// The gripper of `options`: its own, else the scenario's with its overrides. Throws as find_gripper.
+Gripper gripper_of(const DetectionOptions& options);
 
 // Throws Error for an empty cloud, options out of their bounds, and what the steps throw.
 DetectionResult detect(const libmap::PointCloud& terrain, const DetectionOptions& options,

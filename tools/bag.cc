@@ -7,6 +7,7 @@
 #include <string>
 
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
@@ -103,7 +104,7 @@ std::optional<double> graspmap_tools::bag_stamp(const BagCommandOptions& options
 }
 
 libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& run) {
-  const fs::path file = fs::exists(name) ? fs::path(name) : find_data_file("rigs", name);
+  const fs::path file = fs::exists(name) ? fs::path(name) : libmap::find_data_file("rigs", name);
   libmap::CameraRig rig = libmap::read_rig(file);
   run.add_input(file);
   return rig;

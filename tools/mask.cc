@@ -6,6 +6,7 @@
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/view/picture_sheet.h"
@@ -97,7 +98,7 @@ void mask(const MaskOptions& options, Run& run) {
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
   refuse_ignored(options, extension);
   run.claim_output(options.output);
-  const auto file = graspmap_tools::find_data_file("grippers", options.gripper);
+  const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
   const GripperMask made = libgtd::make_gripper_mask(gripper, options.mask);
   run.add_input(file);

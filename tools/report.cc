@@ -7,6 +7,7 @@
 #include <system_error>
 #include <vector>
 
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/report/found_outline.h"
@@ -68,7 +69,7 @@ std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::Outli
 }
 
 std::string read_asset(const std::string& name, Run& run) {
-  const fs::path path = graspmap_tools::toolkit_data_folder() / "report" / name;
+  const fs::path path = libmap::data_folder() / "report" / name;
   run.add_input(path);
   return libmap::read_whole_file(path);
 }
@@ -100,7 +101,7 @@ libmap::Outline find_outline(const ReportCommandOptions& options, Run& run) {
   if (options.outline.empty()) {
     outline = libmap::outline_of_folder(options.folder);
   } else {
-    const fs::path file = graspmap_tools::find_data_file("reports", options.outline);
+    const fs::path file = libmap::find_data_file("reports", options.outline);
     run.add_input(file);
     outline = libmap::read_outline(file);
   }

@@ -9,6 +9,7 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/cloud_pieces.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "tools/support/command_line.h"
@@ -141,10 +142,9 @@ void score(ScoreOptions& options, Run& run) {
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
     throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
                         {.field = "--up", .value = options.up});
-  const auto gripper_file = graspmap_tools::find_data_file("grippers", scenario.gripper);
-  options.detection.gripper = libgtd::read_gripper(gripper_file, scenario.gripper_overrides);
+  const auto gripper_file = libmap::find_data_file("grippers", scenario.gripper);
   // Before any work: a voxel size that does not suit the gripper shows here.
-  libgtd::make_gripper_mask(options.detection.gripper,
+  libgtd::make_gripper_mask(libgtd::gripper_of(options.detection),
                             {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
   if (libgtd::is_tile_store_name(options.output)) {
     graspmap_tools::score_into_store(
@@ -213,6 +213,6 @@ int main(int argc, char** argv) {
                "the terrain has more pieces than the tile store: score the tiles that they touch");
   bind(command.parameters(), options);
   command.config_resolver(
-      [](const std::string& name) { return graspmap_tools::find_data_file("scenarios", name); });
+      [](const std::string& name) { return libmap::find_data_file("scenarios", name); });
   return command.run(argc, argv, [&](Run& run) { score(options, run); });
 }

@@ -94,14 +94,14 @@ std::vector<std::string> roc_row(const std::string& name, const char* at, const 
           text_or_empty(share)};
 }
 
-Json json_of(const std::optional<Interval>& interval) {
+Json number_or_null(const std::optional<Interval>& interval) {
   if (!interval) return nullptr;
   return Json::array({interval->low, interval->high});
 }
 
-Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
 
-Json json_of(const RocResult& result) {
+Json number_or_null(const RocResult& result) {
   const Confusion& counts = result.at_rate_cutoff.counts;
   Json json;
   json["locations"] = counts.size();
@@ -112,7 +112,7 @@ Json json_of(const RocResult& result) {
   Json auc;
   if (const auto& area = result.area) {
     auc["trapezoid"] = area->trapezoid;
-    auc["trapezoid_bootstrap_95"] = json_of(area->trapezoid_bootstrap_95);
+    auc["trapezoid_bootstrap_95"] = number_or_null(area->trapezoid_bootstrap_95);
     auc["upper_sum"] = area->upper_sum;
     auc["upper_sum_shares"] = area->upper_sum_shares;
     auc["upper_sum_width"] = area->upper_sum_width;
@@ -125,8 +125,8 @@ Json json_of(const RocResult& result) {
   for (const NamedRate& named : named_rates(counts))
     rates[named.name] = {{"count", named.rate.count},
                          {"total", named.rate.total},
-                         {"value", json_of(named.rate.value())},
-                         {"wilson_95", json_of(named.rate.wilson_95())}};
+                         {"value", number_or_null(named.rate.value())},
+                         {"wilson_95", number_or_null(named.rate.wilson_95())}};
   json["rates"] = std::move(rates);
   return json;
 }
@@ -335,7 +335,7 @@ std::string to_json(const TableEvaluation& evaluation) {
   for (const ColumnEvaluation& column : evaluation.columns) {
     Json entry;
     entry["name"] = column.name;
-    entry.update(json_of(column.result));
+    entry.update(number_or_null(column.result));
     scores.push_back(std::move(entry));
   }
   json["scores"] = std::move(scores);

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 
@@ -37,6 +38,11 @@ Gripper read_gripper(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& overrides) {
   return parse_gripper(libmap::read_whole_file(path, std::uint64_t{1} << 20), path.string(),
                        overrides);
+}
+
+Gripper find_gripper(const std::string& name,
+                     const std::vector<std::pair<std::string, std::string>>& overrides) {
+  return read_gripper(libmap::find_data_file("grippers", name), overrides);
 }
 
 }  // namespace libgtd

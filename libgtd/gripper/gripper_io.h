@@ -19,4 +19,8 @@ Gripper read_gripper(const std::filesystem::path& path,
 Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides = {});
 
+// The gripper of this name in the toolkit's data (libmap::find_data_file), or of a file.
+Gripper find_gripper(const std::string& name,
+                     const std::vector<std::pair<std::string, std::string>>& overrides = {});
+
 }  // namespace libgtd

@@ -1,16 +1,21 @@
 #!/bin/sh
-# Installs the build folder $1 of the source folder $2 into a scratch prefix, builds the little
-# project beside this script against it, and runs it and the installed program from there.
+# Installs the build folder $1 of the source folder $2 into a scratch prefix, builds README's example
+# against it, and compares its map with that of the installed program.
 set -eu
 build=$1
 source=$2
 scratch=$(mktemp -d)
 trap 'rm -rf "$scratch"' EXIT
 cmake --install "$build" --prefix "$scratch/prefix" >"$scratch/install.log"
-cmake -S "$source/tests/consumer" -B "$scratch/build" -G Ninja \
+sed -n '/^```cpp$/,/^```$/p' "$source/README.md" | sed '1d; $d' >"$scratch/main.cc"
+cmake -S "$source/tests/consumer" -B "$scratch/build" -G Ninja -DMAIN="$scratch/main.cc" \
   -DCMAKE_PREFIX_PATH="$scratch/prefix" ${3:+-DCMAKE_CXX_FLAGS="$3"} >"$scratch/configure.log"
 cmake --build "$scratch/build"
-"$scratch/build/consumer" "$scratch/prefix/share/graspmap/grippers/hubrobo.yaml"
+program=$scratch/prefix/bin/graspmap
+"$program" simulate scene --spacing 0.02 -o "$scratch/terrain.pcd" --quiet
+"$scratch/build/consumer" "$scratch/terrain.pcd" "$scratch/library.pcd" | grep -q ' voxels are graspable$'
+"$program" score "$scratch/terrain.pcd" --config primitive_shapes_prescan -o "$scratch/command.pcd" --quiet
+cmp "$scratch/library.pcd" "$scratch/command.pcd"
 # Moved as a whole, it still finds its libraries and its data.
 mv "$scratch/prefix" "$scratch/moved"
 "$scratch/moved/bin/graspmap" simulate scene --spacing 0.03 -o "$scratch/scene.pcd" --quiet

@@ -334,23 +334,4 @@ int run_usage(int argc, char** argv, bool is_special, Usage& usual, Usage& speci
   return special(argc, argv);
 }
 
-fs::path find_data_file(const std::string& kind, const std::string& name) {
-  if (name.find('/') != std::string::npos || name.ends_with(".yaml")) {
-    libmap::require_readable_file(name);
-    return name;
-  }
-  const fs::path folder = toolkit_data_folder() / kind;
-  fs::path file = folder / (name + ".yaml");
-  if (fs::is_regular_file(file)) return file;
-  std::vector<std::string> known;
-  if (fs::is_directory(folder))
-    for (const auto& entry : fs::directory_iterator(folder))
-      if (entry.path().extension() == ".yaml") known.push_back(entry.path().stem().string());
-  std::sort(known.begin(), known.end());
-  std::string names;
-  for (const std::string& one : known) names += (names.empty() ? "" : ", ") + one;
-  throw libmap::Error("is neither a file nor one of " + names + libmap::did_you_mean(name, known),
-                      {.field = kind.substr(0, kind.size() - 1), .value = name});
-}
-
 }  // namespace graspmap_tools

@@ -72,8 +72,4 @@ class Command {
 using Usage = int(int argc, char** argv);
 int run_usage(int argc, char** argv, bool is_special, Usage& usual, Usage& special);
 
-// A file of the toolkit's own data: a path as it stands if it has a '/' or the extension, else
-// DATA/KIND/NAME.yaml, e.g. ("grippers", "scar-e"). Throws Error naming the nearest known one.
-std::filesystem::path find_data_file(const std::string& kind, const std::string& name);
-
 }  // namespace graspmap_tools

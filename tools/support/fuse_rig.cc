@@ -9,6 +9,7 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/panorama.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "libmap/scan/rig_images.h"
@@ -140,7 +141,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   const fs::path rig_file = options.rig.empty() ? fs::path(options.folder) / libmap::rig_file_name
                             : fs::exists(options.rig)
                                 ? fs::path(options.rig)
-                                : graspmap_tools::find_data_file("rigs", options.rig);
+                                : libmap::find_data_file("rigs", options.rig);
   if (!fs::is_directory(options.folder))
     throw libmap::Error(fs::exists(options.folder) ? "is no folder" : "no such folder",
                         {.file = options.folder});

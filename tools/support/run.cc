@@ -7,6 +7,7 @@
 #include <sstream>
 #include <utility>
 
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/folder_output.h"
@@ -72,15 +73,6 @@ void make_folder(const fs::path& folder) {
 
 }  // namespace
 
-fs::path toolkit_data_folder() {
-  // Installed, beside the program; in the build folder, in the source tree.
-  std::error_code code;
-  const fs::path program = fs::read_symlink("/proc/self/exe", code);
-  fs::path installed = (program.parent_path() / "../../share/graspmap").lexically_normal();
-  if (!code && fs::is_directory(installed)) return installed;
-  return GRASPMAP_SOURCE_DATA;
-}
-
 Run::Run(std::string command, RunOptions options, libmap::Progress& progress)
     : command_(std::move(command)), options_(options), progress_(progress) {
   manifest_.command = command_;
@@ -90,7 +82,7 @@ Run::Run(std::string command, RunOptions options, libmap::Progress& progress)
 
 void Run::add_input(const fs::path& path) {
   manifest_.add_input(path);
-  const fs::path place = path.lexically_relative(toolkit_data_folder());
+  const fs::path place = path.lexically_relative(libmap::data_folder());
   if (!place.empty() && *place.begin() != "..") manifest_.inputs.back().path = place.string();
 }
 

@@ -15,9 +15,6 @@
 
 namespace graspmap_tools {
 
-// Where the toolkit's own data lie: grippers, scenarios, scenes.
-std::filesystem::path toolkit_data_folder();
-
 struct RunOptions {
   bool dry_run = false;
   bool force = false;

@@ -94,7 +94,7 @@ class StoreScoring {
         files_(libmap::cloud_pieces(options.terrain)),
         tile_voxels_(libgtd::tile_voxels(scenario_)),
         mask_(libgtd::make_gripper_mask(
-            options.detection.gripper,
+            libgtd::gripper_of(options.detection),
             {scenario_.method, scenario_.voxel_size_m, scenario_.extra_void_layers})),
         halo_(libgtd::halo_voxels(mask_, scenario_)) {
     if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&

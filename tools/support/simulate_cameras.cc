@@ -6,6 +6,7 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
@@ -55,7 +56,7 @@ void bind(libmap::ParameterTable& table, SimulateCamerasOptions& options) {
 }
 
 libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
-  const fs::path file = graspmap_tools::find_data_file("rigs", options.rig);
+  const fs::path file = libmap::find_data_file("rigs", options.rig);
   libmap::CameraRig rig = libmap::read_rig(file);
   run.add_input(file);
   if (options.depth_scale_m > 0)

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/simulate/primitive_scene_io.h"
@@ -94,7 +95,7 @@ void simulate(const SimulateOptions& options, Run& run) {
   else
     libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
-  const auto file = graspmap_tools::find_data_file("scenes", options.scene);
+  const auto file = libmap::find_data_file("scenes", options.scene);
   const libmap::PrimitiveScene scene = libmap::load_scene(file);
   run.add_input(file);
   run.manifest().frame = "scene";

@@ -5,6 +5,7 @@
 #include <optional>
 #include <string>
 
+#include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/mesh/mesh_io.h"
@@ -56,7 +57,7 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
         "names a file; a site is a folder with mesh.ply, field_points.csv, site.yaml",
         {.file = options.output});
   run.claim_output_folder(options.output);
-  const auto file = graspmap_tools::find_data_file("sites", options.site);
+  const auto file = libmap::find_data_file("sites", options.site);
   const libmap::RockSite site = load(options, file);
   run.add_input(file);
   run.manifest().frame = "site";

@@ -96,7 +96,7 @@ TEST(DetectionErrors, NameTheField) {
   options.scenario.tile_size_m = -1.0;
   EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "tile_size_m");
   options = options_for(Method::corrected);
-  options.gripper.closing_angle_deg = options.gripper.opening_angle_deg;
+  options.gripper->closing_angle_deg = options.gripper->opening_angle_deg;
   EXPECT_EQ(error_of([&] { detect(cloud, options); }).context().field, "closing_angle_deg");
 }
 
