@@ -10,7 +10,7 @@
 # A map is made by site.mk. Pre-scanned: Poisson-disk samples of the site's true mesh, COUNT of them.
 # In situ: the six depth images of the robot at one pose on the site, with the noise of a real sensor
 # (SENSOR), as one panorama. EDGE, SPACING and COUNT coarsen sites, scene and samples; CAMERAS and
-# PANORAMA hold further flags of `simulate cameras` and `panorama`, LOOKUP of `lookup` (but of the
+# PANORAMA hold further flags of `simulate cameras` and `fuse`, LOOKUP of `lookup` (but of the
 # wall a hold is looked up as the best within HOLD_RADIUS); SHARES is the number of processes that
 # score one map. A second run does nothing; other variables or changed files make again what depends
 # on them.

@@ -5,7 +5,7 @@
 #        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
 #
 # TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
-# render, info and merge read; `map` merges it to $(OUT)/map.pcd as well. TERRAIN, OUT and graspmap
+# render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. TERRAIN, OUT and graspmap
 # itself must be reached by the same path on all nodes. SBATCH holds further flags of sbatch, among
 # them --cpus-per-task and --array=1-100%10 to run ten at a time. A second run does nothing; after a
 # run that failed, the next scores what is missing. Logs: $(OUT)/logs.
