@@ -59,7 +59,7 @@ folders := $(foreach name,$(names),$(foreach gripper,$(GRIPPERS),$(OUT)/$(name)/
 sections := $(foreach gripper,$(GRIPPERS),$(foreach method,$(METHODS),\
   $(OUT)/sections/$(gripper)_$(method).png))
 results := $(sections) $(foreach gripper,$(GRIPPERS),$(OUT)/$(gripper).png) $(OUT)/pairs.csv \
-  $(OUT)/maps.csv $(foreach folder,$(folders),$(folder)/scores.png $(folder)/scores.svg)
+  $(OUT)/maps.csv $(foreach folder,$(folders),$(folder)/summary/histograms.png)
 
 .DELETE_ON_ERROR:
 .SECONDARY:

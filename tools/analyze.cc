@@ -334,7 +334,8 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
 void analyze(AnalyzeOptions& options, Run& run) {
   if (options.maps.size() > 1 || !options.table.expected.empty()) {
     if (!options.other.empty())
-      throw graspmap_tools::UsageError("--against takes one MAP; --pairs compares several");
+      throw graspmap_tools::UsageError(
+          "--against is for one MAP without --expected; --pairs compares several");
     options.table.points_frame = options.points_frame;
     options.table.pictures = options.pictures;
     return graspmap_tools::tabulate_maps(options.maps, options.folder, options.table, run);

@@ -74,6 +74,12 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
 libmap::ColorImage draw_several(const RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
     throw libmap::Error("is for one file", {.field = "--view", .value = "camera"});
+  const libmap::SceneViewOptions unset;
+  for (const auto& [name, is_given] : {std::pair{"--width", options.view.width != unset.width},
+                                       std::pair{"--height", options.view.height != unset.height},
+                                       std::pair{"--legend", options.view.legend != unset.legend},
+                                       std::pair{"--axes", options.view.axes != unset.axes}})
+    if (is_given) throw libmap::Error("is for one file", {.field = name});
   graspmap_tools::SheetOptions sheet = options.sheet;
   sheet.files = options.files;
   sheet.view = options.view.view;

@@ -24,12 +24,14 @@ bool is_picture(const fs::path& file) {
   return std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end();
 }
 
-// Maps are told by the command that made them, other clouds by nothing.
+// Maps are told by the command that made them. Of `convert`, those that it merged from several
+// inputs: any other is a copy of a map in another format.
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
   constexpr std::array<const char*, 5> extensions = {".pcd", ".ply", ".vtp", ".csv", ".tiles"};
   return manifest &&
          std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end() &&
-         (manifest->command == "score" || manifest->command == "merge");
+         (manifest->command == "score" ||
+          (manifest->command == "convert" && manifest->inputs.size() > 1));
 }
 
 // "2_slopes_and_bumps" -> "2 Slopes and bumps".
@@ -93,9 +95,10 @@ class Finder {
       timings.cases.push_back(std::move(one));
     }
     if (timings.cases.empty()) return {};
-    timings.commands = {"simulate scene", "simulate site", "simulate cameras", "panorama", "fuse",
-                        "mesh",           "crop",          "resample",         "score",    "merge",
-                        "lookup",         "evaluate",      "footholds",        "analyze"};
+    timings.commands = {"simulate scene", "simulate site", "simulate cameras", "fuse",
+                        "mesh",           "crop",          "resample",         "score",
+                        "convert",        "lookup",        "evaluate",         "footholds",
+                        "analyze"};
     timings.caption = "Running times.";
     return {{.heading = "Running times", .items = {std::move(timings)}}};
   }

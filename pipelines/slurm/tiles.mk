@@ -66,5 +66,5 @@ $(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
 	@touch -c $@
 
 $(OUT)/map.pcd: $(store)/index.json
-	@exec $(program) merge $(store) -o $@
+	@exec $(program) convert $(store) -o $@
 endif

@@ -24,7 +24,7 @@ $(folder_poses)/$(1)/panorama.pcd: $(ground_4) $(folder_4)/seen_with
 	@exec $$(GRASPMAP) simulate cameras $$< $(pose_4) \
 	  $(call turn_$(call direction_of,$(1)),$(call angle_of,$(1))) $$(SENSOR) $$(CAMERAS) \
 	  --seed $$(SEED) -o $$(@D)/cameras --quiet
-	@exec $$(GRASPMAP) panorama $$(@D)/cameras -o $$@ $$(PANORAMA) --quiet
+	@exec $$(GRASPMAP) fuse $$(@D)/cameras -o $$@ $$(PANORAMA) --quiet
 endef
 $(foreach one,$(poses),$(eval $(call pose,$(one))))
 

@@ -73,7 +73,7 @@ $(folder_$(1))/cameras.json: $(ground_$(1)) $(folder_$(1))/seen_with
 	@exec $$(GRASPMAP) simulate cameras $$< $(pose_$(1)) $$(SENSOR) $$(CAMERAS) --seed $$(SEED) \
 	  -o $(folder_$(1))/cameras
 $(folder_$(1))/panorama.pcd: $(folder_$(1))/cameras.json
-	@exec $$(GRASPMAP) panorama $(folder_$(1))/cameras -o $$@ $$(PANORAMA)
+	@exec $$(GRASPMAP) fuse $(folder_$(1))/cameras -o $$@ $$(PANORAMA)
 $(call picture,$(folder_$(1))/site.png,$(folder_$(1))/site.ply,--view oblique --color own,\
 $(subst _, ,$(name_$(1))))
 $(call picture,$(folder_$(1))/panorama.png,$(folder_$(1))/panorama.pcd,--view top --color height,\

@@ -26,7 +26,7 @@ done
 
 masks -j2
 require_files "$out/masks/scar-e.png" "$out/masks/sections/scar-e_thesis.png" \
-  "$out/masks/one/scar-e/scores.svg" "$out/masks/maps.csv"
+  "$out/masks/one/scar-e/summary/histograms.svg" "$out/masks/maps.csv"
 [ "$(wc -l <"$out/masks/pairs.csv")" -eq 2 ] || fail "not one pair"
 grep -q '^one,scar-e,thesis,corrected,' "$out/masks/pairs.csv" || fail "another pair"
 

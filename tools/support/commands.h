@@ -1,4 +1,5 @@
-// The commands of graspmap: the one place that describes them. `graspmap --help`, each command's own
+// The commands of graspmap: the one place that describes them. `graspmap --help`, each command's
+// own
 // --help, completion, man pages and the manual's table come from here.
 #pragma once
 
@@ -28,10 +29,11 @@ constexpr CommandEntry commands[] = {
     {"Map", "analyze", "analyze a map, compare it with another, or tabulate several maps"},
     {"Map", "footholds", "list the best footholds of a map for a step planner"},
     {"Field test", "lookup", "look up a map's values at listed locations"},
-    {"Field test", "evaluate", "evaluate looked-up scores against a field test: ROC, AUC, accuracy"},
+    {"Field test", "evaluate",
+     "evaluate looked-up scores against a field test: ROC, AUC, accuracy"},
     {"Pictures and files", "render", "draw clouds, meshes and maps, one or several side by side"},
     {"Pictures and files", "report", "write one HTML report of a whole run"},
-    {"Pictures and files", "info", "describe a scan, a cloud, a mesh, a map or a bag"},
+    {"Pictures and files", "info", "describe a scan, cloud, mesh, map, tile store or bag"},
     {"Pictures and files", "convert", "convert scans, poses, clouds, meshes and maps; merge tiles"},
 };
 

@@ -139,9 +139,8 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const fs::path rig_file = options.rig.empty() ? fs::path(options.folder) / libmap::rig_file_name
-                            : fs::exists(options.rig)
-                                ? fs::path(options.rig)
-                                : libmap::find_data_file("rigs", options.rig);
+                            : fs::exists(options.rig) ? fs::path(options.rig)
+                                                      : libmap::find_data_file("rigs", options.rig);
   if (!fs::is_directory(options.folder))
     throw libmap::Error(fs::exists(options.folder) ? "is no folder" : "no such folder",
                         {.file = options.folder});
@@ -180,9 +179,9 @@ int graspmap_tools::fuse_rig(int argc, char** argv) {
   command.input("RIG_FOLDER", options.folder,
                 "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
-  command.option(
-      "--rig", "FILE|NAME", options.rig,
-      "the rig, if it is not DIR/rig.yaml: a file, or one of the toolkit's own, e.g. scar-e");
+  command.option("--rig", "FILE|NAME", options.rig,
+                 "the rig, if it is not RIG_FOLDER/rig.yaml: a file, or one of the toolkit's own, "
+                 "e.g. scar-e");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { panorama(options, run); });
 }

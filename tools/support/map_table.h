@@ -24,8 +24,8 @@ struct MapTableOptions {
 // All but `expected`, `points_frame` and `pictures`.
 void bind(libmap::ParameterTable& table, MapTableOptions& options);
 
-// Writes maps.csv, histograms.csv with a chart and, if asked for, pairs.csv, regions.csv and charts of
-// graspable_share, voxel_youden and place_youden against the varied parameter into `folder`.
+// Writes maps.csv, histograms.csv with a chart and, if asked for, pairs.csv, regions.csv and charts
+// of graspable_share, voxel_youden and place_youden against the varied parameter into `folder`.
 // Throws Error naming the map or the table.
 void tabulate_maps(const std::vector<std::string>& map_files, const std::string& folder,
                    const MapTableOptions& options, Run& run);

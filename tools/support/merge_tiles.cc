@@ -234,6 +234,8 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
   }
   std::vector<libmap::Manifest> manifests;
   for (const std::string& tile : tiles) {
+    if (tiles.size() > 1 && !is_part_of_map(tile) && libmap::read_manifest_of(tile))
+      throw libmap::Error("is no share of a map, and only shares are merged", {.file = tile});
     manifests.push_back(manifest_of(tile));
     require_same_map(manifests.front(), manifests.back(), tiles.front(), tile);
   }

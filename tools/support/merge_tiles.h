@@ -11,9 +11,9 @@ namespace graspmap_tools {
 // A tile store, or a share of a map by its manifest.
 bool is_part_of_map(const std::string& file);
 
-// Writes the same bytes as scoring in one run. `tiles` are all shares that `score --tile K/N` wrote,
-// in any order, or one tile store, which is merged row by row of tiles. Throws Error if a share is
-// missing, given twice, or of another map.
+// Writes the same bytes as scoring in one run. `tiles` are all shares that `score --tile K/N`
+// wrote, in any order, or one tile store, which is merged row by row of tiles. Throws Error if a
+// share is missing, given twice, or of another map.
 void merge_tiles(const std::vector<std::string>& tiles, const std::string& output, Run& run);
 
 }  // namespace graspmap_tools

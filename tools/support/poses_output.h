@@ -15,7 +15,7 @@ namespace graspmap_tools {
 void claim_poses_output(const std::string& path, const std::vector<std::string>& inputs, Run& run);
 
 // `nodes` as in libmap::write_trajectory. A model of COLMAP has the scan's calibrations and names
-// its images as `extract --colmap` does; frames without a photograph or a calibration are left out
+// its images as `convert --colmap` does; frames without a photograph or a calibration are left out
 // with a warning.
 void write_poses_output(const std::string& path, const libmap::TrajectoryFile& poses,
                         const libmap::ScanSource& scan, bool nodes, Run& run);

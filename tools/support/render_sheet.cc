@@ -28,7 +28,8 @@ void bind(libmap::ParameterTable& table, SheetOptions& options) {
   table.add("cell_height_px", sheet.cell_height_px, libmap::Range{0, 16384},
             "of several files: height of a cell, pixels; 0: from what the cells show");
   table.add("captions", options.captions,
-            "of several files: texts below the cells, with | between; default: the files' names");
+            "of several files: texts below the cells, with | between; default: the files' names "
+            "without extension");
   table.add("column_titles", options.column_titles,
             "of several files: above the columns, with | between");
   table.add("row_titles", options.row_titles, "of several files: before the rows, with | between");

@@ -26,7 +26,8 @@ struct SheetOptions {
 // What a picture of one file does not have.
 void bind(libmap::ParameterTable& table, SheetOptions& options);
 
-// Maps, clouds, meshes, tile stores and pictures (.png) with one legend. Throws Error naming the file.
+// Maps, clouds, meshes, tile stores and pictures (.png) with one legend. Throws Error naming the
+// file.
 libmap::ColorImage draw_sheet(SheetOptions options, Run& run);
 
 }  // namespace graspmap_tools
