@@ -113,7 +113,7 @@ int main(int argc, char** argv) {
   BagCommandOptions options;
   graspmap_tools::Command command("bag", "ROS 1 bags in and out, offline.");
   command.input("IN", options.input,
-                "out of a bag: IN.bag; into one: a map (.pcd, .ply, .vtp, .csv), or a rig's folder "
+                "out of a bag: IN.bag; into one: a map (.pcd, .ply, .csv), or a rig's folder "
                 "as `panorama` reads it");
   command.output(options.output,
                  "out of a bag: a rig's folder (no extension) of its depth images, or one of its "

@@ -400,7 +400,7 @@ int main(int argc, char** argv) {
   CompareOptions options;
   graspmap_tools::Command command(
       "compare", "How far a cloud or mesh A lies from B, and how much of B it covers.");
-  command.input("A", options.a, "cloud or mesh (.pcd, .ply, .vtp, .csv, .obj, .stl, .off, .glb)");
+  command.input("A", options.a, "cloud or mesh (.pcd, .ply, .csv, .obj, .stl, .off, .glb)");
   command.input("B", options.b, "the surface that A is measured by: a mesh, or a cloud");
   command.output(options.output,
                  "A's points in B's frame with the fields distance and signed_distance", false);

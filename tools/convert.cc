@@ -223,9 +223,10 @@ int main(int argc, char** argv) {
                                   "Any format of clouds, maps, meshes and poses to any other.");
   command.input(
       "IN", options.input,
-      "cloud (.pcd .ply .vtp .csv), mesh (.ply .obj .stl ...) or poses (.tum .kitti .g2o .toro "
+      "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...) or poses (.tum .kitti .g2o .toro "
       "...)");
-  command.input("OUT", options.output, "the same in the format of this extension");
+  command.input("OUT", options.output,
+                "the same in the format of this extension, or .vtp for ParaView");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},

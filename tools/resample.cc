@@ -77,7 +77,7 @@ int main(int argc, char** argv) {
   ResampleOptions options;
   graspmap_tools::Command command("resample",
                                   "A surface -> points evenly over it (Poisson-disk samples).");
-  command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb, .vtp)");
+  command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "cloud with normals (.pcd, .ply, .vtp, .csv)");
   libmap::bind(command.parameters(), options.sampling);
   return command.run(argc, argv, [&](Run& run) { resample(options, run); });

@@ -26,7 +26,7 @@ bool is_picture(const fs::path& file) {
 
 // Maps are told by the command that made them, other clouds by nothing.
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
-  constexpr std::array<const char*, 5> extensions = {".pcd", ".ply", ".vtp", ".csv", ".tiles"};
+  constexpr std::array<const char*, 4> extensions = {".pcd", ".ply", ".csv", ".tiles"};
   return manifest &&
          std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end() &&
          (manifest->command == "score" || manifest->command == "merge");
