@@ -14,8 +14,8 @@
 #include <set>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "tests/libmap/mesh/mesh_samples.h"
