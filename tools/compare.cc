@@ -399,7 +399,7 @@ void compare(const CompareOptions& options, Run& run) {
 int compare_surfaces(int argc, char** argv) {
   CompareOptions options;
   graspmap_tools::Command command("compare");
-  command.input("A", options.a, "cloud or mesh (.pcd, .ply, .vtp, .csv, .obj, .stl, .off, .glb)");
+  command.input("A", options.a, "cloud or mesh (.pcd, .ply, .csv, .obj, .stl, .off, .glb)");
   command.input("B", options.b, "the surface that A is measured by: a mesh, or a cloud");
   command.output(options.output,
                  "A's points in B's frame with the fields distance and signed_distance", false);

@@ -242,7 +242,7 @@ int convert_file(int argc, char** argv) {
                  "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), poses (.tum .kitti .g2o .toro "
                  "...), tile store (.tiles), or all shares of a map");
   command.output(options.output,
-                 "the same in the format of this extension; of tiles and shares the whole map, the "
+                 "the same in the format of this extension, or .vtp for ParaView; of tiles and shares the whole map, the "
                  "same bytes as in one run");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},

@@ -279,7 +279,7 @@ void crop(CropCommandOptions& options, Run& run) {
 int main(int argc, char** argv) {
   CropCommandOptions options;
   graspmap_tools::Command command("crop");
-  command.input("MAP", options.input, "mesh (.ply .obj .stl ...) or cloud (.pcd .ply .vtp .csv)");
+  command.input("MAP", options.input, "mesh (.ply .obj .stl ...) or cloud (.pcd .ply .csv)");
   command.output(options.output,
                  "the site, of the same kind; OUTPUT's stem + .site_from_map.txt is the transform");
   command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box, "keep what is in it");

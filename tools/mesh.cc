@@ -254,7 +254,7 @@ void mesh(const MeshOptions& options, Run& run) {
 int main(int argc, char** argv) {
   MeshOptions options;
   graspmap_tools::Command command("mesh");
-  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .vtp, .csv)");
+  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv)");
   command.output(options.output, "mesh (.ply, .vtp, .obj, .stl, .off, .glb)");
   command.flag("--report", options.report,
                "print what the mesh is as a surface, and how far the points lie from it");

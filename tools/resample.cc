@@ -76,7 +76,7 @@ void resample(const ResampleOptions& options, Run& run) {
 int main(int argc, char** argv) {
   ResampleOptions options;
   graspmap_tools::Command command("resample");
-  command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb, .vtp)");
+  command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "cloud with normals (.pcd, .ply, .vtp, .csv)");
   libmap::bind(command.parameters(), options.sampling);
   return command.run(argc, argv, [&](Run& run) { resample(options, run); });

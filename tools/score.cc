@@ -201,7 +201,7 @@ int main(int argc, char** argv) {
   ScoreOptions options;
   graspmap_tools::Command command("score");
   command.input("TERRAIN", options.terrain,
-                "cloud of the terrain (.pcd, .ply, .vtp, .csv), or a folder of its pieces");
+                "cloud of the terrain (.pcd, .ply, .csv), or a folder of its pieces");
   command.output(options.output,
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,

@@ -2,67 +2,20 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nanoflann.hpp>
-#include <tuple>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 
 namespace libgtd {
 
 namespace {
 
-struct Points {
-  const std::vector<Eigen::Vector3d>& positions;
-  std::size_t kdtree_get_point_count() const { return positions.size(); }
-  double kdtree_get_pt(std::size_t n, std::size_t axis) const {
-    return positions[n][static_cast<Eigen::Index>(axis)];
-  }
-  template <typename Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using Tree = nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, Points>,
-                                                 Points, 3, std::size_t>;
-
 std::vector<double> values_of(const libmap::PointCloud& map, std::size_t point) {
   std::vector<double> values;
   for (const libmap::ScalarField& field : map.fields) values.push_back(field.values[point]);
   return values;
-}
-
-// The tree rounds the distances of its boxes: it is asked for a little more.
-double with_margin(double squared) {
-  constexpr double margin = 1e-9;
-  return std::nextafter(squared * (1.0 + margin), HUGE_VAL);
-}
-
-// Of the nearest points the first. It keeps no list: from far off all of them are nearly as near.
-struct FirstOfNearest {
-  std::size_t index = 0;
-  double squared = HUGE_VAL;
-
-  bool addPoint(double distance, std::size_t n) {  // NOLINT: nanoflann's names from here on
-    if (distance < squared || (distance == squared && n < index))
-      std::tie(index, squared) = std::pair(n, distance);
-    return true;
-  }
-  double worstDist() const { return with_margin(squared); }
-  bool full() const { return true; }
-};
-
-// The points with a squared distance of at most `squared`, by index, so that a mean does not depend
-// on the tree's order.
-std::vector<std::pair<std::size_t, double>> points_within(const Tree& tree,
-                                                          const Eigen::Vector3d& point,
-                                                          double squared) {
-  std::vector<std::pair<std::size_t, double>> matches;
-  tree.radiusSearch(point.data(), with_margin(squared), matches, nanoflann::SearchParams());
-  std::erase_if(matches, [&](const auto& match) { return match.second > squared; });
-  std::sort(matches.begin(), matches.end());
-  return matches;
 }
 
 std::vector<double> mean_values(const libmap::PointCloud& map,
@@ -92,17 +45,16 @@ void check(const libmap::PointCloud& map, const LookupOptions& options) {
     throw libmap::Error("the map has no such field", {.field = "score"});
 }
 
-LookupAnswer answer_of(const libmap::PointCloud& map, const Tree& tree, const Eigen::Vector3d& at,
-                       const LookupOptions& options) {
+LookupAnswer answer_of(const libmap::PointCloud& map, const libmap::PointTree& tree,
+                       const Eigen::Vector3d& at, const LookupOptions& options) {
   LookupAnswer answer;
   if (!at.allFinite()) {
     answer.distance_m = HUGE_VAL;
     return answer;
   }
-  FirstOfNearest nearest;
-  tree.findNeighbors(nearest, at.data(), nanoflann::SearchParams());
+  const libmap::NeighborPoint nearest = tree.first_of_nearest(at);
   answer.map_point = nearest.index;
-  answer.distance_m = std::sqrt(nearest.squared);
+  answer.distance_m = std::sqrt(nearest.square_m2);
   if (options.mode == LookupMode::nearest) {
     answer.found = answer.distance_m <= options.max_distance_m;
     if (!answer.found) return answer;
@@ -110,9 +62,10 @@ LookupAnswer answer_of(const libmap::PointCloud& map, const Tree& tree, const Ei
     answer.values = values_of(map, answer.map_point);
     return answer;
   }
+  // By index, so that a mean does not depend on the tree's order.
   std::vector<std::size_t> points;
-  for (const auto& [index, distance] : points_within(tree, at, options.radius_m * options.radius_m))
-    points.push_back(index);
+  for (const libmap::NeighborPoint& near : tree.within(at, options.radius_m))
+    points.push_back(near.index);
   answer.map_points = points.size();
   answer.found = !points.empty();
   if (!answer.found) return answer;
@@ -154,9 +107,7 @@ std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options) {
   check(map, options);
-  const Points adaptor{map.positions};
-  Tree tree(3, adaptor, nanoflann::KDTreeSingleIndexAdaptorParams(10));
-  tree.buildIndex();
+  const libmap::PointTree tree(map.positions);
   std::vector<LookupAnswer> answers(points.size());
   libmap::parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) answers[n] = answer_of(map, tree, points[n], options);

@@ -37,7 +37,7 @@ struct LookupAnswer {
 
 // |a - b|^2, the same to the bit wherever two points are compared.
 inline double squared_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  // In the order of nanoflann's L2_Simple_Adaptor.
+  // In the order of PointTree (nanoflann's L2_Simple_Adaptor).
   double sum = 0.0;
   for (Eigen::Index axis = 0; axis < 3; ++axis) sum += (a[axis] - b[axis]) * (a[axis] - b[axis]);
   return sum;

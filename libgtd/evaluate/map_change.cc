@@ -5,11 +5,10 @@
 #include <cmath>
 #include <limits>
 
-#include "libgtd/evaluate/lookup.h"
 #include "libgtd/evaluate/value_bins.h"
-#include "libgtd/shape/point_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 
 namespace libgtd {
 
@@ -71,22 +70,12 @@ std::vector<VoxelPair> pairs_by_index(const VoxelMap& map, const VoxelMap& other
 std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& points,
                                           const std::vector<Eigen::Vector3d>& places,
                                           double reach_m) {
-  const PointGrid grid(points, reach_m);
+  const libmap::PointTree tree(points);
   std::vector<std::uint32_t> nearest(places.size(), none);
   libmap::parallel_for(places.size(), places_per_chunk, [&](std::size_t begin, std::size_t end) {
-    std::vector<PointGrid::Range> runs;
     for (std::size_t n = begin; n < end; ++n) {
-      if (!grid.reaches(places[n])) continue;
-      double least = reach_m * reach_m;
-      grid.find_near(grid.cell_of(places[n]), 1, runs);
-      for (const PointGrid::Range& run : runs)
-        for (std::uint32_t r = run.first; r < run.last; ++r) {
-          const std::uint32_t point = grid.order()[r];
-          const double squared = squared_distance(points[point], places[n]);
-          if (squared > least || (squared == least && point > nearest[n])) continue;
-          least = squared;
-          nearest[n] = point;
-        }
+      const libmap::NeighborPoint near = tree.first_of_nearest(places[n]);
+      if (near.square_m2 <= reach_m * reach_m) nearest[n] = static_cast<std::uint32_t>(near.index);
     }
   });
   return nearest;

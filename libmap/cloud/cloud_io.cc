@@ -7,6 +7,7 @@
 #include <cstring>
 #include <fstream>
 #include <utility>
+#include <vector>
 
 #include "libmap/cloud/cloud_columns.h"
 #include "libmap/cloud/csv_codec.h"
@@ -21,25 +22,28 @@
 namespace libmap {
 namespace {
 
-Error unknown_format(const std::filesystem::path& path) {
+// `is_read`: the formats that clouds are read from, else those that they are written in.
+void require_format(const std::filesystem::path& path, bool is_read) {
   const std::string format = format_of(path);
+  std::vector<std::string> formats = {".pcd", ".ply", ".csv"};
+  if (!is_read) formats.push_back(".vtp");
+  if (std::find(formats.begin(), formats.end(), format) != formats.end()) return;
   // No library of Debian 12 reads LAS, and LAZ even less.
   if (format == ".las" || format == ".laz")
-    return Error(
+    throw Error(
         "LAS and LAZ cannot be read or written: Debian has no library for them; convert "
-        "to .pcd, .ply, .vtp or .csv",
+        "to .pcd, .ply or .csv",
         {.file = path.string()});
-  return Error("not a cloud format" + did_you_mean(format, {".pcd", ".ply", ".vtp", ".csv"}),
-               {.file = path.string(),
-                .field = "extension",
-                .value = format.empty() ? "missing" : format,
-                .bound = ".pcd, .ply, .vtp or .csv"});
+  throw Error("not a cloud format" + did_you_mean(format, formats),
+              {.file = path.string(),
+               .field = "extension",
+               .value = format.empty() ? "missing" : format,
+               .bound = is_read ? ".pcd, .ply or .csv" : ".pcd, .ply, .csv or .vtp"});
 }
 
 // The file's bytes as the system's own cache holds them, without a copy.
 GeometryColumns decode_mapped_pcd(const std::filesystem::path& path) {
   namespace ipc = boost::interprocess;
-  require_readable_file(path);
   if (std::filesystem::file_size(path) == 0) throw Error("is empty");
   try {
     const ipc::file_mapping file(path.c_str(), ipc::read_only);
@@ -56,7 +60,6 @@ GeometryColumns decode(const std::filesystem::path& path) {
   if (format == ".pcd") return decode_mapped_pcd(path);
   const auto bytes = read_geometry_bytes(path);
   if (format == ".ply") return decode_ply(bytes);
-  if (format == ".vtp") return decode_vtp(*bytes);
   return decode_csv(*bytes, {});
 }
 
@@ -71,10 +74,20 @@ std::string read_head(const std::filesystem::path& path) {
 
 }  // namespace
 
-void require_cloud_format(const std::filesystem::path& path) {
-  const std::string format = format_of(path);
-  if (format != ".pcd" && format != ".ply" && format != ".vtp" && format != ".csv")
-    throw unknown_format(path);
+void require_cloud_format(const std::filesystem::path& path) { require_format(path, false); }
+
+void refuse_vtp(const std::filesystem::path& path) {
+  if (format_of(path) == ".vtp")
+    throw Error(
+        ".vtp is written only, for ParaView; readable are clouds as .pcd, .ply or .csv and meshes "
+        "as .ply, .obj, .off, .stl or .glb",
+        {.file = path.string()});
+}
+
+void require_cloud_file(const std::filesystem::path& path) {
+  refuse_vtp(path);
+  require_format(path, true);
+  require_readable_file(path);
 }
 
 std::string format_of(const std::filesystem::path& path) {
@@ -111,7 +124,7 @@ void write_geometry_file(const std::filesystem::path& path,
 }
 
 CloudReadResult read_cloud(const std::filesystem::path& path) {
-  require_cloud_format(path);
+  require_cloud_file(path);
   try {
     GeometryColumns content = decode(path);
     if (content.info.faces > 0)
@@ -125,14 +138,12 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
 }
 
 CloudFileInfo read_cloud_info(const std::filesystem::path& path) {
-  require_cloud_format(path);
-  require_readable_file(path);
+  require_cloud_file(path);
   const std::string format = format_of(path);
   try {
     if (format == ".pcd") return pcd_info(read_head(path), std::filesystem::file_size(path));
     if (format == ".ply") return ply_info(read_head(path), std::filesystem::file_size(path));
-    const auto bytes = read_geometry_bytes(path);
-    return format == ".vtp" ? vtp_info(*bytes) : decode_csv(*bytes, {}).info;
+    return decode_csv(*read_geometry_bytes(path), {}).info;
   } catch (const Error& error) {
     throw error.in_file(path.string());
   }

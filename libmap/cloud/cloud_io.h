@@ -3,7 +3,7 @@
 //          fields and their types   viewpoint   encodings
 //   .pcd   all                      yes         ascii, binary, binary_compressed
 //   .ply   all                      comment     ascii, binary (little- or big-endian)
-//   .vtp   all                      field data  ascii, binary, binary_compressed (zlib)
+//   .vtp   all                      field data  ascii, binary, binary_compressed (zlib); not read
 //   .csv   all, without types       no          text
 //
 // Coordinates are doubles in memory. They are written as float32 unless that moves some coordinate
@@ -44,7 +44,7 @@ struct CloudWriteOptions {
 // holds, or has no fields x, y and z. A file of no points is an empty cloud.
 CloudReadResult read_cloud(const std::filesystem::path& path);
 
-// The same of the header alone where the format has one (PCD, PLY); VTP and CSV are read whole.
+// The same of the header alone where the format has one (PCD, PLY); CSV is read whole.
 CloudFileInfo read_cloud_info(const std::filesystem::path& path);
 
 // Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
@@ -53,8 +53,14 @@ CloudFileInfo read_cloud_info(const std::filesystem::path& path);
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
                  const CloudWriteOptions& options = {});
 
-// Throws Error unless the extension is that of a format of clouds.
+// Throws Error unless clouds are written in the format that the extension names.
 void require_cloud_format(const std::filesystem::path& path);
+
+// Throws Error unless `path` is a readable file of a format that clouds are read from.
+void require_cloud_file(const std::filesystem::path& path);
+
+// Throws Error, with the formats that can be read, for a .vtp file: VTP is written only.
+void refuse_vtp(const std::filesystem::path& path);
 
 // The extension in lower case, e.g. ".ply".
 std::string format_of(const std::filesystem::path& path);

@@ -109,8 +109,7 @@ struct CloudBlockReader::State {
 };
 
 CloudBlockReader::CloudBlockReader(fs::path path) : state_(std::make_unique<State>()) {
-  require_cloud_format(path);
-  require_readable_file(path);
+  require_cloud_file(path);
   state_->path = std::move(path);
   try {
     if (!state_->open_records()) state_->read_whole();
@@ -146,20 +145,20 @@ void CloudBlockReader::leave_out_normals() {
 
 std::vector<fs::path> cloud_pieces(const fs::path& given) {
   if (!fs::is_directory(given)) {
-    require_cloud_format(given);
-    require_readable_file(given);
+    require_cloud_file(given);
     return {given};
   }
   std::vector<fs::path> pieces;
   for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
     const std::string format = format_of(entry.path());
+    // A .vtp is refused when it is opened: a terrain without it would be incomplete.
     const bool is_cloud =
         format == ".pcd" || format == ".ply" || format == ".vtp" || format == ".csv";
     if (is_cloud && entry.is_regular_file() && entry.path().filename().string().front() != '.')
       pieces.push_back(entry.path());
   }
   if (pieces.empty())
-    throw Error("the folder holds no cloud (.pcd, .ply, .vtp, .csv)", {.file = given.string()});
+    throw Error("the folder holds no cloud (.pcd, .ply, .csv)", {.file = given.string()});
   std::sort(pieces.begin(), pieces.end());
   return pieces;
 }

@@ -22,7 +22,7 @@ struct FileField {
 };
 
 struct GeometryFileInfo {
-  std::string format;  // "pcd", "ply", "vtp", "csv", "obj", "stl", "off", "glb"
+  std::string format;  // "pcd", "ply", "csv", "obj", "stl", "off", "glb"
   FileEncoding encoding = FileEncoding::binary;
   bool big_endian = false;
   std::uint64_t bytes = 0;           // size of the file

@@ -10,9 +10,9 @@
 #include <string>
 #include <tuple>
 
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
 
 namespace libmap {

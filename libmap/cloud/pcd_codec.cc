@@ -426,10 +426,6 @@ std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t fi
                        std::move(set.columns), header.viewpoint};
 }
 
-GeometryColumns decode_pcd(const std::shared_ptr<const std::string>& bytes) {
-  return decode_pcd(*bytes, bytes);
-}
-
 GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner) {
   const PcdHeader header = read_header(bytes);
   require_data(header, bytes.size());

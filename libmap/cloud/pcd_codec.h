@@ -26,9 +26,7 @@ std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t fi
 
 // Throws Error (without the file's name): a header line that is missing, unknown, stands twice or
 // does not fit the others; more points promised than there is data; compressed data that is broken.
-// All of this is known before memory for the points is taken.
-GeometryColumns decode_pcd(const std::shared_ptr<const std::string>& bytes);
-// The same of bytes that `owner` keeps, whatever they lie in.
+// All of this is known before memory for the points is taken. `owner` keeps the bytes.
 GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner);
 
 // Colours are written as packed `rgb`, TYPE U. Throws Error: a field name that cannot stand in the

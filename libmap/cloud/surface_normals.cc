@@ -25,7 +25,9 @@ struct Neighbour {
   float certainty = 0.0F;
 };
 
-// Points by cells as wide as the radius, the points of a cell side by side.
+// Points by cells as wide as the radius, the points of a cell side by side. Not a PointTree: one
+// walk serves all points of a cell, and the order of the cells is that of the single-precision
+// sums.
 class NeighbourCells {
  public:
   NeighbourCells(const PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m)

@@ -1,8 +1,8 @@
 // Colours and fields of a cloud given to the vertices of a mesh near it.
 #pragma once
 
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {

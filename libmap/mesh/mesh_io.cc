@@ -19,11 +19,20 @@
 namespace libmap {
 namespace {
 
-constexpr std::array<const char*, 6> mesh_formats = {".ply", ".obj", ".stl",
-                                                     ".off", ".glb", ".vtp"};
+constexpr std::array<const char*, 5> read_formats = {".ply", ".obj", ".stl", ".off", ".glb"};
 
-bool is_mesh_format(const std::string& format) {
-  return std::find(mesh_formats.begin(), mesh_formats.end(), format) != mesh_formats.end();
+bool is_read(const std::string& format) {
+  return std::find(read_formats.begin(), read_formats.end(), format) != read_formats.end();
+}
+
+Error no_mesh_format(const std::filesystem::path& path, const std::string& bound) {
+  const std::string format = format_of(path);
+  return Error(
+      "not a mesh format" + did_you_mean(format, {read_formats.begin(), read_formats.end()}),
+      {.file = path.string(),
+       .field = "extension",
+       .value = format.empty() ? "missing" : format,
+       .bound = bound});
 }
 
 // A field of polygons as one of triangles.
@@ -64,8 +73,8 @@ GeometryFileInfo info_of(const TriangleMesh& mesh, const std::string& format,
 }
 
 MeshReadResult decode(const std::string& format, const std::shared_ptr<const std::string>& bytes) {
-  if (format == ".ply" || format == ".vtp") {
-    GeometryColumns content = format == ".ply" ? decode_ply(bytes) : decode_vtp(*bytes);
+  if (format == ".ply") {
+    GeometryColumns content = decode_ply(bytes);
     TriangleMesh mesh = mesh_of_columns(content);
     return {std::move(mesh), std::move(content.info)};
   }
@@ -114,17 +123,13 @@ void encode(const std::string& format, const TriangleMesh& mesh, const MeshWrite
 
 void require_mesh_format(const std::filesystem::path& path) {
   const std::string format = format_of(path);
-  if (is_mesh_format(format)) return;
-  throw Error(
-      "not a mesh format" + did_you_mean(format, {mesh_formats.begin(), mesh_formats.end()}),
-      {.file = path.string(),
-       .field = "extension",
-       .value = format.empty() ? "missing" : format,
-       .bound = ".ply, .obj, .stl, .off, .glb or .vtp"});
+  if (!is_read(format) && format != ".vtp")
+    throw no_mesh_format(path, ".ply, .obj, .stl, .off, .glb or .vtp");
 }
 
 MeshReadResult read_mesh(const std::filesystem::path& path) {
-  require_mesh_format(path);
+  refuse_vtp(path);
+  if (!is_read(format_of(path))) throw no_mesh_format(path, ".ply, .obj, .stl, .off or .glb");
   const auto bytes = read_geometry_bytes(path);
   try {
     MeshReadResult result = decode(format_of(path), bytes);
@@ -154,16 +159,16 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
 }
 
 FileKind file_kind(const std::filesystem::path& path) {
+  refuse_vtp(path);
   const std::string format = format_of(path);
-  if (format == ".ply" || format == ".vtp")
-    return read_cloud_info(path).faces > 0 ? FileKind::mesh : FileKind::cloud;
-  if (is_mesh_format(format)) return FileKind::mesh;
+  if (format == ".ply") return read_cloud_info(path).faces > 0 ? FileKind::mesh : FileKind::cloud;
+  if (is_read(format)) return FileKind::mesh;
   if (format == ".pcd" || format == ".csv") return FileKind::cloud;
   throw Error("neither a cloud nor a mesh",
               {.file = path.string(),
                .field = "extension",
                .value = format.empty() ? "missing" : format,
-               .bound = ".pcd, .ply, .vtp, .csv, .obj, .stl, .off or .glb"});
+               .bound = ".pcd, .ply, .csv, .obj, .stl, .off or .glb"});
 }
 
 }  // namespace libmap

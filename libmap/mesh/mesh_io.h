@@ -2,14 +2,14 @@
 //
 //          read by         written by      kept
 //   .ply   ply_codec       ply_codec       doubles, normals, colours, vertex and face fields
-//   .vtp   VTK             VTK             doubles, normals, colours, vertex and face fields
+//   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
 //   .obj   assimp          mesh_text       doubles written, float32 read; normals, colours
 //   .off   mesh_text       mesh_text       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
 //   .glb   assimp          assimp          float32; normals, colours
 //
 // float32 holds 24 bits: at 16 m from the origin a step is 2 micrometres, at 500 km (map
-// coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp: they write float64
+// coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp, which store float64
 // where float32 would move some coordinate by more than 1e-5 m.
 //
 // assimp yields corners, not vertices: corners equal in every number are made
@@ -50,11 +50,11 @@ MeshReadResult read_mesh(const std::filesystem::path& path);
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshWriteOptions& options = {});
 
-// Throws Error unless the extension is one that meshes are read from and written to.
+// Throws Error unless meshes are written in the format that the extension names.
 void require_mesh_format(const std::filesystem::path& path);
 
-// Whether the file holds a mesh (it has faces) or a cloud: by its extension, and for .ply and .vtp
-// by its content. Throws Error: an extension of neither, or a file that cannot be read.
+// Whether the file holds a mesh (it has faces) or a cloud: by its extension, and for .ply by its
+// content. Throws Error: an extension of neither, or a file that cannot be read.
 FileKind file_kind(const std::filesystem::path& path);
 
 }  // namespace libmap

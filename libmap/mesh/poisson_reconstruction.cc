@@ -6,10 +6,10 @@
 #include <numbers>
 #include <tuple>
 
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/cloud_values.h"

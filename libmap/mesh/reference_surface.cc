@@ -6,9 +6,9 @@
 #include <cmath>
 #include <cstdint>
 
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/surface_distance.h"
 

@@ -1,4 +1,5 @@
-// Points that come one by one, in a hashed grid of cubes. Inner part of libmap/mesh.
+// Points that come one by one, in a hashed grid of cubes: PointTree needs all of its points before
+// the first search. Inner part of libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>

@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/ray_caster.h"
 

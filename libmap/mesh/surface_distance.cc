@@ -7,9 +7,9 @@
 #include <limits>
 #include <random>
 
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/embree_mesh.h"
 #include "libmap/mesh/ray_caster.h"

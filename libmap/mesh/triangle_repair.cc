@@ -3,17 +3,15 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
-#include <bit>
 #include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
-#include <tuple>
-#include <unordered_map>
 
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/sample_grid.h"
 
 namespace libmap {
 
@@ -24,69 +22,8 @@ constexpr std::uint32_t no_vertex = 0xffffffff;
 constexpr std::size_t max_cap_passes = 1000;
 constexpr double max_coordinate = 1e30;  // its powers that areas and volumes need are finite
 
-// A coordinate counts a finite number of them.
-constexpr double least_cell = 1e-270;
-
-// Kept vertices by cells four distances wide: most searches look into one or two of them.
-class VertexGrid {
- public:
-  VertexGrid(const std::vector<Eigen::Vector3d>& vertices, double distance)
-      : vertices_(vertices),
-        distance_(distance),
-        cells_per_m_(distance > 0.0 ? 1.0 / std::max(4.0 * distance, least_cell) : 1.0),
-        next_(vertices.size(), no_vertex) {
-    first_.reserve(vertices.size());
-  }
-
-  // The first kept vertex within the distance of v, or none.
-  std::uint32_t find(std::uint32_t v) const {
-    const Eigen::Array3d at = vertices_[v].array();
-    const Eigen::Array3d low = cell_of(at - distance_);
-    const Eigen::Array3d high = cell_of(at + distance_);
-    std::uint32_t found = no_vertex;
-    for (int corner = 0; corner < 8; ++corner) {
-      const std::array<bool, 3> upper = {(corner & 1) != 0, (corner & 2) != 0, (corner & 4) != 0};
-      if ((upper[0] && low.x() == high.x()) || (upper[1] && low.y() == high.y()) ||
-          (upper[2] && low.z() == high.z()))
-        continue;
-      const auto cell =
-          first_.find(key({upper[0] ? high.x() : low.x(), upper[1] ? high.y() : low.y(),
-                           upper[2] ? high.z() : low.z()}));
-      if (cell == first_.end()) continue;
-      for (std::uint32_t n = cell->second; n != no_vertex; n = next_[n])
-        if (n < found && (vertices_[n] - vertices_[v]).norm() <= distance_) found = n;
-    }
-    return found;
-  }
-
-  void keep(std::uint32_t v) {
-    const auto [cell, is_new] = first_.try_emplace(key(cell_of(vertices_[v].array())), v);
-    if (is_new) return;
-    next_[v] = cell->second;
-    cell->second = v;
-  }
-
- private:
-  // A search is half as wide as a cell: it meets one or two of them along each axis.
-  Eigen::Array3d cell_of(const Eigen::Array3d& at) const { return (at * cells_per_m_).floor(); }
-
-  // Cells that share a key share their vertices' list: distances decide.
-  static std::uint64_t key(const Eigen::Array3d& cell) {
-    std::uint64_t mixed = 0;
-    for (int axis = 0; axis < 3; ++axis) {
-      // Of numbers of any size, unlike those of an integer. Adding 0 makes -0 equal to 0.
-      mixed = (mixed ^ std::bit_cast<std::uint64_t>(cell[axis] + 0.0)) * 0x9e3779b97f4a7c15ULL;
-      mixed ^= mixed >> 29U;
-    }
-    return mixed;
-  }
-
-  const std::vector<Eigen::Vector3d>& vertices_;
-  double distance_;
-  double cells_per_m_;
-  std::unordered_map<std::uint64_t, std::uint32_t> first_;
-  std::vector<std::uint32_t> next_;
-};
+// A coordinate of 10^6 m still counts cells in whole numbers.
+constexpr double least_cell_m = 3e-12;
 
 HalfEdge longest_edge(const TriangleMesh& mesh, std::uint32_t t) {
   HalfEdge longest = 3 * t;
@@ -235,17 +172,29 @@ std::vector<bool> degenerate_triangles(const TriangleMesh& mesh) {
 }
 
 std::size_t weld_vertices(TriangleMesh& mesh, double distance_m) {
-  VertexGrid grid(mesh.vertices, distance_m);
+  // Most searches look into one or two cells. The odd factor keeps vertices of a lattice from the
+  // same slots.
+  const double cell_m = std::max(4.1 * distance_m, least_cell_m);
+  SampleGrid grid(Eigen::Vector3d::Zero(), cell_m, mesh.vertices.size());
+  std::vector<std::uint32_t> kept;  // vertices by their number in the grid
   std::vector<std::uint32_t> kept_of(mesh.vertices.size());
-  std::size_t joined = 0;
+  const Eigen::Vector3d margin = Eigen::Vector3d::Constant(distance_m);
   for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
-    const std::uint32_t found = grid.find(v);
-    kept_of[v] = found == no_vertex ? v : found;
-    if (found == no_vertex)
-      grid.keep(v);
-    else
-      ++joined;
+    const Eigen::Vector3d& vertex = mesh.vertices[v];
+    std::uint32_t first = no_vertex;
+    grid.any_in_box(vertex - margin, vertex + margin,
+                    [&](const Eigen::Vector3d& other, std::uint32_t n) {
+                      if (n < first && (other - vertex).norm() <= distance_m) first = n;
+                      return false;
+                    });
+    if (first == no_vertex) {
+      first = static_cast<std::uint32_t>(kept.size());
+      grid.add(vertex);
+      kept.push_back(v);
+    }
+    kept_of[v] = kept[first];
   }
+  const std::size_t joined = mesh.vertices.size() - kept.size();
   if (joined > 0)
     for (Triangle& t : mesh.triangles)
       for (std::uint32_t& v : t) v = kept_of[v];

@@ -9,8 +9,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
-#include "libmap/poses/pose_neighbors.h"
 #include "libmap/poses/rigid_motion.h"
 #include "libmap/poses/surface_samples.h"
 
@@ -75,7 +75,7 @@ class Alignment {
   }
   void pairs_of_links(const std::vector<PoseLink>& links);
   void pairs_by_overlap();
-  std::vector<std::size_t> candidates_of(const PoseNeighbors& neighbors,
+  std::vector<std::size_t> candidates_of(const PointTree& neighbors,
                                          const std::vector<std::size_t>& posed,
                                          std::size_t n) const;
   void accumulate(std::size_t from, std::size_t onto, const Pose& onto_from_from, bool from_is_a,
@@ -113,20 +113,20 @@ void Alignment::pairs_of_links(const std::vector<PoseLink>& links) {
 }
 
 // Frames that may see what the n-th of those with a pose sees.
-std::vector<std::size_t> Alignment::candidates_of(const PoseNeighbors& neighbors,
+std::vector<std::size_t> Alignment::candidates_of(const PointTree& neighbors,
                                                   const std::vector<std::size_t>& posed,
                                                   std::size_t n) const {
   const std::size_t frame = posed[n];
   const Pose& pose = *pose_of(frame);
   std::vector<std::pair<double, std::size_t>> ranked;
-  for (const auto& [near, apart] : neighbors.nearest(n, nearest_considered, reach_m)) {
+  for (const auto& [near, square_m2] : neighbors.around(n, nearest_considered, reach_m)) {
     const std::size_t other = posed[near];
     if (component_.at(frames_[frame].node) != component_.at(frames_[other].node)) continue;
     const double angle =
         rotation_vector_of(pose.linear().transpose() * pose_of(other)->linear()).norm() * 180.0 /
         std::numbers::pi;
     if (angle > view_angle_deg) continue;
-    ranked.emplace_back(apart / reach_m + angle / view_angle_deg, other);
+    ranked.emplace_back(std::sqrt(square_m2) / reach_m + angle / view_angle_deg, other);
   }
   std::sort(ranked.begin(), ranked.end());
   ranked.resize(std::min(ranked.size(), most_candidates));
@@ -145,7 +145,7 @@ void Alignment::pairs_by_overlap() {
     places.emplace_back(pose_of(f)->translation());
   }
   if (posed.empty()) return;
-  const PoseNeighbors neighbors(std::move(places));
+  const PointTree neighbors(places);
   std::vector<std::vector<FramePair>> of_frame(posed.size());
   parallel_for(posed.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {

@@ -7,8 +7,8 @@
 #include <optional>
 
 #include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/poses/pose_neighbors.h"
 #include "libmap/poses/rigid_motion.h"
 
 namespace libmap {
@@ -33,18 +33,19 @@ void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<c
   std::vector<Eigen::Vector3d> places;
   places.reserve(members.size());
   for (const std::size_t f : members) places.emplace_back(poses[f]->translation());
-  const PoseNeighbors neighbors(std::move(places));
+  const PointTree neighbors(places);
   const auto wanted = static_cast<std::size_t>(options.near_candidates);
   for (std::size_t n = 0; n < members.size(); ++n) {
     std::vector<std::pair<double, std::size_t>> ranked;
-    for (const auto& [other, distance] :
-         neighbors.nearest(n, considered_per_pair * wanted, options.radius_m)) {
+    for (const auto& [other, square_m2] :
+         neighbors.around(n, considered_per_pair * wanted, options.radius_m)) {
       const double angle = rotation_vector_of(poses[members[n]]->linear().transpose() *
                                               poses[members[other]]->linear())
                                .norm() /
                            degree;
       if (angle > options.angle_deg) continue;
-      ranked.emplace_back(distance / options.radius_m + angle / options.angle_deg, members[other]);
+      ranked.emplace_back(std::sqrt(square_m2) / options.radius_m + angle / options.angle_deg,
+                          members[other]);
     }
     std::sort(ranked.begin(), ranked.end());
     ranked.resize(std::min(ranked.size(), wanted));

@@ -27,7 +27,7 @@ bool is_picture(const fs::path& file) {
 // Maps are told by the command that made them. Of `convert`, those that it merged from several
 // inputs: any other is a copy of a map in another format.
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
-  constexpr std::array<const char*, 5> extensions = {".pcd", ".ply", ".vtp", ".csv", ".tiles"};
+  constexpr std::array<const char*, 4> extensions = {".pcd", ".ply", ".csv", ".tiles"};
   return manifest &&
          std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end() &&
          (manifest->command == "score" ||

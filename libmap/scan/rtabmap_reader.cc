@@ -109,20 +109,6 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
       refuse(std::string("its table ") + table + " has no column id");
 }
 
-// Without a key each look-up of a node goes through all of them: hours for a long scan.
-void require_key(const SqliteFile& file, const RtabmapColumns& columns, std::size_t nodes) {
-  constexpr std::size_t few_nodes = 1000;
-  if (nodes <= few_nodes || !(columns.has_table("Data") || columns.has_table("Image"))) return;
-  const ImageColumns of = image_columns(columns);
-  constexpr int detail = 3;
-  file.each_row("EXPLAIN QUERY PLAN SELECT 1 FROM " + of.from + " WHERE " + of.id + " = 1", {},
-                [&](const SqliteRow& row) {
-                  if (row.bytes(detail).starts_with("SCAN"))
-                    throw Error("a table of images has no key to the nodes",
-                                {.file = file.path().string()});
-                });
-}
-
 std::string joined(const std::string& place, const std::string& field) {
   return place.empty() || field.empty() ? place + field : place + ": " + field;
 }
@@ -180,7 +166,6 @@ RtabmapDatabase::RtabmapDatabase(const fs::path& path)
   RtabmapGraph read = read_rtabmap_graph(*file_, columns_);
   graph_ = std::move(read.graph);
   warnings_ = std::move(read.warnings);
-  require_key(*file_, columns_, graph_.nodes.size());
   if (!columns_.has_table("Data") && !columns_.has_table("Image"))
     warnings_.push_back("it has no table Data: there are no images");
   for (const std::string& name : columns_.unknown()) warnings_.push_back(name + unknown_part);
@@ -294,7 +279,7 @@ namespace {
 
 std::size_t count_rows(const SqliteFile& file, const std::string& table) {
   std::size_t count = 0;
-  file.each_row("SELECT count(1) FROM " + table, {}, [&](const SqliteRow& row) {
+  file.each_row("SELECT count(*) FROM " + table, {}, [&](const SqliteRow& row) {
     count = static_cast<std::size_t>(std::max<std::int64_t>(row.integer(0), 0));
   });
   return count;

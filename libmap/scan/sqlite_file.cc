@@ -81,8 +81,6 @@ Error read_error(const fs::path& path, const SQLite::Exception& error) {
   if (error.getErrorCode() == SQLITE_BUSY)
     reason = "another program has locked it; " + std::to_string(busy_timeout_ms / 1000) +
              " s were waited";
-  if (error.getErrorCode() == SQLITE_INTERRUPT)
-    reason = "is broken: it lists more rows than a file of its size can hold";
   const int code = error.getExtendedErrorCode();
   if (code == SQLITE_READONLY_ROLLBACK || code == SQLITE_READONLY_RECOVERY)
     reason =
@@ -96,9 +94,7 @@ Error read_error(const fs::path& path, const SQLite::Exception& error) {
 struct SqliteFile::Connection {
   Connection(const OpenMode& mode, std::uint64_t file_bytes)
       : database(mode.uri, SQLite::OPEN_READONLY | SQLite::OPEN_URI, busy_timeout_ms,
-                 mode.file_system == nullptr ? "" : mode.file_system),
-        max_steps(least_steps + steps_per_byte * (file_bytes / steps_between_looks)) {
-    sqlite3_progress_handler(database.getHandle(), steps_between_looks, take_step, this);
+                 mode.file_system == nullptr ? "" : mode.file_system) {
     // No value is longer than the file, but what an expression of its schema makes up.
     constexpr std::uint64_t least_length = 1U << 20U;
     constexpr std::uint64_t most_length = 1'000'000'000;  // SQLite's own
@@ -112,21 +108,8 @@ struct SqliteFile::Connection {
     sqlite3_db_config(database.getHandle(), SQLITE_DBCONFIG_NO_CKPT_ON_CLOSE, 1, nullptr);
   }
 
-  // Pages that name each other as children, or a join of rows without keys, are rows without end in
-  // a few kilobytes: a query may take no more steps of SQLite's machine than a sound file of that
-  // size needs. Steps are counted by the thousand.
-  static constexpr int steps_between_looks = 1000;
-  static constexpr std::uint64_t least_steps = 1000;
-  static constexpr std::uint64_t steps_per_byte = 100;
-  static int take_step(void* connection) {
-    auto* const self = static_cast<Connection*>(connection);
-    return ++self->steps > self->max_steps ? 1 : 0;
-  }
-
   SQLite::Database database;
   std::mutex mutex;
-  std::uint64_t max_steps;
-  std::uint64_t steps = 0;  // of the present query
 };
 
 bool SqliteRow::is_null(int column) const { return column_of(statement_, column).isNull(); }
@@ -158,20 +141,12 @@ SqliteFile::SqliteFile(const fs::path& path) : path_(path) {
   if (header.size() < 100)
     throw Error("is an SQLite file that ends in its header", {.file = path.string()});
   std::uint64_t bytes = fs::file_size(path);
-  // SQLite opens them too, and a pipe would never open.
-  for (const char* suffix : {"-journal", "-wal", "-shm"}) {
-    const fs::path companion = beside(path, suffix);
-    std::error_code gone;  // a program that writes makes and removes them
-    const fs::file_status status = fs::status(companion, gone);
-    if (fs::exists(status) && !fs::is_regular_file(status))
-      throw Error("is no file, and SQLite would read it", {.file = companion.string()});
-    const std::uintmax_t size = fs::file_size(companion, gone);
-    if (!gone) bytes += size;
-  }
+  std::error_code missing;
+  const std::uintmax_t wal_bytes = fs::file_size(beside(path, "-wal"), missing);
+  if (!missing) bytes += wal_bytes;
   try {
     connection_ = std::make_unique<Connection>(open_mode(path, header), bytes);
-    // Not count(*), which is a single step however long it takes.
-    connection_->database.execAndGet("SELECT count(1) FROM sqlite_master");
+    connection_->database.execAndGet("SELECT count(*) FROM sqlite_master");
   } catch (const SQLite::Exception& error) {
     throw read_error(path, error);
   }
@@ -182,7 +157,6 @@ SqliteFile::~SqliteFile() = default;
 void SqliteFile::each_row(const std::string& query, const std::vector<std::int64_t>& arguments,
                           const std::function<void(const SqliteRow&)>& use) const {
   const std::lock_guard lock(connection_->mutex);
-  connection_->steps = 0;
   try {
     SQLite::Statement statement(connection_->database, query);
     for (std::size_t i = 0; i < arguments.size(); ++i)
@@ -195,7 +169,6 @@ void SqliteFile::each_row(const std::string& query, const std::vector<std::int64
 
 void SqliteFile::copy_to(const fs::path& target) const {
   const std::lock_guard lock(connection_->mutex);
-  connection_->steps = 0;
   write_text(target, {});
   try {
     SQLite::Database copy(target.string(), SQLite::OPEN_READWRITE | SQLite::OPEN_CREATE);

@@ -1,14 +1,13 @@
 #include "libmap/view/scene_geometry.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <nanoflann.hpp>
 #include <variant>
 
 #include "libmap/core/error.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/view/scene_texture.h"
 
 namespace libmap {
@@ -25,21 +24,6 @@ constexpr double lone_point_size_m = 0.01;
 constexpr double filler_per_spacing = 3.0;
 constexpr double filler_depth_per_size = 2.75;
 
-struct KdTreeSource {
-  const std::vector<Eigen::Vector3d>& points;
-  std::size_t kdtree_get_point_count() const { return points.size(); }
-  double kdtree_get_pt(std::size_t i, std::size_t axis) const {
-    return points[i][static_cast<Eigen::Index>(axis)];
-  }
-  template <class Box>
-  bool kdtree_get_bbox(Box&) const {
-    return false;
-  }
-};
-using KdTree =
-    nanoflann::KDTreeSingleIndexAdaptor<nanoflann::L2_Simple_Adaptor<double, KdTreeSource>,
-                                        KdTreeSource, 3>;
-
 // The value that the given share of the others does not exceed.
 double quantile_of(std::vector<double> values, double share) {
   const auto rank = static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
@@ -54,23 +38,17 @@ struct Neighborhoods {
 };
 
 Neighborhoods look_around(const std::vector<Eigen::Vector3d>& positions) {
-  const KdTreeSource source{positions};
-  KdTree tree(3, source, nanoflann::KDTreeSingleIndexAdaptorParams(16));
-  tree.buildIndex();
+  const PointTree tree(positions);
   Neighborhoods result;
   const std::size_t step = std::max<std::size_t>(1, positions.size() / spacing_samples);
   for (std::size_t i = 0; i < positions.size(); i += step) {
-    std::array<std::uint32_t, 12> neighbors{};
-    std::array<double, 12> squared{};
-    const std::size_t found =
-        tree.knnSearch(positions[i].data(), neighbors.size(), neighbors.data(), squared.data());
-    // Several points may stand in one place.
-    std::size_t first = 0;
-    while (first < found && !(squared[first] > 0.0)) ++first;
-    if (first == found) continue;
-    result.nearest.push_back(positions[neighbors[first]] - positions[i]);
-    result.eighth_m.push_back(first + 7 < found ? std::sqrt(squared[first + 7])
-                                                : std::numeric_limits<double>::infinity());
+    std::vector<NeighborPoint> neighbors = tree.nearest(positions[i], 12);
+    // Several points may be in one place.
+    std::erase_if(neighbors, [](const NeighborPoint& near) { return !(near.square_m2 > 0.0); });
+    if (neighbors.empty()) continue;
+    result.nearest.push_back(positions[neighbors[0].index] - positions[i]);
+    result.eighth_m.push_back(neighbors.size() > 7 ? std::sqrt(neighbors[7].square_m2)
+                                                   : std::numeric_limits<double>::infinity());
   }
   return result;
 }

@@ -8,8 +8,8 @@
 #include <string>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/point_tree.h"
 #include "libmap/core/error.h"
+#include "libmap/core/point_tree.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/surface_distance.h"

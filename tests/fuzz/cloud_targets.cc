@@ -4,7 +4,6 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
-#include "tests/fuzz/vtp_samples.h"
 
 namespace graspmap_fuzz {
 
@@ -14,7 +13,6 @@ namespace fs = std::filesystem;
 
 constexpr const char* pcd = ".pcd";
 constexpr const char* ply = ".ply";
-constexpr const char* vtp = ".vtp";
 constexpr const char* csv = ".csv";
 
 template <const char* const& extension>
@@ -82,12 +80,6 @@ Seeds cloud_and_mesh_seeds() {
   return seeds;
 }
 
-Seeds vtp_seeds() {
-  Seeds seeds = cloud_and_mesh_seeds<vtp>();
-  for (std::string& sample : vtp_samples()) seeds.push_back(std::move(sample));
-  return seeds;
-}
-
 }  // namespace
 
 std::vector<FuzzTarget> cloud_targets() {
@@ -95,7 +87,6 @@ std::vector<FuzzTarget> cloud_targets() {
       {"cloud_csv", "clouds as CSV", run_cloud<csv>, cloud_seeds<csv>},
       {"pcd", "PCD clouds", run_cloud<pcd>, cloud_seeds<pcd>},
       {"ply", "PLY clouds and meshes", run_cloud_or_mesh<ply>, cloud_and_mesh_seeds<ply>},
-      {"vtp", "VTP clouds and meshes", run_cloud_or_mesh<vtp>, vtp_seeds},
   };
 }
 

@@ -20,17 +20,17 @@ TEST(Footholds, OfAMapInEitherFrame) {
     ASSERT_TRUE(succeeded(graspmap(
         {"score", "terrain.pcd", "-o", map, "--frame", frame, "--solid-voxel-threshold", "1"})));
     ASSERT_TRUE(succeeded(graspmap(
-        {"footholds", map, "-o", std::string(frame) + ".vtp", "--no-graspable-only", "--edges"})));
+        {"footholds", map, "-o", std::string(frame) + ".ply", "--no-graspable-only", "--edges"})));
   }
-  const PointCloud terrain = libmap::read_cloud(scratch("terrain.vtp")).cloud;
-  const PointCloud input = libmap::read_cloud(scratch("input.vtp")).cloud;
+  const PointCloud terrain = libmap::read_cloud(scratch("terrain.ply")).cloud;
+  const PointCloud input = libmap::read_cloud(scratch("input.ply")).cloud;
   ASSERT_GT(terrain.size(), 5U);
   ASSERT_EQ(terrain.size(), input.size());
   // The same places, turned: slopes are against the same plane.
   for (std::size_t n = 0; n < terrain.size(); ++n)
     EXPECT_NEAR(terrain.find_field("slope_deg")->values[n],
                 input.find_field("slope_deg")->values[n], 2.0);
-  const auto json = json_of("input.vtp.json");
+  const auto json = json_of("input.ply.json");
   EXPECT_EQ(json.at("frame"), "input");
   EXPECT_EQ(json.at("results").at("footholds"), input.size());
 }

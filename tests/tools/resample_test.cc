@@ -40,7 +40,7 @@ double smallest_pair(const std::vector<Eigen::Vector3d>& points) {
 
 TEST(Resample, EveryFormatHoldsTheSameSamples) {
   write_ridge();
-  for (const char* name : {"a.pcd", "a.ply", "a.vtp", "a.csv"}) {
+  for (const char* name : {"a.pcd", "a.ply", "a.csv"}) {
     ASSERT_TRUE(succeeded(graspmap({"resample", "ridge.ply", "-o", name, "--radius", "0.05"})));
     const libmap::PointCloud cloud = libmap::read_cloud(scratch(name)).cloud;
     EXPECT_GE(smallest_pair(cloud.positions), 0.05 - (name[2] == 'c' ? 1e-7 : 0.0)) << name;

@@ -104,9 +104,9 @@ TEST(ScoreOrientation, FootholdsComeAlongTheMasksAxis) {
     ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--frame", frame,
                                     "--up", "0,0,1", "--orientation", "surface", "--force"})));
     ASSERT_TRUE(succeeded(graspmap(
-        {"footholds", "map.pcd", "-o", "f.vtp", "--no-graspable-only", "--edges", "--force"})));
+        {"footholds", "map.pcd", "-o", "f.ply", "--no-graspable-only", "--edges", "--force"})));
     const PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
-    const PointCloud found = libmap::read_cloud(scratch("f.vtp")).cloud;
+    const PointCloud found = libmap::read_cloud(scratch("f.ply")).cloud;
     ASSERT_GT(found.size(), 20U);
     int sideways = 0;
     for (std::size_t n = 0; n < found.size(); ++n) {

@@ -206,7 +206,7 @@ TEST(ScoreStoreTerrain, InAnyFormat) {
   libmap::write_cloud(scratch("in/1.pcd"), part(1), {.encoding = compressed});
   libmap::write_cloud(scratch("in/2.ply"), part(2), {.big_endian = true});
   libmap::write_cloud(scratch("in/3.csv"), part(3));
-  libmap::write_cloud(scratch("in/4.vtp"), part(4));
+  libmap::write_cloud(scratch("in/4.csv"), part(4));
   libmap::write_cloud(scratch("in/5.ply"), part(5), {.encoding = libmap::FileEncoding::ascii});
   graspmap_test::write_text(scratch("in/notes.txt"), "no cloud");
   ASSERT_TRUE(succeeded(score("in", "whole.pcd")));

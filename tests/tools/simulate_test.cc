@@ -90,9 +90,9 @@ TEST(Mask, AsTextEqualsTheAuthorsProgram) {
 
 TEST(Mask, AsCloudAndPicture) {
   ASSERT_TRUE(succeeded(
-      graspmap({"mask", "--gripper", "hubrobo", "--voxel-size", "0.004", "-o", "mask.vtp"})));
+      graspmap({"mask", "--gripper", "hubrobo", "--voxel-size", "0.004", "-o", "mask.ply"})));
   ASSERT_TRUE(succeeded(graspmap({"mask", "-o", "mask.png"})));
-  const libmap::PointCloud cloud = libmap::read_cloud(scratch("mask.vtp")).cloud;
+  const libmap::PointCloud cloud = libmap::read_cloud(scratch("mask.ply")).cloud;
   EXPECT_GT(cloud.size(), 100U);
   EXPECT_NE(cloud.find_field("layer"), nullptr);
   EXPECT_EQ(content("mask.png").substr(1, 3), "PNG");

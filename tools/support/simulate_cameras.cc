@@ -158,8 +158,7 @@ void simulate(const SimulateCamerasOptions& options, Run& run) {
 int graspmap_tools::simulate_cameras(int argc, char** argv) {
   SimulateCamerasOptions options;
   Command command("simulate cameras", "What the depth cameras of a robot see from one place.");
-  command.input("MESH", options.mesh,
-                "where the robot stands (.ply, .obj, .stl, .off, .glb, .vtp)");
+  command.input("MESH", options.mesh, "where the robot stands (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "folder of 16-bit depth images and their rig file");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

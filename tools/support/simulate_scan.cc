@@ -125,7 +125,7 @@ void simulate(SimulateScanOptions& options, Run& run) {
 int graspmap_tools::simulate_scan(int argc, char** argv) {
   SimulateScanOptions options;
   Command command("simulate scan", "A scan of a mesh by a depth camera carried by hand.");
-  command.input("MESH", options.mesh, "what is scanned (.ply, .obj, .stl, .off, .glb, .vtp)");
+  command.input("MESH", options.mesh, "what is scanned (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "RTAB-Map database with true poses (.db)");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });

@@ -51,9 +51,6 @@ const Format formats[] = {{".pcd", FileEncoding::ascii, false, "pcd_ascii"},
                           {".ply", FileEncoding::ascii, false, "ply_ascii"},
                           {".ply", FileEncoding::binary, false, "ply_little_endian"},
                           {".ply", FileEncoding::binary, true, "ply_big_endian"},
-                          {".vtp", FileEncoding::ascii, false, "vtp_ascii"},
-                          {".vtp", FileEncoding::binary, false, "vtp_binary"},
-                          {".vtp", FileEncoding::binary_compressed, false, "vtp_compressed"},
                           {".csv", FileEncoding::ascii, false, "csv"}};
 
 fs::path write_sample(const Format& format, const PointCloud& cloud) {
@@ -290,7 +287,7 @@ TEST(CloudIo, UnknownExtensionNamesTheKnownOnes) {
     const fs::path path = scratch_folder() / name;
     write_text(path, "x");
     const Error error = error_of([&] { read_cloud(path); });
-    EXPECT_THAT(error.what(), HasSubstr(".pcd, .ply, .vtp or .csv"));
+    EXPECT_THAT(error.what(), HasSubstr(".pcd, .ply or .csv"));
     EXPECT_EQ(error.context().file, path.string());
     EXPECT_THROW(write_cloud(path, sample_cloud(1)), Error);
     EXPECT_THROW(read_cloud_info(path), Error);

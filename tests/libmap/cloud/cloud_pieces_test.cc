@@ -70,7 +70,7 @@ TEST(CloudPieces, BlocksAreFullAndHoldAllPointsInOrder) {
 }
 
 TEST(CloudPieces, SameValuesAsReadWhole) {
-  for (const char* name : {"a.pcd", "a.ply", "a.vtp"}) {
+  for (const char* name : {"a.pcd", "a.ply", "a.csv"}) {
     const auto path = write(name, random_cloud(70001, false));
     const PointCloud whole = libmap::read_cloud(path).cloud;
     const PointCloud pieces = libmap::read_pieces({path}).cloud;

@@ -41,9 +41,6 @@ const Format formats[] = {
     {".ply", FileEncoding::ascii, false, "ply_ascii", true, true, true, true},
     {".ply", FileEncoding::binary, false, "ply_little_endian", true, true, true, true},
     {".ply", FileEncoding::binary, true, "ply_big_endian", true, true, true, true},
-    {".vtp", FileEncoding::ascii, false, "vtp_ascii", true, true, true, true},
-    {".vtp", FileEncoding::binary, false, "vtp_binary", true, true, true, true},
-    {".vtp", FileEncoding::binary_compressed, false, "vtp_compressed", true, true, true, true},
     {".obj", FileEncoding::ascii, false, "obj", true, true, false, false},
     {".off", FileEncoding::ascii, false, "off", false, false, false, true},
     {".stl", FileEncoding::binary, false, "stl_binary", false, false, false, false},
@@ -348,7 +345,7 @@ TEST(MeshFiles, WhatSinglePrecisionCannotHoldIsNotWritten) {
                                         ": vertex 4 is 1e+39 m: too far away for " + extension));
     EXPECT_FALSE(fs::exists(path));
   }
-  for (const char* extension : {".ply", ".vtp", ".off"}) {
+  for (const char* extension : {".ply", ".off"}) {
     const fs::path path = scratch_folder() / (std::string("far") + extension);
     write_mesh(path, mesh);
     EXPECT_EQ(read_mesh(path).mesh.vertices, mesh.vertices);
@@ -398,7 +395,7 @@ TEST(MeshFiles, UnknownExtensionNamesTheKnownOnes) {
   const fs::path path = scratch_folder() / "mesh.objj";
   write_text(path, "x");
   EXPECT_THAT(error_of([&] { read_mesh(path); }).what(),
-              HasSubstr(".ply, .obj, .stl, .off, .glb or .vtp"));
+              HasSubstr(".ply, .obj, .stl, .off or .glb"));
   EXPECT_THROW(write_mesh(path, sheet(2)), Error);
 }
 
@@ -413,9 +410,9 @@ TEST(FileKinds, ByExtensionAndContent) {
     write_mesh(path, sheet(3));
     return path;
   };
-  for (const char* const name : {"a.pcd", "a.ply", "a.vtp", "a.csv"})
+  for (const char* const name : {"a.pcd", "a.ply", "a.csv"})
     EXPECT_EQ(file_kind(cloud(name)), FileKind::cloud) << name;
-  for (const char* const name : {"a.ply", "a.vtp", "a.obj", "a.stl", "a.off", "a.glb", "A.PLY"})
+  for (const char* const name : {"a.ply", "a.obj", "a.stl", "a.off", "a.glb", "A.PLY"})
     EXPECT_EQ(file_kind(mesh(name)), FileKind::mesh) << name;
   EXPECT_THAT(error_of([] { file_kind("scan.db"); }).what(), HasSubstr(".pcd"));
   EXPECT_THROW(file_kind(scratch_folder() / "missing.ply"), Error);
@@ -423,14 +420,12 @@ TEST(FileKinds, ByExtensionAndContent) {
 
 TEST(FileKinds, AMeshReadsAsTheCloudOfItsVertices) {
   const TriangleMesh written = sheet(4);
-  for (const char* const name : {"mesh.ply", "mesh.vtp"}) {
-    const fs::path path = scratch_folder() / name;
-    write_mesh(path, written);
-    const CloudReadResult read = read_cloud(path);
-    EXPECT_EQ(read.cloud.positions, written.vertices);
-    EXPECT_EQ(read.cloud.fields, written.vertex_fields);
-    EXPECT_THAT(read.info.skipped, ::testing::Contains("18 faces"));
-  }
+  const fs::path path = scratch_folder() / "mesh.ply";
+  write_mesh(path, written);
+  const CloudReadResult read = read_cloud(path);
+  EXPECT_EQ(read.cloud.positions, written.vertices);
+  EXPECT_EQ(read.cloud.fields, written.vertex_fields);
+  EXPECT_THAT(read.info.skipped, ::testing::Contains("18 faces"));
 }
 
 TEST(RealMeshes, GroundTruthOfTheSite) {
@@ -444,7 +439,7 @@ TEST(RealMeshes, GroundTruthOfTheSite) {
   EXPECT_NO_THROW(read.mesh.check());
   // Through every other format and back.
   const double area = surface_area(read.mesh);
-  for (const char* const name : {"m.obj", "m.off", "m.stl", "m.glb", "m.vtp", "m.ply"}) {
+  for (const char* const name : {"m.obj", "m.off", "m.stl", "m.glb", "m.ply"}) {
     const fs::path copy = scratch_folder() / name;
     write_mesh(copy, read.mesh);
     const TriangleMesh again = read_mesh(copy).mesh;

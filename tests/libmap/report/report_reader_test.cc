@@ -166,8 +166,8 @@ TEST(FoundOutline, OfAFolder) {
   put("2_b/map.pcd", "");
   put("10_c/table.csv", "a\n1\n");
   put_manifest("2_b/map.pcd", "convert", {{"1.pcd", "", 1}, {"2.pcd", "", 1}});
-  put("2_b/map.vtp", "");
-  put_manifest("2_b/map.vtp", "convert", {{"map.pcd", "", 1}});
+  put("2_b/map.ply", "");
+  put_manifest("2_b/map.ply", "convert", {{"map.pcd", "", 1}});
   put("2_b/lookup.csv", "place,graspable,score\nA,1,0.5\n");
   put_manifest("2_b/lookup.csv", "lookup", {{"elsewhere/map.pcd", "", 1}});
   put("2_b/oblique.png", "");

@@ -130,21 +130,6 @@ TEST(RtabmapReader, NodesWhoseNumbersAreTexts) {
   EXPECT_EQ(scan.graph().find_node(2)->label, "two");  // a table could not hold the rest
 }
 
-// Of a schema before 0.10: every image with every depth image, 9 million rows in 50 kB.
-TEST(RtabmapReader, RowsWithoutEndAreRefused) {
-  const std::string rows =
-      " WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n WHERE i < 3000) "
-      "SELECT 1, NULL FROM n";
-  const fs::path file =
-      database_of({"CREATE TABLE Node (id INTEGER)", "CREATE TABLE Image (id INTEGER, data BLOB)",
-                   "CREATE TABLE Depth (id INTEGER, data BLOB)", "INSERT INTO Image" + rows,
-                   "INSERT INTO Depth" + rows});
-  const RtabmapDatabase scan(file);
-  const libmap::Error error = error_of([&] { scan.each_content([](const auto&) {}); });
-  EXPECT_EQ(error.context().file, file);
-  EXPECT_NE(error.reason().find("more rows than a file of its size can hold"), std::string::npos);
-}
-
 TEST(RtabmapReader, ValuesThatASchemaMakesUpAreNotRead) {
   const std::string made_up = " BLOB AS (zeroblob(900000000)))";
   const RtabmapDatabase scan(database_of(
@@ -369,21 +354,6 @@ TEST(RtabmapReader, OptimizedPosesAreCountedBeforeTheyAreInflated) {
     EXPECT_EQ(scan.warnings(),
               (std::vector<std::string>{std::string("Admin.opt_poses: ") + reason}));
   }
-}
-
-TEST(RtabmapReader, ImagesOfManyNodesHaveAKey) {
-  const fs::path file = sample_file();
-  execute(file,
-          "INSERT INTO Node (id, map_id, weight, stamp, pose) "
-          "WITH RECURSIVE n(i) AS (SELECT 100 UNION ALL SELECT i + 1 FROM n WHERE i < 1100) "
-          "SELECT i, 0, 0, i, (SELECT pose FROM Node WHERE id = 1) FROM n");
-  EXPECT_EQ(RtabmapDatabase(file).graph().nodes.size(), 1004U);
-  execute(file, "ALTER TABLE Data RENAME TO Keyed");
-  execute(file, "CREATE TABLE Data AS SELECT * FROM Keyed");
-  EXPECT_EQ(error_of([&] { RtabmapDatabase{file}; }).reason(),
-            "a table of images has no key to the nodes");
-  execute(file, "DELETE FROM Node WHERE id > 1000");
-  EXPECT_FALSE(RtabmapDatabase(file).read_frame(1).color.empty());
 }
 
 TEST(RtabmapReader, PolygonsOfSeveralMaterials) {

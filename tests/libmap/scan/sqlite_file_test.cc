@@ -3,7 +3,6 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 #include <sqlite3.h>
-#include <sys/stat.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -50,21 +49,6 @@ TEST(SqliteFile, LeavesNothingBeside) {
     EXPECT_EQ(files_in(folder), before);
   }
   EXPECT_EQ(files_in(folder), before);
-}
-
-// SQLite would wait for ever until somebody writes into it.
-TEST(SqliteFile, PipesBesideIt) {
-  const fs::path file = scratch_folder() / "a.db";
-  write_sample(file);
-  for (const char* suffix : {"-journal", "-wal", "-shm"}) {
-    const fs::path pipe = fs::path(file).concat(suffix);
-    ASSERT_EQ(mkfifo(pipe.c_str(), 0600), 0);
-    const libmap::Error error = error_of([&] { RtabmapDatabase{file}; });
-    EXPECT_EQ(error.context().file, pipe);
-    EXPECT_NE(error.reason().find("is no file"), std::string::npos);
-    fs::remove(pipe);
-  }
-  expect_sample(RtabmapDatabase(file));
 }
 
 TEST(SqliteFile, WalModeThatNobodyHasOpen) {

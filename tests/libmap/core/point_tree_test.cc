@@ -1,4 +1,4 @@
-#include "libmap/cloud/point_tree.h"
+#include "libmap/core/point_tree.h"
 
 #include <gtest/gtest.h>
 
@@ -58,6 +58,42 @@ TEST(PointTree, TheNearestAmongPointsInOnePlace) {
     ASSERT_EQ(list.size(), 1U);
     EXPECT_EQ(one.index, list[0].index);
     EXPECT_EQ(one.square_m2, list[0].square_m2);
+  }
+}
+
+TEST(PointTree, TheFirstOfThoseEquallyNear) {
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 600; ++n)
+    points.emplace_back(0.25 * (n % 4), 0.25 * (n / 4 % 3), n < 300 ? 0.0 : 0.5);
+  const PointTree tree(points);
+  std::vector<Eigen::Vector3d> places = random_points(50);
+  places.insert(places.end(), points.begin(), points.end());
+  places.emplace_back(0.125, 0.125, 0.25);
+  places.emplace_back(1e6, 0, 0);
+  for (const Eigen::Vector3d& at : places) {
+    std::pair<double, std::size_t> least{HUGE_VAL, 0};
+    for (std::size_t n = 0; n < points.size(); ++n)
+      least = std::min(least, {(points[n] - at).squaredNorm(), n});
+    EXPECT_EQ(tree.first_of_nearest(at).index, least.second);
+  }
+}
+
+TEST(PointTree, AroundAPointWithoutIt) {
+  std::vector<Eigen::Vector3d> points = random_points(300);
+  for (int n = 0; n < 20; ++n) points.push_back(points[7]);
+  const PointTree tree(points);
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    std::vector<double> squares;
+    for (std::size_t other = 0; other < points.size(); ++other)
+      if (other != n) squares.push_back((points[other] - points[n]).squaredNorm());
+    std::sort(squares.begin(), squares.end());
+    const std::vector<NeighborPoint> found = tree.around(n, 9, 0.3);
+    for (std::size_t k = 0; k < 9; ++k) {
+      ASSERT_EQ(k < found.size(), squares[k] <= 0.09);
+      if (k == found.size()) break;
+      EXPECT_NE(found[k].index, n);
+      EXPECT_NEAR(found[k].square_m2, squares[k], 1e-15);
+    }
   }
 }
 

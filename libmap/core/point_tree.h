@@ -1,4 +1,6 @@
-// Nearest neighbours among points (a k-d tree by nanoflann).
+// The project's neighbor search among points that are all known (a k-d tree by nanoflann). Other
+// structures exist where this one cannot be used; each says why: libmap/mesh/sample_grid.h,
+// libmap/cloud/surface_normals.cc, libgtd/shape/point_grid.h.
 #pragma once
 
 #include <Eigen/Core>
@@ -26,6 +28,11 @@ class PointTree {
   std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
   // The nearest one; there must be one.
   NeighborPoint nearest(const Eigen::Vector3d& point) const;
+  // The nearest one, among equally near ones that of the lowest index; there must be one.
+  NeighborPoint first_of_nearest(const Eigen::Vector3d& point) const;
+  // The `count` points nearest to the n-th and at most `radius_m` away, the nearest first, without
+  // the n-th.
+  std::vector<NeighborPoint> around(std::size_t n, std::size_t count, double radius_m) const;
   // All points at most `radius_m` away, by index.
   std::vector<NeighborPoint> within(const Eigen::Vector3d& point, double radius_m) const;
 

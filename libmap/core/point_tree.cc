@@ -1,4 +1,4 @@
-#include "libmap/cloud/point_tree.h"
+#include "libmap/core/point_tree.h"
 
 #include <algorithm>
 #include <cmath>
@@ -41,6 +41,26 @@ struct NearestPoint {
   }
 };
 
+// The tree rounds the distances of its boxes: it is asked for a little more.
+double with_margin(double square_m2) {
+  constexpr double margin = 1e-9;
+  return std::nextafter(square_m2 * (1.0 + margin), HUGE_VAL);
+}
+
+// It keeps no list: from far off all points are nearly as near.
+struct FirstOfNearest {
+  NeighborPoint neighbor{0, HUGE_VAL};
+
+  bool full() const { return true; }
+  double worstDist() const { return with_margin(neighbor.square_m2); }
+  bool addPoint(double square_m2, std::size_t index) {
+    if (square_m2 < neighbor.square_m2 ||
+        (square_m2 == neighbor.square_m2 && index < neighbor.index))
+      neighbor = {index, square_m2};
+    return true;
+  }
+};
+
 }  // namespace
 
 struct PointTree::Index {
@@ -73,17 +93,32 @@ NeighborPoint PointTree::nearest(const Eigen::Vector3d& point) const {
   return result.neighbor;
 }
 
+NeighborPoint PointTree::first_of_nearest(const Eigen::Vector3d& point) const {
+  FirstOfNearest result;
+  index_->tree.findNeighbors(result, point.data(), nanoflann::SearchParams());
+  return result.neighbor;
+}
+
+std::vector<NeighborPoint> PointTree::around(std::size_t n, std::size_t count,
+                                             double radius_m) const {
+  std::vector<NeighborPoint> found = nearest(index_->list.points[n], count + 1);
+  std::erase_if(found, [&](const NeighborPoint& near) {
+    return near.index == n || near.square_m2 > radius_m * radius_m;
+  });
+  found.resize(std::min(found.size(), count));
+  return found;
+}
+
 std::vector<NeighborPoint> PointTree::within(const Eigen::Vector3d& point, double radius_m) const {
   std::vector<NeighborPoint> neighbors;
   if (index_->list.points.empty()) return neighbors;
+  const double square = radius_m * radius_m;
   std::vector<std::pair<std::size_t, double>> matches;
-  // nanoflann leaves out what lies exactly at the radius.
-  const double square =
-      std::nextafter(radius_m * radius_m, std::numeric_limits<double>::infinity());
-  index_->tree.radiusSearch(point.data(), square, matches, nanoflann::SearchParams());
+  index_->tree.radiusSearch(point.data(), with_margin(square), matches, nanoflann::SearchParams());
   std::sort(matches.begin(), matches.end());
   neighbors.reserve(matches.size());
-  for (const auto& [index, square_m2] : matches) neighbors.push_back({index, square_m2});
+  for (const auto& [index, square_m2] : matches)
+    if (square_m2 <= square) neighbors.push_back({index, square_m2});
   return neighbors;
 }
 
