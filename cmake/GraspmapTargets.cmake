@@ -34,7 +34,7 @@ set(graspmap_sanitizer_definitions $<$<BOOL:${GRASPMAP_SANITIZE}>:EIGEN_MALLOC_A
 # stay apart.
 set(CMAKE_UNITY_BUILD_BATCH_SIZE 12)
 
-# Libraries; graspmap_kernels has -O3, graspmap_compile_quickly -O1.
+# Libraries; graspmap_compile_quickly has -O1.
 set(CMAKE_CXX_FLAGS_RELEASE "-O2 -DNDEBUG")
 
 # For targets that do little themselves.
@@ -64,12 +64,6 @@ endfunction()
 function(graspmap_precompiled target headers)
   target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess>)
   target_precompile_headers(${target} REUSE_FROM ${headers})
-endfunction()
-
-# graspmap_kernels(TARGET FILE...): sources of the target that -O3 makes measurably faster.
-function(graspmap_kernels target)
-  set_source_files_properties(${ARGN} TARGET_DIRECTORY ${target} PROPERTIES
-    COMPILE_OPTIONS $<$<CONFIG:Release>:-O3>)
 endfunction()
 
 function(graspmap_set_flags target)

@@ -5,6 +5,7 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "libgtd/evaluate/named_cells.h"
 #include "libmap/core/text.h"
 
 namespace libgtd {
@@ -148,30 +149,31 @@ void add_change_row(const char* of, const ChangeSummary& summary, bool bounds, T
   const bool scored = difference.count > 0;
   const auto value = [&](double number) { return scored ? text(number) : std::string(); };
   const std::optional<Kappa>& kappa = summary.kappa;
-  table.rows.push_back({of,
-                        bounds ? text(summary.low) : "",
-                        bounds ? text(summary.high) : "",
-                        text(counts.size()),
-                        text(counts.true_positives),
-                        text(summary.lost()),
-                        text(summary.gained()),
-                        text(counts.true_negatives),
-                        text(counts.accuracy().value()),
-                        text(counts.true_positive_rate().value()),
-                        text(counts.true_negative_rate().value()),
-                        text(counts.positive_predictive_value().value()),
-                        kappa ? text(kappa->value) : "",
-                        kappa ? text(kappa->standard_error) : "",
-                        text(summary.both_area_m2),
-                        text(summary.lost_area_m2),
-                        text(summary.gained_area_m2),
-                        value(difference.mean),
-                        value(difference.mean_absolute),
-                        value(difference.rms),
-                        value(difference.low_5),
-                        value(difference.median),
-                        value(difference.high_95),
-                        text(difference.correlation)});
+  append({{"of", of},
+          {"from", bounds ? text(summary.low) : ""},
+          {"to", bounds ? text(summary.high) : ""},
+          {"voxels", text(counts.size())},
+          {"both", text(counts.true_positives)},
+          {"lost", text(summary.lost())},
+          {"gained", text(summary.gained())},
+          {"neither", text(counts.true_negatives)},
+          {"accuracy", text(counts.accuracy().value())},
+          {"sensitivity", text(counts.true_positive_rate().value())},
+          {"specificity", text(counts.true_negative_rate().value())},
+          {"positive_predictive_value", text(counts.positive_predictive_value().value())},
+          {"kappa", kappa ? text(kappa->value) : ""},
+          {"kappa_error", kappa ? text(kappa->standard_error) : ""},
+          {"both_area_m2", text(summary.both_area_m2)},
+          {"lost_area_m2", text(summary.lost_area_m2)},
+          {"gained_area_m2", text(summary.gained_area_m2)},
+          {"difference_mean", value(difference.mean)},
+          {"difference_mean_absolute", value(difference.mean_absolute)},
+          {"difference_rms", value(difference.rms)},
+          {"difference_p05", value(difference.low_5)},
+          {"difference_median", value(difference.median)},
+          {"difference_p95", value(difference.high_95)},
+          {"correlation", text(difference.correlation)}},
+         table);
 }
 
 }  // namespace
@@ -264,30 +266,6 @@ Table region_links_table(const VoxelMap& map, const RegionReach& reach) {
 
 Table change_table(const MapChange& change) {
   Table table;
-  table.columns = {"of",
-                   "from",
-                   "to",
-                   "voxels",
-                   "both",
-                   "lost",
-                   "gained",
-                   "neither",
-                   "accuracy",
-                   "sensitivity",
-                   "specificity",
-                   "positive_predictive_value",
-                   "kappa",
-                   "kappa_error",
-                   "both_area_m2",
-                   "lost_area_m2",
-                   "gained_area_m2",
-                   "difference_mean",
-                   "difference_mean_absolute",
-                   "difference_rms",
-                   "difference_p05",
-                   "difference_median",
-                   "difference_p95",
-                   "correlation"};
   add_change_row("common", change.common, false, table);
   add_change_row("judged", change.judged, false, table);
   for (const ChangeSummary& bin : change.by_height) add_change_row("height_m", bin, true, table);

@@ -235,24 +235,6 @@ std::string_view to_text(VoxelMatching matching) {
   return matching == VoxelMatching::lattice ? "lattice" : "nearest";
 }
 
-std::string_view to_text(ChangeClass change) {
-  switch (change) {
-    case ChangeClass::neither:
-      return "neither";
-    case ChangeClass::both:
-      return "both";
-    case ChangeClass::gained:
-      return "gained";
-    case ChangeClass::lost:
-      return "lost";
-    case ChangeClass::only_map:
-      return "only in MAP";
-    case ChangeClass::only_other:
-      return "only in OTHER";
-  }
-  return {};
-}
-
 ChangeClass class_of(const VoxelMap& map, const VoxelMap& other, const VoxelPair& pair) {
   const bool in_other = other.graspable[pair.other] != 0;
   if (map.graspable[pair.map] != 0) return in_other ? ChangeClass::both : ChangeClass::lost;

@@ -33,7 +33,6 @@ std::string_view to_text(VoxelMatching matching);
 // Whether a place can be held: in neither map, in both, in OTHER alone, in MAP alone; or the place
 // is in one map alone.
 enum class ChangeClass : std::uint8_t { neither, both, gained, lost, only_map, only_other };
-std::string_view to_text(ChangeClass change);
 
 struct VoxelPair {
   std::uint32_t map = 0;  // entries of the two maps

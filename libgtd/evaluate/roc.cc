@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <random>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 
 namespace libgtd {
@@ -111,15 +111,6 @@ void sum_upper(const std::vector<RocPoint>& points, AreaUnderCurve& area) {
   area.upper_sum_width = width.value().value();
 }
 
-// A whole number below `bound`, all equally likely: draws beyond the last whole multiple of
-// `bound` are thrown away.
-std::uint64_t draw_below(std::mt19937_64& engine, std::uint64_t bound) {
-  const std::uint64_t excess = (std::uint64_t{0} - bound) % bound;  // 2^64 mod bound
-  std::uint64_t drawn = engine();
-  while (drawn < excess) drawn = engine();
-  return drawn % bound;
-}
-
 // Hyndman and Fan 1996, definition 7.
 double quantile(const std::vector<double>& sorted, double probability) {
   const double position = probability * static_cast<double>(sorted.size() - 1);
@@ -137,28 +128,21 @@ class Bootstrap {
     }
   }
 
-  // Each replicate has an engine of its own: the order in which they are made does not matter.
+  // Each replicate has a stream of its own: the order in which they are made does not matter.
   double replicate(std::uint64_t seed, std::uint64_t index) const {
-    const auto halves = [](std::uint64_t value) {
-      return std::pair(static_cast<std::uint32_t>(value), static_cast<std::uint32_t>(value >> 32));
-    };
-    const auto [seed_low, seed_high] = halves(seed);
-    const auto [index_low, index_high] = halves(index);
-    std::seed_seq sequence{seed_low, seed_high, index_low, index_high};
-    std::mt19937_64 engine(sequence);
-    const auto positives = draw(engine, group_of_positive_);
-    const auto negatives = draw(engine, group_of_negative_);
+    libmap::RandomStream random(seed, index);
+    const auto positives = draw(random, group_of_positive_);
+    const auto negatives = draw(random, group_of_negative_);
     PairCount pairs;
     for (std::size_t g = 0; g < sample_.groups.size(); ++g) pairs.add(positives[g], negatives[g]);
     return pairs.area(sample_.positives, sample_.negatives);
   }
 
  private:
-  std::vector<std::uint64_t> draw(std::mt19937_64& engine,
+  std::vector<std::uint64_t> draw(libmap::RandomStream& random,
                                   const std::vector<std::size_t>& groups) const {
     std::vector<std::uint64_t> drawn(sample_.groups.size(), 0);
-    for (std::size_t i = 0; i < groups.size(); ++i)
-      ++drawn[groups[draw_below(engine, groups.size())]];
+    for (std::size_t i = 0; i < groups.size(); ++i) ++drawn[groups[random.below(groups.size())]];
     return drawn;
   }
 

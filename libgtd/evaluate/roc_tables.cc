@@ -4,6 +4,7 @@
 #include <array>
 #include <nlohmann/json.hpp>
 
+#include "libgtd/evaluate/named_cells.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -77,21 +78,22 @@ std::vector<std::optional<double>> read_scores(const Table& table, const std::st
   return scores;
 }
 
-std::vector<std::string> roc_row(const std::string& name, const char* at, const RocPoint& point,
-                                 std::optional<double> share) {
+void add_roc_row(const std::string& name, const char* at, const RocPoint& point,
+                 std::optional<double> share, Table& table) {
   const Confusion& counts = point.counts;
-  return {name,
-          at,
-          libmap::to_text(point.cutoff),
-          number_text(counts.predicted_positives()),
-          number_text(counts.predicted_negatives()),
-          number_text(counts.true_positives),
-          number_text(counts.false_positives),
-          number_text(counts.true_negatives),
-          number_text(counts.false_negatives),
-          text_or_empty(counts.true_positive_rate().value()),
-          text_or_empty(counts.false_positive_rate().value()),
-          text_or_empty(share)};
+  append({{"scores", name},
+          {"at", at},
+          {"cutoff", libmap::to_text(point.cutoff)},
+          {"predicted_positives", number_text(counts.predicted_positives())},
+          {"predicted_negatives", number_text(counts.predicted_negatives())},
+          {"true_positives", number_text(counts.true_positives)},
+          {"false_positives", number_text(counts.false_positives)},
+          {"true_negatives", number_text(counts.true_negatives)},
+          {"false_negatives", number_text(counts.false_negatives)},
+          {"true_positive_rate", text_or_empty(counts.true_positive_rate().value())},
+          {"false_positive_rate", text_or_empty(counts.false_positive_rate().value())},
+          {"upper_sum_share", text_or_empty(share)}},
+         table);
 }
 
 Json number_or_null(const std::optional<Interval>& interval) {
@@ -263,27 +265,15 @@ TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions&
 
 Table roc_table(const TableEvaluation& evaluation) {
   Table table;
-  table.columns = {"scores",
-                   "at",
-                   "cutoff",
-                   "predicted_positives",
-                   "predicted_negatives",
-                   "true_positives",
-                   "false_positives",
-                   "true_negatives",
-                   "false_negatives",
-                   "true_positive_rate",
-                   "false_positive_rate",
-                   "upper_sum_share"};
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocResult& result = column.result;
     for (std::size_t k = 0; k < result.at_cutoffs.size(); ++k) {
       std::optional<double> share;
       if (result.area) share = result.area->upper_sum_shares[k];
-      table.rows.push_back(roc_row(column.name, "cutoff", result.at_cutoffs[k], share));
+      add_roc_row(column.name, "cutoff", result.at_cutoffs[k], share, table);
     }
     for (const RocPoint& point : result.at_scores)
-      table.rows.push_back(roc_row(column.name, "score", point, std::nullopt));
+      add_roc_row(column.name, "score", point, std::nullopt, table);
   }
   return table;
 }

@@ -34,9 +34,4 @@ std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& 
                                       InstructionSet instructions = best_instruction_set(),
                                       libmap::Progress& progress = libmap::no_progress());
 
-// The same by the plain triple loop of listing A.6, over a dense array of the whole box, one
-// thread: the oracle of the tests and the baseline of the benchmarks.
-std::vector<VoxelCounts> match_voxels_plainly(const VoxelGrid& grid, const GripperMask& mask,
-                                              const std::vector<std::size_t>& pivots);
-
 }  // namespace libgtd

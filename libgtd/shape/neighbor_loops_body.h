@@ -1,18 +1,52 @@
-// The functions of neighbor_loops.h but for their instruction set; for neighbor_loops.cc alone,
-// which includes this once for each.
+// The functions of neighbor_loops.h but for their instruction set; for neighbor_loops.cc alone.
+
+using Register [[gnu::vector_size(GRASPMAP_REGISTER)]] = double;
 
 using Lanes [[gnu::vector_size(NeighborLoops::lanes * sizeof(double))]] = double;
 
-// Without asking for alignment. Not returned: how vectors are depends on the instruction set.
-inline void load_lanes(const double* values, Lanes& loaded) {
-  __builtin_memcpy(&loaded, values, sizeof(Lanes));
+template <typename Vector>
+inline void load_places(const NeighborLoops::Places& places, std::size_t at, Vector& x, Vector& y,
+                        Vector& z) {
+  __builtin_memcpy(&x, places.x + at, sizeof(Vector));
+  __builtin_memcpy(&y, places.y + at, sizeof(Vector));
+  __builtin_memcpy(&z, places.z + at, sizeof(Vector));
 }
 
-inline void load_places(const NeighborLoops::Places& places, std::size_t at, Lanes& x, Lanes& y,
-                        Lanes& z) {
-  load_lanes(places.x + at, x);
-  load_lanes(places.y + at, y);
-  load_lanes(places.z + at, z);
+std::size_t select(const NeighborLoops::Places& candidates, std::size_t count, const double* center,
+                   double radius, const NeighborLoops::Places& neighbors) {
+  constexpr std::size_t width = GRASPMAP_REGISTER / sizeof(double);
+  const double inverse = 1 / radius;
+  const double limit = radius * radius;
+  std::size_t selected = 0;
+  for (std::size_t k = 0; k < count; k += width) {
+    Register x, y, z;
+    load_places(candidates, k, x, y, z);
+    x -= center[0];
+    y -= center[1];
+    z -= center[2];
+    const auto within = x * x + y * y + z * z <= limit;
+    x *= inverse;
+    y *= inverse;
+    z *= inverse;
+#if GRASPMAP_REGISTER == 64
+    const __mmask8 mask = _mm512_test_epi64_mask(__m512i(within), __m512i(within));
+    _mm512_storeu_pd(neighbors.x + selected, _mm512_maskz_compress_pd(mask, __m512d(x)));
+    _mm512_storeu_pd(neighbors.y + selected, _mm512_maskz_compress_pd(mask, __m512d(y)));
+    _mm512_storeu_pd(neighbors.z + selected, _mm512_maskz_compress_pd(mask, __m512d(z)));
+    selected += static_cast<std::size_t>(__builtin_popcount(mask));
+#else
+#pragma GCC unroll 4
+    for (std::size_t n = 0; n < width; ++n) {
+      neighbors.x[selected] = x[n];
+      neighbors.y[selected] = y[n];
+      neighbors.z[selected] = z[n];
+      selected += within[n] != 0 ? 1 : 0;
+    }
+#endif
+  }
+  for (std::size_t k = selected; k < selected + NeighborLoops::lanes; ++k)
+    neighbors.x[k] = neighbors.y[k] = neighbors.z[k] = 0;
+  return selected;
 }
 
 template <std::size_t count>
@@ -74,3 +108,38 @@ void sum_quadric(const NeighborLoops::Places& neighbors, std::size_t count, cons
   }
   join_lanes(s, sums);
 }
+
+std::size_t rank(const float* x, const float* y, const float* z, std::size_t count,
+                 const float* center, float limit, std::uint64_t* keys) {
+  constexpr std::size_t at_once = NeighborLoops::rank_lanes;
+  std::size_t ranked = 0;
+  for (std::size_t first = 0; first < count; first += at_once) {
+    float squares[at_once];
+    for (std::size_t n = 0; n < at_once; ++n) {
+      const float dx = center[0] - x[first + n], dy = center[1] - y[first + n],
+                  dz = center[2] - z[first + n];
+      squares[n] = dx * dx + dy * dy + dz * dz;
+    }
+#if GRASPMAP_REGISTER == 64
+    const __m512 loaded = _mm512_loadu_ps(squares);
+    const __m512i numbers = _mm512_setr_epi32(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+    const __mmask16 near = _mm512_cmp_ps_mask(loaded, _mm512_set1_ps(limit), _CMP_LT_OQ);
+    std::uint32_t bits[at_once], kept[at_once];
+    _mm512_storeu_si512(bits, _mm512_maskz_compress_epi32(near, _mm512_castps_si512(loaded)));
+    _mm512_storeu_si512(kept, _mm512_maskz_compress_epi32(near, numbers));
+    for (std::size_t n = 0; n < at_once; ++n)
+      keys[ranked + n] = std::uint64_t{bits[n]} << 32 | (first + kept[n]);
+    ranked += static_cast<std::size_t>(__builtin_popcount(near));
+#else
+    for (std::size_t n = 0; n < at_once; ++n) {
+      std::uint32_t bits = 0;
+      __builtin_memcpy(&bits, &squares[n], sizeof(bits));
+      keys[ranked] = std::uint64_t{bits} << 32 | (first + n);
+      ranked += squares[n] < limit ? 1 : 0;
+    }
+#endif
+  }
+  return ranked;
+}
+
+constexpr NeighborLoops all = {select, sum_moments, sum_quadric, rank};

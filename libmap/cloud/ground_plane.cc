@@ -5,12 +5,12 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
-#include <random>
 #include <string>
 
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/symmetric_eigen.h"
 
 namespace libmap {
@@ -23,6 +23,7 @@ constexpr std::size_t most_drawn = 20000;  // points that hypotheses are drawn f
 constexpr std::size_t first_look = 2000;   // of them, that every hypothesis is counted on
 constexpr std::size_t second_look = 20;    // hypotheses that are counted on all of them
 constexpr int most_rounds = 10;            // planes that are looked for, walls included
+constexpr std::uint64_t points_stream = 0, hypotheses_stream = 1;  // of random numbers
 
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
@@ -109,13 +110,13 @@ std::size_t count_near(const Points& points, std::size_t count, const Plane& pla
 
 // Planes through three points each that do not lie steeper than allowed.
 std::vector<Plane> draw_hypotheses(const Points& points, const GroundPlaneOptions& options,
-                                   const Eigen::Vector3d& up, std::mt19937_64& engine) {
-  std::uniform_int_distribution<std::size_t> draw(0, points.size() - 1);
+                                   const Eigen::Vector3d& up, RandomStream& random) {
+  const auto draw = [&] { return random.below(points.size()); };
   std::vector<Plane> planes;
   for (int n = 0; n < options.hypotheses; ++n) {
-    const Eigen::Vector3d& a = points[draw(engine)];
-    const Eigen::Vector3d ab = points[draw(engine)] - a;
-    const Eigen::Vector3d ac = points[draw(engine)] - a;
+    const Eigen::Vector3d& a = points[draw()];
+    const Eigen::Vector3d ab = points[draw()] - a;
+    const Eigen::Vector3d ac = points[draw()] - a;
     Eigen::Vector3d normal = ab.cross(ac);
     if (!(normal.norm() > 1e-6 * ab.norm() * ac.norm())) continue;
     normal.normalize();
@@ -127,8 +128,8 @@ std::vector<Plane> draw_hypotheses(const Points& points, const GroundPlaneOption
 
 // The hypothesis with the most points, fitted to them.
 std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& options,
-                                const Eigen::Vector3d& up, std::mt19937_64& engine) {
-  const std::vector<Plane> planes = draw_hypotheses(points, options, up, engine);
+                                const Eigen::Vector3d& up, RandomStream& random) {
+  const std::vector<Plane> planes = draw_hypotheses(points, options, up, random);
   if (planes.empty()) return std::nullopt;
   const auto counts_on = [&](const std::vector<std::size_t>& which, std::size_t count) {
     std::vector<std::size_t> counts(which.size());
@@ -165,10 +166,10 @@ struct Candidate {
 std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& options,
                                        const Eigen::Vector3d& up, double& largest_share) {
   const auto total = static_cast<double>(points.size());
-  std::mt19937_64 engine(options.seed);
+  RandomStream random(options.seed, hypotheses_stream);
   std::vector<Candidate> candidates;
   for (int round = 0; round < most_rounds && points.size() >= 3; ++round) {
-    const std::optional<Plane> plane = best_plane(points, options, up, engine);
+    const std::optional<Plane> plane = best_plane(points, options, up, random);
     if (!plane) break;
     Candidate candidate{*plane, {}};
     Points rest;
@@ -260,15 +261,14 @@ Points finite_points(const Points& points) {
 }
 
 Points drawn_points(const Points& points, std::uint64_t seed) {
-  std::mt19937_64 engine(seed);
+  RandomStream random(seed, points_stream);
   Points drawn;
   if (points.size() <= most_drawn) {
     drawn = points;
-    std::shuffle(drawn.begin(), drawn.end(), engine);
+    for (std::size_t n = drawn.size(); n > 1; --n) std::swap(drawn[n - 1], drawn[random.below(n)]);
     return drawn;
   }
-  std::uniform_int_distribution<std::size_t> draw(0, points.size() - 1);
-  for (std::size_t n = 0; n < most_drawn; ++n) drawn.push_back(points[draw(engine)]);
+  for (std::size_t n = 0; n < most_drawn; ++n) drawn.push_back(points[random.below(points.size())]);
   return drawn;
 }
 

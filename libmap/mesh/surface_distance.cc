@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/embree_mesh.h"
 #include "libmap/mesh/ray_caster.h"
@@ -177,16 +177,15 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
          .bound = "<= " + std::to_string(static_cast<std::size_t>(most)) + " in all for " +
                   std::to_string(mesh.triangles.size()) + " triangles"});
   const auto count = static_cast<std::size_t>(wanted);
-  std::mt19937_64 engine(seed);
-  // Not a distribution of the standard library: those differ between libraries.
-  const auto uniform = [&] { return static_cast<double>(engine() >> 11U) * 0x1p-53; };
+  RandomStream random(seed, 0);
   std::vector<TrianglePoint> samples(count);
   for (std::size_t n = 0; n < count; ++n) {
     // One in each of `count` strata of equal area.
-    const double at = (static_cast<double>(n) + uniform()) / static_cast<double>(count) * area;
+    const double at =
+        (static_cast<double>(n) + random.uniform()) / static_cast<double>(count) * area;
     const auto above = std::upper_bound(area_before.begin(), area_before.end(), at);
-    const double root = std::sqrt(uniform());
-    const double share = uniform();
+    const double root = std::sqrt(random.uniform());
+    const double share = random.uniform();
     samples[n] = {static_cast<std::uint32_t>(above - area_before.begin() - 1), root * (1.0 - share),
                   root * share};
   }

@@ -229,20 +229,10 @@ void Adjustment::add_links(ceres::Problem& problem, const std::vector<GraphLinkR
   for (const GraphLinkResult& kept : links) {
     const PoseLink& link = kept.link;
     if (kept.rejected || !blocks_.contains(link.from)) continue;
-    if (link.type == LinkType::gravity) {
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<GravityResidual, 3, 7>(
-                                   new GravityResidual(link.from_from_to, link.information(3, 3))),
-                               nullptr, blocks_.at(link.from));
-    } else if (link.type == LinkType::pose_prior) {
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorResidual, 6, 7>(
-                                   new PriorResidual(link.from_from_to, link.information)),
-                               nullptr, blocks_.at(link.from));
-    } else if (blocks_.contains(link.to)) {
-      problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<LinkResidual, 6, 7, 7>(
-              new LinkResidual(link.from_from_to, kept.weight * link.information)),
-          nullptr, blocks_.at(link.from), blocks_.at(link.to));
-    }
+    if (is_absolute(link))
+      add_link(problem, blocks_, link, link.information, nullptr);
+    else if (blocks_.contains(link.to))
+      add_link(problem, blocks_, link, kept.weight * link.information, nullptr);
   }
 }
 
@@ -362,19 +352,13 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
   ceres::Problem problem;
   add_observations(problem);
   add_links(problem, links);
-  for (const auto& [node, block] : blocks_.all())
-    if (problem.HasParameterBlock(block))
-      problem.SetManifold(block, new ceres::ProductManifold<ceres::EigenQuaternionManifold,
-                                                            ceres::EuclideanManifold<3>>());
+  set_pose_manifolds(problem, blocks_);
   for (const GraphComponent& component : components) {
     double* block = blocks_.at(component.gauge_node);
     if (problem.HasParameterBlock(block)) problem.SetParameterBlockConstant(block);
   }
   if (result_.observations > 0) solve(problem);
-  for (auto& [node, pose] : result_.map_from_base)
-    if (problem.HasParameterBlock(blocks_.at(node)) &&
-        !problem.IsParameterBlockConstant(blocks_.at(node)))
-      pose = blocks_.pose(node);
+  take_poses(problem, blocks_, result_.map_from_base);
   for (const auto& point : points_) result_.points.emplace_back(point[0], point[1], point[2]);
   for (std::size_t n = 0; n < cameras_; ++n) {
     const double* step = intrinsics(n);

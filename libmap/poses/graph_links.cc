@@ -10,8 +10,6 @@
 
 namespace libmap {
 
-namespace {}  // namespace
-
 void require_usable(const PoseLink& link) {
   const Matrix6d& information = link.information;
   const std::string field = "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);

@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <optional>
@@ -83,25 +84,13 @@ Verified verify_pair(const FrameFeatures& a, const FrameFeatures& b, FramePair p
   return result;
 }
 
+// In the order of RelativePoseOutcome.
 void count(RelativePoseOutcome outcome, RejectionCounts& counts) {
+  constexpr std::array counted = {&RejectionCounts::accepted, &RejectionCounts::too_few_matches,
+                                  &RejectionCounts::too_few_inliers, &RejectionCounts::narrow,
+                                  &RejectionCounts::not_converged};
   ++counts.candidates;
-  switch (outcome) {
-    case RelativePoseOutcome::found:
-      ++counts.accepted;
-      break;
-    case RelativePoseOutcome::too_few_matches:
-      ++counts.too_few_matches;
-      break;
-    case RelativePoseOutcome::too_few_inliers:
-      ++counts.too_few_inliers;
-      break;
-    case RelativePoseOutcome::narrow:
-      ++counts.narrow;
-      break;
-    case RelativePoseOutcome::not_converged:
-      ++counts.not_converged;
-      break;
-  }
+  ++(counts.*counted.at(static_cast<std::size_t>(outcome)));
 }
 
 Matrix6d slack_of(const LoopClosureDetectionOptions& options) {
@@ -162,18 +151,6 @@ void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
   table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
             "of a closure against the graph's own estimate");
   table.add("words", options.appearance.words, {1, 65536}, "of the vocabulary of appearance");
-}
-
-RejectionCounts& RejectionCounts::operator+=(const RejectionCounts& more) {
-  candidates += more.candidates;
-  too_few_matches += more.too_few_matches;
-  too_few_inliers += more.too_few_inliers;
-  narrow += more.narrow;
-  not_converged += more.not_converged;
-  against_graph += more.against_graph;
-  unconfirmed += more.unconfirmed;
-  accepted += more.accepted;
-  return *this;
 }
 
 std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors) {

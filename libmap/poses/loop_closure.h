@@ -66,8 +66,6 @@ struct RejectionCounts {
   std::size_t against_graph = 0;  // further from the graph's own estimate than it can be
   std::size_t unconfirmed = 0;    // between parts of the graph, without a second that agrees
   std::size_t accepted = 0;
-
-  RejectionCounts& operator+=(const RejectionCounts& more);
 };
 
 struct PairVerification {

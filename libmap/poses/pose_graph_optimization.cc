@@ -73,7 +73,6 @@ class Optimization {
   void add_landmarks();
   void find_components();
   void solve();
-  void add_absolute(ceres::Problem& problem, const PoseBlocks& blocks, const PoseLink& link);
   void hold_gauges(ceres::Problem& problem, const PoseBlocks& blocks);
   void update_residuals();
   bool reject();
@@ -139,20 +138,6 @@ void Optimization::find_components() {
     if (node > 0 && !linked.contains(node)) result_.without_links.push_back(node);
 }
 
-void Optimization::add_absolute(ceres::Problem& problem, const PoseBlocks& blocks,
-                                const PoseLink& link) {
-  ceres::LossFunction* loss = new_loss();
-  double* block = blocks.at(link.from);
-  if (link.type == LinkType::gravity)
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<GravityResidual, 3, 7>(
-                                 new GravityResidual(link.from_from_to, link.information(3, 3))),
-                             loss, block);
-  else
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorResidual, 6, 7>(
-                                 new PriorResidual(link.from_from_to, link.information)),
-                             loss, block);
-}
-
 // Relative links leave the whole component free to move: one node stands still. Priors hold it
 // already; gravity holds all but the place and the turn about the vertical.
 void Optimization::hold_gauges(ceres::Problem& problem, const PoseBlocks& blocks) {
@@ -188,19 +173,10 @@ void Optimization::solve() {
     if (!used_[n] || result_.links[n].rejected) continue;
     const PoseLink& link = result_.links[n].link;
     any = true;
-    if (is_absolute(link)) {
-      add_absolute(problem, blocks, link);
-      continue;
-    }
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LinkResidual, 6, 7, 7>(
-                                 new LinkResidual(link.from_from_to, link.information)),
-                             new_loss(), blocks.at(link.from), blocks.at(link.to));
+    add_link(problem, blocks, link, link.information, new_loss());
   }
   if (!any) return;
-  for (const auto& [node, block] : blocks.all())
-    if (problem.HasParameterBlock(block))
-      problem.SetManifold(block, new ceres::ProductManifold<ceres::EigenQuaternionManifold,
-                                                            ceres::EuclideanManifold<3>>());
+  set_pose_manifolds(problem, blocks);
   hold_gauges(problem, blocks);
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
@@ -215,10 +191,7 @@ void Optimization::solve() {
   settings.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(settings, &problem, &summary);
-  for (auto& [node, pose] : result_.map_from_base)
-    if (problem.HasParameterBlock(blocks.at(node)) &&
-        !problem.IsParameterBlockConstant(blocks.at(node)))
-      pose = blocks.pose(node);
+  take_poses(problem, blocks, result_.map_from_base);
   result_.initial_cost = summary.initial_cost;
   result_.final_cost = summary.final_cost;
   result_.iterations += static_cast<int>(summary.iterations.size());

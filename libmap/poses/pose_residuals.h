@@ -2,6 +2,8 @@
 // number.
 #pragma once
 
+#include <ceres/ceres.h>
+
 #include <Eigen/Cholesky>
 #include <Eigen/Core>
 #include <Eigen/Geometry>
@@ -127,5 +129,39 @@ class YawGaugeResidual {
  private:
   Pose held_;
 };
+
+// Adds the residual of a link, which the problem takes over with `loss` (or nullptr).
+inline void add_link(ceres::Problem& problem, const PoseBlocks& blocks, const PoseLink& link,
+                     const Matrix6d& information, ceres::LossFunction* loss) {
+  double* from = blocks.at(link.from);
+  if (link.type == LinkType::gravity)
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<GravityResidual, 3, 7>(
+                                 new GravityResidual(link.from_from_to, information(3, 3))),
+                             loss, from);
+  else if (link.type == LinkType::pose_prior)
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<PriorResidual, 6, 7>(
+                                 new PriorResidual(link.from_from_to, information)),
+                             loss, from);
+  else
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<LinkResidual, 6, 7, 7>(
+                                 new LinkResidual(link.from_from_to, information)),
+                             loss, from, blocks.at(link.to));
+}
+
+inline void set_pose_manifolds(ceres::Problem& problem, const PoseBlocks& blocks) {
+  for (const auto& [node, block] : blocks.all())
+    if (problem.HasParameterBlock(block))
+      problem.SetManifold(block, new ceres::ProductManifold<ceres::EigenQuaternionManifold,
+                                                            ceres::EuclideanManifold<3>>());
+}
+
+// Of the poses that the problem was free to move.
+inline void take_poses(const ceres::Problem& problem, const PoseBlocks& blocks,
+                       std::map<int, Pose>& poses) {
+  for (auto& [node, pose] : poses)
+    if (problem.HasParameterBlock(blocks.at(node)) &&
+        !problem.IsParameterBlockConstant(blocks.at(node)))
+      pose = blocks.pose(node);
+}
 
 }  // namespace libmap

@@ -69,17 +69,4 @@ inline RelativeJacobian relative_jacobian(const Pose& a_from_b) {
   return jacobian;
 }
 
-// The information of a link seen from its other end: of the step of to_from_from.
-inline Matrix6d reversed_information(const Matrix6d& information, const Pose& from_from_to) {
-  // The step e of T = from_from_to is -Ad(T) e of its inverse.
-  Matrix6d back = Matrix6d::Zero();  // step of T by the step of its inverse
-  const Eigen::Matrix3d r = from_from_to.linear().transpose();
-  const Eigen::Vector3d t = from_from_to.inverse().translation();
-  back.topLeftCorner<3, 3>() = -r;
-  back.bottomRightCorner<3, 3>() = -r;
-  back.topRightCorner<3, 3>() = -cross_matrix(t) * r;
-  Matrix6d result = back.transpose() * information * back;
-  return 0.5 * (result + result.transpose());
-}
-
 }  // namespace libmap

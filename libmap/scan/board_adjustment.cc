@@ -1,10 +1,12 @@
 #include "libmap/scan/board_adjustment.h"
 
-#include <Eigen/Cholesky>
+#include <ceres/ceres.h>
+#include <ceres/rotation.h>
+
+#include <Eigen/SparseCore>
 #include <algorithm>
-#include <cmath>
+#include <array>
 #include <limits>
-#include <utility>
 
 #include "libmap/core/symmetric_eigen.h"
 
@@ -12,130 +14,71 @@ namespace libmap {
 
 namespace {
 
-constexpr int max_steps = 200;
-constexpr double least_gain = 1e-12;  // of the error
-constexpr double max_damping = 1e10;
+using PoseBlock = std::array<double, 6>;  // rotation vector, translation
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
+PoseBlock block_of(const Pose& pose) {
+  PoseBlock block{};
+  const Eigen::Matrix3d rotation = pose.linear();
+  ceres::RotationMatrixToAngleAxis(rotation.data(), block.data());
+  std::copy_n(pose.translation().data(), 3, block.data() + 3);
+  return block;
+}
 
-Camera with_intrinsics(Camera camera, const Eigen::VectorXd& values) {
-  camera.fx = values(0);
-  camera.fy = values(1);
-  camera.cx = values(2);
-  camera.cy = values(3);
-  for (std::size_t n = 0; n < camera.distortion.size(); ++n)
-    camera.distortion[n] = values(4 + static_cast<Eigen::Index>(n));
+Pose pose_of(const double* block) {
+  Eigen::Matrix3d rotation;
+  ceres::AngleAxisToRotationMatrix(block, rotation.data());
+  Pose pose = Pose::Identity();
+  pose.linear() = rotation;
+  pose.translation() << block[3], block[4], block[5];
+  return pose;
+}
+
+Camera with_intrinsics(Camera camera, const double* values) {
+  camera.fx = values[0];
+  camera.fy = values[1];
+  camera.cx = values[2];
+  camera.cy = values[3];
+  std::copy_n(values + 4, camera.distortion.size(), camera.distortion.begin());
   return camera;
 }
 
-// Translation, then a turn in the camera's frame.
-Pose moved(const Pose& pose, const Vector6d& step) {
-  Pose result = pose;
-  const Eigen::Vector3d turn = step.tail<3>();
-  if (turn.norm() > 0)
-    result.linear() =
-        Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix() * pose.linear();
-  result.translation() += step.head<3>();
-  return result;
-}
+// Projected minus found, of all corners of a picture.
+struct PictureResidual {
+  const Camera& camera;
+  const std::vector<Eigen::Vector3d>& in_board;
+  const std::vector<Eigen::Vector2d>& in_image;
 
-// Derivatives of one corner's pixel by central differences.
-Eigen::MatrixXd by_intrinsics(const Camera& camera, const Pose& pose,
-                              const Eigen::Vector3d& corner) {
-  const Eigen::VectorXd values = intrinsics_of(camera);
-  Eigen::MatrixXd derivative(2, values.size());
-  for (Eigen::Index n = 0; n < values.size(); ++n) {
-    const double step = 1e-6 * std::max(1.0, std::abs(values(n)));
-    Eigen::VectorXd above = values;
-    Eigen::VectorXd below = values;
-    above(n) += step;
-    below(n) -= step;
-    derivative.col(n) = (board_pixel(with_intrinsics(camera, above), pose, corner) -
-                         board_pixel(with_intrinsics(camera, below), pose, corner)) /
-                        (above(n) - below(n));
+  bool operator()(const double* const* blocks, double* residuals) const {
+    const Camera moved = with_intrinsics(camera, blocks[0]);
+    const Pose pose = pose_of(blocks[1]);
+    Eigen::Map<Eigen::Matrix2Xd> out(residuals, 2, static_cast<Eigen::Index>(in_board.size()));
+    for (std::size_t n = 0; n < in_board.size(); ++n)
+      out.col(static_cast<Eigen::Index>(n)) = board_pixel(moved, pose, in_board[n]) - in_image[n];
+    return out.allFinite();
   }
-  return derivative;
-}
-
-Eigen::Matrix<double, 2, 6> by_pose(const Camera& camera, const Pose& pose,
-                                    const Eigen::Vector3d& corner) {
-  constexpr double step = 1e-6;
-  Eigen::Matrix<double, 2, 6> derivative;
-  for (Eigen::Index n = 0; n < 6; ++n)
-    derivative.col(n) = (board_pixel(camera, moved(pose, step * Vector6d::Unit(n)), corner) -
-                         board_pixel(camera, moved(pose, -step * Vector6d::Unit(n)), corner)) /
-                        (2 * step);
-  return derivative;
-}
-
-// Normal equations, one block a picture.
-struct Normal {
-  Eigen::MatrixXd camera;
-  Eigen::VectorXd camera_side;
-  std::vector<Eigen::MatrixXd> mixed;  // camera x pose
-  std::vector<Matrix6d> pose;
-  std::vector<Vector6d> pose_side;
 };
 
-Normal normal_equations(const BoardFit& fit, const BoardCorners& corners) {
-  const Eigen::Index size = intrinsics_of(fit.camera).size();
-  Normal normal{Eigen::MatrixXd::Zero(size, size), Eigen::VectorXd::Zero(size), {}, {}, {}};
-  for (std::size_t picture = 0; picture < corners.in_images.size(); ++picture) {
-    const Pose& pose = fit.camera_from_board[picture];
-    Eigen::MatrixXd mixed = Eigen::MatrixXd::Zero(size, 6);
-    Matrix6d of_pose = Matrix6d::Zero();
-    Vector6d pose_side = Vector6d::Zero();
-    for (std::size_t n = 0; n < corners.in_board.size(); ++n) {
-      const Eigen::Vector3d& corner = corners.in_board[n];
-      const Eigen::MatrixXd a = by_intrinsics(fit.camera, pose, corner);
-      const Eigen::Matrix<double, 2, 6> b = by_pose(fit.camera, pose, corner);
-      const Eigen::Vector2d miss =
-          corners.in_images[picture][n] - board_pixel(fit.camera, pose, corner);
-      normal.camera += a.transpose() * a;
-      normal.camera_side += a.transpose() * miss;
-      mixed += a.transpose() * b;
-      of_pose += b.transpose() * b;
-      pose_side += b.transpose() * miss;
-    }
-    normal.mixed.push_back(mixed);
-    normal.pose.push_back(of_pose);
-    normal.pose_side.push_back(pose_side);
-  }
-  return normal;
-}
+struct BoardProblem {
+  std::vector<double> intrinsics;
+  std::vector<PoseBlock> poses;
+  ceres::Problem problem;
 
-// One damped step; the poses are eliminated (Schur complement).
-BoardFit stepped(const BoardFit& fit, const Normal& normal, double damping) {
-  Eigen::MatrixXd reduced = normal.camera;
-  reduced.diagonal() *= 1 + damping;
-  Eigen::VectorXd side = normal.camera_side;
-  std::vector<Eigen::LDLT<Matrix6d>> poses;
-  for (std::size_t n = 0; n < normal.pose.size(); ++n) {
-    Matrix6d damped = normal.pose[n];
-    damped.diagonal() *= 1 + damping;
-    poses.emplace_back(damped);
-    reduced -= normal.mixed[n] * poses.back().solve(normal.mixed[n].transpose());
-    side -= normal.mixed[n] * poses.back().solve(normal.pose_side[n]);
+  BoardProblem(const BoardFit& fit, const BoardCorners& corners)
+      : intrinsics{fit.camera.fx, fit.camera.fy, fit.camera.cx, fit.camera.cy} {
+    intrinsics.insert(intrinsics.end(), fit.camera.distortion.begin(), fit.camera.distortion.end());
+    for (const Pose& pose : fit.camera_from_board) poses.push_back(block_of(pose));
+    for (std::size_t n = 0; n < poses.size(); ++n) {
+      auto* cost = new ceres::DynamicNumericDiffCostFunction<PictureResidual, ceres::CENTRAL>(
+          new PictureResidual{fit.camera, corners.in_board, corners.in_images[n]});
+      cost->AddParameterBlock(static_cast<int>(intrinsics.size()));
+      cost->AddParameterBlock(static_cast<int>(poses[n].size()));
+      cost->SetNumResiduals(static_cast<int>(2 * corners.in_board.size()));
+      problem.AddResidualBlock(cost, nullptr, intrinsics.data(), poses[n].data());
+    }
   }
-  const Eigen::VectorXd step = reduced.ldlt().solve(side);
-  BoardFit next{with_intrinsics(fit.camera, intrinsics_of(fit.camera) + step), {}};
-  for (std::size_t n = 0; n < normal.pose.size(); ++n)
-    next.camera_from_board.push_back(
-        moved(fit.camera_from_board[n],
-              poses[n].solve(normal.pose_side[n] - normal.mixed[n].transpose() * step)));
-  return next;
-}
+};
 
 }  // namespace
-
-Eigen::VectorXd intrinsics_of(const Camera& camera) {
-  Eigen::VectorXd values(4 + static_cast<Eigen::Index>(camera.distortion.size()));
-  values.head<4>() << camera.fx, camera.fy, camera.cx, camera.cy;
-  for (std::size_t n = 0; n < camera.distortion.size(); ++n)
-    values(4 + static_cast<Eigen::Index>(n)) = camera.distortion[n];
-  return values;
-}
 
 Eigen::Vector2d board_pixel(const Camera& camera, const Pose& camera_from_board,
                             const Eigen::Vector3d& corner) {
@@ -154,42 +97,45 @@ double squared_error(const BoardFit& fit, const BoardCorners& corners) {
 }
 
 double adjust_boards(BoardFit& fit, const BoardCorners& corners) {
-  double error = squared_error(fit, corners);
-  double damping = 1e-3;
-  for (int step = 0; step < max_steps && damping < max_damping; ++step) {
-    const Normal normal = normal_equations(fit, corners);
-    double gain = 0.0;
-    while (damping < max_damping) {
-      BoardFit next = stepped(fit, normal, damping);
-      const double next_error = squared_error(next, corners);
-      if (next_error < error) {
-        gain = error - next_error;
-        fit = std::move(next);
-        error = next_error;
-        damping = std::max(damping * 0.1, 1e-12);
-        break;
-      }
-      damping *= 10;
-    }
-    if (gain <= least_gain * error) break;
-  }
-  return error;
+  BoardProblem boards(fit, corners);
+  ceres::Solver::Options settings;
+  settings.linear_solver_type = ceres::DENSE_SCHUR;
+  settings.dense_linear_algebra_library_type = ceres::EIGEN;
+  settings.num_threads = 1;
+  settings.max_num_iterations = 200;
+  settings.max_trust_region_radius = 1e8;  // with less damping, Cholesky fails and Ceres warns
+  settings.function_tolerance = 1e-12;
+  settings.gradient_tolerance = 1e-14;
+  settings.parameter_tolerance = 1e-12;
+  settings.logging_type = ceres::SILENT;
+  ceres::Solver::Summary summary;
+  ceres::Solve(settings, &boards.problem, &summary);
+  fit.camera = with_intrinsics(fit.camera, boards.intrinsics.data());
+  for (std::size_t n = 0; n < boards.poses.size(); ++n)
+    fit.camera_from_board[n] = pose_of(boards.poses[n].data());
+  return squared_error(fit, corners);
 }
 
 Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners) {
-  const Normal normal = normal_equations(fit, corners);
-  Eigen::MatrixXd reduced = normal.camera;
-  for (std::size_t n = 0; n < normal.pose.size(); ++n)
-    reduced -= normal.mixed[n] * normal.pose[n].ldlt().solve(normal.mixed[n].transpose());
-  if (!reduced.allFinite() || (reduced.diagonal().array() <= 0).any()) return {};
+  BoardProblem boards(fit, corners);
+  ceres::Problem::EvaluateOptions options;
+  options.parameter_blocks = {boards.intrinsics.data()};
+  for (PoseBlock& pose : boards.poses) options.parameter_blocks.push_back(pose.data());
+  ceres::CRSMatrix sparse;
+  if (!boards.problem.Evaluate(options, nullptr, nullptr, nullptr, &sparse)) return {};
+  const Eigen::MatrixXd jacobian = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>(
+      sparse.num_rows, sparse.num_cols, static_cast<Eigen::Index>(sparse.values.size()),
+      sparse.rows.data(), sparse.cols.data(), sparse.values.data());
+  const Eigen::MatrixXd normal = jacobian.transpose() * jacobian;
+  if (!normal.allFinite() || (normal.diagonal().array() <= 0).any()) return {};
   // Pixels and lens terms differ by many orders of magnitude.
-  const Eigen::VectorXd scale = reduced.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = scale.asDiagonal() * reduced * scale.asDiagonal();
-  const SymmetricEigen<Eigen::Dynamic> eigen = symmetric_eigen(scaled);
+  const Eigen::VectorXd scale = normal.diagonal().cwiseSqrt().cwiseInverse();
+  const SymmetricEigen<Eigen::Dynamic> eigen =
+      symmetric_eigen(Eigen::MatrixXd(scale.asDiagonal() * normal * scale.asDiagonal()));
   if (!(eigen.values.minCoeff() > 0)) return {};
-  const Eigen::MatrixXd inverse =
-      eigen.vectors * eigen.values.cwiseInverse().asDiagonal() * eigen.vectors.transpose();
-  return scale.asDiagonal() * inverse * scale.asDiagonal();
+  const auto size = static_cast<Eigen::Index>(boards.intrinsics.size());
+  const Eigen::MatrixXd rows = scale.head(size).asDiagonal() * eigen.vectors.topRows(size);
+  return rows * eigen.values.cwiseInverse().asDiagonal() * rows.transpose();
 }
 
 }  // namespace libmap

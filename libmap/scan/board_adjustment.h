@@ -10,16 +10,13 @@ namespace libmap {
 
 struct BoardFit {
   Camera camera{};
-  std::vector<Pose> camera_from_board{};  // one a picture
+  std::vector<Pose> camera_from_board{};  // one per picture
 };
 
 struct BoardCorners {
   std::vector<Eigen::Vector3d> in_board{};                // m
-  std::vector<std::vector<Eigen::Vector2d>> in_images{};  // px, one list a picture
+  std::vector<std::vector<Eigen::Vector2d>> in_images{};  // px, one list per picture
 };
-
-// fx fy cx cy and the lens's terms.
-Eigen::VectorXd intrinsics_of(const Camera& camera);
 
 // NaN behind the camera.
 Eigen::Vector2d board_pixel(const Camera& camera, const Pose& camera_from_board,
@@ -28,12 +25,12 @@ Eigen::Vector2d board_pixel(const Camera& camera, const Pose& camera_from_board,
 // Sum of the squared distances between the corners and their projections, px^2.
 double squared_error(const BoardFit& fit, const BoardCorners& corners);
 
-// Moves the camera's intrinsics and the boards to the least squared error nearby (Levenberg and
-// Marquardt, the boards eliminated). Returns that error.
+// Moves the camera's intrinsics and the boards to the local minimum of the squared error (Ceres:
+// Levenberg-Marquardt, the boards eliminated). Returns that error.
 double adjust_boards(BoardFit& fit, const BoardCorners& corners);
 
-// Covariance of the intrinsics for a noise of 1 px in each coordinate, whatever the boards' poses
-// are. Empty where the pictures do not determine them.
+// Covariance of the intrinsics (fx fy cx cy and the lens's terms) for a noise of 1 px in each
+// coordinate, whatever the boards' poses are. Empty where the pictures do not determine them.
 Eigen::MatrixXd unit_covariance(const BoardFit& fit, const BoardCorners& corners);
 
 }  // namespace libmap

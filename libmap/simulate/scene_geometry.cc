@@ -128,12 +128,6 @@ RadialHeight radial_height(const Bump& bump, double r) {
   return {h * cosine * cosine, -0.5 * h * k * k * sinc, -0.5 * h * k * k * std::cos(angle)};
 }
 
-double steepest_slope(const Bump& bump) {
-  const double ratio = std::abs(bump.height_m) / bump.radius_m;
-  // At half the radius; at one standard deviation.
-  return bump.profile == BumpProfile::cosine ? 0.5 * pi * ratio : 3.0 * std::exp(-0.5) * ratio;
-}
-
 // Principal curvatures of a height field, ascending, positive where it is convex seen from above:
 // eigenvalues of the shape operator in an orthonormal frame of the tangent plane.
 std::pair<double, double> height_field_curvatures(const GroundHeight& ground) {
@@ -306,86 +300,6 @@ bool SceneGeometry::is_visible(const SceneSolid& solid, const Eigen::Vector3d& p
   return std::none_of(solids_.begin(), solids_.end(), [&](const SceneSolid& other) {
     return &other != &solid && is_hidden_by(solid, other, position, normal);
   });
-}
-
-std::optional<double> SceneGeometry::ground_hit(const SceneSolid& solid,
-                                                const Eigen::Vector3d& origin,
-                                                const Eigen::Vector3d& direction) const {
-  if (!solid.is_ground || !has_bumps()) return -origin.z() / direction.z();
-  double top = 0.0;
-  double bottom = 0.0;
-  double steepest = 0.0;
-  for (const PlacedBump& placed : bumps_) {
-    (placed.bump.height_m > 0.0 ? top : bottom) += placed.bump.height_m;
-    steepest += steepest_slope(placed.bump);
-  }
-  // Descend from above all bumps by steps that cannot pass the surface.
-  const double rate = direction.z() + steepest * direction.head<2>().norm();
-  double s = (top - origin.z()) / direction.z();
-  double above = 0.0;
-  for (int step = 0; step < 100'000; ++step) {
-    const Eigen::Vector3d at = origin + s * direction;
-    if (at.z() < bottom - 1e-9) return std::nullopt;
-    above = at.z() - ground_height(at.x(), at.y()).value;
-    if (above < 1e-9) break;
-    s -= above / rate;
-  }
-  for (int step = 0; step < 4; ++step) {
-    const Eigen::Vector3d at = origin + s * direction;
-    const GroundHeight height = ground_height(at.x(), at.y());
-    const double derivative = direction.z() - height.gradient.dot(direction.head<2>());
-    if (derivative > 1e-6) s -= (at.z() - height.value) / derivative;
-  }
-  return s;
-}
-
-std::optional<SurfaceTruth> SceneGeometry::highest_on(const SceneSolid& solid, double x,
-                                                      double y) const {
-  const auto line_in = [&](const Pose& frame_from_scene) {
-    return std::pair<Eigen::Vector3d, Eigen::Vector3d>(
-        frame_from_scene * Eigen::Vector3d(x, y, 0.0),
-        frame_from_scene.linear() * Eigen::Vector3d::UnitZ());
-  };
-  if (!solid.profile.empty()) {
-    const auto [origin, direction] = line_in(solid.solid_from_scene);
-    ProfileHit hit;
-    if (!last_hit(solid.profile, origin, direction, hit)) return std::nullopt;
-    const Eigen::Vector3d at = origin + hit.s * direction;
-    const ProfileSegment& segment = solid.profile[hit.segment];
-    double t = 0.0;
-    if (segment.is_arc) {
-      const double angle = std::atan2(at.head<2>().norm(), at.z() - segment.centre_a);
-      t = (angle - segment.angle_start) / (segment.angle_end - segment.angle_start);
-    } else {
-      const Eigen::Vector2d step = segment.end - segment.start;
-      t = (Eigen::Vector2d(at.head<2>().norm(), at.z()) - segment.start).dot(step) /
-          step.squaredNorm();
-    }
-    return on_profile(solid, hit.segment, std::clamp(t, 0.0, 1.0), std::atan2(at.y(), at.x()));
-  }
-  std::optional<SurfaceTruth> highest;
-  for (const FlatFace& face : solid.faces) {
-    const auto [origin, direction] = line_in(face.scene_from_face.inverse(Eigen::Isometry));
-    if (direction.z() <= 1e-12) continue;
-    const std::optional<double> s = ground_hit(solid, origin, direction);
-    if (!s) continue;
-    const Eigen::Vector3d at = origin + *s * direction;
-    const double slack = 1e-12 * (1.0 + origin.norm());
-    if (std::abs(at.x()) > face.half_x + slack || std::abs(at.y()) > face.half_y + slack) continue;
-    const SurfaceTruth truth = on_face(solid, face, at.x(), at.y());
-    if (!highest || truth.position.z() > highest->position.z()) highest = truth;
-  }
-  return highest;
-}
-
-std::optional<SurfaceTruth> SceneGeometry::from_above(double x, double y) const {
-  std::optional<SurfaceTruth> highest;
-  for (const SceneSolid& solid : solids_) {
-    const std::optional<SurfaceTruth> truth = highest_on(solid, x, y);
-    if (truth && (!highest || truth->position.z() > highest->position.z() + touching_m))
-      highest = truth;
-  }
-  return highest;
 }
 
 std::string count_text(double count) {

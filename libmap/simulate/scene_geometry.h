@@ -1,9 +1,8 @@
-// The solids of a scene, posed and ready to be asked. Inner part of libmap/simulate: sampling,
-// meshing and the exact queries stand on it.
+// The solids of a scene, posed and ready to be asked. Inner part of libmap/simulate: sampling and
+// meshing use it.
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -46,6 +45,13 @@ class SceneGeometry {
 
   const std::vector<SceneSolid>& solids() const { return solids_; }
   const SceneSolid* ground() const { return ground_ < 0 ? nullptr : &solids_[index(ground_)]; }
+  // A bump in the ground's frame.
+  struct PlacedBump {
+    Bump bump;
+    Eigen::Vector2d centre;
+    int shape = 0;
+  };
+  const std::vector<PlacedBump>& bumps() const { return bumps_; }
   bool has_bumps() const { return !bumps_.empty(); }
 
   GroundHeight ground_height(double x, double y) const;  // of the ground at (x, y), bumps included
@@ -67,25 +73,12 @@ class SceneGeometry {
   bool is_hidden_by(const SceneSolid& solid, const SceneSolid& other,
                     const Eigen::Vector3d& position, const Eigen::Vector3d& normal) const;
 
-  // The topmost surface at (x, y); nothing where there is none.
-  std::optional<SurfaceTruth> from_above(double x, double y) const;
-
  private:
-  // A bump in the ground's frame.
-  struct PlacedBump {
-    Bump bump;
-    Eigen::Vector2d centre;
-    int shape = 0;
-  };
-
   static std::size_t index(int i) { return static_cast<std::size_t>(i); }
   void add_bumps(const PrimitiveScene& scene);
   double height_of(const Eigen::Vector3d& point) const;
   int ground_shape_at(double x, double y) const;
   void bend_to_ground(const SceneSolid& ground, double x, double y, SurfaceTruth& truth) const;
-  std::optional<double> ground_hit(const SceneSolid& solid, const Eigen::Vector3d& origin,
-                                   const Eigen::Vector3d& direction) const;
-  std::optional<SurfaceTruth> highest_on(const SceneSolid& solid, double x, double y) const;
 
   std::vector<SceneSolid> solids_;
   std::vector<PlacedBump> bumps_;

@@ -1,7 +1,6 @@
 #include "libmap/simulate/scene_profile.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -11,61 +10,6 @@ namespace libmap {
 namespace {
 
 using std::numbers::pi;
-
-struct Roots {
-  std::array<double, 2> values{};
-  int count = 0;
-};
-
-// Real roots of a s^2 + 2 b s + c, without cancellation.
-Roots solve_quadratic(double a, double b, double c, double scale) {
-  Roots roots;
-  if (std::abs(a) <= 1e-14 * scale) {
-    if (b != 0.0) roots = {{-c / (2.0 * b), 0.0}, 1};
-    return roots;
-  }
-  const double discriminant = b * b - a * c;
-  if (discriminant < 0.0) return roots;
-  const double q = -(b + std::copysign(std::sqrt(discriminant), b));
-  roots.count = 2;
-  roots.values = {q / a, q != 0.0 ? c / q : 0.0};
-  return roots;
-}
-
-Roots line_hits(const ProfileSegment& segment, const Eigen::Vector3d& origin,
-                const Eigen::Vector3d& direction) {
-  const Eigen::Vector2d step = segment.end - segment.start;
-  if (step.y() == 0.0) {
-    if (direction.z() == 0.0) return {};
-    return {{(segment.start.y() - origin.z()) / direction.z(), 0.0}, 1};
-  }
-  const double slope = step.x() / step.y();
-  const double rho = segment.start.x() + slope * (origin.z() - segment.start.y());
-  const double rho_step = slope * direction.z();
-  const Eigen::Vector2d o = origin.head<2>();
-  const Eigen::Vector2d d = direction.head<2>();
-  return solve_quadratic(d.squaredNorm() - rho_step * rho_step, o.dot(d) - rho * rho_step,
-                         o.squaredNorm() - rho * rho, 1.0);
-}
-
-Roots arc_hits(const ProfileSegment& segment, const Eigen::Vector3d& origin,
-               const Eigen::Vector3d& direction) {
-  const Eigen::Vector3d o = origin - Eigen::Vector3d(0.0, 0.0, segment.centre_a);
-  return solve_quadratic(direction.squaredNorm(), o.dot(direction),
-                         o.squaredNorm() - segment.radius * segment.radius, 1.0);
-}
-
-bool lies_on(const ProfileSegment& segment, const Eigen::Vector2d& point, double tolerance) {
-  if (segment.is_arc) {
-    const double low = segment.centre_a + segment.radius * std::cos(segment.angle_end);
-    const double high = segment.centre_a + segment.radius * std::cos(segment.angle_start);
-    return point.y() >= low - tolerance && point.y() <= high + tolerance;
-  }
-  const Eigen::Vector2d low = segment.start.cwiseMin(segment.end);
-  const Eigen::Vector2d high = segment.start.cwiseMax(segment.end);
-  return (point.array() >= low.array() - tolerance).all() &&
-         (point.array() <= high.array() + tolerance).all();
-}
 
 }  // namespace
 
@@ -163,27 +107,6 @@ double profile_signed_distance(const Profile& profile, const Eigen::Vector2d& po
     outside = outside || segment.is_beyond(point);
   }
   return outside ? distance : -distance;
-}
-
-bool last_hit(const Profile& profile, const Eigen::Vector3d& origin,
-              const Eigen::Vector3d& direction, ProfileHit& hit) {
-  bool found = false;
-  for (std::size_t i = 0; i < profile.size(); ++i) {
-    const ProfileSegment& segment = profile[i];
-    const Roots roots = segment.is_arc ? arc_hits(segment, origin, direction)
-                                       : line_hits(segment, origin, direction);
-    for (int k = 0; k < roots.count; ++k) {
-      const double s = roots.values[static_cast<std::size_t>(k)];
-      const Eigen::Vector3d at = origin + s * direction;
-      const Eigen::Vector2d in_profile(at.head<2>().norm(), at.z());
-      // Wide enough that no line slips through a seam.
-      if (!lies_on(segment, in_profile, 1e-12 * (1.0 + origin.norm()))) continue;
-      if (found && s <= hit.s) continue;
-      hit = {s, i};
-      found = true;
-    }
-  }
-  return found;
 }
 
 }  // namespace libmap

@@ -45,13 +45,4 @@ using Profile = std::vector<ProfileSegment>;
 // Signed distance to the convex solid that a closed profile encloses.
 double profile_signed_distance(const Profile& profile, const Eigen::Vector2d& point);
 
-// Where a line meets the solid last: the largest s at which origin + s * direction lies on the
-// surface, with the segment that it meets.
-struct ProfileHit {
-  double s = 0.0;
-  std::size_t segment = 0;
-};
-bool last_hit(const Profile& profile, const Eigen::Vector3d& origin,
-              const Eigen::Vector3d& direction, ProfileHit& hit);
-
 }  // namespace libmap

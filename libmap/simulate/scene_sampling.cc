@@ -5,11 +5,11 @@
 #include <cmath>
 #include <functional>
 #include <numbers>
-#include <random>
 #include <vector>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/simulate/scene_geometry.h"
 
@@ -18,27 +18,6 @@ namespace libmap {
 namespace {
 
 using std::numbers::pi;
-
-class Random {
- public:
-  Random(std::uint64_t seed, std::uint64_t stream) : engine_(mix(mix(seed) + stream)) {}
-  // In [0, 1), from the upper 53 bits.
-  double uniform() { return static_cast<double>(engine_() >> 11) * 0x1.0p-53; }
-  // Box and Muller 1958.
-  double gaussian() {
-    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
-    return radius * std::cos(2.0 * pi * uniform());
-  }
-
- private:
-  static std::uint64_t mix(std::uint64_t x) {  // splitmix64
-    x += 0x9e3779b97f4a7c15U;
-    x = (x ^ (x >> 30)) * 0xbf58476d1ce4e5b9U;
-    x = (x ^ (x >> 27)) * 0x94d049bb133111ebU;
-    return x ^ (x >> 31);
-  }
-  std::mt19937_64 engine_;
-};
 
 double steps_of(double length, double spacing) {
   return std::max(1.0, std::round(length / spacing));
@@ -65,7 +44,7 @@ class Sampler {
   Sampler(const SceneGeometry& geometry, double spacing, double jitter)
       : geometry_(geometry), spacing_(spacing), jitter_(jitter) {}
 
-  std::vector<SurfaceTruth> draw(const Patch& patch, Random random) const {
+  std::vector<SurfaceTruth> draw(const Patch& patch, RandomStream random) const {
     std::vector<SurfaceTruth> samples;
     if (patch.face != nullptr) {
       draw_face(patch, random, samples);
@@ -77,9 +56,10 @@ class Sampler {
 
  private:
   // The place of one sample in a cell of the grid, as a share of the cell.
-  double place(Random& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
+  double place(RandomStream& random) const { return 0.5 + jitter_ * (random.uniform() - 0.5); }
 
-  void draw_segment(const Patch& patch, Random& random, std::vector<SurfaceTruth>& samples) const {
+  void draw_segment(const Patch& patch, RandomStream& random,
+                    std::vector<SurfaceTruth>& samples) const {
     const ProfileSegment& segment = patch.solid->profile[patch.segment];
     const double rows = steps_of(segment.length(), spacing_);
     for (double row = 0.0; row < rows; row += 1.0) {
@@ -96,7 +76,8 @@ class Sampler {
   }
 
   // Bent ground is cut into tiles of about twelve spacings, so that each follows the slope.
-  void draw_face(const Patch& patch, Random& random, std::vector<SurfaceTruth>& samples) const {
+  void draw_face(const Patch& patch, RandomStream& random,
+                 std::vector<SurfaceTruth>& samples) const {
     const FlatFace& face = *patch.face;
     const bool bent = patch.solid->is_ground && geometry_.has_bumps();
     const double tiles_x = bent ? steps_of(2.0 * face.half_x, 12.0 * spacing_) : 1.0;
@@ -110,7 +91,7 @@ class Sampler {
   }
 
   void draw_tile(const Patch& patch, const Eigen::Vector2d& corner, const Eigen::Vector2d& tile,
-                 Random& random, std::vector<SurfaceTruth>& samples, double& owed) const {
+                 RandomStream& random, std::vector<SurfaceTruth>& samples, double& owed) const {
     const Stretch stretch = stretch_of(patch, corner, tile);
     const double wanted = tile.prod() * stretch.area / spacing_ / spacing_ + owed;
     // The longer side takes up what rounding leaves.
@@ -200,7 +181,7 @@ PatchAreas measure_areas(const SceneGeometry& geometry, const std::vector<Patch>
   for (const Patch& patch : patches) areas.whole += area_of(geometry, patch);
   const Sampler sampler(geometry, std::sqrt(areas.whole / points), 0.3);
   for (std::size_t i = 0; i < patches.size(); ++i) {
-    const std::vector<SurfaceTruth> samples = sampler.draw(patches[i], Random(1, i));
+    const std::vector<SurfaceTruth> samples = sampler.draw(patches[i], RandomStream(1, i));
     const std::vector<char> visible = visible_of(geometry, *patches[i].solid, samples);
     areas.visible += area_of(geometry, patches[i]) *
                      static_cast<double>(std::count(visible.begin(), visible.end(), 1)) /
@@ -232,11 +213,12 @@ SceneSamples sample_at(const SceneGeometry& geometry, const std::vector<Patch>& 
                                               &cloud.fields[3]};
   const Sampler sampler(geometry, spacing, options.jitter);
   for (std::size_t i = 0; i < patches.size(); ++i) {
-    const std::vector<SurfaceTruth> samples = sampler.draw(patches[i], Random(options.seed, 2 * i));
+    const std::vector<SurfaceTruth> samples =
+        sampler.draw(patches[i], RandomStream(options.seed, 2 * i));
     const std::vector<char> visible = visible_of(geometry, *patches[i].solid, samples);
-    Random noise(options.seed, 2 * i + 1);
+    RandomStream noise(options.seed, 2 * i + 1);
     for (std::size_t k = 0; k < samples.size(); ++k) {
-      const double shift = options.noise_m > 0.0 ? options.noise_m * noise.gaussian() : 0.0;
+      const double shift = options.noise_m > 0.0 ? options.noise_m * noise.normal() : 0.0;
       if (visible[k] != 0) {
         append(samples[k], shift, cloud, fields);
       } else {

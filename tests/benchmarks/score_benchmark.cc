@@ -13,7 +13,9 @@
 #include "libmap/core/parallel.h"
 #include "libmap/simulate/scene_sampling.h"
 #include "tests/benchmarks/benchmark_table.h"
+#include "tests/libgtd/plain_matching.h"
 #include "tests/support/reference_data.h"
+#include "tests/support/thesis_scene.h"
 
 namespace {
 
@@ -70,7 +72,7 @@ VoxelGrid grid_of(const Set& set) {
   libmap::SceneSamplingOptions sampling;
   sampling.spacing_m = set.voxel_size_m;
   return libgtd::voxelize(
-      libmap::sample_scene(libmap::thesis_primitive_scene(), sampling).cloud.positions,
+      libmap::sample_scene(graspmap_test::thesis_primitive_scene(), sampling).cloud.positions,
       set.voxel_size_m);
 }
 
@@ -120,7 +122,8 @@ double peak_bytes_per_s(InstructionSet instructions) {
 void triple_loop(benchmark::State& state, const Set& set) {
   Workload& work = workload(set);
   const Times times = time_iterations(state, [&] {
-    benchmark::DoNotOptimize(libgtd::match_voxels_plainly(work.grid, work.mask, work.pivots));
+    benchmark::DoNotOptimize(
+        graspmap_test::match_voxels_plainly(work.grid, work.mask, work.pivots));
   });
   work.baseline_s = times.least();
   state.counters["pivots"] = static_cast<double>(work.pivots.size());

@@ -5,9 +5,9 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <random>
 
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "tests/support/test_support.h"
 
 namespace roc_test {
@@ -321,7 +321,7 @@ TEST(Roc, BootstrapIsTheSameAtAnyThreadCountAndDiffersWithTheSeed) {
   EXPECT_NEAR(other.high, intervals.front().high, 0.02);
 }
 
-// The bootstrap written down straight: the library's engine, and a draw a location.
+// The bootstrap written down straight: one draw per location.
 std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicates,
                                    std::uint32_t seed) {
   std::vector<double> positives, negatives;
@@ -331,11 +331,10 @@ std::vector<double> slow_bootstrap(const Sample& sample, std::uint64_t replicate
   std::sort(negatives.begin(), negatives.end());
   std::vector<double> areas;
   for (std::uint32_t replicate = 0; replicate < replicates; ++replicate) {
-    std::seed_seq sequence{seed, 0U, replicate, 0U};
-    std::mt19937_64 engine(sequence);
+    libmap::RandomStream random(seed, replicate);
     const auto draw = [&](const std::vector<double>& of) {
       std::vector<double> drawn;
-      for (std::size_t i = 0; i < of.size(); ++i) drawn.push_back(of[engine() % of.size()]);
+      for (std::size_t i = 0; i < of.size(); ++i) drawn.push_back(of[random.below(of.size())]);
       return drawn;
     };
     const std::vector<double> drawn_positives = draw(positives);

@@ -10,6 +10,7 @@
 #include "libgtd/detect.h"
 #include "libgtd/score/scoring.h"
 #include "libmap/core/parallel.h"
+#include "tests/libgtd/plain_matching.h"
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
@@ -124,7 +125,8 @@ TEST(Corrected, AgreesWithTheTripleLoopForAnyLayersAndNarrowGround) {
       const TileBounds box = graspmap_test::whole_box(grid);
       const auto pivots = pivots_in(grid, mask, box);
       EXPECT_EQ(pivots.size(), grid.voxels.size());
-      EXPECT_EQ(match_voxels(grid, mask, pivots), match_voxels_plainly(grid, mask, pivots));
+      EXPECT_EQ(match_voxels(grid, mask, pivots),
+                graspmap_test::match_voxels_plainly(grid, mask, pivots));
     }
   }
 }

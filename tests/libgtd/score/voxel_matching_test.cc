@@ -9,6 +9,7 @@
 
 #include "libgtd/score/scoring.h"
 #include "tests/libgtd/instruction_sets.h"
+#include "tests/libgtd/plain_matching.h"
 #include "tests/libgtd/score/score_test_support.h"
 #include "tests/support/reference_data.h"
 
@@ -151,7 +152,7 @@ TEST(ClimbLab, SameGraspableVoxels) {
 
 void expect_as_plainly(const VoxelGrid& grid, const GripperMask& mask,
                        const std::vector<std::size_t>& pivots, const std::string& what) {
-  const auto expected = libgtd::match_voxels_plainly(grid, mask, pivots);
+  const auto expected = graspmap_test::match_voxels_plainly(grid, mask, pivots);
   for (const auto instructions : graspmap_test::instruction_sets())
     EXPECT_TRUE(libgtd::match_voxels(grid, mask, pivots, instructions) == expected)
         << what << ", instructions " << static_cast<int>(instructions);

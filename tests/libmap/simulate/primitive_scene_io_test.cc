@@ -6,13 +6,17 @@
 
 #include "libmap/simulate/scene_geometry.h"
 #include "scene_test_support.h"
+#include "tests/libmap/simulate/scene_query.h"
 #include "tests/support/test_support.h"
+#include "tests/support/thesis_scene.h"
 
 namespace libmap {
 namespace primitive_scene_io_test {
 
 using graspmap_test::error_of;
+using graspmap_test::from_above;
 using graspmap_test::source_folder;
+using graspmap_test::thesis_primitive_scene;
 using testing::AllOf;
 using testing::HasSubstr;
 
@@ -39,10 +43,10 @@ TEST(SceneYaml, the_primitive_shapes_file_is_the_thesis_scene) {
 TEST(SceneYaml, the_slopes_file_is_a_hollow_with_bumps) {
   const PrimitiveScene scene = load_scene(source_folder() / "data/scenes/slopes_and_bumps.yaml");
   const SceneGeometry geometry(scene);
-  EXPECT_LT(geometry.from_above(0.25, -0.2)->height, -0.5);
-  EXPECT_GT(geometry.from_above(1.4, 1.4)->height, 0.1);
-  EXPECT_GT(geometry.from_above(-1.4, 1.4)->height, -0.05);
-  EXPECT_GT(geometry.from_above(0.4, 0.75)->curvature_min, 1.0);
+  EXPECT_LT(from_above(geometry, 0.25, -0.2)->height, -0.5);
+  EXPECT_GT(from_above(geometry, 1.4, 1.4)->height, 0.1);
+  EXPECT_GT(from_above(geometry, -1.4, 1.4)->height, -0.05);
+  EXPECT_GT(from_above(geometry, 0.4, 0.75)->curvature_min, 1.0);
 }
 
 TEST(SceneYaml, reads_flow_and_block_style_and_defaults) {

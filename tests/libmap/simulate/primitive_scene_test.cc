@@ -10,16 +10,20 @@
 
 #include "libmap/simulate/scene_geometry.h"
 #include "scene_test_support.h"
+#include "tests/libmap/simulate/scene_query.h"
 #include "tests/support/test_support.h"
+#include "tests/support/thesis_scene.h"
 
 namespace libmap {
 namespace primitive_scene_test {
 
 using graspmap_test::error_of;
+using graspmap_test::from_above;
 using graspmap_test::ground_plane;
 using graspmap_test::mixed_scene;
 using graspmap_test::pi;
 using graspmap_test::scene_of;
+using graspmap_test::thesis_primitive_scene;
 using graspmap_test::uniform;
 
 TEST(ThesisScene, holds_the_published_shapes_apart_from_each_other) {
@@ -57,35 +61,35 @@ TEST(ThesisScene, holds_the_published_shapes_apart_from_each_other) {
 TEST(TruthFromAbove, is_the_closed_form_on_the_thesis_scene) {
   const SceneGeometry geometry(thesis_primitive_scene());
   // Hemisphere of radius 0.25 at (-1, -1).
-  const SurfaceTruth ball = *geometry.from_above(-0.9, -1.1);
+  const SurfaceTruth ball = *from_above(geometry, -0.9, -1.1);
   EXPECT_EQ(ball.shape, 5);
   EXPECT_NEAR(ball.height, std::sqrt(0.25 * 0.25 - 0.02), 1e-14);
   EXPECT_NEAR((ball.normal - Eigen::Vector3d(0.1, -0.1, ball.height) / 0.25).norm(), 0.0, 1e-13);
   EXPECT_DOUBLE_EQ(ball.curvature_min, 4.0);
   EXPECT_DOUBLE_EQ(ball.curvature_max, 4.0);
   // Half-capsule 0.3 x 0.6 at (-1, 0): straight for |y| < 0.15, round beyond.
-  const SurfaceTruth side = *geometry.from_above(-0.91, 0.1);
+  const SurfaceTruth side = *from_above(geometry, -0.91, 0.1);
   EXPECT_EQ(side.shape, 10);
   EXPECT_NEAR(side.height, 0.12, 1e-14);
   EXPECT_NEAR((side.normal - Eigen::Vector3d(0.6, 0.0, 0.8)).norm(), 0.0, 1e-13);
   EXPECT_EQ(side.curvature_min, 0.0);
   EXPECT_NEAR(side.curvature_max, 1.0 / 0.15, 1e-12);
-  const SurfaceTruth end = *geometry.from_above(-1.0, -0.24);
+  const SurfaceTruth end = *from_above(geometry, -1.0, -0.24);
   EXPECT_NEAR(end.height, 0.12, 1e-14);
   EXPECT_NEAR(end.curvature_min, 1.0 / 0.15, 1e-12);
   EXPECT_NEAR((end.normal - Eigen::Vector3d(0.0, -0.6, 0.8)).norm(), 0.0, 1e-13);
   // Cone 0.15 x 0.2 at (-1, 1): at distance 0.05 of the axis it is 2/15 high and inclined by 3:4.
-  const SurfaceTruth cone = *geometry.from_above(-1.0, 1.05);
+  const SurfaceTruth cone = *from_above(geometry, -1.0, 1.05);
   EXPECT_EQ(cone.shape, 15);
   EXPECT_NEAR(cone.height, 2.0 / 15.0, 1e-14);
   EXPECT_NEAR((cone.normal - Eigen::Vector3d(0.0, 0.8, 0.6)).norm(), 0.0, 1e-13);
   EXPECT_NEAR(cone.curvature_min, 0.0, 1e-15);
   EXPECT_NEAR(cone.curvature_max, 0.8 / 0.05, 1e-11);
-  const SurfaceTruth ground = *geometry.from_above(1.3, 0.4);
+  const SurfaceTruth ground = *from_above(geometry, 1.3, 0.4);
   EXPECT_EQ(ground.shape, 0);
   EXPECT_EQ(ground.height, 0.0);
-  EXPECT_FALSE(geometry.from_above(1.51, 0.0).has_value());
-  EXPECT_FALSE(geometry.from_above(0.0, -2.0).has_value());
+  EXPECT_FALSE(from_above(geometry, 1.51, 0.0).has_value());
+  EXPECT_FALSE(from_above(geometry, 0.0, -2.0).has_value());
 }
 
 // Descends the vertical line by the distance to the union: slow, and knows no formula but it.
@@ -107,7 +111,7 @@ TEST(TruthFromAbove, agrees_with_a_search_by_signed_distance_on_any_shapes) {
   for (int i = 0; i < 600; ++i) {
     const double x = uniform(-0.8, 0.8);
     const double y = uniform(-0.8, 0.8);
-    const std::optional<SurfaceTruth> truth = geometry.from_above(x, y);
+    const std::optional<SurfaceTruth> truth = from_above(geometry, x, y);
     const std::optional<double> z = height_by_search(scene, x, y);
     ASSERT_EQ(truth.has_value(), z.has_value()) << x << " " << y;
     if (!truth) continue;
@@ -126,7 +130,7 @@ struct Numeric {
 Numeric numeric_truth(const SceneGeometry& geometry, double x, double y) {
   constexpr double h = 1e-4;
   const auto z = [&](int i, int j) {
-    return geometry.from_above(x + h * i, y + h * j)->position.z();
+    return from_above(geometry, x + h * i, y + h * j)->position.z();
   };
   const double fx = (z(1, 0) - z(-1, 0)) / (2.0 * h);
   const double fy = (z(0, 1) - z(0, -1)) / (2.0 * h);
@@ -144,10 +148,10 @@ Numeric numeric_truth(const SceneGeometry& geometry, double x, double y) {
 
 // Whether the four faces of the difference stencil belong to one smooth piece.
 bool is_smooth_around(const SceneGeometry& geometry, double x, double y) {
-  const std::optional<SurfaceTruth> middle = geometry.from_above(x, y);
+  const std::optional<SurfaceTruth> middle = from_above(geometry, x, y);
   for (const double dx : {-3e-4, 3e-4}) {
     for (const double dy : {-3e-4, 3e-4}) {
-      const std::optional<SurfaceTruth> near = geometry.from_above(x + dx, y + dy);
+      const std::optional<SurfaceTruth> near = from_above(geometry, x + dx, y + dy);
       if (!near || (near->normal - middle->normal).norm() > 0.02) return false;
       if (std::abs(near->curvature_max - middle->curvature_max) > 0.5) return false;
       if (std::abs(near->curvature_min - middle->curvature_min) > 0.5) return false;
@@ -163,7 +167,7 @@ void expect_numeric_agreement(const PrimitiveScene& scene, double half_m) {
     const double x = uniform(-half_m, half_m);
     const double y = uniform(-half_m, half_m);
     if (!is_smooth_around(geometry, x, y)) continue;
-    const SurfaceTruth truth = *geometry.from_above(x, y);
+    const SurfaceTruth truth = *from_above(geometry, x, y);
     const Numeric numeric = numeric_truth(geometry, x, y);
     EXPECT_NEAR((truth.normal - numeric.normal).norm(), 0.0, 3e-5) << x << " " << y;
     const double scale = 1.0 + std::abs(truth.curvature_max) + std::abs(truth.curvature_min);
@@ -191,23 +195,23 @@ TEST(Bump, follows_its_profile_and_its_curvature_at_the_top_is_the_closed_form) 
   for (const double height : {0.1, -0.1}) {
     const SceneGeometry cosine(
         scene_of({ground_plane(), {Bump{height, 0.4, BumpProfile::cosine}, {.x_m = 0.5}, {}}}));
-    const SurfaceTruth top = *cosine.from_above(0.5, 0.0);
+    const SurfaceTruth top = *from_above(cosine, 0.5, 0.0);
     const double expected = height * pi * pi / (2.0 * 0.4 * 0.4);
     EXPECT_NEAR(top.height, height, 1e-15);
     EXPECT_NEAR(top.curvature_min, expected, 1e-12);  // positive on a bump, negative in a hollow
     EXPECT_NEAR(top.curvature_max, expected, 1e-12);
     EXPECT_EQ(top.shape, 1);
     const double at_quarter = std::pow(std::cos(pi / 8.0), 2);
-    EXPECT_NEAR(cosine.from_above(0.5, 0.1)->height, height * at_quarter, 1e-15);
-    EXPECT_NEAR(cosine.from_above(0.5, 0.1)->position.z(), height * at_quarter, 1e-15);
-    const SurfaceTruth beyond = *cosine.from_above(0.5, 0.41);
+    EXPECT_NEAR(from_above(cosine, 0.5, 0.1)->height, height * at_quarter, 1e-15);
+    EXPECT_NEAR(from_above(cosine, 0.5, 0.1)->position.z(), height * at_quarter, 1e-15);
+    const SurfaceTruth beyond = *from_above(cosine, 0.5, 0.41);
     EXPECT_EQ(beyond.height, 0.0);
     EXPECT_EQ(beyond.curvature_max, 0.0);
     EXPECT_EQ(beyond.shape, 0);
     const SceneGeometry gaussian(
         scene_of({ground_plane(), {Bump{height, 0.6, BumpProfile::gaussian}, {}, {}}}));
-    EXPECT_NEAR(gaussian.from_above(0.2, 0.0)->height, height * std::exp(-0.5), 1e-15);
-    EXPECT_NEAR(gaussian.from_above(0.0, 0.0)->curvature_min, height / 0.04, 1e-12);
+    EXPECT_NEAR(from_above(gaussian, 0.2, 0.0)->height, height * std::exp(-0.5), 1e-15);
+    EXPECT_NEAR(from_above(gaussian, 0.0, 0.0)->curvature_min, height / 0.04, 1e-12);
   }
 }
 
@@ -219,7 +223,7 @@ TEST(Bump, bends_a_tilted_ground_along_the_grounds_normal) {
       scene_of({{Plane{2.0, 2.0}, tilt, {}},
                 {Bump{0.2, 0.5, BumpProfile::cosine}, {foot.x(), foot.y(), foot.z()}, {}}}));
   for (int i = 0; i < 200; ++i) {
-    const SurfaceTruth truth = *geometry.from_above(uniform(-0.5, 0.6), uniform(-0.5, 0.5));
+    const SurfaceTruth truth = *from_above(geometry, uniform(-0.5, 0.6), uniform(-0.5, 0.5));
     const Eigen::Vector3d local = pose.inverse() * truth.position;
     const double r = (local.head<2>() - Eigen::Vector2d(0.2, -0.1)).norm();
     const double expected = r < 0.5 ? 0.2 * std::pow(std::cos(pi * r), 2) : 0.0;

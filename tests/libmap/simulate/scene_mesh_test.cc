@@ -12,6 +12,7 @@
 #include "libmap/simulate/scene_sampling.h"
 #include "scene_test_support.h"
 #include "tests/support/test_support.h"
+#include "tests/support/thesis_scene.h"
 
 namespace libmap {
 namespace scene_mesh_test {
@@ -21,6 +22,7 @@ using graspmap_test::ground_plane;
 using graspmap_test::mixed_scene;
 using graspmap_test::pi;
 using graspmap_test::scene_of;
+using graspmap_test::thesis_primitive_scene;
 using graspmap_test::uniform;
 
 double area_of_shape(const TriangleMesh& mesh, std::size_t shape) {

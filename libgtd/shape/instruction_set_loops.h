@@ -1,0 +1,41 @@
+// Compiles the functions of GRASPMAP_LOOPS, a file that ends with their table `all`, once for each
+// instruction set; GRASPMAP_REGISTER is the size of its vector registers, bytes. To be included in
+// an anonymous namespace of a source that is compiled alone. The file must see no type whose inline
+// functions other sources compile too.
+
+#define GRASPMAP_REGISTER 16
+namespace portable {
+#include GRASPMAP_LOOPS
+}  // namespace portable
+#undef GRASPMAP_REGISTER
+
+#if defined(GRASPMAP_X86_LOOPS)
+
+#pragma GCC push_options
+#pragma GCC target("avx2,popcnt")
+#define GRASPMAP_REGISTER 32
+namespace avx2 {
+#include GRASPMAP_LOOPS
+}  // namespace avx2
+#undef GRASPMAP_REGISTER
+#pragma GCC pop_options
+
+#pragma GCC push_options
+#pragma GCC target("avx2,popcnt,avx512f,avx512bw,avx512vl,avx512vpopcntdq,prefer-vector-width=512")
+#define GRASPMAP_REGISTER 64
+namespace avx512 {
+#include GRASPMAP_LOOPS
+}  // namespace avx512
+#undef GRASPMAP_REGISTER
+#pragma GCC pop_options
+
+#endif
+
+// The table for instructions that the processor has.
+constexpr auto& all_of([[maybe_unused]] InstructionSet instructions) {
+#if defined(GRASPMAP_X86_LOOPS)
+  if (instructions == InstructionSet::avx512) return avx512::all;
+  if (instructions == InstructionSet::avx2) return avx2::all;
+#endif
+  return portable::all;
+}

@@ -1,0 +1,14 @@
+// What is seen of a scene straight from above, in closed form: the oracle of samples and meshes.
+#pragma once
+
+#include <optional>
+
+#include "libmap/simulate/scene_geometry.h"
+
+namespace graspmap_test {
+
+// The topmost surface at (x, y); nothing where there is none.
+std::optional<libmap::SurfaceTruth> from_above(const libmap::SceneGeometry& geometry, double x,
+                                               double y);
+
+}  // namespace graspmap_test
