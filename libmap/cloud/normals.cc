@@ -227,11 +227,7 @@ void bind(ParameterTable& table, NormalEstimationOptions& options) {
 
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options) {
-  if (!(options.neighbors >= neighbor_range.min && options.neighbors <= neighbor_range.max))
-    throw Error("normals cannot be estimated so", {.file = {},
-                                                   .field = "normal_neighbors",
-                                                   .value = std::to_string(options.neighbors),
-                                                   .bound = describe(neighbor_range)});
+  check_parameters(options);
   cloud.check();
   for (const Eigen::Vector3d& position : cloud.positions)
     if (!position.allFinite()) throw Error("a position is not finite");

@@ -51,9 +51,7 @@ void check(const StereoCamera& cameras) {
 }
 
 StereoDepthOptions checked(StereoDepthOptions options) {
-  ParameterTable table;
-  bind(table, options);
-  for (const auto& [key, value] : table.values()) table.set(key, value);
+  check_parameters(options);
   if (options.block_px % 2 == 0)
     refuse_pair("out of range", "block_px", std::to_string(options.block_px), "odd");
   options.disparities_px = (options.disparities_px + 15) / 16 * 16;

@@ -27,11 +27,9 @@ bool resemble(const Pose& a, const Pose& b, const ViewSelectionOptions& options)
   return angle <= options.angle_deg * std::numbers::pi / 180.0;
 }
 
-void check(ViewSelectionOptions options, const std::vector<Pose>& poses,
+void check(const ViewSelectionOptions& options, const std::vector<Pose>& poses,
            const std::vector<double>& qualities) {
-  ParameterTable table;
-  bind(table, options);
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  check_parameters(options);
   if (poses.size() != qualities.size())
     throw Error("not one quality a view", {.file = {},
                                            .field = "qualities",
