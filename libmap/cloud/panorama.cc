@@ -127,15 +127,12 @@ void check(const PanoramaView& view) {
   } catch (const Error& error) {
     throw error.in_file(view.name);
   }
-  const auto size = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
   if (view.depth.width != view.camera.width || view.depth.height != view.camera.height)
     throw Error("does not fit its calibration",
                 {.file = view.name,
                  .field = "image size",
-                 .value = size(view.depth.width, view.depth.height),
-                 .bound = size(view.camera.width, view.camera.height)});
+                 .value = size_text(view.depth.width, view.depth.height),
+                 .bound = size_text(view.camera.width, view.camera.height)});
 }
 
 }  // namespace

@@ -24,11 +24,7 @@ const std::vector<std::pair<std::string, StereoDirections>> direction_names = {
 
 [[noreturn]] void refuse_pair(const std::string& reason, const std::string& field,
                               const std::string& value, const std::string& bound) {
-  throw Error(reason, {.file = {}, .field = field, .value = value, .bound = bound});
-}
-
-std::string size_text(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
+  throw Error(reason, {.field = field, .value = value, .bound = bound});
 }
 
 void check(const GrayImage& image, const Camera& camera, const std::string& field) {
@@ -59,15 +55,8 @@ StereoDepthOptions checked(StereoDepthOptions options) {
 }
 
 int mode_of(StereoDirections directions) {
-  switch (directions) {
-    case StereoDirections::three:
-      return cv::StereoSGBM::MODE_SGBM_3WAY;
-    case StereoDirections::five:
-      return cv::StereoSGBM::MODE_SGBM;
-    case StereoDirections::eight:
-      return cv::StereoSGBM::MODE_HH;
-  }
-  return cv::StereoSGBM::MODE_SGBM;
+  if (directions == StereoDirections::three) return cv::StereoSGBM::MODE_SGBM_3WAY;
+  return directions == StereoDirections::five ? cv::StereoSGBM::MODE_SGBM : cv::StereoSGBM::MODE_HH;
 }
 
 // With columns repeated on both sides: SGBM gives nothing where a disparity of the range would
