@@ -5,7 +5,6 @@
 #include <filesystem>
 #include <optional>
 #include <string>
-#include <string_view>
 #include <vector>
 
 #include "libmap/cloud/cloud_io.h"
@@ -109,11 +108,10 @@ void fuse(FuseOptions options, Run& run) {
   try {
     result = libmap::fuse_depth(*scan, poses, options.fusion, run.progress());
   } catch (const libmap::Error& error) {
-    // A broken frame's message names the file already.
-    if (std::string_view(error.what()).starts_with(options.scan)) throw;
     throw error.in_file(options.scan);
   }
-  for (const auto& [node, fault] : result.skipped) run.warn("skipped: " + fault);
+  for (const auto& [node, fault] : result.skipped)
+    run.warn(std::string("skipped: ") + fault.what());
   // By the poses that the cloud was made with.
   if (in_true_frame)
     result.cloud = libmap::transform_cloud(

@@ -4,7 +4,6 @@
 #include <filesystem>
 #include <map>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -155,11 +154,10 @@ void refine(const RefineOptions& options, Run& run) {
     result = libmap::refine_poses(*scan, options.refinement, run.progress(),
                                   feature_cache_of(options, run));
   } catch (const libmap::Error& error) {
-    if (std::string_view(error.what()).starts_with(options.scan)) throw;
     throw error.in_file(options.scan);
   }
   for (const auto& [node, fault] : result.skipped)
-    run.warn(fmt::format("no features: node {}: {}", node, fault));
+    run.warn(fmt::format("no features: node {}: {}", node, fault.what()));
   for (const std::string& warning : result.warnings) run.warn(options.scan + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   run.say(fmt::format("{} poses, {} links, of which {} were found", result.poses.size(),

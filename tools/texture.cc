@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <string>
-#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -82,9 +81,7 @@ libmap::TextureResult textured(const TextureCommandOptions& options, const libma
   try {
     return libmap::texture_mesh(mesh, scan, poses, options.texture, run.progress());
   } catch (const libmap::Error& error) {
-    // A broken frame's message names the scan already.
-    if (std::string_view(error.what()).starts_with(options.scan)) throw;
-    throw error.in_file(options.mesh);
+    throw error.in_file(options.mesh);  // unless it names the scan
   }
 }
 
@@ -123,7 +120,8 @@ void add_results(const libmap::TextureResult& result, libmap::Manifest& manifest
 }
 
 void say_result(const libmap::TextureResult& result, Run& run) {
-  for (const auto& [node, fault] : result.skipped) run.warn("skipped: " + fault);
+  for (const auto& [node, fault] : result.skipped)
+    run.warn(std::string("skipped: ") + fault.what());
   for (const auto& [name, seconds] : result.timings_s)
     run.detail(fmt::format("{}: {:.3f} s", name, seconds));
   run.say(fmt::format(

@@ -39,7 +39,7 @@ std::size_t best_of(const libmap::PointCloud& map, const std::vector<double>& sc
 }
 
 void check(const libmap::PointCloud& map, const LookupOptions& options) {
-  options.check();
+  libmap::check_parameters(options);
   if (map.empty()) throw libmap::Error("the map has no points");
   if (options.mode == LookupMode::maximum && map.find_field("score") == nullptr)
     throw libmap::Error("the map has no such field", {.field = "score"});
@@ -94,13 +94,6 @@ void bind(libmap::ParameterTable& table, LookupOptions& options) {
   table.add("radius_m", options.radius_m, libmap::positive, "radius of maximum and mean, m");
   table.add("max_distance_m", options.max_distance_m, libmap::positive,
             "nearest: farther off there is nothing, m");
-}
-
-void LookupOptions::check() const {
-  LookupOptions copy = *this;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
 }
 
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,

@@ -22,8 +22,6 @@ struct LookupOptions {
   LookupMode mode = LookupMode::nearest;
   double radius_m = 0.02;        // of maximum and mean
   double max_distance_m = 0.05;  // of nearest: farther off there is nothing
-
-  void check() const;  // throws Error naming the field, its value and its bound
 };
 void bind(libmap::ParameterTable& table, LookupOptions& options);
 

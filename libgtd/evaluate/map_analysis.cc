@@ -15,13 +15,6 @@ namespace {
 constexpr double score_tolerance = 1e-6;  // as in score_color.h
 constexpr int largest_gap = 6;            // of empty columns inside the ground
 
-void check(const MapAnalysisOptions& options) {
-  MapAnalysisOptions copy = options;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
-}
-
 class MapCounter {
  public:
   MapCounter(const VoxelMap& map, const MapSurface& surface, const MapAnalysisOptions& options)
@@ -180,7 +173,7 @@ std::optional<double> GroundBin::mean_score() const {
 
 MapAnalysis analyze_map(const VoxelMap& map, const MapSurface& surface,
                         const MapAnalysisOptions& options) {
-  check(options);
+  libmap::check_parameters(options);
   if (surface.slope_deg.size() != map.size() || surface.area_m2.size() != map.size())
     throw libmap::Error("the surface is of another map", {.field = "slope_deg"});
   return MapCounter(map, surface, options).run();

@@ -18,13 +18,6 @@ constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 constexpr double lattice_tolerance_voxels = 0.01;
 constexpr std::size_t places_per_chunk = 1 << 14;
 
-void check(const MapChangeOptions& options) {
-  MapChangeOptions copy = options;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
-}
-
 // What is added to the indices of OTHER's voxels to get those of MAP's, where the lattices are one.
 std::optional<Voxel> lattice_offset(const VoxelMap& map, const VoxelMap& other,
                                     const libmap::Pose& map_from_other) {
@@ -244,7 +237,7 @@ ChangeClass class_of(const VoxelMap& map, const VoxelMap& other, const VoxelPair
 MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                        const libmap::Pose& map_terrain_from_other_terrain,
                        const MapChangeOptions& options) {
-  check(options);
+  libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
     throw libmap::Error("the surface is of another map", {.field = "area_m2"});
   MapChange change;

@@ -13,13 +13,6 @@ namespace {
 using Parents = std::vector<std::uint32_t>;
 using Sets = boost::disjoint_sets<std::uint32_t*, std::uint32_t*>;
 
-void check(const MapRegionOptions& options) {
-  MapRegionOptions copy = options;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
-}
-
 std::vector<std::uint32_t> graspable_voxels(const VoxelMap& map, bool edges) {
   std::vector<std::uint32_t> graspable;
   for (std::uint32_t n = 0; n < map.size(); ++n)
@@ -97,7 +90,7 @@ void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
 
 MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
                              const MapRegionOptions& options) {
-  check(options);
+  libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
     throw libmap::Error("the surface is of another map", {.field = "area_m2"});
   const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.edges);

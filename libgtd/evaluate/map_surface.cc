@@ -116,10 +116,7 @@ double MapSurface::plan_area_m2(std::size_t n) const {
 }
 
 MapSurface measure_surface(const VoxelMap& map, const MapSurfaceOptions& options) {
-  if (!(options.surface_radius_m >= 0.0) || !std::isfinite(options.surface_radius_m))
-    throw libmap::Error("no radius", {.field = "surface_radius_m",
-                                      .value = libmap::to_text(options.surface_radius_m),
-                                      .bound = ">= 0"});
+  libmap::check_parameters(options);
   const double size_m = map.lattice.voxel_size_m;
   MapSurface surface;
   surface.radius_m =

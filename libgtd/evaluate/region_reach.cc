@@ -30,10 +30,7 @@ constexpr double tolerance = 1.0 + 1e-9;
 constexpr double farthest_m = std::numeric_limits<double>::max();
 
 void check(const RegionReachOptions& options) {
-  RegionReachOptions copy = options;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  libmap::check_parameters(options);
   if (options.start && !options.start->allFinite())
     throw libmap::Error("not a place", {.field = "start"});
 }

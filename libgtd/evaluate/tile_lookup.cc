@@ -343,7 +343,7 @@ class TileLookup {
 std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileLoader& load,
                                         const std::vector<Eigen::Vector3d>& points,
                                         const LookupOptions& options, libmap::Progress& progress) {
-  options.check();
+  libmap::check_parameters(options);
   if (index.tiles.empty()) throw libmap::Error("the map has no points");
   const libmap::Pose terrain_from_map = index.frame == MapFrame::input
                                             ? index.terrain_from_input()

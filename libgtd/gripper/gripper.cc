@@ -38,11 +38,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
 }
 
 void Gripper::check() const {
-  Gripper copy = *this;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  // Setting each field to its own value checks it against its own bound.
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  libmap::check_parameters(*this);
   if (closing_angle_deg >= opening_angle_deg)
     throw libmap::Error("the fingers close inward",
                         {.field = "closing_angle_deg",

@@ -23,10 +23,7 @@ using libmap::ScalarField;
 constexpr double nan = std::numeric_limits<double>::quiet_NaN();
 
 void check(const FootholdOptions& options, const FootholdFrame& frame) {
-  FootholdOptions copy = options;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  libmap::check_parameters(options);
   if (!(frame.up.norm() > 0.0) || !frame.up.allFinite())
     throw libmap::Error("has no length", {.field = "up"});
 }

@@ -45,11 +45,7 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
 }
 
 void Scenario::check() const {
-  Scenario copy = *this;
-  libmap::ParameterTable table;
-  bind(table, copy);
-  // Setting each field to its own value checks it against its own bound.
-  for (const libmap::Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  libmap::check_parameters(*this);
   if (orientation == Orientation::surface &&
       (method == Method::thesis || method == Method::envelope))
     throw libmap::Error("not with method " + name_of(method) + ", which knows no tilted mask",

@@ -40,8 +40,7 @@ std::vector<std::string> names_of(const ColumnSet& set) {
 void require_unique(const std::vector<std::string>& names) {
   std::set<std::string_view> seen;
   for (const std::string& name : names)
-    if (!seen.insert(name).second)
-      throw Error("stands twice", {.file = {}, .field = "field '" + name + "'"});
+    if (!seen.insert(name).second) throw Error("stands twice", {.field = "field '" + name + "'"});
 }
 
 Triple require_positions(const ColumnSet& set) {
@@ -121,7 +120,7 @@ CloudFromColumns without_holes(PointCloud cloud, NotFinite not_finite) {
     if (cloud.positions[i].allFinite())
       kept.push_back(i);
     else if (not_finite == NotFinite::refuse)
-      throw Error("position is not finite", {.file = {}, .field = "vertex " + std::to_string(i)});
+      throw Error("position is not finite", {.field = "vertex " + std::to_string(i)});
   }
   const std::size_t dropped = cloud.size() - kept.size();
   if (dropped == 0) return {std::move(cloud), 0};
@@ -148,8 +147,7 @@ void require_readable_back(const ColumnSet& set, const std::vector<ScalarField>&
       throw Error(
           "scalar fields under these names would be read back as positions, normals or "
           "colours",
-          {.file = {},
-           .field = (*triple)[0]->name + " " + (*triple)[1]->name + " " + (*triple)[2]->name});
+          {.field = (*triple)[0]->name + " " + (*triple)[1]->name + " " + (*triple)[2]->name});
 }
 
 }  // namespace

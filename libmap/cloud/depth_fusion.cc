@@ -3,9 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <iterator>
-#include <limits>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <numbers>
+#include <optional>
 #include <span>
 
 #include "libmap/cloud/frame_registration.h"
@@ -34,167 +36,45 @@ constexpr double first_search_voxels = 3.0;
 // Corrections of heights, root mean square, that are not worth another coarse surface.
 constexpr double least_correction_voxels = 0.05;
 
-void require(double value, const Range& range, const char* field) {
-  const bool low = range.min_open ? value > range.min : value >= range.min;
-  const bool high = range.max_open ? value < range.max : value <= range.max;
-  if (low && high && std::isfinite(value)) return;
-  throw Error("depth cannot be fused so",
-              {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-}
-
-constexpr Range radius_range{1, 7};
-constexpr Range rounds_range{0, 20};
-constexpr Range incidence_range{0, 89.5, true, false};
+// Decoded frames and their planes are kept for later passes as far as this reaches.
+constexpr std::size_t most_kept_bytes = std::size_t{512} << 20;
+constexpr std::size_t kept_pixel_bytes = 25;
 
 void check(const DepthFusionOptions& options) {
-  require(options.voxel_size_m, positive, "voxel_size_m");
-  require(options.planes.min_depth_m, positive, "min_depth_m");
-  require(options.planes.max_depth_m, positive, "max_depth_m");
-  require(options.planes.max_depth_m,
-          {options.planes.min_depth_m, std::numeric_limits<double>::infinity(), true, false},
-          "max_depth_m");
-  require(options.planes.noise.axial_m, positive, "axial_noise_m");
-  require(options.planes.noise.axial_of_range, not_negative, "range_noise");
-  require(options.planes.noise.lateral_px, not_negative, "lateral_noise_px");
-  require(options.planes.radius_px, radius_range, "plane_radius_px");
-  require(options.planes.min_pair_share, zero_to_one, "min_pair_share");
-  require(options.planes.max_incidence_deg, incidence_range, "max_incidence_deg");
-  require(options.disc_radius_voxels, positive, "disc_radius_voxels");
-  require(options.pose_error_m, not_negative, "pose_error_m");
-  require(options.registration_rounds, rounds_range, "registration_rounds");
-  require(options.min_views, {1}, "min_views");
-  require(options.max_seen_through, not_negative, "max_seen_through");
+  check_parameters(options);
+  if (!(options.planes.max_depth_m > options.planes.min_depth_m))
+    throw Error("out of range", {.field = "max_depth_m",
+                                 .value = to_text(options.planes.max_depth_m),
+                                 .bound = "> " + to_text(options.planes.min_depth_m)});
 }
+
+std::string node_name(int node) { return "node " + std::to_string(node); }
 
 struct FusedFrame {
   int node = 0;
   Pose grid_from_base = Pose::Identity();
 };
 
-// What the first pass makes of one frame.
+// What every pass needs of a frame: decoded and fitted once where memory allows.
+struct DepthFrame {
+  RgbdFrame images;                 // depth alone
+  std::vector<DepthPlanes> planes;  // one per camera; none: not fitted yet
+};
+
+// What one frame gives to the coarse surface.
 struct CoarseFrame {
   SurfaceVoxels voxels;
   DepthPixelCounts pixels;
   std::size_t image_pixels = 0;
-  std::string fault;  // empty: it can be used
+  std::optional<Error> fault;  // none: it can be used
 };
 
-class Fusion {
- public:
-  Fusion(const ScanSource& scan, const DepthFusionOptions& options, Progress& progress)
-      : scan_(scan), options_(options), progress_(progress) {}
-
-  DepthFusionResult run(const Trajectory& world_from_base) {
-    take_poses(world_from_base);
-    timed("coarse surface", [&] { find_surface(); });
-    timed("registration", [&] { register_poses(world_from_base); });
-    if (used_.empty()) throw no_frames(world_from_base.size());
-    result_.frames = used_.size();
-    result_.occupied_voxels = voxels_.size();
-    RefinedSurface surface;
-    timed("refinement", [&] { surface = refine(); });
-    timed("cloud", [&] { make_cloud(surface); });
-    return std::move(result_);
-  }
-
- private:
-  template <typename Step>
-  void timed(const char* name, const Step& step) {
-    libmap::timed(result_.timings_s, name, step);
-  }
-
-  Error no_frames(std::size_t poses) const {
-    if (result_.skipped.empty())
-      return Error(poses == 0 ? "no poses to fuse by" : "no frame has depth");
-    return Error("none of " + std::to_string(poses) + " frames can be used, the first because " +
-                 result_.skipped.front().second);
-  }
-
-  void skip(int node, const std::string& fault) {
-    if (options_.strict) throw Error(fault);
-    result_.skipped.emplace_back(node, fault);
-  }
-
-  void take_poses(const Trajectory& world_from_base);
-  RgbdFrame read_frame(int node, bool color) const;
-  CoarseFrame coarse_frame(const FusedFrame& frame) const;
-  void merge_coarse(std::span<const FusedFrame> frames, std::span<const CoarseFrame> coarse);
-  void find_surface();
-  // use(views) of some frames at a time, in their order.
-  template <typename Use>
-  void each_view_group(bool color, const Use& use) const {
-    const std::size_t group = frames_in_batch(most_image_pixels_);
-    for (std::size_t first = 0; first < used_.size(); first += group) {
-      const std::size_t count = std::min(group, used_.size() - first);
-      std::vector<std::vector<RefinementView>> frames(count);
-      parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t n = begin; n < end; ++n)
-          frames[n] = views_of(used_[first + n], static_cast<std::uint32_t>(first + n), color);
-      });
-      std::vector<RefinementView> views;
-      for (std::vector<RefinementView>& frame : frames)
-        std::move(frame.begin(), frame.end(), std::back_inserter(views));
-      use(std::span<const RefinementView>(views), count);
-    }
-  }
-  FrameRegistration registration(int round);
-  void register_poses(const Trajectory& world_from_base);
-  void note_poses(const Trajectory& world_from_base);
-  SurfaceRefinementOptions refinement_options() const;
-  std::vector<RefinementView> views_of(const FusedFrame& frame, std::uint32_t number,
-                                       bool color) const;
-  RefinedSurface refine();
-  void make_cloud(const RefinedSurface& surface);
-
-  const ScanSource& scan_;
-  const DepthFusionOptions& options_;
-  Progress& progress_;
-  mutable PixelRayCache rays_;
-  mutable MemoryBudget memory_;
-  std::size_t most_image_pixels_ = 0;  // of the frames used
-  // The grid's origin is a corner of the world's own voxels near the first camera: single precision
-  // is enough about it, wherever the scan lies.
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  std::vector<FusedFrame> frames_;
-  std::vector<FusedFrame> used_;
-  SurfaceVoxels voxels_;
-  DepthFusionResult result_;
+struct CoarseSurface {
+  std::vector<FusedFrame> frames;  // those that can be used
+  SurfaceVoxels voxels;
+  DepthPixelCounts pixels;
+  std::size_t most_image_pixels = 0;
 };
-
-void Fusion::take_poses(const Trajectory& world_from_base) {
-  bool has_origin = false;
-  for (const TrajectoryPose& pose : world_from_base) {
-    if (!pose.world_from_base.matrix().allFinite()) {
-      skip(pose.node, "node " + std::to_string(pose.node) + ": its pose is not finite");
-      continue;
-    }
-    FusedFrame frame{pose.node, pose.world_from_base};
-    if (!has_origin)
-      origin_ = (frame.grid_from_base.translation() / options_.voxel_size_m).array().floor() *
-                options_.voxel_size_m;
-    has_origin = true;
-    frame.grid_from_base.translation() -= origin_;
-    const double reach = frame.grid_from_base.translation().cwiseAbs().maxCoeff();
-    const double bound = 0.9 * voxel_cell_limit * options_.voxel_size_m;
-    const double needed = reach + options_.planes.max_depth_m;
-    if (needed > bound && reach <= options_.planes.max_depth_m)
-      throw Error(
-          "voxels too small for the reach of the depth images",
-          {.file = {},
-           .field = "voxel_size_m",
-           .value = to_text(options_.voxel_size_m),
-           .bound = "> " + to_text(static_cast<float>(options_.voxel_size_m * needed / bound))});
-    if (needed > bound)
-      throw Error("poses lie too far apart for the voxel size",
-                  {.file = {},
-                   .field = "node " + std::to_string(pose.node),
-                   .value = to_text(static_cast<float>(reach)) + " m from the first",
-                   .bound = "< " + to_text(static_cast<float>(bound)) + " m"});
-    frames_.push_back(frame);
-  }
-  std::stable_sort(frames_.begin(), frames_.end(),
-                   [](const FusedFrame& a, const FusedFrame& b) { return a.node < b.node; });
-}
 
 void add_planes(const DepthPlanes& planes, const PixelRays& rays, const Pose& grid_from_camera,
                 const DepthFusionOptions& options, SurfaceVoxels& voxels) {
@@ -215,202 +95,332 @@ void add_planes(const DepthPlanes& planes, const PixelRays& rays, const Pose& gr
   }
 }
 
-RgbdFrame Fusion::read_frame(int node, bool color) const {
-  RgbdFrame frame = scan_.read_frame(node, {.color = color, .depth = true});
-  if (!frame.depth.empty()) return frame;
-  const std::string name = "node " + std::to_string(node);
-  if (frame.right.empty()) throw Error(name + ": it has no depth image");
-  if (!options_.stereo)
-    throw Error(name + ": it has a stereo pair and no depth, which stereo matching would compute");
-  if (!color) frame = scan_.read_frame(node);
-  frame.depth = stereo_depth(frame);
-  return frame;
-}
+class Fusion {
+ public:
+  Fusion(const ScanSource& scan, const DepthFusionOptions& options, Progress& progress)
+      : scan_(scan), options_(options), progress_(progress) {}
 
-CoarseFrame Fusion::coarse_frame(const FusedFrame& frame) const {
-  CoarseFrame coarse;
-  try {
-    const RgbdFrame images = read_frame(frame.node, false);
-    if (images.cameras.empty())
-      throw Error("node " + std::to_string(frame.node) + ": it has no calibration");
-    coarse.image_pixels = image_pixels(images);
-    const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * images.depth.pixels.size());
-    for (const CameraView& view : camera_views(images)) {
-      view.depth_camera.check();
-      const auto rays = rays_.rays_of(view.depth_camera);
-      const DepthPlanes planes = fit_depth_planes(view.depth, *rays, options_.planes);
-      coarse.pixels += planes.counts;
-      add_planes(planes, *rays, frame.grid_from_base * view.depth_camera.base_from_camera, options_,
-                 coarse.voxels);
-    }
-  } catch (const Error& error) {
-    if (error.kind() != ErrorKind::bad_input) throw;
-    coarse.fault = error.what();
+  DepthFusionResult run(const Trajectory& world_from_base) {
+    const std::vector<FusedFrame> frames = place_frames(world_from_base);
+    CoarseSurface coarse;
+    timed("coarse surface", [&] { coarse = coarse_surface(frames); });
+    timed("registration", [&] { register_frames(coarse); });
+    if (coarse.frames.empty()) throw no_frames(world_from_base.size());
+    note_frames(coarse, world_from_base);
+    RefinedSurface surface;
+    timed("refinement", [&] { surface = refine(std::move(coarse)); });
+    timed("cloud", [&] { make_cloud(surface); });
+    return std::move(result_);
   }
-  return coarse;
-}
 
-void Fusion::merge_coarse(std::span<const FusedFrame> frames, std::span<const CoarseFrame> coarse) {
-  for (std::size_t n = 0; n < coarse.size(); ++n) {
-    if (!coarse[n].fault.empty()) {
-      skip(frames[n].node, coarse[n].fault);
-      continue;
-    }
-    voxels_.merge_frame(coarse[n].voxels);
-    result_.pixels += coarse[n].pixels;
-    most_image_pixels_ = std::max(most_image_pixels_, coarse[n].image_pixels);
-    used_.push_back(frames[n]);
+ private:
+  template <typename Step>
+  void timed(const char* name, const Step& step) {
+    libmap::timed(result_.timings_s, name, step);
   }
-}
 
-void Fusion::find_surface() {
-  progress_.begin("coarse surface", frames_.size());
-  const std::span<const FusedFrame> frames = frames_;
-  std::span<const FusedFrame> before;
-  std::vector<CoarseFrame> coarse_before;
-  for (std::size_t first = 0; first < frames.size(); first += frames_in_flight) {
-    const auto now = frames.subspan(first, std::min(frames_in_flight, frames.size() - first));
-    std::vector<CoarseFrame> coarse(now.size());
-    // One thread merges the frames before, in their order, while others make these.
-    parallel_for(now.size() + 1, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t task = begin; task < end; ++task) {
-        if (task == 0) {
-          merge_coarse(before, coarse_before);
-        } else {
-          coarse[task - 1] = coarse_frame(now[task - 1]);
-          progress_.advance(1);
-        }
+  Error no_frames(std::size_t poses) const {
+    if (result_.skipped.empty())
+      return Error(poses == 0 ? "no poses to fuse by" : "no frame has depth");
+    return Error("none of " + std::to_string(poses) + " frames can be used, the first because " +
+                 result_.skipped.front().second.what());
+  }
+
+  void skip(int node, const Error& fault) {
+    if (options_.strict) throw fault;
+    result_.skipped.emplace_back(node, fault);
+  }
+
+  std::vector<FusedFrame> place_frames(const Trajectory& world_from_base) {
+    std::vector<FusedFrame> frames;
+    bool has_origin = false;
+    for (const TrajectoryPose& pose : world_from_base) {
+      if (!pose.world_from_base.matrix().allFinite()) {
+        skip(pose.node, Error("its pose is not finite", {.field = node_name(pose.node)}));
+        continue;
       }
-    });
-    before = now;
-    coarse_before = std::move(coarse);
-  }
-  merge_coarse(before, coarse_before);
-}
-
-std::vector<RefinementView> Fusion::views_of(const FusedFrame& frame, std::uint32_t number,
-                                             bool color) const {
-  std::vector<RefinementView> views;
-  RgbdFrame images;
-  try {
-    images = read_frame(frame.node, color);
-  } catch (const Error&) {
-    // Its depth was read before: only the colours are broken.
-    if (!color || options_.strict) throw;
-    images = read_frame(frame.node, false);
-  }
-  for (CameraView& view : camera_views(images)) {
-    auto rays = rays_.rays_of(view.depth_camera);
-    const Pose camera_from_grid =
-        (frame.grid_from_base * view.depth_camera.base_from_camera).inverse();
-    views.push_back(
-        make_refinement_view(std::move(view), std::move(rays), camera_from_grid, number));
-  }
-  return views;
-}
-
-SurfaceRefinementOptions Fusion::refinement_options() const {
-  SurfaceRefinementOptions options;
-  options.disc_radius_m = options_.disc_radius_voxels * options_.voxel_size_m;
-  options.search_m = options_.voxel_size_m;
-  options.min_depth_m = options_.planes.min_depth_m;
-  options.max_depth_m = options_.planes.max_depth_m;
-  options.max_incidence_deg = options_.planes.max_incidence_deg;
-  options.noise = options_.planes.noise;
-  options.pose_error_m = options_.pose_error_m;
-  return options;
-}
-
-// By what the frames measured of some of the coarse surface.
-FrameRegistration Fusion::registration(int round) {
-  std::vector<SurfaceElement> elements = surface_elements(voxels_, false);
-  const std::size_t step = std::max<std::size_t>(1, elements.size() / registration_elements);
-  for (std::size_t n = 0; n * step < elements.size(); ++n) {
-    elements[n] = elements[n * step];
-    elements[n].position *= static_cast<float>(options_.voxel_size_m);
-  }
-  elements.resize((elements.size() + step - 1) / step);
-  SurfaceRefinementOptions options = refinement_options();
-  options.search_m = first_search_voxels * options_.voxel_size_m / round;
-  std::vector<SurfaceObservation> observations;
-  each_view_group(false, [&](std::span<const RefinementView> views, std::size_t) {
-    const auto more = observe_surface(elements, views, options);
-    observations.insert(observations.end(), more.begin(), more.end());
-  });
-  std::stable_sort(observations.begin(), observations.end(),
-                   [](const auto& a, const auto& b) { return a.element < b.element; });
-  std::vector<Eigen::Vector3d> centres;
-  for (const FusedFrame& frame : used_) centres.push_back(frame.grid_from_base.translation());
-  return register_frames(elements, observations, centres);
-}
-
-void Fusion::register_poses(const Trajectory& world_from_base) {
-  for (int round = 1; round <= options_.registration_rounds && used_.size() > 1; ++round) {
-    const FrameRegistration found = registration(round);
-    if (round == 1) result_.disagreement_before_m = found.disagreement_before_m;
-    result_.disagreement_after_m = found.disagreement_before_m;
-    // Poses that are right stay as they are, and with them the coarse surface.
-    if (!(found.correction_m > least_correction_voxels * options_.voxel_size_m)) break;
-    frames_ = std::move(used_);
-    for (std::size_t n = 0; n < frames_.size(); ++n)
-      frames_[n].grid_from_base = found.corrected_from_given[n] * frames_[n].grid_from_base;
-    result_.disagreement_after_m = found.disagreement_after_m;
-    ++result_.registration_rounds;
-    voxels_ = {};
-    used_.clear();
-    result_.pixels = {};
-    find_surface();
-  }
-  note_poses(world_from_base);
-}
-
-void Fusion::note_poses(const Trajectory& world_from_base) {
-  double turns = 0.0;
-  double shifts = 0.0;
-  for (const FusedFrame& frame : used_) {
-    const auto given =
-        std::find_if(world_from_base.begin(), world_from_base.end(),
-                     [&](const TrajectoryPose& pose) { return pose.node == frame.node; });
-    TrajectoryPose pose = *given;
-    if (result_.registration_rounds > 0) {
-      pose.world_from_base = Eigen::Translation3d(origin_) * frame.grid_from_base;
-      const Pose given_from_used = given->world_from_base.inverse() * pose.world_from_base;
-      const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
-      turns += turn * turn;
-      shifts += given_from_used.translation().squaredNorm();
+      FusedFrame frame{pose.node, pose.world_from_base};
+      if (!has_origin)
+        origin_ = (frame.grid_from_base.translation() / options_.voxel_size_m).array().floor() *
+                  options_.voxel_size_m;
+      has_origin = true;
+      frame.grid_from_base.translation() -= origin_;
+      const double reach = frame.grid_from_base.translation().cwiseAbs().maxCoeff();
+      const double bound = 0.9 * voxel_cell_limit * options_.voxel_size_m;
+      const double needed = reach + options_.planes.max_depth_m;
+      if (needed > bound && reach <= options_.planes.max_depth_m)
+        throw Error(
+            "voxels too small for the reach of the depth images",
+            {.field = "voxel_size_m",
+             .value = to_text(options_.voxel_size_m),
+             .bound = "> " + to_text(static_cast<float>(options_.voxel_size_m * needed / bound))});
+      if (needed > bound)
+        throw Error("poses lie too far apart for the voxel size",
+                    {.field = node_name(pose.node),
+                     .value = to_text(static_cast<float>(reach)) + " m from the first",
+                     .bound = "< " + to_text(static_cast<float>(bound)) + " m"});
+      frames.push_back(frame);
     }
-    result_.poses.push_back(pose);
+    std::stable_sort(frames.begin(), frames.end(),
+                     [](const FusedFrame& a, const FusedFrame& b) { return a.node < b.node; });
+    return frames;
   }
-  const auto count = static_cast<double>(used_.size());
-  result_.registration_turn_deg = std::sqrt(turns / count) * 180.0 / std::numbers::pi;
-  result_.registration_shift_m = std::sqrt(shifts / count);
-}
 
-RefinedSurface Fusion::refine() {
-  std::vector<SurfaceElement> elements = surface_elements(voxels_, options_.extend_edges);
-  voxels_ = {};
-  const auto voxel = static_cast<float>(options_.voxel_size_m);
-  for (SurfaceElement& element : elements) element.position *= voxel;
-  result_.elements = elements.size();
-  SurfaceRefinement refinement(std::move(elements), refinement_options());
-  progress_.begin("refinement", used_.size());
-  each_view_group(options_.color, [&](std::span<const RefinementView> views, std::size_t frames) {
-    refinement.add(views);
-    progress_.advance(frames);
-  });
-  return std::move(refinement).finish();
-}
+  std::shared_ptr<DepthFrame> depth_of(int node) const {
+    {
+      const std::scoped_lock lock(mutex_);
+      if (const auto kept = kept_.find(node); kept != kept_.end()) return kept->second;
+    }
+    const auto frame = std::make_shared<DepthFrame>();
+    RgbdFrame& images = frame->images;
+    images = scan_.read_frame(node, {.color = false, .depth = true});
+    if (images.depth.empty()) {
+      const std::string name = node_name(node);
+      if (images.right.empty()) throw Error("it has no depth image", {.field = name});
+      if (!options_.stereo)
+        throw Error("it has a stereo pair and no depth, which stereo matching would compute",
+                    {.field = name});
+      images = scan_.read_frame(node);
+      images.depth = stereo_depth(images);
+    }
+    if (images.cameras.empty()) throw Error("it has no calibration", {.field = node_name(node)});
+    images.color = {};
+    images.right = {};
+    return frame;
+  }
 
-void Fusion::make_cloud(const RefinedSurface& surface) {
-  SurfacePointOptions options;
-  options.voxel_size_m = options_.voxel_size_m;
-  options.min_views = options_.min_views;
-  options.max_seen_through = options_.max_seen_through;
-  SurfacePoints points = make_surface_points(surface, options);
-  result_.cloud = std::move(points.cloud);
-  for (Eigen::Vector3d& position : result_.cloud.positions) position += origin_;
-  result_.points = points.counts;
-}
+  // All passes go through the frames in one order: those that came first stay.
+  void keep(int node, const std::shared_ptr<DepthFrame>& frame) const {
+    const std::size_t bytes = kept_pixel_bytes * frame->images.depth.pixels.size();
+    const std::scoped_lock lock(mutex_);
+    if (kept_bytes_ + bytes <= most_kept_bytes && kept_.emplace(node, frame).second)
+      kept_bytes_ += bytes;
+  }
+
+  CoarseFrame coarse_frame(const FusedFrame& frame) const {
+    CoarseFrame coarse;
+    try {
+      const std::shared_ptr<DepthFrame> depth = depth_of(frame.node);
+      coarse.image_pixels = image_pixels(depth->images);
+      const MemoryBudget::Share share =
+          memory_.take(coarse_pixel_bytes * depth->images.depth.pixels.size());
+      const std::vector<CameraView> views = camera_views(depth->images);
+      const bool is_new = depth->planes.empty();
+      for (std::size_t n = 0; n < views.size(); ++n) {
+        const Camera& camera = views[n].depth_camera;
+        camera.check();
+        const auto rays = rays_.rays_of(camera);
+        if (is_new)
+          depth->planes.push_back(fit_depth_planes(views[n].depth, *rays, options_.planes));
+        coarse.pixels += depth->planes[n].counts;
+        add_planes(depth->planes[n], *rays, frame.grid_from_base * camera.base_from_camera,
+                   options_, coarse.voxels);
+      }
+      if (is_new) keep(frame.node, depth);
+    } catch (const Error& error) {
+      if (error.kind() != ErrorKind::bad_input) throw;
+      coarse.fault = error;
+    }
+    return coarse;
+  }
+
+  void merge(std::span<const FusedFrame> frames, std::span<const CoarseFrame> parts,
+             CoarseSurface& coarse) {
+    for (std::size_t n = 0; n < parts.size(); ++n) {
+      if (parts[n].fault) {
+        skip(frames[n].node, *parts[n].fault);
+        continue;
+      }
+      coarse.frames.push_back(frames[n]);
+      coarse.voxels.merge_frame(parts[n].voxels);
+      coarse.pixels += parts[n].pixels;
+      coarse.most_image_pixels = std::max(coarse.most_image_pixels, parts[n].image_pixels);
+    }
+  }
+
+  CoarseSurface coarse_surface(std::span<const FusedFrame> frames) {
+    progress_.begin("coarse surface", frames.size());
+    CoarseSurface coarse;
+    std::span<const FusedFrame> before;
+    std::vector<CoarseFrame> parts_before;
+    for (std::size_t first = 0; first < frames.size(); first += frames_in_flight) {
+      const auto now = frames.subspan(first, std::min(frames_in_flight, frames.size() - first));
+      std::vector<CoarseFrame> parts(now.size());
+      // One thread merges the frames before, in their order, while others make these.
+      parallel_for(now.size() + 1, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t task = begin; task < end; ++task) {
+          if (task == 0) {
+            merge(before, parts_before, coarse);
+          } else {
+            parts[task - 1] = coarse_frame(now[task - 1]);
+            progress_.advance(1);
+          }
+        }
+      });
+      before = now;
+      parts_before = std::move(parts);
+    }
+    merge(before, parts_before, coarse);
+    return coarse;
+  }
+
+  std::vector<RefinementView> views_of(const FusedFrame& frame, std::uint32_t number,
+                                       bool color) const {
+    RgbdFrame images = depth_of(frame.node)->images;
+    try {
+      if (color) images.color = scan_.read_frame(frame.node, {.color = true, .depth = false}).color;
+    } catch (const Error&) {
+      if (options_.strict) throw;  // else the frame's depth is used alone
+    }
+    std::vector<RefinementView> views;
+    for (CameraView& view : camera_views(images)) {
+      auto rays = rays_.rays_of(view.depth_camera);
+      const Pose camera_from_grid =
+          (frame.grid_from_base * view.depth_camera.base_from_camera).inverse();
+      views.push_back(
+          make_refinement_view(std::move(view), std::move(rays), camera_from_grid, number));
+    }
+    return views;
+  }
+
+  // use(views, frames) of some frames at a time, in their order.
+  template <typename Use>
+  void each_view_group(const CoarseSurface& coarse, bool color, const Use& use) const {
+    const std::size_t group = frames_in_batch(coarse.most_image_pixels);
+    for (std::size_t first = 0; first < coarse.frames.size(); first += group) {
+      const std::size_t count = std::min(group, coarse.frames.size() - first);
+      std::vector<std::vector<RefinementView>> frames(count);
+      parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t n = begin; n < end; ++n)
+          frames[n] =
+              views_of(coarse.frames[first + n], static_cast<std::uint32_t>(first + n), color);
+      });
+      std::vector<RefinementView> views;
+      for (std::vector<RefinementView>& frame : frames)
+        std::move(frame.begin(), frame.end(), std::back_inserter(views));
+      use(std::span<const RefinementView>(views), count);
+    }
+  }
+
+  SurfaceRefinementOptions refinement_options() const {
+    SurfaceRefinementOptions options;
+    options.disc_radius_m = options_.disc_radius_voxels * options_.voxel_size_m;
+    options.search_m = options_.voxel_size_m;
+    options.min_depth_m = options_.planes.min_depth_m;
+    options.max_depth_m = options_.planes.max_depth_m;
+    options.max_incidence_deg = options_.planes.max_incidence_deg;
+    options.noise = options_.planes.noise;
+    options.pose_error_m = options_.pose_error_m;
+    return options;
+  }
+
+  // By what the frames measured of some of the coarse surface.
+  FrameRegistration registration(const CoarseSurface& coarse, int round) const {
+    std::vector<SurfaceElement> elements = surface_elements(coarse.voxels, false);
+    const std::size_t step = std::max<std::size_t>(1, elements.size() / registration_elements);
+    for (std::size_t n = 0; n * step < elements.size(); ++n) {
+      elements[n] = elements[n * step];
+      elements[n].position *= static_cast<float>(options_.voxel_size_m);
+    }
+    elements.resize((elements.size() + step - 1) / step);
+    SurfaceRefinementOptions options = refinement_options();
+    options.search_m = first_search_voxels * options_.voxel_size_m / round;
+    std::vector<SurfaceObservation> observations;
+    each_view_group(coarse, false, [&](std::span<const RefinementView> views, std::size_t) {
+      const auto more = observe_surface(elements, views, options);
+      observations.insert(observations.end(), more.begin(), more.end());
+    });
+    std::stable_sort(observations.begin(), observations.end(),
+                     [](const auto& a, const auto& b) { return a.element < b.element; });
+    std::vector<Eigen::Vector3d> centres;
+    for (const FusedFrame& frame : coarse.frames)
+      centres.push_back(frame.grid_from_base.translation());
+    return libmap::register_frames(elements, observations, centres);
+  }
+
+  void register_frames(CoarseSurface& coarse) {
+    for (int round = 1; round <= options_.registration_rounds && coarse.frames.size() > 1;
+         ++round) {
+      const FrameRegistration found = registration(coarse, round);
+      if (round == 1) result_.disagreement_before_m = found.disagreement_before_m;
+      result_.disagreement_after_m = found.disagreement_before_m;
+      // Poses that are right stay as they are, and with them the coarse surface.
+      if (!(found.correction_m > least_correction_voxels * options_.voxel_size_m)) break;
+      std::vector<FusedFrame> frames = std::move(coarse.frames);
+      for (std::size_t n = 0; n < frames.size(); ++n)
+        frames[n].grid_from_base = found.corrected_from_given[n] * frames[n].grid_from_base;
+      result_.disagreement_after_m = found.disagreement_after_m;
+      ++result_.registration_rounds;
+      coarse = {};  // before the next one takes memory
+      coarse = coarse_surface(frames);
+    }
+  }
+
+  void note_frames(const CoarseSurface& coarse, const Trajectory& world_from_base) {
+    double turns = 0.0;
+    double shifts = 0.0;
+    for (const FusedFrame& frame : coarse.frames) {
+      const auto given =
+          std::find_if(world_from_base.begin(), world_from_base.end(),
+                       [&](const TrajectoryPose& pose) { return pose.node == frame.node; });
+      TrajectoryPose pose = *given;
+      if (result_.registration_rounds > 0) {
+        pose.world_from_base = Eigen::Translation3d(origin_) * frame.grid_from_base;
+        const Pose given_from_used = given->world_from_base.inverse() * pose.world_from_base;
+        const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
+        turns += turn * turn;
+        shifts += given_from_used.translation().squaredNorm();
+      }
+      result_.poses.push_back(pose);
+    }
+    const auto count = static_cast<double>(coarse.frames.size());
+    result_.registration_turn_deg = std::sqrt(turns / count) * 180.0 / std::numbers::pi;
+    result_.registration_shift_m = std::sqrt(shifts / count);
+    result_.frames = coarse.frames.size();
+    result_.pixels = coarse.pixels;
+    result_.occupied_voxels = coarse.voxels.size();
+  }
+
+  RefinedSurface refine(CoarseSurface coarse) {
+    std::vector<SurfaceElement> elements = surface_elements(coarse.voxels, options_.extend_edges);
+    coarse.voxels = {};
+    const auto voxel = static_cast<float>(options_.voxel_size_m);
+    for (SurfaceElement& element : elements) element.position *= voxel;
+    result_.elements = elements.size();
+    progress_.begin("refinement", coarse.frames.size());
+    return refine_surface(std::move(elements), refinement_options(), [&](const AddViews& add) {
+      each_view_group(coarse, options_.color,
+                      [&](std::span<const RefinementView> views, std::size_t frames) {
+                        add(views);
+                        progress_.advance(frames);
+                      });
+    });
+  }
+
+  void make_cloud(const RefinedSurface& surface) {
+    SurfacePointOptions options;
+    options.voxel_size_m = options_.voxel_size_m;
+    options.min_views = options_.min_views;
+    options.max_seen_through = options_.max_seen_through;
+    SurfacePoints points = make_surface_points(surface, options);
+    result_.cloud = std::move(points.cloud);
+    for (Eigen::Vector3d& position : result_.cloud.positions) position += origin_;
+    result_.points = points.counts;
+  }
+
+  const ScanSource& scan_;
+  const DepthFusionOptions& options_;
+  Progress& progress_;
+  mutable PixelRayCache rays_;
+  mutable MemoryBudget memory_;
+  mutable std::mutex mutex_;  // of these two
+  mutable std::map<int, std::shared_ptr<DepthFrame>> kept_;
+  mutable std::size_t kept_bytes_ = 0;
+  // The grid's origin is a corner of the world's own voxels near the first camera: single precision
+  // is enough about it, wherever the scan lies.
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  DepthFusionResult result_;
+};
 
 }  // namespace
 
@@ -419,7 +429,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("voxel_size_m", options.voxel_size_m, positive, "one point a voxel of this size");
   table.add("min_depth_m", planes.min_depth_m, positive, "nearer measurements are dropped");
   table.add("max_depth_m", planes.max_depth_m, positive, "farther measurements are dropped");
-  table.add("max_incidence_deg", planes.max_incidence_deg, incidence_range,
+  table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
             "measurements more oblique than this to their surface are dropped");
   table.add("axial_noise_m", planes.noise.axial_m, positive,
             "standard deviation of depth at range 0");
@@ -427,7 +437,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "standard deviation of depth added by each metre of range, m/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
             "standard deviation across the line of sight");
-  table.add("plane_radius_px", planes.radius_px, radius_range,
+  table.add("plane_radius_px", planes.radius_px, {1, 7},
             "disc of pixels that a plane is fitted to");
   table.add("min_pair_share", planes.min_pair_share, zero_to_one,
             "share of the pairs of opposite pixels around a pixel that must agree with it");
@@ -435,7 +445,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "disc of the surface whose measurements make a point");
   table.add("pose_error_m", options.pose_error_m, not_negative,
             "standard deviation of a whole frame, along a normal");
-  table.add("registration_rounds", options.registration_rounds, rounds_range,
+  table.add("registration_rounds", options.registration_rounds, {0, 20},
             "times, at most, that poses are corrected so that frames agree; 0: not at all");
   table.add("min_views", options.min_views, {1}, "points that fewer frames measured are dropped");
   table.add("max_seen_through", options.max_seen_through, not_negative,

@@ -6,7 +6,9 @@
 // coarse surface, one element a voxel. The second moves each element along its normal to the
 // weighted mean of what all frames measured within a disc around it (surface_refinement). Both
 // average where the rays meet the surface, not where noise has put the measurements: that is what
-// makes the means free of bias. Memory grows with the occupied voxels alone.
+// makes the means free of bias. Memory grows with the occupied voxels alone; besides, up to 512 MB
+// of decoded frames are kept for later passes (20 megapixels: 70 frames of 640 x 480), others are
+// decoded once per pass.
 #pragma once
 
 #include <cstddef>
@@ -16,6 +18,7 @@
 
 #include "libmap/cloud/depth_planes.h"
 #include "libmap/cloud/surface_points.h"
+#include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose_graph.h"
@@ -65,7 +68,7 @@ struct DepthFusionResult {
   // end.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
-  std::vector<std::pair<int, std::string>> skipped;  // node and what it lacks
+  std::vector<std::pair<int, Error>> skipped;  // node and what it lacks
   std::size_t occupied_voxels = 0;
   std::size_t elements = 0;  // of the surface, before points were made of them
   SurfacePointCounts points;

@@ -16,10 +16,6 @@ bool same_lens(const Camera& a, const Camera& b) {
          a.distortion == b.distortion;
 }
 
-std::string size_text(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
-
 }  // namespace
 
 PixelRays pixel_rays(const Camera& camera) {
@@ -60,8 +56,7 @@ std::shared_ptr<const PixelRays> PixelRayCache::rays_of(const Camera& camera) {
 void require_size_of(const Camera& camera, int width, int height) {
   if (width == camera.width && height == camera.height) return;
   throw Error("a depth image is not of its camera's size",
-              {.file = {},
-               .field = "depth image",
+              {.field = "depth image",
                .value = size_text(width, height),
                .bound = size_text(camera.width, camera.height)});
 }

@@ -243,10 +243,7 @@ Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up,
 }
 
 void require_ranges(const GroundPlaneOptions& options) {
-  GroundPlaneOptions copy = options;
-  ParameterTable table;
-  bind(table, copy);
-  for (const auto& [key, value] : table.values()) table.set(key, value);
+  check_parameters(options);
   if (!options.up.allFinite() || !(options.up.norm() > 0.0))
     throw Error("not a direction", {.field = "up", .bound = "finite, of some length"});
 }

@@ -19,7 +19,6 @@ namespace libmap {
 
 namespace {
 
-constexpr Range neighbor_range{3, 1000};
 // Second eigenvalue of the neighbours' covariance, against the first, below which they lie on a
 // line.
 constexpr double least_spread = 1e-6;
@@ -209,29 +208,19 @@ std::optional<std::array<const ScalarField*, 3>> view_fields(const PointCloud& c
 }  // namespace
 
 std::string_view to_text(NormalOrientation orientation) {
-  switch (orientation) {
-    case NormalOrientation::view_fields:
-      return "the points' view fields";
-    case NormalOrientation::viewpoint:
-      return "the cloud's viewpoint";
-    case NormalOrientation::spanning_tree:
-      return "a minimum spanning tree";
-  }
-  return {};
+  if (orientation == NormalOrientation::view_fields) return "the points' view fields";
+  return orientation == NormalOrientation::viewpoint ? "the cloud's viewpoint"
+                                                     : "a minimum spanning tree";
 }
 
 void bind(ParameterTable& table, NormalEstimationOptions& options) {
-  table.add("normal_neighbors", options.neighbors, neighbor_range,
+  table.add("normal_neighbors", options.neighbors, {3, 1000},
             "points that a plane is fitted to where normals are estimated");
 }
 
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options) {
-  if (!(options.neighbors >= neighbor_range.min && options.neighbors <= neighbor_range.max))
-    throw Error("normals cannot be estimated so", {.file = {},
-                                                   .field = "normal_neighbors",
-                                                   .value = std::to_string(options.neighbors),
-                                                   .bound = describe(neighbor_range)});
+  check_parameters(options);
   cloud.check();
   for (const Eigen::Vector3d& position : cloud.positions)
     if (!position.allFinite()) throw Error("a position is not finite");

@@ -127,15 +127,12 @@ void check(const PanoramaView& view) {
   } catch (const Error& error) {
     throw error.in_file(view.name);
   }
-  const auto size = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
   if (view.depth.width != view.camera.width || view.depth.height != view.camera.height)
     throw Error("does not fit its calibration",
                 {.file = view.name,
                  .field = "image size",
-                 .value = size(view.depth.width, view.depth.height),
-                 .bound = size(view.camera.width, view.camera.height)});
+                 .value = size_text(view.depth.width, view.depth.height),
+                 .bound = size_text(view.camera.width, view.camera.height)});
 }
 
 }  // namespace
@@ -152,16 +149,13 @@ void bind(ParameterTable& table, PanoramaOptions& options) {
 
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
                              const PanoramaOptions& options) {
-  ParameterTable table;
-  PanoramaOptions checked = options;
-  bind(table, checked);
-  for (const auto& [key, value] : table.values()) table.set(key, value);
+  check_parameters(options);
   PanoramaResult result;
   std::vector<double> camera;
   for (const PanoramaView& view : views) {
     check(view);
-    const ViewProjection projection(view, checked);
-    const int rows_in_steps = (view.depth.height - 1) / checked.stride_px + 1;
+    const ViewProjection projection(view, options);
+    const int rows_in_steps = (view.depth.height - 1) / options.stride_px + 1;
     const auto rows = static_cast<std::size_t>(rows_in_steps);
     Part part = parallel_reduce(
         rows, rows_a_chunk, Part{},

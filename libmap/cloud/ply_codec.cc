@@ -70,7 +70,7 @@ class RowReader {
     if (!(length >= 0.0) || length > static_cast<double>(left))
       throw Error("row " + std::to_string(row_) + " of '" + element_.name.substr(0, 40) +
                       "' has a list longer than the data",
-                  {.file = {}, .field = property.name, .value = to_text(length), .bound = {}});
+                  {.field = property.name, .value = to_text(length)});
     return static_cast<std::uint64_t>(length);
   }
   void end_row() {
@@ -83,7 +83,7 @@ class RowReader {
   double text_number(const PlyProperty& property, StoredType type) {
     if (word_ >= words_.size())
       throw Error("line " + std::to_string(cursor_.rows.line()) + " ends before the number",
-                  {.file = {}, .field = property.name, .value = {}, .bound = {}});
+                  {.field = property.name});
     return cursor_.rows.number(words_[word_++], property.name, scalar_type_of(type));
   }
   double binary_number(StoredType type) {
@@ -136,14 +136,12 @@ void add_fan(const std::vector<double>& corners, std::uint64_t face, std::uint64
              GeometryColumns& content) {
   const std::string name = "face " + std::to_string(face);
   if (corners.size() < 3)
-    throw Error(
-        "too few corners",
-        {.file = {}, .field = name, .value = std::to_string(corners.size()), .bound = ">= 3"});
+    throw Error("too few corners",
+                {.field = name, .value = std::to_string(corners.size()), .bound = ">= 3"});
   for (const double corner : corners)
     if (!(corner >= 0.0) || corner >= static_cast<double>(vertices) ||
         corner > std::numeric_limits<std::uint32_t>::max())
-      throw Error("a corner is no vertex", {.file = {},
-                                            .field = name,
+      throw Error("a corner is no vertex", {.field = name,
                                             .value = to_text(corner),
                                             .bound = "0 to " + std::to_string(vertices) + " - 1"});
   for (std::size_t i = 2; i < corners.size(); ++i) {
@@ -234,7 +232,7 @@ void write_property_lines(const ColumnSet& set, std::ostream& out) {
   for (const Column& column : set.columns) {
     if (column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
       throw Error("this name cannot stand in a PLY header",
-                  {.file = {}, .field = "field '" + column.name + "'"});
+                  {.field = "field '" + column.name + "'"});
     out << "property " << ply_type_name(column.type) << ' ' << column.name << '\n';
   }
 }
@@ -343,7 +341,7 @@ void encode_ply(const PlyContent& content, const PlyEncoding& encoding, std::ost
   if (content.triangles != nullptr &&
       content.vertices->rows > std::numeric_limits<std::int32_t>::max())
     throw Error("too many vertices for a PLY mesh",
-                {.file = {}, .field = "vertices", .value = std::to_string(content.vertices->rows)});
+                {.field = "vertices", .value = std::to_string(content.vertices->rows)});
   write_header(content, encoding, out);
   write_rows(*content.vertices, encoding, out);
   if (content.triangles != nullptr) write_faces(content, encoding, out);

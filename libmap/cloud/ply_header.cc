@@ -19,10 +19,8 @@ constexpr std::array<const char*, 8> type_names = {"char", "uchar", "short", "us
                                                    "int",  "uint",  "float", "double"};
 
 Error bad_line(std::size_t line, const std::string& reason, std::string_view value = {}) {
-  return Error(reason, {.file = {},
-                        .field = "PLY header line " + std::to_string(line),
-                        .value = std::string(value.substr(0, 60)),
-                        .bound = {}});
+  return Error(reason, {.field = "PLY header line " + std::to_string(line),
+                        .value = std::string(value.substr(0, 60))});
 }
 
 StoredType type_of(std::string_view name, std::size_t line) {

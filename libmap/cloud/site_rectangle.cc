@@ -249,10 +249,7 @@ std::string size_text(const Vector2d& size) {
 }
 
 void require_ranges(const Vector2d& size_m, const SiteRectangleOptions& options) {
-  SiteRectangleOptions copy = options;
-  ParameterTable table;
-  bind(table, copy);
-  for (const auto& [key, value] : table.values()) table.set(key, value);
+  check_parameters(options);
   if (!size_m.allFinite() || (size_m.array() <= 0.0).any())
     throw Error("not a size", {.field = "size",
                                .value = to_text(size_m.x()) + " x " + to_text(size_m.y()),

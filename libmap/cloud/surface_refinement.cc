@@ -319,78 +319,62 @@ RefinedElement result_of(const ElementSum& sum) {
   return refined;
 }
 
+std::vector<Chunk> chunks_of(const std::vector<SurfaceElement>& elements, double margin_m) {
+  std::vector<Chunk> chunks;
+  for (std::size_t begin = 0; begin < elements.size(); begin += chunk_size) {
+    Chunk chunk{begin, std::min(begin + chunk_size, elements.size()), {}, 0.0};
+    Eigen::AlignedBox3d box;
+    for (std::size_t n = chunk.begin; n < chunk.end; ++n)
+      box.extend(elements[n].position.cast<double>());
+    chunk.centre = box.center();
+    chunk.radius = 0.5 * box.diagonal().norm() + margin_m;
+    chunks.push_back(chunk);
+  }
+  return chunks;
+}
+
 float pose_variance(const SurfaceRefinementOptions& options) {
   return static_cast<float>(options.pose_error_m * options.pose_error_m);
 }
 
 }  // namespace
 
-struct SurfaceRefinement::Parts {
-  std::vector<SurfaceElement> elements;
-  SurfaceRefinementOptions options;
-  std::vector<ElementSum> sums;
-  std::vector<Chunk> chunks;
-  bool has_color = false;
-};
-
-SurfaceRefinement::SurfaceRefinement(std::vector<SurfaceElement> elements,
-                                     const SurfaceRefinementOptions& options)
-    : parts_(std::make_unique<Parts>()) {
-  parts_->elements = std::move(elements);
-  parts_->options = options;
-  parts_->sums.resize(parts_->elements.size());
-  for (std::size_t begin = 0; begin < parts_->elements.size(); begin += chunk_size) {
-    Chunk chunk{begin, std::min(begin + chunk_size, parts_->elements.size()), {}, 0.0};
-    Eigen::AlignedBox3d box;
-    for (std::size_t n = chunk.begin; n < chunk.end; ++n)
-      box.extend(parts_->elements[n].position.cast<double>());
-    chunk.centre = box.center();
-    chunk.radius = 0.5 * box.diagonal().norm() + options.disc_radius_m;
-    parts_->chunks.push_back(chunk);
-  }
-}
-
-SurfaceRefinement::~SurfaceRefinement() = default;
-
-void SurfaceRefinement::add(std::span<const RefinementView> views) {
-  std::vector<ViewGather> gathers;
-  gathers.reserve(views.size());
-  for (const RefinementView& view : views) {
-    gathers.emplace_back(view, parts_->options);
-    parts_->has_color = parts_->has_color || !view.color.empty();
-  }
-  const float variance = pose_variance(parts_->options);
-  parallel_for(parts_->chunks.size(), 4, [&](std::size_t first, std::size_t last) {
-    for (std::size_t c = first; c < last; ++c) {
-      const Chunk& chunk = parts_->chunks[c];
-      for (std::size_t v = 0; v < views.size(); ++v) {
-        if (!gathers[v].may_see(chunk)) continue;
-        for (std::size_t n = chunk.begin; n < chunk.end; ++n) {
-          ElementSum& sum = parts_->sums[n];
-          if (sum.frame != views[v].frame) {
-            close_frame(sum, variance);
-            sum.frame = views[v].frame;
-          }
-          gathers[v].gather(parts_->elements[n], sum);
-        }
-      }
-    }
-  });
-}
-
-RefinedSurface SurfaceRefinement::finish() && {
+RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
+                              const SurfaceRefinementOptions& options,
+                              const std::function<void(const AddViews&)>& each_group) {
+  const std::vector<Chunk> chunks = chunks_of(elements, options.disc_radius_m);
+  const float variance = pose_variance(options);
+  std::vector<ElementSum> sums(elements.size());
   RefinedSurface surface;
-  surface.refined.resize(parts_->sums.size());
-  const float variance = pose_variance(parts_->options);
-  parallel_for(parts_->sums.size(), 4096, [&](std::size_t begin, std::size_t end) {
+  each_group([&](std::span<const RefinementView> views) {
+    std::vector<ViewGather> gathers;
+    gathers.reserve(views.size());
+    for (const RefinementView& view : views) {
+      gathers.emplace_back(view, options);
+      surface.has_color = surface.has_color || !view.color.empty();
+    }
+    parallel_for(chunks.size(), 4, [&](std::size_t first, std::size_t last) {
+      for (std::size_t c = first; c < last; ++c)
+        for (std::size_t v = 0; v < views.size(); ++v) {
+          if (!gathers[v].may_see(chunks[c])) continue;
+          for (std::size_t n = chunks[c].begin; n < chunks[c].end; ++n) {
+            if (sums[n].frame != views[v].frame) {
+              close_frame(sums[n], variance);
+              sums[n].frame = views[v].frame;
+            }
+            gathers[v].gather(elements[n], sums[n]);
+          }
+        }
+    });
+  });
+  surface.refined.resize(sums.size());
+  parallel_for(sums.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      close_frame(parts_->sums[n], variance);
-      surface.refined[n] = result_of(parts_->sums[n]);
+      close_frame(sums[n], variance);
+      surface.refined[n] = result_of(sums[n]);
     }
   });
-  surface.elements = std::move(parts_->elements);
-  surface.has_color = parts_->has_color;
-  parts_.reset();
+  surface.elements = std::move(elements);
   return surface;
 }
 

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <vector>
@@ -57,23 +58,13 @@ struct RefinedSurface {
   bool has_color = false;
 };
 
-class SurfaceRefinement {
- public:
-  // Elements in metres.
-  SurfaceRefinement(std::vector<SurfaceElement> elements, const SurfaceRefinementOptions& options);
-  ~SurfaceRefinement();
-
-  // Gathers what the views measured of every element. The result does not depend on how views are
-  // grouped into calls nor on the number of threads, but on their order by rounding.
-  void add(std::span<const RefinementView> views);
-
-  // What was found of each element. Ends the refinement.
-  RefinedSurface finish() &&;
-
- private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
-};
+// What the views measured of every element. `each_group(add)` calls add(views) for all views, by
+// frame: their order changes the result by rounding, their grouping and the number of threads do
+// not. Elements in metres.
+using AddViews = std::function<void(std::span<const RefinementView>)>;
+RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
+                              const SurfaceRefinementOptions& options,
+                              const std::function<void(const AddViews&)>& each_group);
 
 // What one frame measured of an element: the mean height within its disc.
 struct SurfaceObservation {

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "libmap/core/point_cloud.h"
@@ -37,6 +38,11 @@ using ColorImage = Image<Color>;
 using GrayImage = Image<std::uint8_t>;
 // Distance from the camera's plane (its z) in metres; 0 where nothing was measured.
 using DepthImage = Image<float>;
+
+// "640 x 480".
+inline std::string size_text(std::int64_t width, std::int64_t height) {
+  return std::to_string(width) + " x " + std::to_string(height);
+}
 
 // Columns `x` to `x + width - 1`, one of several pictures that stand side by side.
 template <typename T>

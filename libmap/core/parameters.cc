@@ -25,20 +25,46 @@ void require_in_range(const std::string& key, std::string_view text, double valu
   throw wrong_value(key, text, "out of range", describe(range));
 }
 
-// An integer kind of field: `Integer` is int or std::uint64_t.
-template <typename Integer>
-std::function<void(std::string_view)> integer_setter(Integer& field, std::string key, Range range) {
-  return [&field, key = std::move(key), range](std::string_view text) {
-    const std::optional<std::int64_t> value = parse_integer(text);
-    if (!value) throw wrong_value(key, text, "not a whole number", describe(range));
-    require_in_range(key, text, static_cast<double>(*value), range);
-    if constexpr (sizeof(Integer) < sizeof(std::int64_t)) {
-      if (*value > std::numeric_limits<Integer>::max() ||
-          *value < std::numeric_limits<Integer>::min())
-        throw wrong_value(key, text, "too large", describe(range));
-    }
-    field = static_cast<Integer>(*value);
+// `text` as a double, int or std::uint64_t within `range`.
+template <typename Number>
+Number parse_number(const std::string& key, std::string_view text, const Range& range) {
+  constexpr bool is_real = std::is_floating_point_v<Number>;
+  std::conditional_t<is_real, std::optional<double>, std::optional<std::int64_t>> value;
+  if constexpr (is_real)
+    value = parse_double(text);
+  else
+    value = parse_integer(text);
+  if (!value)
+    throw wrong_value(key, text, is_real ? "not a number" : "not a whole number", describe(range));
+  require_in_range(key, text, static_cast<double>(*value), range);
+  if constexpr (sizeof(Number) < sizeof(std::int64_t)) {
+    if (*value > std::numeric_limits<Number>::max() || *value < std::numeric_limits<Number>::min())
+      throw wrong_value(key, text, "too large", describe(range));
+  }
+  return static_cast<Number>(*value);
+}
+
+template <typename Number>
+Parameter number_parameter(const std::string& key, Number& field, const Range& range,
+                           std::string description) {
+  constexpr bool is_real = std::is_floating_point_v<Number>;
+  Parameter parameter;
+  parameter.key = key;
+  parameter.description = std::move(description);
+  parameter.type = is_real ? ParameterType::real : ParameterType::integer;
+  parameter.get = [&field] {
+    if constexpr (is_real)
+      return to_text(field);
+    else
+      return std::to_string(field);
   };
+  parameter.set = [&field, key, range](std::string_view text) {
+    field = parse_number<Number>(key, text, range);
+  };
+  parameter.check = [&field, key, range, get = parameter.get] {
+    require_in_range(key, get(), static_cast<double>(field), range);
+  };
+  return parameter;
 }
 
 }  // namespace
@@ -54,38 +80,17 @@ std::string describe(const Range& range) {
 }
 
 void ParameterTable::add(std::string key, double& field, Range range, std::string description) {
-  const auto set = [&field, key, range](std::string_view text) {
-    const std::optional<double> value = parse_double(text);
-    if (!value) throw wrong_value(key, text, "not a number", describe(range));
-    require_in_range(key, text, *value, range);
-    field = *value;
-  };
-  add_parameter({.key = key,
-                 .description = std::move(description),
-                 .type = ParameterType::real,
-                 .choices = {},
-                 .get = [&field] { return to_text(field); },
-                 .set = set});
+  parameters_.push_back(number_parameter(key, field, range, std::move(description)));
 }
 
 void ParameterTable::add(std::string key, int& field, Range range, std::string description) {
-  add_parameter({.key = key,
-                 .description = std::move(description),
-                 .type = ParameterType::integer,
-                 .choices = {},
-                 .get = [&field] { return to_text(std::int64_t{field}); },
-                 .set = integer_setter(field, key, range)});
+  parameters_.push_back(number_parameter(key, field, range, std::move(description)));
 }
 
 void ParameterTable::add(std::string key, std::uint64_t& field, Range range,
                          std::string description) {
   if (range.min < 0.0) range = {0.0, range.max, false, range.max_open};
-  add_parameter({.key = key,
-                 .description = std::move(description),
-                 .type = ParameterType::integer,
-                 .choices = {},
-                 .get = [&field] { return std::to_string(field); },
-                 .set = integer_setter(field, key, range)});
+  parameters_.push_back(number_parameter(key, field, range, std::move(description)));
 }
 
 void ParameterTable::add(std::string key, bool& field, std::string description) {
@@ -94,25 +99,23 @@ void ParameterTable::add(std::string key, bool& field, std::string description) 
     if (!value) throw wrong_value(key, text, "not a switch", "true or false");
     field = *value;
   };
-  add_parameter({.key = key,
-                 .description = std::move(description),
-                 .type = ParameterType::boolean,
-                 .choices = {},
-                 .get = [&field] { return std::string(field ? "true" : "false"); },
-                 .set = set});
+  parameters_.push_back({.key = key,
+                         .description = std::move(description),
+                         .type = ParameterType::boolean,
+                         .choices = {},
+                         .get = [&field] { return std::string(field ? "true" : "false"); },
+                         .set = set,
+                         .check = {}});
 }
 
 void ParameterTable::add(std::string key, std::string& field, std::string description) {
-  add_parameter({.key = key,
-                 .description = std::move(description),
-                 .type = ParameterType::text,
-                 .choices = {},
-                 .get = [&field] { return field; },
-                 .set = [&field](std::string_view text) { field = std::string(text); }});
-}
-
-void ParameterTable::add_parameter(Parameter parameter) {
-  parameters_.push_back(std::move(parameter));
+  parameters_.push_back({.key = key,
+                         .description = std::move(description),
+                         .type = ParameterType::text,
+                         .choices = {},
+                         .get = [&field] { return field; },
+                         .set = [&field](std::string_view text) { field = std::string(text); },
+                         .check = {}});
 }
 
 std::vector<std::string> ParameterTable::keys() const {
@@ -165,6 +168,11 @@ void ParameterTable::set(std::string_view key, std::string_view value) const {
   if (parameter == nullptr)
     throw Error("unknown key" + did_you_mean(key, keys()), {.field = std::string(key)});
   parameter->set(value);
+}
+
+void ParameterTable::check() const {
+  for (const Parameter& parameter : parameters_)
+    if (parameter.check) parameter.check();
 }
 
 std::string flag_of(std::string_view key) {

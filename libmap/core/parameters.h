@@ -38,6 +38,7 @@ struct Parameter {
   std::vector<std::string> choices{};  // for enumerations
   std::function<std::string()> get;
   std::function<void(std::string_view)> set;  // throws Error naming key, value and bound
+  std::function<void()> check{};  // the field's own value; throws as `set`; none: any is right
 };
 
 class ParameterTable {
@@ -68,14 +69,25 @@ class ParameterTable {
   // value that is not of its type or outside its bound.
   void set(std::string_view key, std::string_view value) const;
 
+  // Throws the Error of set() for the first field whose value is outside its bound.
+  void check() const;
+
  private:
   using Overrides = std::vector<std::pair<std::string, std::string>>;
-  void add_parameter(Parameter parameter);
   Overrides* overrides_of(std::string_view key) const;
 
   std::vector<Parameter> parameters_;
   std::vector<std::pair<std::string, Overrides*>> overrides_;  // by prefix
 };
+
+// Throws Error naming field, value and bound if a field of `options` is outside the range, or is
+// none of the choices, that bind(table, options) declares for it.
+template <typename Options>
+void check_parameters(Options options) {
+  ParameterTable table;
+  bind(table, options);
+  table.check();
+}
 
 // "voxel_size_m" -> "--voxel-size": the flag of a key, without the unit at its end.
 std::string flag_of(std::string_view key);
@@ -115,7 +127,8 @@ void ParameterTable::add(std::string key, Enum& field,
     throw Error("unknown name" + did_you_mean(text, choices),
                 {.file = {}, .field = key, .value = std::string(text), .bound = bound});
   };
-  add_parameter(std::move(parameter));
+  parameter.check = [get = parameter.get, set = parameter.set] { set(get()); };
+  parameters_.push_back(std::move(parameter));
 }
 
 }  // namespace libmap

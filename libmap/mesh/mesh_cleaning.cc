@@ -175,24 +175,6 @@ class Cleaning {
   Progress& progress_;
 };
 
-void require(bool is_good, const std::string& field, double value, const std::string& bound) {
-  if (!is_good)
-    throw Error("out of range", {.field = field, .value = to_text(value), .bound = bound});
-}
-
-void require_in_range(const MeshCleaningOptions& options) {
-  const auto require_not_negative = [](const std::string& field, double value) {
-    require(value >= 0.0 && std::isfinite(value), field, value, ">= 0");
-  };
-  require_not_negative("merge_distance_m", options.merge_distance_m);
-  require_not_negative("min_island_area_m2", options.min_island_area_m2);
-  require(options.min_island_share >= 0.0 && options.min_island_share <= 1.0, "min_island_share",
-          options.min_island_share, ">= 0 and <= 1");
-  require_not_negative("max_hole_m", options.max_hole_m);
-  require_not_negative("smoothing_iterations", options.smoothing_iterations);
-  require_not_negative("decimation_error_m", options.decimation_error_m);
-}
-
 }  // namespace
 
 void bind(ParameterTable& table, MeshCleaningOptions& options) {
@@ -214,7 +196,7 @@ void bind(ParameterTable& table, MeshCleaningOptions& options) {
 
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options,
                               Progress& progress) {
-  require_in_range(options);
+  check_parameters(options);
   require_sound(mesh);
   if (mesh.triangles.empty()) throw Error("the mesh has no triangle");
   return Cleaning(mesh, options, progress).run();

@@ -41,18 +41,8 @@ SampledSurface surface_of(const TriangleMesh& mesh) {
 }
 
 void require_sense(const SampledSurface& surface, const PoissonDiskOptions& options) {
-  if (options.count > 0) {
-    if (static_cast<double>(options.count) > most_samples)
-      throw Error("too many samples", {.file = {},
-                                       .field = "count",
-                                       .value = std::to_string(options.count),
-                                       .bound = "<= " + to_text(most_samples)});
-    return;
-  }
-  if (!(options.radius_m > 0.0) || !std::isfinite(options.radius_m))
-    throw Error(
-        "not a radius",
-        {.file = {}, .field = "radius_m", .value = to_text(options.radius_m), .bound = "> 0"});
+  check_parameters(options);
+  if (options.count > 0) return;
   // By a radius that is small against the mesh, a small file asks for as many as a large one: not
   // more than some for each triangle.
   const double most =

@@ -36,22 +36,6 @@ struct UsedPoint {
   Eigen::Vector3d position;  // cells
 };
 
-void check(const PoissonReconstructionOptions& options) {
-  const auto fail = [](const char* field, double value, const Range& range) {
-    throw Error("a surface cannot be made so",
-                {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-  };
-  const auto finite = [](double value) { return std::isfinite(value); };
-  if (!(options.cell_size_m >= 0.0 && finite(options.cell_size_m)))
-    fail("cell_size_m", options.cell_size_m, not_negative);
-  if (!(options.screening >= 0.0 && finite(options.screening)))
-    fail("screening", options.screening, not_negative);
-  if (!(options.trim_distance_cells > 0.0 && finite(options.trim_distance_cells)))
-    fail("trim_distance_cells", options.trim_distance_cells, positive);
-  if (!(options.samples_per_cell > 0.0 && finite(options.samples_per_cell)))
-    fail("samples_per_cell", options.samples_per_cell, positive);
-}
-
 class Reconstruction {
  public:
   Reconstruction(const PointCloud& cloud, const PoissonReconstructionOptions& options,
@@ -315,7 +299,7 @@ void bind(ParameterTable& table, PoissonReconstructionOptions& options) {
 PoissonReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const PoissonReconstructionOptions& options,
                                                 Progress& progress) {
-  check(options);
+  check_parameters(options);
   return Reconstruction(cloud, options, progress).run();
 }
 

@@ -147,10 +147,8 @@ HeightFunction heights_of(const std::vector<Eigen::Vector3d>& points, double rad
 
 namespace {
 
-void check(SpotCheckOptions options, const SiteCorners& site) {
-  ParameterTable table;
-  bind(table, options);
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+void check(const SpotCheckOptions& options, const SiteCorners& site) {
+  check_parameters(options);
   const double least = std::min((site.corners[1] - site.corners[0]).norm(),
                                 (site.corners[2] - site.corners[1]).norm());
   if (!(2.0 * options.inset_m < least))

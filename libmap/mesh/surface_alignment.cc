@@ -33,12 +33,6 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr std::size_t distances_per_chunk = 512;
 
-void check(SurfaceAlignmentOptions options) {
-  ParameterTable table;
-  bind(table, options);
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
-}
-
 std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points, int most) {
   const std::size_t count = std::min(points.size(), static_cast<std::size_t>(most));
   std::vector<Eigen::Vector3d> part;
@@ -177,7 +171,7 @@ double rmse_of(const std::vector<Pair>& pairs) {
 SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& points,
                                         const ReferenceSurface& surface,
                                         const SurfaceAlignmentOptions& options) {
-  check(options);
+  check_parameters(options);
   if (!surface.is_oriented()) throw Error("a surface without normals cannot be aligned to");
   if (points.size() < 6)
     throw Error(

@@ -22,36 +22,6 @@ constexpr std::size_t views_a_triangle = 12;
 constexpr double least_cut_px = 16.0;
 constexpr std::uint64_t most_cut_triangles = 2'500'000;
 
-constexpr Range size_range{64, 16384};
-constexpr Range padding_range{1, 64};
-constexpr Range texels_range{0.05, 8.0};
-constexpr Range incidence_range{0, 90, true, true};
-constexpr Range view_range{1, 16};
-
-void require(double value, const Range& range, const char* field) {
-  const bool low = range.min_open ? value > range.min : value >= range.min;
-  const bool high = range.max_open ? value < range.max : value <= range.max;
-  if (low && high && std::isfinite(value)) return;
-  throw Error("a mesh cannot be textured so",
-              {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-}
-
-void check(const TextureOptions& options) {
-  require(options.atlas.texture_size, size_range, "texture_size_px");
-  require(options.atlas.texel_size_m, not_negative, "texel_size_m");
-  require(options.atlas.texels_a_pixel, texels_range, "texels_a_pixel");
-  require(options.atlas.max_pages, not_negative, "max_pages");
-  require(options.atlas.padding_px, padding_range, "padding_px");
-  require(options.views.max_incidence_deg, incidence_range, "max_incidence_deg");
-  require(options.views.occlusion_tolerance_m, not_negative, "occlusion_tolerance_m");
-  require(options.views.border_px, not_negative, "border_px");
-  require(options.views.occlusion_margin_px, not_negative, "occlusion_margin_px");
-  require(options.labelling.seam_cost_m, not_negative, "seam_cost_m");
-  require(options.blend_views, view_range, "blend_views");
-  require(options.blend_exponent, not_negative, "blend_exponent");
-  require(options.max_side_m, not_negative, "max_side_m");
-}
-
 // Whether any photograph may show the triangle, or a part of it, so large that cutting it matters.
 bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& photos) {
   const Eigen::Vector3d centre =
@@ -131,7 +101,7 @@ void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh
 
 TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
                              const Trajectory& world_from_base) {
-  check(options_);
+  check_parameters(options_);
   input.check();
   if (input.triangles.empty()) throw Error("the mesh has no triangles");
   const auto photos = timed("photographs", [&] {
@@ -174,17 +144,17 @@ TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
 }  // namespace
 
 void bind(ParameterTable& table, TextureOptions& options) {
-  table.add("texture_size_px", options.atlas.texture_size, size_range,
+  table.add("texture_size_px", options.atlas.texture_size, {64, 16384},
             "no page of the texture is wider or higher, pixels");
   table.add("texel_size_m", options.atlas.texel_size_m, not_negative,
             "side of a texel on the surface, m; 0: by the photographs' own pixels");
-  table.add("texels_a_pixel", options.atlas.texels_a_pixel, texels_range,
+  table.add("texels_a_pixel", options.atlas.texels_a_pixel, {0.05, 8.0},
             "with texel_size_m 0: texels along a side of the photographs' pixels");
   table.add("max_pages", options.atlas.max_pages, not_negative,
             "texels are made larger where more pages would be needed; 0: any number of pages");
-  table.add("padding_px", options.atlas.padding_px, padding_range,
+  table.add("padding_px", options.atlas.padding_px, {1, 64},
             "texels around each chart that continue its colours");
-  table.add("max_incidence_deg", options.views.max_incidence_deg, incidence_range,
+  table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "views that are more aslant are not used");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
             "a surface is hidden that lies further behind another, m");
@@ -194,7 +164,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
             "border of each photograph that is not used, pixels");
   table.add("seam_cost_m", options.labelling.seam_cost_m, not_negative,
             "larger: fewer seams and larger charts, of views that are not the best");
-  table.add("blend_views", options.blend_views, view_range,
+  table.add("blend_views", options.blend_views, {1, 16},
             "photographs that are blended at a place; 1: one a triangle");
   table.add("blend_exponent", options.blend_exponent, not_negative,
             "how much the better of them count for more");

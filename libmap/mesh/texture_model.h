@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
@@ -45,8 +46,8 @@ void bind(ParameterTable& table, TextureOptions& options);
 struct TextureResult {
   TexturedMesh model;
   std::size_t photos = 0;
-  std::vector<std::pair<int, std::string>> skipped;  // frames, and what they lack
-  std::size_t cut_triangles = 0;                     // more triangles than the mesh had
+  std::vector<std::pair<int, Error>> skipped;  // frames, and what they lack
+  std::size_t cut_triangles = 0;               // more triangles than the mesh had
   std::size_t seen_triangles = 0;
   std::size_t unseen_triangles = 0;
   double seen_m2 = 0.0;

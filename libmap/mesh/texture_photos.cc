@@ -35,10 +35,10 @@ double largest_ray(const Camera& camera) {
   return 1.1 * largest;
 }
 
-Error no_photographs(const std::vector<std::pair<int, std::string>>& skipped, std::size_t poses) {
+Error no_photographs(const std::vector<std::pair<int, Error>>& skipped, std::size_t poses) {
   if (poses == 0) return Error("no poses to texture by");
   return Error("none of " + std::to_string(poses) + " frames has a photograph, the first because " +
-               (skipped.empty() ? std::string("it has no camera") : skipped.front().second));
+               (skipped.empty() ? "it has no camera" : skipped.front().second.what()));
 }
 
 }  // namespace
@@ -128,7 +128,7 @@ Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y) {
 struct TexturePhotos::Frame {
   std::vector<TexturePhoto> photos{};
   std::vector<ColorImage> images{};
-  std::string fault{};  // empty: it can be used
+  std::optional<Error> fault{};  // none: it can be used
 };
 
 TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const {
@@ -151,7 +151,7 @@ TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const
     }
   } catch (const Error& error) {
     frame = {};
-    frame.fault = error.what();
+    frame.fault = error;
   }
   return frame;
 }
@@ -172,9 +172,9 @@ TexturePhotos::TexturePhotos(const ScanSource& scan, const Trajectory& world_fro
     });
     for (std::size_t i = 0; i < batch.size(); ++i) {
       Frame& frame = batch[i];
-      if (!frame.fault.empty()) {
-        if (strict) throw Error(frame.fault).in_file(scan.path().string());
-        skipped_.emplace_back(poses[first + i].node, frame.fault);
+      if (frame.fault) {
+        if (strict) throw frame.fault->in_file(scan.path().string());
+        skipped_.emplace_back(poses[first + i].node, *frame.fault);
       }
       for (std::size_t k = 0; k < frame.photos.size(); ++k) {
         photos_.push_back(std::move(frame.photos[k]));

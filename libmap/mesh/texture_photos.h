@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "libmap/core/camera.h"
+#include "libmap/core/error.h"
 #include "libmap/core/image.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
@@ -70,7 +71,7 @@ class TexturePhotos {
 
   std::size_t size() const { return photos_.size(); }
   const TexturePhoto& operator[](std::size_t photo) const { return photos_[photo]; }
-  const std::vector<std::pair<int, std::string>>& skipped() const { return skipped_; }
+  const std::vector<std::pair<int, Error>>& skipped() const { return skipped_; }
 
   // Decoded anew where memory did not allow to keep it. May be called from several threads.
   std::shared_ptr<const ColorImage> image(std::size_t photo) const;
@@ -82,7 +83,7 @@ class TexturePhotos {
 
   const ScanSource& scan_;
   std::vector<TexturePhoto> photos_;
-  std::vector<std::pair<int, std::string>> skipped_;
+  std::vector<std::pair<int, Error>> skipped_;
 
   mutable std::mutex mutex_;
   mutable std::vector<std::shared_ptr<const ColorImage>> images_;

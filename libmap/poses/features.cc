@@ -141,23 +141,13 @@ DepthAtRay depth_at(const DepthPlanes& planes, const Camera& camera, const Eigen
   return result;
 }
 
-void require_range(double value, const Range& range, const char* field) {
-  const bool low = range.min_open ? value > range.min : value >= range.min;
-  if (low && value <= range.max && std::isfinite(value)) return;
-  throw Error("features cannot be found so",
-              {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-}
-
 void check(const FeatureOptions& options) {
-  require_range(options.max_features, {1, 100000}, "max_features");
-  require_range(options.min_contrast, positive, "min_contrast");
-  require_range(options.pixel_noise_px, positive, "pixel_noise_px");
-  require_range(options.scale_noise, not_negative, "scale_noise");
-  require_range(options.surface_noise_m, not_negative, "surface_noise_m");
-  require_range(options.surface_step_px, {1, 32}, "surface_step_px");
-  require_range(options.planes.min_depth_m, positive, "min_depth_m");
-  require_range(options.planes.max_depth_m, {options.planes.min_depth_m, positive.max, true, false},
-                "max_depth_m");
+  check_parameters(options);
+  if (!(options.planes.max_depth_m > options.planes.min_depth_m))
+    throw Error("out of range", {.file = {},
+                                 .field = "max_depth_m",
+                                 .value = to_text(options.planes.max_depth_m),
+                                 .bound = "> " + to_text(options.planes.min_depth_m)});
 }
 
 std::uint64_t bytes_to_find(const CameraView& view) {
@@ -276,7 +266,7 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
   const FeatureCache none;
   const SingleThreadedOpenCv single;
   std::vector<FoundFeatures> frames(nodes.size());
-  std::vector<std::string> faults(nodes.size());
+  std::vector<std::optional<Error>> faults(nodes.size());
   PixelRayCache rays;
   MemoryBudget memory;
   progress.begin("features", nodes.size());
@@ -286,7 +276,7 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
         frames[n] =
             features_of(scan, nodes[n], options, rays, cache != nullptr ? *cache : none, memory);
       } catch (const Error& error) {
-        faults[n] = error.what();
+        faults[n] = error;
       }
       progress.advance(1);
     }
@@ -294,8 +284,8 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
   progress.end();
   FeatureResult result;
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    if (!faults[n].empty()) {
-      result.skipped.emplace_back(nodes[n], faults[n]);
+    if (faults[n]) {
+      result.skipped.emplace_back(nodes[n], *faults[n]);
       continue;
     }
     result.from_cache += frames[n].from_cache ? 1 : 0;

@@ -12,6 +12,7 @@
 
 #include "libmap/cloud/depth_planes.h"
 #include "libmap/core/camera.h"
+#include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
 #include "libmap/poses/depth_surface.h"
@@ -62,9 +63,9 @@ struct FrameFeatures {
 };
 
 struct FeatureResult {
-  std::vector<FrameFeatures> frames;                 // by ascending node
-  std::vector<std::pair<int, std::string>> skipped;  // node and what it lacks
-  std::size_t from_cache = 0;                        // frames
+  std::vector<FrameFeatures> frames;           // by ascending node
+  std::vector<std::pair<int, Error>> skipped;  // node and what it lacks
+  std::size_t from_cache = 0;                  // frames
 };
 
 class FeatureCache;

@@ -356,17 +356,6 @@ PoseGraphResult Optimization::run() {
   return std::move(result_);
 }
 
-void check(const PoseGraphOptions& options) {
-  const auto require = [](double value, const Range& range, const char* field) {
-    if (!(value >= range.min) || (range.min_open && value == range.min) || !std::isfinite(value))
-      throw Error("a graph cannot be optimised so",
-                  {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-  };
-  require(options.recalibrations, {1}, "recalibrations");
-  require(options.robust_scale, not_negative, "robust_scale");
-  require(options.max_chi_square, positive, "max_chi_square");
-}
-
 }  // namespace
 
 void bind(ParameterTable& table, PoseGraphOptions& options) {
@@ -384,7 +373,7 @@ void bind(ParameterTable& table, PoseGraphOptions& options) {
 PoseGraphResult optimize_pose_graph(const std::map<int, Pose>& map_from_base,
                                     const std::vector<GraphLink>& links,
                                     const PoseGraphOptions& options) {
-  check(options);
+  check_parameters(options);
   return Optimization(map_from_base, links, options).run();
 }
 

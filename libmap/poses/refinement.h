@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
@@ -70,8 +71,8 @@ struct RefinementResult {
   std::vector<PoseLink> closures;  // those found, among the links
   std::map<int, Matrix6d> covariance;  // of a step of each pose against its component's gauge node
   std::vector<GraphComponent> components;
-  std::vector<StageReport> stages;                   // "start" first
-  std::vector<std::pair<int, std::string>> skipped;  // frames without features and why
+  std::vector<StageReport> stages;             // "start" first
+  std::vector<std::pair<int, Error>> skipped;  // frames without features and why
   std::vector<int> without_pose;
   std::vector<TrackingLoss> losses;  // of visual odometry
   std::vector<int> without_links;

@@ -399,19 +399,6 @@ VisualOdometryResult Tracker::run(Progress& progress) {
   return finish();
 }
 
-void check(const VisualOdometryOptions& options) {
-  const auto require = [](double value, const Range& range, const char* field) {
-    const bool low = range.min_open ? value > range.min : value >= range.min;
-    if (!low || !std::isfinite(value))
-      throw Error("frames cannot be tracked so",
-                  {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-  };
-  require(options.keyframe_inliers, not_negative, "keyframe_inliers");
-  require(options.keyframe_distance_m, positive, "keyframe_distance_m");
-  require(options.keyframe_angle_deg, positive, "keyframe_angle_deg");
-  require(options.relocalization_candidates, not_negative, "relocalization_candidates");
-}
-
 }  // namespace
 
 void bind(ParameterTable& table, VisualOdometryOptions& options) {
@@ -430,7 +417,7 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const LoopClosureDetectionOptions& matching,
                                   const VisualOdometryOptions& options, std::uint64_t seed,
                                   Progress& progress) {
-  check(options);
+  check_parameters(options);
   return Tracker(frames, start, matching, options, seed).run(progress);
 }
 

@@ -66,8 +66,7 @@ void append_list(std::string& bytes, const std::vector<T>& values) {
 
 void require_count(const char* field, std::int32_t count, std::int32_t full) {
   if (count != 0 && count != full)
-    throw Error("calibration cannot be read", {.file = {},
-                                               .field = std::string("numbers of ") + field,
+    throw Error("calibration cannot be read", {.field = std::string("numbers of ") + field,
                                                .value = std::to_string(count),
                                                .bound = "0 or " + std::to_string(full)});
 }
@@ -323,9 +322,8 @@ StereoCamera stereo_camera_of(const StereoCalibrationRecord& record, int width, 
   else if (record.t.size() == 3)
     stereo.baseline_m = Eigen::Vector3d(record.t[0], record.t[1], record.t[2]).norm();
   if (!(stereo.baseline_m > 0) || !std::isfinite(stereo.baseline_m))
-    throw Error(
-        "stereo camera cannot be used",
-        {.file = {}, .field = "baseline_m", .value = to_text(stereo.baseline_m), .bound = "> 0"});
+    throw Error("stereo camera cannot be used",
+                {.field = "baseline_m", .value = to_text(stereo.baseline_m), .bound = "> 0"});
   stereo.right_from_left.translation().x() = -stereo.baseline_m;
   // Of the raw images.
   if (has_right && !is_used(record.right.p) && record.r.size() == 9 && record.t.size() == 3) {
@@ -339,15 +337,8 @@ StereoCamera stereo_camera_of(const StereoCalibrationRecord& record, int width, 
 }  // namespace
 
 std::string to_text(CalibrationLayout layout) {
-  switch (layout) {
-    case CalibrationLayout::records:
-      return "records";
-    case CalibrationLayout::floats_with_size:
-      return "floats with size";
-    case CalibrationLayout::floats:
-      return "floats";
-  }
-  return {};
+  if (layout == CalibrationLayout::records) return "records";
+  return layout == CalibrationLayout::floats_with_size ? "floats with size" : "floats";
 }
 
 Calibration decode_calibration(std::string_view bytes) {

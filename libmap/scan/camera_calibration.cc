@@ -254,8 +254,7 @@ CameraCalibrationResult calibrate_once(const std::vector<BoardPicture>& pictures
                                        int height, const CameraCalibrationOptions& options) {
   if (pictures.size() < min_pictures)
     throw Error("too few pictures show the board in places of its own",
-                {.file = {},
-                 .field = "pictures",
+                {.field = "pictures",
                  .value = std::to_string(pictures.size()),
                  .bound = ">= " + std::to_string(min_pictures) + ", better 15 and more"});
   const BoardCorners corners = corners_of(pictures, options.board);
@@ -342,8 +341,7 @@ Points2 refine_corners(const cv::Mat& pixels, const Chessboard& board, Points2 c
 
 void Chessboard::check() const {
   const auto refuse = [](const std::string& field, double value, const std::string& bound) {
-    throw Error("no such board",
-                {.file = {}, .field = field, .value = to_text(value), .bound = bound});
+    throw Error("no such board", {.field = field, .value = to_text(value), .bound = bound});
   };
   if (columns < min_side || columns > max_side)
     refuse("columns", columns, "3 to 100 inner corners");
@@ -360,8 +358,7 @@ Chessboard parse_chessboard(const std::string& text, const std::string& field) {
   const int columns = side(text.substr(0, cross));
   const int rows = cross == std::string::npos ? 0 : side(text.substr(cross + 1));
   if (columns == 0 || rows == 0)
-    throw Error("no such board", {.file = {},
-                                  .field = field,
+    throw Error("no such board", {.field = field,
                                   .value = text,
                                   .bound = "COLUMNSxROWS inner corners, 3 to 100 each, e.g. 8x6"});
   Chessboard board;

@@ -23,7 +23,7 @@ constexpr double max_image_side = 65536;
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& reason, const std::string& bound) {
-  throw Error(reason, {.file = {}, .field = field, .value = value, .bound = bound});
+  throw Error(reason, {.field = field, .value = value, .bound = bound});
 }
 
 double number_of(const YAML::Node& node, const std::string& field) {

@@ -71,10 +71,7 @@ void bind(ParameterTable& table, ColmapBuilderOptions& options) {
 }
 
 ColmapBuilder::ColmapBuilder(const ColmapBuilderOptions& options) : options_(options) {
-  if (options_.point_spacing_px < 1)
-    throw Error("no distance between points", {.field = "point_spacing_px",
-                                               .value = std::to_string(options_.point_spacing_px),
-                                               .bound = ">= 1"});
+  check_parameters(options);
 }
 
 int ColmapBuilder::add_camera(const ColmapCamera& camera) {

@@ -56,10 +56,7 @@ const CameraModel& model_named(const std::string& name) {
 
 int positive_integer_of(const TextLine& line, std::size_t word, const std::string& file) {
   const int value = integer_of(line, word, file);
-  if (value <= 0)
-    throw Error(
-        "no size of an image",
-        {.file = file, .field = name_of(line), .value = std::to_string(value), .bound = "> 0"});
+  if (value <= 0) throw in_line("no size of an image", line, file, std::to_string(value), "> 0");
   return value;
 }
 
@@ -71,10 +68,7 @@ std::string rest_of(const TextLine& line, std::size_t first) {
 
 std::vector<ColmapObservation> observations_of(const TextLine& line, const std::string& file) {
   if (line.words.size() % 3 != 0)
-    throw Error("no features of an image", {.file = file,
-                                            .field = name_of(line),
-                                            .value = std::to_string(line.words.size()) + " columns",
-                                            .bound = "X Y POINT3D_ID of each"});
+    throw wrong_columns("no features of an image", line, file, "X Y POINT3D_ID of each");
   std::vector<ColmapObservation> observations;
   observations.reserve(line.words.size() / 3);
   for (std::size_t word = 0; word < line.words.size(); word += 3) {
@@ -84,18 +78,10 @@ std::vector<ColmapObservation> observations_of(const TextLine& line, const std::
   return observations;
 }
 
-std::string numbers_to_text(std::initializer_list<double> numbers) {
-  std::string text;
-  for (const double number : numbers) text += " " + to_text(number);
-  return text;
-}
-
 std::string pose_to_text(const Pose& pose) {
-  Eigen::Quaterniond q(pose.linear());
-  q.normalize();
-  if (q.w() < 0.0) q.coeffs() *= -1.0;
+  const Eigen::Quaterniond q = quaternion_of(pose);
   const Eigen::Vector3d t = pose.translation();
-  return numbers_to_text({q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()});
+  return to_words({q.w(), q.x(), q.y(), q.z(), t.x(), t.y(), t.z()});
 }
 
 bool is_model(const fs::path& folder, const char* ending) {
@@ -174,10 +160,7 @@ std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std:
     const TextLine& line = lines[i];
     if (is_comment(line)) continue;
     if (line.words.size() < columns)
-      throw Error("no image", {.file = file,
-                               .field = name_of(line),
-                               .value = std::to_string(line.words.size()) + " columns",
-                               .bound = "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME"});
+      throw wrong_columns("no image", line, file, "IMAGE_ID QW QX QY QZ TX TY TZ CAMERA_ID NAME");
     const int id = integer_of(line, 0, file);
     const std::vector<double> n = numbers_of(line, 1, 7, file);
     ColmapImage image;
@@ -207,20 +190,14 @@ std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
     for (std::size_t c = 0; c < point.color.size(); ++c) {
       const int value = integer_of(line, 4 + c, file);
       if (value < 0 || value > 255)
-        throw Error("no colour", {.file = file,
-                                  .field = name_of(line),
-                                  .value = std::to_string(value),
-                                  .bound = "0 to 255"});
+        throw in_line("no colour", line, file, std::to_string(value), "0 to 255");
       point.color[c] = static_cast<std::uint8_t>(value);
     }
     point.error_px = numbers_of(line, 7, 1, file).front();
     for (std::size_t word = columns; word < line.words.size(); word += 2) {
       const std::int64_t observation = large_integer_of(line, word + 1, file);
       if (observation < 0)
-        throw Error("no feature of an image", {.file = file,
-                                               .field = name_of(line),
-                                               .value = std::to_string(observation),
-                                               .bound = ">= 0"});
+        throw in_line("no feature of an image", line, file, std::to_string(observation), ">= 0");
       point.track.push_back({integer_of(line, word, file), static_cast<std::size_t>(observation)});
     }
     if (!points.emplace(id, std::move(point)).second)
@@ -265,8 +242,8 @@ std::string to_colmap_points(const ColmapModel& model) {
       "# POINT3D_ID X Y Z R G B ERROR TRACK[] as IMAGE_ID POINT2D_IDX\n# Number of points: " +
       std::to_string(model.points.size()) + "\n";
   for (const auto& [id, point] : model.points) {
-    text += std::to_string(id) +
-            numbers_to_text({point.position.x(), point.position.y(), point.position.z()});
+    text +=
+        std::to_string(id) + to_words({point.position.x(), point.position.y(), point.position.z()});
     for (const std::uint8_t channel : point.color) text += " " + std::to_string(channel);
     text += " " + to_text(point.error_px);
     for (const ColmapTrackElement& element : point.track)

@@ -99,8 +99,7 @@ void check_size(std::uint64_t columns, std::uint64_t rows) {
       columns * rows <= max_depth_pixels && (columns == 0) == (rows == 0))
     return;
   throw Error("depth image of no valid size",
-              {.file = {},
-               .field = "image size",
+              {.field = "image size",
                .value = std::to_string(columns) + " x " + std::to_string(rows),
                .bound = "<= " + std::to_string(max_depth_pixels) + " pixels"});
 }
@@ -114,8 +113,7 @@ DepthInfo rvl_info(std::string_view bytes) {
 }
 
 [[noreturn]] void refuse_run(std::uint64_t count, std::uint64_t left) {
-  throw Error("RVL holds more pixels than its size says", {.file = {},
-                                                           .field = "run of pixels",
+  throw Error("RVL holds more pixels than its size says", {.field = "run of pixels",
                                                            .value = std::to_string(count),
                                                            .bound = "<= " + std::to_string(left)});
 }
@@ -123,15 +121,8 @@ DepthInfo rvl_info(std::string_view bytes) {
 }  // namespace
 
 std::string to_text(DepthFormat format) {
-  switch (format) {
-    case DepthFormat::rvl:
-      return "RVL";
-    case DepthFormat::png16:
-      return "16-bit PNG";
-    case DepthFormat::float_png:
-      return "float PNG";
-  }
-  return {};
+  if (format == DepthFormat::rvl) return "RVL";
+  return format == DepthFormat::png16 ? "16-bit PNG" : "float PNG";
 }
 
 std::optional<DepthInfo> read_depth_info(std::string_view bytes) {
@@ -149,14 +140,8 @@ std::optional<DepthInfo> read_depth_info(std::string_view bytes) {
 DepthImage decode_depth(std::string_view bytes) {
   const std::optional<DepthInfo> info = read_depth_info(bytes);
   if (!info) throw Error("not a depth image: neither RVL, 16-bit PNG nor float PNG");
-  switch (info->format) {
-    case DepthFormat::rvl:
-      return to_metres(decode_rvl(bytes));
-    case DepthFormat::png16:
-      return to_metres(decode_gray16(bytes));
-    case DepthFormat::float_png:
-      break;
-  }
+  if (info->format == DepthFormat::rvl) return to_metres(decode_rvl(bytes));
+  if (info->format == DepthFormat::png16) return to_metres(decode_gray16(bytes));
   DepthImage image = decode_float_png(bytes);
   for (float& depth : image.pixels)
     if (!std::isfinite(depth) || depth < 0) depth = 0;

@@ -36,8 +36,12 @@ std::string cell_of(const Table& table, std::size_t row, const char* column) {
   return index ? std::string(trim(table.rows[row][*index])) : std::string();
 }
 
-std::string field_of(std::size_t row, const char* column) {
-  return "row " + std::to_string(row + 1) + ", column " + column;
+Error wrong_cell(const std::string& reason, const Table& table, std::size_t row, const char* column,
+                 std::string bound = {}) {
+  return Error(reason, {.file = table.file,
+                        .field = "row " + std::to_string(row + 1) + ", column " + column,
+                        .value = cell_of(table, row, column),
+                        .bound = std::move(bound)});
 }
 
 int integer_in(const Table& table, std::size_t row, const char* column, int missing) {
@@ -46,9 +50,7 @@ int integer_in(const Table& table, std::size_t row, const char* column, int miss
   const std::optional<std::int64_t> value = parse_integer(cell);
   if (!value || *value < std::numeric_limits<int>::min() ||
       *value > std::numeric_limits<int>::max())
-    throw Error(
-        "not a whole number",
-        {.file = table.file, .field = field_of(row, column), .value = cell, .bound = "of 32 bits"});
+    throw wrong_cell("not a whole number", table, row, column, "of 32 bits");
   return static_cast<int>(*value);
 }
 
@@ -59,9 +61,7 @@ std::vector<double> numbers_in(const Table& table, std::size_t row, const char* 
   for (const TextLine& line : split_lines(cell)) {
     for (const std::string_view word : line.words) {
       const std::optional<double> value = parse_double(word);
-      if (!value || !std::isfinite(*value))
-        throw Error("not a number",
-                    {.file = table.file, .field = field_of(row, column), .value = cell});
+      if (!value || !std::isfinite(*value)) throw wrong_cell("not a number", table, row, column);
       numbers.push_back(*value);
     }
   }
@@ -72,10 +72,7 @@ std::optional<std::array<double, 6>> six_in(const Table& table, std::size_t row,
                                             const char* column) {
   const std::vector<double> numbers = numbers_in(table, row, column);
   if (numbers.empty()) return std::nullopt;
-  if (numbers.size() != 6)
-    throw Error(
-        "not six numbers",
-        {.file = table.file, .field = field_of(row, column), .value = cell_of(table, row, column)});
+  if (numbers.size() != 6) throw wrong_cell("not six numbers", table, row, column);
   std::array<double, 6> six{};
   std::copy(numbers.begin(), numbers.end(), six.begin());
   return six;
@@ -84,18 +81,12 @@ std::optional<std::array<double, 6>> six_in(const Table& table, std::size_t row,
 GraphNode node_in(const Table& table, std::size_t row) {
   GraphNode node;
   node.id = integer_in(table, row, "node", 0);
-  if (node.id <= 0)
-    throw Error("no number of a node", {.file = table.file,
-                                        .field = field_of(row, "node"),
-                                        .value = cell_of(table, row, "node"),
-                                        .bound = "> 0"});
+  if (node.id <= 0) throw wrong_cell("no number of a node", table, row, "node", "> 0");
   node.session = integer_in(table, row, "session", 0);
   node.weight = integer_in(table, row, "weight", 0);
   node.stamp_s = table.optional_number(row, table.column("stamp_s")).value_or(0.0);
   if (!std::isfinite(node.stamp_s))
-    throw Error("not a number of seconds", {.file = table.file,
-                                            .field = field_of(row, "stamp_s"),
-                                            .value = cell_of(table, row, "stamp_s")});
+    throw wrong_cell("not a number of seconds", table, row, "stamp_s");
   node.label = cell_of(table, row, "label");
   node.velocity = six_in(table, row, "velocity");
   if (const auto gps = six_in(table, row, "gps")) {
@@ -164,10 +155,7 @@ struct FrameFolder::Listing {
 
   void add(const TextLine& line, std::size_t first, const std::string& file) {
     if (line.words.size() < first + 2)
-      throw Error("no stamp and file", {.file = file,
-                                        .field = name_of(line),
-                                        .value = std::to_string(line.words.size()) + " columns",
-                                        .bound = ">= " + std::to_string(first + 2)});
+      throw wrong_columns("no stamp and file", line, file, ">= " + std::to_string(first + 2));
     stamps.push_back(numbers_of(line, first, 1, file).front());
     names.emplace_back(line.words[first + 1]);
   }
@@ -242,14 +230,9 @@ void FrameFolder::read_nodes() {
     for (const std::string& name : split_names(cell_of(table, row, "calibration")))
       of_node.cameras.push_back(add_camera(name));
     if (!of_node.baselines_m.empty() && of_node.cameras.size() != 2 * of_node.baselines_m.size())
-      throw Error("each stereo pair has two cameras",
-                  {.file = table.file,
-                   .field = field_of(row, "calibration"),
-                   .value = cell_of(table, row, "calibration")});
+      throw wrong_cell("each stereo pair has two cameras", table, row, "calibration");
     if (!files_.emplace(node.id, std::move(of_node)).second)
-      throw Error(
-          "stands twice",
-          {.file = table.file, .field = field_of(row, "node"), .value = std::to_string(node.id)});
+      throw wrong_cell("stands twice", table, row, "node");
     graph_.nodes.push_back(std::move(node));
   }
   std::sort(graph_.nodes.begin(), graph_.nodes.end(),

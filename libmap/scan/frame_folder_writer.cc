@@ -14,6 +14,7 @@
 #include "libmap/scan/frame_folder.h"
 #include "libmap/scan/frame_folder_files.h"
 #include "libmap/scan/image_codec.h"
+#include "libmap/scan/picture_file.h"
 #include "libmap/scan/trajectory_text.h"
 
 namespace libmap {
@@ -22,13 +23,6 @@ namespace fs = std::filesystem;
 namespace files = frame_folder_files;
 
 namespace {
-
-constexpr int name_digits = 6;
-
-std::string padded(int node) {
-  const std::string number = std::to_string(node);
-  return std::string(number.size() < name_digits ? name_digits - number.size() : 0, '0') + number;
-}
 
 std::string join(const std::string& words, const std::string& word) {
   return words.empty() ? word : words + " " + word;
@@ -83,7 +77,7 @@ FrameFolderWriter::FrameFolderWriter(fs::path folder) : folder_(std::move(folder
 
 std::string FrameFolderWriter::write_image(const char* folder, int node, const std::string& bytes) {
   const ImageFormat format = image_format(bytes).value_or(ImageFormat::png);
-  std::string name = std::string(folder) + "/" + padded(node) + file_extension(format);
+  std::string name = std::string(folder) + "/" + picture_name(node, 0, file_extension(format));
   write_text(folder_ / name, bytes);
   return name;
 }

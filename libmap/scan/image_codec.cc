@@ -30,16 +30,11 @@ std::uint32_t big_endian(std::string_view bytes, std::size_t at, std::size_t cou
   return value;
 }
 
-std::string size_text(std::int64_t width, std::int64_t height) {
-  return std::to_string(width) + " x " + std::to_string(height);
-}
-
 void check_size(const ImageInfo& info, std::size_t bytes, std::int64_t max_pixels) {
   const std::int64_t pixels = std::int64_t{info.width} * info.height;
   const std::string text = size_text(info.width, info.height) + " pixels";
   if (pixels > max_pixels)
-    throw Error("image too large", {.file = {},
-                                    .field = "image size",
+    throw Error("image too large", {.field = "image size",
                                     .value = text,
                                     .bound = "<= " + std::to_string(max_pixels) + " pixels"});
   if (pixels <= always_allowed_pixels) return;
@@ -51,7 +46,7 @@ void check_size(const ImageInfo& info, std::size_t bytes, std::int64_t max_pixel
                                   : pixels / jpeg_pixels_per_byte;
   if (wanted > held)
     throw Error("more than its " + std::to_string(held) + " bytes can hold",
-                {.file = {}, .field = "image size", .value = text});
+                {.field = "image size", .value = text});
 }
 
 // ---------------------------------------------------------------------------------------- headers
@@ -147,10 +142,9 @@ std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int p
                         int subsampling, int quality) {
   if (width <= 0 || height <= 0) throw Error("an empty image cannot be written");
   if (quality < 1 || quality > 100)
-    throw Error("no such JPEG quality", {.file = {},
-                                         .field = "jpeg_quality",
-                                         .value = std::to_string(quality),
-                                         .bound = ">= 1 and <= 100"});
+    throw Error(
+        "no such JPEG quality",
+        {.field = "jpeg_quality", .value = std::to_string(quality), .bound = ">= 1 and <= 100"});
   const JpegHandle handle(tjInitCompress(), &tjDestroy);
   if (!handle) throw Error("libjpeg-turbo cannot be used", {}, ErrorKind::failed);
   unsigned char* buffer = nullptr;
@@ -160,8 +154,7 @@ std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int p
   const std::unique_ptr<unsigned char, decltype(&tjFree)> owner(buffer, &tjFree);
   if (result != 0)
     throw Error(std::string("JPEG cannot be made: ") + tjGetErrorStr2(handle.get()),
-                {.file = {}, .field = "image size", .value = size_text(width, height)},
-                ErrorKind::failed);
+                {.field = "image size", .value = size_text(width, height)}, ErrorKind::failed);
   return std::string(reinterpret_cast<const char*>(buffer), size);
 }
 
@@ -290,10 +283,9 @@ std::string encode_png(const PngPixels& pixels) {
   const bool is_written = info != nullptr && encode_png_rows(sink, pixels, png, info);
   png_destroy_write_struct(&png, &info);
   if (!is_written)
-    throw Error(
-        std::string("PNG cannot be made: ") + sink.message,
-        {.file = {}, .field = "image size", .value = size_text(pixels.width, pixels.height)},
-        ErrorKind::failed);
+    throw Error(std::string("PNG cannot be made: ") + sink.message,
+                {.field = "image size", .value = size_text(pixels.width, pixels.height)},
+                ErrorKind::failed);
   return std::move(sink.bytes);
 }
 

@@ -56,22 +56,11 @@ LaserScanFormat format_of(float number) {
 
 // Before 0.16.1 the format is not stored: the channels that those versions used.
 LaserScanFormat format_of_channels(int count) {
-  switch (count) {
-    case 2:
-      return LaserScanFormat::xy;
-    case 3:
-      return LaserScanFormat::xyz;
-    case 4:
-      return LaserScanFormat::xyz_rgb;
-    case 5:
-      return LaserScanFormat::xy_normal;
-    case 6:
-      return LaserScanFormat::xyz_normal;
-    case 7:
-      return LaserScanFormat::xyz_rgb_normal;
-    default:
-      throw Error("laser scan of an unknown number of channels", {.value = std::to_string(count)});
-  }
+  using enum LaserScanFormat;
+  constexpr std::array formats{xy, xyz, xyz_rgb, xy_normal, xyz_normal, xyz_rgb_normal};
+  if (count < 2 || count > 7)
+    throw Error("laser scan of an unknown number of channels", {.value = std::to_string(count)});
+  return formats[static_cast<std::size_t>(count - 2)];
 }
 
 void read_info(LaserScan& scan, std::string_view info) {

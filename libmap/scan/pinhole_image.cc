@@ -51,11 +51,9 @@ Camera centered_pinhole(const Camera& camera) {
   const Eigen::Vector2d reach = inner_reach(camera);
   if (!(reach.minCoeff() > 0.0) || !reach.allFinite())
     throw Error("the optical axis does not meet the image",
-                {.file = {},
-                 .field = "principal point",
+                {.field = "principal point",
                  .value = to_text(camera.cx) + ", " + to_text(camera.cy),
-                 .bound = "inside " + std::to_string(camera.width) + " x " +
-                          std::to_string(camera.height)});
+                 .bound = "inside " + size_text(camera.width, camera.height)});
   Camera centered = without_distortion(camera);
   const double focal = std::max(camera.fx, camera.fy);
   // No more pixels than the image has, however far a fisheye sees.
@@ -71,11 +69,9 @@ Camera centered_pinhole(const Camera& camera) {
 
 ColorImage resample_image(const ColorImage& image, const Camera& from, const Camera& to) {
   if (image.width != from.width || image.height != from.height)
-    throw Error("the image does not fit its camera",
-                {.file = {},
-                 .field = "size",
-                 .value = std::to_string(image.width) + " x " + std::to_string(image.height),
-                 .bound = std::to_string(from.width) + " x " + std::to_string(from.height)});
+    throw Error("the image does not fit its camera", {.field = "size",
+                                                      .value = size_text(image.width, image.height),
+                                                      .bound = size_text(from.width, from.height)});
   cv::Mat places(to.height, to.width, CV_32FC2);
   parallel_for(static_cast<std::size_t>(to.height), 16, [&](std::size_t begin, std::size_t end) {
     for (auto row = static_cast<int>(begin); row < static_cast<int>(end); ++row)

@@ -13,8 +13,7 @@ int part_width(int node, const std::string& what, int width, std::size_t count) 
   const int cameras = static_cast<int>(count);
   if (width % cameras != 0)
     throw Error("images of several cameras cannot be told apart",
-                {.file = {},
-                 .field = "node " + std::to_string(node) + ": " + what + " width",
+                {.field = "node " + std::to_string(node) + ": " + what + " width",
                  .value = std::to_string(width),
                  .bound = "a multiple of " + std::to_string(cameras)});
   return width / cameras;

@@ -23,31 +23,16 @@ namespace fs = std::filesystem;
 constexpr std::size_t max_cameras = 256;
 
 const std::vector<std::string> limit_keys = {"depth_scale_m", "near_m", "far_m"};
-const std::vector<std::string> camera_keys = {"name",
-                                              "calibration",
-                                              "camera_name",
-                                              "image_width",
-                                              "image_height",
-                                              "camera_matrix",
-                                              "fisheye_model",
-                                              "distortion_model",
-                                              "distortion_coefficients",
-                                              "rectification_matrix",
-                                              "projection_matrix",
-                                              "local_transform",
-                                              "robot_from_camera",
-                                              "position_m",
-                                              "roll_pitch_yaw_deg",
-                                              "depth_scale_m",
-                                              "near_m",
-                                              "far_m"};
+const std::vector<std::string> camera_keys = split_list(
+    "name,calibration,camera_name,image_width,image_height,camera_matrix,fisheye_model,"
+    "distortion_model,distortion_coefficients,rectification_matrix,projection_matrix,"
+    "local_transform,robot_from_camera,position_m,roll_pitch_yaw_deg,depth_scale_m,near_m,far_m");
 
 double rig_number(const YAML::Node& node, const std::string& field) {
   if (!node.IsScalar()) throw Error("not a single number", {.field = field});
   const std::optional<double> value = parse_double(node.Scalar());
   if (!value)
-    throw Error("not a number",
-                {.file = {}, .field = field, .value = node.Scalar(), .bound = "a number"});
+    throw Error("not a number", {.field = field, .value = node.Scalar(), .bound = "a number"});
   return *value;
 }
 
@@ -174,15 +159,14 @@ CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {
 
 void check_camera(const RigCamera& camera) {
   const auto refuse = [&](const std::string& field, double value, const std::string& bound) {
-    throw Error(
-        "out of range",
-        {.file = {}, .field = camera.name + ": " + field, .value = to_text(value), .bound = bound});
+    throw Error("out of range",
+                {.field = camera.name + ": " + field, .value = to_text(value), .bound = bound});
   };
   const std::string& name = camera.name;
   if (name.empty() || name == "." || name == ".." || name.find('/') != std::string::npos ||
       name.find('\0') != std::string::npos)
     throw Error("cannot name a folder",
-                {.file = {}, .field = "name", .value = name, .bound = "a name without '/'"});
+                {.field = "name", .value = name, .bound = "a name without '/'"});
   if (!(camera.depth_scale_m > 0) || !std::isfinite(camera.depth_scale_m))
     refuse("depth_scale_m", camera.depth_scale_m, "> 0");
   if (!(camera.near_m >= 0) || !std::isfinite(camera.near_m))

@@ -78,8 +78,7 @@ void check_frame(const GraphNode& node, const RgbdFrame& frame) {
   if (!frame.stereo.empty() && !frame.cameras.empty() &&
       frame.cameras.size() != frame.stereo.size())
     throw Error("a stereo frame has no cameras but its left ones",
-                {.file = {},
-                 .field = field + ": cameras",
+                {.field = field + ": cameras",
                  .value = std::to_string(frame.cameras.size()),
                  .bound = std::to_string(frame.stereo.size())});
   try {

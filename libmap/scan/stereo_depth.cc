@@ -24,11 +24,7 @@ const std::vector<std::pair<std::string, StereoDirections>> direction_names = {
 
 [[noreturn]] void refuse_pair(const std::string& reason, const std::string& field,
                               const std::string& value, const std::string& bound) {
-  throw Error(reason, {.file = {}, .field = field, .value = value, .bound = bound});
-}
-
-std::string size_text(int width, int height) {
-  return std::to_string(width) + " x " + std::to_string(height);
+  throw Error(reason, {.field = field, .value = value, .bound = bound});
 }
 
 void check(const GrayImage& image, const Camera& camera, const std::string& field) {
@@ -51,9 +47,7 @@ void check(const StereoCamera& cameras) {
 }
 
 StereoDepthOptions checked(StereoDepthOptions options) {
-  ParameterTable table;
-  bind(table, options);
-  for (const auto& [key, value] : table.values()) table.set(key, value);
+  check_parameters(options);
   if (options.block_px % 2 == 0)
     refuse_pair("out of range", "block_px", std::to_string(options.block_px), "odd");
   options.disparities_px = (options.disparities_px + 15) / 16 * 16;
@@ -61,15 +55,8 @@ StereoDepthOptions checked(StereoDepthOptions options) {
 }
 
 int mode_of(StereoDirections directions) {
-  switch (directions) {
-    case StereoDirections::three:
-      return cv::StereoSGBM::MODE_SGBM_3WAY;
-    case StereoDirections::five:
-      return cv::StereoSGBM::MODE_SGBM;
-    case StereoDirections::eight:
-      return cv::StereoSGBM::MODE_HH;
-  }
-  return cv::StereoSGBM::MODE_SGBM;
+  if (directions == StereoDirections::three) return cv::StereoSGBM::MODE_SGBM_3WAY;
+  return directions == StereoDirections::five ? cv::StereoSGBM::MODE_SGBM : cv::StereoSGBM::MODE_HH;
 }
 
 // With columns repeated on both sides: SGBM gives nothing where a disparity of the range would

@@ -26,10 +26,7 @@ std::vector<std::string_view> split_words(std::string_view text) {
 
 void require_word(const TextLine& line, std::size_t word, const std::string& file) {
   if (word >= line.words.size())
-    throw Error("ends too early", {.file = file,
-                                   .field = name_of(line),
-                                   .value = std::to_string(line.words.size()) + " columns",
-                                   .bound = ">= " + std::to_string(word + 1)});
+    throw wrong_columns("ends too early", line, file, ">= " + std::to_string(word + 1));
 }
 
 }  // namespace
@@ -59,10 +56,7 @@ std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::siz
   for (std::size_t i = first; i < first + count; ++i) {
     const std::optional<double> value = parse_double(line.words[i]);
     if (!value || !std::isfinite(*value))
-      throw Error("not a number", {.file = file,
-                                   .field = name_of(line),
-                                   .value = std::string(line.words[i]),
-                                   .bound = "a finite number"});
+      throw in_line("not a number", line, file, std::string(line.words[i]), "a finite number");
     numbers.push_back(*value);
   }
   return numbers;
@@ -72,10 +66,7 @@ std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std:
   require_word(line, word, file);
   const std::optional<std::int64_t> value = parse_integer(line.words[word]);
   if (!value)
-    throw Error("not a whole number", {.file = file,
-                                       .field = name_of(line),
-                                       .value = std::string(line.words[word]),
-                                       .bound = "of 64 bits"});
+    throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 64 bits");
   return *value;
 }
 
@@ -84,15 +75,25 @@ int integer_of(const TextLine& line, std::size_t word, const std::string& file) 
   const std::optional<std::int64_t> value = parse_integer(line.words[word]);
   if (!value || *value < std::numeric_limits<int>::min() ||
       *value > std::numeric_limits<int>::max())
-    throw Error("not a whole number", {.file = file,
-                                       .field = name_of(line),
-                                       .value = std::string(line.words[word]),
-                                       .bound = "of 32 bits"});
+    throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 32 bits");
   return static_cast<int>(*value);
 }
 
+Error in_line(const std::string& reason, const TextLine& line, const std::string& file,
+              std::string value, std::string bound) {
+  return Error(
+      reason,
+      {.file = file, .field = name_of(line), .value = std::move(value), .bound = std::move(bound)});
+}
+
+Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
+                    std::string bound) {
+  return in_line(reason, line, file, std::to_string(line.words.size()) + " columns",
+                 std::move(bound));
+}
+
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file) {
-  return Error("stands twice", {.file = file, .field = name_of(line), .value = record});
+  return in_line("stands twice", line, file, record);
 }
 
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
@@ -100,16 +101,24 @@ Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
   constexpr double length_tolerance = 0.05;
   const double length = rotation.norm();
   if (!(std::abs(length - 1.0) <= length_tolerance))
-    throw Error("no rotation", {.file = file,
-                                .field = name_of(line),
-                                .value = to_text(length),
-                                .bound = "a quaternion of length 1"});
+    throw in_line("no rotation", line, file, to_text(length), "a quaternion of length 1");
   const double distance = translation.cwiseAbs().maxCoeff();
   if (!(distance <= max_position_m))
-    throw Error(
-        "no position",
-        {.file = file, .field = name_of(line), .value = to_text(distance), .bound = "<= 1e8 m"});
+    throw in_line("no position", line, file, to_text(distance), "<= 1e8 m");
   return make_pose(translation, rotation);
+}
+
+std::string to_words(std::initializer_list<double> numbers) {
+  std::string text;
+  for (const double number : numbers) text += " " + to_text(number);
+  return text;
+}
+
+Eigen::Quaterniond quaternion_of(const Pose& pose) {
+  Eigen::Quaterniond rotation(pose.linear());
+  rotation.normalize();
+  if (rotation.w() < 0.0) rotation.coeffs() *= -1.0;
+  return rotation;
 }
 
 }  // namespace libmap

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -32,6 +33,12 @@ std::vector<double> numbers_of(const TextLine& line, std::size_t first, std::siz
 int integer_of(const TextLine& line, std::size_t word, const std::string& file);
 std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std::string& file);
 
+// "REASON" in that line of `file`.
+Error in_line(const std::string& reason, const TextLine& line, const std::string& file,
+              std::string value, std::string bound = {});
+// The same of a line's number of words.
+Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
+                    std::string bound);
 // For a record that an earlier line already has.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
@@ -39,5 +46,10 @@ Error duplicate(const TextLine& line, const std::string& record, const std::stri
 // than 5 %, the position lies more than 1e8 m away.
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file);
+
+// Numbers as words with a space before each.
+std::string to_words(std::initializer_list<double> numbers);
+// Of the two quaternions of a pose's rotation the one with qw >= 0.
+Eigen::Quaterniond quaternion_of(const Pose& pose);
 
 }  // namespace libmap

@@ -22,12 +22,6 @@ constexpr std::size_t triangle_size = 21;
 constexpr std::string_view type_comment = "graspmap:type";
 constexpr std::string_view edge_comment = "graspmap:edge";
 
-Error no_rotation(const TextLine& line, const std::string& file, double value,
-                  const std::string& bound) {
-  return Error("no rotation",
-               {.file = file, .field = name_of(line), .value = to_text(value), .bound = bound});
-}
-
 // x y z qx qy qz qw.
 Pose pose_from_words(const TextLine& line, std::size_t first, const std::string& file) {
   const std::vector<double> n = numbers_of(line, first, 7, file);
@@ -35,17 +29,11 @@ Pose pose_from_words(const TextLine& line, std::size_t first, const std::string&
                  Eigen::Quaterniond(n[6], n[3], n[4], n[5]), file);
 }
 
-// x y z qx qy qz qw; of the two quaternions that mean the same the one with qw >= 0.
+// x y z qx qy qz qw, a space before each.
 std::string pose_to_words(const Pose& pose) {
-  Eigen::Quaterniond rotation(pose.linear());
-  rotation.normalize();
-  if (rotation.w() < 0.0) rotation.coeffs() *= -1.0;
+  const Eigen::Quaterniond q = quaternion_of(pose);
   const Eigen::Vector3d t = pose.translation();
-  std::string text;
-  for (const double value :
-       {t.x(), t.y(), t.z(), rotation.x(), rotation.y(), rotation.z(), rotation.w()})
-    text += (text.empty() ? "" : " ") + to_text(value);
-  return text;
+  return to_words({t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()});
 }
 
 // x y z roll pitch yaw, radians.
@@ -61,10 +49,7 @@ std::string pose_to_angles(const Pose& pose) {
   // No sign before a zero.
   const Eigen::Vector3d angles_rad = (roll_pitch_yaw_deg(pose) * (M_PI / 180.0)).array() + 0.0;
   const Eigen::Vector3d t = pose.translation();
-  std::string text;
-  for (const double value : {t.x(), t.y(), t.z(), angles_rad.x(), angles_rad.y(), angles_rad.z()})
-    text += (text.empty() ? "" : " ") + to_text(value);
-  return text;
+  return to_words({t.x(), t.y(), t.z(), angles_rad.x(), angles_rad.y(), angles_rad.z()});
 }
 
 struct GraphFormat {
@@ -102,9 +87,7 @@ Matrix6d information_from_words(const GraphFormat& format, const TextLine& line,
     for (int column = row; column < 6; ++column) {
       const double value = numbers[next++] / factor_of(format, row, column);
       if (!(std::abs(value) <= max_information))
-        throw Error(
-            "no information of a link",
-            {.file = file, .field = name_of(line), .value = to_text(value), .bound = "<= 1e300"});
+        throw in_line("no information of a link", line, file, to_text(value), "<= 1e300");
       information(row, column) = value;
       information(column, row) = value;
     }
@@ -126,13 +109,13 @@ PoseLink link_from_words(const GraphFormat& format, const TextLine& line, std::s
 std::string vertices_to_text(const GraphFormat& format, const Trajectory& poses) {
   std::string text;
   for (const TrajectoryPose& pose : poses)
-    text += std::string(format.vertex_tag) + " " + std::to_string(pose.node) + " " +
+    text += std::string(format.vertex_tag) + " " + std::to_string(pose.node) +
             format.pose_to(pose.world_from_base) + "\n";
   return text;
 }
 
 std::string link_to_words(const GraphFormat& format, const PoseLink& link) {
-  return std::to_string(link.from) + " " + std::to_string(link.to) + " " +
+  return std::to_string(link.from) + " " + std::to_string(link.to) +
          format.pose_to(link.from_from_to) + information_to_words(format, link.information);
 }
 
@@ -179,11 +162,8 @@ struct GraphReader {
     } else if (tag == format.edge_tag) {
       add_link(line, 1);
     } else if (tag.find(format.planar_mark) != std::string_view::npos) {
-      throw Error("a planar pose graph", {.file = file,
-                                          .field = name_of(line),
-                                          .value = std::string(tag),
-                                          .bound = std::string(format.vertex_tag) + " or " +
-                                                   std::string(format.edge_tag)});
+      throw in_line("a planar pose graph", line, file, std::string(tag),
+                    std::string(format.vertex_tag) + " or " + std::string(format.edge_tag));
     }
   }
 
@@ -218,10 +198,7 @@ Trajectory parse_tum(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
     if (line.words.size() != 8 && line.words.size() != 9)
-      throw Error("no pose", {.file = file,
-                              .field = name_of(line),
-                              .value = std::to_string(line.words.size()) + " columns",
-                              .bound = "stamp x y z qx qy qz qw, and perhaps a node"});
+      throw wrong_columns("no pose", line, file, "stamp x y z qx qy qz qw, and perhaps a node");
     TrajectoryPose pose;
     pose.stamp_s = numbers_of(line, 0, 1, file).front();
     pose.world_from_base = pose_from_words(line, 1, file);
@@ -238,7 +215,7 @@ Trajectory parse_tum(std::string_view text, const std::string& file) {
 std::string to_tum(const Trajectory& trajectory, bool nodes) {
   std::string text = nodes ? "# stamp x y z qx qy qz qw node\n" : "# stamp x y z qx qy qz qw\n";
   for (const TrajectoryPose& pose : trajectory) {
-    text += stamp_text(pose.stamp_s) + " " + pose_to_words(pose.world_from_base);
+    text += stamp_text(pose.stamp_s) + pose_to_words(pose.world_from_base);
     text += nodes ? " " + std::to_string(pose.node) + "\n" : "\n";
   }
   return text;
@@ -248,11 +225,7 @@ Trajectory parse_kitti(std::string_view text, const std::string& file) {
   Trajectory trajectory;
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
-    if (line.words.size() != 12)
-      throw Error("no pose", {.file = file,
-                              .field = name_of(line),
-                              .value = std::to_string(line.words.size()) + " columns",
-                              .bound = "12"});
+    if (line.words.size() != 12) throw wrong_columns("no pose", line, file, "12");
     const std::vector<double> numbers = numbers_of(line, 0, 12, file);
     Eigen::Matrix<double, 3, 4> matrix;
     for (int i = 0; i < 12; ++i) matrix(i / 4, i % 4) = numbers[static_cast<std::size_t>(i)];
@@ -260,7 +233,8 @@ Trajectory parse_kitti(std::string_view text, const std::string& file) {
     const double deviation =
         (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
     if (!(deviation <= rotation_tolerance) || rotation.determinant() <= 0.0)
-      throw no_rotation(line, file, rotation.determinant(), "a rotation matrix, determinant 1");
+      throw in_line("no rotation", line, file, to_text(rotation.determinant()),
+                    "a rotation matrix, determinant 1");
     const Eigen::Matrix3d nearest = nearest_rotation(rotation);
     Pose pose = pose_of(line, matrix.col(3), Eigen::Quaterniond(nearest), file);
     pose.linear() = nearest;
@@ -358,11 +332,8 @@ PoseTextFormat recognise_poses(std::string_view text, const std::string& file) {
       if (tag.starts_with(start)) return PoseTextFormat::toro;
     if (line.words.size() == 12) return PoseTextFormat::kitti;
     if (line.words.size() == 8 || line.words.size() == 9) return PoseTextFormat::tum;
-    throw Error("no known format of poses",
-                {.file = file,
-                 .field = name_of(line),
-                 .value = std::to_string(line.words.size()) + " columns",
-                 .bound = "8 or 9 of TUM, 12 of KITTI, or VERTEX... of g2o or TORO"});
+    throw wrong_columns("no known format of poses", line, file,
+                        "8 or 9 of TUM, 12 of KITTI, or VERTEX... of g2o or TORO");
   }
   throw Error("holds no pose", {.file = file});
 }

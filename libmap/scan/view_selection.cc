@@ -27,20 +27,16 @@ bool resemble(const Pose& a, const Pose& b, const ViewSelectionOptions& options)
   return angle <= options.angle_deg * std::numbers::pi / 180.0;
 }
 
-void check(ViewSelectionOptions options, const std::vector<Pose>& poses,
+void check(const ViewSelectionOptions& options, const std::vector<Pose>& poses,
            const std::vector<double>& qualities) {
-  ParameterTable table;
-  bind(table, options);
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  check_parameters(options);
   if (poses.size() != qualities.size())
-    throw Error("not one quality a view", {.file = {},
-                                           .field = "qualities",
+    throw Error("not one quality a view", {.field = "qualities",
                                            .value = std::to_string(qualities.size()),
                                            .bound = std::to_string(poses.size())});
   for (std::size_t n = 0; n < poses.size(); ++n)
     if (!poses[n].matrix().allFinite() || !std::isfinite(qualities[n]))
-      throw Error("its pose or quality is not finite",
-                  {.file = {}, .field = "view " + std::to_string(n), .value = {}, .bound = {}});
+      throw Error("its pose or quality is not finite", {.field = "view " + std::to_string(n)});
 }
 
 }  // namespace

@@ -162,14 +162,9 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
 }  // namespace
 
 void CameraTrajectoryOptions::check() const {
-  const auto refuse = [](const char* field, double value, const char* bound) {
-    throw Error("no way to carry a camera",
-                {.file = {}, .field = field, .value = to_text(value), .bound = bound});
-  };
-  if (frames < 1 || frames > 1000000) refuse("frames", frames, ">= 1 and <= 1000000");
-  if (loops < 1 || loops > 1000) refuse("loops", loops, ">= 1 and <= 1000");
-  if (!(frame_interval_s > 0)) refuse("frame_interval_s", frame_interval_s, "> 0");
-  if (target && !target->allFinite()) refuse("target", target->sum(), "finite");
+  check_parameters(*this);
+  if (target && !target->allFinite())
+    throw Error("not a place", {.file = {}, .field = "target", .value = {}, .bound = "finite"});
 }
 
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {

@@ -57,10 +57,8 @@ Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
 }
 
 void check_shape(const SceneShape& shape) {
-  // A table's setters know the bounds: set each parameter of a copy to what it is.
   SceneShape copy = shape;
-  const ParameterTable table = shape_parameters(copy);
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  shape_parameters(copy).check();
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
       throw Error("shorter than wide", {.file = {},

@@ -59,9 +59,8 @@ bool is_within(const Footprint& footprint, double half_x, double half_y) {
 }
 
 void check_table(const ParameterTable& table, const std::string& place) {
-  // A table's setters know the bounds: set each parameter of a copy to what it is.
   try {
-    for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+    table.check();
   } catch (const Error& error) {
     ErrorContext context = error.context();
     context.field = place + "." + context.field;

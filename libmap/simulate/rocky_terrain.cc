@@ -53,10 +53,7 @@ void bind(ParameterTable& table, RockyTerrainOptions& options) {
 }
 
 void RockyTerrainOptions::check() const {
-  RockyTerrainOptions copy = *this;
-  ParameterTable table;
-  bind(table, copy);
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  check_parameters(*this);
   if (max_rock_m < min_rock_m)
     throw Error("the highest rocks are lower than the lowest",
                 {.file = {},

@@ -106,7 +106,7 @@ void TerrainPiecesOptions::check() const {
   bind(table, copy);
   table.add("size_x_m", copy.size_x_m, Range{1e-3, 1e5}, "");
   table.add("size_y_m", copy.size_y_m, Range{1e-3, 1e5}, "");
-  for (const Parameter& parameter : table.parameters()) parameter.set(parameter.get());
+  table.check();
   terrain.check();
   const double cells = piece_m / spacing_m;
   if (cells < 1.0 || cells * cells > 1e8)

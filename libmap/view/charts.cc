@@ -9,7 +9,6 @@
 #include <vtkContextActor.h>
 #include <vtkContextScene.h>
 #include <vtkDoubleArray.h>
-#include <vtkImageData.h>
 #include <vtkNew.h>
 #include <vtkPen.h>
 #include <vtkPlotArea.h>
@@ -20,7 +19,6 @@
 #include <vtkStringArray.h>
 #include <vtkTable.h>
 #include <vtkTextProperty.h>
-#include <vtkWindowToImageFilter.h>
 
 #include <algorithm>
 #include <array>
@@ -33,6 +31,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/view/offscreen.h"
 
 namespace libmap {
 namespace {
@@ -293,8 +292,7 @@ class ChartView {
     if (size.width_px < 200 || size.height_px < 200 || size.width_px > 16384 ||
         size.height_px > 16384)
       throw Error("cannot be drawn", {.field = "chart size",
-                                      .value = std::to_string(size.width_px) + " x " +
-                                               std::to_string(size.height_px) + " pixels",
+                                      .value = size_text(size.width_px, size.height_px) + " pixels",
                                       .bound = "from 200 to 16384 each"});
     window_->SetOffScreenRendering(1);
     window_->SetMultiSamples(8);
@@ -325,21 +323,6 @@ std::string description(const Chart& chart) {
   for (const ChartCurve& curve : chart.curves)
     if (!curve.name.empty()) text += "; " + curve.name;
   return text;
-}
-
-ColorImage image_of(vtkRenderWindow* window) {
-  vtkNew<vtkWindowToImageFilter> filter;
-  filter->SetInput(window);
-  filter->SetInputBufferTypeToRGB();
-  filter->ReadFrontBufferOff();
-  filter->Update();
-  vtkImageData* pixels = filter->GetOutput();
-  ColorImage image(pixels->GetDimensions()[0], pixels->GetDimensions()[1]);
-  const std::size_t row_bytes = 3 * static_cast<std::size_t>(image.width);
-  for (int row = 0; row < image.height; ++row)  // VTK's rows begin at the bottom
-    std::memcpy(image.pixels.data() + image.index(0, row),
-                pixels->GetScalarPointer(0, image.height - 1 - row, 0), row_bytes);
-  return image;
 }
 
 // VTK writes its numbers into SVG files through streams of the global locale.
@@ -426,7 +409,7 @@ void Chart::check() const {
 }
 
 ColorImage draw_chart(const Chart& chart, const ChartSize& size) {
-  return image_of(ChartView(chart, size).render());
+  return pixels_of(*ChartView(chart, size).render(), size.width_px, size.height_px);
 }
 
 void write_chart_svg(const std::filesystem::path& path, const Chart& chart, const ChartSize& size) {

@@ -74,15 +74,14 @@ const ScalarField* find(const ColorSource& source, std::string_view name) {
   std::string bound = "one of";
   for (const std::string& candidate : known) bound += " " + candidate;
   throw Error("there is no such field to colour by" + did_you_mean(name, known),
-              {.file = {}, .field = "field", .value = name, .bound = bound});
+              {.field = "field", .value = name, .bound = bound});
 }
 
 std::vector<double> values_of(const ColorSource& source, const std::string& name) {
   if (const ScalarField* field = find(source, name)) {
     if (field->values.size() != source.positions.size())
       throw Error("the field has not one value a point",
-                  {.file = {},
-                   .field = name,
+                  {.field = name,
                    .value = std::to_string(field->values.size()) + " values",
                    .bound = std::to_string(source.positions.size())});
     return field->values;
@@ -149,8 +148,7 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
   if (!std::isfinite(coloring.range_min) || !std::isfinite(coloring.range_max) ||
       coloring.range_max < coloring.range_min)
     throw Error("the range of colours is upside down or not finite",
-                {.file = {},
-                 .field = "range_max",
+                {.field = "range_max",
                  .value = to_text(coloring.range_max),
                  .bound = ">= range_min = " + to_text(coloring.range_min)});
   const std::vector<double> values = values_of(source, name);
@@ -248,7 +246,7 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
     case ColorMode::own:
       if (source.own_colors.size() != source.positions.size())
         throw Error("the data bring no colours of their own",
-                    {.file = {}, .field = "color mode", .value = "own", .bound = {}});
+                    {.field = "color mode", .value = "own"});
       result.colors = source.own_colors;
       result.legend = coloring.own_legend;
       break;
@@ -322,7 +320,7 @@ Color parse_color(std::string_view text, const std::string& field) {
   std::string bound = "#rrggbb or one of";
   for (const std::string& name : known) bound += " " + name;
   throw Error("not a colour" + did_you_mean(text, known),
-              {.file = {}, .field = field, .value = std::string(text), .bound = bound});
+              {.field = field, .value = std::string(text), .bound = bound});
 }
 
 }  // namespace libmap

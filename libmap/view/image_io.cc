@@ -23,16 +23,14 @@ void check(const ColorImage& image) {
     throw Error("an image without pixels cannot be written");
   if (std::max(image.width, image.height) > largest_side)
     throw Error("too large for a PNG",
-                {.file = {},
-                 .field = "size",
-                 .value = std::to_string(image.width) + " x " + std::to_string(image.height),
+                {.field = "size",
+                 .value = size_text(image.width, image.height),
                  .bound = "at most " + std::to_string(largest_side) + " a side"});
   const std::size_t pixels =
       static_cast<std::size_t>(image.width) * static_cast<std::size_t>(image.height);
   if (image.pixels.size() != pixels)
     throw Error("the image's pixels do not fit its size",
-                {.file = {},
-                 .field = "pixels",
+                {.field = "pixels",
                  .value = std::to_string(image.pixels.size()),
                  .bound = std::to_string(pixels)});
 }

@@ -66,6 +66,8 @@ class QuietScope {
   vtkNew<QuietOutput> quiet_;
 };
 
+}  // namespace
+
 ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
   ColorImage image(width, height);
   vtkNew<vtkUnsignedCharArray> pixels;
@@ -81,8 +83,6 @@ ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
                 row_bytes);
   return image;
 }
-
-}  // namespace
 
 ColorImage draw_offscreen(int width, int height,
                           const std::function<void(vtkRenderWindow&)>& fill) {

@@ -15,4 +15,7 @@ namespace libmap {
 // throws.
 ColorImage draw_offscreen(int width, int height, const std::function<void(vtkRenderWindow&)>& fill);
 
+// The pixels that were rendered last. Throws Error (failed) if OpenGL does not give them.
+ColorImage pixels_of(vtkRenderWindow& window, int width, int height);
+
 }  // namespace libmap

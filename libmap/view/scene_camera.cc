@@ -107,18 +107,15 @@ void fit_perspective(SceneCamera& camera, const std::vector<Eigen::Vector3d>& po
 void place(SceneCamera& camera, const CameraPlacement& placement) {
   const Eigen::Vector3d view = placement.focal_point - placement.position;
   if (!view.allFinite() || !(view.norm() > 0.0))
-    throw Error("the camera stands at its focal point or is not finite",
-                {.file = {}, .field = "camera", .value = {}, .bound = {}});
+    throw Error("the camera stands at its focal point or is not finite", {.field = "camera"});
   const double sine = view.normalized().cross(placement.up.normalized()).norm();
   if (!(sine > 1e-6))
     throw Error("the camera's up direction is parallel to its view, or zero",
-                {.file = {}, .field = "camera up", .value = {}, .bound = {}});
+                {.field = "camera up"});
   const double angle = placement.field_of_view_deg;
   if (!(angle > 0.0 && angle < 180.0))
-    throw Error("no camera has this field of view", {.file = {},
-                                                     .field = "field_of_view_deg",
-                                                     .value = to_text(angle),
-                                                     .bound = "> 0 and < 180"});
+    throw Error("no camera has this field of view",
+                {.field = "field_of_view_deg", .value = to_text(angle), .bound = "> 0 and < 180"});
   orient(camera, view, placement.up);
   camera.position = placement.position;
 }

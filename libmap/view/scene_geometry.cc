@@ -307,8 +307,7 @@ std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& t
   const bool has_texture = textured != nullptr && textured->has_texture();
   const ColorMode mode = layer.coloring.mode;
   if (mode == ColorMode::texture && !has_texture)
-    throw Error("the data bring no texture",
-                {.file = {}, .field = "color mode", .value = "texture", .bound = {}});
+    throw Error("the data bring no texture", {.field = "color mode", .value = "texture"});
   if (has_texture && (mode == ColorMode::texture || mode == ColorMode::automatic))
     return prepare_textured(*textured, layer, terrain_from_scene);
   return {prepare_layer(layer, terrain_from_scene)};

@@ -37,8 +37,7 @@ void check(const SceneViewOptions& options) {
   const auto check_side = [](const char* name, int value) {
     if (value < 1 || value > max_side_px)
       throw Error("no picture can have this size",
-                  {.file = {},
-                   .field = name,
+                  {.field = name,
                    .value = std::to_string(value),
                    .bound = ">= 1 and <= " + std::to_string(max_side_px)});
   };

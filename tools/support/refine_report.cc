@@ -191,8 +191,8 @@ std::string refinement_json(const std::string& scan, const libmap::RefinementRes
   Json rejected = Json::array();
   for (const libmap::PoseLink& link : result.rejected_links) rejected.push_back(link_json(link));
   Json skipped = Json::array();
-  for (const auto& [node, reason] : result.skipped)
-    skipped.push_back({{"node", node}, {"reason", reason}});
+  for (const auto& [node, fault] : result.skipped)
+    skipped.push_back({{"node", node}, {"reason", fault.what()}});
   Json losses = Json::array();
   for (const libmap::TrackingLoss& loss : result.losses)
     losses.push_back({{"node", loss.node},
@@ -227,8 +227,8 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
                    part.gauge_node);
   fmt::format_to(out, "nodes without links:{}\nnodes without pose:{}\n",
                  numbers_text(result.without_links), numbers_text(result.without_pose));
-  for (const auto& [node, reason] : result.skipped)
-    fmt::format_to(out, "node {} skipped: {}\n", node, reason);
+  for (const auto& [node, fault] : result.skipped)
+    fmt::format_to(out, "node {} skipped: {}\n", node, fault.what());
   for (const libmap::TrackingLoss& loss : result.losses)
     fmt::format_to(out, "odometry lost at node {}: {}\n", loss.node, loss.reason);
   for (const libmap::PoseLink& link : result.rejected_links)

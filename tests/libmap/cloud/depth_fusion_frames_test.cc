@@ -1,6 +1,7 @@
 // What frames fusion takes: several cameras, colours of another size, frames without depth.
 #include <gmock/gmock.h>
 
+#include <atomic>
 #include <cmath>
 #include <functional>
 #include <limits>
@@ -108,7 +109,8 @@ TEST(DepthFusionFrames, FramesThatCannotBeUsedAreSkippedAndNamed) {
   const DepthFusionResult result = fuse_depth(scan, scan.poses);
   EXPECT_EQ(result.frames, 1U);
   ASSERT_EQ(result.skipped.size(), 5U);
-  std::map<int, std::string> faults(result.skipped.begin(), result.skipped.end());
+  std::map<int, std::string> faults;
+  for (const auto& [node, fault] : result.skipped) faults[node] = fault.what();
   EXPECT_THAT(faults.at(2), HasSubstr("ends too early"));
   EXPECT_THAT(faults.at(3), HasSubstr("node 3: it has no depth"));
   EXPECT_THAT(faults.at(4), HasSubstr("stereo"));
@@ -121,6 +123,25 @@ TEST(DepthFusionFrames, FramesThatCannotBeUsedAreSkippedAndNamed) {
     const Error error = error_of([&] { fuse_depth(scan, {scan.poses[0], pose}, strict); });
     EXPECT_THAT(error.what(), HasSubstr("node " + std::to_string(pose.node)));
   }
+}
+
+// Counts how often the depth of a frame is read.
+class CountingScan : public MemoryScan {
+ public:
+  explicit CountingScan(MemoryScan scan) : MemoryScan(std::move(scan)) {}
+  RgbdFrame read_frame(int node, FrameParts parts) const override {
+    if (parts.depth) ++depth_reads;
+    return MemoryScan::read_frame(node, parts);
+  }
+  mutable std::atomic<int> depth_reads = 0;
+};
+
+TEST(DepthFusionFrames, EachDepthImageIsReadOnce) {
+  CountingScan scan(ring_scan(plane_z(0), 6, {}));
+  for (TrajectoryPose& pose : scan.poses)
+    pose.world_from_base.translation().z() += pose.node % 2 == 0 ? 0.01 : -0.01;
+  EXPECT_GT(fuse_depth(scan, scan.poses).registration_rounds, 0);
+  EXPECT_EQ(scan.depth_reads, 6);
 }
 
 TEST(DepthFusionFrames, NothingToFuse) {

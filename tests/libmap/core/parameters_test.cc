@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/test_support.h"
 
 namespace parameters_test {
@@ -34,6 +36,8 @@ struct Options {
   }
 };
 
+void bind(ParameterTable& table, Options& options) { options.bind(table); }
+
 class ParametersTest : public testing::Test {
  protected:
   ParametersTest() { options.bind(table); }
@@ -43,6 +47,22 @@ class ParametersTest : public testing::Test {
   Options options;
   ParameterTable table;
 };
+
+TEST(Parameters, FieldsOutsideTheirBoundsAreNamed) {
+  const auto refused = [](const auto& change) {
+    Options options;
+    change(options);
+    return std::string(error_of([&] { libmap::check_parameters(options); }).what());
+  };
+  EXPECT_NO_THROW(libmap::check_parameters(Options{.seed = ~std::uint64_t{0}, .overrides = {}}));
+  EXPECT_EQ(refused([](Options& o) { o.size_m = 0; }), "size_m is 0: out of range (must be > 0)");
+  EXPECT_EQ(refused([](Options& o) { o.height_m = std::nan(""); }),
+            "height_m is nan: out of range (must be a finite number)");
+  EXPECT_EQ(refused([](Options& o) { o.layers = 11; }),
+            "layers is 11: out of range (must be >= 0 and <= 10)");
+  EXPECT_EQ(refused([](Options& o) { o.shape = static_cast<Shape>(7); }),
+            "shape: unknown name (must be one of round square)");
+}
 
 TEST_F(ParametersTest, GetsAndSetsTheFields) {
   EXPECT_EQ(table.find("size_m")->get(), "0.01");

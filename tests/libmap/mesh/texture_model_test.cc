@@ -335,7 +335,7 @@ class GapScan : public PaintedScan {
  public:
   using PaintedScan::PaintedScan;
   libmap::RgbdFrame read_frame(int node, libmap::FrameParts parts = {}) const override {
-    if (node == broken) throw libmap::Error("painted: node 2: broken");
+    if (node == broken) throw libmap::Error("broken", {.file = "painted", .field = "node 2"});
     libmap::RgbdFrame frame = PaintedScan::read_frame(node, parts);
     if (without_color) frame.color = {};
     return frame;
@@ -353,8 +353,10 @@ TEST(TextureModel, FramesThatCannotBeUsed) {
   const TextureResult result = libmap::texture_mesh(mesh, scan, poses);
   EXPECT_EQ(result.photos, 2U);
   ASSERT_EQ(result.skipped.size(), 2U);
-  EXPECT_EQ(result.skipped[0], std::pair(2, std::string("painted: node 2: broken")));
-  EXPECT_NE(result.skipped[1].second.find("pose is not finite"), std::string::npos);
+  EXPECT_EQ(result.skipped[0].first, 2);
+  EXPECT_STREQ(result.skipped[0].second.what(), "painted: node 2: broken");
+  EXPECT_EQ(result.skipped[0].second.context().file, "painted");
+  EXPECT_EQ(result.skipped[1].second.reason(), "node 3: its pose is not finite");
   TextureOptions strict;
   strict.strict = true;
   EXPECT_THROW(libmap::texture_mesh(mesh, scan, poses, strict), libmap::Error);

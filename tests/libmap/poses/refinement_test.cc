@@ -207,9 +207,9 @@ TEST(Features, OptionsOutOfTheirRangesAreNamed) {
                        }).what());
   };
   EXPECT_EQ(refusal([](auto& o) { o.max_features = 0; }),
-            "max_features is 0: features cannot be found so (must be >= 1 and <= 1e+05)");
+            "max_features is 0: out of range (must be >= 1 and <= 1e+05)");
   EXPECT_EQ(refusal([](auto& o) { o.pixel_noise_px = 0.0; }),
-            "pixel_noise_px is 0: features cannot be found so (must be > 0)");
+            "pixel_noise_px is 0: out of range (must be > 0)");
   EXPECT_EQ(refusal([](auto& o) {
               o.planes.max_depth_m = o.planes.min_depth_m;
             }).substr(0, std::string("max_depth_m is ").size()),

@@ -434,7 +434,7 @@ TEST(ColmapBuilder, WithoutDepthThereAreCamerasAlone) {
 
 TEST(ColmapBuilder, RefusesNoSpacingAndPosesThatAreNotFinite) {
   EXPECT_EQ(std::string(error_of([] { ColmapBuilder({.point_spacing_px = 0}); }).what()),
-            "point_spacing_px is 0: no distance between points (must be >= 1)");
+            "point_spacing_px is 0: out of range (must be >= 1 and <= 10000)");
   ColmapBuilder builder;
   Pose lost = above(0.0);
   lost.translation().x() = NAN;
