@@ -15,7 +15,9 @@ install(TARGETS ${graspmap_libraries} EXPORT graspmap_targets
 install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   FILES_MATCHING PATTERN "*.h"
   PATTERN *_body.h EXCLUDE
+  PATTERN instruction_set_loops.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
+  PATTERN pose_residuals.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
 install(DIRECTORY data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sites data/field_test

@@ -21,8 +21,8 @@ std::vector<Eigen::Vector3f> to_float(const std::vector<Eigen::Vector3d>& points
   return floats;
 }
 
-// Positions alone: the program's thinning drops all else that it does not use later.
-PointCloud thinned(const PointCloud& cloud, double leaf_m) {
+// Positions alone: the program's downsampling drops all else that it does not use later.
+PointCloud downsampled(const PointCloud& cloud, double leaf_m) {
   PointCloud thin;
   thin.viewpoint = cloud.viewpoint;
   for (const Eigen::Vector3f& centroid : thin_to_centroids(to_float(cloud.positions), leaf_m))
@@ -41,9 +41,9 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& opti
   const bool thesis = follows_thesis(options.scenario.method);
   PointCloud cloud = input;
   if (thesis) {
-    cloud = libmap::timed(result.timings_s, "thinning",
-                          [&] { return thinned(input, options.scenario.voxel_size_m); });
-    result.thinned_points = cloud.size();
+    cloud = libmap::timed(result.timings_s, "downsampling",
+                          [&] { return downsampled(input, options.scenario.voxel_size_m); });
+    result.downsampled_points = cloud.size();
   }
   const PlaneMethod method = thesis ? PlaneMethod::thesis : PlaneMethod::corrected;
   return libmap::timed(result.timings_s, "regression plane", [&] {
@@ -89,7 +89,7 @@ VoxelGrid make_grid(const std::vector<Eigen::Vector3d>& points, const Scenario& 
   });
 }
 
-void judge_obstacles(const Scenario& scenario, DetectionResult& result) {
+void evaluate_obstacles(const Scenario& scenario, DetectionResult& result) {
   std::vector<Voxel> voxels;
   std::vector<float> slopes_deg;
   for (const MapVoxel& one : result.map.voxels) {
@@ -156,11 +156,11 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.map.voxels = std::move(detected.voxels);
   result.unoriented_voxels = detected.unoriented_voxels;
   result.map.content = content_of(scenario);
-  if (scenario.judges_obstacles() && options.share.count == 1)
-    libmap::timed(result.timings_s, "obstacles", [&] { judge_obstacles(scenario, result); });
+  if (scenario.evaluates_obstacles() && options.share.count == 1)
+    libmap::timed(result.timings_s, "obstacles", [&] { evaluate_obstacles(scenario, result); });
   for (const MapVoxel& voxel : result.map.voxels) {
     result.graspable_voxels += voxel.graspable ? 1 : 0;
-    result.edge_voxels += voxel.edge ? 1 : 0;
+    result.border_voxels += voxel.border ? 1 : 0;
   }
   return result;
 }

@@ -34,8 +34,8 @@ struct DetectionResult {
   GraspabilityMap map;
   GripperMask mask;
   std::optional<RegressionPlane> plane;
-  std::size_t points = 0;          // of the input
-  std::size_t thinned_points = 0;  // after thinning, which only `thesis` does
+  std::size_t points = 0;              // of the input
+  std::size_t downsampled_points = 0;  // after downsampling, which only `thesis` does
   std::size_t interpolated_points = 0;
   double grid_spacing_m = 0.0;  // of the interpolation
   std::size_t occupied_voxels = 0;
@@ -45,13 +45,14 @@ struct DetectionResult {
   std::size_t curvature_points = 0;  // whose curvature was measured
   std::size_t convex_points = 0;
   std::size_t graspable_voxels = 0;
-  std::size_t edge_voxels = 0;
-  std::size_t unoriented_voxels = 0;  // orientation surface: without a normal, so judged upright
+  std::size_t border_voxels = 0;
+  std::size_t unoriented_voxels = 0;  // orientation surface: without a normal, so evaluated upright
   std::size_t obstacle_voxels = 0;    // of the whole map alone, not of a share
   libmap::StageTimings timings_s;     // wall time of each step
 };
 
-// The gripper of `options`: its own, else the scenario's with its overrides. Throws as find_gripper.
+// The gripper of `options`: its own, else the scenario's with its overrides. Throws as
+// find_gripper.
 Gripper gripper_of(const DetectionOptions& options);
 
 // Throws Error for an empty cloud, options out of their bounds, and what the steps throw.

@@ -14,9 +14,9 @@ namespace {
 
 using libmap::PointCloud;
 
-constexpr std::size_t most_stored_tiles = std::size_t{1} << 20U;
+constexpr std::size_t max_stored_tiles = std::size_t{1} << 20U;
 // However few points they have: each takes some memory while it is worked on.
-constexpr std::size_t most_tiles_at_once = std::size_t{1} << 14U;
+constexpr std::size_t max_tiles_at_once = std::size_t{1} << 14U;
 
 TileBounds cut(const TileBounds& a, const TileBounds& b) {
   return {std::max(a.i_begin, b.i_begin), std::min(a.i_end, b.i_end),
@@ -42,7 +42,7 @@ class StreamedDetection {
         scenario_(options.scenario),
         max_points_(std::max<std::size_t>(streaming.max_points, 1)),
         mask_(make_gripper_mask(gripper_of(options), {scenario_.method, scenario_.voxel_size_m,
-                                                  scenario_.extra_void_layers})),
+                                                      scenario_.extra_void_layers})),
         tile_voxels_(tile_voxels(scenario_)),
         halo_(halo_voxels(mask_, scenario_)) {}
 
@@ -52,7 +52,7 @@ class StreamedDetection {
            libmap::Progress& progress) {
     const Block block = block_of(std::move(tiles));
     if (block.tiles.size() > 1 &&
-        (block.tiles.size() > most_tiles_at_once || !is_small(block.columns))) {
+        (block.tiles.size() > max_tiles_at_once || !is_small(block.columns))) {
       auto [first, second] = halves(block);
       run(std::move(first), visit, progress);
       run(std::move(second), visit, progress);
@@ -174,7 +174,7 @@ void require_streamable(const DetectionOptions& options) {
   if (options.scenario.interpolation)
     throw libmap::Error("needs the whole cloud in memory: write a map in one file, MAP.pcd",
                         {.field = "interpolation", .value = "true"});
-  if (options.scenario.judges_obstacles())
+  if (options.scenario.evaluates_obstacles())
     throw libmap::Error("needs the whole map in memory: write a map in one file, MAP.pcd",
                         {.field = "obstacle_height_m",
                          .value = libmap::to_text(options.scenario.obstacle_height_m)});
@@ -215,12 +215,12 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
   std::vector<TileNumber> numbers;
   std::vector<TileBounds> all = make_tiles(box, tile_voxels);
   // Each is a line of a journal, and a file if it has voxels.
-  if (all.size() > most_stored_tiles)
+  if (all.size() > max_stored_tiles)
     throw libmap::Error(
         "too small: the tile store would have " + std::to_string(all.size()) + " tiles",
         {.field = "tile_size_m",
          .value = libmap::to_text(tile_voxels * frame.lattice.voxel_size_m),
-         .bound = "at most " + std::to_string(most_stored_tiles) + " tiles"});
+         .bound = "at most " + std::to_string(max_stored_tiles) + " tiles"});
   const std::vector<TileBounds> tiles = share_of(std::move(all), share);
   numbers.reserve(tiles.size());
   for (const TileBounds& tile : tiles)

@@ -24,7 +24,7 @@ struct TerrainFrame {
 };
 
 // Throws Error naming the option that needs the whole cloud in memory: `method` thesis or envelope
-// (their thinning and lattice), `interpolation`.
+// (their downsampling and lattice), `interpolation`.
 void require_streamable(const DetectionOptions& options);
 
 // Throws Error for no points, and what the steps throw.
@@ -59,7 +59,7 @@ struct StreamingOptions {
   std::size_t max_points = 1'000'000;
 };
 
-// Rectangle in metres that holds all points on which the tile depends.
+// Rectangle in meters that holds all points on which the tile depends.
 struct PointsRectangle {
   Eigen::Vector2d low;
   Eigen::Vector2d high;

@@ -24,7 +24,7 @@ CurvatureMethod curvature_method(const Scenario& scenario) {
 }
 
 // How far off the points lie that decide on the curvature at a point: PCL's looks at the normals
-// of its neighbours, which have neighbours of their own.
+// of its neighbors, which have neighbors of their own.
 double curvature_reach_m(const Scenario& scenario) {
   const double reach = scenario.curvature_radius_m * (1 + 1e-6);
   return curvature_method(scenario) == CurvatureMethod::thesis ? 2 * reach : reach;
@@ -53,7 +53,7 @@ class TilesWithMargin {
     const Eigen::Vector3d cell = lattice_.cell_of(point);
     if (!holds(box_, cell)) return false;
     if (fill_box_) return !tiles_.empty();
-    // Neighbouring points lie in the same tile mostly.
+    // Neighboring points lie in the same tile mostly.
     if (last_ < tiles_.size() && holds(tiles_[last_], cell)) return true;
     for (last_ = 0; last_ < tiles_.size(); ++last_)
       if (holds(tiles_[last_], cell)) return true;
@@ -122,7 +122,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                                  const std::vector<SurfaceNormal>& surface,
                                  const std::vector<std::uint8_t>& convex,
                                  const VoxelLattice& lattice, const Scenario& scenario) {
-  const bool judge_convexity = scenario.curvature_radius_m > 0.0;
+  const bool evaluate_convexity = scenario.curvature_radius_m > 0.0;
   std::vector<MapVoxel> voxels;
   voxels.reserve(scored.size());
   for (std::size_t n = 0; n < scored.size(); ++n) {
@@ -131,7 +131,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .score = scored[n].score,
                    .convex = convex[n] != 0,
                    .graspable = false,
-                   .edge = scored[n].edge};
+                   .border = scored[n].border};
     if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
     if (scenario.orientation == Orientation::surface && surface[n].normal.allFinite())
       voxel.normal = surface[n].normal;
@@ -139,7 +139,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
     voxel.graspable =
         meets_threshold(voxel.counts, voxel.score, scenario.method, scenario.solid_voxel_threshold,
                         scenario.graspability_threshold) &&
-        height >= scenario.zero_plane_m && (voxel.convex || !judge_convexity);
+        height >= scenario.zero_plane_m && (voxel.convex || !evaluate_convexity);
     voxels.push_back(voxel);
   }
   return voxels;
@@ -208,7 +208,7 @@ double normal_radius_m(const GripperMask& mask, const Scenario& scenario) {
 
 MapContent content_of(const Scenario& scenario) {
   return {.normals = scenario.orientation == Orientation::surface,
-          .slopes = scenario.judges_obstacles()};
+          .slopes = scenario.evaluates_obstacles()};
 }
 
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,

@@ -23,7 +23,7 @@ bool follows_thesis(Method method);
 int tile_voxels(const Scenario& scenario);
 
 // How many columns around a tile its voxels depend on: the mask's window, the closing of the
-// scanned area, the points that decide on convexity with all their neighbours, and those on the
+// scanned area, the points that decide on convexity with all their neighbors, and those on the
 // surface's normal. Not of interpolation or obstacles, which look at the whole terrain.
 int halo_voxels(const GripperMask& mask, const Scenario& scenario);
 

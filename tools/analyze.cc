@@ -182,7 +182,7 @@ std::string percent_text(const std::optional<double>& share) {
 
 void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
   const libgtd::MapAnalysis& ground = analysis.ground;
-  run.say(fmt::format("{} of {} voxels judged: {:.3f} m2 of ground, {:.4f} m2 ({}) can be held",
+  run.say(fmt::format("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) can be held",
                       ground.ground.voxels, ground.voxels, ground.ground.area_m2,
                       ground.ground.graspable_area_m2,
                       percent_text(ground.ground.graspable_share())));
@@ -209,7 +209,7 @@ void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& ru
 }
 
 void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, Run& run) {
-  const libgtd::ChangeSummary& judged = change.judged;
+  const libgtd::ChangeSummary& evaluated = change.evaluated;
   run.say(fmt::format(
       "{} voxels in common ({}), {} in MAP alone, {} in OTHER alone", change.pairs.size(),
       change.matching == libgtd::VoxelMatching::lattice
@@ -217,18 +217,18 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
           : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
       change.only_map.size(), change.only_other.size()));
   run.say(fmt::format(
-      "of {} judged in both: kappa {}, accuracy {}; can be held in both {}, in MAP alone {}, in "
+      "of {} evaluated in both: kappa {}, accuracy {}; can be held in both {}, in MAP alone {}, in "
       "OTHER alone {}",
-      judged.graspable.size(),
-      judged.kappa ? fmt::format("{:.3f} (standard error {:.3f})", judged.kappa->value,
-                                 judged.kappa->standard_error)
-                   : "not defined",
-      percent_text(judged.graspable.accuracy().value()), judged.graspable.true_positives,
-      judged.lost(), judged.gained()));
-  if (judged.difference.count > 0)
+      evaluated.graspable.size(),
+      evaluated.kappa ? fmt::format("{:.3f} (standard error {:.3f})", evaluated.kappa->value,
+                                    evaluated.kappa->standard_error)
+                      : "not defined",
+      percent_text(evaluated.graspable.accuracy().value()), evaluated.graspable.true_positives,
+      evaluated.lost(), evaluated.gained()));
+  if (evaluated.difference.count > 0)
     run.say(fmt::format("score, OTHER less MAP: mean {:+.3f}, mean size {:.3f}, rms {:.3f}",
-                        judged.difference.mean, judged.difference.mean_absolute,
-                        judged.difference.rms));
+                        evaluated.difference.mean, evaluated.difference.mean_absolute,
+                        evaluated.difference.rms));
 }
 
 void note_results(const Analysis& analysis, const Comparison* comparison, Run& run) {
@@ -236,7 +236,7 @@ void note_results(const Analysis& analysis, const Comparison* comparison, Run& r
   const graspmap_tools::ResultCounts count(run.manifest());
   const libgtd::MapAnalysis& ground = analysis.ground;
   count("voxels", ground.voxels);
-  count("judged_voxels", ground.ground.voxels);
+  count("evaluated_voxels", ground.ground.voxels);
   results.emplace_back("surface_area_m2", ground.ground.area_m2);
   results.emplace_back("graspable_surface_area_m2", ground.ground.graspable_area_m2);
   results.emplace_back("column_coverage", ground.column_coverage);
@@ -249,8 +249,8 @@ void note_results(const Analysis& analysis, const Comparison* comparison, Run& r
   const libgtd::MapChange& change = comparison->change;
   results.emplace_back("matching", std::string(to_text(change.matching)));
   count("voxels_in_common", change.pairs.size());
-  count("judged_in_both", change.judged.graspable.size());
-  if (change.judged.kappa) results.emplace_back("kappa", change.judged.kappa->value);
+  count("evaluated_in_both", change.evaluated.graspable.size());
+  if (change.evaluated.kappa) results.emplace_back("kappa", change.evaluated.kappa->value);
   run.manifest().transforms.emplace_back("map_terrain_from_other_terrain",
                                          comparison->map_terrain_from_other_terrain);
 }
@@ -299,7 +299,7 @@ void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const
   const libgtd::MapChange& change = comparison->change;
   picture.title = fmt::format(
       "MAP {}, OTHER {}{}", name, short_name(options.other),
-      change.judged.kappa ? fmt::format(": kappa {:.2f}", change.judged.kappa->value) : "");
+      change.evaluated.kappa ? fmt::format(": kappa {:.2f}", change.evaluated.kappa->value) : "");
   write("change.png", graspmap_tools::draw_change(picture, change, comparison->other.voxels,
                                                   comparison->map_terrain_from_other_terrain));
   write("change_score.png",
@@ -328,7 +328,7 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
   libmap::write_cloud(
       folder / "change.pcd",
       libgtd::to_cloud(comparison->change, map.voxels, comparison->other.voxels,
-                       comparison->map_terrain_from_other_terrain, options.change.edges));
+                       comparison->map_terrain_from_other_terrain, options.change.border));
 }
 
 void analyze(AnalyzeOptions& options, Run& run) {
@@ -351,7 +351,7 @@ void analyze(AnalyzeOptions& options, Run& run) {
     throw libmap::Error("is for comparing with OTHER, which is not given",
                         {.field = "--transform", .value = options.transform});
   run.claim_output_tree(options.folder, output_names(), {options.map, options.other});
-  options.regions.edges = options.change.edges = options.analysis.edges;
+  options.regions.border = options.change.border = options.analysis.border;
   options.change.height_bin_m = options.analysis.height_bin_m;
   options.change.slope_bin_deg = options.analysis.slope_bin_deg;
   const ReadMap map = run.timed("read", [&] { return read_map(options.map, run); });

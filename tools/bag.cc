@@ -96,10 +96,10 @@ std::optional<double> graspmap_tools::bag_stamp(const BagCommandOptions& options
   if (options.stamp == "auto") return std::nullopt;
   const std::optional<double> stamp = libmap::parse_double(options.stamp);
   if (!stamp || !std::isfinite(*stamp))
-    throw libmap::Error("no such moment", {.file = {},
-                                           .field = "--stamp",
-                                           .value = options.stamp,
-                                           .bound = "a number of seconds, or auto"});
+    throw libmap::Error("no such time", {.file = {},
+                                         .field = "--stamp",
+                                         .value = options.stamp,
+                                         .bound = "a number of seconds, or auto"});
   return stamp;
 }
 
@@ -120,7 +120,7 @@ int main(int argc, char** argv) {
                  "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
                  "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag",
                  false);
-  command.flag("--list", options.list, "print what the bag holds and do nothing else");
+  command.flag("--list", options.list, "print what the bag contains and do nothing else");
   command.flag("--json", options.json, "print it as JSON");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
                  "topics of depth images, or of the cloud (repeatable); else all that are found");

@@ -75,14 +75,14 @@ std::vector<std::string> image_files(const std::vector<std::string>& given) {
     for (const fs::directory_entry& entry : fs::directory_iterator(path))
       if (entry.is_regular_file() && has_image_extension(entry.path()))
         inside.push_back(entry.path().string());
-    if (inside.empty()) throw libmap::Error("holds no .png or .jpg image", {.file = path});
+    if (inside.empty()) throw libmap::Error("contains no .png or .jpg image", {.file = path});
     std::sort(inside.begin(), inside.end());
     files.insert(files.end(), inside.begin(), inside.end());
   }
   return files;
 }
 
-// The search takes some 30 bytes a pixel.
+// The search takes some 30 bytes per pixel.
 constexpr std::int64_t max_pixels = std::int64_t{1} << 24;
 
 Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
@@ -338,7 +338,7 @@ void calibrate(CalibrateOptions& options, Run& run) {
   });
 }
 
-// Boards are sold by millimetres: the flag may carry its unit.
+// Boards are sold by millimeters: the flag may carry its unit.
 void drop_unit_of_square(std::vector<std::string>& words) {
   const std::string with_unit = "--square-mm";
   for (std::string& word : words)

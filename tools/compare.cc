@@ -58,7 +58,7 @@ void bind(libmap::ParameterTable& table, CompareOptions& options) {
   table.add("icp", options.icp, "align A with B by point-to-plane ICP first");
   bind(table, options.alignment);
   table.add("picture_range_m", options.picture_range_m, libmap::not_negative,
-            "distance at the end of the picture's colours, m; 0: that of 98 of 100 points");
+            "distance at the end of the picture's colors, m; 0: that of 98 of 100 points");
   table.add("picture_view", options.view.view,
             {{"top", libmap::Viewpoint::top},
              {"oblique", libmap::Viewpoint::oblique},
@@ -93,18 +93,18 @@ Shape read_shape(const std::string& file, const CompareOptions& options) {
 // was carried there by a wrong transform.
 void require_nearness(const libmap::ReferenceSurface& surface, const libmap::PointCloud& cloud,
                       const CompareOptions& options) {
-  constexpr double most_sizes = 100;
+  constexpr double max_sizes = 100;
   const libmap::Bounds3d& b = surface.bounds();
   const libmap::Bounds3d a = libmap::bounds_of(cloud.positions);
   const double size = (b.max - b.min).norm();
   if (size == 0.0) return;  // one place: near and far are the same work
   const double apart = ((a.max + a.min) / 2 - (b.max + b.min) / 2).norm();
-  if (!(apart <= most_sizes * size))
-    throw libmap::Error("the two lie too far apart to be compared",
+  if (!(apart <= max_sizes * size))
+    throw libmap::Error("the two are too far apart to be compared",
                         {.file = options.a,
-                         .field = "distance of the centres",
+                         .field = "distance of the centers",
                          .value = libmap::to_text(static_cast<float>(apart)) + " m",
-                         .bound = "<= " + libmap::to_text(static_cast<float>(most_sizes * size)) +
+                         .bound = "<= " + libmap::to_text(static_cast<float>(max_sizes * size)) +
                                   " m, 100 times the size of " + options.b});
 }
 
@@ -329,7 +329,7 @@ void add_results(const Comparison& comparison, libmap::Manifest& manifest) {
   add("icp_free_motions", static_cast<std::int64_t>(found.free_motions));
 }
 
-// The points of A by their signed distance, in millimetres.
+// The points of A by their signed distance, in millimeters.
 libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions& options) {
   const bool has_sides = comparison.bias_m.has_value();
   const std::string name = has_sides ? "signed distance [mm]" : "distance [mm]";
@@ -404,9 +404,9 @@ int compare_surfaces(int argc, char** argv) {
   command.output(options.output,
                  "A's points in B's frame with the fields distance and signed_distance", false);
   command.option("--picture", "FILE.png", options.picture,
-                 "A's points coloured by their signed distance");
+                 "A's points colored by their signed distance");
   command.option("--transform", "X,Y,Z,ROLL,PITCH,YAW|FILE|crop", options.transform,
-                 "b_from_a: metres and degrees about the fixed axes, roll first; a file of four "
+                 "b_from_a: meters and degrees about the fixed axes, roll first; a file of four "
                  "rows of four numbers, as crop writes; crop: A or B was cropped from the other's "
                  "map, as the manifests say");
   command.option("--box", "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX", options.box,

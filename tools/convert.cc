@@ -104,7 +104,7 @@ void tell_losses(const libmap::TriangleMesh& mesh, const std::string& format, Ru
   const bool geometry_alone = format == ".stl" || format == ".off";
   const bool no_fields = geometry_alone || format == ".obj" || format == ".glb";
   std::vector<std::string> lost;
-  if (geometry_alone && !mesh.vertex_colors.empty()) lost.emplace_back("colours");
+  if (geometry_alone && !mesh.vertex_colors.empty()) lost.emplace_back("colors");
   if (no_fields)
     for (const auto* fields : {&mesh.vertex_fields, &mesh.face_fields})
       for (const libmap::ScalarField& field : *fields) lost.push_back(field.name);
@@ -122,7 +122,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
   if (read.dropped_points > 0)
     run.warn(fmt::format("{} points without a position were dropped", read.dropped_points));
   if (holds_meshes_alone(options.output))
-    throw libmap::Error("a cloud has no faces: this format holds meshes alone",
+    throw libmap::Error("a cloud has no faces: this format contains meshes alone",
                         {.file = options.output});
   run.manifest().results.emplace_back("points", static_cast<std::int64_t>(read.cloud.size()));
   add_input(options, run);
@@ -168,7 +168,7 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   tell_losses(mesh, libmap::format_of(options.output), run);
   const bool to_cloud = holds_clouds_alone(options.output);
-  if (to_cloud) run.say("the output holds the mesh's vertices alone");
+  if (to_cloud) run.say("the output contains the mesh's vertices alone");
   run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
   run.manifest().results.emplace_back("triangles",
                                       static_cast<std::int64_t>(mesh.triangles.size()));
@@ -224,15 +224,21 @@ void convert(ConvertOptions& options, Run& run) {
     convert_cloud(options, run);
 }
 
-// A database, or a folder of frames.
+// A database, or a folder of frames. A folder that is converted to a file is another one, such as a
+// model of COLMAP.
 bool names_scan(int argc, char** argv) {
+  bool has_scan = false;
+  bool to_file = false;
   for (int n = 1; n < argc; ++n) {
     const std::string word = argv[n];
     const bool is_output =
         n > 1 && (std::string(argv[n - 1]) == "-o" || std::string(argv[n - 1]) == "--output");
-    if (!is_output && !word.starts_with("-") && graspmap_tools::is_scan_path(word)) return true;
+    if (is_output) to_file = std::filesystem::path(word).has_extension();
+    if (is_output || word.starts_with("-")) continue;
+    if (word.ends_with(".db")) return true;
+    has_scan = has_scan || graspmap_tools::is_scan_path(word);
   }
-  return false;
+  return has_scan && !to_file;
 }
 
 int convert_file(int argc, char** argv) {
@@ -242,7 +248,8 @@ int convert_file(int argc, char** argv) {
                  "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), poses (.tum .kitti .g2o .toro "
                  "...), tile store (.tiles), or all shares of a map");
   command.output(options.output,
-                 "the same in the format of this extension, or .vtp for ParaView; of tiles and shares the whole map, the "
+                 "the same in the format of this extension, or .vtp for ParaView; of tiles and "
+                 "shares the whole map, the "
                  "same bytes as in one run");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},

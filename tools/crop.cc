@@ -56,7 +56,7 @@ void bind(libmap::ParameterTable& table, CropCommandOptions& options) {
 }
 
 libmap::Bounds3d box_of(const std::string& text) {
-  const char* bound = "XMIN,YMIN,XMAX,YMAX or XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX in metres";
+  const char* bound = "XMIN,YMIN,XMAX,YMAX or XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX in meters";
   constexpr double open = std::numeric_limits<double>::infinity();
   const std::vector<double> n = std::count(text.begin(), text.end(), ',') == 5
                                     ? graspmap_tools::parse_numbers(text, 6, "--box", bound)
@@ -76,7 +76,7 @@ Eigen::Vector2d size_of(const std::string& text) {
   if (!x || !y || !(*x > 0.0) || !(*y > 0.0) || !std::isfinite(*x) || !std::isfinite(*y))
     throw libmap::Error(
         "no such size",
-        {.field = "--size", .value = text, .bound = "WIDTHxHEIGHT in metres, each > 0, e.g. 3x3"});
+        {.field = "--size", .value = text, .bound = "WIDTHxHEIGHT in meters, each > 0, e.g. 3x3"});
   return {*x, *y};
 }
 
@@ -286,7 +286,7 @@ int main(int argc, char** argv) {
   command.option("--polygon", "FILE.csv", options.polygon,
                  "keep what stands on it: columns x, y, in order round it, convex or not");
   command.option("--size", "WIDTHxHEIGHT", options.size,
-                 "keep the rectangle of this size that lies best centred in the data, m");
+                 "keep the rectangle of this size that lies best centered in the data, m");
   command.flag("--border", options.border, "keep what a white band on the ground frames");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { crop(options, run); });

@@ -123,7 +123,7 @@ void evaluate(EvaluateOptions& options, Run& run) {
 int main(int argc, char** argv) {
   EvaluateOptions options;
   graspmap_tools::Command command("evaluate");
-  command.input("TABLE.csv", options.table, "labels and scores, one row a location");
+  command.input("TABLE.csv", options.table, "labels and scores, one row per location");
   command.output(
       options.folder,
       "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");

@@ -47,14 +47,14 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
                                       static_cast<std::int64_t>(result.footholds.size()));
   run.say(fmt::format("{} footholds among {} voxels that may be one", result.footholds.size(),
                       result.candidates));
-  run.manifest().results.emplace_back("candidates_at_edges",
-                                      static_cast<std::int64_t>(result.at_edges));
+  run.manifest().results.emplace_back("candidates_at_border",
+                                      static_cast<std::int64_t>(result.at_border));
   if (result.footholds.empty())
     run.warn(fmt::format(
         "{}: no voxel may be a foothold{}", options.map,
-        result.at_edges == 0
+        result.at_border == 0
             ? ""
-            : fmt::format("; {} at the scan's edges are left out (--edges)", result.at_edges)));
+            : fmt::format("; {} at the scan's edges are left out (--edges)", result.at_border)));
   const libmap::PointCloud cloud = libgtd::to_cloud(result, map);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });

@@ -1,4 +1,4 @@
-// graspmap fuse: the depth images of a scan -> one oriented, coloured cloud.
+// graspmap fuse: the depth images of a scan -> one oriented, colored cloud.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -82,7 +82,7 @@ void say_result(const libmap::DepthFusionResult& result, const FuseOptions& opti
     run.warn(
         fmt::format("--min-views {} leaves no point: the cloud is empty; {} frames see one "
                     "at most",
-                    options.fusion.min_views, result.points.most_views));
+                    options.fusion.min_views, result.points.max_views));
   else
     run.warn("nothing was measured within the limits: the cloud is empty");
 }

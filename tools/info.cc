@@ -292,7 +292,7 @@ int main(int argc, char** argv) {
   command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or ROS 1 bag");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify,
-               "read all that a scan or a tile store holds and list what is broken");
+               "read all that a scan or a tile store contains and list what is broken");
   command.flag("--quick", options.quick, "do not look for self-intersections of a mesh");
   return command.run(argc, argv, [&](Run& run) { info(options, run); });
 }

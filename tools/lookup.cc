@@ -228,7 +228,7 @@ void lookup(LookupCommandOptions& options, Run& run) {
   run.add_input(options.points);
   run.manifest().results.emplace_back("points", static_cast<std::int64_t>(map.answers.size()));
   run.manifest().results.emplace_back("found", found);
-  run.say(fmt::format("{} of {} points lie on the map", found, map.answers.size()));
+  run.say(fmt::format("{} of {} points are on the map", found, map.answers.size()));
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_geometry_file(temporary,
                                 [&](std::ostream& out) { write_answers(out, table, cells, map); });
@@ -241,7 +241,7 @@ int main(int argc, char** argv) {
   LookupCommandOptions options;
   graspmap_tools::Command command("lookup");
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
-  command.input("POINTS", options.points, "CSV with the columns x, y, z in metres, and any others");
+  command.input("POINTS", options.points, "CSV with the columns x, y, z in meters, and any others");
   command.output(options.output, "CSV: the points, each with the map's values there");
   command.option("--visible", "CLOUD", options.visible,
                  "what was measured, in the frame of the cloud that was scored (usually that "

@@ -133,7 +133,7 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
   if (made.trimmed_triangles == 0)
     throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
                         {.file = options.cloud});
-  throw libmap::Error("no surface lies so near the points",
+  throw libmap::Error("no surface is so near the points",
                       {.file = options.cloud,
                        .field = "trim_distance_cells",
                        .value = libmap::to_text(options.reconstruction.trim_distance_cells)});

@@ -47,7 +47,8 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   add_cost("matches", stage.held_out.matches);
   add_cost("surfaces", stage.held_out.surfaces);
   if (stage.undone)
-    text += stage.held_out.is_worse() ? ", which is worse: undone" : ", which is no better: undone";
+    text += stage.held_out.is_worse() ? ", rejected (validation got worse)"
+                                      : ", which is no better: undone";
   if (stage.error)
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);

@@ -63,11 +63,11 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(file) : error;
   }
-  if (shown.columns_a_point > 0)
-    run.manifest().results.emplace_back("columns_a_point", shown.columns_a_point);
-  if (shown.columns_a_point > 1)
+  if (shown.columns_per_point > 0)
+    run.manifest().results.emplace_back("columns_per_point", shown.columns_per_point);
+  if (shown.columns_per_point > 1)
     run.say(fmt::format("one point for {0} x {0} columns: --box shows a part in full",
-                        shown.columns_a_point));
+                        shown.columns_per_point));
   return image;
 }
 
@@ -120,7 +120,7 @@ int main(int argc, char** argv) {
                  "(.png), are drawn side by side with one legend");
   command.output(options.output, "picture (.png)");
   command.option("--points", "POINTS.csv", options.scene.points,
-                 "places to mark: CSV with the columns x, y, z in metres");
+                 "places to mark: CSV with the columns x, y, z in meters");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { render(options, run); });
 }

@@ -79,7 +79,7 @@ void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& resu
     manifest.results.emplace_back("plane_rmse_m", result.plane->rmse_m);
     manifest.results.emplace_back("up_source", std::string(to_text(result.plane->up_source)));
   }
-  if (result.thinned_points > 0) count("thinned_points", result.thinned_points);
+  if (result.downsampled_points > 0) count("downsampled_points", result.downsampled_points);
   if (options.detection.scenario.interpolation) {
     count("interpolated_points", result.interpolated_points);
     manifest.results.emplace_back("interpolation_grid_m", result.grid_spacing_m);
@@ -89,7 +89,7 @@ void add_results(libmap::Manifest& manifest, const libgtd::DetectionResult& resu
   count("mask_layers", static_cast<std::size_t>(result.mask.layers));
   count("tiles", result.tiles);
   count("scored_voxels", result.map.voxels.size());
-  count("edge_voxels", result.edge_voxels);
+  count("border_voxels", result.border_voxels);
   count("curvature_points", result.curvature_points);
   count("convex_points", result.convex_points);
   count("graspable_voxels", result.graspable_voxels);

@@ -126,7 +126,7 @@ void say_result(const libmap::TextureResult& result, Run& run) {
     run.detail(fmt::format("{}: {:.3f} s", name, seconds));
   run.say(fmt::format(
       "{} photographs, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) "
-      "are seen by none and grey",
+      "are seen by none and gray",
       result.photos, result.charts, result.model.pages.size(),
       result.model.pages.size() == 1 ? "" : "s", 1e3 * result.texel_size_m, result.unseen_triangles,
       result.model.mesh.triangles.size(), result.unseen_m2));
@@ -203,8 +203,9 @@ int main(int argc, char** argv) {
   TextureCommandOptions options;
   graspmap_tools::Command command("texture");
   command.input("MESH", options.mesh, "mesh in the frame of the poses (.ply, .obj, ...)");
-  command.output(options.output,
-                 "textured mesh (.glb; .obj: with STEM.mtl and a picture a page, STEM_0.png ...)");
+  command.output(
+      options.output,
+      "textured mesh (.glb; .obj: with STEM.mtl and a picture per page, STEM_0.png ...)");
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
   graspmap_tools::add_poses_option(command, options.poses);

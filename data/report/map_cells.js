@@ -30,8 +30,8 @@ const FRAGMENT = `
   varying vec3 color;
   void main() { gl_FragColor = vec4(color, 1.0); }`;
 
-// A unit cube without its bottom. Tops have the legend's colour, sides darker ones; these end just
-// below the top, so that those between neighbours of one height do not shine through.
+// A unit cube without its bottom. Tops have the legend's color, sides darker ones; these end just
+// below the top, so that those between neighbors of one height do not shine through.
 function cubeFaces() {
   const t = 0.96;
   const faces = [

@@ -25,7 +25,7 @@ std::string text(double value) {
 std::string text(std::optional<double> value) { return value ? text(*value) : std::string(); }
 
 void add_place(const Eigen::Vector3d& place, std::vector<std::string>& row) {
-  // To the micrometre: in single precision a place in UTM coordinates would be off by decimetres.
+  // To the micrometer: in single precision a place in UTM coordinates would be off by decimeters.
   constexpr double steps_a_m = 1e6;
   for (const double coordinate : place)
     row.push_back(std::isfinite(coordinate)
@@ -89,29 +89,29 @@ Json json_of(const MapAnalysis& analysis) {
   json["voxels"] = {{"all", analysis.voxels},
                     {"without_score", analysis.without_score},
                     {"below_zero_plane", analysis.below_zero_plane},
-                    {"at_edges", analysis.at_edges},
+                    {"at_border", analysis.at_border},
                     {"obstacles", analysis.obstacles},
                     {"graspable", analysis.graspable},
-                    {"judged", ground.voxels},
-                    {"judged_graspable", ground.graspable_voxels}};
-  json["judged"] = {{"surface_area_m2", ground.area_m2},
-                    {"graspable_surface_area_m2", ground.graspable_area_m2},
-                    {"graspable_share", json_of(ground.graspable_share())},
-                    {"plan_area_m2", analysis.plan_area_m2},
-                    {"graspable_plan_area_m2", analysis.graspable_plan_area_m2},
-                    {"columns", analysis.columns},
-                    {"graspable_columns", analysis.graspable_columns},
-                    {"mean_score", json_of(ground.mean_score())},
-                    {"min_height_m", ground.low},
-                    {"max_height_m", ground.high},
-                    {"column_coverage", analysis.column_coverage}};
+                    {"evaluated", ground.voxels},
+                    {"evaluated_graspable", ground.graspable_voxels}};
+  json["evaluated"] = {{"surface_area_m2", ground.area_m2},
+                       {"graspable_surface_area_m2", ground.graspable_area_m2},
+                       {"graspable_share", json_of(ground.graspable_share())},
+                       {"plan_area_m2", analysis.plan_area_m2},
+                       {"graspable_plan_area_m2", analysis.graspable_plan_area_m2},
+                       {"columns", analysis.columns},
+                       {"graspable_columns", analysis.graspable_columns},
+                       {"mean_score", json_of(ground.mean_score())},
+                       {"min_height_m", ground.low},
+                       {"max_height_m", ground.high},
+                       {"column_coverage", analysis.column_coverage}};
   Json classes = Json::array();
   for (std::size_t n = 0; n < analysis.classes.size(); ++n) {
     const ScoreBin& bin = analysis.classes[n];
     Json entry;
     entry["score_from"] = std::isfinite(bin.low) ? Json(bin.low) : Json(nullptr);
     entry["all"] = bin.all;
-    entry["judged"] = bin.judged;
+    entry["evaluated"] = bin.evaluated;
     entry["area_m2"] = bin.area_m2;
     classes.push_back(std::move(entry));
   }
@@ -180,11 +180,11 @@ void add_change_row(const char* of, const ChangeSummary& summary, bool bounds, T
 
 Table histogram_table(const MapAnalysis& analysis) {
   Table table;
-  table.columns = {"bins",   "score_from", "score_to", "all", "above_zero_plane",
-                   "judged", "graspable",  "area_m2"};
+  table.columns = {"bins",      "score_from", "score_to", "all", "above_zero_plane",
+                   "evaluated", "graspable",  "area_m2"};
   const auto add = [&](const char* bins, const ScoreBin& bin) {
     table.rows.push_back({bins, text(bin.low), text(bin.high), text(bin.all),
-                          text(bin.above_zero_plane), text(bin.judged), text(bin.graspable),
+                          text(bin.above_zero_plane), text(bin.evaluated), text(bin.graspable),
                           text(bin.area_m2)});
   };
   for (const ScoreBin& bin : analysis.classes) add("class", bin);
@@ -214,7 +214,7 @@ Table regions_table(const VoxelMap& map, const MapRegionResult& regions, const R
   for (std::size_t r = 0; r < regions.regions.size(); ++r) {
     const MapRegion& region = regions.regions[r];
     const RegionAccess& access = reach.access[r];
-    // Voxels, not only their centres.
+    // Voxels, not only their centers.
     const Eigen::Vector3d size = (region.max - region.min).array() + map.lattice.voxel_size_m;
     std::vector<std::string> row = {text(r + 1), text(region.voxels.size()), text(region.area_m2),
                                     text(region.plan_area_m2)};
@@ -267,7 +267,7 @@ Table region_links_table(const VoxelMap& map, const RegionReach& reach) {
 Table change_table(const MapChange& change) {
   Table table;
   add_change_row("common", change.common, false, table);
-  add_change_row("judged", change.judged, false, table);
+  add_change_row("evaluated", change.evaluated, false, table);
   for (const ChangeSummary& bin : change.by_height) add_change_row("height_m", bin, true, table);
   for (const ChangeSummary& bin : change.by_slope) add_change_row("slope_deg", bin, true, table);
   return table;
@@ -287,7 +287,7 @@ std::string analysis_json(const MapAnalysis& analysis, const MapSurface& surface
     part["only_in_other"] = {{"voxels", change->only_other.size()},
                              {"graspable", change->only_other_graspable}};
     part["common"] = json_of(change->common);
-    part["judged"] = json_of(change->judged);
+    part["evaluated"] = json_of(change->evaluated);
     json["change"] = std::move(part);
   }
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";

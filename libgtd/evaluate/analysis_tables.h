@@ -26,7 +26,7 @@ libmap::Table regions_table(const VoxelMap& map, const MapRegionResult& regions,
 // One row a pair of regions that the stride or the spanning tree joins.
 libmap::Table region_links_table(const VoxelMap& map, const RegionReach& reach);
 
-// Rows: all voxels in common, those judged, and these by height and by slope.
+// Rows: all voxels in common, those evaluated, and these by height and by slope.
 libmap::Table change_table(const MapChange& change);
 
 // Counts, areas, regions and reach; `change` may be null.

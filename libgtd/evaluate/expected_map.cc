@@ -55,7 +55,7 @@ void check_columns(const libmap::Table& table) {
       throw libmap::Error("unknown column" + libmap::did_you_mean(column, known),
                           {.file = table.file, .field = column});
     if (!seen.insert(column).second)
-      throw libmap::Error("stands twice", {.file = table.file, .field = column});
+      throw libmap::Error("is a duplicate", {.file = table.file, .field = column});
   }
 }
 
@@ -158,7 +158,7 @@ void ExpectedMap::check() const {
     const ExpectedRegion& region = regions[i];
     check_region(region);
     if (!names.insert(region.name).second)
-      throw libmap::Error("stands twice", {.field = "region '" + region.name + "'"});
+      throw libmap::Error("is a duplicate", {.field = "region '" + region.name + "'"});
     any = any || region.graspable.has_value();
     for (std::size_t j = 0; j < i; ++j) {
       const ExpectedRegion& other = regions[j];

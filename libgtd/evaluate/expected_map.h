@@ -18,7 +18,7 @@ namespace libgtd {
 // All points at most `radius_m` from the segment, in space: a ball where its ends coincide.
 struct ExpectedRegion {
   std::string name;
-  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // metres
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // meters
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
   std::optional<bool> graspable;  // nothing: undecided
@@ -31,13 +31,13 @@ struct ExpectedRegion {
 struct ExpectedMap {
   std::vector<ExpectedRegion> regions;
 
-  // Throws Error naming the region: a name that stands twice or is empty, a radius that is not
+  // Throws Error naming the region: a name that is a duplicate or is empty, a radius that is not
   // > 0, a coordinate that is not finite, two regions of different verdicts that overlap, no region
   // with a verdict.
   void check() const;
 };
 
-// Columns region, x, y, z, to_x, to_y, to_z, radius, graspable, why: metres; the three of the
+// Columns region, x, y, z, to_x, to_y, to_z, radius, graspable, why: meters; the three of the
 // segment's other end empty for a ball; `graspable` empty where it is undecided. All columns are
 // required, and no other is known. Throws Error naming file, row and column.
 ExpectedMap parse_expected_map(const libmap::Table& table);
@@ -61,7 +61,7 @@ struct ExpectedMapResult {
   std::size_t unlisted_voxels = 0;    // left out: in none, or without a score
   // Of all voxels with a score, those below the zero plane and at the edge included. A voxel is
   // predicted graspable where its score reaches the cutoff, or where the map's flag says so and it
-  // is no obstacle. One that lies in several regions counts once. Neighbouring voxels are not
+  // is no obstacle. One that lies in several regions counts once. Neighboring voxels are not
   // independent: Wilson intervals of their rates are too narrow, those of the places are not.
   Confusion voxels_by_score;
   std::optional<Confusion> voxels_by_flag;  // nothing if the map has no field "graspable"

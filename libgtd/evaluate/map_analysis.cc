@@ -51,7 +51,7 @@ class MapCounter {
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
     for (std::size_t n = 0; n < map_.size(); ++n) {
-      if (!map_.judged(n, options_.edges)) continue;
+      if (!map_.evaluated(n, options_.border)) continue;
       const double height = map_.center_in_terrain(n).z();
       low = std::min(low, height);
       high = std::max(high, height);
@@ -73,7 +73,7 @@ class MapCounter {
     ++result_.voxels;
     result_.without_score += scored ? 0 : 1;
     result_.below_zero_plane += above ? 0 : 1;
-    result_.at_edges += map_.edge[n] != 0 ? 1 : 0;
+    result_.at_border += map_.border[n] != 0 ? 1 : 0;
     result_.obstacles += map_.obstacle[n] != 0 ? 1 : 0;
     result_.graspable += map_.graspable[n] != 0 ? 1 : 0;
     if (!scored) return;
@@ -84,7 +84,7 @@ class MapCounter {
         add_to(one, n);
         break;
       }
-    if (!map_.judged(n, options_.edges)) return;
+    if (!map_.evaluated(n, options_.border)) return;
     add_to(result_.ground, n);
     const double plan_area_m2 = surface_.plan_area_m2(n);
     result_.plan_area_m2 += plan_area_m2;
@@ -99,8 +99,8 @@ class MapCounter {
   void add_to(ScoreBin& bin, std::size_t n) const {
     ++bin.all;
     bin.above_zero_plane += map_.above_zero_plane(n) ? 1 : 0;
-    if (!map_.judged(n, options_.edges)) return;
-    ++bin.judged;
+    if (!map_.evaluated(n, options_.border)) return;
+    ++bin.evaluated;
     bin.graspable += map_.graspable[n];
     bin.area_m2 += static_cast<double>(surface_.area_m2[n]);
   }
@@ -121,17 +121,17 @@ class MapCounter {
     std::size_t gaps = 0;
     for (std::size_t n = 0; n < map_.size();) {
       const Voxel& here = map_.voxels[n];
-      bool judged = false;
+      bool evaluated = false;
       bool graspable = false;
       std::size_t next = n;
       for (; next < map_.size() && map_.voxels[next].i == here.i && map_.voxels[next].j == here.j;
            ++next) {
-        if (!map_.judged(next, options_.edges)) continue;
-        judged = true;
+        if (!map_.evaluated(next, options_.border)) continue;
+        evaluated = true;
         graspable = graspable || map_.graspable[next] != 0;
       }
       ++columns;
-      result_.columns += judged ? 1 : 0;
+      result_.columns += evaluated ? 1 : 0;
       result_.graspable_columns += graspable ? 1 : 0;
       if (next < map_.size() && map_.voxels[next].i == here.i &&
           map_.voxels[next].j - here.j - 1 <= largest_gap)
@@ -159,7 +159,7 @@ void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
   table.add("height_bin_m", options.height_bin_m, libmap::positive, "width of bins of height, m");
   table.add("slope_bin_deg", options.slope_bin_deg, libmap::Range{0.0, 90.0, true, false},
             "width of bins of slope, degrees");
-  table.add("edges", options.edges,
+  table.add("border", options.border,
             "also count voxels whose mask's window leaves the scanned area");
 }
 

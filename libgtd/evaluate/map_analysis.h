@@ -16,7 +16,7 @@ struct MapAnalysisOptions {
   double score_bin = 0.05;  // width of the histogram's bins
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool edges = false;  // voxels whose mask's window leaves the scanned area count too
+  bool border = false;  // voxels whose mask's window leaves the scanned area count too
 };
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options);
 
@@ -27,12 +27,12 @@ struct ScoreBin {
   double high = 0.0;
   std::size_t all = 0;
   std::size_t above_zero_plane = 0;
-  std::size_t judged = 0;     // VoxelMap::judged
-  std::size_t graspable = 0;  // of those judged
-  double area_m2 = 0.0;       // of those judged
+  std::size_t evaluated = 0;  // VoxelMap::evaluated
+  std::size_t graspable = 0;  // of those evaluated
+  double area_m2 = 0.0;       // of those evaluated
 };
 
-// Judged voxels with low <= value < high; the last bin holds its high end too.
+// Evaluated voxels with low <= value < high; the last bin holds its high end too.
 struct GroundBin {
   double low = 0.0;
   double high = 0.0;
@@ -43,7 +43,7 @@ struct GroundBin {
   double score_sum = 0.0;
 
   std::optional<double> graspable_share() const;  // of the area
-  std::optional<double> mean_score() const;       // of its judged voxels; nothing if there is none
+  std::optional<double> mean_score() const;  // of its evaluated voxels; nothing if there is none
 };
 
 struct MapAnalysis {
@@ -51,16 +51,16 @@ struct MapAnalysis {
   std::size_t voxels = 0;
   std::size_t without_score = 0;
   std::size_t below_zero_plane = 0;
-  std::size_t at_edges = 0;
+  std::size_t at_border = 0;
   std::size_t obstacles = 0;
   std::size_t graspable = 0;
-  // Of the judged ones. A column is a place in plan; one with a voxel that can be held counts as
+  // Of the evaluated ones. A column is a place in plan; one with a voxel that can be held counts as
   // one that can.
   std::size_t columns = 0;
   std::size_t graspable_columns = 0;
   double plan_area_m2 = 0.0;  // of the surface, seen from above
   double graspable_plan_area_m2 = 0.0;
-  GroundBin ground;  // all judged voxels; low and high are the least and the largest height
+  GroundBin ground;  // all evaluated voxels; low and high are the least and the largest height
   // Share of the columns with a voxel among these and the empty ones between them (at most six in a
   // row along y), of the whole map: less than 1 where the cloud has fewer points than columns.
   double column_coverage = 1.0;

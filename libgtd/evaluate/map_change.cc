@@ -143,10 +143,10 @@ ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
 ChangeSummary summarize(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                         const std::vector<VoxelPair>& pairs) {
   ChangeSummary summary;
-  std::vector<std::uint8_t> judged;
+  std::vector<std::uint8_t> evaluated;
   std::vector<std::uint8_t> reference;
   for (const VoxelPair& pair : pairs) {
-    judged.push_back(map.graspable[pair.map]);
+    evaluated.push_back(map.graspable[pair.map]);
     reference.push_back(other.graspable[pair.other]);
     const auto area_m2 = static_cast<double>(surface.area_m2[pair.map]);
     const ChangeClass change = class_of(map, other, pair);
@@ -154,7 +154,7 @@ ChangeSummary summarize(const VoxelMap& map, const MapSurface& surface, const Vo
     summary.gained_area_m2 += change == ChangeClass::gained ? area_m2 : 0.0;
     summary.lost_area_m2 += change == ChangeClass::lost ? area_m2 : 0.0;
   }
-  summary.graspable = confusion_of(judged, reference);
+  summary.graspable = confusion_of(evaluated, reference);
   summary.kappa = cohens_kappa(summary.graspable);
   summary.difference = difference_of(map, other, pairs);
   return summary;
@@ -179,18 +179,19 @@ std::vector<ChangeSummary> summarize_bins(const VoxelMap& map, const MapSurface&
   return summaries;
 }
 
-void summarize_judged(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
-                      const MapChangeOptions& options, MapChange& change) {
+void summarize_evaluated(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
+                         const MapChangeOptions& options, MapChange& change) {
   std::vector<VoxelPair> pairs;
   double low = std::numeric_limits<double>::infinity();
   double high = -low;
   for (const VoxelPair& pair : change.pairs) {
-    if (!map.judged(pair.map, options.edges) || !other.judged(pair.other, options.edges)) continue;
+    if (!map.evaluated(pair.map, options.border) || !other.evaluated(pair.other, options.border))
+      continue;
     pairs.push_back(pair);
     low = std::min(low, map.center_in_terrain(pair.map).z());
     high = std::max(high, map.center_in_terrain(pair.map).z());
   }
-  change.judged = summarize(map, surface, other, pairs);
+  change.evaluated = summarize(map, surface, other, pairs);
   if (pairs.empty()) return;
   change.by_height = summarize_bins(map, surface, other, pairs,
                                     bins_over(low, high, options.height_bin_m, "height_bin_m"),
@@ -254,18 +255,18 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
     throw libmap::Error("the maps have no voxel in common: they lie apart, or in other frames");
   find_unpaired(map, other, change);
   change.common = summarize(map, surface, other, change.pairs);
-  summarize_judged(map, surface, other, options, change);
+  summarize_evaluated(map, surface, other, options, change);
   return change;
 }
 
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
-                            const libmap::Pose& map_terrain_from_other_terrain, bool edges) {
+                            const libmap::Pose& map_terrain_from_other_terrain, bool border) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN();
   const libmap::Pose map_from_terrain = map.terrain_from_map.inverse();
   const std::size_t count = change.pairs.size() + change.only_map.size() + change.only_other.size();
   libmap::PointCloud cloud;
   cloud.positions.reserve(count);
-  std::vector<double> score_map, score_other, graspable_map, graspable_other, judged, classes;
+  std::vector<double> score_map, score_other, graspable_map, graspable_other, evaluated, classes;
   const auto add = [&](std::uint32_t a, std::uint32_t b, ChangeClass one) {
     cloud.positions.push_back(map_from_terrain * (a != none ? map.center_in_terrain(a)
                                                             : map_terrain_from_other_terrain *
@@ -274,7 +275,8 @@ libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const 
     score_other.push_back(b != none ? static_cast<double>(other.scores[b]) : nan);
     graspable_map.push_back(a != none ? map.graspable[a] : 0.0);
     graspable_other.push_back(b != none ? other.graspable[b] : 0.0);
-    judged.push_back((a == none || map.judged(a, edges)) && (b == none || other.judged(b, edges)));
+    evaluated.push_back((a == none || map.evaluated(a, border)) &&
+                        (b == none || other.evaluated(b, border)));
     classes.push_back(static_cast<double>(one));
   };
   for (const VoxelPair& pair : change.pairs) add(pair.map, pair.other, class_of(map, other, pair));
@@ -290,7 +292,7 @@ libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const 
   field("difference", libmap::ScalarType::float32, difference);
   field("graspable_map", libmap::ScalarType::uint8, graspable_map);
   field("graspable_other", libmap::ScalarType::uint8, graspable_other);
-  field("judged", libmap::ScalarType::uint8, judged);
+  field("evaluated", libmap::ScalarType::uint8, evaluated);
   field("change", libmap::ScalarType::uint8, classes);
   return cloud;
 }

@@ -17,12 +17,12 @@ namespace libgtd {
 
 struct MapChangeOptions {
   // Where the lattices differ: voxels are of one place if each is the other's nearest and their
-  // centres lie at most so many edges of a voxel apart. Half a diagonal: no place is farther from
-  // the nearest centre of a lattice.
+  // centers lie at most so many edges of a voxel apart. Half a diagonal: no place is farther from
+  // the nearest center of a lattice.
   double match_distance_voxels = 0.87;
   double height_bin_m = 0.05;
   double slope_bin_deg = 5.0;
-  bool edges = false;  // voxels whose mask's window leaves the scanned area count too
+  bool border = false;  // voxels whose mask's window leaves the scanned area count too
 };
 void bind(libmap::ParameterTable& table, MapChangeOptions& options);
 
@@ -60,7 +60,7 @@ struct ScoreDifference {
 struct ChangeSummary {
   double low = 0.0;  // of a bin
   double high = 0.0;
-  Confusion graspable;  // MAP judges, OTHER is the reference
+  Confusion graspable;  // MAP evaluates, OTHER is the reference
   std::optional<Kappa> kappa;
   ScoreDifference difference;
   double both_area_m2 = 0.0;  // of MAP's surface
@@ -79,8 +79,8 @@ struct MapChange {
   std::size_t only_map_graspable = 0;
   std::size_t only_other_graspable = 0;
   ChangeSummary common;                  // all pairs
-  ChangeSummary judged;                  // those judged in both maps (VoxelMap::judged)
-  std::vector<ChangeSummary> by_height;  // of those judged, in MAP's terrain frame
+  ChangeSummary evaluated;               // those evaluated in both maps (VoxelMap::evaluated)
+  std::vector<ChangeSummary> by_height;  // of those evaluated, in MAP's terrain frame
   std::vector<ChangeSummary> by_slope;   // of MAP's surface; without those of unknown slope
 };
 
@@ -93,8 +93,8 @@ MapChange compare_maps(const VoxelMap& map, const MapSurface& surface, const Vox
 
 // A point for each pair and for each voxel that is in one map alone, at its place in the frame of
 // MAP's points (of pairs MAP's voxel), with the fields score_map, score_other, difference (NaN
-// where there is none), graspable_map, graspable_other, judged and change (ChangeClass).
+// where there is none), graspable_map, graspable_other, evaluated and change (ChangeClass).
 libmap::PointCloud to_cloud(const MapChange& change, const VoxelMap& map, const VoxelMap& other,
-                            const libmap::Pose& map_terrain_from_other_terrain, bool edges);
+                            const libmap::Pose& map_terrain_from_other_terrain, bool border);
 
 }  // namespace libgtd

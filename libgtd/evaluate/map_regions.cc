@@ -13,14 +13,14 @@ namespace {
 using Parents = std::vector<std::uint32_t>;
 using Sets = boost::disjoint_sets<std::uint32_t*, std::uint32_t*>;
 
-std::vector<std::uint32_t> graspable_voxels(const VoxelMap& map, bool edges) {
+std::vector<std::uint32_t> graspable_voxels(const VoxelMap& map, bool border) {
   std::vector<std::uint32_t> graspable;
   for (std::uint32_t n = 0; n < map.size(); ++n)
-    if (map.graspable[n] != 0 && map.judged(n, edges)) graspable.push_back(n);
+    if (map.graspable[n] != 0 && map.evaluated(n, border)) graspable.push_back(n);
   return graspable;
 }
 
-// Joins each voxel with its neighbours before it in the order of voxels. For each of the columns
+// Joins each voxel with its neighbors before it in the order of voxels. For each of the columns
 // that can hold some, a cursor follows the voxels: both move on in the same order.
 void join_neighbors(const VoxelMap& map, const std::vector<std::uint32_t>& graspable, int reach,
                     Sets& sets) {
@@ -83,7 +83,7 @@ MapRegion describe(const VoxelMap& map, const MapSurface& surface,
 
 void bind(libmap::ParameterTable& table, MapRegionOptions& options) {
   table.add("adjacency_voxels", options.adjacency_voxels, libmap::Range{1.0, 100.0},
-            "voxels of one region differ by at most so much in each index; 1: 26 neighbours");
+            "voxels of one region differ by at most so much in each index; 1: 26 neighbors");
   table.add("min_voxels", options.min_voxels, libmap::Range{1.0, 1e9},
             "smaller regions are left out, voxels");
 }
@@ -93,7 +93,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
   libmap::check_parameters(options);
   if (surface.area_m2.size() != map.size())
     throw libmap::Error("the surface is of another map", {.field = "area_m2"});
-  const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.edges);
+  const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.border);
   std::vector<std::uint32_t> ranks(graspable.size());
   Parents parents(graspable.size());
   Sets sets(ranks.data(), parents.data());

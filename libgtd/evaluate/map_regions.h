@@ -13,9 +13,9 @@
 namespace libgtd {
 
 struct MapRegionOptions {
-  int adjacency_voxels = 1;  // of one region: indices differ by at most so much; 1: 26 neighbours
+  int adjacency_voxels = 1;  // of one region: indices differ by at most so much; 1: 26 neighbors
   int min_voxels = 1;        // smaller regions are left out
-  bool edges = false;        // voxels whose mask's window leaves the scanned area count too
+  bool border = false;       // voxels whose mask's window leaves the scanned area count too
 };
 void bind(libmap::ParameterTable& table, MapRegionOptions& options);
 
@@ -23,7 +23,7 @@ struct MapRegion {
   std::vector<std::uint32_t> voxels;  // entries of the map, ascending
   double area_m2 = 0.0;               // of the surface
   double plan_area_m2 = 0.0;          // the same seen from above
-  // In the terrain frame: mean of the voxels' centres, weighted by their areas; box around them.
+  // In the terrain frame: mean of the voxels' centers, weighted by their areas; box around them.
   Eigen::Vector3d centroid = Eigen::Vector3d::Zero();
   Eigen::Vector3d min = Eigen::Vector3d::Zero();
   Eigen::Vector3d max = Eigen::Vector3d::Zero();
@@ -40,7 +40,8 @@ struct MapRegionResult {
   std::size_t left_out_voxels = 0;
 };
 
-// Connected components of the judged graspable voxels. Throws Error: options out of their bounds.
+// Connected components of the evaluated graspable voxels. Throws Error: options out of their
+// bounds.
 MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
                              const MapRegionOptions& options = {});
 

@@ -107,11 +107,11 @@ Row row_of(const SummarizedMap& map, bool with_expected) {
   row.add("cutoff", libmap::to_text(map.cutoff));
   const MapSummary& summary = map.summary;
   row.add("voxels", summary.voxels);
-  row.add("judged", summary.judged);
-  row.add("reached_share", share(summary.reached, summary.judged));
-  row.add("graspable_share", share(summary.graspable, summary.judged));
+  row.add("evaluated", summary.evaluated);
+  row.add("reached_share", share(summary.reached, summary.evaluated));
+  row.add("graspable_share", share(summary.graspable, summary.evaluated));
   row.add("few_solid_share",
-          summary.few_solid ? share(*summary.few_solid, summary.judged) : std::nullopt);
+          summary.few_solid ? share(*summary.few_solid, summary.evaluated) : std::nullopt);
   add_quantiles("score", summary.scores, row);
   add_quantiles("ssv", summary.solid_voxels, row);
   if (with_expected) add_expected(map.expected.value_or(ExpectedMapResult{}), row);
@@ -151,8 +151,8 @@ MapSummary summarize_map(const libmap::PointCloud& map, const VoxelMap& voxels,
   std::vector<double> scores;
   std::vector<double> solid_voxels;
   for (std::size_t n = 0; n < voxels.size(); ++n) {
-    if (!voxels.judged(n, false)) continue;
-    ++summary.judged;
+    if (!voxels.evaluated(n, false)) continue;
+    ++summary.evaluated;
     const double score = static_cast<double>(voxels.scores[n]);
     summary.reached += reaches_cutoff(score, options.graspability_threshold) ? 1 : 0;
     summary.graspable += voxels.graspable[n] != 0 ? 1 : 0;
@@ -195,7 +195,7 @@ libmap::Table region_table(const std::vector<SummarizedMap>& maps, const Expecte
       const ExpectedRegion& region = expected.regions[r];
       const RegionResult& result = map.expected->regions[r];
       const std::optional<bool> predicted = result.predicted();
-      const bool judged = region.graspable && predicted;
+      const bool evaluated = region.graspable && predicted;
       Row row;
       row.add("map", map.name);
       row.add("region", region.name);
@@ -207,7 +207,7 @@ libmap::Table region_table(const std::vector<SummarizedMap>& maps, const Expecte
       row.add("median_score", result.median_score);
       row.add("predicted", yes_no(predicted));
       row.add("agrees",
-              yes_no(judged ? std::optional(*predicted == *region.graspable) : std::nullopt));
+              yes_no(evaluated ? std::optional(*predicted == *region.graspable) : std::nullopt));
       row.add("why", region.why);
       rows.push_back(std::move(row));
     }
@@ -222,8 +222,8 @@ libmap::Table histogram_table(const std::vector<SummarizedMap>& maps) {
       Row row;
       row.add("map", map.name);
       row.add("score", std::optional((bin.low + bin.high) / 2.0));
-      row.add("voxels", bin.judged);
-      row.add("share", share(bin.judged, map.summary.judged));
+      row.add("voxels", bin.evaluated);
+      row.add("share", share(bin.evaluated, map.summary.evaluated));
       rows.push_back(std::move(row));
     }
   }
@@ -237,7 +237,7 @@ MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
   MapPair pair;
   pair.matching = change.matching;
   pair.common = change.pairs.size();
-  pair.judged = change.judged;
+  pair.evaluated = change.evaluated;
   return pair;
 }
 
@@ -245,9 +245,9 @@ libmap::Table pair_table(const std::vector<SummarizedMap>& maps,
                          const std::vector<MapPair>& pairs) {
   std::vector<Row> rows;
   for (const MapPair& pair : pairs) {
-    const Confusion& counts = pair.judged.graspable;
-    const std::optional<Kappa>& kappa = pair.judged.kappa;
-    const ScoreDifference& difference = pair.judged.difference;
+    const Confusion& counts = pair.evaluated.graspable;
+    const std::optional<Kappa>& kappa = pair.evaluated.kappa;
+    const ScoreDifference& difference = pair.evaluated.difference;
     const auto where = [](bool there, double value) {
       return there ? std::optional(value) : std::nullopt;
     };
@@ -256,7 +256,7 @@ libmap::Table pair_table(const std::vector<SummarizedMap>& maps,
     row.add("second", maps[pair.second].name);
     row.add("matching", std::string(to_text(pair.matching)));
     row.add("common_voxels", pair.common);
-    row.add("judged_voxels", counts.size());
+    row.add("evaluated_voxels", counts.size());
     row.add("both", counts.true_positives);
     row.add("first_alone", counts.false_positives);
     row.add("second_alone", counts.false_negatives);

@@ -20,17 +20,17 @@ namespace libgtd {
 
 inline constexpr std::array<double, 5> summary_quantiles{0.05, 0.25, 0.5, 0.75, 0.95};
 
-// Of the judged voxels (VoxelMap::judged): above the zero plane, and with all of the mask's window
-// in the scanned area.
+// Of the evaluated voxels (VoxelMap::evaluated): above the zero plane, and with all of the mask's
+// window in the scanned area.
 struct MapSummary {
   std::size_t voxels = 0;  // of the whole map
-  std::size_t judged = 0;
+  std::size_t evaluated = 0;
   std::size_t reached = 0;    // with a score that reaches the threshold
   std::size_t graspable = 0;  // with the map's flag
   // With fewer solid voxels than the threshold TSV: no other score depends on it. Nothing where
   // TSV or SSV is not known.
   std::optional<std::size_t> few_solid;
-  // By nearest rank, at summary_quantiles; empty where nothing was judged.
+  // By nearest rank, at summary_quantiles; empty where nothing was evaluated.
   std::vector<double> scores;
   std::vector<double> solid_voxels;  // SSV; empty too where it is not known
   std::vector<ScoreBin> score_bins;  // without areas
@@ -56,24 +56,24 @@ struct SummarizedMap {
   std::optional<ExpectedMapResult> expected{};
 };
 
-// One row a map: name, parameters of the detection, counts, shares, quantiles; if one of them has
+// One row per map: name, parameters of the detection, counts, shares, quantiles; if one of them has
 // an expectation also sensitivity and specificity, of voxels and of places, with Wilson 95 %
 // intervals, Youden's index and the area under the curve. Undefined values are empty cells.
 libmap::Table summary_table(const std::vector<SummarizedMap>& maps);
 
-// One row a map and region of `expected`.
+// One row per map and region of `expected`.
 libmap::Table region_table(const std::vector<SummarizedMap>& maps, const ExpectedMap& expected);
 
-// Columns map, score (the middle of a bin), voxels, share (of the judged).
+// Columns map, score (the middle of a bin), voxels, share (of the evaluated).
 libmap::Table histogram_table(const std::vector<SummarizedMap>& maps);
 
-// How two maps of one cloud agree, over the voxels that are judged in both.
+// How two maps of one cloud agree, over the voxels that are evaluated in both.
 struct MapPair {
   std::size_t first = 0;  // of the list of maps
   std::size_t second = 0;
   VoxelMatching matching = VoxelMatching::lattice;
-  std::size_t common = 0;  // voxels of one place, judged or not
-  ChangeSummary judged{};  // the first is MAP, the second OTHER; without areas
+  std::size_t common = 0;     // voxels of one place, evaluated or not
+  ChangeSummary evaluated{};  // the first is MAP, the second OTHER; without areas
 };
 
 // Of maps scored from one cloud, `first_terrain_from_second_terrain` between their frames. Throws

@@ -15,7 +15,7 @@ struct MapSurfaceOptions {
 };
 void bind(libmap::ParameterTable& table, MapSurfaceOptions& options);
 
-// One entry a voxel of the map.
+// One entry per voxel of the map.
 struct MapSurface {
   double radius_m = 0.0;         // that was used
   std::vector<float> slope_deg;  // between the surface and the level, 0..90; NaN: not known
@@ -25,7 +25,7 @@ struct MapSurface {
   double plan_area_m2(std::size_t n) const;
 };
 
-// Normals are those of quadrics fitted to the voxels' centres (curvature.h). The area that a voxel
+// Normals are those of quadrics fitted to the voxels' centers (curvature.h). The area that a voxel
 // stands for is one over the density of voxels on the surface there: the sum of 1 - d^2 / r^2 over
 // the voxels at distances d < r (Epanechnikov's kernel), by the kernel's whole mass pi r^2 / 2. So
 // it depends neither on how many voxels a slope has more than its plan, nor on a cloud that has

@@ -24,7 +24,7 @@ using libmap::Bounds3d;
 using Graph = boost::adjacency_list<boost::vecS, boost::vecS, boost::undirectedS,
                                     boost::no_property, RegionLink>;
 
-constexpr std::size_t most_links = 10'000'000;
+constexpr std::size_t max_links = 10'000'000;
 // Distances of voxels are multiples of their size: rounding shall not part them from the stride.
 constexpr double tolerance = 1.0 + 1e-9;
 constexpr double farthest_m = std::numeric_limits<double>::max();
@@ -87,7 +87,7 @@ class NearestPairs {
     for (std::uint32_t s = 0; s < sets_.size(); ++s) {
       smaller[s] = smaller_neighbors(s);
       pairs += smaller[s].size();
-      if (pairs > most_links)
+      if (pairs > max_links)
         throw libmap::Error("joins more than 10 million pairs of regions",
                             {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
@@ -225,7 +225,7 @@ std::vector<RegionLink> spanning_tree(const VoxelMap& map, const MapRegionResult
     const Components components = components_of(graph);
     if (components.count == sets.size() && !(reach_m < farthest_m))
       throw libmap::Error(
-          "the regions lie too far apart: their distances are no numbers",
+          "the regions are too far apart: their distances are no numbers",
           {.field = "voxel_size_m", .value = libmap::to_text(map.lattice.voxel_size_m)});
     if (components.count < sets.size()) sets = joined(map, sets, components);
     reach_m = std::max(2.0 * reach_m, map.lattice.voxel_size_m);
@@ -261,10 +261,10 @@ std::vector<double> lengths_from(std::uint32_t start, const Graph& graph,
 
 // The start is one more node. Without a place of its own it lies on its region, at no distance.
 std::vector<RegionLink> with_start(std::vector<RegionLink> links,
-                                   const std::vector<double>& start_distances, double most_m) {
+                                   const std::vector<double>& start_distances, double max_m) {
   const auto start = static_cast<std::uint32_t>(start_distances.size());
   for (std::uint32_t r = 0; r < start; ++r)
-    if (start_distances[r] <= most_m)
+    if (start_distances[r] <= max_m)
       links.push_back({.a = r, .b = start, .distance_m = start_distances[r]});
   return links;
 }

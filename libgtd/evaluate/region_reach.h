@@ -13,7 +13,7 @@
 namespace libgtd {
 
 struct RegionReachOptions {
-  double stride_m = 0.3;  // the longest step, from voxel centre to voxel centre
+  double stride_m = 0.3;  // the longest step, from voxel center to voxel center
   // Where the robot stands, in the terrain frame; nothing: on the largest region.
   std::optional<Eigen::Vector3d> start{};
 };

@@ -167,7 +167,7 @@ std::string why_no_area(const Sample& sample) {
     return "no location has both a label and a score: the area under the curve is not defined";
   const std::string number =
       libmap::to_text(static_cast<std::int64_t>(sample.positives + sample.negatives));
-  return "all " + number + " locations are labelled " + (sample.positives > 0 ? "true" : "false") +
+  return "all " + number + " locations are labeled " + (sample.positives > 0 ? "true" : "false") +
          ": the area under the curve is not defined";
 }
 
@@ -229,7 +229,7 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
     if (!scores[i].has_value() || std::isnan(*scores[i])) {
       ++result.left_out_unscored;
     } else if (!labels[i].has_value()) {
-      ++result.left_out_unlabelled;
+      ++result.left_out_unlabeled;
     } else {
       locations.emplace_back(*scores[i], *labels[i]);
     }

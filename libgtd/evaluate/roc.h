@@ -88,10 +88,10 @@ struct RocResult {
   std::vector<RocPoint> at_cutoffs;  // ascending, as given
   std::vector<RocPoint> at_scores;   // every distinct score, ascending
   RocPoint at_rate_cutoff;
-  std::optional<AreaUnderCurve> area;   // nothing unless both classes are there
-  std::string area_note;                // why there is none
-  std::size_t left_out_unscored = 0;    // no score: not visible
-  std::size_t left_out_unlabelled = 0;  // a score and no label
+  std::optional<AreaUnderCurve> area;  // nothing unless both classes are there
+  std::string area_note;               // why there is none
+  std::size_t left_out_unscored = 0;   // no score: not visible
+  std::size_t left_out_unlabeled = 0;  // a score and no label
 };
 
 // One label and one score a location; a location without either, or whose score is NaN, is left

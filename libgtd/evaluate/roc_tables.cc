@@ -101,7 +101,9 @@ Json number_or_null(const std::optional<Interval>& interval) {
   return Json::array({interval->low, interval->high});
 }
 
-Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
+Json number_or_null(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
 
 Json number_or_null(const RocResult& result) {
   const Confusion& counts = result.at_rate_cutoff.counts;
@@ -110,7 +112,7 @@ Json number_or_null(const RocResult& result) {
   json["positives"] = counts.positives();
   json["negatives"] = counts.negatives();
   json["left_out_without_score"] = result.left_out_unscored;
-  json["left_out_without_label"] = result.left_out_unlabelled;
+  json["left_out_without_label"] = result.left_out_unlabeled;
   Json auc;
   if (const auto& area = result.area) {
     auc["trapezoid"] = area->trapezoid;
@@ -195,8 +197,8 @@ std::string notes_markdown(const TableEvaluation& evaluation) {
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocResult& result = column.result;
     if (!result.area) text += "- " + markdown_cell(column.name) + ": " + result.area_note + ".\n";
-    if (result.left_out_unlabelled > 0)
-      text += "- " + markdown_cell(column.name) + ": " + number_text(result.left_out_unlabelled) +
+    if (result.left_out_unlabeled > 0)
+      text += "- " + markdown_cell(column.name) + ": " + number_text(result.left_out_unlabeled) +
               " locations have a score and no label and are left out.\n";
     if (result.area && result.area->upper_sum_width < 1.0)
       text += "- " + markdown_cell(column.name) +
@@ -231,7 +233,7 @@ std::optional<bool> parse_label(std::string_view text) {
 
 std::vector<std::string> default_score_columns(const Table& table, std::string_view label_column) {
   static constexpr std::array<std::string_view, 13> known = {
-      "id", "place", "region", "point", "hold", "x", "y", "z", "i", "j", "k", "found", "edge"};
+      "id", "place", "region", "point", "hold", "x", "y", "z", "i", "j", "k", "found", "border"};
   std::vector<std::string> names;
   for (std::size_t c = 0; c < table.columns.size(); ++c) {
     const std::string& name = table.columns[c];

@@ -10,7 +10,7 @@ namespace libgtd {
 
 namespace {
 
-constexpr double most_bins = 100'000.0;
+constexpr double max_bins = 100'000.0;
 constexpr double rounding = 1e-9;  // of a bin's width
 
 }  // namespace
@@ -26,12 +26,12 @@ ValueBins bins_over(double low, double high, double width, const char* field) {
                         {.field = field, .value = libmap::to_text(width), .bound = "> 0"});
   const double first = std::floor(low / width + rounding);
   const double count = std::max(1.0, std::ceil(high / width - rounding) - first);
-  if (!(count <= most_bins))
+  if (!(count <= max_bins))
     throw libmap::Error(
         "too narrow: there would be " + libmap::to_text(count) + " bins",
         {.field = field,
          .value = libmap::to_text(width),
-         .bound = ">= " + libmap::to_text(static_cast<float>((high - low) / most_bins))});
+         .bound = ">= " + libmap::to_text(static_cast<float>((high - low) / max_bins))});
   return {first * width, width, static_cast<std::size_t>(count)};
 }
 

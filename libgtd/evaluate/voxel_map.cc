@@ -74,18 +74,18 @@ VoxelLattice fitted_lattice(const PointCloud& map, const libmap::Pose& terrain_f
 
 // Squares of distances on the lattice are numbers.
 void require_measurable(const VoxelLattice& lattice) {
-  constexpr double least_m = 1e-100;
-  constexpr double most_m = 1e100;
+  constexpr double min_m = 1e-100;
+  constexpr double max_m = 1e100;
   const auto refuse = [](const char* field, double value, const std::string& bound) {
     throw libmap::Error("out of range",
                         {.field = field, .value = libmap::to_text(value), .bound = bound});
   };
-  if (!(lattice.voxel_size_m >= least_m && lattice.voxel_size_m <= most_m))
+  if (!(lattice.voxel_size_m >= min_m && lattice.voxel_size_m <= max_m))
     refuse("voxel_size_m", lattice.voxel_size_m,
-           libmap::to_text(least_m) + " to " + libmap::to_text(most_m));
+           libmap::to_text(min_m) + " to " + libmap::to_text(max_m));
   const double farthest_m = lattice.origin_m.cwiseAbs().maxCoeff();
-  if (farthest_m > most_m)
-    refuse("lattice_origin_m", farthest_m, "within +-" + libmap::to_text(most_m));
+  if (farthest_m > max_m)
+    refuse("lattice_origin_m", farthest_m, "within +-" + libmap::to_text(max_m));
 }
 
 void require_on_lattice(const PointCloud& map, const VoxelMap& result,
@@ -96,7 +96,7 @@ void require_on_lattice(const PointCloud& map, const VoxelMap& result,
     const Eigen::Vector3d point = result.terrain_from_map * map.positions[kept[n]];
     if (!((point - center).cwiseAbs().array() <= bound_m).all())
       throw libmap::Error(
-          "points do not lie at the centres of the map's voxels",
+          "points do not lie at the centers of the map's voxels",
           {.field = "point " + std::to_string(kept[n] + 1),
            .value = libmap::to_text(static_cast<float>((point - center).cwiseAbs().maxCoeff())) +
                     " m off",
@@ -130,12 +130,13 @@ void sort_by_voxel(std::vector<Voxel>& voxels, std::vector<std::uint32_t>& kept)
 void fill_values(const PointCloud& map, VoxelMap& result) {
   const std::vector<double>& score = values_of(map, "score");
   const std::vector<double>& graspable = values_of(map, "graspable");
-  const std::vector<double>* edge = optional_values(map, "edge");
+  const std::vector<double>* border = optional_values(map, "border");
+  if (border == nullptr) border = optional_values(map, "edge");  // of earlier versions
   const std::vector<double>* obstacle = optional_values(map, "obstacle");
   const std::size_t count = result.voxels.size();
   result.scores.resize(count);
   result.graspable.resize(count);
-  result.edge.resize(count);
+  result.border.resize(count);
   result.obstacle.resize(count);
   libmap::parallel_for(count, voxels_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -145,7 +146,7 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
       result.scores[n] =
           scored ? static_cast<float>(score[point]) : std::numeric_limits<float>::quiet_NaN();
       result.graspable[n] = scored && !blocked && graspable[point] > 0.0 ? 1 : 0;
-      result.edge[n] = edge != nullptr && (*edge)[point] > 0.0 ? 1 : 0;
+      result.border[n] = border != nullptr && (*border)[point] > 0.0 ? 1 : 0;
       result.obstacle[n] = blocked ? 1 : 0;
     }
   });

@@ -25,7 +25,7 @@ struct MapFacts {
 // As `graspmap score` writes it down: parameters, frame, transforms and the lattice's origin.
 MapFacts facts_of(const libmap::Manifest& manifest);
 
-// One entry a voxel in each array, ascending by voxel, whatever the order of the map's points.
+// One entry per voxel in each array, ascending by voxel, whatever the order of the map's points.
 struct VoxelMap {
   VoxelLattice lattice;                                      // in the terrain frame
   libmap::Pose terrain_from_map = libmap::Pose::Identity();  // of the map's points
@@ -33,7 +33,7 @@ struct VoxelMap {
   std::vector<Voxel> voxels;
   std::vector<float> scores;              // NaN: none
   std::vector<std::uint8_t> graspable;    // and scored, and no obstacle
-  std::vector<std::uint8_t> edge;         // 0 where the map has no such field
+  std::vector<std::uint8_t> border;       // 0 where the map has no such field
   std::vector<std::uint8_t> obstacle;     // the same
   std::vector<std::uint32_t> map_points;  // index among the map's points
 
@@ -43,9 +43,9 @@ struct VoxelMap {
     return !(lattice.center_of(voxels[n]).z() < zero_plane_m);
   }
   // A voxel whose score counts: it has one, and lies above the zero plane; one whose mask's window
-  // leaves the scanned area only if `edges`.
-  bool judged(std::size_t n, bool edges) const {
-    return scores[n] == scores[n] && above_zero_plane(n) && (edges || edge[n] == 0);
+  // leaves the scanned area only if `with_border`.
+  bool evaluated(std::size_t n, bool with_border) const {
+    return scores[n] == scores[n] && above_zero_plane(n) && (with_border || border[n] == 0);
   }
 };
 

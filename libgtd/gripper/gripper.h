@@ -7,7 +7,7 @@
 
 namespace libgtd {
 
-// Millimetres and degrees.
+// Millimeters and degrees.
 struct Gripper {
   std::string name;
   double palm_diameter_mm = 0.0;

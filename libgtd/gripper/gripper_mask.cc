@@ -60,22 +60,22 @@ void fill(GripperMask& mask, const Solid& solid) {
 
 // The measures in voxels as `thesis` and `envelope` round them (eq. 3-6..3-12).
 struct VoxelMeasures {
-  float ratio = 0.0F;  // voxels a millimetre
+  float ratio = 0.0F;  // voxels a millimeter
   double half = 0.0;
   int H = 0;
   double RT = 0.0;
   double Hcl = 0.0;
   double RB = 0.0;
 
-  double in_voxels(double millimetres) const {
-    return static_cast<double>(static_cast<float>(millimetres * static_cast<double>(ratio)));
+  double in_voxels(double millimeters) const {
+    return static_cast<double>(static_cast<float>(millimeters * static_cast<double>(ratio)));
   }
 };
 
 VoxelMeasures measure(const Gripper& gripper, const GripperMaskOptions& options) {
   VoxelMeasures m;
   m.ratio = 1.0F / (static_cast<float>(options.voxel_size_m) * 1000.0F);
-  const auto rounded = [&](double millimetres) { return std::round(m.in_voxels(millimetres)); };
+  const auto rounded = [&](double millimeters) { return std::round(m.in_voxels(millimeters)); };
   const bool exact_palm = options.method == Method::envelope;
   const double P =
       exact_palm ? m.in_voxels(gripper.palm_diameter_mm) : rounded(gripper.palm_diameter_mm);
@@ -151,12 +151,12 @@ GripperMask make_envelope(const Gripper& gripper, const GripperMaskOptions& opti
   return mask;
 }
 
-// ClimbLab v3: an odd side about the true centre, no void layers, the pivot on top.
+// ClimbLab v3: an odd side about the true center, no void layers, the pivot on top.
 GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   options.extra_void_layers = 0;
   const VoxelMeasures m = measure(gripper, options);
   GripperMask mask = empty_mask(options, std::floor(2.0 * m.half) + 1.0, m.H);
-  // One beyond the centre: MATLAB's index (L + 1) / 2 counts from 1, the window from 0.
+  // One beyond the center: MATLAB's index (L + 1) / 2 counts from 1, the window from 0.
   mask.pivot_xy = (mask.side + 1) / 2;
   mask.pivot_z = m.H - 1;
   const double ROS = std::round(m.in_voxels(gripper.opening_spine_radius_mm));
@@ -174,8 +174,8 @@ GripperMask make_climblab(const Gripper& gripper, GripperMaskOptions options) {
   return mask;
 }
 
-// The radii of `thesis` in millimetres decide for the centre of each voxel; the pivot is the
-// centre of the top solid layer (fig. 3-11).
+// The radii of `thesis` in millimeters decide for the center of each voxel; the pivot is the
+// center of the top solid layer (fig. 3-11).
 GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& options) {
   const double voxel_mm = options.voxel_size_m * 1000.0;
   const double half =

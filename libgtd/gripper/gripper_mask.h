@@ -15,7 +15,7 @@ namespace libgtd {
 
 // thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), in which
 // what the fingers cannot reach is not counted. climblab: the base of both. corrected: the idea of
-// `thesis` with an odd side, centred on the pivot's voxel, radii not rounded.
+// `thesis` with an odd side, centered on the pivot's voxel, radii not rounded.
 enum class Method { thesis, envelope, climblab, corrected };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
@@ -53,7 +53,7 @@ struct GripperMask {
 };
 
 // Throws Error if the gripper breaks a bound, or if the voxel size gives a mask without a layer or
-// without a ring around its centre, or one of more than 2^28 voxels (it says how much memory
+// without a ring around its center, or one of more than 2^28 voxels (it says how much memory
 // it would take).
 GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& options);
 
@@ -61,7 +61,7 @@ GripperMask make_gripper_mask(const Gripper& gripper, const GripperMaskOptions& 
 // characters (y), '1' for solid.
 std::string to_text(const GripperMask& mask);
 
-// A point at the centre of each solid voxel, metres, the pivot in the origin, z toward the palm;
+// A point at the center of each solid voxel, meters, the pivot in the origin, z toward the palm;
 // fields `layer` (0 is the lowest) and `counted`.
 libmap::PointCloud to_cloud(const GripperMask& mask);
 

@@ -10,7 +10,7 @@
 
 namespace libgtd {
 
-// 64 bytes of a mask: the bits of up to 32 neighbouring columns, 16 layers each.
+// 64 bytes of a mask: the bits of up to 32 neighboring columns, 16 layers each.
 struct MaskChunk {
   static constexpr std::size_t columns = 32;
   alignas(64) std::uint16_t bits[columns];

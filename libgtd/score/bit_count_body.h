@@ -107,7 +107,7 @@ void slide(std::uint16_t* sums, const std::uint16_t* entering, const std::uint16
     sums[n] = static_cast<std::uint16_t>(sums[n] + entering[n] - leaving[n]);
 }
 
-// The sums of two neighbours.
+// The sums of two neighbors.
 inline Numbers pairs_of(const Numbers& sums) { return (sums & 0xffff) + (sums >> 16); }
 
 void add_runs(const std::uint16_t* sums, const std::uint32_t* places, std::size_t place_count,

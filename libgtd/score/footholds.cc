@@ -57,7 +57,7 @@ class FootholdSearch {
 
   FootholdResult run() {
     FootholdResult result;
-    std::vector<Foothold> candidates = find_candidates(result.at_edges);
+    std::vector<Foothold> candidates = find_candidates(result.at_border);
     result.candidates = candidates.size();
     std::sort(candidates.begin(), candidates.end(), [](const Foothold& a, const Foothold& b) {
       if (a.score != b.score) return a.score > b.score;
@@ -81,20 +81,22 @@ class FootholdSearch {
   }
 
  private:
-  std::vector<Foothold> find_candidates(std::size_t& at_edges) const {
+  std::vector<Foothold> find_candidates(std::size_t& at_border) const {
     const std::vector<double>* graspable =
         map_.find_field("graspable") != nullptr || options_.graspable_only
             ? &values_of(map_, "graspable")
             : nullptr;
-    const std::vector<double>* edge = options_.edges ? nullptr : &values_of(map_, "edge");
+    // Maps of earlier versions call it edge.
+    const char* name = map_.find_field("edge") != nullptr ? "edge" : "border";
+    const std::vector<double>* border = options_.border ? nullptr : &values_of(map_, name);
     std::vector<Foothold> candidates;
     for (std::size_t n = 0; n < map_.size(); ++n) {
       if (!map_.positions[n].allFinite() || !std::isfinite(scores_[n]) ||
           !(scores_[n] >= options_.min_score))
         continue;
       if (options_.graspable_only && (*graspable)[n] == 0.0) continue;
-      if (edge != nullptr && (*edge)[n] != 0.0) {
-        ++at_edges;
+      if (border != nullptr && (*border)[n] != 0.0) {
+        ++at_border;
         continue;
       }
       Foothold& candidate = candidates.emplace_back();
@@ -190,8 +192,8 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
             "no two footholds lie nearer to each other, m");
   table.add("min_score", options.min_score, libmap::zero_to_one, "least score of a foothold");
   table.add("graspable_only", options.graspable_only,
-            "only where the map's threshold, zero plane and convexity hold");
-  table.add("edges", options.edges, "also where the mask's window leaves the scanned area");
+            "only where the map's threshold, zero plane and convexity are known");
+  table.add("border", options.border, "also where the mask's window leaves the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
             "radius in which the surface's normal and curvatures are fitted, m");
   table.add("max_count", options.max_count, libmap::not_negative,

@@ -14,7 +14,7 @@ struct FootholdOptions {
   double separation_m = 0.1;       // > 0: no two footholds lie nearer to each other
   double min_score = 0.0;          // of a foothold
   bool graspable_only = true;      // the map's own threshold, zero plane and convexity hold there
-  bool edges = false;              // also where the mask's window leaves the scanned area
+  bool border = false;             // also where the mask's window leaves the scanned area
   double surface_radius_m = 0.05;  // > 0: the surface's normal and curvatures are fitted within
   int max_count = 0;               // the best ones alone; 0: all
 };
@@ -48,17 +48,17 @@ struct Foothold {
 struct FootholdResult {
   std::vector<Foothold> footholds;  // best first
   std::size_t candidates = 0;       // map points that may be one
-  std::size_t at_edges = 0;         // would be candidates, but for the option `edges`
+  std::size_t at_border = 0;        // would be candidates, but for the option `edges`
 };
 
 // Local maxima of the score by non-maximum suppression: the best candidate is a foothold, those
 // nearer to it than the separation are none, and so on. Of equals, the order of the map's points
 // decides. Throws Error: an empty map, one without a field that the options need ("score",
-// "graspable", "edge"), options out of their bounds, an `up` of no length.
+// "graspable", "border"), options out of their bounds, an `up` of no length.
 FootholdResult find_footholds(const libmap::PointCloud& map, const FootholdOptions& options = {},
                               const FootholdFrame& frame = {});
 
-// A point for each: its place, normal and colour; the map's own fields, but for slope_deg, which is
+// A point for each: its place, normal and color; the map's own fields, but for slope_deg, which is
 // that of this normal; mean_score, graspable_points, approach_x, approach_y, approach_z, slope_deg,
 // k1, k2.
 libmap::PointCloud to_cloud(const FootholdResult& result, const libmap::PointCloud& map);

@@ -39,7 +39,7 @@ void append(PointCloud& whole, const PointCloud& part) {
     add(field.values, other->values);
   }
   if (whole.has_colors() != part.has_colors() && !whole.empty() && !part.empty())
-    throw libmap::Error("only some parts have colours");
+    throw libmap::Error("only some parts have colors");
   if (whole.has_normals() != part.has_normals() && !whole.empty() && !part.empty())
     throw libmap::Error("only some parts have normals");
   add(whole.positions, part.positions);
@@ -72,7 +72,7 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("gsv", ScalarType::uint32, [](const MapVoxel& one) { return one.counts.gsv; });
   add("convex", ScalarType::uint8, [](const MapVoxel& one) { return one.convex; });
   add("graspable", ScalarType::uint8, [](const MapVoxel& one) { return one.graspable; });
-  add("edge", ScalarType::uint8, [](const MapVoxel& one) { return one.edge; });
+  add("border", ScalarType::uint8, [](const MapVoxel& one) { return one.border; });
   add("i", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.i; });
   add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
@@ -120,7 +120,7 @@ PointCloud merge_map_clouds(const std::vector<PointCloud>& parts) {
   for (std::size_t n = 1; n < order.size(); ++n)
     if (voxels[order[n - 1]] == voxels[order[n]])
       throw libmap::Error(
-          "two parts hold the same voxel",
+          "two parts contain the same voxel",
           {.field = "i, j, k",
            .value = std::to_string(voxels[order[n]].i) + ", " + std::to_string(voxels[order[n]].j) +
                     ", " + std::to_string(voxels[order[n]].k)});

@@ -14,9 +14,9 @@ struct MapVoxel {
   Voxel voxel;
   VoxelCounts counts;
   double score = 0.0;      // 0..1; `thesis` can go below
-  bool convex = false;     // a convex point lies close to its centre
-  bool graspable = false;  // score, zero plane and, if it was judged, convexity say yes
-  bool edge = false;       // the mask's window leaves the scanned area
+  bool convex = false;     // a convex point lies close to its center
+  bool graspable = false;  // score, zero plane and, if it was evaluated, convexity say yes
+  bool border = false;     // the mask's window leaves the scanned area
   Obstacle obstacle = Obstacle::none;
   float slope_deg = 0.0F;                             // of the surface, as SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // in the terrain frame: the mask's axis
@@ -25,8 +25,8 @@ struct MapVoxel {
 // What a map says beside its scores.
 struct MapContent {
   bool normals = false;    // the mask was tilted
-  bool slopes = false;     // obstacles are judged
-  bool obstacles = false;  // and the whole map is there to judge them
+  bool slopes = false;     // obstacles are evaluated
+  bool obstacles = false;  // and the whole map is there to evaluate them
 };
 
 struct GraspabilityMap {
@@ -41,14 +41,15 @@ struct GraspabilityMap {
 enum class MapFrame { terrain, input };
 const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 
-// A point for each voxel, at its centre, coloured by score and white below the zero plane, with the
+// A point for each voxel, at its center, colored by score and white below the zero plane, with the
 // fields score, ssv, gsv, convex, graspable, edge and the voxel's i, j, k on the lattice. As the
 // content says: the mask's axis as the point's normal, from which the gripper comes; the fields
 // slope_deg and obstacle (the number of an Obstacle).
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
 
-// Judges the obstacles of a map that has slopes, once all of it is there: sets each point's field
-// obstacle. Throws Error: a map without the fields i, j, k, slope_deg, or not ascending by them.
+// Evaluates the obstacles of a map that has slopes, once all of it is there: sets each point's
+// field obstacle. Throws Error: a map without the fields i, j, k, slope_deg, or not ascending by
+// them.
 std::size_t add_obstacles(libmap::PointCloud& map, double voxel_size_m,
                           const ObstacleOptions& options);
 

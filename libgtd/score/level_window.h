@@ -57,7 +57,7 @@ class BlockMatcher {
   BlockMatcher(const VoxelGrid& grid, const MatchingPlan& plan, InstructionSet instructions)
       : grid_(grid), plan_(plan), loops_(loops_of(instructions)) {}
 
-  // A run of neighbouring pivots: the places first .. last - 1 of `pivots`.
+  // A run of neighboring pivots: the places first .. last - 1 of `pivots`.
   struct Run {
     std::size_t first = 0;
     std::size_t last = 0;

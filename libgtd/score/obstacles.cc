@@ -91,7 +91,7 @@ void check(const std::vector<Voxel>& voxels, const std::vector<float>& slopes_de
 void check(double voxel_size_m, const ObstacleOptions& options) {
   const auto require = [](bool sound, const char* name, double value, const char* bound) {
     if (!sound || !std::isfinite(value))
-      throw libmap::Error("obstacles cannot be judged by it",
+      throw libmap::Error("obstacles cannot be evaluated by it",
                           {.field = name, .value = libmap::to_text(value), .bound = bound});
   };
   require(voxel_size_m > 0.0, "voxel_size_m", voxel_size_m, "> 0");

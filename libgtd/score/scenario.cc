@@ -29,7 +29,7 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
             "least score of a graspable voxel");
   table.add("curvature_radius_m", scenario.curvature_radius_m, not_negative,
-            "radius in which curvature is measured, m; 0: convexity is not judged");
+            "radius in which curvature is measured, m; 0: convexity is not evaluated");
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
             "a voxel this close to a convex point counts as convex, m");
   table.add("orientation", scenario.orientation, orientation_names(),
@@ -37,9 +37,9 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   table.add("normal_radius_m", scenario.normal_radius_m, not_negative,
             "radius in which the surface's normal is fitted, m; 0: the gripper's palm diameter");
   table.add("obstacle_height_m", scenario.obstacle_height_m, not_negative,
-            "steep faces that rise more than this are obstacles, m; 0: not judged");
+            "steep faces that rise more than this are obstacles, m; 0: not evaluated");
   table.add("obstacle_slope_deg", scenario.obstacle_slope_deg, {0.0, 180.0},
-            "slope beyond which a face is steep, degrees; 0: not judged");
+            "slope beyond which a face is steep, degrees; 0: not evaluated");
   table.add("tile_size_m", scenario.tile_size_m, positive, "edge of a tile, m");
   table.add_overrides("gripper", scenario.gripper_overrides);
 }

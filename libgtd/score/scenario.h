@@ -11,7 +11,7 @@
 namespace libgtd {
 
 // Which way the gripper mask stands: along the terrain frame's z axis everywhere, or along the
-// normal of the surface at each voxel (thesis, 6.2), so that walls are judged as walls.
+// normal of the surface at each voxel (thesis, 6.2), so that walls are evaluated as walls.
 enum class Orientation { plane, surface };
 const std::vector<std::pair<std::string, Orientation>>& orientation_names();
 
@@ -26,18 +26,18 @@ struct Scenario {
   bool interpolation = false;
   double interpolation_max_edge_m = 0.0;  // 0: no limit
   double graspability_threshold = 0.8;
-  double curvature_radius_m = 0.09;  // 0: convexity is not judged
+  double curvature_radius_m = 0.09;  // 0: convexity is not evaluated
   double intersection_distance_m = 0.01;
   Orientation orientation = Orientation::plane;
   double normal_radius_m = 0.0;  // of the surface's normals; 0: the gripper's palm diameter
   // A steep face that rises more than this, and what stands on it out of reach, is an obstacle; 0:
-  // not judged.
+  // not evaluated.
   double obstacle_height_m = 0.0;
-  double obstacle_slope_deg = 60.0;  // steeper than this is steep; 0: not judged
+  double obstacle_slope_deg = 60.0;  // steeper than this is steep; 0: not evaluated
   double tile_size_m = 1.0;
 
-  bool judges_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
-  bool fits_normals() const { return orientation == Orientation::surface || judges_obstacles(); }
+  bool evaluates_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
+  bool fits_normals() const { return orientation == Orientation::surface || evaluates_obstacles(); }
 
   // Throws Error naming the field, its value and its bound; `orientation` surface with a method
   // that prepares the cloud as the author's program does, on a lattice of its own.

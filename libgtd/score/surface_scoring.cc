@@ -103,7 +103,7 @@ std::vector<ScoredVoxel> score_on_surface(const std::vector<Voxel>& voxels,
               .voxel = voxels[n],
               .counts = counts[n],
               .score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0,
-              .edge = edges[n] != 0};
+              .border = edges[n] != 0};
       });
   return scored;
 }

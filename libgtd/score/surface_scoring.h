@@ -14,14 +14,14 @@ namespace libgtd {
 std::vector<Voxel> pivots_of(const VoxelGrid& grid, const GripperMask& mask,
                              const std::vector<TileBounds>& tiles);
 
-// The surface at the centre of each voxel, facing where the normals of the voxel's own points do,
+// The surface at the center of each voxel, facing where the normals of the voxel's own points do,
 // or +z where they have none.
 std::vector<SurfaceNormal> normals_at(const std::vector<Voxel>& voxels,
                                       const libmap::PointCloud& surface,
                                       const VoxelLattice& lattice, double radius_m);
 
 // Scores the pivots `voxels` with the mask along `normals`, along +z where there is none. The
-// pivot's tilted voxel has its centre where the normal through the voxel's centre meets the height
+// pivot's tilted voxel has its center where the normal through the voxel's center meets the height
 // of the voxel's points along it: the mask's top layer holds a flat surface whole, whichever way it
 // faces and wherever it cuts through the terrain's voxels. Without a normal it is the voxel itself,
 // so that its counts are those of the upright mask. `surface` are the points that made the voxels.

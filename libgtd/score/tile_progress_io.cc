@@ -130,10 +130,10 @@ std::size_t count_tiles(const TileStoreIndex& index) {
 
 // Of all tiles, those without a scored voxel too.
 void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& index) {
-  std::uint64_t occupied = 0, edge = 0, graspable = 0;
+  std::uint64_t occupied = 0, border = 0, graspable = 0;
   for (const auto& [number, tile] : tiles) {
     occupied += tile.occupied_voxels;
-    edge += tile.edge_voxels;
+    border += tile.border_voxels;
     graspable += tile.graspable_voxels;
   }
   auto& results = index.manifest.results;
@@ -142,7 +142,7 @@ void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& i
   };
   add("occupied_voxels", occupied);
   add("scored_voxels", index.voxels());
-  add("edge_voxels", edge);
+  add("border_voxels", border);
   add("graspable_voxels", graspable);
 }
 

@@ -1,6 +1,6 @@
 // A map in tiles, as plain data: what the index of a tile store says. A store is a folder
-// NAME.tiles with an index and one cloud file a tile, each a part of the map as to_cloud makes it;
-// tile_store_io.h reads and writes it.
+// NAME.tiles with an index and one cloud file per tile, each a part of the map as to_cloud makes
+// it; tile_store_io.h reads and writes it.
 #pragma once
 
 #include <compare>
@@ -31,7 +31,7 @@ struct StoredTile {
   Voxel max;
   std::uint64_t voxels = 0;  // scored ones; a tile without any has no file and is not listed
   std::uint64_t occupied_voxels = 0;
-  std::uint64_t edge_voxels = 0;
+  std::uint64_t border_voxels = 0;
   std::uint64_t graspable_voxels = 0;
   std::string file;  // in the store
   std::uint64_t bytes = 0;

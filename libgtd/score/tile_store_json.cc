@@ -64,7 +64,7 @@ Json json_of(const StoredTile& tile) {
   json["max"] = json_of(tile.max);
   json["voxels"] = tile.voxels;
   json["occupied_voxels"] = tile.occupied_voxels;
-  json["edge_voxels"] = tile.edge_voxels;
+  json["border_voxels"] = tile.border_voxels;
   json["graspable_voxels"] = tile.graspable_voxels;
   json["file"] = tile.file;
   json["bytes"] = tile.bytes;
@@ -80,7 +80,9 @@ StoredTile tile_from(const Json& json, const TileStoreIndex& index) {
   tile.max = voxel_from(json.at("max"));
   tile.voxels = voxel_count_at(json, "voxels");
   tile.occupied_voxels = voxel_count_at(json, "occupied_voxels");
-  tile.edge_voxels = voxel_count_at(json, "edge_voxels");
+  // Stores of earlier versions call it edge_voxels.
+  tile.border_voxels =
+      voxel_count_at(json, json.contains("edge_voxels") ? "edge_voxels" : "border_voxels");
   tile.graspable_voxels = voxel_count_at(json, "graspable_voxels");
   tile.file = json.at("file").get<std::string>();
   tile.bytes = libmap::integer_at<std::uint64_t>(json, "bytes");

@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t pivots_per_chunk = 4096;
 
 constexpr std::uint8_t is_pivot = 1;
-constexpr std::uint8_t is_edge = 2;
+constexpr std::uint8_t is_border = 2;
 
 // Of each of the grid's voxels, whether it is a pivot of the tiles, and one at an edge.
 std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& mask,
@@ -32,7 +32,7 @@ std::vector<std::uint8_t> find_pivots(const VoxelGrid& grid, const GripperMask& 
       if (!flag_edges) continue;
       const std::vector<std::uint8_t> edges = find_edges(grid, mask, tiles[t], pivots);
       for (std::size_t n = 0; n < pivots.size(); ++n)
-        if (edges[n] != 0) flags[pivots[n]] |= is_edge;
+        if (edges[n] != 0) flags[pivots[n]] |= is_border;
     }
   });
   return flags;
@@ -134,7 +134,7 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
       one.voxel = grid.voxels[pivots[n]];
       one.counts = counts[n];
       one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0;
-      one.edge = (flags[pivots[n]] & is_edge) != 0;
+      one.border = (flags[pivots[n]] & is_border) != 0;
     }
   });
   return scored;

@@ -17,7 +17,7 @@ namespace libgtd {
 // than 2^24 tiles.
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
 
-// Share `number` of `count`, from 1 on: a run of neighbouring tiles; all shares together are all
+// Share `number` of `count`, from 1 on: a run of neighboring tiles; all shares together are all
 // tiles. Throws Error naming `--tile`.
 struct TileShare {
   int number = 1;
@@ -28,8 +28,8 @@ std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare&
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;
-  double score = 0.0;  // score_percent / 100
-  bool edge = false;   // the mask's window leaves the scanned area
+  double score = 0.0;   // score_percent / 100
+  bool border = false;  // the mask's window leaves the scanned area
 };
 
 struct ScoringOptions {

@@ -11,7 +11,7 @@ namespace libgtd {
 
 // From the terrain's lattice, in voxels, into a pivot's own, whose cell 0, 0, 0 is the pivot's.
 struct TiltedLattice {
-  double origin[3];   // centre of that cell
+  double origin[3];   // center of that cell
   double axes[3][3];  // one after the other
 };
 

@@ -14,7 +14,7 @@ namespace {
 using Eigen::Matrix3d;
 using Eigen::Vector3d;
 
-// Distance from the pivot's centre to the farthest corner of a window, in voxels.
+// Distance from the pivot's center to the farthest corner of a window, in voxels.
 double matched_reach(const GripperMask& mask) {
   const double across = 0.5 + std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1);
   const double along = 0.5 + std::max(mask.pivot_z, mask.layers - mask.pivot_z - 1);

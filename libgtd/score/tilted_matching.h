@@ -15,7 +15,7 @@
 namespace libgtd {
 
 struct TiltedPivot {
-  Eigen::Vector3d anchor_m = Eigen::Vector3d::Zero();  // centre of the pivot's tilted voxel
+  Eigen::Vector3d anchor_m = Eigen::Vector3d::Zero();  // center of the pivot's tilted voxel
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();   // of unit length: the mask's axis, outward
 };
 

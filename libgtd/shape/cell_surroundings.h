@@ -29,7 +29,7 @@ class CoordinateRows {
 std::vector<Eigen::Vector3d> in_order_of(const PointGrid& grid,
                                          const std::vector<Eigen::Vector3d>& points);
 
-// Of `count` neighbours, in the unit of their coordinates.
+// Of `count` neighbors, in the unit of their coordinates.
 Eigen::Matrix3d covariance_of(const NeighborLoops& loops, const NeighborLoops::Places& neighbors,
                               std::size_t count);
 

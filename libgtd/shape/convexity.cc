@@ -30,7 +30,7 @@ void check_bound(const char* field, double value) {
   if (std::isnan(value)) throw libmap::Error("not a number", {.field = field, .value = "nan"});
 }
 
-// Whether places are near to one of the points; neighbouring places share a search.
+// Whether places are near to one of the points; neighboring places share a search.
 class NearSearch {
  public:
   NearSearch(const std::vector<Eigen::Vector3d>& points, const PointGrid& grid, double distance)

@@ -14,7 +14,7 @@ namespace libgtd {
 struct ConvexityOptions {
   // Corrected: both principal curvatures exceed this, in 1/m, away from the outside. Nothing: 0.1
   // over the radius of the estimate, 1.1/m at 0.09 m, so that a convex place falls off by a
-  // twentieth of the radius within it (4.5 mm at 0.09 m); 2 mm of noise on 200 neighbours within
+  // twentieth of the radius within it (4.5 mm at 0.09 m); 2 mm of noise on 200 neighbors within
   // 0.09 m bends a plane by 0.17/m (standard deviation).
   std::optional<double> min_curvature_per_m = std::nullopt;
   // Thesis: k1 * k2 exceeds this (listing 3.2). PCL's curvature of a ball of radius R is about

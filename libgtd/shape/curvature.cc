@@ -31,7 +31,7 @@ constexpr std::size_t min_neighbors = 6;  // a quadric has six coefficients
 // What must be left of a column of the normal equations after the ones before it are taken out.
 constexpr double min_pivot = 1e-6;
 
-// Columns u, v, w: the neighbourhood's widest, second and thinnest direction. False if it is a line
+// Columns u, v, w: the neighborhood's widest, second and thinnest direction. False if it is a line
 // or a lump.
 bool tangent_frame(const Matrix3d& covariance, Matrix3d& frame) {
   Eigen::SelfAdjointEigenSolver<Matrix3d> solver;
@@ -142,7 +142,7 @@ class QuadricFitter {
   }
 
  private:
-  // As the neighbours tell it, before it is known which side is outside.
+  // As the neighbors tell it, before it is known which side is outside.
   struct Surface {
     Vector3d normal;
     std::array<double, 2> bending;

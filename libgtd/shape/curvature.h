@@ -16,18 +16,18 @@ namespace libgtd {
 // thesis: PCL's NormalEstimation and PrincipalCurvaturesEstimation, as the author's program: the
 // curvatures are eigenvalues of a covariance of projected normals, without unit, never negative, so
 // that a bowl and a ball look alike; normals face the frame's origin.
-// corrected: a quadric is fitted by least squares to the neighbours in each point's own tangent
+// corrected: a quadric is fitted by least squares to the neighbors in each point's own tangent
 // frame; curvatures are signed, in 1/m, and normals face outside.
 enum class CurvatureMethod { thesis, corrected };
 
 struct CurvatureOptions {
   CurvatureMethod method = CurvatureMethod::corrected;
-  double radius_m = 0.09;  // neighbours lie at most this far off; 0.09 SCAR-E, 0.03 HubRobo
+  double radius_m = 0.09;  // neighbors lie at most this far off; 0.09 SCAR-E, 0.03 HubRobo
   // The outside where the cloud has no normal of its own for a point. Corrected only.
   Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
 };
 
-// Of one point. Where `valid` is false all numbers are NaN: too few neighbours, neighbours that fix
+// Of one point. Where `valid` is false all numbers are NaN: too few neighbors, neighbors that fix
 // no quadric (on a line, on two lines, all in one place), or a surface along `up` with no normal of
 // its own, whose outside is not known.
 struct Curvature {
@@ -50,7 +50,7 @@ struct CurvatureResult {
 
 // At all points of the cloud, or at those of the indices `queries`. The value at a point does not
 // depend on which others are asked for, nor on the number of threads. Points that are not finite
-// are nobody's neighbours. Throws Error for a radius that is not positive, for an `up` of no
+// are nobody's neighbors. Throws Error for a radius that is not positive, for an `up` of no
 // length, and for an index out of range.
 CurvatureResult estimate_curvature(
     const libmap::PointCloud& cloud, const CurvatureOptions& options = {},

@@ -1,4 +1,4 @@
-// The innermost loops over the neighbours of a point, each for several instruction sets, with the
+// The innermost loops over the neighbors of a point, each for several instruction sets, with the
 // same bits from each: sums run in eight lanes, whatever the width of the registers, and are joined
 // in one order. Plain pointers alone: sources that are compiled for more than the base instruction
 // set must see no type whose inline functions other sources compile too.
@@ -14,7 +14,7 @@ namespace libgtd {
 struct NeighborLoops {
   static constexpr std::size_t lanes = 8;
 
-  // Coordinates of places, each axis one after the other. Candidates are read, and neighbours
+  // Coordinates of places, each axis one after the other. Candidates are read, and neighbors
   // written, up to a full set of lanes beyond their number.
   struct Places {
     double* x = nullptr;

@@ -1,4 +1,4 @@
-// Points in one place, to the bit: what their neighbours say of one holds for all of them.
+// Points in one place, to the bit: what their neighbors say of one holds for all of them.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 // Points sorted into cubic cells: whoever asks for all points near a place walks few cells and
-// always meets them in the same order, so that sums over neighbours are the same to the bit. The
+// always meets them in the same order, so that sums over neighbors are the same to the bit. The
 // cells lie on the lattice through the frame's origin, so that this order does not depend on what
 // else is in the cloud: a tile with its surroundings yields what the whole cloud yields there. A
 // libmap::PointTree meets them in an order that depends on all points, and takes 8 times as long

@@ -25,8 +25,8 @@ using Eigen::Matrix3f;
 using Eigen::Vector3f;
 
 constexpr std::size_t cells_at_once = 16;
-constexpr std::uint32_t most_inserted = 32;  // of a bucket that insertion sorts
-// Neighbours are found once and kept for the second pass while there is room for them.
+constexpr std::uint32_t max_inserted = 32;  // of a bucket that insertion sorts
+// Neighbors are found once and kept for the second pass while there is room for them.
 constexpr std::size_t max_kept_neighbors = std::size_t{1} << 26;
 
 // Three numbers side by side, and a fourth for the register.
@@ -52,7 +52,7 @@ struct Sums {
 
 using Numbers = std::vector<std::uint32_t>;  // of candidates
 
-// The points near one cell of the grid, of which each point of the cell takes its neighbours: the
+// The points near one cell of the grid, of which each point of the cell takes its neighbors: the
 // candidates, by number.
 class NeighborSearch {
  public:
@@ -89,7 +89,7 @@ class NeighborSearch {
   // The candidates' places.
   const std::vector<Quad>& near() const { return near_; }
 
-  // Keys of the neighbours of a point of that cell, among them itself, by distance, then by the
+  // Keys of the neighbors of a point of that cell, among them itself, by distance, then by the
   // point's index.
   std::span<const std::uint64_t> find(const Quad& at) {
     const float center[3] = {at[0], at[1], at[2]};
@@ -120,7 +120,7 @@ class NeighborSearch {
     for (std::size_t n = 0; n < count; ++n) sorted_[begin_of[bucket_of(keys_[n])]++] = keys_[n];
     const auto is_before = [&](std::uint64_t a, std::uint64_t b) { return comes_before(a, b); };
     for (std::size_t b = 0, begin = 0; b < buckets; begin = begin_of[b++])
-      if (begin_of[b] - begin > most_inserted)
+      if (begin_of[b] - begin > max_inserted)
         std::sort(sorted_.begin() + static_cast<std::ptrdiff_t>(begin),
                   sorted_.begin() + static_cast<std::ptrdiff_t>(begin_of[b]), is_before);
     for (std::size_t n = 1; n < count; ++n) {
@@ -178,8 +178,8 @@ Vector3f normal_of(const std::vector<Quad>& near, const Quad& at, const Numbers&
   return normal;
 }
 
-// The covariance of the neighbours' normals in the tangent plane, as
-// computePointPrincipalCurvatures. One neighbour without a normal spoils the sum, as in PCL.
+// The covariance of the neighbors' normals in the tangent plane, as
+// computePointPrincipalCurvatures. One neighbor without a normal spoils the sum, as in PCL.
 // `normals` are the candidates'.
 Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
                        const Numbers& neighbors, std::vector<Quad>& projected) {
@@ -213,7 +213,7 @@ Curvature curvature_of(const Vector3f& normal, const std::vector<Quad>& normals,
   return result.valid ? result : Curvature{};
 }
 
-// The neighbours of the places of a run of cells, one list after the other.
+// The neighbors of the places of a run of cells, one list after the other.
 struct KeptNeighbors {
   bool complete = false;
   Numbers lists;
@@ -283,7 +283,7 @@ class CurvatureEstimation {
   }
 
   // Calls visit(point, twin): points in one place follow each other, and `twin` says whether this
-  // one lies where the last one did, so that it has the same neighbours.
+  // one lies where the last one did, so that it has the same neighbors.
   template <typename Visit>
   void for_each_point(std::size_t cell, const Visit& visit) const {
     const PointGrid::Range range = grid_.ranges()[cell];

@@ -112,7 +112,7 @@ double thesis_spacing(std::size_t count, const Box& box) {
   return 1 / (std::round(std::sqrt(density) * 10000) / 10000);
 }
 
-std::size_t most_nodes(std::size_t points, const InterpolationOptions& options) {
+std::size_t max_nodes(std::size_t points, const InterpolationOptions& options) {
   constexpr double always = 1e6;
   const double most =
       always + static_cast<double>(options.max_nodes_a_point) * static_cast<double>(points);
@@ -149,7 +149,7 @@ Axis lattice(double min, double max, double spacing) {
   return axis;
 }
 
-// The first node of `axis` at or after `at`; all but its neighbours are passed over by the spacing.
+// The first node of `axis` at or after `at`; all but its neighbors are passed over by the spacing.
 std::size_t first_node(const Axis& axis, double at, double spacing) {
   const double index = (at - axis.front()) / spacing - 1;
   std::size_t i = !(index > 0)                               ? 0
@@ -356,7 +356,7 @@ HeightGrid make_grid(const std::vector<Vector3d>& points, const Box& box,
   if (options.method == InterpolationMethod::thesis) {
     result.area_m2 = box.area();
     const double spacing = result.grid_spacing_m = thesis_spacing(points.size(), box);
-    check_grid(box, spacing, most_nodes(points.size(), options));
+    check_grid(box, spacing, max_nodes(points.size(), options));
     return {repeated_addition(box.min_x, box.max_x, spacing),
             repeated_addition(box.min_y, box.max_y, spacing), spacing};
   }
@@ -366,7 +366,7 @@ HeightGrid make_grid(const std::vector<Vector3d>& points, const Box& box,
                                               : 1 / std::sqrt(density * 5 / 3);  // eq. 3-5
   if (options.max_grid_spacing_m > 0) spacing = std::min(spacing, options.max_grid_spacing_m);
   result.grid_spacing_m = spacing;
-  check_grid(box, spacing, most_nodes(points.size(), options));
+  check_grid(box, spacing, max_nodes(points.size(), options));
   return {lattice(box.min_x, box.max_x, spacing), lattice(box.min_y, box.max_y, spacing), spacing};
 }
 

@@ -54,7 +54,7 @@ std::uint32_t hilbert_place(std::uint32_t x, std::uint32_t y) {
   return place;
 }
 
-// Along Hilbert's curve neighbours follow each other, so that each is found within a few triangles
+// Along Hilbert's curve neighbors follow each other, so that each is found within a few triangles
 // of the one before.
 void sort_along_hilbert(const Points& points, Indices& members) {
   struct Item {
@@ -140,7 +140,7 @@ struct Strip {
 
 // Whether a triangle's circumcircle lies within the strip for certain: then no point beyond touches
 // it. Margins of a thousandth of its radius are wide against rounding, which reaches 1e-5 of it for
-// the thinnest triangles that are judged at all.
+// the thinnest triangles that are evaluated at all.
 bool is_final(const Face& face, const Strip& strip) {
   const auto &a = face->vertex(0)->point(), &b = face->vertex(1)->point(),
              &c = face->vertex(2)->point();

@@ -36,7 +36,7 @@ struct RegressionPlaneOptions {
 };
 
 struct RegressionPlane {
-  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();          // in the input frame, metres
+  Eigen::Vector3d centroid = Eigen::Vector3d::Zero();          // in the input frame, meters
   libmap::Pose terrain_from_input = libmap::Pose::Identity();  // p' = R^T (p - c), R = [x, -y, n]
   double rmse_m = 0;                                           // of the points' heights
   UpSource up_source = UpSource::frame_z;

@@ -27,7 +27,8 @@ void require_room(const Vector& extent_in_voxels, double voxel_size_m) {
   if ((extent.cwiseAbs().array() < 0x1p29).all()) return;
   const double gigabytes = (extent.cwiseAbs().array() + 1.0).prod() / 8.0 / 0x1p30;
   throw libmap::Error("too small for this cloud: the grid would take " +
-                          libmap::to_text(static_cast<float>(gigabytes)) + " GiB at a bit a voxel",
+                          libmap::to_text(static_cast<float>(gigabytes)) +
+                          " GiB at a bit per voxel",
                       {.field = "voxel_size_m", .value = libmap::to_text(voxel_size_m)});
 }
 

@@ -67,7 +67,7 @@ void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit
 
 // `corrected`: index = floor(p / voxel_size_m) on the lattice through the frame's origin, so that a
 // point lies in the same voxel whatever else is in the cloud. Throws Error naming voxel_size_m if
-// an index would leave +-2^29 (it says how much memory a bit a voxel would take).
+// an index would leave +-2^29 (it says how much memory a bit per voxel would take).
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
 
 // `thesis` (listing A.4), in single precision: the centroid of each cell of one lattice, put into

@@ -1,4 +1,4 @@
-// All arithmetic between points and voxels. Points are in the terrain frame, in metres.
+// All arithmetic between points and voxels. Points are in the terrain frame, in meters.
 #pragma once
 
 #include <Eigen/Core>
@@ -42,7 +42,7 @@ struct VoxelLattice {
 };
 
 // The same in single precision, as the author's program does it (spec of method `thesis`): voxels
-// count from the cloud's smallest coordinates, and a quarter of the voxel size, in metres, is added
+// count from the cloud's smallest coordinates, and a quarter of the voxel size, in meters, is added
 // to an index before it is cut off.
 struct ThesisLattice {
   Eigen::Vector3f min_m = Eigen::Vector3f::Zero();

@@ -10,7 +10,7 @@
 namespace libgtd {
 
 struct VoxelPoints {
-  // Mean of the points in the voxel, metres; the voxel's centre where there is none.
+  // Mean of the points in the voxel, meters; the voxel's center where there is none.
   std::vector<Eigen::Vector3d> centroids;
   // Sum of their normals, each of unit length; zero where none is known.
   std::vector<Eigen::Vector3f> outsides;

@@ -23,8 +23,8 @@ using Eigen::Vector2d;
 
 constexpr double unseen = -1.0;
 constexpr double max_band_cells = 4e6;
-constexpr double least_contrast = 40.0;  // of 255, of white from what is usual
-constexpr std::size_t most_lines = 10;   // white lines in one direction
+constexpr double min_contrast = 40.0;  // of 255, of white from what is usual
+constexpr std::size_t max_lines = 10;  // white lines in one direction
 
 // What is white, seen from above.
 struct Picture {
@@ -32,7 +32,7 @@ struct Picture {
   double cell = 0.0;
   Image<double> levels;  // mean of the least of red, green and blue; `unseen` where no point is
 
-  // Between the centres of the cells around, those that are seen.
+  // Between the centers of the cells around, those that are seen.
   double at(const Vector2d& place) const {
     const Vector2d index = (place - corner) / cell - Vector2d::Constant(0.5);
     const Vector2d low(std::floor(index.x()), std::floor(index.y()));
@@ -56,7 +56,7 @@ struct Picture {
 };
 
 Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) {
-  if (!cloud.has_colors()) throw Error("there are no colours to find a white border in");
+  if (!cloud.has_colors()) throw Error("there are no colors to find a white border in");
   std::vector<std::size_t> used;
   Vector2d low = Vector2d::Constant(std::numeric_limits<double>::infinity());
   Vector2d high = -low;
@@ -101,12 +101,12 @@ double white_level_of(const Picture& picture, const BorderBandOptions& options) 
   std::sort(seen.begin(), seen.end());
   const double usual = seen[seen.size() / 2];
   const double brightest = seen[seen.size() - 1 - seen.size() / 200];
-  if (brightest - usual < least_contrast)
-    throw Error("nothing stands out as white: no border band",
+  if (brightest - usual < min_contrast)
+    throw Error("nothing is white enough: no border band",
                 {.field = "brightest half percent",
                  .value = to_fixed_text(brightest, 0),
-                 .bound = ">= " + to_fixed_text(usual + least_contrast, 0) + " of 255, " +
-                          to_fixed_text(least_contrast, 0) + " above what is usual"});
+                 .bound = ">= " + to_fixed_text(usual + min_contrast, 0) + " of 255, " +
+                          to_fixed_text(min_contrast, 0) + " above what is usual"});
   return (usual + brightest) / 2.0;
 }
 
@@ -150,7 +150,7 @@ std::vector<double> peaks_of(const Axis& axis) {
   }
   std::stable_sort(peaks.begin(), peaks.end(),
                    [&](std::size_t a, std::size_t b) { return counts[a] > counts[b]; });
-  peaks.resize(std::min(peaks.size(), most_lines));
+  peaks.resize(std::min(peaks.size(), max_lines));
   std::sort(peaks.begin(), peaks.end());
   std::vector<double> places;
   places.reserve(peaks.size());
@@ -316,7 +316,7 @@ void move_to_inner_edge(Side& side, const Picture& picture, double white_level,
                         const BorderBandOptions& options) {
   const double length = (side.to - side.from).norm();
   const double step = std::max(2.0 * picture.cell, length / 400.0);
-  // The bands of the neighbouring sides end it.
+  // The bands of the neighboring sides end it.
   const double rim = std::min(options.max_width_m, length / 4.0);
   std::vector<Vector2d> edges;
   int slices = 0;
@@ -353,7 +353,7 @@ std::array<Vector2d, 4> corners_of(const std::array<Side, 4>& sides) {
 
 void bind(ParameterTable& table, BorderBandOptions& options) {
   table.add("white_level", options.white_level, {0.0, 255.0},
-            "border: least of red, green, blue of white, 0 to 255; 0: from the colours");
+            "border: least of red, green, blue of white, 0 to 255; 0: from the colors");
   table.add("max_band_width_m", options.max_width_m, positive, "border: width of the band, m");
   table.add("min_band_side_m", options.min_side_m, positive, "border: side of the area, m");
   table.add("min_band_seen", options.min_seen, {0.0, 1.0, true, false},

@@ -32,8 +32,8 @@ struct BorderBand {
 // along and across it, and takes the rectangle with the most white along all four sides; then each
 // side's inner edge, where white ends, is found slice by slice and a line is fitted to it robustly,
 // so that gaps in the band and white rocks that touch it do no harm. Sides need not be parallel.
-// `level_cloud`: coloured points, ground at z = 0, spread more densely than cell_m. Each side lies
-// `margin_m` inside the edge found. Throws Error: no colours, no white, no band.
+// `level_cloud`: colored points, ground at z = 0, spread more densely than cell_m. Each side lies
+// `margin_m` inside the edge found. Throws Error: no colors, no white, no band.
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m = 0.0,
                             const BorderBandOptions& options = {});
 

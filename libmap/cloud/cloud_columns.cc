@@ -40,14 +40,14 @@ std::vector<std::string> names_of(const ColumnSet& set) {
 void require_unique(const std::vector<std::string>& names) {
   std::set<std::string_view> seen;
   for (const std::string& name : names)
-    if (!seen.insert(name).second) throw Error("stands twice", {.field = "field '" + name + "'"});
+    if (!seen.insert(name).second) throw Error("is a duplicate", {.field = "field '" + name + "'"});
 }
 
 Triple require_positions(const ColumnSet& set) {
   if (const auto triple = find_triple(set, position_names)) return *triple;
   std::string all;
   for (const std::string& name : names_of(set)) all += " " + name.substr(0, 40);
-  throw Error("holds no points: fields x, y and z are needed, it has" +
+  throw Error("contains no points: fields x, y and z are needed, it has" +
               (all.empty() ? std::string(" none") : all.substr(0, 400)));
 }
 
@@ -146,7 +146,7 @@ void require_readable_back(const ColumnSet& set, const std::vector<ScalarField>&
     if (triple)
       throw Error(
           "scalar fields under these names would be read back as positions, normals or "
-          "colours",
+          "colors",
           {.field = (*triple)[0]->name + " " + (*triple)[1]->name + " " + (*triple)[2]->name});
 }
 

@@ -2,7 +2,7 @@
 //
 // Read under any of these names: x y z, X Y Z; normal_x .., nx .., Normals_0 ..; red green blue,
 // r g b, diffuse_red ... Three columns are a triple only if all three are there; every other column
-// becomes a scalar field. Colours stored as fractions (float, none above 1) are scaled to 0-255.
+// becomes a scalar field. Colors stored as fractions (float, none above 1) are scaled to 0-255.
 #pragma once
 
 #include <cstddef>

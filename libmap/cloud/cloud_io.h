@@ -7,7 +7,7 @@
 //   .csv   all, without types       no          text
 //
 // Coordinates are doubles in memory. They are written as float32 unless that moves some coordinate
-// by more than 1e-5 m, then as float64; normals as float32, colours as three bytes, integers as
+// by more than 1e-5 m, then as float64; normals as float32, colors as three bytes, integers as
 // their type. CSV: a header line; columns x y z, optionally nx ny nz and red green blue; a column
 // of integers is read as int32, any other as float64, an empty cell as NaN. Its numbers are the
 // shortest that read back as the float32 written; as doubles they may differ from it by half a unit

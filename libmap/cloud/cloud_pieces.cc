@@ -158,7 +158,7 @@ std::vector<fs::path> cloud_pieces(const fs::path& given) {
       pieces.push_back(entry.path());
   }
   if (pieces.empty())
-    throw Error("the folder holds no cloud (.pcd, .ply, .csv)", {.file = given.string()});
+    throw Error("the folder contains no cloud (.pcd, .ply, .csv)", {.file = given.string()});
   std::sort(pieces.begin(), pieces.end());
   return pieces;
 }

@@ -13,7 +13,7 @@ namespace libmap {
 // that is no number in a column of numbers, an empty cell in x, y or z.
 GeometryColumns decode_csv(std::string_view text, const std::string& file);
 
-// A header line and a row a point, each number as the shortest text that reads back the same.
+// A header line and a row per point, each number as the shortest text that reads back the same.
 void encode_csv(const ColumnSet& columns, std::ostream& out);
 
 }  // namespace libmap

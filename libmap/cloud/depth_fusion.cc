@@ -34,10 +34,10 @@ constexpr std::size_t registration_elements = 20000;
 // By which frames may lie off the coarse surface when they are first registered.
 constexpr double first_search_voxels = 3.0;
 // Corrections of heights, root mean square, that are not worth another coarse surface.
-constexpr double least_correction_voxels = 0.05;
+constexpr double min_correction_voxels = 0.05;
 
 // Decoded frames and their planes are kept for later passes as far as this reaches.
-constexpr std::size_t most_kept_bytes = std::size_t{512} << 20;
+constexpr std::size_t max_kept_bytes = std::size_t{512} << 20;
 constexpr std::size_t kept_pixel_bytes = 25;
 
 void check(const DepthFusionOptions& options) {
@@ -73,7 +73,7 @@ struct CoarseSurface {
   std::vector<FusedFrame> frames;  // those that can be used
   SurfaceVoxels voxels;
   DepthPixelCounts pixels;
-  std::size_t most_image_pixels = 0;
+  std::size_t max_image_pixels = 0;
 };
 
 void add_planes(const DepthPlanes& planes, const PixelRays& rays, const Pose& grid_from_camera,
@@ -155,7 +155,7 @@ class Fusion {
              .value = to_text(options_.voxel_size_m),
              .bound = "> " + to_text(static_cast<float>(options_.voxel_size_m * needed / bound))});
       if (needed > bound)
-        throw Error("poses lie too far apart for the voxel size",
+        throw Error("poses are too far apart for the voxel size",
                     {.field = node_name(pose.node),
                      .value = to_text(static_cast<float>(reach)) + " m from the first",
                      .bound = "< " + to_text(static_cast<float>(bound)) + " m"});
@@ -193,7 +193,7 @@ class Fusion {
   void keep(int node, const std::shared_ptr<DepthFrame>& frame) const {
     const std::size_t bytes = kept_pixel_bytes * frame->images.depth.pixels.size();
     const std::scoped_lock lock(mutex_);
-    if (kept_bytes_ + bytes <= most_kept_bytes && kept_.emplace(node, frame).second)
+    if (kept_bytes_ + bytes <= max_kept_bytes && kept_.emplace(node, frame).second)
       kept_bytes_ += bytes;
   }
 
@@ -234,7 +234,7 @@ class Fusion {
       coarse.frames.push_back(frames[n]);
       coarse.voxels.merge_frame(parts[n].voxels);
       coarse.pixels += parts[n].pixels;
-      coarse.most_image_pixels = std::max(coarse.most_image_pixels, parts[n].image_pixels);
+      coarse.max_image_pixels = std::max(coarse.max_image_pixels, parts[n].image_pixels);
     }
   }
 
@@ -286,7 +286,7 @@ class Fusion {
   // use(views, frames) of some frames at a time, in their order.
   template <typename Use>
   void each_view_group(const CoarseSurface& coarse, bool color, const Use& use) const {
-    const std::size_t group = frames_in_batch(coarse.most_image_pixels);
+    const std::size_t group = frames_in_batch(coarse.max_image_pixels);
     for (std::size_t first = 0; first < coarse.frames.size(); first += group) {
       const std::size_t count = std::min(group, coarse.frames.size() - first);
       std::vector<std::vector<RefinementView>> frames(count);
@@ -332,10 +332,10 @@ class Fusion {
     });
     std::stable_sort(observations.begin(), observations.end(),
                      [](const auto& a, const auto& b) { return a.element < b.element; });
-    std::vector<Eigen::Vector3d> centres;
+    std::vector<Eigen::Vector3d> centers;
     for (const FusedFrame& frame : coarse.frames)
-      centres.push_back(frame.grid_from_base.translation());
-    return libmap::register_frames(elements, observations, centres);
+      centers.push_back(frame.grid_from_base.translation());
+    return libmap::register_frames(elements, observations, centers);
   }
 
   void register_frames(CoarseSurface& coarse) {
@@ -345,7 +345,7 @@ class Fusion {
       if (round == 1) result_.disagreement_before_m = found.disagreement_before_m;
       result_.disagreement_after_m = found.disagreement_before_m;
       // Poses that are right stay as they are, and with them the coarse surface.
-      if (!(found.correction_m > least_correction_voxels * options_.voxel_size_m)) break;
+      if (!(found.correction_m > min_correction_voxels * options_.voxel_size_m)) break;
       std::vector<FusedFrame> frames = std::move(coarse.frames);
       for (std::size_t n = 0; n < frames.size(); ++n)
         frames[n].grid_from_base = found.corrected_from_given[n] * frames[n].grid_from_base;
@@ -426,7 +426,7 @@ class Fusion {
 
 void bind(ParameterTable& table, DepthFusionOptions& options) {
   DepthPlaneOptions& planes = options.planes;
-  table.add("voxel_size_m", options.voxel_size_m, positive, "one point a voxel of this size");
+  table.add("voxel_size_m", options.voxel_size_m, positive, "one point per voxel of this size");
   table.add("min_depth_m", planes.min_depth_m, positive, "nearer measurements are dropped");
   table.add("max_depth_m", planes.max_depth_m, positive, "farther measurements are dropped");
   table.add("max_incidence_deg", planes.max_incidence_deg, {0, 89.5, true, false},
@@ -434,7 +434,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("axial_noise_m", planes.noise.axial_m, positive,
             "standard deviation of depth at range 0");
   table.add("range_noise", planes.noise.axial_of_range, not_negative,
-            "standard deviation of depth added by each metre of range, m/m");
+            "standard deviation of depth added by each meter of range, m/m");
   table.add("lateral_noise_px", planes.noise.lateral_px, not_negative,
             "standard deviation across the line of sight");
   table.add("plane_radius_px", planes.radius_px, {1, 7},
@@ -452,7 +452,7 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "points are dropped that are seen through more often, against being seen");
   table.add("extend_edges", options.extend_edges,
             "also points one voxel beyond the edges of what was measured");
-  table.add("color", options.color, "colours, blended with the nearest front views ahead");
+  table.add("color", options.color, "colors, blended with the nearest front views ahead");
   table.add("stereo", options.stereo, "compute the depth of stereo pairs by semi-global matching");
   table.add("strict", options.strict, "end with an error if a frame cannot be used");
 }

@@ -1,4 +1,4 @@
-// One oriented, coloured cloud from all depth images of a scan.
+// One oriented, colored cloud from all depth images of a scan.
 //
 // Frames whose poses do not agree are moved together first (frame_registration): a map is as sharp
 // as its poses. Then two passes over the frames. The first fits a plane to the pixels around each
@@ -51,7 +51,7 @@ struct DepthFusionOptions {
 void bind(ParameterTable& table, DepthFusionOptions& options);
 
 struct DepthFusionResult {
-  // World frame; unit normals towards the cameras; colours if any frame has them. Fields: `views`,
+  // World frame; unit normals towards the cameras; colors if any frame has them. Fields: `views`,
   // distinct frames; `expected_error` of the position along the normal, m, one standard deviation:
   // from the noise, from how far frames disagree, and from how far the two passes do, as they do
   // where the surface bends within a disc.

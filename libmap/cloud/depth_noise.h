@@ -10,7 +10,7 @@ namespace libmap {
 // pixel is what a pixel's own footprint leaves open.
 struct DepthNoise {
   double axial_m = 0.002;         // > 0: standard deviation at range 0
-  double axial_of_range = 0.005;  // >= 0: what each metre of range adds, m/m
+  double axial_of_range = 0.005;  // >= 0: what each meter of range adds, m/m
   double lateral_px = 0.8;        // >= 0
 
   double axial_at(double z_m) const { return axial_m + axial_of_range * z_m; }

@@ -144,7 +144,7 @@ std::vector<PlaneFit::Offset> PlaneFit::pair_offsets() const {
 // The sums of four pixels side by side.
 PlaneFit::PairSums PlaneFit::sum_pairs(int x, int y, const std::vector<Offset>& offsets) const {
   const float* middle = &measured_[margin_at(x, y)];
-  const Four centre = Eigen::Map<const Four>(middle);
+  const Four center = Eigen::Map<const Four>(middle);
   const Four tolerance = Eigen::Map<const Four>(&tolerance_[at(x, y)]);
   PairSums sums;
   for (const Offset& offset : offsets) {
@@ -153,8 +153,8 @@ PlaneFit::PairSums PlaneFit::sum_pairs(int x, int y, const std::vector<Offset>& 
     const Four mean = 0.5F * (a + b);
     const Four half = 0.5F * (a - b);
     // Positive where both are measured and agree with the pixel between, within noise and slope.
-    const Four slack = (tolerance - (mean - centre).abs())
-                           .min(tolerance + offset.steepest * centre - half.abs())
+    const Four slack = (tolerance - (mean - center).abs())
+                           .min(tolerance + offset.steepest * center - half.abs())
                            .min(a)
                            .min(b);
     // 1 or 0, by arithmetic that is done on four at once where a comparison would not be.

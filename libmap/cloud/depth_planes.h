@@ -49,7 +49,7 @@ struct DepthPlanes {
   DepthPixelCounts counts;
 };
 
-// For each pixel those pairs of opposite neighbours whose mean agrees with it within the noise:
+// For each pixel those pairs of opposite neighbors whose mean agrees with it within the noise:
 // their mean inverse depth and its least-squares slopes. A pixel with too few such pairs, at the
 // edge of a surface, takes the plane next to it that predicts its depth within the noise; if there
 // is none, it is flying. Throws Error if image and rays differ in size.

@@ -32,14 +32,14 @@ class Adjustment {
  public:
   Adjustment(std::span<const SurfaceElement> elements,
              std::span<const SurfaceObservation> observations,
-             std::span<const Eigen::Vector3d> centres, const FrameRegistrationOptions& options)
-      : options_(options), corrections_(centres.size(), Vector6d::Zero()) {
+             std::span<const Eigen::Vector3d> centers, const FrameRegistrationOptions& options)
+      : options_(options), corrections_(centers.size(), Vector6d::Zero()) {
     const double turn = options.rotation_error_deg * std::numbers::pi / 180.0;
     prior_.head<3>().setConstant(1.0 / (turn * turn));
     prior_.tail<3>().setConstant(1.0 / (options.place_error_m * options.place_error_m));
     const double scatter = options.scatter_m * options.scatter_m;
     const double share =
-        std::min(1.0, options.independent_heights * static_cast<double>(centres.size()) /
+        std::min(1.0, options.independent_heights * static_cast<double>(centers.size()) /
                           static_cast<double>(std::max<std::size_t>(1, observations.size())));
     for (const SurfaceObservation& one : observations) {
       const SurfaceElement& element = elements[one.element];
@@ -48,7 +48,7 @@ class Adjustment {
       equation.height = static_cast<double>(one.height_m);
       equation.information = share / (static_cast<double>(one.variance_m2) + scatter);
       const Eigen::Vector3d normal = element.normal.cast<double>();
-      const Eigen::Vector3d arm = element.position.cast<double>() - centres[one.frame];
+      const Eigen::Vector3d arm = element.position.cast<double>() - centers[one.frame];
       equation.slope << arm.cross(normal), normal;
       if (starts_.empty() || one.element != last_element_) starts_.push_back(equations_.size());
       last_element_ = one.element;
@@ -182,10 +182,10 @@ class Adjustment {
 
 FrameRegistration register_frames(std::span<const SurfaceElement> elements,
                                   std::span<const SurfaceObservation> observations,
-                                  std::span<const Eigen::Vector3d> centres,
+                                  std::span<const Eigen::Vector3d> centers,
                                   const FrameRegistrationOptions& options) {
   FrameRegistration result;
-  Adjustment adjustment(elements, observations, centres, options);
+  Adjustment adjustment(elements, observations, centers, options);
   for (int round = 0; round < robust_rounds; ++round) {
     adjustment.weigh();
     if (round == 0) result.disagreement_before_m = adjustment.disagreement();
@@ -193,13 +193,13 @@ FrameRegistration register_frames(std::span<const SurfaceElement> elements,
   }
   result.disagreement_after_m = adjustment.disagreement();
   result.correction_m = adjustment.correction();
-  for (std::size_t f = 0; f < centres.size(); ++f) {
+  for (std::size_t f = 0; f < centers.size(); ++f) {
     const Vector6d& correction = adjustment.corrections()[f];
     const Eigen::Vector3d turn = correction.head<3>();
     const double angle = turn.norm();
     Pose pose = Pose::Identity();
     if (angle > 0.0) pose.linear() = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
-    pose.translation() = centres[f] + correction.tail<3>() - pose.linear() * centres[f];
+    pose.translation() = centers[f] + correction.tail<3>() - pose.linear() * centers[f];
     result.corrected_from_given.push_back(pose);
   }
   return result;

@@ -31,13 +31,13 @@ struct FrameRegistration {
   double correction_m = 0.0;          // root mean square of what heights change by
 };
 
-// All frames at once: turns and shifts, small, that minimise the weighted squares of the heights
+// All frames at once: turns and shifts, small, that minimize the weighted squares of the heights
 // about each element's own mean (point to plane, Chen and Medioni 1991; all views jointly, Bergevin
 // et al. 1996), by conjugate gradients. Robust by weights after Geman and McClure (1987). Elements
-// in metres; `centres` are where the frames turn about. The same for any number of threads.
+// in meters; `centers` are where the frames turn about. The same for any number of threads.
 FrameRegistration register_frames(std::span<const SurfaceElement> elements,
                                   std::span<const SurfaceObservation> observations,
-                                  std::span<const Eigen::Vector3d> centres,
+                                  std::span<const Eigen::Vector3d> centers,
                                   const FrameRegistrationOptions& options = {});
 
 }  // namespace libmap

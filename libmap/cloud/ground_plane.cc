@@ -19,10 +19,10 @@ namespace {
 
 using Points = std::vector<Eigen::Vector3d>;
 
-constexpr std::size_t most_drawn = 20000;  // points that hypotheses are drawn from
-constexpr std::size_t first_look = 2000;   // of them, that every hypothesis is counted on
-constexpr std::size_t second_look = 20;    // hypotheses that are counted on all of them
-constexpr int most_rounds = 10;            // planes that are looked for, walls included
+constexpr std::size_t max_drawn = 20000;  // points that hypotheses are drawn from
+constexpr std::size_t first_look = 2000;  // of them, that every hypothesis is counted on
+constexpr std::size_t second_look = 20;   // hypotheses that are counted on all of them
+constexpr int max_rounds = 10;            // planes that are looked for, walls included
 constexpr std::uint64_t points_stream = 0, hypotheses_stream = 1;  // of random numbers
 
 double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
@@ -31,9 +31,9 @@ double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
 
 struct Plane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
 
-  double height(const Eigen::Vector3d& point) const { return normal.dot(point - centre); }
+  double height(const Eigen::Vector3d& point) const { return normal.dot(point - center); }
 };
 
 // Weighted sums of a plane's points about a place near them.
@@ -56,7 +56,7 @@ struct Moments {
 };
 
 struct Spread {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
   Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // ascending
   Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
 
@@ -67,9 +67,9 @@ struct Spread {
 Spread spread_of(const Moments& moments) {
   Spread spread;
   if (!(moments.weight > 0.0)) return spread;
-  spread.centre = moments.first / moments.weight;
+  spread.center = moments.first / moments.weight;
   const Eigen::Matrix3d covariance =
-      moments.second / moments.weight - spread.centre * spread.centre.transpose();
+      moments.second / moments.weight - spread.center * spread.center.transpose();
   const SymmetricEigen<3> eigen = symmetric_eigen(covariance);
   spread.variances = eigen.values;
   spread.axes = eigen.vectors;
@@ -90,12 +90,12 @@ Spread weighted_spread(const Points& points, const Eigen::Vector3d& near, const 
         return part;
       },
       [](Moments a, const Moments& b) { return a += b; }));
-  spread.centre += near;
+  spread.center += near;
   return spread;
 }
 
 Plane plane_of(const Spread& spread, const Eigen::Vector3d& up) {
-  Plane plane{spread.axes.col(0), spread.centre};
+  Plane plane{spread.axes.col(0), spread.center};
   if (plane.normal.dot(up) < 0.0) plane.normal = -plane.normal;
   return plane;
 }
@@ -149,7 +149,7 @@ std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& 
   const auto most = std::max_element(second.begin(), second.end()) - second.begin();
   Plane plane = planes[order[static_cast<std::size_t>(most)]];
   for (int round = 0; round < 5; ++round) {
-    const Spread spread = weighted_spread(points, plane.centre, [&](const Eigen::Vector3d& point) {
+    const Spread spread = weighted_spread(points, plane.center, [&](const Eigen::Vector3d& point) {
       return std::abs(plane.height(point)) <= options.tolerance_m ? 1.0 : 0.0;
     });
     if (!spread.is_plane()) return std::nullopt;
@@ -168,7 +168,7 @@ std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& 
   const auto total = static_cast<double>(points.size());
   RandomStream random(options.seed, hypotheses_stream);
   std::vector<Candidate> candidates;
-  for (int round = 0; round < most_rounds && points.size() >= 3; ++round) {
+  for (int round = 0; round < max_rounds && points.size() >= 3; ++round) {
     const std::optional<Plane> plane = best_plane(points, options, up, random);
     if (!plane) break;
     Candidate candidate{*plane, {}};
@@ -207,7 +207,7 @@ bool lies_under(const Candidate& other, const Candidate& ground, const Eigen::Ve
   const double tilt_of_other = degrees_between(other.plane.normal, up);
   const double tilt_of_ground = degrees_between(ground.plane.normal, up);
   if (std::abs(tilt_of_other - tilt_of_ground) > 5.0) return tilt_of_other < tilt_of_ground;
-  return up.dot(ground.plane.centre - other.plane.centre) > tolerance;
+  return up.dot(ground.plane.center - other.plane.center) > tolerance;
 }
 
 // Iterated least squares with Tukey's biweight (Beaton and Tukey 1974); its scale is that of the
@@ -228,13 +228,13 @@ Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up,
     if (deviations.size() < 3) return plane;
     const double limit = std::clamp(4.685 * 1.4826 * median(std::move(deviations)),
                                     std::min(100.0 * exact, tolerance), tolerance);
-    const Spread spread = weighted_spread(near, plane.centre, [&](const Eigen::Vector3d& point) {
+    const Spread spread = weighted_spread(near, plane.center, [&](const Eigen::Vector3d& point) {
       const double ratio = plane.height(point) / limit;
       return std::abs(ratio) < 1.0 ? (1.0 - ratio * ratio) * (1.0 - ratio * ratio) : 0.0;
     });
     if (!spread.is_plane()) return plane;
     const Plane fitted = plane_of(spread, up);
-    const double moved = std::abs(fitted.height(plane.centre)) +
+    const double moved = std::abs(fitted.height(plane.center)) +
                          (fitted.normal - plane.normal).norm() * std::sqrt(spread.variances[2]);
     plane = fitted;
     if (moved <= exact) break;
@@ -260,12 +260,12 @@ Points finite_points(const Points& points) {
 Points drawn_points(const Points& points, std::uint64_t seed) {
   RandomStream random(seed, points_stream);
   Points drawn;
-  if (points.size() <= most_drawn) {
+  if (points.size() <= max_drawn) {
     drawn = points;
     for (std::size_t n = drawn.size(); n > 1; --n) std::swap(drawn[n - 1], drawn[random.below(n)]);
     return drawn;
   }
-  for (std::size_t n = 0; n < most_drawn; ++n) drawn.push_back(points[random.below(points.size())]);
+  for (std::size_t n = 0; n < max_drawn; ++n) drawn.push_back(points[random.below(points.size())]);
   return drawn;
 }
 
@@ -289,9 +289,9 @@ void bind(ParameterTable& table, GroundPlaneOptions& options) {
   table.add("max_tilt_deg", options.max_tilt_deg, {0.0, 90.0, true, true},
             "of the ground from up, degrees");
   table.add("min_ground_share", options.min_share, share,
-            "of all points (of a mesh: of its area) that the ground must hold");
+            "of all points (of a mesh: of its area) that the ground must contain");
   table.add("min_share_of_largest", options.min_share_of_largest, share,
-            "of the largest plane's points that a lower plane must hold to be the ground");
+            "of the largest plane's points that a lower plane must contain to be the ground");
   table.add("plane_hypotheses", options.hypotheses, {1.0, 1e6},
             "planes through three points that are tried for each plane");
   table.add("seed", options.seed, not_negative, "of what is drawn at random");
@@ -326,16 +326,16 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
     if (std::abs(height) > options.tolerance_m) continue;
     ++result.inliers;
     squares += height * height;
-    sum += point - plane.centre;
+    sum += point - plane.center;
   }
   const auto count = static_cast<double>(result.inliers);
-  result.centre = plane.centre;
+  result.center = plane.center;
   if (result.inliers > 0) {
     result.rmse_m = std::sqrt(squares / count);
     const Eigen::Vector3d mean = sum / count;
-    result.centre += mean - plane.normal.dot(mean) * plane.normal;
+    result.center += mean - plane.normal.dot(mean) * plane.normal;
   }
-  result.offset_m = result.normal.dot(result.centre);
+  result.offset_m = result.normal.dot(result.center);
   result.share = count / static_cast<double>(finite.size());
   result.tilt_deg = degrees_between(result.normal, up);
   return result;
@@ -365,7 +365,7 @@ Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals) {
 
 Pose level_from_map(const GroundPlane& plane) {
   const Eigen::Vector3d pivot =
-      plane.centre - (plane.normal.dot(plane.centre) - plane.offset_m) * plane.normal;
+      plane.center - (plane.normal.dot(plane.center) - plane.offset_m) * plane.normal;
   Pose level = Pose::Identity();
   level.linear() = shortest_rotation(plane.normal, Eigen::Vector3d::UnitZ());
   level.translation() = Eigen::Vector3d(pivot.x(), pivot.y(), 0.0) - level.linear() * pivot;

@@ -31,7 +31,7 @@ void bind(ParameterTable& table, GroundPlaneOptions& options);
 struct GroundPlane {
   Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();  // unit, up
   double offset_m = 0.0;                              // normal . p = offset_m on the plane
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();   // of the inliers, on the plane
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, on the plane
   double rmse_m = 0.0;                                // of the inliers
   std::size_t inliers = 0;                            // points within the tolerance
   double share = 0.0;                                 // of all finite points
@@ -53,7 +53,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
 // otherwise that mean. Normals of any length, zeros passed over.
 Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals);
 
-// Carries the plane to z = 0 by the least rotation, about `centre`: x and y of the ground stay as
+// Carries the plane to z = 0 by the least rotation, about `center`: x and y of the ground stay as
 // near as that allows.
 Pose level_from_map(const GroundPlane& plane);
 

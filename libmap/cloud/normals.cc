@@ -19,10 +19,10 @@ namespace libmap {
 
 namespace {
 
-// Second eigenvalue of the neighbours' covariance, against the first, below which they lie on a
+// Second eigenvalue of the neighbors' covariance, against the first, below which they lie on a
 // line.
-constexpr double least_spread = 1e-6;
-// Neighbours along which sides are passed on.
+constexpr double min_spread = 1e-6;
+// Neighbors along which sides are passed on.
 constexpr std::size_t graph_neighbors = 10;
 
 using Normals = std::vector<Eigen::Vector3f>;
@@ -40,7 +40,7 @@ Eigen::Vector3f plane_normal(const std::vector<Eigen::Vector3d>& positions,
   const auto count = static_cast<double>(neighbors.size());
   moments -= mean * mean.transpose() / count;
   const SymmetricEigen<3> spread = symmetric_eigen(moments);
-  if (!(spread.values[1] > least_spread * spread.values[2])) return Eigen::Vector3f::Zero();
+  if (!(spread.values[1] > min_spread * spread.values[2])) return Eigen::Vector3f::Zero();
   return spread.vectors.col(0).cast<float>().normalized();
 }
 

@@ -1,4 +1,4 @@
-// Normals of a cloud that has none: planes through each point's neighbours, turned to the side from
+// Normals of a cloud that has none: planes through each point's neighbors, turned to the side from
 // which the surface was seen.
 #pragma once
 
@@ -22,20 +22,20 @@ void bind(ParameterTable& table, NormalEstimationOptions& options);
 enum class NormalOrientation {
   view_fields,   // fields vp_x, vp_y, vp_z: where each point was seen from, as PCL names them
   viewpoint,     // the cloud's viewpoint, where it is not the identity
-  spanning_tree  // neighbours look the same way; most of each part outwards or up
+  spanning_tree  // neighbors look the same way; most of each part outwards or up
 };
 std::string_view to_text(NormalOrientation orientation);
 
 struct NormalEstimationResult {
-  // Unit; zero where the neighbours lie on a line or in one place.
+  // Unit; zero where the neighbors lie on a line or in one place.
   std::vector<Eigen::Vector3f> normals;
   std::size_t undefined = 0;  // normals that are zero
   NormalOrientation orientation = NormalOrientation::spanning_tree;
-  std::size_t parts = 0;  // of the graph of neighbours, each with sides of its own
+  std::size_t parts = 0;  // of the graph of neighbors, each with sides of its own
 };
 
 // Planes of total least squares (Hoppe et al. 1992, section 3.2). Without views, sides go along the
-// minimum spanning tree of the graph of neighbours, by which the least turning neighbour decides
+// minimum spanning tree of the graph of neighbors, by which the least turning neighbor decides
 // (section 3.3); of each part they are such that it looks away from its middle or, where it rather
 // has an up than an outside, up. The same for any number of threads. Throws Error: an option out of
 // its range, a position that is not finite.

@@ -17,7 +17,7 @@ namespace {
 using Eigen::Vector2d;
 
 constexpr double on_border_m = 1e-9;
-constexpr std::size_t most_strips = 1024;
+constexpr std::size_t max_strips = 1024;
 
 double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
 
@@ -91,7 +91,7 @@ std::size_t Outline::strip_of(double y) const {
 }
 
 void Outline::make_strips() {
-  strips_.resize(std::min(corners_.size(), most_strips));
+  strips_.resize(std::min(corners_.size(), max_strips));
   for (std::uint32_t n = 0; n < corners_.size(); ++n) {
     const double a = corners_[n].y();
     const double b = corners_[(n + 1) % corners_.size()].y();
@@ -116,7 +116,7 @@ void Outline::require_simple() const {
         std::uint32_t b = strip[j];
         if ((b + 1) % count == a) std::swap(a, b);
         if ((a + 1) % count == b) {
-          // Neighbours share a corner; one may not turn back onto the other.
+          // Neighbors share a corner; one may not turn back onto the other.
           if (side_of(corners_[a], end(a), end(b)) == 0 &&
               (end(a) - corners_[a]).dot(end(b) - corners_[b]) < 0.0)
             throw crossing(a, b);
@@ -148,7 +148,7 @@ std::vector<std::uint32_t> Outline::edges_near(const Vector2d& box_min,
   std::vector<std::uint32_t> edges;
   if ((box_max.array() < min_.array()).any() || (box_min.array() > max_.array()).any())
     return edges;
-  const Vector2d centre = (box_min + box_max) / 2.0;
+  const Vector2d center = (box_min + box_max) / 2.0;
   const Vector2d half = (box_max - box_min) / 2.0;
   const std::size_t last = strip_of(box_max.y());
   for (std::size_t s = strip_of(box_min.y()); s <= last; ++s)
@@ -160,7 +160,7 @@ std::vector<std::uint32_t> Outline::edges_near(const Vector2d& box_min,
         continue;
       // The box lies on one side of the edge's line.
       const Vector2d normal(a.y() - b.y(), b.x() - a.x());
-      if (std::abs(normal.dot(centre - a)) > normal.cwiseAbs().dot(half) * (1.0 + 1e-9)) continue;
+      if (std::abs(normal.dot(center - a)) > normal.cwiseAbs().dot(half) * (1.0 + 1e-9)) continue;
       edges.push_back(n);
     }
   std::sort(edges.begin(), edges.end());

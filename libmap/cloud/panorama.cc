@@ -92,7 +92,7 @@ class ViewProjection {
     return (jumps(-1, 0) && jumps(1, 0)) || (jumps(0, -1) && jumps(0, 1));
   }
 
-  // Where only one of two opposite neighbours lies on the surface, the pixel stands for the other.
+  // Where only one of two opposite neighbors lies on the surface, the pixel stands for the other.
   std::optional<Eigen::Vector3d> tangent(int x, int y, int dx, int dy,
                                          const Eigen::Vector3d& point) const {
     const auto neighbor = [&](int sign) -> std::optional<Eigen::Vector3d> {
@@ -140,11 +140,11 @@ void check(const PanoramaView& view) {
 void bind(ParameterTable& table, PanoramaOptions& options) {
   table.add("stride_px", options.stride_px, Range{1, 1e6}, "takes every n-th row and column");
   table.add("flying_pixel_jump_m", options.flying_pixel_jump_m, not_negative,
-            "drops pixels that differ by more from both neighbours in a row or column; 0: keeps "
+            "drops pixels that differ by more from both neighbors in a row or column; 0: keeps "
             "all");
-  table.add("normals", options.normals, "normals from neighbouring pixels, towards the camera");
+  table.add("normals", options.normals, "normals from neighboring pixels, towards the camera");
   table.add("normal_jump_m", options.normal_jump_m, positive,
-            "neighbours that differ by more are another surface");
+            "neighbors that differ by more are another surface");
 }
 
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,

@@ -25,11 +25,11 @@ struct PanoramaView {
 
 struct PanoramaOptions {
   int stride_px = 1;  // >= 1: takes every n-th row and column
-  // >= 0; drops pixels further than this in front of or behind both neighbours in their row or
+  // >= 0; drops pixels further than this in front of or behind both neighbors in their row or
   // column: between the edge of one surface and the next. 0: none are dropped.
   double flying_pixel_jump_m = 0.0;
-  // Of the surface through a pixel and its four neighbours, towards the camera, of unit length; 0 0
-  // 0 where neighbours are missing or nearer or further by normal_jump_m.
+  // Of the surface through a pixel and its four neighbors, towards the camera, of unit length; 0 0
+  // 0 where neighbors are missing or nearer or further by normal_jump_m.
   bool normals = false;
   double normal_jump_m = 0.05;  // > 0
 };

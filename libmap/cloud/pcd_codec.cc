@@ -81,7 +81,7 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
                   {.file = {}, .field = "line " + std::to_string(header.data_line - 1)});
     if (key == "COLUMNS") key = "FIELDS";
     if (!lines.try_emplace(key, words.begin() + 1, words.end()).second)
-      throw bad_header("stands twice", key);
+      throw bad_header("is a duplicate", key);
     if (is_data) {
       header.data_begin = position;
       return lines;
@@ -93,7 +93,7 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
 const std::string& single_word(const HeaderLines& lines, const std::string& key) {
   const std::vector<std::string>& words = lines.at(key);
   if (words.size() != 1)
-    throw bad_header("holds " + std::to_string(words.size()) + " words", key, {}, "one");
+    throw bad_header("contains " + std::to_string(words.size()) + " words", key, {}, "one");
   return words.front();
 }
 
@@ -173,8 +173,8 @@ Pose read_viewpoint(const HeaderLines& lines) {
   if (found == lines.end()) return Pose::Identity();
   std::array<double, 7> numbers{};
   if (found->second.size() != numbers.size())
-    throw bad_header("holds " + std::to_string(found->second.size()) + " numbers", "VIEWPOINT", {},
-                     "tx ty tz qw qx qy qz");
+    throw bad_header("contains " + std::to_string(found->second.size()) + " numbers", "VIEWPOINT",
+                     {}, "tx ty tz qw qx qy qz");
   for (std::size_t i = 0; i < numbers.size(); ++i) {
     const std::optional<double> number = parse_double(found->second[i]);
     if (!number || !std::isfinite(*number))
@@ -285,11 +285,11 @@ void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& s
   const bool padded = few && uncompressed == header.points * record;
   if (!padded && !(few && uncompressed == header.points * record_unpadded))
     throw Error("the header promises " + std::to_string(header.points) + " points of " +
-                std::to_string(record_unpadded) + " bytes, but the data hold " +
+                std::to_string(record_unpadded) + " bytes, but the data contain " +
                 std::to_string(uncompressed) + " bytes");
   // LZF makes at most 264 bytes of 3.
   if (uncompressed / 88 > compressed)
-    throw Error("the compressed data cannot hold " + std::to_string(uncompressed) + " bytes");
+    throw Error("the compressed data cannot contain " + std::to_string(uncompressed) + " bytes");
   auto buffer = std::make_shared<std::string>(uncompressed, '\0');
   if (uncompressed > 0 &&
       (compressed == 0 ||
@@ -305,7 +305,7 @@ void add_compressed(const PcdHeader& header, std::string_view data, ColumnSet& s
   set.storage.push_back(buffer);
 }
 
-// Text into records, which then are read as binary ones are: so that packed colours keep the bits
+// Text into records, which then are read as binary ones are: so that packed colors keep the bits
 // of a float whatever its value.
 void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
   struct Target {
@@ -337,8 +337,9 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
       throw Error("the header promises " + std::to_string(header.points) + " points, but only " +
                   std::to_string(row) + " lines of data follow");
     if (words.size() != targets.size())
-      throw Error("line " + std::to_string(rows.line()) + " holds " + std::to_string(words.size()) +
-                  " of " + std::to_string(targets.size()) + " numbers");
+      throw Error("line " + std::to_string(rows.line()) + " contains " +
+                  std::to_string(words.size()) + " of " + std::to_string(targets.size()) +
+                  " numbers");
     for (std::size_t i = 0; i < words.size(); ++i) {
       const Target& target = targets[i];
       if (target.values == nullptr && target.packed == nullptr) continue;
@@ -359,7 +360,7 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
 void require_name(const Column& column, bool is_color) {
   const bool reserved = column.name == "_" || column.name == "rgb" || column.name == "rgba";
   if ((reserved && !is_color) || column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
-    throw Error("this name cannot stand in a PCD header",
+    throw Error("this name cannot be used in a PCD header",
                 {.file = {}, .field = "field '" + column.name + "'"});
 }
 

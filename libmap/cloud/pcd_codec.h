@@ -24,12 +24,12 @@ GeometryFileInfo pcd_info(std::string_view head, std::uint64_t file_bytes);
 std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block);
 
-// Throws Error (without the file's name): a header line that is missing, unknown, stands twice or
+// Throws Error (without the file's name): a header line that is missing, unknown, is a duplicate or
 // does not fit the others; more points promised than there is data; compressed data that is broken.
 // All of this is known before memory for the points is taken. `owner` keeps the bytes.
 GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner);
 
-// Colours are written as packed `rgb`, TYPE U. Throws Error: a field name that cannot stand in the
+// Colors are written as packed `rgb`, TYPE U. Throws Error: a field name that cannot stand in the
 // header, or more than 4 GiB to compress.
 void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding encoding,
                 std::ostream& out);

@@ -52,10 +52,10 @@ void PcdPartsWriter::require_good() const {
 }
 
 void PcdPartsWriter::append(const PointCloud& part) {
-  if (part.empty()) return;  // it does not say whether the whole has normals and colours
+  if (part.empty()) return;  // it does not say whether the whole has normals and colors
   written_ += part.size();
   if (written_ > options_.points)
-    throw Error("holds more points than were promised", {.file = path_.string()});
+    throw Error("contains more points than were promised", {.file = path_.string()});
   const std::string bytes = encoded(part, options_.float64_positions);
   const std::size_t begin = data_begin(bytes);
   std::string header = bytes.substr(0, begin);
@@ -73,7 +73,7 @@ void PcdPartsWriter::append(const PointCloud& part) {
 
 void PcdPartsWriter::finish() {
   if (written_ != options_.points)
-    throw Error("holds fewer points than were promised", {.file = path_.string()});
+    throw Error("contains fewer points than were promised", {.file = path_.string()});
   file_.close();
   require_good();
 }

@@ -21,7 +21,7 @@ class PcdPartsWriter {
   // Writes straight to `path`, as write_cloud does. Throws Error (failed).
   PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options);
 
-  // All parts have the fields of the first, and normals and colours if it has; empty ones are
+  // All parts have the fields of the first, and normals and colors if it has; empty ones are
   // passed over. Throws Error: one has others, more points than promised, a failed write
   // (ErrorKind::failed).
   void append(const PointCloud& part);

@@ -75,8 +75,8 @@ class RowReader {
   }
   void end_row() {
     if (ascii_ && word_ != words_.size())
-      throw Error("line " + std::to_string(cursor_.rows.line()) + " holds more than one row of '" +
-                  element_.name.substr(0, 40) + "'");
+      throw Error("line " + std::to_string(cursor_.rows.line()) +
+                  " contains more than one row of '" + element_.name.substr(0, 40) + "'");
   }
 
  private:
@@ -231,7 +231,7 @@ void require_vertices(const PlyHeader& header) {
 void write_property_lines(const ColumnSet& set, std::ostream& out) {
   for (const Column& column : set.columns) {
     if (column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
-      throw Error("this name cannot stand in a PLY header",
+      throw Error("this name cannot be used in a PLY header",
                   {.field = "field '" + column.name + "'"});
     out << "property " << ply_type_name(column.type) << ' ' << column.name << '\n';
   }

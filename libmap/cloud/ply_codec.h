@@ -25,7 +25,7 @@ struct PlyEncoding {
 struct PlyContent {
   const ColumnSet* vertices = nullptr;
   const std::vector<Triangle>* triangles = nullptr;
-  const ColumnSet* faces = nullptr;  // one row a triangle
+  const ColumnSet* faces = nullptr;  // one row per triangle
   const Pose* viewpoint = nullptr;   // as a comment line; not written if it is the identity
 };
 

@@ -72,7 +72,7 @@ std::optional<Pose> viewpoint_of(const Words& words) {
 
 void add_element(PlyElement element, std::size_t line, PlyHeader& header) {
   if (header.find(element.name) != nullptr)
-    throw bad_line(line, "this element stands twice", element.name);
+    throw bad_line(line, "this element is a duplicate", element.name);
   constexpr std::size_t max_elements = 1000;
   if (header.elements.size() == max_elements) throw bad_line(line, "more than 1000 elements");
   header.elements.push_back(std::move(element));
@@ -82,7 +82,7 @@ void add_property(PlyProperty property, std::size_t line, PlyHeader& header) {
   if (header.elements.empty()) throw bad_line(line, "a property before the first element");
   for (const PlyProperty& other : header.elements.back().properties)
     if (other.name == property.name)
-      throw bad_line(line, "this property stands twice", property.name);
+      throw bad_line(line, "this property is a duplicate", property.name);
   constexpr std::size_t max_properties = 10'000;
   if (header.elements.back().properties.size() == max_properties)
     throw bad_line(line, "more than 10000 properties");

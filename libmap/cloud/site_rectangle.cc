@@ -20,9 +20,9 @@ namespace {
 using Eigen::Vector2d;
 using Mask = Image<std::uint8_t>;
 
-constexpr double most_cells = 1e6;
-constexpr double most_on_a_side = 20000.0;
-constexpr double least_on_a_site = 20.0;  // cells along its shorter side
+constexpr double max_cells = 1e6;
+constexpr double max_on_a_side = 20000.0;
+constexpr double min_on_a_site = 20.0;  // cells along its shorter side
 
 // Sums of a mask over rectangles in constant time (Crow 1984).
 class AreaTable {
@@ -98,7 +98,7 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
   }
   const double area = (high - low).x() * (high - low).y();
   ground.cell = std::max(
-      {options.cell_m, std::sqrt(area / most_cells), (high - low).maxCoeff() / most_on_a_side});
+      {options.cell_m, std::sqrt(area / max_cells), (high - low).maxCoeff() / max_on_a_side});
   // A closing of this many cells on each side fills gaps of twice as many.
   const int reach = static_cast<int>(std::ceil(options.max_gap_m / ground.cell / 2.0));
   const int rim = reach + 2;
@@ -118,7 +118,7 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
 
 struct Fit {
   int growth = 0;  // cells on every side; negative: the rectangle is too large
-  Vector2d centre = Vector2d::Zero();
+  Vector2d center = Vector2d::Zero();
 };
 
 // The data seen along axes that are turned by yaw.
@@ -139,7 +139,7 @@ class TurnedGround {
     table_ = AreaTable(mask);
   }
 
-  // The best centred place of a rectangle of so many cells, if it fits somewhere when each side is
+  // The best centered place of a rectangle of so many cells, if it fits somewhere when each side is
   // as small as one cell.
   std::optional<Fit> best(const Eigen::Vector2i& size) const {
     int least = -(size.minCoeff() - 1) / 2;
@@ -274,7 +274,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
     if (point.allFinite()) finite.push_back(point);
   if (finite.empty()) throw Error("there are no data to lay a site into");
   const Ground ground = make_ground(finite, options);
-  if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / least_on_a_site))
+  if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_a_site))
     throw Error("the data reach too far for a site of this size: are there stray points?",
                 {.field = "size of the data",
                  .value = to_fixed_text(ground.cell * ground.mask.width, 0) + " x " +
@@ -300,7 +300,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
                                                 2.0 * (result.clearance_m - options.margin_m))
                                     : std::string("0")) +
                           ", the largest that fits"});
-  result.centre = best.fit->centre;
+  result.center = best.fit->center;
   return result;
 }
 

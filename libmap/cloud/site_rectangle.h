@@ -16,14 +16,14 @@ struct SiteRectangleOptions {
 void bind(ParameterTable& table, SiteRectangleOptions& options);
 
 struct SiteRectangle {
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
   double yaw_deg = 0.0;  // of its first side from the x axis; -45..45 for a square, else -90..90
   double clearance_m = 0.0;  // by which it could grow on every side and still lie inside
 };
 
 // The rectangle size_m.x() along its own x axis and size_m.y() along y that has the largest
 // clearance, over all places and directions; among equals the least turned, in their middle.
-// `points` are the data seen from above, spread so densely that no gap between neighbours is as
+// `points` are the data seen from above, spread so densely that no gap between neighbors is as
 // wide as max_gap_m. A rectangle fits if no more than one cell is missing. Throws Error: options
 // out of their ranges, no finite point, none fits (it names the largest that does).
 SiteRectangle find_site_rectangle(const std::vector<Eigen::Vector2d>& points,

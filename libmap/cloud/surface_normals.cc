@@ -13,13 +13,13 @@ namespace libmap {
 
 namespace {
 
-constexpr float least_agreement = 0.7F;
-// Second eigenvalue of the neighbours' covariance, in squared radii, below which they lie on a
+constexpr float min_agreement = 0.7F;
+// Second eigenvalue of the neighbors' covariance, in squared radii, below which they lie on a
 // line.
 constexpr float min_spread_ratio = 0.02F;
 
 // What a fit needs of a point, lengths in radii.
-struct Neighbour {
+struct Neighbor {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  // from the middle of the cell
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   float certainty = 0.0F;
@@ -28,9 +28,9 @@ struct Neighbour {
 // Points by cells as wide as the radius, the points of a cell side by side. Not a PointTree: one
 // walk serves all points of a cell (the tree's search alone takes 3 times as long as all of
 // fit_normals), and the order of the cells is that of the single-precision sums.
-class NeighbourCells {
+class NeighborCells {
  public:
-  NeighbourCells(const PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m)
+  NeighborCells(const PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m)
       : cloud_(cloud),
         radius_m_(radius_m),
         deviations_m_(deviations_m),
@@ -54,29 +54,29 @@ class NeighbourCells {
   }
 
   // Of the cell and the 26 around it; the cell's own members first.
-  void gather(std::size_t cell, std::vector<Neighbour>& neighbours) const {
-    neighbours.clear();
+  void gather(std::size_t cell, std::vector<Neighbor>& neighbors) const {
+    neighbors.clear();
     const Eigen::Vector3i there = unpack(index_.keys()[cell]).cell;
     const Eigen::Vector3d middle =
         origin_ + (there.cast<double>().array() + 0.5).matrix() * radius_m_;
-    add_members(cell, middle, neighbours);
+    add_members(cell, middle, neighbors);
     for (int n = 0; n < 27; ++n) {
       if (n == 13) continue;
       const Eigen::Vector3i beside = there + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
       const std::uint32_t c = index_.find(pack({beside, 0}));
-      if (c != VoxelIndex::none) add_members(c, middle, neighbours);
+      if (c != VoxelIndex::none) add_members(c, middle, neighbors);
     }
   }
 
  private:
   void add_members(std::size_t cell, const Eigen::Vector3d& middle,
-                   std::vector<Neighbour>& neighbours) const {
+                   std::vector<Neighbor>& neighbors) const {
     for (const std::uint32_t n : members(cell)) {
       // No point is believed more than 1 % of the radius.
       const double deviation = deviations_m_[n] / radius_m_;
-      neighbours.push_back({((cloud_.positions[n] - middle) / radius_m_).cast<float>(),
-                            cloud_.normals[n],
-                            static_cast<float>(1.0 / (deviation * deviation + 1e-4))});
+      neighbors.push_back({((cloud_.positions[n] - middle) / radius_m_).cast<float>(),
+                           cloud_.normals[n],
+                           static_cast<float>(1.0 / (deviation * deviation + 1e-4))});
     }
   }
 
@@ -89,15 +89,15 @@ class NeighbourCells {
   std::vector<std::uint32_t> members_;
 };
 
-Eigen::Vector3f fitted_normal(const Neighbour& point, const std::vector<Neighbour>& neighbours) {
+Eigen::Vector3f fitted_normal(const Neighbor& point, const std::vector<Neighbor>& neighbors) {
   float weights = 0.0F;
   Eigen::Vector3f mean = Eigen::Vector3f::Zero();
   Eigen::Vector3f squares = Eigen::Vector3f::Zero();   // xx, yy, zz
   Eigen::Vector3f products = Eigen::Vector3f::Zero();  // xy, yz, zx
-  for (const Neighbour& other : neighbours) {
+  for (const Neighbor& other : neighbors) {
     const Eigen::Vector3f arm = other.position - point.position;
     const float near = 1.0F - arm.squaredNorm();
-    if (near <= 0.0F || other.normal.dot(point.normal) < least_agreement) continue;
+    if (near <= 0.0F || other.normal.dot(point.normal) < min_agreement) continue;
     const float weight = near * other.certainty;
     const Eigen::Vector3f weighted = weight * arm;
     weights += weight;
@@ -122,15 +122,15 @@ void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& 
   if (deviations_m.size() != cloud.size() || cloud.normals.size() != cloud.size())
     throw Error("normals are fitted to points with normals and deviations");
   if (cloud.empty()) return;
-  const NeighbourCells cells(cloud, radius_m, deviations_m);
+  const NeighborCells cells(cloud, radius_m, deviations_m);
   std::vector<Eigen::Vector3f> fitted(cloud.size());
   parallel_for(cells.size(), 256, [&](std::size_t begin, std::size_t end) {
-    std::vector<Neighbour> neighbours;
+    std::vector<Neighbor> neighbors;
     for (std::size_t c = begin; c < end; ++c) {
-      cells.gather(c, neighbours);
+      cells.gather(c, neighbors);
       const std::span<const std::uint32_t> members = cells.members(c);
       for (std::size_t i = 0; i < members.size(); ++i)
-        fitted[members[i]] = fitted_normal(neighbours[i], neighbours);
+        fitted[members[i]] = fitted_normal(neighbors[i], neighbors);
     }
   });
   cloud.normals = std::move(fitted);

@@ -17,7 +17,7 @@ namespace {
 
 // Beyond an edge a surface is believed as far as it goes on straight: in voxels along the normal.
 constexpr double max_extended_shift = 0.5;
-// Part of its neighbour's uncertainty below which a point makes the neighbour an echo.
+// Part of its neighbor's uncertainty below which a point makes the neighbor an echo.
 constexpr float echo_certainty = 0.5F;
 // Voxels along the normal within which points of two voxels are the same.
 constexpr double max_echo_distance = 0.5;
@@ -74,7 +74,7 @@ class PointMaker {
 };
 
 bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElement& refined) {
-  counts_.most_views = std::max(counts_.most_views, std::size_t{refined.frames});
+  counts_.max_views = std::max(counts_.max_views, std::size_t{refined.frames});
   if (refined.frames < static_cast<std::uint32_t>(options_.min_views)) {
     ++counts_.unconfirmed;
     return false;

@@ -1,4 +1,5 @@
-// Refined elements of a surface as a cloud: one point a voxel, without those that views contradict.
+// Refined elements of a surface as a cloud: one point per voxel, without those that views
+// contradict.
 #pragma once
 
 #include <cstddef>
@@ -16,7 +17,7 @@ struct SurfacePointOptions {
 
 struct SurfacePointCounts {
   std::size_t unconfirmed = 0;      // dropped: measured by too few frames
-  std::size_t most_views = 0;       // frames that measured one element, at most
+  std::size_t max_views = 0;        // frames that measured one element, at most
   std::size_t seen_through = 0;     // dropped: views see through them
   std::size_t bent_away = 0;        // dropped: beyond an edge where the surface does not go on
   std::size_t merged = 0;           // with another one of the same voxel, or an echo of one
@@ -24,7 +25,7 @@ struct SurfacePointCounts {
 };
 
 struct SurfacePoints {
-  // With normals, colours if the surface has them, and the fields `views` and `expected_error`.
+  // With normals, colors if the surface has them, and the fields `views` and `expected_error`.
   PointCloud cloud;
   SurfacePointCounts counts;
 };

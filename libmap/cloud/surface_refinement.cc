@@ -19,15 +19,15 @@ constexpr float refinement_gate_sigmas = 4.0F;
 // Frames' worth of belief in the noise model against the scatter between frames.
 constexpr float prior_frames = 4.0F;
 // Smallest cosine of a pixel's ray and the plane's normal that is computed with.
-constexpr float least_cosine = 0.02F;
+constexpr float min_cosine = 0.02F;
 // Part of a shift that is taken for an error left: on the test sites errors grow with it so.
 constexpr float bend_share = 0.5F;
-// How much colour counts where no depth says that it is the element's own.
+// How much color counts where no depth says that it is the element's own.
 constexpr float unmeasured_color_share = 1e-3F;
 
 using Four = Eigen::Array<float, 4, 1>;
 
-// Weighted sums over one frame or all; heights along the normal in metres.
+// Weighted sums over one frame or all; heights along the normal in meters.
 struct HeightSum {
   float weight = 0.0F;
   float height = 0.0F;   // weighted
@@ -57,7 +57,7 @@ struct ElementSum {
 struct Chunk {
   std::size_t begin = 0;
   std::size_t end = 0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius = 0.0;
 };
 
@@ -94,12 +94,12 @@ class ViewGather {
         rotation_f_(rotation_.cast<float>()),
         pixel_pitch_(
             static_cast<float>(1.0 / std::min(view.depth_camera.fx, view.depth_camera.fy))),
-        least_incidence_(
+        min_incidence_(
             static_cast<float>(std::cos(options.max_incidence_deg * std::numbers::pi / 180.0))),
         is_distorted_(view.depth_camera.is_distorted()) {}
 
   bool may_see(const Chunk& chunk) const {
-    const Eigen::Vector3d p = rotation_ * chunk.centre + translation_;
+    const Eigen::Vector3d p = rotation_ * chunk.center + translation_;
     if (p.z() + chunk.radius < options_.min_depth_m || p.z() - chunk.radius > options_.max_depth_m)
       return false;
     const auto beyond = [&](double offset, double slope) {
@@ -117,9 +117,9 @@ class ViewGather {
     if (!look_at(element, seen)) return;
     const int x = static_cast<int>(std::lround(seen.pixel.x()));
     const int y = static_cast<int>(std::lround(seen.pixel.y()));
-    const float centre = view_.depth_m[view_index(x, y)];
-    const bool is_measured = centre > 0.0F;
-    const float miss = centre - plane_depth(seen, x, y);
+    const float center = view_.depth_m[view_index(x, y)];
+    const bool is_measured = center > 0.0F;
+    const float miss = center - plane_depth(seen, x, y);
     if (is_measured && miss > seen.gate) {
       sum.seen_through += seen.cosine;
       return;
@@ -158,7 +158,7 @@ class ViewGather {
     seen.normal = rotation_f_ * element.normal;
     seen.plane = seen.normal.dot(seen.position);
     seen.cosine = -seen.plane / seen.position.norm();
-    if (!(seen.cosine >= least_incidence_)) return false;
+    if (!(seen.cosine >= min_incidence_)) return false;
     const float z = seen.position.z();
     const float square = seen.cosine * seen.cosine;
     const float lateral = static_cast<float>(options_.noise.lateral_px) * pixel_pitch_ * z;
@@ -176,7 +176,7 @@ class ViewGather {
     const std::size_t n = view_index(x, y);
     const float along =
         seen.normal.x() * view_.rays->x[n] + seen.normal.y() * view_.rays->y[n] + seen.normal.z();
-    return seen.plane / std::min(along, -least_cosine);
+    return seen.plane / std::min(along, -min_cosine);
   }
 
   // Around the disc's image, to first order.
@@ -219,7 +219,7 @@ class ViewGather {
         const Four ry = Eigen::Map<const Four>(ray_y + n);
         const Four depth = Eigen::Map<const Four>(view_.depth_m.data() + n);
         const Four along =
-            (seen.normal.x() * rx + seen.normal.y() * ry + seen.normal.z()).min(-least_cosine);
+            (seen.normal.x() * rx + seen.normal.y() * ry + seen.normal.z()).min(-min_cosine);
         const Four plane = seen.plane / along;
         const Four dx = rx * plane - seen.position.x();
         const Four dy = ry * plane - seen.position.y();
@@ -275,7 +275,7 @@ class ViewGather {
   Eigen::Vector3d translation_;
   Eigen::Matrix3f rotation_f_;
   float pixel_pitch_;
-  float least_incidence_;
+  float min_incidence_;
   bool is_distorted_;
 };
 
@@ -326,7 +326,7 @@ std::vector<Chunk> chunks_of(const std::vector<SurfaceElement>& elements, double
     Eigen::AlignedBox3d box;
     for (std::size_t n = chunk.begin; n < chunk.end; ++n)
       box.extend(elements[n].position.cast<double>());
-    chunk.centre = box.center();
+    chunk.center = box.center();
     chunk.radius = 0.5 * box.diagonal().norm() + margin_m;
     chunks.push_back(chunk);
   }

@@ -60,7 +60,7 @@ struct RefinedSurface {
 
 // What the views measured of every element. `each_group(add)` calls add(views) for all views, by
 // frame: their order changes the result by rounding, their grouping and the number of threads do
-// not. Elements in metres.
+// not. Elements in meters.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
                               const SurfaceRefinementOptions& options,

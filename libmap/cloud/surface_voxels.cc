@@ -123,9 +123,9 @@ constexpr float one_surface = 1.0F;
 struct Piece {
   Eigen::Vector3f normal = Eigen::Vector3f::Zero();
   int axis = 2;                   // of the column
-  float height = 0.0F;            // along it, on its centre line
+  float height = 0.0F;            // along it, on its center line
   bool speaks = false;            // for its column
-  std::array<bool, 4> is_edge{};  // by neighbour
+  std::array<bool, 4> is_edge{};  // by neighbor
 };
 
 class ElementMaker {
@@ -135,7 +135,7 @@ class ElementMaker {
     each_piece([&](std::size_t n) {
       pieces_[n].speaks = speaks_for_column(n);
       for (std::size_t step = 0; extend && pieces_[n].speaks && step < 4; ++step)
-        pieces_[n].is_edge[step] = is_empty(neighbour(n, step), pieces_[n]);
+        pieces_[n].is_edge[step] = is_empty(neighbor(n, step), pieces_[n]);
     });
   }
 
@@ -147,7 +147,7 @@ class ElementMaker {
       found_.emplace_back(curve_place(key_of(n)),
                           element(place.cell, piece.axis, piece.height, piece.normal, false));
       for (std::size_t step = 0; step < 4; ++step)
-        if (piece.is_edge[step]) expect(neighbour(n, step), piece, voxels_.sums()[n].weight);
+        if (piece.is_edge[step]) expect(neighbor(n, step), piece, voxels_.sums()[n].weight);
     }
     for (std::size_t n = 0; n < beside_.size(); ++n) {
       const Beside& one = beside_[n];
@@ -160,7 +160,7 @@ class ElementMaker {
   }
 
  private:
-  // Sums of what the neighbours of an empty voxel expect in it.
+  // Sums of what the neighbors of an empty voxel expect in it.
   struct Beside {
     int axis = 2;
     float weight = 0.0F;
@@ -178,7 +178,7 @@ class ElementMaker {
     piece.normal = length > 0.0F ? Eigen::Vector3f(sum.normal / length) : Eigen::Vector3f::UnitZ();
     piece.normal.cwiseAbs().maxCoeff(&piece.axis);
     const int cell = unpack(key_of(n)).cell[piece.axis];
-    // The plane through the mean meets the column's centre line.
+    // The plane through the mean meets the column's center line.
     const float along = piece.normal.dot(offset) / piece.normal[piece.axis];
     piece.height = static_cast<float>(cell) + 0.5F + along;
     return piece;
@@ -212,7 +212,7 @@ class ElementMaker {
   }
 
   // Where a piece goes on in the column beside it.
-  struct Neighbour {
+  struct Neighbor {
     VoxelPlace place;
     float height = 0.0F;
   };
@@ -224,25 +224,25 @@ class ElementMaker {
     });
   }
 
-  Neighbour neighbour(std::size_t n, std::size_t step) const {
+  Neighbor neighbor(std::size_t n, std::size_t step) const {
     const Piece& piece = pieces_[n];
     const int lateral = (piece.axis + 1 + static_cast<int>(step) / 2) % 3;
     const int direction = step % 2 == 0 ? 1 : -1;
     const float slope = -piece.normal[lateral] / piece.normal[piece.axis];
-    Neighbour there{unpack(key_of(n)), piece.height + slope * static_cast<float>(direction)};
+    Neighbor there{unpack(key_of(n)), piece.height + slope * static_cast<float>(direction)};
     there.place.cell[lateral] += direction;
     there.place.cell[piece.axis] = static_cast<int>(std::floor(there.height));
     return there;
   }
 
-  bool is_empty(const Neighbour& there, const Piece& piece) const {
+  bool is_empty(const Neighbor& there, const Piece& piece) const {
     const int cell = there.place.cell[piece.axis];
     for (const int height : {cell, cell - 1, cell + 1})
       if (piece_at(there.place.cell, piece.axis, height, piece.normal)) return false;
     return true;
   }
 
-  void expect(const Neighbour& there, const Piece& piece, float weight) {
+  void expect(const Neighbor& there, const Piece& piece, float weight) {
     const std::uint32_t n = beside_index_.find_or_add(pack(there.place));
     Beside& beside =
         n < beside_.size() ? beside_[n] : beside_.emplace_back(Beside{.axis = piece.axis});

@@ -47,7 +47,7 @@ class SurfaceVoxels {
   // Sums over the measurements of a voxel; lengths in voxels.
   struct Sum {
     float weight = 0.0F;
-    Eigen::Vector3f offset = Eigen::Vector3f::Zero();  // from the voxel's centre
+    Eigen::Vector3f offset = Eigen::Vector3f::Zero();  // from the voxel's center
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     std::uint32_t frames = 0;
   };
@@ -77,9 +77,9 @@ struct SurfaceElement {
 };
 
 // One element for each column of voxels that a piece of surface passes through: columns run along
-// the axis that the normal is nearest to, the element lies on the column's centre line. Where
+// the axis that the normal is nearest to, the element lies on the column's center line. Where
 // noise spreads a surface over two voxels of a column, the heavier one speaks for it. With
-// `extend`, also an element in each empty column beside. Neighbours stand near each other, in an
+// `extend`, also an element in each empty column beside. Neighbors stand near each other, in an
 // order that depends on the voxels alone.
 std::vector<SurfaceElement> surface_elements(const SurfaceVoxels& voxels, bool extend);
 

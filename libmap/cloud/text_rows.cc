@@ -35,10 +35,10 @@ double TextRows::number(std::string_view word, const std::string& field, ScalarT
   const std::optional<double> value = parse_double(word);
   const std::string where = "line " + std::to_string(line());
   if (!value)
-    throw Error(where + " holds no number there",
+    throw Error(where + " contains no number there",
                 {.field = field, .value = std::string(word.substr(0, 40))});
   if (!fits_type(*value, type))
-    throw Error(where + " holds a number that its type cannot hold",
+    throw Error(where + " contains a number that its type cannot represent",
                 {.field = field,
                  .value = std::string(word.substr(0, 40)),
                  .bound = "of type " + to_text(type)});

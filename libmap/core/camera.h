@@ -1,6 +1,6 @@
 // Pinhole cameras with lens distortion.
 //
-// The camera's optical frame has z forward, x right, y down (REP-103); pixel centres have whole
+// The camera's optical frame has z forward, x right, y down (REP-103); pixel centers have whole
 // coordinates: u = fx * x/z + cx, v = fy * y/z + cy.
 #pragma once
 
@@ -38,7 +38,7 @@ struct Camera {
 };
 
 // The same camera with its image resampled to another size. Pixels are areas: the image's edges,
-// half a pixel outside the centres of its border pixels, stay where they are.
+// half a pixel outside the centers of its border pixels, stay where they are.
 Camera scale_camera(const Camera& camera, int width, int height);
 
 // The same camera without its distortion.

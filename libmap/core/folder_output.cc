@@ -27,8 +27,9 @@ void require_own_content(const fs::path& path, const std::vector<std::string>& n
   for (const fs::directory_entry& entry : fs::directory_iterator(path)) {
     const std::string name = entry.path().filename().string();
     if (std::find(names.begin(), names.end(), name) == names.end())
-      throw Error("would be replaced as a whole, but holds " + name + ", which is not of its kind",
-                  {.file = path.string()});
+      throw Error(
+          "would be replaced as a whole, but contains " + name + ", which is not of its kind",
+          {.file = path.string()});
   }
 }
 

@@ -1,4 +1,4 @@
-// Images as plain data, row by row from the top left. Pixel centres have whole coordinates:
+// Images as plain data, row by row from the top left. Pixel centers have whole coordinates:
 // column x, row y.
 #pragma once
 
@@ -36,7 +36,7 @@ struct Image {
 
 using ColorImage = Image<Color>;
 using GrayImage = Image<std::uint8_t>;
-// Distance from the camera's plane (its z) in metres; 0 where nothing was measured.
+// Distance from the camera's plane (its z) in meters; 0 where nothing was measured.
 using DepthImage = Image<float>;
 
 // "640 x 480".

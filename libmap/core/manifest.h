@@ -31,7 +31,7 @@ struct Manifest {
   std::string version;
   std::vector<std::pair<std::string, ManifestValue>> parameters;
   std::vector<ManifestInput> inputs;
-  std::string frame;  // of the output's coordinates; lengths are metres
+  std::string frame;  // of the output's coordinates; lengths are meters
   std::vector<std::pair<std::string, Pose>> transforms;        // by name, e.g. "terrain_from_input"
   std::vector<std::pair<std::string, ManifestValue>> results;  // counts, residuals
   std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"

@@ -10,8 +10,8 @@ namespace libmap {
 // Threads take a share before they begin what needs much memory, and wait while the shares of
 // others leave too little. Order and number of results stay as they are; only time is lost.
 //
-// What holds a share must not run a parallel loop: a thread that waits for its end may take up
-// other work, which waits for the share.
+// A thread that has a share must not run a parallel loop: a thread that waits for its end may take
+// up other work, which waits for the share.
 class MemoryBudget {
  public:
   // An eighth of the machine's memory.

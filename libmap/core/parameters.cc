@@ -196,7 +196,7 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
       const std::string key = entry.first.as<std::string>();
       if (!table.knows(key))
         throw Error("unknown key" + did_you_mean(key, table.keys()), {.field = key});
-      if (!seen.insert(key).second) throw Error("stands twice", {.field = key});
+      if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
       if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
     }
     for (const auto& entry : root)

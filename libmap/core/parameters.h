@@ -93,7 +93,7 @@ void check_parameters(Options options) {
 std::string flag_of(std::string_view key);
 
 // A flat YAML map of scalars, `text` (named `file` in errors), into the table. A key that is not
-// in the table, stands twice or holds no scalar is an Error; nothing is set halfway: all keys are
+// in the table, is a duplicate or holds no scalar is an Error; nothing is set halfway: all keys are
 // known before the first is set. Returns the keys that the text holds.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file);

@@ -16,7 +16,7 @@ namespace libmap {
 // How a scalar field is stored in files; in memory every value is a double.
 enum class ScalarType { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 
-// One number a point (or a face), for instance "score" or "curvature". Names are unique.
+// One number per point (or a face), for instance "score" or "curvature". Names are unique.
 struct ScalarField {
   std::string name;
   ScalarType type = ScalarType::float32;
@@ -27,7 +27,7 @@ struct ScalarField {
 
 using Color = std::array<std::uint8_t, 3>;  // red, green, blue
 
-// Positions in metres. `normals` and `colors` are either empty or as long as `positions`, and so is
+// Positions in meters. `normals` and `colors` are either empty or as long as `positions`, and so is
 // each field. Normals need not be of unit length: some programs store their confidence in it.
 struct PointCloud {
   std::vector<Eigen::Vector3d> positions;

@@ -127,8 +127,8 @@ namespace {
 // The square of the distance to the nearest point that lies elsewhere; 0 if none was met among
 // many that lie here.
 double square_to_next(const PointTree& tree, const Eigen::Vector3d& point) {
-  constexpr std::size_t most_here = 512;
-  for (std::size_t count = 2; count <= most_here; count *= 4)
+  constexpr std::size_t max_here = 512;
+  for (std::size_t count = 2; count <= max_here; count *= 4)
     for (const NeighborPoint& neighbor : tree.nearest(point, count))
       if (neighbor.square_m2 > 0.0) return neighbor.square_m2;
   return 0.0;

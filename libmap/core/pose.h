@@ -9,7 +9,7 @@ namespace libmap {
 
 using Pose = Eigen::Isometry3d;
 
-// Translation in metres and a quaternion of any non-zero length.
+// Translation in meters and a quaternion of any non-zero length.
 Pose make_pose(const Eigen::Vector3d& translation, const Eigen::Quaterniond& rotation);
 
 // Roll, pitch, yaw in degrees about the fixed x, y, z axes: R = Rz(yaw) Ry(pitch) Rx(roll)

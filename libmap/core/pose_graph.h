@@ -88,7 +88,7 @@ struct TrajectoryPose {
 };
 using Trajectory = std::vector<TrajectoryPose>;
 
-// Which of a scan's own poses: by odometry, optimised as stored, or ground truth.
+// Which of a scan's own poses: by odometry, optimized as stored, or ground truth.
 enum class PoseSource { odometry, stored, ground_truth };
 std::string to_text(PoseSource source);  // "odometry", "stored", "ground-truth"
 

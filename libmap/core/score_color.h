@@ -1,4 +1,4 @@
-// The colours of graspability scores in the thesis's legend, for files and pictures alike.
+// The colors of graspability scores in the thesis's legend, for files and pictures alike.
 #pragma once
 
 #include <array>
@@ -28,7 +28,7 @@ inline constexpr Color below_plane_color{255, 255, 255};
 inline constexpr Color no_value_color{128, 128, 128};
 
 // A bound is met from 1e-6 below it, so that a score stored in single precision keeps its class.
-// NaN is grey.
+// NaN is gray.
 constexpr Color score_color(double score) {
   for (const ScoreClass& one : score_classes)
     if (score >= one.min_score - 1e-6) return one.color;

@@ -12,7 +12,7 @@
 namespace libmap {
 
 // Where a triangle's corners lie on its page: from 0 to 1 over the page's width and height, from
-// the top left (as in glTF; OBJ counts from the bottom). The centre of texel (column, row) lies at
+// the top left (as in glTF; OBJ counts from the bottom). The center of texel (column, row) lies at
 // ((column + 0.5) / width, (row + 0.5) / height).
 using TextureCorners = std::array<Eigen::Vector2f, 3>;
 
@@ -35,7 +35,7 @@ struct TexturedMesh {
 };
 
 // The texture at (1 - u - v) * a + u * b + v * c of a triangle, 0 to 255 a channel, bilinear
-// between the centres of texels. Zeros where the triangle has no page.
+// between the centers of texels. Zeros where the triangle has no page.
 Eigen::Vector3f texture_color(const TexturedMesh& model, std::uint32_t triangle, double u,
                               double v);
 

@@ -20,7 +20,7 @@ void TriangleMesh::check() const {
   if (!vertex_normals.empty())
     require_length("vertex normals", vertex_normals.size(), vertices.size());
   if (!vertex_colors.empty())
-    require_length("vertex colours", vertex_colors.size(), vertices.size());
+    require_length("vertex colors", vertex_colors.size(), vertices.size());
   for (const ScalarField& field : vertex_fields)
     require_length(field.name, field.values.size(), vertices.size());
   for (const ScalarField& field : face_fields)

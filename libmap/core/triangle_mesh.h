@@ -12,7 +12,7 @@ namespace libmap {
 
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
-// Positions in metres. `vertex_normals` and `vertex_colors` are empty or one a vertex, vertex
+// Positions in meters. `vertex_normals` and `vertex_colors` are empty or one a vertex, vertex
 // fields hold one value a vertex, face fields one a triangle.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;
@@ -26,7 +26,7 @@ struct TriangleMesh {
   void check() const;
 };
 
-// Twice-signed-area normal of a triangle, not normalised: its length is twice the area in m2.
+// Twice-signed-area normal of a triangle, not normalized: its length is twice the area in m2.
 Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 
 // Surface area in m2.
@@ -38,7 +38,7 @@ double signed_volume(const TriangleMesh& mesh);
 // Unit vertex normals: mean of the adjacent triangles' normals weighted by area.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
-// `addition` behind `base`, its indices shifted. Normals and colours are kept where both have them;
+// `addition` behind `base`, its indices shifted. Normals and colors are kept where both have them;
 // fields only where both have one of that name.
 TriangleMesh join_meshes(const TriangleMesh& base, const TriangleMesh& addition);
 

@@ -43,7 +43,7 @@ class NodeCount : public YAML::EventHandler {
  private:
   void add(std::size_t nodes) {
     count_ += nodes;
-    if (count_ > max_nodes) throw Error("holds more than 500000 values");
+    if (count_ > max_nodes) throw Error("contains more than 500000 values");
   }
   void leaf(YAML::anchor_t anchor) {
     add(1);
@@ -79,7 +79,7 @@ bool has_second_document(const std::string& text) {
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read) {
   try {
-    if (has_second_document(text)) throw Error("holds more than one YAML document");
+    if (has_second_document(text)) throw Error("contains more than one YAML document");
     read(YAML::Load(text));
   } catch (const YAML::Exception& error) {
     const std::string place =

@@ -28,7 +28,7 @@
 namespace libmap {
 namespace {
 
-// A corner's numbers, bit for bit: position, normal, colour.
+// A corner's numbers, bit for bit: position, normal, color.
 using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
 
 struct CornerHash {
@@ -58,7 +58,7 @@ std::uint8_t to_byte(float fraction) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(fraction, 0.0F, 1.0F) * 255.0F));
 }
 
-// glTF's vertex colours are linear (glTF 2.0, 3.9.2), ours sRGB (IEC 61966-2-1).
+// glTF's vertex colors are linear (glTF 2.0, 3.9.2), ours sRGB (IEC 61966-2-1).
 float linear_of(std::uint8_t byte) {
   const double srgb = byte / 255.0;
   return static_cast<float>(srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4));
@@ -251,9 +251,9 @@ std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
   const aiShadingMode unlit = aiShadingMode_Unlit;
   material->AddProperty(&unlit, 1, AI_MATKEY_SHADING_MODEL);
   if (page == no_page) {
-    const float grey_128 = linear_of(128);
-    const aiColor4D grey(grey_128, grey_128, grey_128, 1.0F);
-    material->AddProperty(&grey, 1, AI_MATKEY_BASE_COLOR);
+    const float gray_128 = linear_of(128);
+    const aiColor4D gray(gray_128, gray_128, gray_128, 1.0F);
+    material->AddProperty(&gray, 1, AI_MATKEY_BASE_COLOR);
     return material;
   }
   const aiString picture("*" + std::to_string(page));
@@ -314,7 +314,7 @@ std::string first_line(const char* text) {
   return std::string(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
 }
 
-// The picture of a material's own colour, or nothing.
+// The picture of a material's own color, or nothing.
 std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial& material) {
   for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
     aiString path;
@@ -384,9 +384,9 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
     builder.add_node(*scene->mRootNode, root);
     return take(*scene, builder);
   } catch (const std::bad_alloc&) {
-    throw Error("claims more data than the memory holds");
+    throw Error("claims more data than there is memory");
   } catch (const std::length_error&) {
-    throw Error("claims more data than the memory holds");
+    throw Error("claims more data than there is memory");
   }
 }
 

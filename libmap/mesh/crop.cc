@@ -24,8 +24,8 @@ using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double ground_samples = 100000.0;  // of a mesh
-constexpr double most_view_samples = 4e6;
-constexpr double most_side_samples = 2e6;  // of few triangles
+constexpr double max_view_samples = 4e6;
+constexpr double max_side_samples = 2e6;  // of few triangles
 
 Pose turn_about(const Vector2d& place, double yaw_deg) {
   const Vector3d pivot(place.x(), place.y(), 0.0);
@@ -99,13 +99,13 @@ void lay_rectangle(const Source& source, const CropOptions& options, const Pose&
   plan.report.rectangle = rectangle;
   const Vector2d half = options.size_m / 2.0;
   if (!options.yaw_deg) {
-    plan.cut_from_map = turn_about(rectangle.centre, -rectangle.yaw_deg) * level;
-    plan.prism.outline = make_rectangle(rectangle.centre - half, rectangle.centre + half);
+    plan.cut_from_map = turn_about(rectangle.center, -rectangle.yaw_deg) * level;
+    plan.prism.outline = make_rectangle(rectangle.center - half, rectangle.center + half);
     return;
   }
   const Pose turn = turn_about(source.middle, *options.yaw_deg);
-  const Pose from_rectangle = turn_about(rectangle.centre, rectangle.yaw_deg);
-  const Outline straight = make_rectangle(rectangle.centre - half, rectangle.centre + half);
+  const Pose from_rectangle = turn_about(rectangle.center, rectangle.yaw_deg);
+  const Outline straight = make_rectangle(rectangle.center - half, rectangle.center + half);
   plan.cut_from_map = turn * level;
   plan.prism.outline = Outline(moved(straight.corners(), turn * from_rectangle));
 }
@@ -114,10 +114,10 @@ void lay_border(const Source& source, const CropOptions& options, const Pose& le
   const PointCloud view = source.view(level, options.band.cell_m);
   plan.report.band = find_border_band(view, options.rectangle.margin_m, options.band);
   const std::vector<Vector2d>& corners = plan.report.band->corners;
-  Vector2d centre = Vector2d::Zero();
-  for (const Vector2d& corner : corners) centre += corner / static_cast<double>(corners.size());
+  Vector2d center = Vector2d::Zero();
+  for (const Vector2d& corner : corners) center += corner / static_cast<double>(corners.size());
   const Pose turn = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg)
-                                    : turn_about(centre, -yaw_of(corners));
+                                    : turn_about(center, -yaw_of(corners));
   plan.cut_from_map = turn * level;
   plan.prism.outline = Outline(moved(corners, turn));
 }
@@ -184,7 +184,7 @@ Plan make_plan(const Source& source, const CropOptions& options) {
   return plan;
 }
 
-// What is done with a cut cloud or mesh: into the site, centred if the outline was not.
+// What is done with a cut cloud or mesh: into the site, centered if the outline was not.
 template <typename Move>
 void finish(Plan& plan, const CropOptions& options, const std::vector<Vector3d>& positions,
             const Move& move) {
@@ -284,8 +284,8 @@ PointCloud view_of(const TriangleMesh& mesh, double cell) {
     area += std::abs(area_normal(mesh, triangle).z());
     length += flat(mesh, triangle).length();
   }
-  const double most_on_sides = most_side_samples + 3.0 * static_cast<double>(mesh.triangles.size());
-  cell = std::max({cell, std::sqrt(area / 2.0 / most_view_samples), length / most_on_sides});
+  const double max_on_sides = max_side_samples + 3.0 * static_cast<double>(mesh.triangles.size());
+  cell = std::max({cell, std::sqrt(area / 2.0 / max_view_samples), length / max_on_sides});
   for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {
     const FlatTriangle triangle = flat(mesh, mesh.triangles[n]);
     view_sides(triangle, n, cell, samples);

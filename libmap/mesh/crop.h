@@ -17,7 +17,7 @@
 namespace libmap {
 
 // What is kept. whole: all of it, levelled only. size: the rectangle of a given size that lies best
-// centred in the data (site_rectangle). border: what a white band frames (border_band).
+// centered in the data (site_rectangle). border: what a white band frames (border_band).
 enum class CropRegion { whole, box, polygon, size, border };
 
 // Frame of a box or polygon. level: ground at z = 0, x and y near the map's, turned by yaw_deg.

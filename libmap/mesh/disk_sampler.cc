@@ -23,7 +23,7 @@ constexpr double smallest_gap = 1e-3;
 
 constexpr std::size_t gaps_per_chunk = 256;
 constexpr double samples_a_part = 131072.0;
-constexpr std::size_t most_pieces = 30'000'000;
+constexpr std::size_t max_pieces = 30'000'000;
 
 // Darts of each round over the whole surface, in expected samples.
 constexpr std::array<double, 5> dart_rounds = {0.5, 0.5, 1.0, 2.0, 4.0};
@@ -61,7 +61,7 @@ class GapSearch {
   // Whether a single disc covers all of the block.
   bool is_covered(const SurfaceBlock& block) const {
     const double room = radius_m_ - block.reach_m;
-    return room > 0.0 && samples_.any_nearer(block.centre, room, room * room);
+    return room > 0.0 && samples_.any_nearer(block.center, room, room * room);
   }
 
   // Appends those parts, cut until their sides are at most `longest_m`.
@@ -86,19 +86,19 @@ class GapSearch {
   }
 
  private:
-  // Discs whose centres lie farther from `centre` do not meet the fragment.
+  // Discs whose centers lie farther from `center` do not meet the fragment.
   struct Reach {
-    Eigen::Vector3d centre;
+    Eigen::Vector3d center;
     double square_m2;
   };
   Reach reach_of(const PlacedFragment& fragment) const {
-    const Eigen::Vector3d centre =
+    const Eigen::Vector3d center =
         (fragment.corners[0] + fragment.corners[1] + fragment.corners[2]) / 3.0;
     double square = 0.0;
     for (const Eigen::Vector3d& corner : fragment.corners)
-      square = std::max(square, (corner - centre).squaredNorm());
+      square = std::max(square, (corner - center).squaredNorm());
     const double reach = radius_m_ + std::sqrt(square);
-    return {centre, reach * reach};
+    return {center, reach * reach};
   }
 
   bool covers(const Eigen::Vector3d& sample, const PlacedFragment& fragment) const {
@@ -110,7 +110,7 @@ class GapSearch {
   // Whether the sample's disc does; keeps it among the near ones if it only meets the fragment.
   bool is_covered(const Eigen::Vector3d& sample, const PlacedFragment& fragment,
                   const Reach& reach) {
-    if (!((sample - reach.centre).squaredNorm() <= reach.square_m2)) return false;
+    if (!((sample - reach.center).squaredNorm() <= reach.square_m2)) return false;
     if (covers(sample, fragment)) {
       last_ = sample;
       return true;
@@ -150,11 +150,11 @@ class Sampler {
       : surface_(surface),
         radius_m_(radius_m),
         // However a reader sums and roots, it finds no pair below the radius.
-        least_square_m2_(radius_m * radius_m * (1.0 + 1e-14)),
+        min_square_m2_(radius_m * radius_m * (1.0 + 1e-14)),
         seed_(seed),
         expected_(saturation_density * surface.area_m2 / (radius_m * radius_m)),
         samples_(surface.low, 2.0 * radius_m, static_cast<std::size_t>(1.1 * expected_) + 16),
-        pieces_(surface.triangles, piece_size * radius_m, most_pieces) {}
+        pieces_(surface.triangles, piece_size * radius_m, max_pieces) {}
 
   DiskSamples run(const std::function<bool(std::size_t)>& goes_on, Progress& progress) {
     progress.begin("darts", dart_rounds.size());
@@ -175,13 +175,13 @@ class Sampler {
   // Part by part of the surface, so that not all gaps are held at once.
   void fill_gaps(Progress& progress) {
     const std::vector<SurfaceBlock>& blocks = pieces_.blocks();
-    const double most_m2 = samples_a_part * radius_m_ * radius_m_ / saturation_density;
+    const double max_m2 = samples_a_part * radius_m_ * radius_m_ / saturation_density;
     progress.begin("gaps", blocks.size());
     std::uint64_t round = dart_rounds.size();
     for (std::size_t begin = 0; begin < blocks.size();) {
       double area = 0.0;
       std::size_t end = begin;
-      while (end < blocks.size() && area < most_m2) area += blocks[end++].area_m2;
+      while (end < blocks.size() && area < max_m2) area += blocks[end++].area_m2;
       for (std::vector<Fragment> gaps = first_gaps(begin, end); !gaps.empty(); ++round) {
         accept(darts_into(gaps, round));
         gaps = remaining(gaps);
@@ -196,7 +196,7 @@ class Sampler {
     candidate.place = point_of(fragment, first, random.uniform());
     candidate.position = position_on(surface_.mesh, candidate.place);
     if (surface_.rounding_m > 0.0) candidate.position = rounded_to_single(candidate.position);
-    return !samples_.any_nearer(candidate.position, radius_m_, least_square_m2_);
+    return !samples_.any_nearer(candidate.position, radius_m_, min_square_m2_);
   }
 
   // Of darts that are thrown evenly over the surface, those that no sample forbids.
@@ -255,7 +255,7 @@ class Sampler {
     std::stable_sort(candidates.begin(), candidates.end(),
                      [](const Candidate& a, const Candidate& b) { return a.order < b.order; });
     for (const Candidate& candidate : candidates) {
-      if (samples_.any_nearer(candidate.position, radius_m_, least_square_m2_)) continue;
+      if (samples_.any_nearer(candidate.position, radius_m_, min_square_m2_)) continue;
       samples_.add(candidate.position);
       places_.push_back(candidate.place);
     }
@@ -293,7 +293,7 @@ class Sampler {
 
   const SampledSurface& surface_;
   double radius_m_;
-  double least_square_m2_;
+  double min_square_m2_;
   std::uint64_t seed_;
   double expected_;
   SampleGrid samples_;

@@ -38,10 +38,10 @@ EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust)
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     if (!vertex.allFinite()) throw Error("a vertex of the mesh is not finite");
   const Bounds3d bounds = bounds_of(mesh.vertices);
-  centre_ = 0.5 * (bounds.min + bounds.max);
+  center_ = 0.5 * (bounds.min + bounds.max);
   size_ = bounds.max - bounds.min;
   vertices_.reserve(mesh.vertices.size());
-  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices_.push_back(vertex - centre_);
+  for (const Eigen::Vector3d& vertex : mesh.vertices) vertices_.push_back(vertex - center_);
 
   handles_->device.reset(rtcNewDevice(nullptr));
   RTCDevice device = handles_->device.get();

@@ -1,4 +1,4 @@
-// A triangle mesh in Embree, about its centre. Inner part of libmap/mesh: rays and distances stand
+// A triangle mesh in Embree, about its center. Inner part of libmap/mesh: rays and distances stand
 // on it.
 #pragma once
 
@@ -13,7 +13,7 @@ struct RTCSceneTy;  // embree3/rtcore.h
 
 namespace libmap {
 
-// Positions are relative to `centre`, where single precision is finest.
+// Positions are relative to `center`, where single precision is finest.
 class EmbreeMesh {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
@@ -23,11 +23,11 @@ class EmbreeMesh {
   EmbreeMesh(const EmbreeMesh&) = delete;
   EmbreeMesh& operator=(const EmbreeMesh&) = delete;
 
-  RTCSceneTy* scene() const;  // embree's scene, which this object owns; coordinates less centre()
-  const Eigen::Vector3d& centre() const { return centre_; }
+  RTCSceneTy* scene() const;  // embree's scene, which this object owns; coordinates less center()
+  const Eigen::Vector3d& center() const { return center_; }
   Eigen::Vector3d size() const { return size_; }  // of the bounding box, m
   const std::vector<Triangle>& triangles() const { return triangles_; }
-  // A corner of a triangle about the centre, in double precision.
+  // A corner of a triangle about the center, in double precision.
   const Eigen::Vector3d& corner(std::uint32_t triangle, int k) const {
     return vertices_[triangles_[triangle][static_cast<std::size_t>(k)]];
   }
@@ -35,7 +35,7 @@ class EmbreeMesh {
  private:
   struct Handles;
   std::unique_ptr<Handles> handles_;
-  Eigen::Vector3d centre_ = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d size_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> vertices_;
   std::vector<Triangle> triangles_;

@@ -11,7 +11,7 @@ namespace libmap {
 namespace {
 
 // assimp's scene, our mesh and its bytes; a line of OBJ becomes some hundred bytes.
-constexpr std::uint64_t least_memory = std::uint64_t{1} << 30;
+constexpr std::uint64_t min_memory = std::uint64_t{1} << 30;
 constexpr std::uint64_t memory_per_byte = 100;
 
 // Arrays through the pipe: their length, then their bytes.
@@ -51,7 +51,7 @@ class Receiver {
  private:
   void read(void* bytes, std::size_t count) {
     if (!process_.read(bytes, count))
-      throw Error("is broken: the library for its format fell over it" + process_.end());
+      throw Error("is broken: the library for its format crashed on it" + process_.end());
   }
 
   GuardedProcess& process_;
@@ -108,7 +108,7 @@ DecodedModel receive_model(Receiver& receiver) {
 }  // namespace
 
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
-  GuardedProcess process(least_memory + memory_per_byte * file_bytes,
+  GuardedProcess process(min_memory + memory_per_byte * file_bytes,
                          [&](const GuardedProcess::Write& write) {
                            Sender sender(write);
                            try {

@@ -242,7 +242,7 @@ void append_patch(TriangleMesh& mesh, const BoundaryLoop& loop, const PlacedPatc
   }
 }
 
-// Whether each patch meets no triangle but its neighbours.
+// Whether each patch meets no triangle but its neighbors.
 std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<BoundaryLoop>& holes,
                                const std::vector<PlacedPatch>& patches) {
   TriangleMesh trial;

@@ -45,7 +45,7 @@ void bind(ParameterTable& table, MeshCleaningOptions& options);
 
 struct MeshCleaningResult {
   // With unit vertex normals and the face field `filled` (uint8): 1 on triangles that close holes.
-  // Colours and fields are those of the input; new vertices take them from the hole's boundary.
+  // Colors and fields are those of the input; new vertices take them from the hole's boundary.
   TriangleMesh mesh;
 
   std::size_t merged_vertices = 0;

@@ -10,7 +10,7 @@ namespace libmap {
 // corners too; x and y of a border that runs along an axis are exact, on others within rounding. A
 // vertex within 1e-7 m of the border is moved onto it, so that no slivers arise. Triangles that
 // share an edge are cut at the same vertex: a mesh without T-junctions stays without. Normals,
-// colours and fields of vertices are interpolated (mesh_parts.h), those of faces kept. Surfaces of
+// colors and fields of vertices are interpolated (mesh_parts.h), those of faces kept. Surfaces of
 // any form will do: open, not manifold, overhanging, upright. Nothing inside: an empty mesh. Throws
 // Error: arrays that do not fit, a vertex of a triangle that is not finite.
 TriangleMesh cut_mesh(TriangleMesh mesh, const UprightPrism& prism);

@@ -133,7 +133,7 @@ MeshReadResult read_mesh(const std::filesystem::path& path) {
   const auto bytes = read_geometry_bytes(path);
   try {
     MeshReadResult result = decode(format_of(path), bytes);
-    if (result.mesh.triangles.empty()) throw Error("holds no triangle");
+    if (result.mesh.triangles.empty()) throw Error("contains no triangle");
     return result;
   } catch (const Error& error) {
     throw error.in_file(path.string());

@@ -1,14 +1,14 @@
 // Triangle meshes from and to files. The extension, in any case, says the format.
 //
 //          read by         written by      kept
-//   .ply   ply_codec       ply_codec       doubles, normals, colours, vertex and face fields
+//   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
 //   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
-//   .obj   assimp          mesh_text       doubles written, float32 read; normals, colours
+//   .obj   assimp          mesh_text       doubles written, float32 read; normals, colors
 //   .off   mesh_text       mesh_text       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
-//   .glb   assimp          assimp          float32; normals, colours
+//   .glb   assimp          assimp          float32; normals, colors
 //
-// float32 holds 24 bits: at 16 m from the origin a step is 2 micrometres, at 500 km (map
+// float32 holds 24 bits: at 16 m from the origin a step is 2 micrometers, at 500 km (map
 // coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp, which store float64
 // where float32 would move some coordinate by more than 1e-5 m.
 //

@@ -91,11 +91,11 @@ class Orientation {
     if (!is_joined(across)) return;
     const bool same_sense = source_of(mesh_.triangles, h) == source_of(mesh_.triangles, across);
     const State wanted = same_sense ? other(state_[h / 3]) : state_[h / 3];
-    State& neighbour = state_[across / 3];
-    if (neighbour == State::unknown) {
-      neighbour = wanted;
+    State& neighbor = state_[across / 3];
+    if (neighbor == State::unknown) {
+      neighbor = wanted;
       members.push_back(across / 3);
-    } else if (neighbour != wanted) {
+    } else if (neighbor != wanted) {
       opposite_[h] = opposite_[across] = open_edge;
       ++cut_edges_;
     }

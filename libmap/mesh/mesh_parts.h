@@ -1,4 +1,4 @@
-// Parts of a mesh with all that belongs to their vertices and faces: normals, colours, fields.
+// Parts of a mesh with all that belongs to their vertices and faces: normals, colors, fields.
 #pragma once
 
 #include <cstddef>
@@ -40,7 +40,7 @@ struct TrianglePoint {
 Eigen::Vector3d position_on(const TriangleMesh& mesh, const TrianglePoint& point);
 
 // The surface at `points` as a cloud: unit normals (of the vertices, interpolated, or else of the
-// triangle), colours and vertex fields by barycentric interpolation, face fields of the triangle.
+// triangle), colors and vertex fields by barycentric interpolation, face fields of the triangle.
 // Fields of whole numbers take the nearest vertex's value.
 PointCloud points_on_surface(const TriangleMesh& mesh, const std::vector<TrianglePoint>& points);
 

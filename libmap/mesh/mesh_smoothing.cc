@@ -17,13 +17,13 @@ constexpr double pass_band = 0.02;                            // k_PB = 1 / lamb
 constexpr double outward = 1.0 / (pass_band - 1.0 / inward);  // mu
 constexpr std::size_t vertices_grain = 4096;
 
-// The neighbours of each vertex that may move; those that stay have none.
-struct Neighbours {
+// The neighbors of each vertex that may move; those that stay have none.
+struct Neighbors {
   std::vector<std::uint32_t> first;
   std::vector<std::uint32_t> vertices;
 };
 
-Neighbours neighbours_of(const TriangleMesh& mesh) {
+Neighbors neighbors_of(const TriangleMesh& mesh) {
   const MeshEdges edges = edges_of(mesh.triangles, mesh.vertices.size());
   const auto ends = [&](std::size_t e) {
     const HalfEdge h = edges.half_edges[edges.first[e]];
@@ -33,7 +33,7 @@ Neighbours neighbours_of(const TriangleMesh& mesh) {
   for (std::size_t e = 0; e < edges.size(); ++e)
     if (edges.count(e) != 2)
       for (const std::uint32_t v : ends(e)) stays[v] = true;
-  Neighbours result;
+  Neighbors result;
   result.first.assign(mesh.vertices.size() + 1, 0);
   for (std::size_t e = 0; e < edges.size(); ++e)
     for (const std::uint32_t v : ends(e))
@@ -49,14 +49,14 @@ Neighbours neighbours_of(const TriangleMesh& mesh) {
   return result;
 }
 
-void step(const Neighbours& neighbours, double share, const std::vector<Eigen::Vector3d>& from,
+void step(const Neighbors& neighbors, double share, const std::vector<Eigen::Vector3d>& from,
           std::vector<Eigen::Vector3d>& to) {
   parallel_for(from.size(), vertices_grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
       Eigen::Vector3d towards = Eigen::Vector3d::Zero();
       double weights = 0.0;
-      for (std::uint32_t n = neighbours.first[v]; n < neighbours.first[v + 1]; ++n) {
-        const Eigen::Vector3d edge = from[neighbours.vertices[n]] - from[v];
+      for (std::uint32_t n = neighbors.first[v]; n < neighbors.first[v + 1]; ++n) {
+        const Eigen::Vector3d edge = from[neighbors.vertices[n]] - from[v];
         const double length = edge.norm();
         if (length == 0.0) continue;
         towards += edge / length;
@@ -71,11 +71,11 @@ void step(const Neighbours& neighbours, double share, const std::vector<Eigen::V
 
 void smooth_mesh(TriangleMesh& mesh, int iterations) {
   if (iterations <= 0 || mesh.triangles.empty()) return;
-  const Neighbours neighbours = neighbours_of(mesh);
+  const Neighbors neighbors = neighbors_of(mesh);
   std::vector<Eigen::Vector3d> moved(mesh.vertices.size());
   for (int n = 0; n < iterations; ++n) {
-    step(neighbours, inward, mesh.vertices, moved);
-    step(neighbours, outward, moved, mesh.vertices);
+    step(neighbors, inward, mesh.vertices, moved);
+    step(neighbors, outward, moved, mesh.vertices);
   }
 }
 

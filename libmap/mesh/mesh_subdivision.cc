@@ -16,7 +16,7 @@ namespace {
 constexpr std::uint32_t no_vertex = 0xffffffff;
 constexpr std::size_t edges_per_chunk = 1024;
 // Of the largest coordinate: shorter sides are not halved, for their middles were rounded.
-constexpr double least_side = 1e-12;
+constexpr double min_side = 1e-12;
 
 double largest_coordinate(const TriangleMesh& mesh) {
   double largest = 0.0;
@@ -137,15 +137,14 @@ void cut(SubdivisionResult& result, std::vector<std::uint8_t>& open,
 }  // namespace
 
 SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
-                                   std::uint64_t most_triangles,
-                                   const NeedsCutting& needs_cutting) {
+                                   std::uint64_t max_triangles, const NeedsCutting& needs_cutting) {
   SubdivisionResult result;
   result.mesh = mesh;
-  result.max_side_m = std::max(max_side_m, least_side * largest_coordinate(mesh));
+  result.max_side_m = std::max(max_side_m, min_side * largest_coordinate(mesh));
   result.source.resize(mesh.triangles.size());
   for (std::uint32_t t = 0; t < result.source.size(); ++t) result.source[t] = t;
   TriangleMesh& fine = result.mesh;
-  const std::uint64_t most = std::max<std::uint64_t>(most_triangles, 2 * mesh.triangles.size());
+  const std::uint64_t most = std::max<std::uint64_t>(max_triangles, 2 * mesh.triangles.size());
   std::vector<std::uint8_t> open(mesh.triangles.size(), 1);
   for (;;) {
     close_triangles(fine, result.max_side_m, needs_cutting, open);

@@ -20,10 +20,10 @@ using NeedsCutting = std::function<bool(const TriangleMesh& mesh, const Triangle
 
 // Halves sides longer than `max_side_m`, on all of their triangles, until no triangle that needs it
 // has one; vertices that there were keep their places. Where that would make more than
-// `most_triangles`, and more than twice those of the mesh, a longer side is aimed at. Values at new
+// `max_triangles`, and more than twice those of the mesh, a longer side is aimed at. Values at new
 // vertices are interpolated, parts of a triangle have its fields.
 SubdivisionResult split_long_sides(
-    const TriangleMesh& mesh, double max_side_m, std::uint64_t most_triangles,
+    const TriangleMesh& mesh, double max_side_m, std::uint64_t max_triangles,
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });
 
 }  // namespace libmap

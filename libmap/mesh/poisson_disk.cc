@@ -15,7 +15,7 @@ namespace libmap {
 
 namespace {
 
-constexpr double most_samples = 1e8;
+constexpr double max_samples = 1e8;
 constexpr double count_tolerance = 0.01;
 // Within this distance of the origin along each axis, single precision moves no coordinate by more
 // than 1e-5 m: that is how files keep positions.
@@ -46,7 +46,7 @@ void require_sense(const SampledSurface& surface, const PoissonDiskOptions& opti
   // By a radius that is small against the mesh, a small file asks for as many as a large one: not
   // more than some for each triangle.
   const double most =
-      std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 2.5e6, most_samples);
+      std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 2.5e6, max_samples);
   const double least = std::sqrt(saturation_density * surface.area_m2 / most);
   if (!(options.radius_m >= least))
     throw Error("too many samples", {.file = {},
@@ -75,21 +75,21 @@ class CountSearch {
           surface_, radius_, seed_, [&](std::size_t thrown) { return is_near(thrown, tries); },
           progress);
       const double found = static_cast<double>(samples.positions.size());
-      const double miss = is_full_ ? std::abs(found - wanted_) : 2.0 * most_samples;
+      const double miss = is_full_ ? std::abs(found - wanted_) : 2.0 * max_samples;
       if (best.positions.empty() || miss < best_miss) {
         best = std::move(samples);
         best_miss = miss;
         radius_m = radius_;
       }
       const bool hit = is_full_ && miss <= count_tolerance * wanted_;
-      if (hit || tries == most_tries) return best;
+      if (hit || tries == max_tries) return best;
       if (is_full_) share_of_darts_ = thrown_ / found;
       aim(is_full_ ? found : thrown_ / share_of_darts_, tries);
     }
   }
 
  private:
-  static constexpr std::size_t most_tries = 100;
+  static constexpr std::size_t max_tries = 100;
   static constexpr std::size_t direct_tries = 8;  // before chance helps
 
   // Whether the darts over the whole surface foretell about the wanted number.
@@ -133,7 +133,7 @@ class CountSearch {
 void bind(ParameterTable& table, PoissonDiskOptions& options) {
   table.add("radius_m", options.radius_m, positive,
             "least distance of two samples; no point of the surface is farther from one");
-  table.add("count", options.count, {0.0, most_samples},
+  table.add("count", options.count, {0.0, max_samples},
             "> 0: so many samples, to 1 %, of the radius that yields them");
   table.add("seed", options.seed, {}, "of the random draws");
 }

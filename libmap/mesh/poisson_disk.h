@@ -25,7 +25,7 @@ struct PoissonDiskOptions {
 void bind(ParameterTable& table, PoissonDiskOptions& options);
 
 struct PoissonDiskResult {
-  // Unit normals, colours and fields of the surface. Positions are those of single precision where
+  // Unit normals, colors and fields of the surface. Positions are those of single precision where
   // the mesh lies within 256 m of its origin: files keep them, and so their distances, exactly.
   PointCloud cloud;
   double radius_m = 0.0;

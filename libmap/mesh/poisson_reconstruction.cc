@@ -20,15 +20,15 @@ namespace libmap {
 
 namespace {
 
-// Neighbours by which the distance between samples is estimated.
+// Neighbors by which the distance between samples is estimated.
 constexpr std::size_t spacing_neighbors = 8;
 // Smallest weight of a point.
-constexpr double least_weight = 1.0 / 16;
+constexpr double min_weight = 1.0 / 16;
 // The octree's cube against the samples' box, at least.
 constexpr double cube_margin = 1.1;
-constexpr int least_depth = 3;
+constexpr int min_depth = 3;
 // Smallest second standard deviation of a cloud's positions, against its first, of a surface.
-constexpr double least_width = 1e-4;
+constexpr double min_width = 1e-4;
 
 struct UsedPoint {
   std::size_t index;
@@ -138,7 +138,7 @@ void Reconstruction::choose_cell_size() {
     moments += arm * arm.transpose();
   }
   const Eigen::Vector3d spread = symmetric_eigen(moments).values;
-  if (!(spread[1] > least_width * least_width * spread[2]))
+  if (!(spread[1] > min_width * min_width * spread[2]))
     throw too_thin("the points lie on a line: there is no surface through them");
   result_.spacing_m = median_spacing(places);
   result_.cell_size_m = options_.cell_size_m > 0.0 ? options_.cell_size_m : result_.spacing_m;
@@ -161,7 +161,7 @@ void Reconstruction::choose_cell_size() {
          .field = "cell_size_m",
          .value = to_text(static_cast<float>(result_.cell_size_m)),
          .bound = ">= " + to_text(static_cast<float>(result_.cell_size_m * cells / most)) + " m"});
-  problem_.depth = std::max(least_depth, static_cast<int>(std::ceil(std::log2(cells))));
+  problem_.depth = std::max(min_depth, static_cast<int>(std::ceil(std::log2(cells))));
   problem_.cube_m = result_.cell_size_m * std::exp2(problem_.depth);
   problem_.screening = options_.screening;
   problem_.samples_per_cell = options_.samples_per_cell;
@@ -172,7 +172,7 @@ double Reconstruction::weight_of(std::size_t point) const {
   if (errors_ == nullptr) return 1.0;
   const double ratio = median_error_m_ / errors_->values[point];
   if (std::isnan(ratio)) return 1.0;
-  return std::clamp(ratio * ratio, least_weight, 1.0);
+  return std::clamp(ratio * ratio, min_weight, 1.0);
 }
 
 void Reconstruction::make_samples() {

@@ -17,7 +17,7 @@ namespace libmap {
 
 struct PoissonReconstructionOptions {
   // >= 0: of the octree's finest cells; edges of the mesh are about as long. 0: the median distance
-  // of points to their nearest neighbours.
+  // of points to their nearest neighbors.
   double cell_size_m = 0.0;
   double screening = 4.0;  // >= 0: how much the surface is held to the points against being smooth
   // Points count by their field `expected_error` (m), where they have it: inverse squares, and none
@@ -36,10 +36,10 @@ void bind(ParameterTable& table, PoissonReconstructionOptions& options);
 inline constexpr int max_octree_depth = 12;
 
 struct PoissonReconstructionResult {
-  // Unit vertex normals. Colours and fields carried over from the points around each vertex.
+  // Unit vertex normals. Colors and fields carried over from the points around each vertex.
   TriangleMesh mesh;
   double cell_size_m = 0.0;
-  double spacing_m = 0.0;          // median distance of nearest neighbours
+  double spacing_m = 0.0;          // median distance of nearest neighbors
   std::size_t dropped_points = 0;  // whose normal is zero or not finite
   std::size_t samples = 0;         // the points of one cell and side are one
   int octree_depth = 0;

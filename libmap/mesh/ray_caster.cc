@@ -18,7 +18,7 @@ namespace {
 constexpr double largest_float = std::numeric_limits<float>::max();
 constexpr std::size_t packet_size = 8;
 
-// A ray as Embree sees it: of unit length, about the mesh's centre, and begun just outside the
+// A ray as Embree sees it: of unit length, about the mesh's center, and begun just outside the
 // mesh's box, where single precision is finest.
 struct LocalRay {
   Eigen::Vector3f origin;
@@ -33,7 +33,7 @@ struct LocalRay {
 
 struct RayCaster::Scene {
   EmbreeMesh mesh;
-  Eigen::AlignedBox3d box;  // about the centre, a little larger than the mesh
+  Eigen::AlignedBox3d box;  // about the center, a little larger than the mesh
 
   explicit Scene(const TriangleMesh& of) : mesh(of, true) {
     const Eigen::Vector3d half =
@@ -52,7 +52,7 @@ LocalRay RayCaster::Scene::localize(const Eigen::Vector3d& origin, const Eigen::
   ray.length = direction.stableNorm();
   if (!(ray.length > 0.0) || !std::isfinite(ray.length) || !origin.allFinite()) return ray;
   const Eigen::Vector3d unit = direction / ray.length;
-  const Eigen::Vector3d start = origin - mesh.centre();
+  const Eigen::Vector3d start = origin - mesh.center();
   double enter = 0.0;
   double leave = largest_float;
   for (int axis = 0; axis < 3; ++axis) {
@@ -87,7 +87,7 @@ RayHit RayCaster::Scene::refine(const Eigen::Vector3d& origin, const Eigen::Vect
   const Eigen::Vector3d ab = mesh.corner(triangle, 1) - a;
   const Eigen::Vector3d ac = mesh.corner(triangle, 2) - a;
   const Eigen::Vector3d normal = ab.cross(ac);
-  const Eigen::Vector3d start = origin - mesh.centre();
+  const Eigen::Vector3d start = origin - mesh.center();
   const double exact = normal.dot(a - start) / normal.dot(direction);
   // Where a ray grazes its triangle the plane says less about the hit than Embree does.
   if (!(std::abs(exact - hit.distance) * ray.length <= 1e-5 * (1e-3 + std::abs(unit_distance))))

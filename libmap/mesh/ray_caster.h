@@ -1,5 +1,5 @@
 // Rays against a triangle mesh (Embree). Triangles are found in single precision about the mesh's
-// centre, watertight along shared edges; where a ray meets them is then computed in double
+// center, watertight along shared edges; where a ray meets them is then computed in double
 // precision.
 #pragma once
 
@@ -39,7 +39,7 @@ class RayCaster {
   bool is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                   double near = 0.0, double far = 1e30) const;
 
-  // The same for many rays from one place, quickest where neighbours in `directions` point nearly
+  // The same for many rays from one place, quickest where neighbors in `directions` point nearly
   // the same way; `hits` is as long. RayHit::no_triangle marks a ray that meets nothing.
   void cast_bundle(const Eigen::Vector3d& origin, std::span<const Eigen::Vector3d> directions,
                    std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;

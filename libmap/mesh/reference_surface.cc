@@ -142,11 +142,11 @@ struct ReferenceSurface::CloudShape : Shape {
 
   NearestPlace nearest(const Eigen::Vector3d& point) const override {
     const NeighborPoint neighbor = tree->nearest(point);
-    const Eigen::Vector3d& centre = points[neighbor.index];
+    const Eigen::Vector3d& center = points[neighbor.index];
     const Eigen::Vector3d& normal = normals[neighbor.index];
-    NearestPlace place{centre, normal, 0.0, false};
+    NearestPlace place{center, normal, 0.0, false};
     if (normal.squaredNorm() > 0.0) {
-      const Eigen::Vector3d offset = point - centre;
+      const Eigen::Vector3d offset = point - center;
       const Eigen::Vector3d along = offset - offset.dot(normal) * normal;
       const double reach = along.norm();
       place.on_border = reach > disc_radius_m;

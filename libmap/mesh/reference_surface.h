@@ -32,7 +32,7 @@ class ReferenceSurface {
   explicit ReferenceSurface(const TriangleMesh& mesh);
 
   // Of a cloud with normals: discs about the points, across their normals, of twice the median
-  // distance between neighbours as radius; a point's distance is that to the disc of the nearest
+  // distance between neighbors as radius; a point's distance is that to the disc of the nearest
   // point. So the gaps between the points of a dense cloud count for nothing, holes for what they
   // are. Without normals, or where a normal is zero: the points themselves. Throws Error if there
   // is no point or one is not finite.

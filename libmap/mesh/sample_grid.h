@@ -52,7 +52,7 @@ class SampleGrid {
     return false;
   }
 
-  // Whether a point lies nearer to `place` than the root of `square_m2`, which is `radius_m`.
+  // Whether a point is closer to `place` than the root of `square_m2`, which is `radius_m`.
   bool any_nearer(const Eigen::Vector3d& place, double radius_m, double square_m2) const {
     const Eigen::Vector3d reach = Eigen::Vector3d::Constant(radius_m);
     return any_in_box(place - reach, place + reach,
@@ -79,7 +79,7 @@ class SampleGrid {
             static_cast<std::int64_t>(std::floor(at.y())),
             static_cast<std::int64_t>(std::floor(at.z()))};
   }
-  // Neighbours along x lie side by side.
+  // Neighbors along x lie side by side.
   std::size_t slot(const Cell& cell) const {
     return (static_cast<std::uint64_t>(cell.x) + 73856093U * static_cast<std::uint64_t>(cell.y) +
             19349663U * static_cast<std::uint64_t>(cell.z)) &

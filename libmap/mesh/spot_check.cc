@@ -66,7 +66,7 @@ TurnedBox box_at(const std::vector<Eigen::Vector2d>& points, double angle) {
 }
 
 // One side of the least rectangle lies along the hull (Freeman and Shapira 1975).
-TurnedBox least_box(const std::vector<Eigen::Vector2d>& hull) {
+TurnedBox min_box(const std::vector<Eigen::Vector2d>& hull) {
   constexpr double quarter = std::numbers::pi / 2;
   TurnedBox best = box_at(hull, 0.0);
   for (std::size_t n = 0; n < hull.size(); ++n) {
@@ -102,7 +102,7 @@ SiteCorners bounding_corners(const std::vector<Eigen::Vector3d>& points, bool tu
   for (const Eigen::Vector3d& point : points) places.emplace_back(point.head<2>());
   if (!turned) return corners_of(box_at(places, 0.0));
   const std::vector<Eigen::Vector2d> hull = convex_hull(places);
-  return corners_of(least_box(hull.empty() ? places : hull));
+  return corners_of(min_box(hull.empty() ? places : hull));
 }
 
 SiteCorners corners_of(const Eigen::Vector2d& min, const Eigen::Vector2d& max) {
@@ -173,14 +173,14 @@ void summarize(SpotCheckResult& result) {
       ++count;
       of_edge += std::abs(*error);
       result.mean_error_m += *error;
-      result.max_size_m = std::max(result.max_size_m, std::abs(*error));
+      result.max_abs_error_m = std::max(result.max_abs_error_m, std::abs(*error));
     }
     if (count > 0) result.mean_m[e] = of_edge / static_cast<double>(count);
     sum += of_edge;
     result.measured += count;
   }
   if (result.measured == 0) throw Error("no place along the site's edges has data and ground");
-  result.mean_size_m = sum / static_cast<double>(result.measured);
+  result.mean_abs_error_m = sum / static_cast<double>(result.measured);
   result.mean_error_m /= static_cast<double>(result.measured);
 }
 

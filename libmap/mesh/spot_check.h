@@ -61,9 +61,9 @@ struct SpotCheckResult {
   std::array<std::optional<double>, 4> mean_m;       // of the sizes of each edge's errors
   std::size_t measured = 0;                          // places with an error
   std::size_t missing = 0;                           // and without
-  double mean_size_m = 0.0;                          // of all errors' sizes
+  double mean_abs_error_m = 0.0;                     // of all errors' sizes
   double mean_error_m = 0.0;                         // with their signs
-  double max_size_m = 0.0;
+  double max_abs_error_m = 0.0;
 };
 
 // Throws Error: options out of their ranges, an inset of half a side or more, no place with an

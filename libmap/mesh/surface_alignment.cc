@@ -33,7 +33,7 @@ namespace {
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr std::size_t distances_per_chunk = 512;
 
-std::vector<Eigen::Vector3d> thinned(const std::vector<Eigen::Vector3d>& points, int most) {
+std::vector<Eigen::Vector3d> downsampled(const std::vector<Eigen::Vector3d>& points, int most) {
   const std::size_t count = std::min(points.size(), static_cast<std::size_t>(most));
   std::vector<Eigen::Vector3d> part;
   part.reserve(count);
@@ -72,7 +72,7 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   return pairs;
 }
 
-// Tukey's biweight; its scale is the normalised median absolute deviation. Returns the number of
+// Tukey's biweight; its scale is the normalized median absolute deviation. Returns the number of
 // pairs with a weight.
 std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
   constexpr double efficient = 4.685;       // 95 % efficiency for Gaussian errors
@@ -91,9 +91,9 @@ std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
 }
 
 // Rotations count by how far they move the points, so that all six are lengths: turned about
-// `centre` by an angle times `radius_m`.
+// `center` by an angle times `radius_m`.
 struct NormalEquations {
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
   Matrix6d matrix = Matrix6d::Zero();
   Vector6d right = Vector6d::Zero();
@@ -103,19 +103,19 @@ NormalEquations equations_of(const std::vector<Pair>& pairs) {
   NormalEquations equations;
   double weights = 0.0;
   for (const Pair& pair : pairs) {
-    equations.centre += pair.weight * pair.point;
+    equations.center += pair.weight * pair.point;
     weights += pair.weight;
   }
-  equations.centre /= weights;
+  equations.center /= weights;
   double squares = 0.0;
   for (const Pair& pair : pairs)
-    squares += pair.weight * (pair.point - equations.centre).squaredNorm();
+    squares += pair.weight * (pair.point - equations.center).squaredNorm();
   equations.radius_m = std::sqrt(squares / weights);
   if (!(equations.radius_m > 0.0)) equations.radius_m = 1.0;
   for (const Pair& pair : pairs) {
     const Eigen::Vector3d& normal = pair.place.normal;
     Vector6d row;
-    row << (pair.point - equations.centre).cross(normal) / equations.radius_m, normal;
+    row << (pair.point - equations.center).cross(normal) / equations.radius_m, normal;
     const double residual = (pair.place.position - pair.point).dot(normal);
     equations.matrix += pair.weight / weights * row * row.transpose();
     equations.right += pair.weight / weights * residual * row;
@@ -151,7 +151,7 @@ Step solve(const NormalEquations& equations, double min_curvature) {
   if (turn.norm() > 0.0)
     step.motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
   step.motion.translation() =
-      equations.centre + motion.tail<3>() - step.motion.linear() * equations.centre;
+      equations.center + motion.tail<3>() - step.motion.linear() * equations.center;
   return step;
 }
 
@@ -179,7 +179,7 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
         {.file = {}, .field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});
   for (const Eigen::Vector3d& point : points)
     if (!point.allFinite()) throw Error("a point is not finite");
-  const std::vector<Eigen::Vector3d> used = thinned(points, options.max_points);
+  const std::vector<Eigen::Vector3d> used = downsampled(points, options.max_points);
   // Distances below it are rounding.
   const double floor_m = 1e-9 * (surface.bounds().max - surface.bounds().min).norm();
   SurfaceAlignmentResult result;

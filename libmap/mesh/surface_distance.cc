@@ -41,7 +41,7 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
     std::uint32_t triangle;
     double distance;
   };
-  const Eigen::Vector3d local = point - scene_->mesh.centre();
+  const Eigen::Vector3d local = point - scene_->mesh.center();
   Search search{*scene_,
                 local,
                 1e-6 * (scene_->mesh.size().norm() + local.norm()),
@@ -71,7 +71,7 @@ SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
     return true;
   };
   rtcPointQuery(scene_->mesh.scene(), &query, &context, visit, &search);
-  return {search.best + scene_->mesh.centre(), search.triangle, search.distance};
+  return {search.best + scene_->mesh.center(), search.triangle, search.distance};
 }
 
 namespace {

@@ -56,7 +56,7 @@ struct DistanceStatistics {
 // Mean, root mean square, median, 95th percentile and maximum; zeros of no distances.
 DistanceStatistics distance_statistics(std::vector<double> distances_m);
 
-// Points of the surface, `per_m2` on each square metre on the mean, drawn with `seed`: the same for
+// Points of the surface, `per_m2` on each square meter on the mean, drawn with `seed`: the same for
 // any number of threads. Throws Error if the mesh has no area, or if more were asked for than 100 a
 // triangle or 2.5 million, whichever is more, or than 10^8.
 std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per_m2,

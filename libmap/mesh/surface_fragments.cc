@@ -75,7 +75,7 @@ SurfacePieces::SurfacePieces(const TriangleMesh& mesh) : mesh_(mesh) {
 }
 
 SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
-                             std::size_t most_parts)
+                             std::size_t max_parts)
     : mesh_(triangles.mesh_) {
   for (const SurfaceBlock& block : triangles.blocks_) {
     if (block.longest_m <= longest_m) {
@@ -83,21 +83,21 @@ SurfacePieces::SurfacePieces(const SurfacePieces& triangles, double longest_m,
       continue;
     }
     for (std::size_t n = block.begin; n < block.end; ++n)
-      cut(triangles.piece(n), longest_m, most_parts);
+      cut(triangles.piece(n), longest_m, max_parts);
   }
   add_blocks(mesh_.triangles.size(), mesh_.triangles.size() + parts_.size());
 }
 
-void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::size_t most_parts) {
+void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts) {
   if (!(fragment.area_m2() > 0.0)) return;
   // At least so many parts lie along its longest side.
   const double parts = std::sqrt(fragment.square_of_longest_side()) / longest_m;
-  if (static_cast<double>(parts_.size()) + parts > static_cast<double>(most_parts))
+  if (static_cast<double>(parts_.size()) + parts > static_cast<double>(max_parts))
     throw Error(
         "the mesh is too large to be cut so small",
         {.file = {}, .field = "size of a piece", .value = to_text(longest_m) + " m", .bound = {}});
   if (parts > 1.0) {
-    for (const PlacedFragment& half : fragment.halves()) cut(half, longest_m, most_parts);
+    for (const PlacedFragment& half : fragment.halves()) cut(half, longest_m, max_parts);
     return;
   }
   parts_.push_back(fragment.fragment);
@@ -135,10 +135,10 @@ SurfaceBlock SurfacePieces::measured(std::size_t begin, std::size_t end) const {
     for (const Eigen::Vector3d& corner : fragment.corners) box.extend(corner);
   }
   block.longest_m = std::sqrt(block.longest_m);
-  block.centre = box.center();
+  block.center = box.center();
   for (std::size_t n = begin; n < end; ++n)
     for (const Eigen::Vector3d& corner : piece(n).corners)
-      block.reach_m = std::max(block.reach_m, (corner - block.centre).squaredNorm());
+      block.reach_m = std::max(block.reach_m, (corner - block.center).squaredNorm());
   block.reach_m = std::sqrt(block.reach_m);
   return block;
 }

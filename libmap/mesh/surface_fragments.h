@@ -41,8 +41,8 @@ struct SurfaceBlock {
   std::size_t begin = 0;
   std::size_t end = 0;
   double area_m2 = 0.0;
-  Eigen::Vector3d centre = Eigen::Vector3d::Zero();
-  double reach_m = 0.0;    // no point of them is farther from the centre
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double reach_m = 0.0;    // no point of them is farther from the center
   double longest_m = 0.0;  // of their sides
 };
 
@@ -52,8 +52,8 @@ class SurfacePieces {
   // All triangles as they are. The mesh must stay while the pieces are used.
   explicit SurfacePieces(const TriangleMesh& mesh);
   // `triangles` cut until no side is longer than `longest_m`. Throws Error if that yields more than
-  // `most_parts`.
-  SurfacePieces(const SurfacePieces& triangles, double longest_m, std::size_t most_parts);
+  // `max_parts`.
+  SurfacePieces(const SurfacePieces& triangles, double longest_m, std::size_t max_parts);
 
   const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
   // Of all pieces together; one piece by its number.
@@ -61,7 +61,7 @@ class SurfacePieces {
   PlacedFragment piece(std::size_t number) const;
 
  private:
-  void cut(const PlacedFragment& fragment, double longest_m, std::size_t most_parts);
+  void cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts);
   void add_blocks(std::size_t begin, std::size_t end);
   SurfaceBlock measured(std::size_t begin, std::size_t end) const;
 

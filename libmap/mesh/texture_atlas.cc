@@ -8,15 +8,15 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/rectangle_packing.h"
-#include "libmap/mesh/texture_labelling.h"
+#include "libmap/mesh/texture_labeling.h"
 
 namespace libmap {
 
 namespace {
 
-constexpr double least_scale = 1.0 / 64.0;
-constexpr double most_scale = 16.0;
-constexpr int most_rounds = 12;
+constexpr double min_scale = 1.0 / 64.0;
+constexpr double max_scale = 16.0;
+constexpr int max_rounds = 12;
 // Sides of pages are multiples of it where they are cut.
 constexpr int page_step = 4;
 
@@ -50,10 +50,10 @@ class AtlasMaker {
     find_charts(opposite, label);
     any_neutral_ = std::find(label.begin(), label.end(), no_photo) != label.end();
     TextureAtlas atlas;
-    for (int round = 0; round < most_rounds; ++round) {
+    for (int round = 0; round < max_rounds; ++round) {
       atlas = lay_out(scale_);
       const auto pages = static_cast<int>(atlas.pages.size());
-      if (options_.max_pages == 0 || pages <= options_.max_pages || scale_ <= least_scale) break;
+      if (options_.max_pages == 0 || pages <= options_.max_pages || scale_ <= min_scale) break;
       scale_ *= 0.95 * std::sqrt(static_cast<double>(options_.max_pages) / pages);
     }
     return atlas;
@@ -113,7 +113,7 @@ std::array<Eigen::Vector2d, 3> AtlasMaker::corners_px(const TextureChart& chart,
 
 // Texels a pixel that give texels of the wanted size on the mean.
 double AtlasMaker::own_scale(const TextureChart& chart) const {
-  if (!(options_.texel_size_m > 0.0)) return options_.texels_a_pixel;
+  if (!(options_.texel_size_m > 0.0)) return options_.texels_per_pixel;
   double area_m2 = 0.0;
   double area_px = 0.0;
   for (const std::uint32_t t : chart.triangles) {
@@ -122,7 +122,7 @@ double AtlasMaker::own_scale(const TextureChart& chart) const {
     area_px += 0.5 * std::abs(cross(corners[1] - corners[0], corners[2] - corners[0]));
   }
   if (!(area_px > 0.0)) return 1.0;
-  return std::clamp(std::sqrt(area_m2 / area_px) / options_.texel_size_m, least_scale, most_scale);
+  return std::clamp(std::sqrt(area_m2 / area_px) / options_.texel_size_m, min_scale, max_scale);
 }
 
 // The chart with its size, or its parts where it does not fit on a page.
@@ -141,10 +141,10 @@ void AtlasMaker::fit(TextureChart chart, TextureAtlas& atlas) const {
     for (TextureChart& part : parts) part.triangles.clear();
     for (const std::uint32_t t : chart.triangles) {
       const auto corners = corners_px(chart, t);
-      const double centre = (corners[0] + corners[1] + corners[2])[axis] / 3.0;
-      parts[centre < middle ? 0 : 1].triangles.push_back(t);
+      const double center = (corners[0] + corners[1] + corners[2])[axis] / 3.0;
+      parts[center < middle ? 0 : 1].triangles.push_back(t);
     }
-    // Triangles may all have their centres on one side.
+    // Triangles may all have their centers on one side.
     for (std::size_t k = 0; k < 2; ++k) {
       if (!parts[k].triangles.empty()) continue;
       std::vector<std::uint32_t>& all = parts[1 - k].triangles;

@@ -17,19 +17,19 @@
 namespace libmap {
 
 struct TextureAtlasOptions {
-  int texture_size = 4096;      // pixels, 64 to 16384: no page is wider or higher
-  double texel_size_m = 0.0;    // 0: by texels_a_pixel
-  double texels_a_pixel = 1.5;  // along a side of a photograph's pixel
+  int texture_size = 4096;        // pixels, 64 to 16384: no page is wider or higher
+  double texel_size_m = 0.0;      // 0: by texels_per_pixel
+  double texels_per_pixel = 1.5;  // along a side of a photograph's pixel
   // More are made only where the padding around the charts alone needs them; charts are scaled down
   // before. 0: any number.
   int max_pages = 64;
-  int padding_px = 3;  // texels around each chart that continue its colours; 1 to 64
+  int padding_px = 3;  // texels around each chart that continue its colors; 1 to 64
 };
 
-// A place of a page with the colours of some triangles.
+// A place of a page with the colors of some triangles.
 struct TextureChart {
   std::vector<std::uint32_t> triangles;              // ascending
-  double scale = 1.0;                                // texels a pixel of the photograph
+  double scale = 1.0;                                // texels per pixel of the photograph
   Eigen::Vector2d origin = Eigen::Vector2d::Zero();  // pixel of the photograph at texel (0, 0)
   std::uint32_t photo = 0;
   std::int32_t page = 0;
@@ -47,7 +47,7 @@ struct PageSize {
 struct TextureAtlas {
   std::vector<TextureChart> charts;
   std::vector<PageSize> pages;  // cut to what is used
-  // A square of neutral_size texels of one colour, for triangles that no photograph shows.
+  // A square of neutral_size texels of one color, for triangles that no photograph shows.
   std::int32_t neutral_page = 0;
   Eigen::Vector2i neutral_corner = Eigen::Vector2i::Zero();
   int neutral_size = 0;
@@ -64,7 +64,7 @@ TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<Half
                                 const std::vector<std::uint32_t>& label,
                                 const TexturePhotos& photos, const TextureAtlasOptions& options);
 
-// Where a point lies on its chart's page: texels, (0, 0) the centre of the page's first.
+// Where a point lies on its chart's page: texels, (0, 0) the center of the page's first.
 Eigen::Vector2d place_on_page(const TextureChart& chart, const PhotoProjector& projector,
                               const Eigen::Vector3d& point);
 

@@ -13,14 +13,14 @@ namespace {
 constexpr float darkest = 8.0F;
 constexpr float brightest = 250.0F;
 constexpr int rounds = 4;
-// ln(colour): residuals beyond it count less and less.
+// ln(color): residuals beyond it count less and less.
 constexpr double huber = 0.08;
 // Ties a photograph that overlaps no other to a gain of 1, as this many observations of it would.
 constexpr double prior_weight = 0.5;
 // Keeps a lens that few places tell of without darkening, as this many observations would.
 constexpr double lens_prior_weight = 10.0;
 // Views of one place that are compared.
-constexpr std::size_t most_views = 24;
+constexpr std::size_t max_views = 24;
 
 struct Observation {
   std::uint32_t photo = 0;
@@ -74,7 +74,7 @@ ExposureFit::ExposureFit(std::span<const ColorObservation> observations, std::si
     while (last < sorted.size() && sorted[last].vertex == sorted[first].vertex) ++last;
     if (last - first < 2) continue;
     Place place{observations_.size(), 0};
-    const std::size_t step = (last - first - 1) / most_views + 1;
+    const std::size_t step = (last - first - 1) / max_views + 1;
     for (std::size_t i = first; i < last; i += step)
       observations_.push_back({sorted[i].photo, sorted[i].color.cast<double>().array().log(),
                                powers_of(static_cast<double>(sorted[i].radius2))});
@@ -111,7 +111,7 @@ double ExposureFit::weigh() {
   return count > 0.0 ? std::sqrt(sum / count) : 0.0;
 }
 
-// Normal equations of the gains, each place's own colour eliminated.
+// Normal equations of the gains, each place's own color eliminated.
 void ExposureFit::fit_gains() {
   const Eigen::Index photos = gains_.rows();
   std::vector<Eigen::Triplet<double>> terms;

@@ -19,21 +19,21 @@ namespace {
 // Views of a triangle among which one is chosen.
 constexpr std::size_t views_a_triangle = 12;
 // Triangles that all photographs show smaller are not cut; nor are any where more would come out.
-constexpr double least_cut_px = 16.0;
-constexpr std::uint64_t most_cut_triangles = 2'500'000;
+constexpr double min_cut_px = 16.0;
+constexpr std::uint64_t max_cut_triangles = 2'500'000;
 
 // Whether any photograph may show the triangle, or a part of it, so large that cutting it matters.
 bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& photos) {
-  const Eigen::Vector3d centre =
+  const Eigen::Vector3d center =
       (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
   double radius = 0.0;
   double longest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
-    radius = std::max(radius, (mesh.vertices[t[k]] - centre).norm());
+    radius = std::max(radius, (mesh.vertices[t[k]] - center).norm());
     longest = std::max(longest, (mesh.vertices[t[k]] - mesh.vertices[t[(k + 1) % 3]]).norm());
   }
   for (std::size_t i = 0; i < photos.size(); ++i)
-    if (photos[i].projector.most_pixels(centre, radius, longest) > least_cut_px) return true;
+    if (photos[i].projector.max_pixels(center, radius, longest) > min_cut_px) return true;
   return false;
 }
 
@@ -63,7 +63,7 @@ class Texturing {
 TriangleMesh Texturing::cut_finely(const TriangleMesh& input, const TexturePhotos& photos) {
   if (!(options_.max_side_m > 0.0)) return input;
   SubdivisionResult fine = split_long_sides(
-      input, options_.max_side_m, most_cut_triangles,
+      input, options_.max_side_m, max_cut_triangles,
       [&photos](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, photos); });
   result_.cut_triangles = fine.mesh.triangles.size() - input.triangles.size();
   return std::move(fine.mesh);
@@ -117,8 +117,8 @@ TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
   const auto opposite = timed("edges", [&] {
     return opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));
   });
-  const TextureLabels labels = timed("labelling", [&] {
-    return label_triangles(mesh, opposite, views.of_triangles, options_.labelling);
+  const TextureLabels labels = timed("labeling", [&] {
+    return label_triangles(mesh, opposite, views.of_triangles, options_.labeling);
   });
   result_.seams_before_m = labels.seams_before_m;
   result_.seams_m = labels.seams_m;
@@ -148,12 +148,12 @@ void bind(ParameterTable& table, TextureOptions& options) {
             "no page of the texture is wider or higher, pixels");
   table.add("texel_size_m", options.atlas.texel_size_m, not_negative,
             "side of a texel on the surface, m; 0: by the photographs' own pixels");
-  table.add("texels_a_pixel", options.atlas.texels_a_pixel, {0.05, 8.0},
+  table.add("texels_per_pixel", options.atlas.texels_per_pixel, {0.05, 8.0},
             "with texel_size_m 0: texels along a side of the photographs' pixels");
   table.add("max_pages", options.atlas.max_pages, not_negative,
             "texels are made larger where more pages would be needed; 0: any number of pages");
   table.add("padding_px", options.atlas.padding_px, {1, 64},
-            "texels around each chart that continue its colours");
+            "texels around each chart that continue its colors");
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "views that are more aslant are not used");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
@@ -162,7 +162,7 @@ void bind(ParameterTable& table, TextureOptions& options) {
             "so near to what stands before it a surface is better shown by another view, pixels");
   table.add("border_px", options.views.border_px, not_negative,
             "border of each photograph that is not used, pixels");
-  table.add("seam_cost_m", options.labelling.seam_cost_m, not_negative,
+  table.add("seam_cost_m", options.labeling.seam_cost_m, not_negative,
             "larger: fewer seams and larger charts, of views that are not the best");
   table.add("blend_views", options.blend_views, {1, 16},
             "photographs that are blended at a place; 1: one a triangle");

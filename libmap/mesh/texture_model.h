@@ -1,9 +1,9 @@
-// A mesh with the colours of a scan's photographs.
+// A mesh with the colors of a scan's photographs.
 //
 // Which photographs see each triangle, and how well (texture_views); one of them for each triangle
-// with few seams between them (texture_labelling), whose picture gives the triangle its place on
+// with few seams between them (texture_labeling), whose picture gives the triangle its place on
 // the texture's pages (texture_atlas); what photographs differ by as a whole (texture_exposure);
-// the colours, from the few best photographs of each place (texture_painting).
+// the colors, from the few best photographs of each place (texture_painting).
 #pragma once
 
 #include <cstddef>
@@ -19,7 +19,7 @@
 #include "libmap/core/textured_mesh.h"
 #include "libmap/mesh/texture_atlas.h"
 #include "libmap/mesh/texture_exposure.h"
-#include "libmap/mesh/texture_labelling.h"
+#include "libmap/mesh/texture_labeling.h"
 #include "libmap/mesh/texture_views.h"
 #include "libmap/scan/scan_source.h"
 
@@ -28,7 +28,7 @@ namespace libmap {
 struct TextureOptions {
   TextureAtlasOptions atlas{};
   TextureViewOptions views{};
-  LabellingOptions labelling{};
+  LabelingOptions labeling{};
   ExposureOptions exposure{};
   // Photographs that are blended at a place; 1: one a triangle.
   int blend_views = 3;

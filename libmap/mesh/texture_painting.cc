@@ -13,9 +13,9 @@ namespace libmap {
 namespace {
 
 constexpr std::int32_t nobody = -1;
-// Of a texel's side: a texel whose centre is this far outside of a triangle still is its own.
+// Of a texel's side: a texel whose center is this far outside of a triangle still is its own.
 constexpr double edge_slack = 1e-9;
-constexpr int most_samples = 8;  // a texel's side
+constexpr int max_samples = 8;  // a texel's side
 
 Color to_color(const Eigen::Vector3f& color) {
   Color result{};
@@ -121,7 +121,7 @@ PlaneTriangle ChartPainter::on_chart(std::uint32_t triangle) const {
   return PlaneTriangle(corners);
 }
 
-// The texels whose centres lie in a triangle, and one for each triangle without.
+// The texels whose centers lie in a triangle, and one for each triangle without.
 void ChartPainter::find_owners() {
   for (std::size_t i = 0; i < chart_->triangles.size(); ++i) {
     const PlaneTriangle triangle = on_chart(chart_->triangles[i]);
@@ -138,14 +138,14 @@ void ChartPainter::find_owners() {
   }
   for (std::size_t i = 0; i < chart_->triangles.size(); ++i) {
     const auto corners = on_chart(chart_->triangles[i]).corners();
-    const Eigen::Vector2d centre = (corners[0] + corners[1] + corners[2]) / 3.0;
-    own(std::clamp(static_cast<int>(std::lround(centre.x())), 0, chart_->width - 1),
-        std::clamp(static_cast<int>(std::lround(centre.y())), 0, chart_->height - 1),
+    const Eigen::Vector2d center = (corners[0] + corners[1] + corners[2]) / 3.0;
+    own(std::clamp(static_cast<int>(std::lround(center.x())), 0, chart_->width - 1),
+        std::clamp(static_cast<int>(std::lround(center.y())), 0, chart_->height - 1),
         static_cast<std::int32_t>(i));
   }
 }
 
-// Texels around the chart get the owner of a neighbour, ring by ring.
+// Texels around the chart get the owner of a neighbor, ring by ring.
 void ChartPainter::spread_owners() {
   std::vector<std::array<int, 2>> ring;
   for (int row = 0; row < chart_->height; ++row)
@@ -228,7 +228,7 @@ void ChartPainter::paint_triangle(std::int32_t local, std::span<const std::uint3
   gather_shares(triangle);
   ColorImage& page = model_.pages[static_cast<std::size_t>(chart_->page)];
   const int samples =
-      std::clamp(static_cast<int>(std::ceil(1.0 / chart_->scale - 1e-6)), 1, most_samples);
+      std::clamp(static_cast<int>(std::ceil(1.0 / chart_->scale - 1e-6)), 1, max_samples);
   for (const std::uint32_t texel : texels) {
     const int column = static_cast<int>(texel) % chart_->width;
     const int row = static_cast<int>(texel) / chart_->width;

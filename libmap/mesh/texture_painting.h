@@ -1,4 +1,4 @@
-// The colours of a texture's pages from the photographs. Inner part of libmap/mesh.
+// The colors of a texture's pages from the photographs. Inner part of libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>
@@ -14,7 +14,7 @@
 
 namespace libmap {
 
-// A photograph's share in the colour of a vertex.
+// A photograph's share in the color of a vertex.
 struct ViewShare {
   std::uint32_t photo = 0;
   float share = 0.0F;

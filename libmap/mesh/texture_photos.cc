@@ -17,8 +17,8 @@ namespace {
 // Frames in memory at a time; not the number of threads, which results must not depend on.
 constexpr std::size_t frames_in_flight = 8;
 // How much more than a pinhole a lens may enlarge.
-constexpr double most_distortion = 2.0;
-constexpr std::size_t most_kept_bytes = std::size_t{400} << 20;
+constexpr double max_distortion = 2.0;
+constexpr std::size_t max_kept_bytes = std::size_t{400} << 20;
 
 std::size_t bytes_of(const ColorImage& image) { return image.pixels.size() * sizeof(Color); }
 
@@ -62,9 +62,9 @@ Eigen::Vector3d PhotoProjector::project(const Eigen::Vector3d& point_in_world) c
   return {pixel.x(), pixel.y(), p.z()};
 }
 
-double PhotoProjector::most_pixels(const Eigen::Vector3d& centre, double radius_m,
-                                   double length_m) const {
-  const Eigen::Vector3d p = camera_from_world_ * (centre - position_);
+double PhotoProjector::max_pixels(const Eigen::Vector3d& center, double radius_m,
+                                  double length_m) const {
+  const Eigen::Vector3d p = camera_from_world_ * (center - position_);
   if (p.z() + radius_m <= 0.0) return 0.0;
   const double nearest = p.norm() - radius_m;
   if (!std::isfinite(max_ray_) || nearest <= 0.0) return std::numeric_limits<double>::infinity();
@@ -72,7 +72,7 @@ double PhotoProjector::most_pixels(const Eigen::Vector3d& centre, double radius_
   const double stretch = 1.0 + max_ray_ * max_ray_;
   if ((p.head<2>().norm() - max_ray_ * p.z()) / std::sqrt(stretch) > radius_m) return 0.0;
   // A pinhole shows an angle largest along the radius: f / cos^2.
-  return most_distortion * std::max(camera_.fx, camera_.fy) * stretch * length_m / nearest;
+  return max_distortion * std::max(camera_.fx, camera_.fy) * stretch * length_m / nearest;
 }
 
 Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y) {
@@ -138,7 +138,7 @@ TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const
     if (!pose.world_from_base.matrix().allFinite()) throw Error(name + ": its pose is not finite");
     const RgbdFrame read = scan_.read_frame(pose.node, {.color = true, .depth = false});
     if (read.cameras.empty()) throw Error(name + ": it has no calibration");
-    if (read.color.empty()) throw Error(name + ": it has no colour image");
+    if (read.color.empty()) throw Error(name + ": it has no color image");
     std::vector<CameraView> views = camera_views(read);
     for (std::size_t i = 0; i < views.size(); ++i) {
       views[i].color_camera.check();
@@ -200,7 +200,7 @@ void TexturePhotos::keep(std::size_t photo, std::shared_ptr<const ColorImage> im
   kept_bytes_ += bytes_of(*image);
   images_[photo] = std::move(image);
   order_.push_back(photo);
-  while (kept_bytes_ > most_kept_bytes && order_.size() > 1) {
+  while (kept_bytes_ > max_kept_bytes && order_.size() > 1) {
     kept_bytes_ -= bytes_of(*images_[order_.front()]);
     images_[order_.front()].reset();
     order_.pop_front();

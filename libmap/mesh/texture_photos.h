@@ -32,14 +32,14 @@ class PhotoProjector {
     return camera_from_world_.transpose() * direction_in_camera;
   }
 
-  // Column and row, and z in metres; z is 0 where the camera cannot see such a direction. The pixel
+  // Column and row, and z in meters; z is 0 where the camera cannot see such a direction. The pixel
   // may lie outside the image.
   Eigen::Vector3d project(const Eigen::Vector3d& point_in_world) const;
 
-  // No length of so many metres within the ball takes more pixels in the photograph, if its lens
+  // No length of so many meters within the ball takes more pixels in the photograph, if its lens
   // nowhere enlarges more than twice what a pinhole does; 0 only where it shows no part of the
   // ball.
-  double most_pixels(const Eigen::Vector3d& centre, double radius_m, double length_m) const;
+  double max_pixels(const Eigen::Vector3d& center, double radius_m, double length_m) const;
 
  private:
   Camera camera_;
@@ -57,13 +57,13 @@ struct TexturePhoto {
   double sharpness = 1.0;  // relative to the median photograph
 };
 
-// Between the centres of pixels; the image goes on as at its border. Bicubic: Keys 1981, a = -1/2.
+// Between the centers of pixels; the image goes on as at its border. Bicubic: Keys 1981, a = -1/2.
 Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y);
 Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y);
 
 class TexturePhotos {
  public:
-  // Reads each frame of `world_from_base` once, by ascending node. Frames without colour, with a
+  // Reads each frame of `world_from_base` once, by ascending node. Frames without color, with a
   // pose that is not finite or that cannot be decoded are skipped and listed; with `strict` they
   // are an Error. Throws Error if no photograph is left. `scan` must outlive this.
   TexturePhotos(const ScanSource& scan, const Trajectory& world_from_base, bool strict,

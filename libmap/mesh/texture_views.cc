@@ -16,11 +16,11 @@ namespace {
 constexpr std::size_t vertices_per_chunk = 4096;
 // Of a photograph's smaller side: within it, towards the border, a view counts less and less.
 constexpr double border_band = 0.15;
-constexpr double least_border_share = 0.05;
-// Vertices whose colours are compared between all photographs.
+constexpr double min_border_share = 0.05;
+// Vertices whose colors are compared between all photographs.
 constexpr std::size_t wanted_observed_vertices = 20000;
-// A triangle that is larger in the photograph is tested at its centre too.
-constexpr float centre_test_px = 6.0F;
+// A triangle that is larger in the photograph is tested at its center too.
+constexpr float center_test_px = 6.0F;
 
 // What stands this much of the tolerance above a triangle's plane is no part of its own surface.
 constexpr double occluder_tolerances = 3.0;
@@ -189,10 +189,10 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
   const Triangle& triangle = mesh_.triangles[t];
   for (const std::uint32_t corner : triangle)
     if (!vertices_[corner].in_image) return 0.0F;
-  const Eigen::Vector3d centre =
+  const Eigen::Vector3d center =
       (mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] + mesh_.vertices[triangle[2]]) /
       3.0;
-  const Eigen::Vector3d toward = projector_->position() - centre;
+  const Eigen::Vector3d toward = projector_->position() - center;
   const double distance2 = toward.squaredNorm();
   const double cosine = normals_[t].dot(toward) / std::sqrt(distance2);
   if (!(cosine > min_cos_)) return 0.0F;
@@ -206,7 +206,7 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
   const double slant = (cosine - min_cos_) / (1.0 - min_cos_);
   const double resolution = camera.fx * camera.fy / distance2 * cosine;
   return static_cast<float>(resolution * slant * std::clamp(sharpness, 0.1, 2.0) *
-                            (least_border_share + (1.0 - least_border_share) * inside));
+                            (min_border_share + (1.0 - min_border_share) * inside));
 }
 
 void ViewFinder::rate_triangles(double sharpness) {
@@ -262,21 +262,21 @@ float ViewFinder::longest_side_px(const Triangle& triangle) const {
 
 void ViewFinder::test_triangles() {
   std::vector<std::uint32_t> wanted;
-  std::vector<Eigen::Vector3d> centres;
+  std::vector<Eigen::Vector3d> centers;
   for (std::uint32_t t = 0; t < qualities_.size(); ++t) {
     if (!(qualities_[t] > 0.0F)) continue;
     const Triangle& triangle = mesh_.triangles[t];
     if (!vertices_[triangle[0]].visible || !vertices_[triangle[1]].visible ||
         !vertices_[triangle[2]].visible) {
       qualities_[t] = 0.0F;
-    } else if (longest_side_px(triangle) > centre_test_px) {
+    } else if (longest_side_px(triangle) > center_test_px) {
       wanted.push_back(t);
-      centres.push_back((mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] +
+      centers.push_back((mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] +
                          mesh_.vertices[triangle[2]]) /
                         3.0);
     }
   }
-  const std::vector<bool> blocked = hidden(centres);
+  const std::vector<bool> blocked = hidden(centers);
   for (std::size_t i = 0; i < wanted.size(); ++i)
     if (blocked[i]) qualities_[wanted[i]] = 0.0F;
 }

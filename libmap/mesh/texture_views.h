@@ -26,7 +26,7 @@ struct TextureViewOptions {
 
 struct ViewQuality {
   std::uint32_t photo = 0;
-  // Pixels a square metre of the surface, times what counts against the view: slant, the
+  // Pixels a square meter of the surface, times what counts against the view: slant, the
   // photograph's border, blur.
   float quality = 0.0F;
 };
@@ -68,7 +68,7 @@ struct TextureViews {
   std::vector<ColorObservation> observations;
 };
 
-// Corners and centre of a triangle must be in the photograph and not be hidden (one ray each,
+// Corners and center of a triangle must be in the photograph and not be hidden (one ray each,
 // Embree). The same for any number of threads. The mesh must have a triangle, and no triangle large
 // against a photograph: it would be seen whole by none.
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,

@@ -220,7 +220,7 @@ TexturedMesh read_textured_mesh(const fs::path& path) {
   require_file_size(path, machine_memory());
   try {
     DecodedModel decoded = decode_model_by_assimp(path, format_of(path).substr(1));
-    if (decoded.model.mesh.triangles.empty()) throw Error("holds no triangle");
+    if (decoded.model.mesh.triangles.empty()) throw Error("contains no triangle");
     for (const TexturePicture& picture : decoded.pictures)
       decoded.model.pages.push_back(read_picture(picture, path));
     decoded.model.check();

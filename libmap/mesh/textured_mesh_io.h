@@ -1,11 +1,11 @@
 // Textured meshes from and to files.
 //
-//   .obj   MODEL.obj, MODEL.mtl and a picture a page, MODEL_0.png ...: doubles written, float32
+//   .obj   MODEL.obj, MODEL.mtl and a picture per page, MODEL_0.png ...: doubles written, float32
 //   read .glb   glTF 2.0 in one file, pictures within, unlit (KHR_materials_unlit): float32; y up
 //   by its
 //          standard, this project z: writing and reading turn it about x
 //
-// Vertex normals are kept; vertex colours and fields are not. float32 holds 24 bits (mesh_io.h says
+// Vertex normals are kept; vertex colors and fields are not. float32 holds 24 bits (mesh_io.h says
 // what that means far from the origin).
 #pragma once
 

@@ -23,7 +23,7 @@ constexpr std::size_t max_cap_passes = 1000;
 constexpr double max_coordinate = 1e30;  // its powers that areas and volumes need are finite
 
 // A coordinate of 10^6 m still counts cells in whole numbers.
-constexpr double least_cell_m = 3e-12;
+constexpr double min_cell_m = 3e-12;
 
 HalfEdge longest_edge(const TriangleMesh& mesh, std::uint32_t t) {
   HalfEdge longest = 3 * t;
@@ -117,7 +117,7 @@ class CapFlipper {
     join(3 * t + 2, over_ca);
     join(3 * u, over_db);
     join(3 * u + 1, over_bc);
-    // All of the area was the neighbour's.
+    // All of the area was the neighbor's.
     for (ScalarField& field : mesh_.face_fields) field.values[t] = field.values[u];
   }
 
@@ -174,7 +174,7 @@ std::vector<bool> degenerate_triangles(const TriangleMesh& mesh) {
 std::size_t weld_vertices(TriangleMesh& mesh, double distance_m) {
   // Most searches look into one or two cells. The odd factor keeps vertices of a lattice from the
   // same slots.
-  const double cell_m = std::max(4.1 * distance_m, least_cell_m);
+  const double cell_m = std::max(4.1 * distance_m, min_cell_m);
   SampleGrid grid(Eigen::Vector3d::Zero(), cell_m, mesh.vertices.size());
   std::vector<std::uint32_t> kept;  // vertices by their number in the grid
   std::vector<std::uint32_t> kept_of(mesh.vertices.size());

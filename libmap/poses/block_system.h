@@ -48,7 +48,7 @@ class BlockSolver {
   // Blocks (row, column) of the inverse for each row, of one column.
   std::vector<Matrix6d> inverse_column(std::size_t column) const;
   // The blocks of the inverse where `wanted` has blocks. Those that the factored system has too, be
-  // they zero, take about the time of the factorisation together (Takahashi, Fagan and Chin 1973);
+  // they zero, take about the time of the factorization together (Takahashi, Fagan and Chin 1973);
   // others take a column each.
   BlockSystem selected_inverse(const BlockSystem& wanted) const;
 

@@ -123,7 +123,7 @@ Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
       .cast<float>();
 }
 
-std::size_t most_cameras(const std::vector<FrameFeatures>& frames) {
+std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   std::size_t cameras = 0;
   for (const FrameFeatures& frame : frames) cameras = std::max(cameras, frame.cameras.size());
   return cameras;
@@ -136,7 +136,7 @@ class Adjustment {
       : frames_(frames),
         tracks_(tracks),
         options_(options),
-        cameras_(options.refine_intrinsics ? most_cameras(frames) : 0),
+        cameras_(options.refine_intrinsics ? max_cameras(frames) : 0),
         blocks_(poses, 4 * cameras_) {
     result_.map_from_base = poses;
     for (const FeatureTrack& track : tracks_) {

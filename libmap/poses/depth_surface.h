@@ -1,4 +1,4 @@
-// A depth image thinned to a grid of small planes, to be looked up by rays.
+// A depth image downsampled to a grid of small planes, to be looked up by rays.
 #pragma once
 
 #include <Eigen/Core>

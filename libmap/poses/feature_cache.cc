@@ -53,7 +53,7 @@ Json binary(const std::vector<T>& values) {
 template <typename T>
 std::vector<T> values_of(const Json& json) {
   const std::vector<std::uint8_t>& bytes = json.get_binary();
-  if (bytes.size() % sizeof(T) != 0) throw Error("does not hold what it should");
+  if (bytes.size() % sizeof(T) != 0) throw Error("does not contain what it should");
   std::vector<T> values(bytes.size() / sizeof(T));
   if (!values.empty()) std::memcpy(values.data(), bytes.data(), bytes.size());
   return values;
@@ -121,7 +121,7 @@ FrameFeatures unpacked(std::string_view bytes, FeatureType type,
   for (const std::uint16_t camera : values_of<std::uint16_t>(json.at("cameras"))) {
     const std::size_t first = 5 * frame.features.size();
     if (first + 5 > numbers.size() || camera >= depth_cameras.size())
-      throw Error("features are not whole");
+      throw Error("features are truncated");
     frame.features.push_back({{numbers[first], numbers[first + 1]},
                               numbers[first + 2],
                               numbers[first + 3],
@@ -131,8 +131,8 @@ FrameFeatures unpacked(std::string_view bytes, FeatureType type,
   frame.descriptors = values_of<std::uint8_t>(json.at("descriptors"));
   if (numbers.size() != 5 * frame.features.size() ||
       frame.descriptors.size() != descriptor_bytes(type) * frame.features.size())
-    throw Error("features are not whole");
-  if (json.at("surfaces").size() != depth_cameras.size()) throw Error("surfaces are not whole");
+    throw Error("features are truncated");
+  if (json.at("surfaces").size() != depth_cameras.size()) throw Error("surfaces are truncated");
   for (const Json& surface : json.at("surfaces"))
     frame.surfaces.emplace_back(depth_cameras[frame.surfaces.size()],
                                 integer_at<int>(surface, "step_px"),

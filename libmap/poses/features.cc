@@ -19,7 +19,7 @@ constexpr std::size_t sift_bytes = 128;
 constexpr std::size_t orb_bytes = 32;
 constexpr double sift_scale = 512.0;  // square-rooted SIFT of unit length in bytes, as in most uses
 
-// OpenCV's SIFT doubles the picture about its corner, not about its first pixel's centre, and
+// OpenCV's SIFT doubles the picture about its corner, not about its first pixel's center, and
 // halves the places of features again: they lie a quarter of a pixel too far right and down.
 constexpr float sift_offset_px = 0.25F;
 
@@ -127,14 +127,14 @@ DepthAtRay depth_at(const DepthPlanes& planes, const Camera& camera, const Eigen
   const auto n = static_cast<std::size_t>(y) * static_cast<std::size_t>(planes.width) +
                  static_cast<std::size_t>(x);
   if (planes.support[n] < 4) return {};
-  const auto centre = pixel_to_ray(camera, Eigen::Vector2d(x, y));
-  if (!centre) return {};
+  const auto center = pixel_to_ray(camera, Eigen::Vector2d(x, y));
+  if (!center) return {};
   const Eigen::Vector3d normal = planes.normals[n].cast<double>();
   const double depth = static_cast<double>(planes.depth_m[n]);
   const double facing = normal.dot(ray.homogeneous());
   if (!(facing < 0.0)) return {};
   DepthAtRay result;
-  result.depth_m = depth * normal.dot(centre->homogeneous()) / facing;
+  result.depth_m = depth * normal.dot(center->homogeneous()) / facing;
   result.per_pixel = result.depth_m / std::abs(facing) *
                      std::hypot(normal.x() / camera.fx, normal.y() / camera.fy);
   result.support = planes.support[n];
@@ -209,13 +209,13 @@ void bind(ParameterTable& table, FeatureOptions& options) {
   table.add("surface_noise_m", options.surface_noise_m, not_negative,
             "standard deviation of fitted depth that more pixels do not lessen");
   table.add("surface_step_px", options.surface_step_px, {1, 32},
-            "step of the grid to which depth images are thinned");
+            "step of the grid to which depth images are downsampled");
   table.add("min_depth_m", options.planes.min_depth_m, positive, "nearer depths are left out");
   table.add("max_depth_m", options.planes.max_depth_m, positive, "farther depths are left out");
   table.add("axial_noise_m", options.planes.noise.axial_m, positive,
             "standard deviation of depth at range 0");
   table.add("range_noise", options.planes.noise.axial_of_range, not_negative,
-            "what each metre of range adds to it, m a m");
+            "what each meter of range adds to it, m a m");
 }
 
 Eigen::Vector3d FrameFeatures::point_in_camera(std::size_t n) const {

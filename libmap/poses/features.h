@@ -1,6 +1,6 @@
 // What the poses of a scan are estimated from: the features of each frame's pictures with the depth
-// behind them, and its depth thinned to a grid of planes. Frames are read one by one; a few hundred
-// kilobytes of each are kept.
+// behind them, and its depth downsampled to a grid of planes. Frames are read one by one; a few
+// hundred kilobytes of each are kept.
 #pragma once
 
 #include <Eigen/Core>
@@ -49,7 +49,7 @@ struct Feature {
 
 struct FrameFeatures {
   int node = 0;
-  std::vector<Camera> cameras;  // of the colour images
+  std::vector<Camera> cameras;  // of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
   std::vector<std::uint8_t> descriptors;  // 128 (SIFT) or 32 (ORB) bytes a feature; may be dropped
@@ -71,7 +71,7 @@ struct FeatureResult {
 class FeatureCache;
 
 // The frames of `nodes`. The same for any number of threads, with a cache and without. Frames that
-// cannot be read, or have no depth, are listed and left out; a frame without colour has surfaces
+// cannot be read, or have no depth, are listed and left out; a frame without color has surfaces
 // only. Throws Error for options out of their ranges.
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
                             const FeatureOptions& options = {}, Progress& progress = no_progress(),

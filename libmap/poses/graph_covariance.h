@@ -16,7 +16,7 @@ class GraphCovariance {
  public:
   // Links that were rejected do not count; others do by their weight. Components are bound at their
   // gauge nodes. All that the nodes and the links are asked for is found at once, in about the time
-  // of one factorisation; so are `pairs` of nodes that no link joins.
+  // of one factorization; so are `pairs` of nodes that no link joins.
   explicit GraphCovariance(const PoseGraphResult& graph,
                            const std::vector<std::pair<int, int>>& pairs = {});
   // Of any system whose blocks are those of `nodes`, in their order, of which the first of each

@@ -1,4 +1,4 @@
-// The links that a pose graph is optimised by.
+// The links that a pose graph is optimized by.
 #pragma once
 
 #include <string>

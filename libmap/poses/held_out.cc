@@ -14,7 +14,7 @@ namespace {
 constexpr double scale = 9.0;
 constexpr double behind = 1e6;  // chi-square of a match behind the camera
 constexpr int samples_of_frame = 60;
-constexpr double least_cosine = 0.8;  // between the normals
+constexpr double min_cosine = 0.8;  // between the normals
 constexpr double rounding = 1e-6;
 constexpr double clear_rise = 0.005;
 
@@ -34,7 +34,7 @@ void add_surface_costs(const std::vector<BaseElement>& samples, const FrameFeatu
     const Eigen::Vector3d point = onto_from_from * sample.point;
     BaseElement plane;
     if (!seen_from_base(onto, point, plane) ||
-        plane.normal.dot(onto_from_from.linear() * sample.normal) < least_cosine)
+        plane.normal.dot(onto_from_from.linear() * sample.normal) < min_cosine)
       continue;
     const double distance = plane.normal.dot(point - plane.point);
     costs.back() = cost_of(distance * distance /
@@ -42,11 +42,11 @@ void add_surface_costs(const std::vector<BaseElement>& samples, const FrameFeatu
   }
 }
 
-double weight_of(const HeldOutJudgement& judgement, const HeldOutChange& change) {
-  const double matches = static_cast<double>(judgement.matches.count);
-  const double surfaces = surface_weight * static_cast<double>(judgement.surfaces.count);
+double weight_of(const HeldOutEvaluatement& evaluatement, const HeldOutChange& change) {
+  const double matches = static_cast<double>(evaluatement.matches.count);
+  const double surfaces = surface_weight * static_cast<double>(evaluatement.surfaces.count);
   const double all = matches + surfaces;
-  return all > 0.0 ? (&change == &judgement.matches ? matches : surfaces) / all : 0.0;
+  return all > 0.0 ? (&change == &evaluatement.matches ? matches : surfaces) / all : 0.0;
 }
 
 }  // namespace
@@ -122,17 +122,17 @@ HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
   return {match_costs(frames, links, map_from_base), surface_costs(frames, links, map_from_base)};
 }
 
-double HeldOutJudgement::change() const {
+double HeldOutEvaluatement::change() const {
   return weight_of(*this, matches) * (matches.after - matches.before) +
          weight_of(*this, surfaces) * (surfaces.after - surfaces.before);
 }
 
-double HeldOutJudgement::deviation() const {
+double HeldOutEvaluatement::deviation() const {
   return std::hypot(weight_of(*this, matches) * matches.deviation,
                     weight_of(*this, surfaces) * surfaces.deviation);
 }
 
-bool HeldOutJudgement::is_worse() const {
+bool HeldOutEvaluatement::is_worse() const {
   const double before =
       weight_of(*this, matches) * matches.before + weight_of(*this, surfaces) * surfaces.before;
   const auto is_clearly_worse = [](const HeldOutChange& kind) {
@@ -142,11 +142,11 @@ bool HeldOutJudgement::is_worse() const {
   return change() > rounding * before || is_clearly_worse(matches) || is_clearly_worse(surfaces);
 }
 
-bool HeldOutJudgement::is_clearly_better() const {
+bool HeldOutEvaluatement::is_clearly_better() const {
   return !is_worse() && matches.before - matches.after > 2.0 * matches.deviation;
 }
 
-HeldOutJudgement judge_held_out(const HeldOutCosts& before, const HeldOutCosts& after) {
+HeldOutEvaluatement evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after) {
   return {compare_held_out(before.matches, after.matches),
           compare_held_out(before.surfaces, after.surfaces)};
 }

@@ -1,4 +1,4 @@
-// What the stages of a refinement are judged by: observations that no pose is estimated from, by
+// What the stages of a refinement are evaluated by: observations that no pose is estimated from, by
 // how well they fit at the poses before a stage and after it.
 #pragma once
 
@@ -44,7 +44,7 @@ HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
 
 // Both kinds. A match has three residuals, a sample one; samples are so far apart that the discs
 // their planes are fitted to hardly overlap.
-struct HeldOutJudgement {
+struct HeldOutEvaluatement {
   HeldOutChange matches;
   HeldOutChange surfaces;
 
@@ -58,6 +58,6 @@ struct HeldOutJudgement {
   bool is_clearly_better() const;
 };
 inline constexpr double surface_weight = 1.0 / 3.0;
-HeldOutJudgement judge_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
+HeldOutEvaluatement evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
 
 }  // namespace libmap

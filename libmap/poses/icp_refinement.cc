@@ -21,10 +21,10 @@ namespace {
 constexpr int overlap_samples = 300;
 constexpr double reach_m = 2.5;  // frames further apart are not tried
 constexpr double view_angle_deg = 100.0;
-constexpr std::size_t most_candidates = 24;
-constexpr std::size_t nearest_considered = 8 * most_candidates;
+constexpr std::size_t max_candidates = 24;
+constexpr std::size_t nearest_considered = 8 * max_candidates;
 constexpr double robust_scale = 2.5;  // of Geman and McClure's loss, standard deviations
-constexpr double least_distance_m = 0.004;
+constexpr double min_distance_m = 0.004;
 constexpr double settled_m = 2e-6;
 constexpr double farthest_step = 0.2;  // m and rad
 
@@ -129,7 +129,7 @@ std::vector<std::size_t> Alignment::candidates_of(const PointTree& neighbors,
     ranked.emplace_back(std::sqrt(square_m2) / reach_m + angle / view_angle_deg, other);
   }
   std::sort(ranked.begin(), ranked.end());
-  ranked.resize(std::min(ranked.size(), most_candidates));
+  ranked.resize(std::min(ranked.size(), max_candidates));
   std::vector<std::size_t> candidates;
   candidates.reserve(ranked.size());
   for (const auto& [measure, other] : ranked) candidates.push_back(other);
@@ -172,13 +172,13 @@ void Alignment::pairs_by_overlap() {
 // where `from` is b: p -> p + t + r x p before a_from_b; and where it is a, the inverse.
 void Alignment::accumulate(std::size_t from, std::size_t onto, const Pose& onto_from_from,
                            bool from_is_a, double max_distance_m, PairEquations& equations) const {
-  const double least_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
+  const double min_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
   for (const BaseElement& sample : samples_[from]) {
     const Eigen::Vector3d point = onto_from_from * sample.point;
     BaseElement plane;
     if (!seen_from_base(frames_[onto], point, plane)) continue;
     const Eigen::Vector3d normal = onto_from_from.linear() * sample.normal;
-    if (plane.normal.dot(normal) < least_cosine) continue;
+    if (plane.normal.dot(normal) < min_cosine) continue;
     const double distance = plane.normal.dot(point - plane.point);
     if (std::abs(distance) > max_distance_m) continue;
     const double variance = sample.noise_m * sample.noise_m + plane.noise_m * plane.noise_m;
@@ -214,7 +214,7 @@ void Alignment::accumulate(std::size_t from, std::size_t onto, const Pose& onto_
 
 // Directions that a pair hardly binds, such as along a plane, are given no information at all: what
 // the noise of normals says about them is not to be believed (Zhang, Kaess and Singh 2016).
-// Rotations count by the way that the surface moves at a metre.
+// Rotations count by the way that the surface moves at a meter.
 void Alignment::drop_degenerate(PairEquations& equations) const {
   const SymmetricEigen<6> eigen = symmetric_eigen(equations.information);
   const double least = options_.degenerate * eigen.values[5];
@@ -334,8 +334,8 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
     result_.final_rms_m = rms_m;
     ++result_.iterations;
     progress.advance(1);
-    const bool tight = max_distance_m <= least_distance_m + 4.0 * rms_m;
-    max_distance_m = std::max({0.6 * max_distance_m, least_distance_m, 4.0 * rms_m});
+    const bool tight = max_distance_m <= min_distance_m + 4.0 * rms_m;
+    max_distance_m = std::max({0.6 * max_distance_m, min_distance_m, 4.0 * rms_m});
     if (!(farthest < farthest_step)) {
       // What nothing binds runs away: not a refinement.
       result_.map_from_base = start_;

@@ -239,7 +239,7 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   place_by_links(graph, wanted, result.map_from_base);
   for (const int node : wanted)
     if (!result.map_from_base.contains(node)) result.without_pose.push_back(node);
-  // A node that links have placed belongs to its neighbour's part.
+  // A node that links have placed belongs to its neighbor's part.
   std::map<int, std::size_t> part_of;
   for (std::size_t n = 0; n < result.parts.size(); ++n)
     for (const int node : result.parts[n]) part_of[node] = n;

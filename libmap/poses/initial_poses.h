@@ -1,4 +1,4 @@
-// Where an optimisation of a scan's poses starts.
+// Where an optimization of a scan's poses starts.
 #pragma once
 
 #include <map>

@@ -89,7 +89,7 @@ IntrinsicsEstimate estimate_from(std::vector<FrameFeatures> frames,
   const HeldOutCosts before = held_out_costs(frames, links, map_from_base);
   for (FrameFeatures& frame : frames) move_intrinsics(frame, estimate.adjustment.intrinsics);
   estimate.held_out =
-      judge_held_out(before, held_out_costs(frames, links, estimate.adjustment.map_from_base));
+      evaluate_held_out(before, held_out_costs(frames, links, estimate.adjustment.map_from_base));
   return estimate;
 }
 

@@ -18,13 +18,13 @@ namespace libmap {
 
 namespace {
 
-constexpr double least_scale = 0.01;  // of a group's stated deviations
-constexpr double most_scale = 20.0;
-constexpr double settled = 0.02;          // relative change of the scales
-constexpr double least_redundancy = 0.1;  // of a link's residuals: with less the others do not
-                                          // tell it
-constexpr std::size_t least_links = 3;    // fewer do not tell a group's scale
-constexpr double worst_share = 0.25;      // closures near the worst are rejected with it
+constexpr double min_scale = 0.01;  // of a group's stated deviations
+constexpr double max_scale = 20.0;
+constexpr double settled = 0.02;        // relative change of the scales
+constexpr double min_redundancy = 0.1;  // of a link's residuals: with less the others do not
+                                        // tell it
+constexpr std::size_t min_links = 3;    // fewer do not tell a group's scale
+constexpr double worst_share = 0.25;    // closures near the worst are rejected with it
 constexpr int max_rejections = 20;
 constexpr std::size_t simplicial_below = 120;              // poses
 constexpr double unknown_landmark_information = 1.001e-4;  // RTAB-Map: variance >= 9999
@@ -241,7 +241,7 @@ bool Optimization::reject() {
 // apart, and of these the median: up to half of a group may be wrong. 0 where too few links can be
 // told by the others.
 double group_variance(const std::vector<double>& ratios) {
-  return ratios.size() < least_links ? 0.0 : median(ratios);
+  return ratios.size() < min_links ? 0.0 : median(ratios);
 }
 
 bool Optimization::recalibrate() {
@@ -266,7 +266,7 @@ bool Optimization::recalibrate() {
       const Eigen::Index size = apart ? 3 : 6;
       const double all = static_cast<double>(size);
       const double redundancy = all - share.diagonal().segment(first, size).sum();
-      if (redundancy < least_redundancy * all) continue;
+      if (redundancy < min_redundancy * all) continue;
       const double square = residual.segment(first, size)
                                 .dot(link.information.block(first, first, size, size) *
                                      residual.segment(first, size));
@@ -283,7 +283,7 @@ bool Optimization::recalibrate() {
       const double variance = group_variance(parts[part]);
       if (!(variance > 0.0)) continue;
       const double before = *values[part];
-      *values[part] = std::clamp(before * std::sqrt(variance), least_scale, most_scale);
+      *values[part] = std::clamp(before * std::sqrt(variance), min_scale, max_scale);
       change = std::max(change, std::abs(*values[part] / before - 1.0));
     }
   }

@@ -223,7 +223,7 @@ void bind_to_nodes(const std::vector<CameraPose>& cameras, ImportedPoses& result
   }
 }
 
-// Motion between neighbours against the scan's own.
+// Motion between neighbors against the scan's own.
 void check_motion(const std::map<int, Pose>& own, ImportedPoses& result) {
   constexpr std::size_t fewest_steps = 5;
   constexpr double largest_ratio = 1.5;
@@ -253,7 +253,7 @@ void check_motion(const std::map<int, Pose>& own, ImportedPoses& result) {
     result.warnings.push_back("the poses are " + to_fixed_text(1e3 * mean(length_m), 0) +
                               " mm apart on average, and " +
                               to_fixed_text(1e3 * mean(own_length_m), 0) +
-                              " mm by the scan's own: are they metres (poses_scale)?");
+                              " mm by the scan's own: are they meters (poses_scale)?");
   if (mean(turn_rad) > smallest_turn_rad && difference_rad > 0.5 * turn_rad)
     result.warnings.push_back(
         "from pose to pose they turn otherwise than the scan's own, by " +
@@ -268,11 +268,12 @@ void bind(ParameterTable& table, PoseImportOptions& options) {
   table.add("poses_format", options.format, trajectory_format_names(),
             "of a file of poses; auto: by extension, else by content. tum-motion-capture and "
             "kitti-optical are RTAB-Map's formats 1 and 2, whose axes are others");
-  table.add("poses_of", options.frame, pose_frame_names(),
-            "whose poses a file holds: the base's, or the first camera's optical frame's; those of "
-            "COLMAP are the cameras'");
+  table.add(
+      "poses_of", options.frame, pose_frame_names(),
+      "whose poses a file contains: the base's, or the first camera's optical frame's; those of "
+      "COLMAP are the cameras'");
   table.add("poses_scale", options.scale, not_negative,
-            "metres a unit of a file's positions, COLMAP's being arbitrary; 0: the one that fits "
+            "meters a unit of a file's positions, COLMAP's being arbitrary; 0: the one that fits "
             "the scan's odometry best");
 }
 

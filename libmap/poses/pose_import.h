@@ -18,7 +18,7 @@ struct PoseImportOptions {
   // Whose poses the file holds: the base's, or those of the first camera's optical frame. Those of
   // COLMAP are always the cameras'.
   PoseFrame frame = PoseFrame::base;
-  // Metres a unit of the file's positions. 0: the one that fits the scan's own positions best
+  // Meters a unit of the file's positions. 0: the one that fits the scan's own positions best
   // (Umeyama 1991): its odometry's, else its stored ones.
   double scale = 1.0;
 };
@@ -29,7 +29,7 @@ struct ImportedPoses {
   std::size_t poses_in_file = 0;
   double scale = 1.0;                    // that was taken
   double largest_rig_deviation_m = 0.0;  // of the cameras of one node from their mean
-  // Poses left out since their node's calibration is of no use. Motion between neighbours that is
+  // Poses left out since their node's calibration is of no use. Motion between neighbors that is
   // not at all the scan's own: by another length (the scale), or about other axes (the format, the
   // frame).
   std::vector<std::string> warnings{};

@@ -68,8 +68,8 @@ class Refinement {
   Trajectory trajectory(const std::map<int, Pose>& poses) const;
   void close(StageReport stage);
   // Compares poses with those before; true if they are worse.
-  bool judge(StageReport& stage, const std::map<int, Pose>& before,
-             const std::map<int, Pose>& after) const;
+  bool evaluate(StageReport& stage, const std::map<int, Pose>& before,
+                const std::map<int, Pose>& after) const;
   std::optional<StageError> error_of(const std::map<int, Pose>& poses) const;
 
   const ScanSource& scan_;
@@ -110,10 +110,10 @@ std::optional<StageError> Refinement::error_of(const std::map<int, Pose>& poses)
   }
 }
 
-bool Refinement::judge(StageReport& stage, const std::map<int, Pose>& before,
-                       const std::map<int, Pose>& after) const {
-  stage.held_out = judge_held_out(held_out_costs(frames_, links_, before),
-                                  held_out_costs(frames_, links_, after));
+bool Refinement::evaluate(StageReport& stage, const std::map<int, Pose>& before,
+                          const std::map<int, Pose>& after) const {
+  stage.held_out = evaluate_held_out(held_out_costs(frames_, links_, before),
+                                     held_out_costs(frames_, links_, after));
   stage.undone = stage.held_out.is_worse();
   if (stage.undone) stage.undone_error = error_of(after);
   return stage.undone;
@@ -267,7 +267,7 @@ std::vector<GraphLink> Refinement::with_features(const std::vector<FeatureLink>&
   return all;
 }
 
-// Parts that closures connect get into one frame before the graph is optimised.
+// Parts that closures connect get into one frame before the graph is optimized.
 void Refinement::join_new(const std::vector<FeatureLink>& links) {
   if (parts_.size() < 2) return;
   std::vector<PoseLink> between;
@@ -281,7 +281,7 @@ bool Refinement::round(int number) {
   const std::vector<FramePair> pairs = candidates(number);
   if (pairs.empty()) return false;
   StageReport stage;
-  stage.name = number == 0 ? "neighbours" : "closures " + std::to_string(number);
+  stage.name = number == 0 ? "neighbors" : "closures " + std::to_string(number);
   PairVerification verified =
       verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_);
   stage.closures = verified.counts;
@@ -293,12 +293,12 @@ bool Refinement::round(int number) {
   join_new(verified.links);
   PoseGraphResult graph = optimize_pose_graph(poses_, with_features(links_), options_.graph);
   stage.groups = graph.groups;
-  if (judge(stage, poses_before, graph.map_from_base)) {
+  if (evaluate(stage, poses_before, graph.map_from_base)) {
     links_.resize(before);
     poses_ = poses_before;
     parts_ = parts_before;
   } else {
-    // Those that the optimisation has rejected do not come back.
+    // Those that the optimization has rejected do not come back.
     std::vector<FeatureLink> kept;
     for (std::size_t n = 0; n < links_.size(); ++n)
       if (!graph.links[stored_.size() + n].rejected) kept.push_back(links_[n]);
@@ -328,7 +328,7 @@ void Refinement::bundle() {
   BundleAdjustmentResult adjusted =
       adjust_bundle(frames_, links_, poses_, without_features(graph_.links, stored_.size()),
                     graph_.components, options_.bundle_adjustment);
-  judge(stage, poses_, adjusted.map_from_base);
+  evaluate(stage, poses_, adjusted.map_from_base);
   stage.undone = stage.undone || !adjusted.converged;
   stage.figures = {{"tracks", static_cast<double>(adjusted.tracks)},
                    {"observations", static_cast<double>(adjusted.observations)},
@@ -347,8 +347,8 @@ void Refinement::bundle() {
 }
 
 // The same with the intrinsics free. What the camera's file says is kept unless what was held out
-// speaks against it: the pictures of RTAB-Map's own thinning, for one, are a fraction of a pixel
-// off.
+// speaks against it: the pictures of RTAB-Map's own downsampling, for one, are a fraction of a
+// pixel off.
 void Refinement::free_intrinsics() {
   StageReport stage;
   stage.name = "intrinsics";
@@ -376,7 +376,7 @@ void Refinement::free_intrinsics() {
       adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components,
                                options_.bundle_adjustment);
     stage.held_out =
-        judge_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
+        evaluate_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
     stage.undone = stage.held_out.is_worse();
     if (stage.undone)
       for (FrameFeatures& frame : frames_) move_intrinsics(frame, reversed(steps));
@@ -399,7 +399,7 @@ void Refinement::icp() {
     if (!link.rejected) links.push_back(link.link);
   IcpResult aligned = align_surfaces(frames_, poses_, information_, graph_.components, links,
                                      options_.icp, progress_);
-  judge(stage, poses_, aligned.map_from_base);
+  evaluate(stage, poses_, aligned.map_from_base);
   stage.figures = {{"pairs", static_cast<double>(aligned.pairs)},
                    {"samples", static_cast<double>(aligned.samples)},
                    {"degenerate_directions", static_cast<double>(aligned.degenerate_directions)},

@@ -1,5 +1,5 @@
 // The whole way from a scan's odometry to refined poses: features, rounds of loop closures each
-// followed by an optimisation of the pose graph, bundle adjustment, depth against depth. A stage
+// followed by an optimization of the pose graph, bundle adjustment, depth against depth. A stage
 // after which what was held out fits worse is undone and reported.
 #pragma once
 
@@ -56,8 +56,8 @@ struct StageReport {
   std::string name;
   bool undone = false;
   RejectionCounts closures;                             // of this stage
-  HeldOutJudgement held_out;                            // of this stage's links and of those before
-  std::map<std::string, LinkGroupResult> groups;        // of an optimised graph
+  HeldOutEvaluatement held_out;                         // of this stage's links and of those before
+  std::map<std::string, LinkGroupResult> groups;        // of an optimized graph
   std::vector<std::pair<std::string, double>> figures;  // what else the stage counts
   std::optional<StageError> error;
   std::optional<StageError> undone_error;  // of the poses that were given up

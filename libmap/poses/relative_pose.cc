@@ -48,7 +48,7 @@ struct PointPair {
   Eigen::Vector3d b;
 };
 
-// Of three points, by their centred coordinates and Kabsch's rotation.
+// Of three points, by their centered coordinates and Kabsch's rotation.
 Pose motion_of(const std::array<const PointPair*, 3>& pairs) {
   Eigen::Matrix3d a;
   Eigen::Matrix3d b;
@@ -215,9 +215,9 @@ double RelativePoseEstimate::spread() const {
     const Eigen::Vector2d offset = ray(n) - mean;
     scatter += offset * offset.transpose() / count;
   }
-  const double least_variance =
+  const double min_variance =
       scatter.trace() / 2.0 - std::hypot((scatter(0, 0) - scatter(1, 1)) / 2.0, scatter(0, 1));
-  return 2.0 * std::sqrt(std::max(0.0, least_variance));
+  return 2.0 * std::sqrt(std::max(0.0, min_variance));
 }
 
 }  // namespace

@@ -24,7 +24,7 @@ std::vector<FeatureMatch> match_features(const Eigen::MatrixXf& a, const Eigen::
                                          double max_ratio);
 
 // How far a feature of b, carried to a by `a_from_b`, lies from its match: x and y in pixels, depth
-// in metres, and the covariance of the three from the noise of both.
+// in meters, and the covariance of the three from the noise of both.
 struct MatchResidual {
   bool in_front = false;
   Eigen::Vector3d residual = Eigen::Vector3d::Zero();

@@ -85,11 +85,11 @@ TrajectoryError summarize(const std::vector<double>& distances_m,
 
 // Whether the positions lie so near to a line that they do not tell a turn about it.
 bool is_straight(const Eigen::Matrix3Xd& positions) {
-  constexpr double least_width = 0.05;  // of the length
-  const Eigen::Matrix3Xd centred = positions.colwise() - positions.rowwise().mean();
+  constexpr double min_width = 0.05;  // of the length
+  const Eigen::Matrix3Xd centered = positions.colwise() - positions.rowwise().mean();
   const Eigen::Vector3d spreads =
-      symmetric_eigen(Eigen::Matrix3d(centred * centred.transpose())).values;
-  return spreads[1] <= least_width * least_width * spreads[2];
+      symmetric_eigen(Eigen::Matrix3d(centered * centered.transpose())).values;
+  return spreads[1] <= min_width * min_width * spreads[2];
 }
 
 // Least squares of the positions (Umeyama 1991).
@@ -117,11 +117,10 @@ Pose best_alignment(const std::vector<PosePair>& pairs) {
 }
 
 Error too_few(std::size_t count, std::size_t least) {
-  return Error("too few poses stand in both trajectories",
-               {.file = {},
-                .field = "common poses",
-                .value = std::to_string(count),
-                .bound = ">= " + std::to_string(least)});
+  return Error("too few poses are in both trajectories", {.file = {},
+                                                          .field = "common poses",
+                                                          .value = std::to_string(count),
+                                                          .bound = ">= " + std::to_string(least)});
 }
 
 }  // namespace

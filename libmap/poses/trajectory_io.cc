@@ -75,7 +75,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
     return graph.optimized_map_from_base.contains(node->id);
   };
   const std::size_t valid = nodes.size();
-  // What RTAB-Map exports are its optimised poses.
+  // What RTAB-Map exports are its optimized poses.
   if (trajectory.size() != valid)
     std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
@@ -98,7 +98,7 @@ std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
 
 TrajectoryFormat format_of_text(const std::string& text, const fs::path& path) {
   if (const auto format = format_of_extension(path)) return *format;
-  switch (recognise_poses(text, path.string())) {
+  switch (recognize_poses(text, path.string())) {
     case PoseTextFormat::tum:
       return TrajectoryFormat::tum;
     case PoseTextFormat::kitti:
@@ -187,7 +187,7 @@ TrajectoryFile read_trajectory(const fs::path& path, TrajectoryFormat format) {
     file = parse_poses(format, text, path.string());
   }
   if (file.poses.empty() && file.images.empty())
-    throw Error("holds no pose", {.file = path.string()});
+    throw Error("contains no pose", {.file = path.string()});
   return file;
 }
 

@@ -21,7 +21,7 @@ constexpr std::size_t longest_run = 16;     // pairs that are verified at once
 constexpr double motion_agreement_m = 0.1;  // of two motions to one place
 constexpr double motion_agreement_rad = 5.0 * std::numbers::pi / 180.0;
 
-constexpr double least_factor = 1e-3;  // of variances: rounding, where nothing is noisy
+constexpr double min_factor = 1e-3;  // of variances: rounding, where nothing is noisy
 
 struct Trial {
   RejectionCounts counts{};
@@ -42,7 +42,7 @@ void calibrate(const FrameFeatures& a, const FrameFeatures& b, FeatureLink& link
   for (const FeatureMatch& match : link.matches)
     squares += match_residual(a, b, match, link.link.from_from_to).chi_square();
   const double freedom = 3.0 * static_cast<double>(link.matches.size()) - 6.0;
-  const double factor = std::max(least_factor, squares / freedom);
+  const double factor = std::max(min_factor, squares / freedom);
   // What the estimate has been divided by already.
   link.link.information *= std::max(1.0, link.chi_square_per_freedom) / factor;
 }

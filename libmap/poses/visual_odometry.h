@@ -69,7 +69,7 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const VisualOdometryOptions& options, std::uint64_t seed,
                                   Progress& progress = no_progress());
 
-// Normalised estimation error squared (Bar-Shalom et al. 2001) of links against true poses, by
+// Normalized estimation error squared (Bar-Shalom et al. 2001) of links against true poses, by
 // freedom: mean of e^T information e / 6. Near 1 where the stated covariances are honest. Links
 // whose ends have no true pose are left out.
 struct LinkConsistency {

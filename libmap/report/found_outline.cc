@@ -280,7 +280,7 @@ Outline outline_of_folder(const fs::path& folder) {
   Finder finder(root);
   OutlineSection found = finder.section_of(root, 0);
   if (found.items.empty() && found.sections.empty())
-    throw Error("holds nothing that a report could show: no map, picture, table or text",
+    throw Error("contains nothing that a report could show: no map, picture, table or text",
                 {.file = folder.string()});
   Outline outline;
   outline.title = found.heading.empty() ? "Report" : found.heading;

@@ -20,7 +20,7 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-// Of obstacles; no other colour of the legends is violet.
+// Of obstacles; no other color of the legends is violet.
 constexpr Color obstacle_color{122, 40, 140};
 
 struct Swatch {
@@ -42,7 +42,7 @@ std::vector<Swatch> swatches() {
   return all;
 }
 
-// Three 16-bit numbers a cell, little-endian, then a byte a cell.
+// Three 16-bit numbers a cell, little-endian, then a byte per cell.
 std::string cell_bytes(const MapView& view) {
   std::string bytes;
   bytes.reserve(view.cells.size() * 7);
@@ -60,7 +60,7 @@ Json markers_json(const MapView& view) {
   for (const MapMarker& marker : view.markers) {
     Json one;
     one["label"] = marker.label;
-    // To a tenth of a millimetre, from the lowest corner of the cells.
+    // To a tenth of a millimeter, from the lowest corner of the cells.
     one["at"] = Json::array();
     for (Eigen::Index axis = 0; axis < 3; ++axis)
       one["at"].push_back(
@@ -117,7 +117,7 @@ std::string tools_html(const MapView& view) {
     return "<button type=\"button\" data-mode=\"" + mode + "\" aria-pressed=\"" +
            (mode == "score" ? "true" : "false") + "\">" + text + "</button>";
   };
-  std::string html = "<div class=\"tools\" hidden><div role=\"group\" aria-label=\"Colours\">" +
+  std::string html = "<div class=\"tools\" hidden><div role=\"group\" aria-label=\"Colors\">" +
                      button("score", "Score");
   if (view.has_convex) html += button("convex", "Convex");
   if (view.has_graspable) html += button("graspable", "Graspable");

@@ -11,7 +11,7 @@ namespace libmap {
 // the data and the canvas are left out. `still` is the picture as <img>, or empty.
 std::string map_html(const ReportMap& map, const std::string& still, bool with_view);
 
-// Colours of the classes and flags, for the page's script.
+// Colors of the classes and flags, for the page's script.
 std::string palette_json();
 
 // Rules of the legend's swatches, a class each.

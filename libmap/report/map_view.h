@@ -25,13 +25,13 @@ struct MapMarker {
   std::optional<bool> verdict{};
 };
 
-// A cell's byte: its colour in the lower half, flags in the upper one.
+// A cell's byte: its color in the lower half, flags in the upper one.
 struct MapCell {
   std::array<std::uint16_t, 3> place{};  // on the lattice of cells, from the lowest one used
   std::uint8_t colors_and_flags = 0;
 };
 
-// Colours after the classes of core/score_color.h.
+// Colors after the classes of core/score_color.h.
 inline constexpr std::uint8_t no_value_class = 7;
 inline constexpr std::uint8_t below_plane_class = 8;
 inline constexpr std::uint8_t convex_flag = 16;

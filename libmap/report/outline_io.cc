@@ -82,7 +82,7 @@ class Keys {
              "is not known in a " + name_ + did_you_mean(key, known_));
       if (std::count_if(node_.begin(), node_.end(),
                         [&](const auto& other) { return scalar(other.first, name_) == key; }) > 1)
-        fail(entry.first, "key '" + key + "'", "stands twice");
+        fail(entry.first, "key '" + key + "'", "is a duplicate");
     }
   }
 
@@ -110,7 +110,8 @@ class Keys {
 
 OutlineColumn parse_column(const YAML::Node& node) {
   if (node.IsScalar()) return {node.Scalar(), node.Scalar()};
-  if (!node.IsMap() || node.size() != 1) fail(node, "columns", "holds neither NAME nor NAME: TEXT");
+  if (!node.IsMap() || node.size() != 1)
+    fail(node, "columns", "contains neither NAME nor NAME: TEXT");
   const auto entry = *node.begin();
   return {Keys::scalar(entry.first, "columns"), Keys::scalar(entry.second, "columns")};
 }

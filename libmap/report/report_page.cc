@@ -55,8 +55,8 @@ class PageWriter {
     const std::string id = next_id();
     contents_ += "<li><a href=\"#" + id + "\">" + escape_html(section.heading) + "</a>";
     const int heading = std::min(level, 6);
-    std::string html = fmt::format("<section aria-labelledby=\"{}\">\n<h{} id=\"{}\">{}</h{}>\n",
-                                   id, heading, id, escape_html(section.heading), heading);
+    std::string html = fmt::format("<section aria-labeledby=\"{}\">\n<h{} id=\"{}\">{}</h{}>\n", id,
+                                   heading, id, escape_html(section.heading), heading);
     html += paragraphs(section.text) + gaps_html(section.gaps);
     for (const ReportItem& one : section.items) html += item(one);
     if (!section.sections.empty()) contents_ += "\n<ol>\n";
@@ -75,7 +75,7 @@ class PageWriter {
   std::string sources(const ReportContent& content) {
     if (content.sources.empty()) return "";
     contents_ += "<li><a href=\"#provenance\">Provenance</a></li>\n";
-    return "<section aria-labelledby=\"provenance\" class=\"provenance\">\n"
+    return "<section aria-labeledby=\"provenance\" class=\"provenance\">\n"
            "<h2 id=\"provenance\">Provenance</h2>\n<p>Every output of this run with the command "
            "that "
            "made it, its parameters, its inputs with their SHA-256, and what it counted.</p>\n" +

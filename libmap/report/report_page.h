@@ -13,7 +13,7 @@ struct PageAssets {
   std::string style;                   // CSS
   std::vector<std::string> scripts;    // our own, in their order
   std::vector<std::string> libraries;  // scripts that it needs, in their order; none: no 3-D views
-  std::string library_notice;          // whose they are, with their licence
+  std::string library_notice;          // whose they are, with their license
   std::string version;                 // of this toolkit
 };
 

@@ -272,7 +272,7 @@ class Reader {
         } catch (const nlohmann::json::parse_error&) {
           throw Error("is no JSON, or '" + asked.at + "' no place in it");
         } catch (const nlohmann::json::exception&) {
-          throw Error("nothing stands at " + asked.at);
+          throw Error("there is nothing at " + asked.at);
         }
         use(path);
       });

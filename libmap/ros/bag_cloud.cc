@@ -22,7 +22,7 @@ std::string only_cloud_topic(const BagListing& listing) {
     names += (count++ == 0 ? "" : ", ") + topic.name;
   }
   if (count == 1) return names;
-  throw Error(count == 0 ? "no topic holds clouds" : "several topics hold clouds",
+  throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
               {.file = {},
                .field = "topics of " + ros_message::type_of<PointCloud2>(),
                .value = count == 0 ? "none" : names,

@@ -7,16 +7,16 @@ namespace libmap {
 void bind(ParameterTable& table, BagRigOptions& options) {
   table.add("base_frame", options.base_frame,
             "the robot's frame; auto: base_link, or the one that all else hangs on");
-  table.add("transform_topic", options.transform_topic, "transforms of frames that stand still");
+  table.add("transform_topic", options.transform_topic, "transforms of static frames");
   table.add("depth_unit_m", options.depth_unit_m, positive,
-            "metres a unit of 16-bit images in the bag");
+            "meters a unit of 16-bit images in the bag");
   table.add("depth_scale_m", options.depth_scale_m, not_negative,
-            "metres a unit of the images written; 0: the rig's, or as in the bag, 0.1 mm for "
+            "meters a unit of the images written; 0: the rig's, or as in the bag, 0.1 mm for "
             "floats");
   table.add("near_m", options.near_m, not_negative, "nearest depth of the rig; 0: the rig's own");
   table.add("far_m", options.far_m, positive, "furthest depth of the rig; inf: the rig's own");
   table.add("tolerance_s", options.tolerance_s, not_negative,
-            "images of one moment lie so near to its stamp");
+            "images of one synchronized set are within this time of its stamp");
   table.add("every", options.every, {1.0}, "takes the first of so many moments");
 }
 

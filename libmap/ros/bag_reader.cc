@@ -68,7 +68,7 @@ void serve(const fs::path& path, const GuardedProcess::Write& write, const Work&
   } catch (const rosbag::BagException& error) {
     sender.send_error("is broken or cut off: " + printable(std::string(error.what())));
   } catch (const std::bad_alloc&) {
-    sender.send_error("is broken, or holds messages of more than 1 GiB");
+    sender.send_error("is broken, or contains messages of more than 1 GiB");
   } catch (const std::exception& error) {
     // The loader of encryption plugins, for one.
     sender.send_error("cannot be read: " + printable(std::string(error.what())));
@@ -96,7 +96,7 @@ class GuardedBag {
 
  private:
   [[noreturn]] void throw_fallen() {
-    throw Error("is broken: ROS's bag library fell over it" + process_.end(),
+    throw Error("is broken: ROS's bag library crashed on it" + process_.end(),
                 {.file = path_.string()});
   }
 

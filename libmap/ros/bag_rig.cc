@@ -149,7 +149,7 @@ Camera calibrated_camera(const SurveyedImages& images, const BagListing& listing
                 {.file = {}, .field = images.info_topic});
   require_topic(listing, images.info_topic, ros_message::type_of<ros_message::CameraInfo>(),
                 ros_message::md5sum_of<ros_message::CameraInfo>());
-  throw Error("holds no camera info", {.file = {}, .field = images.info_topic});
+  throw Error("contains no camera info", {.file = {}, .field = images.info_topic});
 }
 
 std::string base_frame_of(const BagSurvey& survey, const BagRigOptions& options) {
@@ -271,16 +271,16 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   const std::string found = topics_with_encodings(survey);
   if (options.topics.empty()) keep_depth_topics(choices, survey);
   if (choices.empty())
-    throw Error("no topic holds depth images", {.file = {},
-                                                .field = "topics of images",
-                                                .value = found.empty() ? "none" : found,
-                                                .bound = "16UC1, 32FC1 or compressedDepth"});
+    throw Error("no topic contains depth images", {.file = {},
+                                                   .field = "topics of images",
+                                                   .value = found.empty() ? "none" : found,
+                                                   .bound = "16UC1, 32FC1 or compressedDepth"});
   for (const SurveyedImages& images : survey.images)
     if (!is_depth_encoding(images.encoding, images.compressed))
-      throw Error("holds no depth images", {.file = {},
-                                            .field = "encoding of " + images.topic,
-                                            .value = images.encoding,
-                                            .bound = "16UC1, 32FC1 or compressedDepth"});
+      throw Error("contains no depth images", {.file = {},
+                                               .field = "encoding of " + images.topic,
+                                               .value = images.encoding,
+                                               .bound = "16UC1, 32FC1 or compressedDepth"});
   const std::vector<std::string> names = names_by_difference(survey.images);
   BagRigPlan plan;
   plan.depth_unit_m = options.depth_unit_m;

@@ -19,9 +19,9 @@ struct CloudMessage {
 
 // Either byte order, rows with padding, organized clouds row by row. Fields x, y, z; normal_x,
 // normal_y, normal_z or nx, ny, nz become normals; rgb or rgba (PCL's packing), or r, g, b or red,
-// green, blue of one byte, colours; any other a field, with several numbers a point NAME_0, NAME_1,
+// green, blue of one byte, colors; any other a field, with several numbers a point NAME_0, NAME_1,
 // ... Throws Error naming the field: x, y or z missing, one outside its point or twice there, an
-// unknown type, more than 1024 numbers a point, data shorter than height and row_step say, rows
+// unknown type, more than 1024 numbers per point, data shorter than height and row_step say, rows
 // shorter than their points.
 CloudMessage decode_cloud(std::string_view bytes);
 

@@ -26,7 +26,7 @@ DepthMessageHead read_image_head(std::string_view bytes, bool compressed);
 bool is_depth_encoding(const std::string& encoding, bool compressed);
 
 struct DepthUnits {
-  // Metres a unit of 16-bit messages (REP-118: 0.001), and of the images wanted.
+  // Meters a unit of 16-bit messages (REP-118: 0.001), and of the images wanted.
   double message_unit_m = 0.001;
   double image_unit_m = 0.001;
 };

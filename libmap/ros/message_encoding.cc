@@ -70,18 +70,18 @@ void set_scale(Marker& marker, double x, double y, double z) {
 }  // namespace
 
 ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m) {
-  const bool millimetres = image_unit_m == 0.001;
+  const bool millimeters = image_unit_m == 0.001;
   ros_message::Image message;
   message.width = static_cast<std::uint32_t>(image.width);
   message.height = static_cast<std::uint32_t>(image.height);
-  message.encoding = ros_message::to_ros(millimetres ? "16UC1" : "32FC1");
-  const std::size_t bytes = millimetres ? 2 : 4;
+  message.encoding = ros_message::to_ros(millimeters ? "16UC1" : "32FC1");
+  const std::size_t bytes = millimeters ? 2 : 4;
   message.step = static_cast<std::uint32_t>(bytes) * message.width;
   message.data.resize(image.pixels.size() * bytes);
   for (std::size_t n = 0; n < image.pixels.size(); ++n) {
     const std::uint16_t units = image.pixels[n];
     const float depth = units == 65535 ? 0.0F : static_cast<float>(units * image_unit_m);
-    if (millimetres)
+    if (millimeters)
       std::memcpy(message.data.data() + 2 * n, &units, 2);
     else
       std::memcpy(message.data.data() + 4 * n, &depth, 4);

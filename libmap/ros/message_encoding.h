@@ -18,7 +18,7 @@ namespace libmap {
 // for more than 4 GiB.
 ros_message::PointCloud2 encode_cloud(const PointCloud& cloud);
 
-// In metres (REP-118's 32FC1, 0: not measured) or in millimetres (16UC1), whichever keeps the
+// In meters (REP-118's 32FC1, 0: not measured) or in millimeters (16UC1), whichever keeps the
 // image's units exactly.
 ros_message::Image encode_depth(const Image<std::uint16_t>& image, double image_unit_m);
 

@@ -121,7 +121,8 @@ void read_serialized(std::string_view bytes, const Read& read) {
     read(stream);
   } catch (const std::exception&) {
     allocation_budget = before;
-    throw Error("a message promises more than its " + std::to_string(bytes.size()) + " bytes hold");
+    throw Error("a message promises more than its " + std::to_string(bytes.size()) +
+                " bytes contain");
   }
   allocation_budget = before;
 }

@@ -36,7 +36,7 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const double change =
       (link.parent_from_child.matrix() - parent_from_child.matrix()).cwiseAbs().maxCoeff();
   if (link.parent != above || change > same_pose)
-    throw Error("a transform changes: the frame does not stand still",
+    throw Error("a transform changes: the frame is not static",
                 {.file = {}, .field = "frame", .value = frame});
 }
 

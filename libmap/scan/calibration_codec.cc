@@ -168,14 +168,14 @@ Calibration read_records(std::string_view bytes) {
   Reader reader(bytes);
   while (reader.left() > 0) {
     const std::string_view rest = bytes.substr(bytes.size() - reader.left());
-    if (!begins_with_record(rest)) throw Error("calibration holds bytes that are no record");
+    if (!begins_with_record(rest)) throw Error("calibration contains bytes that are no record");
     if (rest[12] == 0)
       calibration.cameras.push_back(read_record(reader));
     else
       calibration.stereo.push_back(read_stereo_record(reader));
   }
   if (!calibration.cameras.empty() && !calibration.stereo.empty())
-    throw Error("calibration holds single and stereo cameras");
+    throw Error("calibration contains single and stereo cameras");
   return calibration;
 }
 
@@ -190,7 +190,7 @@ bool is_size(float number) { return number >= 0 && number < 1e6F && number == st
 
 std::int32_t size_of(float number) {
   if (!is_size(number))
-    throw Error("calibration holds no valid image size", {.value = to_text(number)});
+    throw Error("calibration contains no valid image size", {.value = to_text(number)});
   return static_cast<std::int32_t>(number);
 }
 
@@ -263,7 +263,7 @@ Pose base_from_camera_of(const CalibrationRecord& record) {
   Eigen::Matrix<double, 3, 4> stored;
   for (int i = 0; i < 12; ++i)
     stored(i / 4, i % 4) = static_cast<double>(record.l[static_cast<std::size_t>(i)]);
-  if (!stored.allFinite()) throw Error("calibration holds a camera pose that is not finite");
+  if (!stored.allFinite()) throw Error("calibration contains a camera pose that is not finite");
   if (stored.isZero(0)) return optical_to_body_rotation();
   Pose pose = Pose::Identity();
   pose.linear() = nearest_rotation(stored.leftCols<3>());
@@ -304,7 +304,7 @@ Camera camera_of(const CalibrationRecord& record, int width, int height) {
     camera.cy = record.k[5];
     set_distortion(camera, record.d);
   } else {
-    throw Error("calibration holds neither K nor P");
+    throw Error("calibration contains neither K nor P");
   }
   camera.check();
   return camera;

@@ -56,7 +56,7 @@ struct Calibration {
   bool operator==(const Calibration&) const = default;
 };
 
-// The layout is recognised by the bytes themselves. Throws Error if they fit none, or are not
+// The layout is recognized by the bytes themselves. Throws Error if they fit none, or are not
 // whole.
 Calibration decode_calibration(std::string_view bytes);
 std::string encode_calibration(const Calibration& calibration);

@@ -31,7 +31,7 @@ Chessboard parse_chessboard(const std::string& text, const std::string& field);
 enum class LensModel { none, plumb_bob, rational, equidistant };
 std::vector<std::pair<std::string, LensModel>> lens_model_names();
 
-// Row by row, to a fraction of a pixel; pixel centres have whole coordinates. Nothing if the image
+// Row by row, to a fraction of a pixel; pixel centers have whole coordinates. Nothing if the image
 // does not show all of the board. Which end of the board comes first is not said.
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,
                                                             const Chessboard& board);

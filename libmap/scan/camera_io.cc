@@ -52,7 +52,7 @@ void append_numbers(const YAML::Node& list, const std::string& field, int depth,
     else
       numbers.push_back(number_of(entry, field));
     if (numbers.size() > 64)
-      throw Error("holds more numbers than any camera has", {.field = field});
+      throw Error("contains more numbers than any camera has", {.field = field});
   }
 }
 
@@ -111,7 +111,7 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
   if (root[field]) terms = matrix_of(root[field], field);
   const bool all_zero = std::all_of(terms.begin(), terms.end(), [](double k) { return k == 0; });
   if (all_zero && model != "equidistant" && model != "fisheye") return;
-  if (model == "none") throw Error("stands beside distortion_model none", {.field = field});
+  if (model == "none") throw Error("is given beside distortion_model none", {.field = field});
   if (model == "equidistant" || model == "fisheye") {
     camera.distortion_model = DistortionModel::equidistant;
     if (terms.size() == 6 && terms[2] == 0 && terms[3] == 0)

@@ -190,7 +190,7 @@ std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
     for (std::size_t c = 0; c < point.color.size(); ++c) {
       const int value = integer_of(line, 4 + c, file);
       if (value < 0 || value > 255)
-        throw in_line("no colour", line, file, std::to_string(value), "0 to 255");
+        throw in_line("no color", line, file, std::to_string(value), "0 to 255");
       point.color[c] = static_cast<std::uint8_t>(value);
     }
     point.error_px = numbers_of(line, 7, 1, file).front();
@@ -262,7 +262,7 @@ fs::path find_colmap_model(const fs::path& path) {
       throw Error(
           "a binary model of COLMAP: 'colmap model_converter --output_type TXT' makes a text of it",
           {.file = place.string()});
-  throw Error("holds no model of COLMAP: neither images.txt nor sparse/images.txt is there",
+  throw Error("contains no model of COLMAP: neither images.txt nor sparse/images.txt is there",
               {.file = path.string()});
 }
 

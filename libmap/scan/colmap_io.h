@@ -2,7 +2,7 @@
 // cameras.txt, images.txt and points3D.txt (https://colmap.github.io/format.html). Numbers are
 // written with as many digits as bring the same number back.
 //
-// COLMAP's pixel centres lie at halves (u = 0.5 for the first column), ours at whole numbers. Its
+// COLMAP's pixel centers lie at halves (u = 0.5 for the first column), ours at whole numbers. Its
 // world has the scale and the axes that its reconstruction happened to take.
 #pragma once
 
@@ -38,7 +38,7 @@ ColmapCamera to_colmap(const Camera& camera);
 
 // A feature of an image.
 struct ColmapObservation {
-  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centres at halves
+  Eigen::Vector2d pixel = Eigen::Vector2d::Zero();  // COLMAP's: centers at halves
   std::int64_t point = -1;                          // its POINT3D_ID; -1: of no point
 };
 
@@ -70,7 +70,7 @@ struct ColmapModel {
 };
 
 // The three files' texts. The parsers throw Error naming `file` and the line: columns that are
-// missing, no finite number, a quaternion that is none, an id that stands twice.
+// missing, no finite number, a quaternion that is none, an id that is a duplicate.
 std::map<int, ColmapCamera> parse_colmap_cameras(std::string_view text, const std::string& file);
 std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file);
 std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,

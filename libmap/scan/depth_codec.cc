@@ -37,7 +37,7 @@ class NibbleReader {
       value |= (nibble & 7) << shift;
       if ((nibble & 8) == 0) return value;
     }
-    throw Error("RVL holds a number of more than 32 bits");
+    throw Error("RVL contains a number of more than 32 bits");
   }
 
   std::size_t bytes_read() const { return at_; }
@@ -113,9 +113,10 @@ DepthInfo rvl_info(std::string_view bytes) {
 }
 
 [[noreturn]] void refuse_run(std::uint64_t count, std::uint64_t left) {
-  throw Error("RVL holds more pixels than its size says", {.field = "run of pixels",
-                                                           .value = std::to_string(count),
-                                                           .bound = "<= " + std::to_string(left)});
+  throw Error("RVL contains more pixels than its size says",
+              {.field = "run of pixels",
+               .value = std::to_string(count),
+               .bound = "<= " + std::to_string(left)});
 }
 
 }  // namespace
@@ -140,20 +141,20 @@ std::optional<DepthInfo> read_depth_info(std::string_view bytes) {
 DepthImage decode_depth(std::string_view bytes) {
   const std::optional<DepthInfo> info = read_depth_info(bytes);
   if (!info) throw Error("not a depth image: neither RVL, 16-bit PNG nor float PNG");
-  if (info->format == DepthFormat::rvl) return to_metres(decode_rvl(bytes));
-  if (info->format == DepthFormat::png16) return to_metres(decode_gray16(bytes));
+  if (info->format == DepthFormat::rvl) return to_meters(decode_rvl(bytes));
+  if (info->format == DepthFormat::png16) return to_meters(decode_gray16(bytes));
   DepthImage image = decode_float_png(bytes);
   for (float& depth : image.pixels)
     if (!std::isfinite(depth) || depth < 0) depth = 0;
   return image;
 }
 
-MillimetreImage decode_rvl(std::string_view bytes) {
+MillimeterImage decode_rvl(std::string_view bytes) {
   const DepthInfo info = rvl_info(bytes);
   const std::uint64_t pixels =
       static_cast<std::uint64_t>(info.width) * static_cast<std::uint64_t>(info.height);
   NibbleReader reader(bytes.substr(rvl_header_bytes));
-  MillimetreImage image(info.width, info.height);
+  MillimeterImage image(info.width, info.height);
   std::uint64_t at = 0;
   std::uint32_t previous = 0;
   while (at < pixels) {
@@ -165,14 +166,14 @@ MillimetreImage decode_rvl(std::string_view bytes) {
     for (const std::uint64_t end = at + values; at < end; ++at) {
       const std::uint32_t zigzag = reader.number();
       previous += (zigzag >> 1) ^ (0U - (zigzag & 1));
-      if (previous > no_depth_mm) throw Error("RVL holds a depth of more than 16 bits");
+      if (previous > no_depth_mm) throw Error("RVL contains a depth of more than 16 bits");
       image.pixels[at] = static_cast<std::uint16_t>(previous);
     }
   }
   return image;
 }
 
-std::string encode_rvl(const MillimetreImage& image) {
+std::string encode_rvl(const MillimeterImage& image) {
   std::string bytes(rvl_signature);
   const std::array<std::uint32_t, 2> size{static_cast<std::uint32_t>(image.width),
                                           static_cast<std::uint32_t>(image.height)};
@@ -216,21 +217,21 @@ std::string encode_float_png(const DepthImage& image) {
   return encode_png(rgba);
 }
 
-MillimetreImage to_millimetres(const DepthImage& image) {
-  MillimetreImage out(image.width, image.height);
+MillimeterImage to_millimeters(const DepthImage& image) {
+  MillimeterImage out(image.width, image.height);
   std::transform(image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](float depth) {
-    const double millimetres = std::round(static_cast<double>(depth) * 1000);
-    const bool is_held = millimetres > 0 && millimetres < no_depth_mm;
-    return static_cast<std::uint16_t>(is_held ? millimetres : 0);
+    const double millimeters = std::round(static_cast<double>(depth) * 1000);
+    const bool is_held = millimeters > 0 && millimeters < no_depth_mm;
+    return static_cast<std::uint16_t>(is_held ? millimeters : 0);
   });
   return out;
 }
 
-DepthImage to_metres(const MillimetreImage& image) {
+DepthImage to_meters(const MillimeterImage& image) {
   DepthImage out(image.width, image.height);
   std::transform(
-      image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](std::uint16_t millimetres) {
-        return millimetres == no_depth_mm ? 0.0F : static_cast<float>(millimetres) / 1000.0F;
+      image.pixels.begin(), image.pixels.end(), out.pixels.begin(), [](std::uint16_t millimeters) {
+        return millimeters == no_depth_mm ? 0.0F : static_cast<float>(millimeters) / 1000.0F;
       });
   return out;
 }

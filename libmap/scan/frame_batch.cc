@@ -6,7 +6,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t most_frames = 8;
+constexpr std::size_t max_frames = 8;
 constexpr std::size_t batch_pixels = std::size_t{1} << 24;
 
 }  // namespace
@@ -18,9 +18,9 @@ std::size_t image_pixels(const RgbdFrame& frame) {
   return std::max({pixels, frame.color.pixels.size(), frame.depth.pixels.size()});
 }
 
-std::size_t frames_in_batch(std::size_t most_image_pixels) {
-  return std::clamp<std::size_t>(batch_pixels / std::max<std::size_t>(most_image_pixels, 1), 1,
-                                 most_frames);
+std::size_t frames_in_batch(std::size_t max_image_pixels) {
+  return std::clamp<std::size_t>(batch_pixels / std::max<std::size_t>(max_image_pixels, 1), 1,
+                                 max_frames);
 }
 
 }  // namespace libmap

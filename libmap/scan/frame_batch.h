@@ -12,6 +12,6 @@ namespace libmap {
 std::size_t image_pixels(const RgbdFrame& frame);
 
 // 8 of up to 2 megapixels each, fewer of larger ones, at least 1.
-std::size_t frames_in_batch(std::size_t most_image_pixels);
+std::size_t frames_in_batch(std::size_t max_image_pixels);
 
 }  // namespace libmap

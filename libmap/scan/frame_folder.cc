@@ -29,7 +29,7 @@ namespace files = frame_folder_files;
 
 namespace {
 
-constexpr double millimetre_m = 0.001;
+constexpr double millimeter_m = 0.001;
 
 std::string cell_of(const Table& table, std::size_t row, const char* column) {
   const std::optional<std::size_t> index = table.find_column(column);
@@ -132,8 +132,8 @@ std::optional<Pose> pose_at(const Trajectory& trajectory, double stamp_s, double
 }
 
 DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
-  const MillimetreImage units = decode_gray16(bytes);
-  if (depth_unit_m == millimetre_m) return to_metres(units);
+  const MillimeterImage units = decode_gray16(bytes);
+  if (depth_unit_m == millimeter_m) return to_meters(units);
   DepthImage depth(units.width, units.height);
   std::transform(units.pixels.begin(), units.pixels.end(), depth.pixels.begin(),
                  [&](std::uint16_t value) {
@@ -177,10 +177,10 @@ const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names() {
 
 void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("depth_unit_m", options.depth_unit_m, positive,
-            "metres a unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimetres");
+            "meters a unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimeters");
   table.add("calibration", options.calibration, "the camera's intrinsics");
   table.add("pose_frame", options.pose_frame, pose_frame_names(),
-            "whose poses the files hold: the camera's optical frame, or the base");
+            "whose poses the files contain: the camera's optical frame, or the base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
             "greatest difference in time of what belongs together");
 }
@@ -232,7 +232,7 @@ void FrameFolder::read_nodes() {
     if (!of_node.baselines_m.empty() && of_node.cameras.size() != 2 * of_node.baselines_m.size())
       throw wrong_cell("each stereo pair has two cameras", table, row, "calibration");
     if (!files_.emplace(node.id, std::move(of_node)).second)
-      throw wrong_cell("stands twice", table, row, "node");
+      throw wrong_cell("is a duplicate", table, row, "node");
     graph_.nodes.push_back(std::move(node));
   }
   std::sort(graph_.nodes.begin(), graph_.nodes.end(),
@@ -264,7 +264,7 @@ void FrameFolder::read_images() {
     if (fs::exists(path_ / files::color_list)) first = Listing::read(path_ / files::color_list);
     add_images(first, Listing::read(depth_list));
   } else {
-    throw Error("is no scan: a folder of frames holds " + std::string(files::associations) +
+    throw Error("is no scan: a folder of frames contains " + std::string(files::associations) +
                     ", or " + files::color_list + " and " + files::depth_list,
                 {.file = path_.string()});
   }
@@ -280,13 +280,13 @@ void FrameFolder::add_images(const Listing& color, const Listing& depth) {
     if (color.names.empty() || !color_of_depth[j].empty()) order.push_back(j);
   const std::string tolerance = to_text(options_.pairing_tolerance_s) + " s";
   if (order.empty())
-    throw Error("no colour image lies within " + tolerance + " of a depth image",
+    throw Error("no color image lies within " + tolerance + " of a depth image",
                 {.file = path_.string()});
   if (order.size() < depth.names.size())
     warnings_.push_back(count_of(depth.names.size() - order.size(), "depth image") +
-                        " without a colour image within " + tolerance);
+                        " without a color image within " + tolerance);
   if (pairs.size() < color.names.size())
-    warnings_.push_back(count_of(color.names.size() - pairs.size(), "colour image") +
+    warnings_.push_back(count_of(color.names.size() - pairs.size(), "color image") +
                         " without a depth image within " + tolerance);
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return depth.stamps[a] < depth.stamps[b]; });
@@ -405,7 +405,7 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
     }
   };
   if (parts.color)
-    read(of_node.color, "colour",
+    read(of_node.color, "color",
          [&](const std::string& bytes) { frame.color = decode_color(bytes); });
   if (parts.depth) {
     read(of_node.depth, "depth",

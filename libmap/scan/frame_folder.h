@@ -7,7 +7,7 @@
 //   calibration.yaml        the camera (camera_io.h)
 //   groundtruth.txt         true poses as TUM lines, or poses_ground_truth.tum
 //   poses.tum               odometry, or poses_odometry.tum
-//   poses_stored.tum        optimised poses
+//   poses_stored.tum        optimized poses
 //   links.g2o               links between nodes; its vertices are not used
 //   nodes.csv               in place of associations.txt: node, session, weight, stamp_s, label,
 //                           color, depth, right, calibration, baseline_m, velocity, gps; files
@@ -38,7 +38,7 @@ const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names();
 
 // Defaults are those of the TUM benchmark.
 struct FrameFolderOptions {
-  double depth_unit_m = 0.0002;  // metres a unit of the 16-bit depth images
+  double depth_unit_m = 0.0002;  // meters a unit of the 16-bit depth images
   std::string calibration = "calibration.yaml";
   PoseFrame pose_frame = PoseFrame::camera;  // whose poses the files hold: the optical frame's
   double pairing_tolerance_s = 0.02;

@@ -104,7 +104,7 @@ void FrameFolderWriter::add_frame(const RgbdFrame& frame, const StoredImages& st
   if (!frame.depth.empty() || !stored.depth.empty()) {
     of_node.depth =
         write_image(files::depth_folder, frame.node,
-                    stored.depth.empty() ? encode_png(to_millimetres(frame.depth)) : stored.depth);
+                    stored.depth.empty() ? encode_png(to_millimeters(frame.depth)) : stored.depth);
     ++counts_.depth_images;
   }
   if (!frame.right.empty() || !stored.right.empty()) {

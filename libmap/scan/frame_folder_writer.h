@@ -1,4 +1,4 @@
-// Writes a scan as a folder of plain files that FrameFolder reads back (frame_folder.h): colour and
+// Writes a scan as a folder of plain files that FrameFolder reads back (frame_folder.h): color and
 // depth images, calibrations, poses, links.
 #pragma once
 
@@ -19,7 +19,7 @@ const std::vector<std::string>& frame_folder_names();
 // Image files to be kept as they are; empty: the frame's image becomes a PNG.
 struct StoredImages {
   std::string color{};  // JPEG or PNG
-  std::string depth{};  // PNG of 16-bit millimetres
+  std::string depth{};  // PNG of 16-bit millimeters
   std::string right{};  // JPEG or PNG
 };
 
@@ -28,7 +28,7 @@ struct FrameFolderCounts {
   std::size_t depth_images = 0;
   std::size_t right_images = 0;
   std::size_t calibrations = 0;
-  std::size_t associations = 0;  // nodes with colour and depth
+  std::size_t associations = 0;  // nodes with color and depth
 };
 
 class FrameFolderWriter {
@@ -37,7 +37,7 @@ class FrameFolderWriter {
   explicit FrameFolderWriter(std::filesystem::path folder);
 
   // Images and calibrations go to files at once: color/000012.jpg for node 12. Depth is rounded to
-  // whole millimetres; 0 beyond 65.534 m.
+  // whole millimeters; 0 beyond 65.534 m.
   void add_frame(const RgbdFrame& frame, const StoredImages& stored = {});
 
   // The nodes, with the files of those whose frames were added; poses, links, scan.yaml.

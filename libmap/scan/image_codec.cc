@@ -78,7 +78,7 @@ std::optional<ImageInfo> png_info(std::string_view bytes) {
       info.channels = 4;
       break;
     default:
-      throw Error("PNG of an unknown colour type");
+      throw Error("PNG of an unknown color type");
   }
   return info;
 }

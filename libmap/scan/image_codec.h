@@ -15,7 +15,7 @@
 
 namespace libmap {
 
-enum class ImageFormat { jpeg, png };            // how a colour image is stored, by its first bytes
+enum class ImageFormat { jpeg, png };            // how a color image is stored, by its first bytes
 std::string to_text(ImageFormat format);         // "JPEG", "PNG"
 std::string file_extension(ImageFormat format);  // ".jpg", ".png"
 
@@ -34,15 +34,16 @@ struct ImageInfo {
 // throws Error if this is no JPEG or PNG.
 std::optional<ImageInfo> read_image_info(std::string_view bytes);
 
-// Decoding takes up to ten bytes a pixel. Frames of a scan are decoded by several threads at once.
+// Decoding takes up to ten bytes per pixel. Frames of a scan are decoded by several threads at
+// once.
 inline constexpr std::int64_t max_frame_pixels = std::int64_t{1} << 25;
 // Pages of a texture and pictures come one at a time.
 inline constexpr std::int64_t max_picture_pixels = std::int64_t{1} << 27;
 
-// Any image as 8-bit colour; gray becomes red = green = blue, transparency is ignored. Throws Error
+// Any image as 8-bit color; gray becomes red = green = blue, transparency is ignored. Throws Error
 // if there are more than `max_pixels`, as the following do beyond max_frame_pixels.
 ColorImage decode_color(std::string_view bytes, std::int64_t max_pixels = max_frame_pixels);
-// Any image as 8-bit gray; colour by ITU-R BT.601 (Y = 0.299 R + 0.587 G + 0.114 B).
+// Any image as 8-bit gray; color by ITU-R BT.601 (Y = 0.299 R + 0.587 G + 0.114 B).
 GrayImage decode_gray(std::string_view bytes);
 // A PNG of one channel of 16 bits; throws Error for any other.
 Image<std::uint16_t> decode_gray16(std::string_view bytes);

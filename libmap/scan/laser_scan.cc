@@ -86,7 +86,7 @@ void read_info(LaserScan& scan, std::string_view info) {
                 {.value = std::to_string(info.size()) + " bytes", .bound = "56, 60 or 76"});
   }
   if (!(points >= 0 && points <= 2e9F))
-    throw Error("scan_info holds no number of points", {.value = to_text(points)});
+    throw Error("scan_info contains no number of points", {.value = to_text(points)});
   scan.max_points = static_cast<int>(points);
   scan.base_from_scan =
       decode_pose(info.substr(info.size() - pose_bytes)).value_or(Pose::Identity());

@@ -30,7 +30,7 @@ std::vector<CameraView> read_pictures(const ScanSource& scan, int node, FramePar
   const RgbdFrame frame = scan.read_frame(node, parts);
   const std::string name = "node " + std::to_string(node);
   if (frame.color.empty())
-    throw Error("it has no colour image", {.file = scan.path().string(), .field = name});
+    throw Error("it has no color image", {.file = scan.path().string(), .field = name});
   if (frame.cameras.empty())
     throw Error("it has no calibration", {.file = scan.path().string(), .field = name});
   return camera_views(frame);

@@ -18,11 +18,11 @@ struct PictureFile {
   std::string bytes{};  // as a database stores it, where that is this picture alone; else a PNG
 };
 
-// `views` are those of the node's frame, with colour.
+// `views` are those of the node's frame, with color.
 PictureFile picture_file(const ScanSource& scan, int node, const std::vector<CameraView>& views,
                          std::size_t camera);
 
-// The cameras of a node's frame with their images. Throws Error naming the node: no colour image,
+// The cameras of a node's frame with their images. Throws Error naming the node: no color image,
 // no calibration.
 std::vector<CameraView> read_pictures(const ScanSource& scan, int node, FrameParts parts);
 

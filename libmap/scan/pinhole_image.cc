@@ -34,7 +34,7 @@ Eigen::Vector2d inner_reach(const Camera& camera) {
 }
 
 // Pixels, at most `half_extent` to each side of the middle. An odd number if the principal point
-// lies nearer to a pixel's centre, else an even one, so that pixels fall on pixels.
+// is closer to a pixel's center, else an even one, so that pixels fall on pixels.
 int centered_size(double half_extent, double principal_point) {
   constexpr double rounding = 1e-9;
   const bool odd = std::llround(2.0 * principal_point) % 2 == 0;

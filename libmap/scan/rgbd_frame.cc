@@ -19,11 +19,11 @@ int part_width(int node, const std::string& what, int width, std::size_t count) 
   return width / cameras;
 }
 
-// The camera at the size of its other image. RTAB-Map thins images by taking every n-th pixel and
-// multiplies the principal point with the size: pixels are samples here, not areas. A database
-// whose colour is half the size of its depth fits this, and not pixels as areas: those put the
+// The camera at the size of its other image. RTAB-Map downsamples images by taking every n-th pixel
+// and multiplies the principal point with the size: pixels are samples here, not areas. A database
+// whose color is half the size of its depth fits this, and not pixels as areas: those put the
 // surface 4.5 mm off.
-Camera thinned_camera(Camera camera, int width, int height) {
+Camera downsampled_camera(Camera camera, int width, int height) {
   const double sx = static_cast<double>(width) / camera.width;
   const double sy = static_cast<double>(height) / camera.height;
   camera.width = width;
@@ -41,7 +41,7 @@ std::vector<CameraView> camera_views(const RgbdFrame& frame) {
   std::vector<CameraView> views;
   if (frame.cameras.empty()) return views;
   const std::size_t count = frame.cameras.size();
-  const int color_width = part_width(frame.node, "colour image", frame.color.width, count);
+  const int color_width = part_width(frame.node, "color image", frame.color.width, count);
   const int depth_width = part_width(frame.node, "depth image", frame.depth.width, count);
   for (std::size_t i = 0; i < count; ++i) {
     CameraView view;
@@ -52,7 +52,8 @@ std::vector<CameraView> camera_views(const RgbdFrame& frame) {
           count == 1 ? frame.color : crop_columns(frame.color, place * color_width, color_width);
       if (view.color.width != view.color_camera.width ||
           view.color.height != view.color_camera.height)
-        view.color_camera = thinned_camera(view.color_camera, view.color.width, view.color.height);
+        view.color_camera =
+            downsampled_camera(view.color_camera, view.color.width, view.color.height);
     }
     view.depth_camera = view.color_camera;
     if (!frame.depth.empty()) {
@@ -60,7 +61,8 @@ std::vector<CameraView> camera_views(const RgbdFrame& frame) {
           count == 1 ? frame.depth : crop_columns(frame.depth, place * depth_width, depth_width);
       if (view.depth.width != view.depth_camera.width ||
           view.depth.height != view.depth_camera.height)
-        view.depth_camera = thinned_camera(view.depth_camera, view.depth.width, view.depth.height);
+        view.depth_camera =
+            downsampled_camera(view.depth_camera, view.depth.width, view.depth.height);
     }
     views.push_back(std::move(view));
   }

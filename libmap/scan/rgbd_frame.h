@@ -17,15 +17,14 @@ struct StereoCamera {
   Pose right_from_left = Pose::Identity();
 };
 
-// Colour and depth of one or several cameras; several stand side by side in one image, each with
-// the same share of its width, in the order of `cameras`. Depth is registered to the colour camera,
-// and may have another size than colour.
+// Color and depth of one or several cameras; several stand side by side in one image, each with
+// the same share of its width, in the order of `cameras`. Depth is registered to the color camera,
+// and may have another size than color.
 struct RgbdFrame {
   int node = 0;
   double stamp_s = 0.0;
-  std::vector<Camera>
-      cameras;       // of the colour images; of the depth images where there is no colour
-  ColorImage color;  // empty if not stored or not asked for
+  std::vector<Camera> cameras;  // of the color images; of the depth images where there is no color
+  ColorImage color;             // empty if not stored or not asked for
   DepthImage depth;
   GrayImage right;  // of a stereo pair
   std::vector<StereoCamera> stereo;

@@ -152,7 +152,7 @@ std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& r
     }
   }
   if (images.empty())
-    throw Error("holds no image of any of the rig's cameras", {.file = folder.string()});
+    throw Error("contains no image of any of the rig's cameras", {.file = folder.string()});
   std::sort(images.begin(), images.end(), [](const RigImage& a, const RigImage& b) {
     if (a.camera != b.camera) return a.camera < b.camera;
     if (a.stamp_s != b.stamp_s) return a.stamp_s < b.stamp_s;

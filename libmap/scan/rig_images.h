@@ -1,7 +1,7 @@
 // The folder in which the images of a camera rig lie, and which of them belong together:
 //
 //   FOLDER/rig.yaml            rig_io.h; or given apart
-//   FOLDER/NAME/STAMP.png      16-bit grey, one folder a camera; STAMP in seconds, e.g. 12.340000
+//   FOLDER/NAME/STAMP.png      16-bit gray, one folder a camera; STAMP in seconds, e.g. 12.340000
 //   FOLDER/images.csv          instead of names that are stamps: columns camera, stamp_s, file
 //                              (relative to FOLDER); where it stands, it alone counts
 #pragma once
@@ -35,7 +35,7 @@ std::string rig_image_name(const std::string& camera, double stamp_s);
 std::vector<RigImage> list_rig_images(const std::filesystem::path& folder, const CameraRig& rig);
 
 // The file as it is: units of the camera's depth scale. Throws Error naming the file: not a 16-bit
-// grey PNG, or of another size than the camera's calibration.
+// gray PNG, or of another size than the camera's calibration.
 Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera);
 
 // Its depth: units of the file times the camera's depth scale; 0 and 65535, where the sensor was

@@ -56,7 +56,7 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known) {
     const std::string& key = entry.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
       throw Error("unknown key" + did_you_mean(key, known), {.field = key});
-    if (!seen.insert(key).second) throw Error("stands twice", {.field = key});
+    if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
   }
 }
 
@@ -72,7 +72,8 @@ Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
   if (!map["calibration"].IsScalar()) throw Error("not a file name", {.field = "calibration"});
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
-    if (map[key]) throw Error("stands beside a calibration file that holds it", {.field = key});
+    if (map[key])
+      throw Error("is given beside a calibration file that contains it", {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
 }
 
@@ -97,7 +98,8 @@ void read_pose(const YAML::Node& map, Camera& camera) {
   const YAML::Node angles = map["roll_pitch_yaw_deg"];
   if (map["robot_from_camera"]) {
     if (position || angles)
-      throw Error("stands beside position_m or roll_pitch_yaw_deg", {.field = "robot_from_camera"});
+      throw Error("is given beside position_m or roll_pitch_yaw_deg",
+                  {.field = "robot_from_camera"});
     camera.base_from_camera = pose_of_matrix(map["robot_from_camera"]);
     return;
   }

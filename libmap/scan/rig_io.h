@@ -1,6 +1,6 @@
 // Several depth cameras on one robot, as YAML (rig_images.h: where their images lie):
 //
-//   depth_scale_m: 0.001       # metres a unit of the depth images
+//   depth_scale_m: 0.001       # meters a unit of the depth images
 //   near_m: 0.28               # measurements outside near..far are dropped
 //   far_m: 1.5                 # .inf: no limit
 //   cameras:

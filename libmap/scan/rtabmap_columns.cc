@@ -88,7 +88,7 @@ std::string RtabmapColumns::or_null(const std::string& table, const std::string&
   return has(table, column) ? column : "NULL";
 }
 
-std::string RtabmapColumns::recognised_version() const {
+std::string RtabmapColumns::recognized_version() const {
   const auto found = std::find_if(marks.begin(), marks.end(), [&](const Mark& mark) {
     const std::string table(mark.table);
     return mark.column.empty() ? has_table(table) : has(table, std::string(mark.column));

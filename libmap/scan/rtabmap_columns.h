@@ -24,7 +24,7 @@ class RtabmapColumns {
 
   // The first RTAB-Map version whose schema has the newest of the columns that are there, e.g.
   // "0.18.0"; "before 0.10.0" where images stand in tables of their own.
-  std::string recognised_version() const;
+  std::string recognized_version() const;
   // Tables, and columns "TABLE.COLUMN" of known tables, that no version up to 0.23 has.
   std::vector<std::string> unknown() const;
 

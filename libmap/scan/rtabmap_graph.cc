@@ -220,7 +220,7 @@ class LinkReader {
   std::map<std::tuple<int, int, int>, PoseLink> links_;
 };
 
-// ---------------------------------------------------------------------------------- optimised
+// ---------------------------------------------------------------------------------- optimized
 // poses
 
 std::uint64_t elements_of(const StoredMatrix& matrix) {

@@ -1,4 +1,4 @@
-// Nodes, links and optimised poses of an RTAB-Map database.
+// Nodes, links and optimized poses of an RTAB-Map database.
 #pragma once
 
 #include <optional>

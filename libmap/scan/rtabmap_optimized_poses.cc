@@ -67,7 +67,7 @@ StoredPoses stored_poses(SQLite::Database& database) {
   return {};
 }
 
-// The node at whose optimised pose the last localisation stands.
+// The node at whose optimized pose the last localisation stands.
 std::optional<int> node_of_localization(const StoredPoses& stored) {
   // From the back: RTAB-Map localises at the last node.
   for (std::size_t i = stored.ids.size(); i-- > 0;)
@@ -114,9 +114,9 @@ void require_nodes(SQLite::Database& database, const std::map<int, Pose>& poses,
   for (const auto& [id, pose] : poses) {
     if (id > 0 && nodes.count(id) == 0)
       throw Error("the scan has no such node",
-                  {.file = source, .field = "optimised pose of node", .value = std::to_string(id)});
+                  {.file = source, .field = "optimized pose of node", .value = std::to_string(id)});
     if (!pose.matrix().allFinite())
-      throw Error("is not finite", {.field = "optimised pose of node " + std::to_string(id)});
+      throw Error("is not finite", {.field = "optimized pose of node " + std::to_string(id)});
   }
 }
 
@@ -125,7 +125,7 @@ void require_columns(SQLite::Database& database, const std::string& source) {
   if (columns.empty() || columns_of(database, "Node").count("id") == 0)
     throw Error("is no RTAB-Map database", {.file = source});
   if (columns.count("opt_ids") == 0 || columns.count("opt_poses") == 0)
-    throw Error("has no place for optimised poses: it was made by RTAB-Map before 0.13",
+    throw Error("has no place for optimized poses: it was made by RTAB-Map before 0.13",
                 {.file = source});
   SQLite::Statement rows(database, "SELECT COUNT(*) FROM Admin");
   rows.executeStep();

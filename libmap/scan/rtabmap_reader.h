@@ -1,7 +1,7 @@
 // RTAB-Map databases of every schema from 0.10 to 0.23 (and images of older ones), without
 // RTAB-Map.
 //
-// A schema is recognised by its columns, never refused for its version. The file is never written
+// A schema is recognized by its columns, never refused for its version. The file is never written
 // to, nothing appears beside it, and another program may have it open (see SqliteFile). Nodes,
 // links and poses are read at once, images one node at a time.
 #pragma once
@@ -85,12 +85,12 @@ class RtabmapDatabase : public ScanSource {
 
   const std::filesystem::path& path() const override { return path_; }
   const PoseGraph& graph() const override { return graph_; }
-  // Grayscale becomes colour; the depth column's image is `right` where it is no depth.
+  // Grayscale becomes color; the depth column's image is `right` where it is no depth.
   RgbdFrame read_frame(int node, FrameParts parts = {}) const override;
 
   // As the file says (Admin.version), empty if it does not; and as its columns say.
   const std::string& version() const { return version_; }
-  std::string recognised_version() const { return columns_.recognised_version(); }
+  std::string recognized_version() const { return columns_.recognized_version(); }
   // What could not be used of nodes, links and poses, and what no known version has.
   const std::vector<std::string>& warnings() const override { return warnings_; }
 

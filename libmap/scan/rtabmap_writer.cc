@@ -73,7 +73,7 @@ void check_frame(const GraphNode& node, const RgbdFrame& frame) {
   if (frame.node != node.id)
     throw Error("the frame is another node's", {.field = field, .value = node_field(frame.node)});
   if (!frame.depth.empty() && !frame.right.empty())
-    throw Error("has both a depth image and a right image: the format holds one of them",
+    throw Error("has both a depth image and a right image: the format contains one of them",
                 {.field = field});
   if (!frame.stereo.empty() && !frame.cameras.empty() &&
       frame.cameras.size() != frame.stereo.size())
@@ -125,7 +125,7 @@ std::string link_field(const PoseLink& link) {
   return "link " + std::to_string(link.from) + " -> " + std::to_string(link.to);
 }
 
-// RTAB-Map's serialisation.
+// RTAB-Map's serialization.
 std::string join_parameters(const std::map<std::string, std::string>& parameters) {
   std::string text;
   for (const auto& [key, value] : parameters) {
@@ -228,9 +228,9 @@ std::string RtabmapWriter::Parts::encode_right_or_depth(const RgbdFrame& frame) 
   if (frame.depth.empty()) return {};
   switch (options.depth) {
     case DepthFormat::rvl:
-      return encode_rvl(to_millimetres(frame.depth));
+      return encode_rvl(to_millimeters(frame.depth));
     case DepthFormat::png16:
-      return encode_png(to_millimetres(frame.depth));
+      return encode_png(to_millimeters(frame.depth));
     case DepthFormat::float_png:
       return encode_float_png(frame.depth);
   }
@@ -298,7 +298,7 @@ void RtabmapWriter::Parts::require_ends() const {
     require(from, field);
     require(to, field);
   }
-  for (const auto& [id, pose] : optimized_map_from_base) require(id, "optimised pose");
+  for (const auto& [id, pose] : optimized_map_from_base) require(id, "optimized pose");
 }
 
 RtabmapWriter::RtabmapWriter(const fs::path& path, const RtabmapWriterOptions& options) {
@@ -346,7 +346,7 @@ void RtabmapWriter::add_link(const PoseLink& link) {
 
 void RtabmapWriter::set_optimized_poses(const std::map<int, Pose>& map_from_base) {
   for (const auto& [id, pose] : map_from_base)
-    require_finite(pose, node_field(id) + ": optimised pose");
+    require_finite(pose, node_field(id) + ": optimized pose");
   parts_->optimized_map_from_base = map_from_base;
 }
 

@@ -15,7 +15,7 @@
 namespace libmap {
 
 struct RtabmapWriterOptions {
-  DepthFormat depth = DepthFormat::rvl;   // rvl and png16: whole millimetres up to 65.534 m
+  DepthFormat depth = DepthFormat::rvl;   // rvl and png16: whole millimeters up to 65.534 m
   ImageFormat color = ImageFormat::jpeg;  // of the right image of a stereo pair too
   int jpeg_quality = 95;                  // RTAB-Map's default
   std::map<std::string, std::string> parameters{};  // into Info.parameters
@@ -43,7 +43,7 @@ class RtabmapWriter {
   void add_link(const PoseLink& link);
   void set_optimized_poses(const std::map<int, Pose>& map_from_base);
   // Writes what is left and closes the file: no journal is left beside it. Throws Error if a link
-  // or an optimised pose names a node that is not there. A writer that goes away without it leaves
+  // or an optimized pose names a node that is not there. A writer that goes away without it leaves
   // a file that is no whole scan.
   void finish();
 
@@ -52,9 +52,9 @@ class RtabmapWriter {
   std::unique_ptr<Parts> parts_;
 };
 
-// `source` copied to `target`, whatever stood there, with other optimised poses (Admin.opt_ids,
+// `source` copied to `target`, whatever stood there, with other optimized poses (Admin.opt_ids,
 // opt_poses); everything else stays as it is, row for row. Where the last localisation stood at an
-// optimised pose it moves with its node, else it is dropped; landmarks among the optimised poses
+// optimized pose it moves with its node, else it is dropped; landmarks among the optimized poses
 // move with the first node that sees them. A grid, cloud or mesh that RTAB-Map stored with the
 // earlier poses goes: it makes them anew. `links` are added, in both directions, where the two
 // nodes have no link yet. `source` may be open elsewhere. Throws Error: no database of RTAB-Map

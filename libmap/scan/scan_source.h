@@ -31,7 +31,7 @@ class ScanSource {
     static const std::vector<std::string> none;
     return none;
   }
-  // The name of the file of the node's colour image, without its folder; empty where images are not
+  // The name of the file of the node's color image, without its folder; empty where images are not
   // files.
   virtual std::string image_name([[maybe_unused]] int node) const { return {}; }
   // May be called from several threads at once. Images that are not stored are left empty. Throws

@@ -96,10 +96,10 @@ struct SqliteFile::Connection {
       : database(mode.uri, SQLite::OPEN_READONLY | SQLite::OPEN_URI, busy_timeout_ms,
                  mode.file_system == nullptr ? "" : mode.file_system) {
     // No value is longer than the file, but what an expression of its schema makes up.
-    constexpr std::uint64_t least_length = 1U << 20U;
-    constexpr std::uint64_t most_length = 1'000'000'000;  // SQLite's own
+    constexpr std::uint64_t min_length = 1U << 20U;
+    constexpr std::uint64_t max_length = 1'000'000'000;  // SQLite's own
     sqlite3_limit(database.getHandle(), SQLITE_LIMIT_LENGTH,
-                  static_cast<int>(std::min(file_bytes + least_length, most_length)));
+                  static_cast<int>(std::min(file_bytes + min_length, max_length)));
     // What a schema from elsewhere may do when it is queried.
     database.exec(
         "PRAGMA trusted_schema = OFF; PRAGMA query_only = ON; PRAGMA temp_store = MEMORY");

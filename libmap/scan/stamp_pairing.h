@@ -1,4 +1,4 @@
-// Things recorded at about the same time, such as colour and depth images of one camera.
+// Things recorded at about the same time, such as color and depth images of one camera.
 #pragma once
 
 #include <cstddef>

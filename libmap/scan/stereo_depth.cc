@@ -70,7 +70,7 @@ cv::Mat widened(const GrayImage& image, int left_px, int right_px) {
   return wide;
 }
 
-// Grey levels that the square of `side_px` around each pixel spans.
+// Gray levels that the square of `side_px` around each pixel spans.
 cv::Mat contrast(const GrayImage& image, int side_px) {
   const cv::Mat pixels = widened(image, 0, 0);
   const cv::Mat square = cv::getStructuringElement(cv::MORPH_RECT, cv::Size(side_px, side_px));
@@ -100,7 +100,7 @@ void bind(ParameterTable& table, StereoDepthOptions& options) {
   table.add("speckle_px", options.speckle_px, Range{0, 1e6},
             "smaller patches of their own disparity are dropped; 0: none");
   table.add("min_contrast", options.min_contrast, Range{0, 255},
-            "grey levels that the matched window must span");
+            "gray levels that the matched window must span");
   table.add("directions", options.directions, direction_names,
             "along which matching costs are summed");
   table.add("max_depth_m", options.max_depth_m, not_negative,

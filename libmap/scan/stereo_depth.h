@@ -17,14 +17,14 @@ struct StereoDepthOptions {
   int uniqueness_percent = 10;  // by which the best match must beat the next; 0 to 100
   int left_right_px = 1;        // by which both directions of matching may differ; -1: not asked
   int speckle_px = 100;         // smaller patches of their own disparity are dropped; 0: none
-  int min_contrast = 2;  // grey levels between darkest and brightest pixel of the left window; 0 to
+  int min_contrast = 2;  // gray levels between darkest and brightest pixel of the left window; 0 to
                          // 255: what is blank, such as an overexposed patch, matches anything
   StereoDirections directions = StereoDirections::five;
   double max_depth_m = 0.0;  // >= 0: what lies beyond is dropped; 0: no limit
 };
 void bind(ParameterTable& table, StereoDepthOptions& options);
 
-// Depth of the left image's pixels, metres, 0 where no match was found:
+// Depth of the left image's pixels, meters, 0 where no match was found:
 // z = fx b / (d - (cx_left - cx_right)), d the disparity x_left - x_right. Throws Error naming the
 // field: images of different sizes or not of the cameras' sizes, cameras that are not rectified
 // (distorted, or with different fx), no baseline, options out of their ranges.

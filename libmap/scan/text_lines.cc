@@ -93,7 +93,7 @@ Error wrong_columns(const std::string& reason, const TextLine& line, const std::
 }
 
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file) {
-  return in_line("stands twice", line, file, record);
+  return in_line("is a duplicate", line, file, record);
 }
 
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,

@@ -182,10 +182,10 @@ struct GraphReader {
 }  // namespace
 
 std::string stamp_text(double stamp_s) {
-  constexpr int most_decimals = 9;
+  constexpr int max_decimals = 9;
   std::string text = to_text(stamp_s);
   if (text.find('e') == std::string::npos) return text;
-  for (int decimals = 1; decimals <= most_decimals; ++decimals) {
+  for (int decimals = 1; decimals <= max_decimals; ++decimals) {
     text = to_fixed_text(stamp_s, decimals);
     if (parse_double(text) == stamp_s) break;
   }
@@ -322,7 +322,7 @@ Pose to_axes(PoseAxes axes, const Pose& world_from_base) {
   return world_from_base;
 }
 
-PoseTextFormat recognise_poses(std::string_view text, const std::string& file) {
+PoseTextFormat recognize_poses(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
     const std::string_view tag = line.words[0];
@@ -335,7 +335,7 @@ PoseTextFormat recognise_poses(std::string_view text, const std::string& file) {
     throw wrong_columns("no known format of poses", line, file,
                         "8 or 9 of TUM, 12 of KITTI, or VERTEX... of g2o or TORO");
   }
-  throw Error("holds no pose", {.file = file});
+  throw Error("contains no pose", {.file = file});
 }
 
 }  // namespace libmap

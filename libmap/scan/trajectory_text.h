@@ -18,7 +18,7 @@ std::string stamp_text(double stamp_s);
 // TUM RGB-D benchmark: "stamp x y z qx qy qz qw", s and m, RTAB-Map's formats 1 and 10; with
 // `nodes` the node's id as a ninth column, its format 11. Reading takes either, and commas for
 // spaces. The parsers throw Error naming `file` and the line: another number of columns, no finite
-// number, a rotation that is none, a position beyond 1e8 m, a node that stands twice.
+// number, a rotation that is none, a position beyond 1e8 m, a node that is a duplicate.
 Trajectory parse_tum(std::string_view text, const std::string& file);
 std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 
@@ -70,6 +70,6 @@ Pose to_axes(PoseAxes axes, const Pose& world_from_base);
 // Which of the formats above a text is, by its first line that is no comment: by its tag or its
 // number of columns. Throws Error if it is none of them.
 enum class PoseTextFormat { tum, kitti, toro, g2o };
-PoseTextFormat recognise_poses(std::string_view text, const std::string& file);
+PoseTextFormat recognize_poses(std::string_view text, const std::string& file);
 
 }  // namespace libmap

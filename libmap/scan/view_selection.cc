@@ -31,9 +31,9 @@ void check(const ViewSelectionOptions& options, const std::vector<Pose>& poses,
            const std::vector<double>& qualities) {
   check_parameters(options);
   if (poses.size() != qualities.size())
-    throw Error("not one quality a view", {.field = "qualities",
-                                           .value = std::to_string(qualities.size()),
-                                           .bound = std::to_string(poses.size())});
+    throw Error("not one quality per view", {.field = "qualities",
+                                             .value = std::to_string(qualities.size()),
+                                             .bound = std::to_string(poses.size())});
   for (std::size_t n = 0; n < poses.size(); ++n)
     if (!poses[n].matrix().allFinite() || !std::isfinite(qualities[n]))
       throw Error("its pose or quality is not finite", {.field = "view " + std::to_string(n)});

@@ -56,7 +56,7 @@ Eigen::Vector3d at(const Wander3& wander, double time_s) {
 
 // Where zeros of the options are replaced.
 struct Way {
-  Eigen::Vector3d centre;  // on the ground
+  Eigen::Vector3d center;  // on the ground
   Eigen::Vector3d target;
   double radius = 0.0, last_radius = 0.0;
   double height = 0.0, last_height = 0.0;
@@ -78,7 +78,7 @@ Way way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& options) {
   const std::optional<Eigen::Vector2d> facing = facing_of_wall(mesh);
   const auto or_fitted = [](double given, double fitted) { return given != 0 ? given : fitted; };
   Way way;
-  way.centre = 0.5 * (bounds.min + bounds.max);
+  way.center = 0.5 * (bounds.min + bounds.max);
   const double half_side =
       0.5 * (facing ? std::max(size.x(), size.y()) : size.head<2>().minCoeff());
   way.radius = or_fitted(options.radius_m, std::clamp(4.0 / 3.0 * half_side, 0.8, 2.0));
@@ -86,14 +86,14 @@ Way way_of(const TriangleMesh& mesh, const CameraTrajectoryOptions& options) {
   way.height = or_fitted(options.height_m, 0.6 * way.radius);
   way.last_height = or_fitted(options.last_height_m, 0.8 * way.radius);
   if (facing) {
-    way.target = options.target.value_or(way.centre);
-    way.centre.z() = bounds.min.z();
+    way.target = options.target.value_or(way.center);
+    way.center.z() = bounds.min.z();
     way.sweep_deg = or_fitted(options.sweep_deg, 120.0);
     way.start_deg =
         options.start_deg + std::atan2(facing->y(), facing->x()) * 180.0 / pi - 0.5 * way.sweep_deg;
   } else {
-    way.centre.z() = surrounding_ground_height(mesh);
-    way.target = options.target.value_or(way.centre);
+    way.center.z() = surrounding_ground_height(mesh);
+    way.target = options.target.value_or(way.center);
     way.sweep_deg = or_fitted(options.sweep_deg, 360.0);
     way.start_deg = options.start_deg;
   }
@@ -119,7 +119,7 @@ Eigen::Vector3d position_on(const Way& way, const CameraTrajectoryOptions& optio
     turns = phase <= 1.0 ? phase : 2.0 - phase;
   }
   const double angle = (way.start_deg + turns * way.sweep_deg) * pi / 180.0;
-  return way.centre + Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), height);
+  return way.center + Eigen::Vector3d(radius * std::cos(angle), radius * std::sin(angle), height);
 }
 
 // Body axes with x toward the target and y level.
@@ -171,7 +171,7 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
   table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
   table.add("radius_m", options.radius_m, not_negative,
-            "distance from the site's centre on the first loop, m; 0: fitted to the mesh");
+            "distance from the site's center on the first loop, m; 0: fitted to the mesh");
   table.add("last_radius_m", options.last_radius_m, not_negative,
             "the same on the last loop, m; 0: 0.7 times the first");
   table.add("height_m", options.height_m, not_negative,

@@ -139,7 +139,7 @@ VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
     : parts_(new Parts{RayCaster(mesh), mesh, texture_seed}) {
   std::vector<Color>& colors = parts_->mesh.vertex_colors;
   if (texture == TextureSource::mesh && colors.empty())
-    throw Error("the mesh has no colours of its own");
+    throw Error("the mesh has no colors of its own");
   const bool plain = std::all_of(colors.begin(), colors.end(),
                                  [&](const Color& color) { return color == colors.front(); });
   if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))
@@ -178,7 +178,7 @@ SurfaceView VisibleSurface::view(const PixelRays& rays, const Pose& world_from_c
                                     });
                    if (y == static_cast<std::size_t>(h)) continue;
                    const std::size_t start = y * static_cast<std::size_t>(w);
-                   parts_->view_row(row_of(rays.centres, y, w), world_from_camera, with_color,
+                   parts_->view_row(row_of(rays.centers, y, w), world_from_camera, with_color,
                                     [&](std::size_t x, const Parts::Seen& seen) {
                                       view.depth.pixels[start + x] = seen.depth;
                                       view.incidence_cos.pixels[start + x] = seen.incidence_cos;
@@ -222,7 +222,7 @@ void bind(ParameterTable& table, PhotoOptions& options) {
   table.add("vignetting", options.vignetting, zero_to_one,
             "how much darker the picture's corners are");
   table.add("color_noise", options.color_noise, not_negative,
-            "standard deviation of the colours, of 255");
+            "standard deviation of the colors, of 255");
 }
 
 DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {
@@ -253,7 +253,7 @@ void DepthSensorOptions::check() const {
 namespace {
 
 struct PixelDepths {
-  double centre = 0.0;
+  double center = 0.0;
   std::array<double, 4> corners{};  // opposite ones follow each other
 };
 
@@ -266,14 +266,14 @@ PixelDepths depths_of(const SurfaceView& view, int x, int y) {
 }
 
 // Whether depth jumps within the pixel. On a plane inverse depth is linear in the image: however
-// flat it is seen, the harmonic mean of opposite corners is the centre's depth. A jump by g leaves
-// the centre at least g / 2 from one of the two means.
+// flat it is seen, the harmonic mean of opposite corners is the center's depth. A jump by g leaves
+// the center at least g / 2 from one of the two means.
 bool is_edge(const PixelDepths& depths, double gap) {
   for (std::size_t k = 0; k < 4; k += 2) {
     const double a = depths.corners[k];
     const double b = depths.corners[k + 1];
     if (a <= 0 || b <= 0) return true;
-    if (std::abs(depths.centre - 2 * a * b / (a + b)) > gap / 2) return true;
+    if (std::abs(depths.center - 2 * a * b / (a + b)) > gap / 2) return true;
   }
   return false;
 }
@@ -291,11 +291,11 @@ enum class PixelKind { nothing, plain, edge, flying };
 std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double incidence_cos,
                                            double range_of_depth, const DepthSensorOptions& options,
                                            RandomStream random) {
-  if (depths.centre <= 0 || !std::isfinite(range_of_depth)) return {0.0, PixelKind::nothing};
+  if (depths.center <= 0 || !std::isfinite(range_of_depth)) return {0.0, PixelKind::nothing};
   const double fate = random.uniform();
   const double grazing_fate = random.uniform();
   const double blend = random.uniform();
-  double depth = depths.centre;
+  double depth = depths.center;
   PixelKind kind = PixelKind::plain;
   if (is_edge(depths, options.edge_gap_m)) {
     kind = PixelKind::edge;
@@ -342,7 +342,7 @@ DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
             const std::size_t index = view.depth.index(x, y);
             const auto [depth, kind] = measure_pixel(
                 depths_of(view, x, y), static_cast<double>(view.incidence_cos.pixels[index]),
-                rays.centres[index].homogeneous().norm(), options, RandomStream(seed, index));
+                rays.centers[index].homogeneous().norm(), options, RandomStream(seed, index));
             result.depth.pixels[index] = static_cast<float>(depth);
             part.measured += depth > 0;
             part.edges += kind == PixelKind::edge || kind == PixelKind::flying;

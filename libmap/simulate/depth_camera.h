@@ -1,4 +1,4 @@
-// A time-of-flight depth camera with a registered colour camera, looking at a triangle mesh.
+// A time-of-flight depth camera with a registered color camera, looking at a triangle mesh.
 //
 // First what an ideal camera sees, then what the sensor makes of it. Every pixel has random numbers
 // of its own: the same seed gives the same image at any thread count.
@@ -23,28 +23,28 @@ namespace libmap {
 struct PixelRays {
   int width = 0;
   int height = 0;
-  std::vector<Eigen::Vector2d> centres;  // width * height
+  std::vector<Eigen::Vector2d> centers;  // width * height
   std::vector<Eigen::Vector2d> corners;  // (width + 1) * (height + 1); (0, 0) is at pixel -0.5 -0.5
 };
 PixelRays make_pixel_rays(const Camera& camera);
 
 // One view without noise. Depths are 0 where there is no surface.
 struct SurfaceView {
-  DepthImage depth;              // at the pixels' centres
+  DepthImage depth;              // at the pixels' centers
   DepthImage corner_depth;       // at their corners, as PixelRays::corners
-  Image<float> incidence_cos;    // of the angle between ray and normal at the centre
-  Image<Eigen::Vector3f> color;  // 0 to 1: half the centre's, an eighth of each corner's
+  Image<float> incidence_cos;    // of the angle between ray and normal at the center
+  Image<Eigen::Vector3f> color;  // 0 to 1: half the center's, an eighth of each corner's
 };
 
-// Where colours come from: the mesh's vertices, or rock_color(); automatic: the vertices, unless
-// they have no colours or all the same.
+// Where colors come from: the mesh's vertices, or rock_color(); automatic: the vertices, unless
+// they have no colors or all the same.
 enum class TextureSource { automatic, mesh, rock };
 const std::vector<std::pair<std::string, TextureSource>>& texture_source_names();
 
 // A mesh ready to be looked at. Light comes from the sky and a little more from one side.
 class VisibleSurface {
  public:
-  // Throws Error as RayCaster does, and where the mesh's own colours are asked for and there are
+  // Throws Error as RayCaster does, and where the mesh's own colors are asked for and there are
   // none. The mesh may go away afterwards.
   explicit VisibleSurface(const TriangleMesh& mesh,
                           TextureSource texture = TextureSource::automatic,
@@ -54,7 +54,7 @@ class VisibleSurface {
   VisibleSurface& operator=(VisibleSurface&&) noexcept;
 
   // Rows in parallel. May be called from several threads at once. Without `with_color` the view's
-  // colour is empty.
+  // color is empty.
   SurfaceView view(const PixelRays& rays, const Pose& world_from_camera,
                    bool with_color = true) const;
 
@@ -63,7 +63,7 @@ class VisibleSurface {
   std::unique_ptr<Parts> parts_;
 };
 
-// Defaults: the Kinect v2's limits (0.5 to 4.5 m, whole millimetres) and the noise of the scans
+// Defaults: the Kinect v2's limits (0.5 to 4.5 m, whole millimeters) and the noise of the scans
 // that this toolkit is tested on, 2 mm and 0.5 % of range.
 struct DepthSensorOptions {
   double noise_m = 0.002;         // standard deviation along the ray at range 0 ...

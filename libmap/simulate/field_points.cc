@@ -21,7 +21,7 @@ constexpr double hard_slope_deg = 60.0;
 // Shares of the normals' spread (eigenvalues of their mean outer product, which add up to 1).
 constexpr double arc_share = 0.05;  // an edge of 26 degrees
 constexpr double tip_share = 0.04;
-constexpr double hollow_share = 0.06;  // of the radius: mean depth below the neighbours' planes
+constexpr double hollow_share = 0.06;  // of the radius: mean depth below the neighbors' planes
 
 // The mesh with what the search asks of it.
 class Surface {
@@ -29,7 +29,7 @@ class Surface {
   explicit Surface(const TriangleMesh& mesh) : mesh_(mesh), first_(mesh.vertices.size() + 1, 0) {
     for (const Triangle& triangle : mesh.triangles) {
       normals_.push_back(0.5 * area_normal(mesh, triangle));
-      centres_.push_back(
+      centers_.push_back(
           (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
           3.0);
       for (const std::uint32_t vertex : triangle) ++first_[vertex + 1];
@@ -70,12 +70,12 @@ class Surface {
   }
 
   const Eigen::Vector3d& area_vector(std::uint32_t triangle) const { return normals_[triangle]; }
-  const Eigen::Vector3d& centre(std::uint32_t triangle) const { return centres_[triangle]; }
+  const Eigen::Vector3d& center(std::uint32_t triangle) const { return centers_[triangle]; }
 
  private:
   const TriangleMesh& mesh_;
   std::vector<Eigen::Vector3d> normals_;  // their length is the area
-  std::vector<Eigen::Vector3d> centres_;
+  std::vector<Eigen::Vector3d> centers_;
   std::vector<std::uint32_t> first_;
   std::vector<std::uint32_t> around_;
 };
@@ -94,8 +94,8 @@ void look_around(const Surface& surface, const TriangleMesh& mesh, std::uint32_t
     spread += vector * vector.transpose() / own;
     sum += vector;
     area += own;
-    hollow += std::max(0.0, (mesh.vertices[vertex] - surface.centre(triangle)).dot(vector)) -
-              0.5 * std::max(0.0, (surface.centre(triangle) - mesh.vertices[vertex]).dot(vector));
+    hollow += std::max(0.0, (mesh.vertices[vertex] - surface.center(triangle)).dot(vector)) -
+              0.5 * std::max(0.0, (surface.center(triangle) - mesh.vertices[vertex]).dot(vector));
   }
   if (area <= 0.0) return;
   point.normal = sum.normalized();
@@ -182,7 +182,7 @@ class Chooser {
 
   // Nothing is left: false.
   bool choose_next() {
-    const std::optional<int> rock = least_used_rock();
+    const std::optional<int> rock = min_used_rock();
     if (!rock) return false;
     const auto is_open = [&](std::size_t n) {
       return candidates_[n].point.rock == *rock && distances_[n] >= spacing_m_;
@@ -198,7 +198,7 @@ class Chooser {
   std::vector<FieldPoint> chosen() && { return std::move(chosen_); }
 
  private:
-  std::optional<int> least_used_rock() const {
+  std::optional<int> min_used_rock() const {
     std::optional<int> rock;
     for (std::size_t n = 0; n < candidates_.size(); ++n) {
       if (distances_[n] < spacing_m_) continue;

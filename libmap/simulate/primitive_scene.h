@@ -20,12 +20,12 @@
 
 namespace libmap {
 
-// Centred on its origin.
+// Centered on its origin.
 struct Sphere {
   double radius_m = 0.0;
   bool operator==(const Sphere&) const = default;
 };
-// Centred on its origin, along its x axis; `length_m` includes the round ends.
+// Centered on its origin, along its x axis; `length_m` includes the round ends.
 struct Capsule {
   double radius_m = 0.0;
   double length_m = 0.0;
@@ -50,7 +50,7 @@ struct Box {
   double size_z_m = 0.0;
   bool operator==(const Box&) const = default;
 };
-// A rectangle centred on its origin whose outside is +z; it must face up.
+// A rectangle centered on its origin whose outside is +z; it must face up.
 struct Plane {
   double size_x_m = 0.0;
   double size_y_m = 0.0;

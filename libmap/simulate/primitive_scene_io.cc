@@ -28,7 +28,7 @@ std::vector<std::pair<std::string, std::string>> entries_of(const YAML::Node& no
   std::set<std::string> seen;
   for (const auto& entry : node) {
     const std::string key = scalar_text(entry.first, "key");
-    if (!seen.insert(key).second) throw Error("stands twice", {.field = key});
+    if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
     entries.emplace_back(key, scalar_text(entry.second, key));
   }
   return entries;
@@ -77,7 +77,7 @@ PrimitiveScene parse_root(const YAML::Node& root) {
     const std::string key = scalar_text(entry.first, "key");
     if (key != "shapes") throw Error("unknown key" + did_you_mean(key, {"shapes"}), {.field = key});
   }
-  if (root.size() > 1) throw Error("stands twice", {.field = "shapes"});
+  if (root.size() > 1) throw Error("is a duplicate", {.field = "shapes"});
   const YAML::Node list = root["shapes"];
   if (!list) throw Error("is missing", {.field = "shapes"});
   if (!list.IsSequence()) throw Error("not a list", {.field = "shapes"});

@@ -29,13 +29,13 @@ Eigen::Vector3d direction(double heading, double rise) {
 }
 
 struct BlockSize {
-  Eigen::Vector2d centre = Eigen::Vector2d::Zero();
+  Eigen::Vector2d center = Eigen::Vector2d::Zero();
   Eigen::Vector2d half = Eigen::Vector2d::Zero();
   double top_m = 0.0;
   double bottom_m = 0.0;
 };
 
-// Distance of a wall at `heading` from the centre: between an ellipse and a rectangle.
+// Distance of a wall at `heading` from the center: between an ellipse and a rectangle.
 double wall_distance(const Eigen::Vector2d& half, double heading) {
   const double x = half.x() * std::cos(heading);
   const double y = half.y() * std::sin(heading);
@@ -46,7 +46,7 @@ double wall_distance(const Eigen::Vector2d& half, double heading) {
 std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& rock,
                                          RandomStream& draw) {
   std::vector<HalfSpace> planes;
-  const Eigen::Vector3d centre(size.centre.x(), size.centre.y(), 0.0);
+  const Eigen::Vector3d center(size.center.x(), size.center.y(), 0.0);
   const double first = draw.uniform(0.0, 2.0 * pi);
   const int overhanging = rock.overhang_deg > 0.0 ? std::max(1, rock.sides / 3) : 0;
   for (int n = 0; n < rock.sides; ++n) {
@@ -57,7 +57,7 @@ std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& 
                             : radians_per_degree * draw.uniform(1.0, 13.0);
     const double distance = wall_distance(size.half, heading) * draw.uniform(0.86, 1.0);
     const double level = leans_out ? draw.uniform(0.55, 0.75) * size.top_m : 0.0;
-    planes.push_back(through(direction(heading, rise), centre + distance * direction(heading, 0.0) +
+    planes.push_back(through(direction(heading, rise), center + distance * direction(heading, 0.0) +
                                                            Eigen::Vector3d(0.0, 0.0, level)));
   }
   // Shoulders cut from the top's rim.
@@ -67,11 +67,11 @@ std::vector<HalfSpace> block_half_spaces(const BlockSize& size, const SiteRock& 
     const double distance = wall_distance(size.half, heading) * draw.uniform(0.55, 0.85);
     planes.push_back(through(
         direction(heading, radians_per_degree * draw.uniform(25.0, 60.0)),
-        centre + distance * direction(heading, 0.0) + Eigen::Vector3d(0.0, 0.0, size.top_m)));
+        center + distance * direction(heading, 0.0) + Eigen::Vector3d(0.0, 0.0, size.top_m)));
   }
   const double slope = radians_per_degree * draw.uniform(0.5, 4.0);
   planes.push_back(through(direction(draw.uniform(0.0, 2.0 * pi), 0.5 * pi - slope),
-                           centre + Eigen::Vector3d(0.0, 0.0, size.top_m)));
+                           center + Eigen::Vector3d(0.0, 0.0, size.top_m)));
   planes.push_back({-Eigen::Vector3d::UnitZ(), -size.bottom_m});
   return planes;
 }
@@ -144,10 +144,10 @@ void fit(Solid& solid, const SiteRock& rock) {
   for (Eigen::Vector3d& vertex : solid.vertices) vertex.z() += rock.height_m - top;
   const Eigen::AlignedBox3d box = box_above_ground(solid);
   const Eigen::Vector2d scale(rock.width_m / box.sizes().x(), rock.depth_m / box.sizes().y());
-  const Eigen::Vector3d centre = box.center();
+  const Eigen::Vector3d center = box.center();
   for (Eigen::Vector3d& vertex : solid.vertices) {
-    vertex.x() = (vertex.x() - centre.x()) * scale.x();
-    vertex.y() = (vertex.y() - centre.y()) * scale.y();
+    vertex.x() = (vertex.x() - center.x()) * scale.x();
+    vertex.y() = (vertex.y() - center.y()) * scale.y();
   }
 }
 
@@ -192,7 +192,7 @@ Solid block(const SiteRock& rock, double edge_length_m, double sink_m) {
     BlockSize ledge = size;
     const double heading = draw.uniform(0.0, 2.0 * pi);
     ledge.half *= draw.uniform(0.5, 0.7);
-    ledge.centre = wall_distance(size.half, heading) * draw.uniform(0.55, 0.75) *
+    ledge.center = wall_distance(size.half, heading) * draw.uniform(0.55, 0.75) *
                    direction(heading, 0.0).head<2>();
     ledge.top_m *= draw.uniform(0.4, 0.8);
     ledge.bottom_m *= draw.uniform(0.85, 0.95);
@@ -215,9 +215,9 @@ Solid rounded(const SiteRock& rock, double edge_length_m) {
   const double w = 0.5 * rock.width_m;
   const double d = 0.5 * rock.depth_m;
   const double h = rock.height_m;
-  const auto ellipsoid = [&](const Eigen::Vector3d& radii, const Eigen::Vector3d& centre) {
+  const auto ellipsoid = [&](const Eigen::Vector3d& radii, const Eigen::Vector3d& center) {
     Solid solid = ellipsoid_solid(radii, edge_length_m);
-    for (Eigen::Vector3d& vertex : solid.vertices) vertex += centre;
+    for (Eigen::Vector3d& vertex : solid.vertices) vertex += center;
     roughen(solid, rock);
     return solid;
   };

@@ -23,7 +23,7 @@ double rounded(double value, double steps) { return std::round(value * steps) / 
 
 // A rectangle on the ground.
 struct Footprint {
-  Eigen::Vector2d centre;
+  Eigen::Vector2d center;
   Eigen::Vector2d axis_x;
   Eigen::Vector2d axis_y;
   Eigen::Vector2d half;
@@ -35,7 +35,7 @@ struct Footprint {
   bool is_apart(const Footprint& other, double gap) const {
     const std::array<Eigen::Vector2d, 4> axes = {axis_x, axis_y, other.axis_x, other.axis_y};
     return std::any_of(axes.begin(), axes.end(), [&](const Eigen::Vector2d& axis) {
-      return std::abs(axis.dot(other.centre - centre)) >= reach(axis) + other.reach(axis) + gap;
+      return std::abs(axis.dot(other.center - center)) >= reach(axis) + other.reach(axis) + gap;
     });
   }
 };
@@ -54,8 +54,8 @@ Footprint square(double size) {
 }
 
 bool is_within(const Footprint& footprint, double half_x, double half_y) {
-  return std::abs(footprint.centre.x()) + footprint.reach(Eigen::Vector2d::UnitX()) <= half_x &&
-         std::abs(footprint.centre.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
+  return std::abs(footprint.center.x()) + footprint.reach(Eigen::Vector2d::UnitX()) <= half_x &&
+         std::abs(footprint.center.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
 }
 
 void check_table(const ParameterTable& table, const std::string& place) {
@@ -111,7 +111,7 @@ ParameterTable rock_parameters(SiteRock& rock) {
             "how far a third of the walls lean outward");
   table.add("cleft_m", rock.cleft_m, Range{0.0, 10.0}, "depth of a wedge cut into the top");
   table.add("roughness", rock.roughness, Range{0.0, 1.5}, "of the surface");
-  table.add("seed", rock.seed, not_negative, "of its form and colours");
+  table.add("seed", rock.seed, not_negative, "of its form and colors");
   return table;
 }
 
@@ -121,7 +121,7 @@ ParameterTable ground_parameters(SiteGround& ground) {
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y");
   table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0}, "height of the random relief");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0}, "0: level, 90: an upright wall");
-  table.add("texture", ground.texture, ground_texture_names(), "colours");
+  table.add("texture", ground.texture, ground_texture_names(), "colors");
   return table;
 }
 

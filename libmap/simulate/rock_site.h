@@ -1,6 +1,6 @@
 // Test sites: uneven ground, or a wall, that bears rocks or climbing holds.
 //
-// The ground is a rectangle centred on the origin of its own frame, z out of it. Rocks stand on it
+// The ground is a rectangle centered on the origin of its own frame, z out of it. Rocks stand on it
 // in that frame. `tilt_deg` turns all of it about the x axis into the site's frame: 0 is level
 // ground, 90 a wall that faces -y, more a wall that leans over whoever stands before it; its lower
 // edge stays at z = 0.
@@ -41,10 +41,10 @@ struct SiteRock {
   double overhang_deg = 0.0;  // how far a third of a block's walls lean outward
   double cleft_m = 0.0;       // depth of a wedge cut into a block's top; 0: none
   double roughness = 1.0;     // of the surface; 0: smooth
-  std::uint64_t seed = 0;     // of its form and colours
+  std::uint64_t seed = 0;     // of its form and colors
 };
 
-enum class GroundTexture { soil, rock, panel };  // the colours of the ground
+enum class GroundTexture { soil, rock, panel };  // the colors of the ground
 const std::vector<std::pair<std::string, GroundTexture>>& ground_texture_names();
 
 struct SiteGround {
@@ -106,7 +106,7 @@ class GroundRelief {
   ~GroundRelief();
   GroundRelief(const GroundRelief&) = delete;
   GroundRelief& operator=(const GroundRelief&) = delete;
-  double height(double x_m, double y_m) const;  // metres above the ground's plane
+  double height(double x_m, double y_m) const;  // meters above the ground's plane
 
  private:
   struct Parts;

@@ -107,7 +107,7 @@ void check_keys(const YAML::Node& root) {
     const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
     if (!is_given(known, key))
       throw Error("unknown key" + did_you_mean(key, known), {.field = key});
-    if (is_given(seen, key)) throw Error("stands twice", {.field = key});
+    if (is_given(seen, key)) throw Error("is a duplicate", {.field = key});
     seen.push_back(key);
   }
 }

@@ -93,8 +93,8 @@ Color soil_color(const Eigen::Vector3d& point, std::uint64_t seed) {
           0.35 * gradient_noise(point / 0.017, own(2));
   const Eigen::Vector3d moved = ragged(point, own(7), 0.03, 0.5);
   const Mark gravel = marks(moved / 0.045, own(3), 0.5, 0.45);
-  const double grey = 60.0 + 150.0 * unit_noise(gravel.kind, 4);
-  tone = blend(tone, Tone(grey, 0.97 * grey, 0.92 * grey), 0.85 * gravel.strength);
+  const double gray = 60.0 + 150.0 * unit_noise(gravel.kind, 4);
+  tone = blend(tone, Tone(gray, 0.97 * gray, 0.92 * gray), 0.85 * gravel.strength);
   const Mark pebble = marks(moved / 0.12, own(5), 0.25, 0.35);
   const double shade = 60.0 + 120.0 * unit_noise(pebble.kind, 6);
   tone = blend(tone, Tone(shade, 0.95 * shade, 0.88 * shade), 0.8 * pebble.strength);

@@ -47,7 +47,7 @@ void bind(ParameterTable& table, RockyTerrainOptions& options) {
             "length of the longest of them, m");
   table.add("roughness_m", options.roughness_m, Range{0.0, 1.0},
             "height of the surface's unevenness, m");
-  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "rocks a square metre");
+  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "rocks a square meter");
   table.add("min_rock_m", options.min_rock_m, Range{0.01, 5.0}, "height of the lowest rocks, m");
   table.add("max_rock_m", options.max_rock_m, Range{0.01, 5.0}, "height of the highest, m");
 }
@@ -137,8 +137,8 @@ void RockyTerrain::add_rocks_of_cell(std::int64_t i, std::int64_t j) {
     const bool is_cobble = draw.uniform() < cobble_share;
     const std::uint64_t seed = mix_bits(mix_bits(options_.seed, cell), static_cast<unsigned>(n));
     Rock rock = is_cobble ? draw_cobble(height_m, seed) : draw_block(height_m, seed);
-    rock.centre = {x, y};
-    if (rectangle_m_.squaredExteriorDistance(rock.centre) > rock.reach_m * rock.reach_m) continue;
+    rock.center = {x, y};
+    if (rectangle_m_.squaredExteriorDistance(rock.center) > rock.reach_m * rock.reach_m) continue;
     rock.foot_m = ground(x, y);
     rocks_.push_back(std::move(rock));
   }
@@ -155,8 +155,8 @@ void RockyTerrain::sort_into_buckets() {
   };
   for (std::size_t r = 0; r < rocks_.size(); ++r) {
     const Eigen::Vector2d reach = Eigen::Vector2d::Constant(rocks_[r].reach_m + rounding_m);
-    const Eigen::Vector2d low = rocks_[r].centre - reach - rectangle_m_.min();
-    const Eigen::Vector2d high = rocks_[r].centre + reach - rectangle_m_.min();
+    const Eigen::Vector2d low = rocks_[r].center - reach - rectangle_m_.min();
+    const Eigen::Vector2d high = rocks_[r].center + reach - rectangle_m_.min();
     for (std::size_t row = bucket_at(low.y(), rows); row <= bucket_at(high.y(), rows); ++row)
       for (std::size_t column = bucket_at(low.x(), columns_);
            column <= bucket_at(high.x(), columns_); ++column)
@@ -165,7 +165,7 @@ void RockyTerrain::sort_into_buckets() {
 }
 
 double RockyTerrain::height_over_foot(const Rock& rock, const Eigen::Vector2d& place) {
-  const Eigen::Vector2d offset = place - rock.centre;
+  const Eigen::Vector2d offset = place - rock.center;
   if (offset.squaredNorm() > rock.reach_m * rock.reach_m) return -HUGE_VAL;
   if (rock.facets.empty()) {
     const double squared = (rock.unit_from_plan * offset).squaredNorm();

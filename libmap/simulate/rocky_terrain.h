@@ -39,15 +39,15 @@ class RockyTerrain {
   std::size_t rocks() const { return rocks_.size(); }
 
  private:
-  // Height over the rock's foot: c - a x - b y about its centre.
+  // Height over the rock's foot: c - a x - b y about its center.
   struct Facet {
     double a = 0.0;
     double b = 0.0;
     double c = 0.0;
   };
   struct Rock {
-    Eigen::Vector2d centre = Eigen::Vector2d::Zero();
-    double foot_m = 0.0;   // height of the ground beneath its centre
+    Eigen::Vector2d center = Eigen::Vector2d::Zero();
+    double foot_m = 0.0;   // height of the ground beneath its center
     double reach_m = 0.0;  // farther off there is none of it
     std::vector<Facet> facets{};
     // A cobble: facets are empty.

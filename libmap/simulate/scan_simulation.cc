@@ -55,8 +55,8 @@ std::vector<std::size_t> closures_of(const Trajectory& truth, std::size_t last,
       found.emplace_back(distance, i);
   }
   std::sort(found.begin(), found.end());
-  if (found.size() > static_cast<std::size_t>(options.closures_a_node))
-    found.resize(static_cast<std::size_t>(options.closures_a_node));
+  if (found.size() > static_cast<std::size_t>(options.closures_per_node))
+    found.resize(static_cast<std::size_t>(options.closures_per_node));
   std::vector<std::size_t> nodes;
   nodes.reserve(found.size());
   for (const auto& [distance, node] : found) nodes.push_back(node);
@@ -92,7 +92,7 @@ void bind(ParameterTable& table, LoopClosureOptions& options) {
   table.add("closure_angle_deg", options.angle_deg, {0.0, 180.0},
             "between the two views at most, degrees");
   table.add("closure_node_gap", options.node_gap, {2.0, 1e6}, "nodes between the two at least");
-  table.add("closures_a_node", options.closures_a_node, {1.0, 1e6},
+  table.add("closures_per_node", options.closures_per_node, {1.0, 1e6},
             "to earlier nodes at most, the nearest first");
   table.add("closure_shift_error_m", options.shift_error_m, positive,
             "standard deviation of a closure in each axis, m");
@@ -108,10 +108,10 @@ PoseGraph simulate_odometry(const Trajectory& truth, const OdometryOptions& odom
     if (i > 0) {
       const Pose motion = truth[i - 1].world_from_base.inverse() * truth[i].world_from_base;
       const double way_m = motion.translation().norm();
-      const double error_m = std::max(least_odometry_error_m, odometry.error_of_distance * way_m);
+      const double error_m = std::max(min_odometry_error_m, odometry.error_of_distance * way_m);
       const double error_deg =
-          std::max(least_odometry_error_deg, odometry.error_of_turn * turn_of(motion) * degrees +
-                                                 odometry.turn_of_distance_deg * way_m);
+          std::max(min_odometry_error_deg, odometry.error_of_turn * turn_of(motion) * degrees +
+                                               odometry.turn_of_distance_deg * way_m);
       graph.links.push_back(noisy_link(truth[i - 1].node, truth[i].node, LinkType::neighbor, motion,
                                        error_m, error_deg,
                                        RandomStream(mix_bits(seed, odometry_key), i)));

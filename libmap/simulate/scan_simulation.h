@@ -27,8 +27,8 @@ struct OdometryOptions {
   double turn_of_distance_deg = 0.2;  // ... and degrees a m of way
 };
 // So much at least, however short the motion.
-inline constexpr double least_odometry_error_m = 2e-4;
-inline constexpr double least_odometry_error_deg = 0.01;
+inline constexpr double min_odometry_error_m = 2e-4;
+inline constexpr double min_odometry_error_deg = 0.01;
 void bind(ParameterTable& table, OdometryOptions& options);
 
 struct LoopClosureOptions {
@@ -36,14 +36,14 @@ struct LoopClosureOptions {
   double distance_m = 0.8;       // between the two places, at most
   double angle_deg = 40.0;       // between the two views, at most
   int node_gap = 10;             // nodes between the two in time, at least
-  int closures_a_node = 2;       // to earlier nodes, the nearest first
+  int closures_per_node = 2;     // to earlier nodes, the nearest first
   double shift_error_m = 0.005;  // standard deviation in each axis
   double turn_error_deg = 0.2;   // standard deviation about each axis
 };
 void bind(ParameterTable& table, LoopClosureOptions& options);
 
 // Odometry from the true poses: nodes with both poses, the first odometry pose being the identity,
-// and neighbour links; then closures where they are wanted.
+// and neighbor links; then closures where they are wanted.
 PoseGraph simulate_odometry(const Trajectory& truth, const OdometryOptions& odometry,
                             const LoopClosureOptions& closures, std::uint64_t seed);
 

@@ -15,7 +15,7 @@ namespace {
 
 using std::numbers::pi;
 
-// Probe length along a normal, and what counts as touching; metres.
+// Probe length along a normal, and what counts as touching; meters.
 constexpr double probe_m = 1e-6;
 constexpr double touching_m = 1e-9;
 
@@ -66,7 +66,7 @@ struct SolidMaker {
   void revolve(Profile profile, double middle_a, double bound) const {
     solid.profile = std::move(profile);
     solid.scene_from_solid = pose;
-    solid.bound_centre = solid.scene_from_solid * Eigen::Vector3d(0.0, 0.0, middle_a);
+    solid.bound_center = solid.scene_from_solid * Eigen::Vector3d(0.0, 0.0, middle_a);
     solid.bound_radius = bound;
   }
   void operator()(const Sphere& sphere) const { revolve(profile_of(sphere), 0.0, sphere.radius_m); }
@@ -92,14 +92,14 @@ struct SolidMaker {
         solid.faces.push_back(
             {solid.scene_from_solid * box_face_pose(axis, sign, solid.half_size[axis]),
              solid.half_size[(axis + 1) % 3], solid.half_size[(axis + 2) % 3]});
-    solid.bound_centre = solid.scene_from_solid.translation();
+    solid.bound_center = solid.scene_from_solid.translation();
     solid.bound_radius = solid.half_size.norm();
   }
   void operator()(const Plane& plane) const {
     solid.is_plane = true;
     solid.scene_from_solid = pose;
     solid.faces.push_back({pose, 0.5 * plane.size_x_m, 0.5 * plane.size_y_m});
-    solid.bound_centre = pose.translation();
+    solid.bound_center = pose.translation();
     solid.bound_radius = std::numeric_limits<double>::infinity();
   }
   void operator()(const Bump&) const {}
@@ -176,16 +176,16 @@ void SceneGeometry::add_bumps(const PrimitiveScene& scene) {
   for (std::size_t i = 0; i < scene.shapes.size(); ++i) {
     const Bump* bump = std::get_if<Bump>(&scene.shapes[i].geometry);
     if (bump == nullptr) continue;
-    const Eigen::Vector3d centre =
+    const Eigen::Vector3d center =
         ground()->solid_from_scene * scene.shapes[i].placement.pose().translation();
-    bumps_.push_back({*bump, centre.head<2>(), static_cast<int>(i)});
+    bumps_.push_back({*bump, center.head<2>(), static_cast<int>(i)});
   }
 }
 
 GroundHeight SceneGeometry::ground_height(double x, double y) const {
   GroundHeight sum;
   for (const PlacedBump& placed : bumps_) {
-    const Eigen::Vector2d offset = Eigen::Vector2d(x, y) - placed.centre;
+    const Eigen::Vector2d offset = Eigen::Vector2d(x, y) - placed.center;
     const double r = offset.norm();
     const RadialHeight radial = radial_height(placed.bump, r);
     sum.value += radial.value;
@@ -247,7 +247,7 @@ int SceneGeometry::ground_shape_at(double x, double y) const {
   int shape = ground()->shape;
   double most = 0.0;
   for (const PlacedBump& placed : bumps_) {
-    const double r = (Eigen::Vector2d(x, y) - placed.centre).norm();
+    const double r = (Eigen::Vector2d(x, y) - placed.center).norm();
     if (r >= placed.bump.radius_m) continue;
     const double lift = std::abs(radial_height(placed.bump, r).value);
     if (lift <= most) continue;
@@ -285,7 +285,7 @@ SurfaceTruth SceneGeometry::on_face(const SceneSolid& solid, const FlatFace& fac
 bool SceneGeometry::is_hidden_by(const SceneSolid& solid, const SceneSolid& other,
                                  const Eigen::Vector3d& position,
                                  const Eigen::Vector3d& normal) const {
-  if ((position - other.bound_centre).norm() > other.bound_radius + 2.0 * probe_m) return false;
+  if ((position - other.bound_center).norm() > other.bound_radius + 2.0 * probe_m) return false;
   const double distance = signed_distance(other, position);
   if (distance < -touching_m) return true;
   if (distance > touching_m) return false;

@@ -24,10 +24,10 @@ struct SceneSolid {
   Pose solid_from_scene = Pose::Identity();
   Profile profile;                                      // of a solid of revolution; else empty
   std::vector<FlatFace> faces;                          // of a box (six) or a plane (one)
-  Eigen::Vector3d half_size = Eigen::Vector3d::Zero();  // of a box about its centre
+  Eigen::Vector3d half_size = Eigen::Vector3d::Zero();  // of a box about its center
   bool is_plane = false;
   bool is_ground = false;  // the first plane, which bumps bend
-  Eigen::Vector3d bound_centre = Eigen::Vector3d::Zero();
+  Eigen::Vector3d bound_center = Eigen::Vector3d::Zero();
   double bound_radius = 0.0;  // of a ball around the solid; infinite for a plane
 };
 
@@ -48,7 +48,7 @@ class SceneGeometry {
   // A bump in the ground's frame.
   struct PlacedBump {
     Bump bump;
-    Eigen::Vector2d centre;
+    Eigen::Vector2d center;
     int shape = 0;
   };
   const std::vector<PlacedBump>& bumps() const { return bumps_; }

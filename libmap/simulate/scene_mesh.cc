@@ -50,7 +50,7 @@ TriangleSoup visible_part(const SceneGeometry& geometry, const SceneSolid& solid
   TriangleSoup soup = tessellate(geometry, solid, options);
   for (const SceneSolid& other : geometry.solids()) {
     if (&other == &solid) continue;
-    if ((solid.bound_centre - other.bound_centre).norm() >
+    if ((solid.bound_center - other.bound_center).norm() >
         solid.bound_radius + other.bound_radius + 1e-6)
       continue;
     soup = cut_by(geometry, soup, solid, other);
@@ -94,9 +94,9 @@ class GroundMesher {
     insert_grid();
     for (auto face = triangulation_.finite_faces_begin(); face != triangulation_.finite_faces_end();
          ++face) {
-      const Eigen::Vector2d centre =
+      const Eigen::Vector2d center =
           (in_plane(face->vertex(0)) + in_plane(face->vertex(1)) + in_plane(face->vertex(2))) / 3.0;
-      const SurfaceTruth truth = geometry_.on_face(ground_, face_, centre.x(), centre.y());
+      const SurfaceTruth truth = geometry_.on_face(ground_, face_, center.x(), center.y());
       if (!geometry_.is_visible(ground_, truth.position, truth.normal)) continue;
       mesh_.triangles.push_back(
           {index_of(face->vertex(0)), index_of(face->vertex(1)), index_of(face->vertex(2))});
@@ -148,7 +148,7 @@ class GroundMesher {
     return std::none_of(
         geometry_.solids().begin(), geometry_.solids().end(), [&](const SceneSolid& other) {
           return &other != &ground_ &&
-                 (point - other.bound_centre).norm() < other.bound_radius + margin &&
+                 (point - other.bound_center).norm() < other.bound_radius + margin &&
                  geometry_.signed_distance(other, point) < margin;
         });
   }

@@ -20,11 +20,11 @@ ProfileSegment ProfileSegment::line(Eigen::Vector2d start, Eigen::Vector2d end) 
   return segment;
 }
 
-ProfileSegment ProfileSegment::arc(double centre_a, double radius, double angle_start,
+ProfileSegment ProfileSegment::arc(double center_a, double radius, double angle_start,
                                    double angle_end) {
   ProfileSegment segment;
   segment.is_arc = true;
-  segment.centre_a = centre_a;
+  segment.center_a = center_a;
   segment.radius = radius;
   segment.angle_start = angle_start;
   segment.angle_end = angle_end;
@@ -48,11 +48,11 @@ double ProfileSegment::area_between(double t0, double t1) const {
 Eigen::Vector2d ProfileSegment::point(double t) const {
   if (!is_arc) return start + t * (end - start);
   const double angle = angle_start + t * (angle_end - angle_start);
-  return {radius * std::sin(angle), centre_a + radius * std::cos(angle)};
+  return {radius * std::sin(angle), center_a + radius * std::cos(angle)};
 }
 
 Eigen::Vector2d ProfileSegment::normal_at(const Eigen::Vector2d& at) const {
-  if (is_arc) return (at - Eigen::Vector2d(0.0, centre_a)).normalized();
+  if (is_arc) return (at - Eigen::Vector2d(0.0, center_a)).normalized();
   const Eigen::Vector2d step = (end - start).normalized();
   return {-step.y(), step.x()};
 }
@@ -70,7 +70,7 @@ double ProfileSegment::t_of_area_share(double t0, double t1, double share) const
   const Eigen::Vector2d p0 = point(t0);
   const Eigen::Vector2d p1 = point(t1);
   if (is_arc) {
-    const double cosine = (p0.y() + share * (p1.y() - p0.y()) - centre_a) / radius;
+    const double cosine = (p0.y() + share * (p1.y() - p0.y()) - center_a) / radius;
     const double angle = std::acos(std::clamp(cosine, -1.0, 1.0));
     return std::clamp((angle - angle_start) / (angle_end - angle_start), t0, t1);
   }
@@ -82,7 +82,7 @@ double ProfileSegment::t_of_area_share(double t0, double t1, double share) const
 
 double ProfileSegment::distance(const Eigen::Vector2d& from) const {
   if (is_arc) {
-    const Eigen::Vector2d offset = from - Eigen::Vector2d(0.0, centre_a);
+    const Eigen::Vector2d offset = from - Eigen::Vector2d(0.0, center_a);
     const double angle = std::atan2(offset.x(), offset.y());
     if (angle >= angle_start && angle <= angle_end) return std::abs(offset.norm() - radius);
     return std::min((from - point(0.0)).norm(), (from - point(1.0)).norm());
@@ -94,7 +94,7 @@ double ProfileSegment::distance(const Eigen::Vector2d& from) const {
 
 bool ProfileSegment::is_beyond(const Eigen::Vector2d& at) const {
   if (!is_arc) return (at - start).dot(normal_at(at)) > 0.0;
-  const Eigen::Vector2d offset = at - Eigen::Vector2d(0.0, centre_a);
+  const Eigen::Vector2d offset = at - Eigen::Vector2d(0.0, center_a);
   const double angle = std::atan2(offset.x(), offset.y());
   return angle >= angle_start && angle <= angle_end && offset.norm() > radius;
 }

@@ -12,16 +12,16 @@ struct ProfileSegment {
   bool is_arc = false;
   Eigen::Vector2d start = Eigen::Vector2d::Zero();  // of a line
   Eigen::Vector2d end = Eigen::Vector2d::Zero();
-  double centre_a = 0.0;  // of an arc, whose centre lies on the axis
+  double center_a = 0.0;  // of an arc, whose center lies on the axis
   double radius = 0.0;
   double angle_start = 0.0;  // from the +a direction, radians
   double angle_end = 0.0;
 
-  // A straight segment; an arc about (centre_a, 0).
+  // A straight segment; an arc about (center_a, 0).
   static ProfileSegment line(Eigen::Vector2d start, Eigen::Vector2d end);
-  static ProfileSegment arc(double centre_a, double radius, double angle_start, double angle_end);
+  static ProfileSegment arc(double center_a, double radius, double angle_start, double angle_end);
 
-  double length() const;  // of the segment, in metres
+  double length() const;  // of the segment, in meters
   double area() const;    // turned once about the axis
   // The part of area() between two places, t0 <= t1.
   double area_between(double t0, double t1) const;

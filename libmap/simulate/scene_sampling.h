@@ -25,7 +25,7 @@ struct SceneSamples {
   std::uint64_t hidden_points = 0;  // drawn, but inside another shape
 };
 
-// Samples of the visible surface, even by area: a jittered grid on the parametrisation of each
+// Samples of the visible surface, even by area: a jittered grid on the parametrization of each
 // face. On flat faces every square of side (1 + jitter) * spacing holds a point; elsewhere rounding
 // to whole rows can widen gaps by a few percent. Equal input gives equal bytes.
 SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOptions& options);

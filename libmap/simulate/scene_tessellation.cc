@@ -259,11 +259,11 @@ class Cutter {
     const Eigen::Vector3d& b = soup_.vertices[triangle[1]];
     const Eigen::Vector3d& c = soup_.vertices[triangle[2]];
     const Eigen::Vector3d normal = (b - a).cross(c - a).normalized();
-    // The centre of a chord triangle lies within a round solid: back to its surface.
-    Eigen::Vector3d centre = (a + b + c) / 3.0;
+    // The center of a chord triangle lies within a round solid: back to its surface.
+    Eigen::Vector3d center = (a + b + c) / 3.0;
     for (int step = 0; step < 3; ++step)
-      centre -= geometry_.signed_distance(solid_, centre) * normal;
-    return geometry_.is_hidden_by(solid_, other_, centre, normal);
+      center -= geometry_.signed_distance(solid_, center) * normal;
+    return geometry_.is_hidden_by(solid_, other_, center, normal);
   }
 
   std::uint32_t cut_vertex(std::uint32_t from, std::uint32_t to) {

@@ -15,7 +15,7 @@ struct TriangleSoup {
   std::vector<Triangle> triangles;  // counter-clockwise from outside
 };
 
-// What counts as lying on a surface, metres.
+// What counts as lying on a surface, meters.
 inline constexpr double on_surface_m = 1e-9;
 
 // The whole surface of a solid, closed but for a plane's outline.

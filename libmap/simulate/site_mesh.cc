@@ -76,7 +76,7 @@ Solid ground_solid(const RockSite& site, const GroundRelief& relief, double edge
   return block_solid(grid, lowest - 2.0 * base_depth_m - reach);
 }
 
-// The rock on the ground, in the ground's frame, its triangles labelled with its number.
+// The rock on the ground, in the ground's frame, its triangles labeled with its number.
 Solid placed_rock(const SiteRock& rock, int number, const GroundRelief& relief,
                   double edge_length_m) {
   const double foot = relief.height(rock.x_m, rock.y_m);

@@ -14,7 +14,7 @@ struct SiteMeshOptions {
   std::uint64_t max_triangles = 10'000'000;  // more is an Error
 };
 
-// Rocks united with the ground (CGAL), in the site's frame, with vertex colours and the face field
+// Rocks united with the ground (CGAL), in the site's frame, with vertex colors and the face field
 // "rock": 0 on the ground, n on the n-th rock. Open, it is one surface without holes but its
 // outline, the ground's; closed, the surface of one solid.
 // Throws Error: a bad option or site, too many triangles, a rock that does not touch the ground.

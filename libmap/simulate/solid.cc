@@ -250,14 +250,14 @@ Solid block_solid(const HeightGrid& top, double base_m) {
     below.z() = base_m;
     solid.vertices.push_back(below);
   }
-  const auto centre = static_cast<std::uint32_t>(solid.vertices.size());
+  const auto center = static_cast<std::uint32_t>(solid.vertices.size());
   solid.vertices.emplace_back(0.0, 0.0, base_m);
   const auto count = static_cast<std::uint32_t>(outline.size());
   for (std::uint32_t n = 0; n < count; ++n) {
     const std::uint32_t next = (n + 1) % count;
     solid.triangles.push_back({outline[n], foot + n, foot + next});
     solid.triangles.push_back({outline[n], foot + next, outline[next]});
-    solid.triangles.push_back({foot + next, foot + n, centre});
+    solid.triangles.push_back({foot + next, foot + n, center});
   }
   solid.labels.resize(solid.triangles.size(), -1);
   return solid;

@@ -22,7 +22,7 @@ struct HalfSpace {
   double offset_m = 0.0;
 };
 
-// What the half-spaces have in common, labelled by the half-space in which a face lies. Throws
+// What the half-spaces have in common, labeled by the half-space in which a face lies. Throws
 // Error if that is empty or reaches farther than `bound_m` from the origin along an axis.
 Solid convex_solid(const std::vector<HalfSpace>& half_spaces, double bound_m);
 

@@ -199,12 +199,12 @@ class FacetRefiner {
         if (face->info().depth >= 0) continue;
         face->info().depth = level;
         for (int k = 0; k < 3; ++k) {
-          const auto neighbour = face->neighbor(k);
-          if (neighbour->info().depth >= 0) continue;
+          const auto neighbor = face->neighbor(k);
+          if (neighbor->info().depth >= 0) continue;
           if (triangulation.is_constrained({face, k}))
-            deeper.emplace_back(neighbour, level + 1);
+            deeper.emplace_back(neighbor, level + 1);
           else
-            open.emplace_back(neighbour, level);
+            open.emplace_back(neighbor, level);
         }
       }
       open = std::move(deeper);

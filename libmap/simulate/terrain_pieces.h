@@ -35,7 +35,7 @@ std::vector<TerrainPiece> terrain_pieces(const TerrainPiecesOptions& options);
 std::string piece_file_name(const TerrainPiece& piece);  // "piece_3_0.pcd"
 bool is_piece_file_name(const std::string& name);
 
-// The points of one piece, with normals, in metres, z up: the plan is cut into squares of
+// The points of one piece, with normals, in meters, z up: the plan is cut into squares of
 // `spacing_m`, and each holds a point for each spacing_m^2 of its surface, by chance rounded up or
 // down, at least one. A piece depends on its place, the seed, the spacing and the terrain alone;
 // one that the size cuts off holds the same points as the whole one as far as it goes. Sizes are

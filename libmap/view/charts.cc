@@ -445,8 +445,8 @@ Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title) {
 std::vector<double> round_ticks(double low, double high, int most) {
   std::vector<double> ticks;
   if (!(low < high) || !std::isfinite(high - low) || most < 1) return ticks;
-  const double least_step = (high - low) / most;
-  const double power = std::floor(std::log10(least_step));
+  const double min_step = (high - low) / most;
+  const double power = std::floor(std::log10(min_step));
   // The tick is a whole number times 10^exponent, divided or multiplied once, so that its text is
   // short.
   const auto scaled = [&](double whole) {
@@ -455,7 +455,7 @@ std::vector<double> round_ticks(double low, double high, int most) {
   double multiple = 1;
   for (const double candidate : {1.0, 2.0, 5.0, 10.0}) {
     multiple = candidate;
-    if (scaled(candidate) >= least_step * (1 - 1e-9)) break;
+    if (scaled(candidate) >= min_step * (1 - 1e-9)) break;
   }
   const double step = scaled(multiple);
   // Numbers this close together have no short texts, and may not even differ by a step.

@@ -18,7 +18,7 @@ struct ChartCurve {
   std::string name;  // in the legend; empty: not in it
   std::vector<double> x;
   std::vector<double> y;
-  std::optional<Color> color;  // default: the next of a palette that colour-blind people can tell
+  std::optional<Color> color;  // default: the next of a palette that color-blind people can tell
                                // apart (Okabe and Ito 2008)
   double width_px = 2.5;
   bool dashed = false;

@@ -33,7 +33,7 @@ constexpr std::array<std::array<double, 3>, 18> viridis_points{{
     {0.993248, 0.906157, 0.143936},
 }};
 
-// The 33 colours of the paper's table, from blue over grey to red.
+// The 33 colors of the paper's table, from blue over gray to red.
 constexpr std::array<Color, 33> diverging_points{{
     {59, 76, 192},   {68, 90, 204},   {77, 104, 215},  {87, 117, 225},  {98, 130, 234},
     {108, 142, 241}, {119, 154, 247}, {130, 165, 251}, {141, 176, 254}, {152, 185, 255},
@@ -51,9 +51,9 @@ struct NamedColor {
 constexpr std::array<NamedColor, 10> named_colors{{
     {"white", {255, 255, 255}},
     {"black", {0, 0, 0}},
-    {"grey", {128, 128, 128}},
-    {"light-grey", {211, 211, 211}},
-    {"dark-grey", {70, 70, 70}},
+    {"gray", {128, 128, 128}},
+    {"light-gray", {211, 211, 211}},
+    {"dark-gray", {70, 70, 70}},
     {"red", {214, 24, 24}},
     {"green", {34, 170, 34}},
     {"blue", {40, 90, 220}},
@@ -73,14 +73,14 @@ const ScalarField* find(const ColorSource& source, std::string_view name) {
   for (const char* axis : {"x", "y", "z"}) known.emplace_back(axis);
   std::string bound = "one of";
   for (const std::string& candidate : known) bound += " " + candidate;
-  throw Error("there is no such field to colour by" + did_you_mean(name, known),
+  throw Error("there is no such field to color by" + did_you_mean(name, known),
               {.field = "field", .value = name, .bound = bound});
 }
 
 std::vector<double> values_of(const ColorSource& source, const std::string& name) {
   if (const ScalarField* field = find(source, name)) {
     if (field->values.size() != source.positions.size())
-      throw Error("the field has not one value a point",
+      throw Error("the field has not one value per point",
                   {.field = name,
                    .value = std::to_string(field->values.size()) + " values",
                    .bound = std::to_string(source.positions.size())});
@@ -147,7 +147,7 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
                     const std::string& title, ColoredPoints& result) {
   if (!std::isfinite(coloring.range_min) || !std::isfinite(coloring.range_max) ||
       coloring.range_max < coloring.range_min)
-    throw Error("the range of colours is upside down or not finite",
+    throw Error("the range of colors is upside down or not finite",
                 {.field = "range_max",
                  .value = to_text(coloring.range_max),
                  .bound = ">= range_min = " + to_text(coloring.range_min)});
@@ -155,7 +155,7 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
   auto [low, high] = std::pair{coloring.range_min, coloring.range_max};
   if (low == high) std::tie(low, high) = percentile_range(values, coloring.scale);
   for (const double value : values) {
-    // A constant field has the middle colour.
+    // A constant field has the middle color.
     const double t = high > low ? (value - low) / (high - low) : value - value + 0.5;
     result.colors.push_back(color_at(coloring.scale, t));
   }
@@ -213,7 +213,7 @@ std::uint8_t to_byte(double share) {
   return static_cast<std::uint8_t>(std::lround(255.0 * std::clamp(share, 0.0, 1.0)));
 }
 
-// Between which of `count` evenly spaced colours t lies, and how far towards the upper one.
+// Between which of `count` evenly spaced colors t lies, and how far towards the upper one.
 std::pair<std::size_t, double> place_in(std::size_t count, double t) {
   const double place = std::clamp(t, 0.0, 1.0) * static_cast<double>(count - 1);
   const std::size_t below = std::min(static_cast<std::size_t>(place), count - 2);
@@ -245,7 +245,7 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
   switch (result.mode) {
     case ColorMode::own:
       if (source.own_colors.size() != source.positions.size())
-        throw Error("the data bring no colours of their own",
+        throw Error("the data bring no colors of their own",
                     {.field = "color mode", .value = "own"});
       result.colors = source.own_colors;
       result.legend = coloring.own_legend;
@@ -319,7 +319,7 @@ Color parse_color(std::string_view text, const std::string& field) {
   for (const NamedColor& named : named_colors) known.emplace_back(named.name);
   std::string bound = "#rrggbb or one of";
   for (const std::string& name : known) bound += " " + name;
-  throw Error("not a colour" + did_you_mean(text, known),
+  throw Error("not a color" + did_you_mean(text, known),
               {.field = field, .value = std::string(text), .bound = bound});
 }
 

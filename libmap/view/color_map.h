@@ -1,4 +1,4 @@
-// What colour a point of a map gets, and the legend that says so.
+// What color a point of a map gets, and the legend that says so.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,25 +13,25 @@
 
 namespace libmap {
 
-// automatic: score where there is a field "score", else own colours where they are not all the
+// automatic: score where there is a field "score", else own colors where they are not all the
 //   same, else height.
-// own:    the colours that the data bring.
+// own:    the colors that the data bring.
 // score:  the seven classes of the graspability map's legend.
-// field:  any scalar field, or "x", "y", "z", on a colour scale.
+// field:  any scalar field, or "x", "y", "z", on a color scale.
 // flags:  convex points blue, intersection ("graspable") dark green, obstacles (1 steep face, 2 out
-//   of reach) brown and ochre where there is such a field, the rest light grey.
-// height: z of the terrain frame on a colour scale.
-// single: one colour.
+//   of reach) brown and ochre where there is such a field, the rest light gray.
+// height: z of the terrain frame on a color scale.
+// single: one color.
 // texture: the pictures that a textured mesh brings; `automatic` where there are any.
 enum class ColorMode { automatic, own, score, field, flags, height, single, texture };
 std::vector<std::pair<std::string, ColorMode>> color_mode_names();
 
-// Colours of continuous values. diverging: blue below and red above the grey middle, for values
+// Colors of continuous values. diverging: blue below and red above the gray middle, for values
 // with a sign.
 enum class ColorScale { viridis, diverging };
 std::vector<std::pair<std::string, ColorScale>> color_scale_names();
 
-// One box of a legend, or the colour at one value of a scalar bar.
+// One box of a legend, or the color at one value of a scalar bar.
 struct LegendEntry {
   Color color{};
   std::string text;
@@ -40,7 +40,7 @@ struct LegendEntry {
 };
 
 // Discrete classes from the best to the worst; before them a scalar bar from `min` to `max` if
-// `continuous`. Nothing at all where colours need no explanation.
+// `continuous`. Nothing at all where colors need no explanation.
 struct Legend {
   std::string title;
   bool continuous = false;
@@ -64,13 +64,13 @@ struct Coloring {
   // Points with z below it are white in the modes score, field, flags and height.
   double zero_plane_m = -std::numeric_limits<double>::infinity();
   std::string color = "#b0a89c";  // of mode `single`: "#rrggbb" or a name
-  Legend own_legend{};            // of mode `own`: what the colours mean
+  Legend own_legend{};            // of mode `own`: what the colors mean
 };
 
 // Appends it, unless it is empty or among them already.
 void add_legend(const Legend& legend, std::vector<Legend>& legends);
 
-// What is to be coloured: points (or the centres of triangles) in the terrain frame, metres.
+// What is to be colored: points (or the centers of triangles) in the terrain frame, meters.
 struct ColorSource {
   const std::vector<Eigen::Vector3d>& positions;
   const std::vector<Color>& own_colors;  // may be empty
@@ -84,20 +84,20 @@ struct ColoredPoints {
 };
 
 // Throws Error: a field that is not there (with the nearest known one), a range upside down, own
-// colours asked of data without any, a colour that is none.
+// colors asked of data without any, a color that is none.
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring);
 
 // The classes of core/score_color.h.
 Legend score_legend();
 
-// viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is grey.
+// viridis (S. van der Walt and N. Smith, 2015, CC0) at t in 0..1, clamped; NaN is gray.
 Color viridis(double t);
 
-// Blue, grey, red (Moreland 2009, "Diverging Color Maps for Scientific Visualization"), likewise.
+// Blue, gray, red (Moreland 2009, "Diverging Color Maps for Scientific Visualization"), likewise.
 Color diverging(double t);
 Color color_at(ColorScale scale, double t);
 
-// "#rrggbb", or white, black, grey, light-grey, dark-grey, red, green, blue, yellow, orange.
+// "#rrggbb", or white, black, gray, light-gray, dark-gray, red, green, blue, yellow, orange.
 // Throws Error naming `field`.
 Color parse_color(std::string_view text, const std::string& field);
 

@@ -21,7 +21,7 @@ namespace libmap {
 namespace {
 
 // Above it the multisampled buffers would take gigabytes.
-constexpr double most_multisampled_pixels = 1.7e7;
+constexpr double max_multisampled_pixels = 1.7e7;
 constexpr int multisamples = 4;
 
 // Takes VTK's messages off the console while it lives; the first error is kept.
@@ -97,7 +97,7 @@ ColorImage draw_offscreen(int width, int height,
     window->ShowWindowOff();
     window->SetSize(width, height);
     window->SetDPI(72);
-    const bool small = double{1} * width * height <= most_multisampled_pixels;
+    const bool small = double{1} * width * height <= max_multisampled_pixels;
     window->SetMultiSamples(small ? multisamples : 0);
     fill(*window);
     window->Render();

@@ -40,7 +40,7 @@ class Overlay {
             const Color& color);
   void polygon(const std::vector<Eigen::Vector2d>& corners, const Color& color,
                std::uint8_t opacity = 255);
-  // `middle_left` is the place of the text's left end (or centre, or right end: as aligned), half
+  // `middle_left` is the place of the text's left end (or center, or right end: as aligned), half
   // way up.
   void text(const Eigen::Vector2d& middle_left, const std::string& text, const TextStyle& style);
 

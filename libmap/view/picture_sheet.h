@@ -61,7 +61,7 @@ struct SheetLayout {
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
                        const std::vector<Legend>& legends, double aspect);
 
-// Continuous colours whose range the scenes leave open share one: from the least to the largest
+// Continuous colors whose range the scenes leave open share one: from the least to the largest
 // that each would have had. Throws Error as plan_sheet and render_scene do, and what a cell's
 // `scene` throws; (failed) if no picture can be drawn here.
 ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options);

@@ -107,7 +107,7 @@ void fit_perspective(SceneCamera& camera, const std::vector<Eigen::Vector3d>& po
 void place(SceneCamera& camera, const CameraPlacement& placement) {
   const Eigen::Vector3d view = placement.focal_point - placement.position;
   if (!view.allFinite() || !(view.norm() > 0.0))
-    throw Error("the camera stands at its focal point or is not finite", {.field = "camera"});
+    throw Error("the camera is at its focal point or is not finite", {.field = "camera"});
   const double sine = view.normalized().cross(placement.up.normalized()).norm();
   if (!(sine > 1e-6))
     throw Error("the camera's up direction is parallel to its view, or zero",

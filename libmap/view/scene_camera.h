@@ -48,10 +48,10 @@ struct SceneCamera {
   Eigen::Vector3d up = Eigen::Vector3d::UnitY();
   Eigen::Vector3d forward = -Eigen::Vector3d::UnitZ();
   bool perspective = false;
-  double scale_px = 1.0;  // orthographic: pixels a metre; perspective: the focal length in pixels
+  double scale_px = 1.0;  // orthographic: pixels a meter; perspective: the focal length in pixels
   PixelRect plot;         // its middle is the optical axis
 
-  // Metres in front of the camera's plane; negative behind it.
+  // Meters in front of the camera's plane; negative behind it.
   double depth_of(const Eigen::Vector3d& point) const { return (point - position).dot(forward); }
   double pixels_per_m(double depth_m) const { return perspective ? scale_px / depth_m : scale_px; }
   // From the picture's top left corner. In perspective only for points with a positive depth.

@@ -14,13 +14,13 @@ namespace libmap {
 namespace {
 
 constexpr std::size_t spacing_samples = 2000;
-constexpr double least_width_px = 1.3;
+constexpr double min_width_px = 1.3;
 // Poisson-disk samples leave gaps of up to twice their spacing.
 constexpr double square_per_spacing = 1.8;
-// Neighbouring cubes overlap by a hair, so that rounding opens no gap between them.
+// Neighboring cubes overlap by a hair, so that rounding opens no gap between them.
 constexpr double cube_per_spacing = 1.005;
 constexpr double lone_point_size_m = 0.01;
-// A filler closes gaps of two missing cells, and lies behind neighbours two steps further away.
+// A filler closes gaps of two missing cells, and lies behind neighbors two steps further away.
 constexpr double filler_per_spacing = 3.0;
 constexpr double filler_depth_per_size = 2.75;
 
@@ -92,7 +92,7 @@ bool has_field(const std::vector<ScalarField>& fields, const std::string& name) 
                      [&name](const ScalarField& field) { return field.name == name; });
 }
 
-// Whether the field that colours the mesh is one of its triangles, not of its vertices.
+// Whether the field that colors the mesh is one of its triangles, not of its vertices.
 bool colored_by_face(const TriangleMesh& mesh, const Coloring& coloring) {
   if (mesh.face_fields.empty()) return false;
   const auto only_faces = [&mesh](const std::string& name) {
@@ -137,7 +137,7 @@ TriangleMesh finite_part(const TriangleMesh& mesh) {
   return result;
 }
 
-// Positions, normals and colours of the vertices that a triangle uses.
+// Positions, normals and colors of the vertices that a triangle uses.
 void keep_used_vertices(const TriangleMesh& mesh, const std::vector<Color>& colors,
                         PreparedLayer& result) {
   constexpr std::uint32_t unused = std::numeric_limits<std::uint32_t>::max();
@@ -213,7 +213,7 @@ Color darkened(const Color& color, double share) {
 }
 
 // Lambert's law with some ambient light, from the upper left behind the camera; both sides of a
-// surface are lit. A point without a normal keeps its colour.
+// surface are lit. A point without a normal keeps its color.
 double shade_of(const Eigen::Vector3f& normal, const SceneCamera& camera) {
   const Eigen::Vector3d n = normal.cast<double>();
   if (n.isZero()) return 1.0;
@@ -245,7 +245,7 @@ class TriangleBuilder {
   // The sides of the cube around `center` that the camera sees.
   void add_cube(const Eigen::Vector3d& center, double half, const Color& color, bool shaded,
                 const SceneCamera& camera) {
-    // Seen along an axis a cube shows one side only, in its exact colour.
+    // Seen along an axis a cube shows one side only, in its exact color.
     constexpr std::array<double, 3> side_shades{0.70, 0.84, 1.0};
     const Eigen::Vector3d toward =
         camera.perspective ? (camera.position - center).eval() : (-camera.forward).eval();
@@ -269,7 +269,7 @@ class TriangleBuilder {
   ColoredTriangles& target_;
 };
 
-// How far behind its point a filler lies, metres.
+// How far behind its point a filler lies, meters.
 double filler_depth_m(const PreparedLayer& layer, const SceneCamera& camera) {
   const double usual = filler_depth_per_size * layer.point_size_m;
   if (camera.perspective || camera.forward.z() > -0.999) return usual;
@@ -319,7 +319,7 @@ PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {
   if (around.nearest.empty()) return {};
   std::vector<double> distances;
   for (const Eigen::Vector3d& offset : around.nearest) distances.push_back(offset.norm());
-  // On a lattice some points at least have a neighbour straight beside them.
+  // On a lattice some points at least have a neighbor straight beside them.
   const double pitch = quantile_of(distances, 0.1);
   const auto on_lattice = [pitch](const Eigen::Vector3d& offset) {
     const Eigen::Array3d steps = offset.array() / pitch;
@@ -348,7 +348,7 @@ ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& cam
     const double depth = camera.depth_of(center);
     if (!(depth > 0.0)) continue;
     const double half =
-        0.5 * std::max(layer.point_size_m, least_width_px / camera.pixels_per_m(depth));
+        0.5 * std::max(layer.point_size_m, min_width_px / camera.pixels_per_m(depth));
     const Color color =
         shaded ? darkened(layer.colors[i], shade_of(layer.normals[i], camera)) : layer.colors[i];
     if (layer.cubes)

@@ -1,4 +1,4 @@
-// From the layers of a scene to coloured triangles, as they are drawn.
+// From the layers of a scene to colored triangles, as they are drawn.
 #pragma once
 
 #include <Eigen/Core>
@@ -13,7 +13,7 @@
 
 namespace libmap {
 
-// A layer in the terrain frame, coloured, with nothing in it that cannot be drawn.
+// A layer in the terrain frame, colored, with nothing in it that cannot be drawn.
 struct PreparedLayer {
   std::vector<Eigen::Vector3d> positions;  // all finite
   std::vector<Color> colors;               // one a position
@@ -25,7 +25,7 @@ struct PreparedLayer {
   double point_size_m = 0.0;   // 0 for a mesh
   double filler_size_m = 0.0;  // of the squares that close gaps; 0: none
   Legend legend;
-  // Of a page of a textured mesh: its colours are times `colors`.
+  // Of a page of a textured mesh: its colors are times `colors`.
   const ColorImage* texture = nullptr;
   std::vector<Eigen::Vector2f> coordinates{};  // one a position, from the top left
 };
@@ -38,18 +38,18 @@ PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_sc
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 struct PointSpacing {
-  // Metres, 0 if no two points are apart: on a lattice along the axes its pitch, else the median
+  // Meters, 0 if no two points are apart: on a lattice along the axes its pitch, else the median
   // distance to the nearest other point.
   double distance_m = 0.0;
   bool lattice = false;
   bool gaps = false;  // cells of a surface on the lattice are empty; always where there is none
 };
 // From the points themselves: their lattice, if they lie on one, else the median distance of
-// nearest neighbours.
+// nearest neighbors.
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions);
 
 struct ColoredTriangles {
-  std::vector<Eigen::Vector3f> vertices;  // metres from the `origin` that was given
+  std::vector<Eigen::Vector3f> vertices;  // meters from the `origin` that was given
   std::vector<Color> colors;              // one a vertex
   std::vector<Triangle> triangles;
   const ColorImage* texture = nullptr;  // as in PreparedLayer
@@ -58,7 +58,7 @@ struct ColoredTriangles {
 
 // Squares or the visible sides of cubes for a cloud, at least 1.3 pixels wide; a mesh as it is. The
 // fillers are larger squares behind the points, seen from the camera: what is seen through a gap is
-// the colour of a point beside it. From above they lie below the whole layer, so that every column
+// the color of a point beside it. From above they lie below the whole layer, so that every column
 // shows its highest point; in other views they cover only what is far behind.
 ColoredTriangles triangles_of(const PreparedLayer& layer, const SceneCamera& camera,
                               const Eigen::Vector3d& origin);

@@ -22,12 +22,12 @@ constexpr double bar_height = 13.0;       // the scalar bar
 constexpr double bar_width = 1.3;
 constexpr double swatch = 1.05;
 constexpr double legend_gap = 1.2;  // between two legends
-constexpr int most_ticks = 6;
-constexpr std::size_t many_markers = 5000;  // from here on they are thinned
+constexpr int max_ticks = 6;
+constexpr std::size_t many_markers = 5000;  // from here on they are downsampled
 
 // Where no round number lies between the ends, the ends.
 std::vector<double> ticks_of(const Legend& legend) {
-  std::vector<double> ticks = round_ticks(legend.min, legend.max, most_ticks);
+  std::vector<double> ticks = round_ticks(legend.min, legend.max, max_ticks);
   if (ticks.size() < 2) ticks = {legend.min, legend.max};
   return ticks;
 }
@@ -151,10 +151,10 @@ std::vector<SeenMarker> seen_markers(const ScenePage& page, const SceneCamera& c
 
 // Keeps the markers whose labels are drawn, and of the others of one verdict in each square of that
 // side the first.
-void thin_markers(double side_px, bool labelled, std::vector<SeenMarker>& seen) {
+void thin_markers(double side_px, bool labeled, std::vector<SeenMarker>& seen) {
   std::set<std::tuple<Verdict, long, long>> taken;
   std::erase_if(seen, [&](const SeenMarker& one) {
-    if (labelled && !one.marker->label.empty()) return false;
+    if (labeled && !one.marker->label.empty()) return false;
     const Eigen::Vector2d square = one.pixel / side_px;
     return !taken
                 .emplace(one.marker->verdict, std::lround(std::floor(square.x())),
@@ -341,8 +341,8 @@ void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
     overlay.rectangle({x, y - tick, thickness, 2.0 * tick}, ink);
   std::string text = length_text(length_m);
   const double room = band.width - length_px - 2.2 * f;
-  if (camera.perspective && text_size(text + " at the centre", style).x() <= room)
-    text += " at the centre";
+  if (camera.perspective && text_size(text + " at the center", style).x() <= room)
+    text += " at the center";
   if (text_size(text, style).x() <= room)
     overlay.text({left + length_px + 0.6 * f, y}, text, style);
 }
@@ -355,10 +355,10 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
   const TextStyle style{.size_px = std::max(min_font_px, static_cast<int>(0.85 * f)),
                         .align = TextAlign::center};
   std::vector<SeenMarker> seen = seen_markers(page, camera, markers);
-  const bool labelled = have_room_for_labels(seen, page.plot, 1.3 * style.size_px);
-  if (seen.size() > many_markers) thin_markers(radius, labelled, seen);
+  const bool labeled = have_room_for_labels(seen, page.plot, 1.3 * style.size_px);
+  if (seen.size() > many_markers) thin_markers(radius, labeled, seen);
   std::vector<LabelRequest> requests;
-  if (labelled)
+  if (labeled)
     for (const SeenMarker& one : seen) {
       LabelRequest& request = requests.emplace_back(LabelRequest{.anchor = one.pixel});
       if (one.marker->label.empty()) continue;
@@ -377,7 +377,7 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
     const Color color = verdict_color(seen[i].marker->verdict);
     overlay.disc(seen[i].pixel, radius + border, paper);
     overlay.disc(seen[i].pixel, radius, color);
-    if (!labelled || seen[i].marker->label.empty()) continue;
+    if (!labeled || seen[i].marker->label.empty()) continue;
     const PixelRect& box = boxes[i];
     overlay.rectangle(box, color);
     overlay.rectangle(

@@ -33,7 +33,7 @@ ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& 
 // Round numbers in a row as texts with the same number of decimals.
 std::vector<std::string> tick_texts(const std::vector<double>& ticks);
 
-// The longest length of 1, 2 or 5 times a power of ten metres that is at most `longest_m`.
+// The longest length of 1, 2 or 5 times a power of ten meters that is at most `longest_m`.
 double round_length_m(double longest_m);
 // "50 m", "2 cm", "5 mm".
 std::string length_text(double length_m);

@@ -11,7 +11,7 @@
 namespace libmap {
 
 // Layers that refer to the pages of `model`, which must outlive them. Triangles without a page are
-// of the colour of untextured_color. Triangles with corners that are not finite are left out.
+// of the color of untextured_color. Triangles with corners that are not finite are left out.
 // Throws what TexturedMesh::check throws.
 std::vector<PreparedLayer> prepare_textured(const TexturedMesh& model, const SceneLayer& layer,
                                             const Pose& terrain_from_scene);

@@ -190,7 +190,7 @@ vtkSmartPointer<vtkActor> actor_of(const ColoredTriangles& triangles) {
     data->GetPointData()->SetTCoords(coordinates_of(triangles));
     actor->SetTexture(texture_of(*triangles.texture));
   }
-  // Shades are in the colours already.
+  // Shades are in the colors already.
   actor->GetProperty()->LightingOff();
   return actor;
 }

@@ -24,9 +24,9 @@ namespace libmap {
 enum class PointShape { automatic, cube, square };
 std::vector<std::pair<std::string, PointShape>> point_shape_names();
 
-// automatic: meshes, the sides of cubes, and clouds of one colour (by their normals) are shaded;
-//            all else has exactly the colours of the legend, or those of its texture.
-// none:      exact colours everywhere.
+// automatic: meshes, the sides of cubes, and clouds of one color (by their normals) are shaded;
+//            all else has exactly the colors of the legend, or those of its texture.
+// none:      exact colors everywhere.
 // full:      squares of a cloud with normals and textures are shaded too.
 enum class Shading { automatic, none, full };
 std::vector<std::pair<std::string, Shading>> shading_names();
@@ -44,9 +44,9 @@ struct SceneLayer {
 // What is known of a marked place: green, red, or dark before there is a verdict.
 enum class Verdict { none, pass, fail };
 
-// A labelled point, drawn over everything. One that the view does not contain is left out.
+// A labeled point, drawn over everything. One that the view does not contain is left out.
 struct Marker {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // scene frame, metres
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  // scene frame, meters
   std::string label{};                                 // may be empty
   Verdict verdict = Verdict::none;
 };
@@ -54,13 +54,13 @@ struct Marker {
 // A measure as technical drawings give it: a line with an arrow head at both ends and its text
 // beside its middle, drawn over everything.
 struct DimensionLine {
-  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // scene frame, metres
+  Eigen::Vector3d from = Eigen::Vector3d::Zero();  // scene frame, meters
   Eigen::Vector3d to = Eigen::Vector3d::Zero();
   std::string text{};
 };
 
 struct Scene {
-  std::vector<SceneLayer> layers;  // all in the scene's frame, metres
+  std::vector<SceneLayer> layers;  // all in the scene's frame, meters
   std::vector<Marker> markers;
   std::vector<DimensionLine> dimension_lines{};
   // Views, axes, heights, the zero plane and cubes refer to the terrain frame.
@@ -78,7 +78,7 @@ struct SceneViewOptions {
   bool legend = true;
   int font_px = 0;                     // of the texts, pixels; 0: from the size of the picture
   std::string background = "#5f6b7a";  // behind the scene: "#rrggbb" or a name
-  // What the view is fitted to, metres in the terrain frame, so that several scenes are shown
+  // What the view is fitted to, meters in the terrain frame, so that several scenes are shown
   // alike; default: all that is drawn.
   std::optional<Bounds3d> extent{};
   // On the page around the scene lie title, legend, axes and scale bar; parts for which a small
@@ -88,7 +88,7 @@ struct SceneViewOptions {
 // The picture of `scene`; the same scene and options give the same bytes on the same machine.
 // Starts a VirtualDisplay of its own if no display answers: hold one around several calls to start
 // only one. Calls from several threads are run one after the other.
-// Throws Error: no point to draw, a size or colour or camera that cannot be, a layer whose arrays
+// Throws Error: no point to draw, a size or color or camera that cannot be, a layer whose arrays
 // do not fit each other, and what color_points throws; (failed) if no picture can be drawn here.
 ColorImage render_scene(const Scene& scene, const SceneViewOptions& options);
 

@@ -1,4 +1,4 @@
-# The rocks' steep walls judged as walls (chapter 6.2); included by study.mk.
+# The rocks' steep walls evaluated as walls (chapter 6.2); included by study.mk.
 #
 # OUT/4_artificial_rocks/walls/: the pre-scanned map with the mask along the surface's normal, and
 # what is too high and too steep (surface/), footholds on it for a planner, and what changes against

@@ -178,7 +178,7 @@ def compare_samples(options, folder, tools):
         "largest hole / smallest distance")
     row(*["---"] * 7)
 
-    def judge(name, output, words):
+    def evaluate(name, output, words):
         run = measured(words, output, options.repeat)
         if run is None:
             row(name, *["failed"] + [""] * 5)
@@ -188,11 +188,11 @@ def compare_samples(options, folder, tools):
             f"{quality['largest_hole_m'] / quality['smallest_distance_m']:.3f}")
         return quality
 
-    qualities = [judge(*run) for run in runs]
+    qualities = [evaluate(*run) for run in runs]
     if tools["CloudCompare"] and qualities[0]:
-        # It has no Poisson-disk sampling of meshes; thinning dense random samples comes nearest.
+        # It has no Poisson-disk sampling of meshes; downsampling dense random samples comes nearest.
         radius = qualities[0]["smallest_distance_m"]
-        judge("CloudCompare, 20 N random samples thinned to our radius", theirs,
+        evaluate("CloudCompare, 20 N random samples downsampled to our radius", theirs,
               ["CloudCompare", "-SILENT", "-AUTO_SAVE", "OFF", "-C_EXPORT_FMT", "PLY", "-O", mesh,
                "-SAMPLE_MESH", "POINTS", str(20 * count), "-SS", "SPATIAL", f"{radius:.9f}",
                "-CLEAR_MESHES", "-SAVE_CLOUDS", "FILE", theirs])

@@ -180,7 +180,7 @@ void run(const std::filesystem::path& folder) {
 
 int main(int argc, char** argv) {
   if (argc != 2) {
-    std::cerr << "usage: fusion_accuracy FOLDER, which holds site_full.db, site_drift.db and "
+    std::cerr << "usage: fusion_accuracy FOLDER, which contains site_full.db, site_drift.db and "
                  "site_ground_truth_mesh.ply\n";
     return 2;
   }

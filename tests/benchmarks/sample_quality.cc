@@ -1,5 +1,5 @@
 // sample_quality MESH CLOUD [DARTS]: how evenly a program's samples lie on a surface, as JSON.
-// Written apart from the sampler, so that it judges any program alike.
+// Written apart from the sampler, so that it evaluates any program alike.
 #include <algorithm>
 #include <cmath>
 #include <iostream>
@@ -16,7 +16,7 @@
 
 namespace {
 
-void judge(const std::string& mesh_path, const std::string& cloud_path, double darts) {
+void evaluate(const std::string& mesh_path, const std::string& cloud_path, double darts) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(mesh_path).mesh;
   const libmap::PointCloud cloud = libmap::read_cloud(cloud_path).cloud;
   if (cloud.size() < 2) throw libmap::Error("fewer than two points", {.file = cloud_path});
@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
     return 2;
   }
   try {
-    judge(argv[1], argv[2], argc > 3 ? libmap::parse_double(argv[3]).value_or(1e6) : 1e6);
+    evaluate(argv[1], argv[2], argc > 3 ? libmap::parse_double(argv[3]).value_or(1e6) : 1e6);
   } catch (const std::exception& error) {
     std::cerr << "sample_quality: error: " << error.what() << "\n";
     return 1;

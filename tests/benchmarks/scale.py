@@ -71,7 +71,7 @@ def row_of(graspmap, folder, side, repeat):
                                      capture_output=True).stdout)
     return {"side_m": side, "area_m2": side * side, "points": points, "pivots": info["points"],
             "graspable": info["graspable_voxels"], "simulate_s": simulated[1], "wall_s": wall,
-            "processor_s": processor, "us_a_pivot": 1e6 * processor / info["points"],
+            "processor_s": processor, "us_per_pivot": 1e6 * processor / info["points"],
             "peak_mib": peak, "terrain_mb": bytes_of(terrain) / 1e6, "map_mb": bytes_of(store) / 1e6}
 
 
@@ -91,10 +91,10 @@ def table_of(rows):
              "|---|---|---|---|---|---|---|---|---|---|---|"]
     for row in rows:
         lines.append("| {side_m} | {points} | {pivots} | {share:.2f} | {wall_s:.2f} | "
-                     "{processor_s:.2f} | {us_a_pivot:.2f} | {ratio:.0f} % | {peak_mib:.0f} | "
+                     "{processor_s:.2f} | {us_per_pivot:.2f} | {ratio:.0f} % | {peak_mib:.0f} | "
                      "{terrain_mb:.1f} | {map_mb:.1f} |".format(
                          share=100 * row["graspable"] / row["pivots"],
-                         ratio=100 * row["us_a_pivot"] / rows[0]["us_a_pivot"], **row))
+                         ratio=100 * row["us_per_pivot"] / rows[0]["us_per_pivot"], **row))
     return "\n".join(lines)
 
 

@@ -30,7 +30,7 @@ Chart time_chart(const libmap::Table& table) {
   const std::vector<double> area = logarithms(column(table, "area_m2"));
   Chart chart;
   chart.title = "graspmap score: time";
-  chart.x_axis.title = "log10 of the area in square metres";
+  chart.x_axis.title = "log10 of the area in square meters";
   chart.y_axis.title = "log10 of the time in seconds";
   chart.legend = libmap::LegendCorner::top_left;
   chart.curves = {{.name = "on the clock",
@@ -51,7 +51,7 @@ Chart memory_chart(const libmap::Table& table) {
   const std::vector<double> peak = column(table, "peak_mib");
   Chart chart;
   chart.title = "graspmap score: memory";
-  chart.x_axis.title = "log10 of the area in square metres";
+  chart.x_axis.title = "log10 of the area in square meters";
   chart.y_axis.title = "largest resident memory, MiB";
   chart.y_axis.range = {0.0, std::max(1100.0, 1.1 * *std::max_element(peak.begin(), peak.end()))};
   chart.legend = libmap::LegendCorner::top_left;

@@ -48,7 +48,7 @@ def check_map(points, manifest):
                                                                 for p in points}), "ascending"
     for point in points:
         for axis, index, start in zip("xyz", "ijk", origin):
-            assert abs(point[axis] - (start + size * (point[index] + 0.5))) < 1e-5, "centre"
+            assert abs(point[axis] - (start + size * (point[index] + 0.5))) < 1e-5, "center"
         assert abs(point["score"] - score_of(point, parameters["solid_voxel_threshold"])) < 1e-6
         above = point["z"] >= parameters["zero_plane_m"]
         color = next(c for least, c in COLORS if point["score"] >= least - 1e-6) if above else (255,) * 3
@@ -58,7 +58,7 @@ def check_map(points, manifest):
             holds = holds and point["convex"] == 1
         assert point["graspable"] == int(holds), "graspable"
     assert results["scored_voxels"] == len(points)
-    assert results["edge_voxels"] == sum(p["edge"] for p in points)
+    assert results["border_voxels"] == sum(p["border"] for p in points)
     assert results["graspable_voxels"] == sum(p["graspable"] for p in points)
 
 

@@ -191,7 +191,7 @@ class Test:
         self.disk.leave(0)
         run = self.run(line)
         self.expect_clear_error(line + " (new)", run)
-        # A store of tiles is gone on with later.
+        # A store of tiles can be resumed later.
         left = [name for name in snapshot(self.disk.folder) if not re.match(r"out\.(tiles|txt\.features|g2o\.features)", name)]
         self.expect(not left, line + " (new)", f"leaves {left}", run)
 

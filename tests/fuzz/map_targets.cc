@@ -4,7 +4,7 @@
 #include "libgtd/evaluate/tile_lookup.h"
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
-#include "libgtd/score/map_thinning.h"
+#include "libgtd/score/map_downsampling.h"
 #include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/score/tile_store_json.h"
@@ -69,8 +69,8 @@ bool run_map(std::string_view bytes) {
     accepts([&] { look_up_all(small_index(), map); });
     accepts([&] { libgtd::thin_map_in_cubes(map, 1 << 20); });
     accepts([&] { libmap::make_map_view(map, {}); });
-    libmap::PointCloud judged = map;
-    accepts([&] { libgtd::add_obstacles(judged, graspmap_test::test_voxel_m, {}); });
+    libmap::PointCloud evaluated = map;
+    accepts([&] { libgtd::add_obstacles(evaluated, graspmap_test::test_voxel_m, {}); });
     libgtd::restore_positions(small_index(), map);
   });
 }

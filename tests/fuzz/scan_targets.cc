@@ -44,13 +44,13 @@ Seeds calibration_seeds() {
 
 bool run_depth(std::string_view bytes) {
   accepts([&] { libmap::read_depth_info(bytes); });
-  return accepts([&] { libmap::to_millimetres(libmap::decode_depth(bytes)); });
+  return accepts([&] { libmap::to_millimeters(libmap::decode_depth(bytes)); });
 }
 
 Seeds depth_seeds() {
   const auto depth = graspmap_test::sample_depth(1);
   return {libmap::encode_rvl(depth), libmap::encode_png(depth),
-          libmap::encode_float_png(libmap::to_metres(depth))};
+          libmap::encode_float_png(libmap::to_meters(depth))};
 }
 
 bool run_image(std::string_view bytes) {
@@ -315,7 +315,7 @@ std::vector<FuzzTarget> scan_targets() {
       {"frame_list", "lists of a folder of images", run_frame_list, frame_list_seeds},
       {"frame_pairs", "lists of pairs of images", run_frame_pairs, frame_pairs_seeds},
       {"frame_table", "tables of a folder of images", run_frame_table, frame_table_seeds},
-      {"image", "colour and grey images", run_image, image_seeds},
+      {"image", "color and gray images", run_image, image_seeds},
       {"laser_scan", "laser scans", run_laser_scan, laser_scan_seeds},
       {"matrix", "compressed matrices and texts", run_matrix, matrix_seeds},
       {"poses", "TUM, KITTI, g2o, TORO and other files of poses", run_poses, pose_seeds},

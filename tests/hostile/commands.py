@@ -83,7 +83,7 @@ USES = [
     use("evaluate {x} --bootstrap 10 -o out", "lookup", "lookup.csv", main=True),
     use("analyze {x} --no-pictures -o out", "map", "map.pcd"),
     use("analyze {good}/map.pcd --against {x} --no-pictures -o out", "map", "map.pcd"),
-    use("footholds {x} --edges --no-graspable-only -o out.csv", "map", "map.pcd"),
+    use("footholds {x} --border --no-graspable-only -o out.csv", "map", "map.pcd"),
     use("analyze {x} {good}/map.pcd --pairs -o out", "map", "map.pcd"),
     use("analyze {good}/map.pcd --expected {x} -o out", "expected", "expected.csv", main=True),
     use(f"render {{x}} {SMALL} -o out.png", "cloud map mesh tiles", "map.pcd"),

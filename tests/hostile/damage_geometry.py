@@ -10,7 +10,7 @@ def replaced(data, *pairs):
     for old, new in pairs:
         old, new = (word.encode() if isinstance(word, str) else word for word in (old, new))
         if old not in data:
-            raise SystemExit(f"the good input holds no {old!r}")
+            raise SystemExit(f"the good input contains no {old!r}")
         data = data.replace(old, new, 1)
     return data
 

@@ -125,7 +125,7 @@ def database_blobs(corpus):
                         ("PNG of other size", png(7, 5, [bytes(14)] * 5, 16)),
                         ("PNG bomb", png_bomb()), ("zlib bomb", zip_bomb(1 << 29, (60, 80, 2)))):
         blob(name, "depth", value)
-    for name, value in (("empty", b""), ("text", "colour"), ("JPEG of its header", b"\xff\xd8\xff\xe0"),
+    for name, value in (("empty", b""), ("text", "color"), ("JPEG of its header", b"\xff\xd8\xff\xe0"),
                         ("PNG of 65535 x 65535", inflated_png(65535)), ("PNG bomb", png_bomb()),
                         ("of another size", png(13, 11, [bytes(39)] * 11, 8, 2)), ("noise", corpus.random("image").randbytes(3000))):
         blob(name, "image", value)
@@ -162,7 +162,7 @@ def database_blobs(corpus):
         blob("zlib bomb of 1 GB", column, bomb, "Admin")
     for name, ids, poses in (("of more poses than ids", 2, 5), ("of 10^6", 10 ** 6, 10 ** 6), ("of no ids", 0, 5)):
         pack = lambda data, count, kind: zlib.compress(data) + struct.pack("<3i", 1, count, kind)
-        database(corpus, f"optimised poses {name}", [("UPDATE Admin SET opt_ids = ?, opt_poses = ?", (
+        database(corpus, f"optimized poses {name}", [("UPDATE Admin SET opt_ids = ?, opt_poses = ?", (
             pack(struct.pack(f"<{ids}i", *range(-2, ids - 2)), ids, 4), pack(bytes(48 * poses), 12 * poses, 5)))])
 
 

@@ -216,7 +216,7 @@ def runs(corpus):
                            ("entities", '<?xml version="1.0"?><!DOCTYPE x [<!ENTITY a "b">]><svg>&a;</svg>'))}.items():
         for name, content in contents:
             in_folder(corpus, "run-folder", "run", f"{file} {name}", file, content)
-    path = corpus.copy("run-folder", "that holds itself", "run")
+    path = corpus.copy("run-folder", "that contains itself", "run")
     (path / "again").symlink_to(".")
     path = corpus.copy("run-folder", "50 folders deep", "run")
     for n in range(50):

@@ -1,6 +1,6 @@
 #!/bin/bash
 # A pipeline that is told to end, by SIGTERM to make alone or by SIGTERM and SIGINT to all of its
-# processes, ends by that signal, leaves no process and no half-made file behind, and is gone on with.
+# processes, ends by that signal, leaves no process and no half-made file behind, and can be resumed.
 # Two at once in one folder: the second says so and harms nothing.
 . "$(dirname "$0")/check.sh"
 RANDOM=${SEED:-1}

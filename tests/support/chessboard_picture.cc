@@ -14,7 +14,7 @@ namespace {
 using libmap::Camera;
 using libmap::Pose;
 
-constexpr float grey = 120;
+constexpr float gray = 120;
 constexpr float black = 25;
 constexpr float white = 225;
 
@@ -24,7 +24,7 @@ float intensity(const PaintedBoard& board, double x, double y) {
   const double row = y / board.square_m + 1;
   const double columns = board.columns + 1;
   const double rows = board.rows + 1;
-  if (column < -1 || row < -1 || column > columns + 1 || row > rows + 1) return grey;
+  if (column < -1 || row < -1 || column > columns + 1 || row > rows + 1) return gray;
   if (column < 0 || row < 0 || column > columns || row > rows) return white;
   const int parity = static_cast<int>(std::floor(column)) + static_cast<int>(std::floor(row));
   return parity % 2 == 0 ? black : white;
@@ -94,7 +94,7 @@ libmap::Image<float> ChessboardPainter::paint(const PaintedBoard& board,
       const bool hits = reach > 0 && std::isfinite(reach);
       sum +=
           hits ? intensity(board, eye.x() + reach * direction.x(), eye.y() + reach * direction.y())
-               : grey;
+               : gray;
     }
     picture.pixels[pixel] = sum / static_cast<float>(per_pixel);
   }

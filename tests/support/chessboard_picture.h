@@ -22,7 +22,7 @@ class ChessboardPainter {
   // `samples` x `samples` rays a pixel.
   ChessboardPainter(const libmap::Camera& camera, int samples);
 
-  // Intensities 0 to 255. What is not board is grey.
+  // Intensities 0 to 255. What is not board is gray.
   libmap::Image<float> paint(const PaintedBoard& board,
                              const libmap::Pose& camera_from_board) const;
 
@@ -41,7 +41,7 @@ class ChessboardPainter {
 std::vector<libmap::Pose> board_poses(const libmap::Camera& camera, const PaintedBoard& board,
                                       int count, double max_tilt_deg, double margin_px = 12);
 
-// A Gaussian blur of `blur_px`, then Gaussian noise of `noise` grey levels, then rounding.
+// A Gaussian blur of `blur_px`, then Gaussian noise of `noise` gray levels, then rounding.
 libmap::GrayImage photographed(const libmap::Image<float>& picture, double blur_px, double noise);
 
 }  // namespace graspmap_test

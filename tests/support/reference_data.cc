@@ -76,7 +76,7 @@ std::string read_gz(const fs::path& path) {
 
 std::vector<Eigen::Vector3f> read_points_f32_gz(const fs::path& path) {
   const std::string data = read_gz(path);
-  if (data.size() % 12 != 0) fail(path, "does not hold triples of float32");
+  if (data.size() % 12 != 0) fail(path, "does not contain triples of float32");
   std::vector<Eigen::Vector3f> points(data.size() / 12);
   for (std::size_t i = 0; i < points.size(); ++i)
     std::memcpy(points[i].data(), data.data() + 12 * i, 12);

@@ -35,7 +35,7 @@ void score(const std::string& map, std::vector<std::string> options = {}) {
 TEST(Analyze, WritesAFolderAndItsManifest) {
   write_terrain();
   score("map.pcd");
-  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.pcd", "-o", "out", "--edges"})));
+  ASSERT_TRUE(succeeded(graspmap({"analyze", "map.pcd", "-o", "out", "--border"})));
   for (const char* name : {"histogram.svg", "histogram.png", "by_height.png", "by_slope.svg",
                            "regions.png", "region_links.csv"})
     EXPECT_TRUE(std::filesystem::file_size(scratch("out") / name) > 0) << name;
@@ -47,7 +47,7 @@ TEST(Analyze, WritesAFolderAndItsManifest) {
   const auto summary = json_of("out/summary.json");
   EXPECT_EQ(summary.at("voxels").at("all"), map.size());
   // Bumpy ground of 0.6 x 0.6 m.
-  EXPECT_NEAR(summary.at("judged").at("plan_area_m2").get<double>(), 0.36, 0.02);
+  EXPECT_NEAR(summary.at("evaluated").at("plan_area_m2").get<double>(), 0.36, 0.02);
   const libmap::Table table = libmap::read_csv(scratch("out/regions.csv"));
   EXPECT_EQ(table.rows.size(), summary.at("regions").at("count"));
   double most = 0.0;
@@ -61,12 +61,12 @@ TEST(Analyze, AgainstItselfInAnotherFrameNothingChanges) {
   score("map.pcd");
   score("input.pcd", {"--frame", "input"});
   ASSERT_TRUE(succeeded(graspmap(
-      {"analyze", "map.pcd", "--against", "input.pcd", "-o", "out", "--edges", "--no-pictures"})));
+      {"analyze", "map.pcd", "--against", "input.pcd", "-o", "out", "--border", "--no-pictures"})));
   const auto change = json_of("out/summary.json").at("change");
   EXPECT_EQ(change.at("matching"), "lattice");
-  EXPECT_EQ(change.at("judged").at("kappa").at("value"), 1.0);
+  EXPECT_EQ(change.at("evaluated").at("kappa").at("value"), 1.0);
   EXPECT_EQ(change.at("only_in_map").at("voxels"), 0);
-  EXPECT_EQ(change.at("judged").at("score_difference").at("max"), 0.0);
+  EXPECT_EQ(change.at("evaluated").at("score_difference").at("max"), 0.0);
   EXPECT_FALSE(std::filesystem::exists(scratch("out/change.png")));
   EXPECT_EQ(libmap::read_csv(scratch("out/change.csv")).rows[0][0], "common");
 }
@@ -83,7 +83,7 @@ TEST(Analyze, SameBytesForAnyNumberOfThreadsAndAnyOrderOfPoints) {
   for (const auto& [file, threads] : {std::pair("map.pcd", "1"), std::pair("turned.pcd", "2")})
     ASSERT_TRUE(succeeded(
         graspmap({"analyze", file, "--against", "map.pcd", "-o", "by_" + std::string(threads),
-                  "--threads", threads, "--no-pictures", "--edges"})));
+                  "--threads", threads, "--no-pictures", "--border"})));
   for (const char* name : {"summary.json", "histogram.csv", "by_height.csv", "by_slope.csv",
                            "regions.csv", "region_links.csv", "change.csv", "change.pcd"})
     EXPECT_EQ(content("by_1/" + std::string(name)), content("by_2/" + std::string(name))) << name;
@@ -113,7 +113,7 @@ TEST(Analyze, MapsWithoutAManifestAndStarts) {
   EXPECT_EQ(regions.at("reachable_regions"), 1);
 }
 
-// Far from the origin, as in UTM coordinates, places keep their centimetres.
+// Far from the origin, as in UTM coordinates, places keep their centimeters.
 TEST(Analyze, PlacesFarFromTheOriginAreExact) {
   std::string map = "x,y,z,score,graspable,i,j,k\n";
   for (int i = 0; i < 3; ++i)

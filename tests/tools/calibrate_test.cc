@@ -32,7 +32,7 @@ libmap::Camera true_camera() {
   return camera;
 }
 
-// shots/00.png, ...: 8-bit grey, 16-bit infrared and colour JPEG in turn.
+// shots/00.png, ...: 8-bit gray, 16-bit infrared and color JPEG in turn.
 void write_shots(int count) {
   const libmap::Camera camera = true_camera();
   const graspmap_test::ChessboardPainter painter(camera, 4);

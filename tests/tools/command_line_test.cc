@@ -16,7 +16,7 @@ using graspmap_test::write_text;
 using graspmap_test::wrong_usage;
 using Words = std::vector<std::string>;
 
-// A quick run: convexity is not judged.
+// A quick run: convexity is not evaluated.
 ProgramResult score_quickly(Words more) {
   Words words = {"score", "terrain.pcd", "--curvature-radius", "0", "-o", "map.csv"};
   words.insert(words.end(), more.begin(), more.end());

@@ -93,12 +93,12 @@ TEST(Convert, ManifestOfAMapIsPassedOn) {
   // What analyses of the map ask for.
   EXPECT_EQ(to.at("parameters").at("zero_plane_m"), from.at("parameters").at("zero_plane_m"));
   EXPECT_EQ(to.at("results").at("lattice_origin_m"), from.at("results").at("lattice_origin_m"));
-  const auto judged = [](const char* map) {
+  const auto evaluated = [](const char* map) {
     EXPECT_TRUE(
         succeeded(graspmap({"analyze", map, map, "-o", "sum", "--names", "map|map", "--force"})));
     return content("sum/maps.csv");
   };
-  EXPECT_EQ(judged("map.ply"), judged("map.pcd"));
+  EXPECT_EQ(evaluated("map.ply"), evaluated("map.pcd"));
 }
 
 TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
@@ -114,7 +114,7 @@ TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
     return result.standard_error;
   };
   EXPECT_EQ(told("m.vtp"), "");
-  EXPECT_NE(told("m.stl").find(".stl has no place for: colours, seen"), std::string::npos);
+  EXPECT_NE(told("m.stl").find(".stl has no place for: colors, seen"), std::string::npos);
   EXPECT_NE(told("m.stl").find("off by up to 100 mm"), std::string::npos);
   EXPECT_NE(told("m.obj").find(".obj has no place for: seen"), std::string::npos);
   EXPECT_EQ(told("m.obj").find("single precision"), std::string::npos);
@@ -150,7 +150,7 @@ TEST(Convert, VtpIsWrittenOnly) {
   graspmap_test::write_terrain();
   std::filesystem::create_directory(scratch("in"));
   for (const char* name : {"a.vtp", "in/a.vtp"})
-    ASSERT_TRUE(succeeded(graspmap({"convert", "terrain.pcd", name})));
+    ASSERT_TRUE(succeeded(graspmap({"convert", "terrain.pcd", "-o", name})));
   graspmap_test::write_text(scratch("points.csv"), "x,y,z\n0,0,0\n");
   for (const Words& words : {Words{"info", "a.vtp"},
                              {"convert", "a.vtp", "-o", "b.ply"},

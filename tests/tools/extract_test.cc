@@ -114,7 +114,7 @@ TEST(Extract, OptionsOfPicturesNeedPictures) {
   EXPECT_FALSE(fs::exists(scratch("out")));
 }
 
-TEST(Extract, KeepsMillimetrePngsByteForByte) {
+TEST(Extract, KeepsMillimeterPngsByteForByte) {
   write_example({.depth = libmap::DepthFormat::png16});
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "-o", "out"})));
   EXPECT_EQ(content("out/depth/000002.png"),
@@ -147,7 +147,7 @@ TEST(Extract, KeepsBothImagesOfAStereoPair) {
   EXPECT_TRUE(read.right == database.read_frame(3).right);
 }
 
-// A depth blob that ends too early and a colour blob that is no image.
+// A depth blob that ends too early and a color blob that is no image.
 void break_frames() {
   SQLite::Database database(scratch("scan.db").string(), SQLite::OPEN_READWRITE);
   database.exec("UPDATE Data SET depth = substr(depth, 1, 40) WHERE id = 2");
@@ -220,11 +220,11 @@ TEST(Extract, FoldersOfOtherCommandsAreKept) {
   ASSERT_TRUE(succeeded(graspmap({"simulate", "site", "-o", "site", "--edge-length", "0.1"})));
   const auto site = files_in("site");
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "-o", "site"}),
-                        {"site", "holds what graspmap simulate site wrote"}));
+                        {"site", "contains what graspmap simulate site wrote"}));
   EXPECT_TRUE(files_in("site") == site);
   const auto before = files_in("out");
   EXPECT_TRUE(bad_input(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1"}),
-                        {"out", "holds what graspmap convert wrote", "--force"}));
+                        {"out", "contains what graspmap convert wrote", "--force"}));
   EXPECT_TRUE(files_in("out") == before);
   EXPECT_TRUE(
       succeeded(graspmap({"simulate", "site", "-o", "out", "--edge-length", "0.1", "--force"})));
@@ -349,7 +349,7 @@ TEST(ExtractBundler, BadInput) {
   EXPECT_NE(strict.standard_error.find("error: scan.db: node 5: image"), std::string::npos);
 }
 
-TEST(ExtractBundler, AScanWithoutColour) {
+TEST(ExtractBundler, AScanWithoutColor) {
   ExampleScan scan = graspmap_test::example_scan();
   for (auto& [node, frame] : scan.frames) frame.color = {};
   graspmap_test::write_database(scratch("scan.db"), scan);
@@ -357,7 +357,7 @@ TEST(ExtractBundler, AScanWithoutColour) {
     const auto result = graspmap({"convert", "scan.db", kind, "out", "--poses", "odometry"});
     EXPECT_EQ(result.exit_code, 3);
     EXPECT_TRUE(result.standard_error.ends_with(
-        "error: scan.db: no frame has a pose, a calibration and a colour image\n"))
+        "error: scan.db: no frame has a pose, a calibration and a color image\n"))
         << result.standard_error;
   }
   EXPECT_EQ(graspmap_test::names_in_scratch(), std::vector<std::string>{"scan.db"});

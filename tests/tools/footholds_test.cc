@@ -20,7 +20,7 @@ TEST(Footholds, OfAMapInEitherFrame) {
     ASSERT_TRUE(succeeded(graspmap(
         {"score", "terrain.pcd", "-o", map, "--frame", frame, "--solid-voxel-threshold", "1"})));
     ASSERT_TRUE(succeeded(graspmap(
-        {"footholds", map, "-o", std::string(frame) + ".ply", "--no-graspable-only", "--edges"})));
+        {"footholds", map, "-o", std::string(frame) + ".ply", "--no-graspable-only", "--border"})));
   }
   const PointCloud terrain = libmap::read_cloud(scratch("terrain.ply")).cloud;
   const PointCloud input = libmap::read_cloud(scratch("input.ply")).cloud;
@@ -41,7 +41,7 @@ TEST(Footholds, EdgesThatAreLeftOutAreSaid) {
   const auto result = graspmap({"footholds", "map.csv", "-o", "f.csv"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find("2 at the scan's edges are left out"), std::string::npos);
-  ASSERT_TRUE(succeeded(graspmap({"footholds", "map.csv", "-o", "e.csv", "--edges"})));
+  ASSERT_TRUE(succeeded(graspmap({"footholds", "map.csv", "-o", "e.csv", "--border"})));
   EXPECT_EQ(libmap::read_cloud(scratch("e.csv")).cloud.size(), 1U);
 }
 

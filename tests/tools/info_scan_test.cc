@@ -45,7 +45,7 @@ TEST(InfoScan, SaysWhatADatabaseHolds) {
   EXPECT_GT(json.at("trajectory_error").at("stored").at("rmse_m"), 1e-3);
   EXPECT_EQ(json.at("cameras").size(), 1U);
   EXPECT_EQ(json.at("cameras").at(0).at("fx"), 30);
-  EXPECT_EQ(json.at("images"), (Json{{"PNG 32 x 24, colour", 3}}));
+  EXPECT_EQ(json.at("images"), (Json{{"PNG 32 x 24, color", 3}}));
   EXPECT_EQ(json.at("depth"), (Json{{"RVL 32 x 24", 3}}));
   EXPECT_EQ(json.at("calibrations"), (Json{{"1 camera, records", 3}}));
   EXPECT_EQ(json.at("laser_scans"), 1);
@@ -63,7 +63,7 @@ TEST(InfoScan, Plainly) {
   EXPECT_TRUE(succeeded(result));
   EXPECT_EQ(result.standard_error, "");
   for (const char* line :
-       {"kind: scan\n", "  neighbor: 2\n", "  PNG 32 x 24, colour: 3\n",
+       {"kind: scan\n", "  neighbor: 2\n", "  PNG 32 x 24, color: 3\n",
         "  session 0, nodes 3, begin_s 101.25, duration_s 2\n",
         "  width 32, height 24, fx 30, fy 31, cx 15.5, cy 11.5, distortion none\n"})
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << line;
@@ -150,7 +150,7 @@ TEST(InfoScan, WhatIsNoScan) {
             (std::vector<std::string>{"empty.db", "folder", "other.db", "terrain.pcd", "text.db"}));
 }
 
-// The table of data/README.md, and what RTAB-Map's own optimiser reached.
+// The table of data/README.md, and what RTAB-Map's own optimizer reached.
 TEST(InfoScan, RealScan) {
   GRASPMAP_REQUIRE_DATA();
   const Json json = info((data_folder() / "scans/site_full.db").string());
@@ -160,7 +160,7 @@ TEST(InfoScan, RealScan) {
   EXPECT_NEAR(errors.at("odometry").at("max_m"), 0.0110, 5e-5);
   EXPECT_NEAR(errors.at("stored").at("rmse_m"), 0.0068, 5e-5);
   EXPECT_NEAR(errors.at("stored").at("mean_rotation_deg"), 0.40, 5e-3);
-  EXPECT_EQ(json.at("images"), (Json{{"JPEG 512 x 424, colour", 40}}));
+  EXPECT_EQ(json.at("images"), (Json{{"JPEG 512 x 424, color", 40}}));
 }
 
 }  // namespace info_scan_test

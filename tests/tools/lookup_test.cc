@@ -107,7 +107,7 @@ TEST(Lookup, AnswersCanBeLookedUpAgainAndAgain) {
     const Table answers = looked_up({});
     EXPECT_EQ(cell(answers, 0, "score"), "0.1");
     const std::set<std::string> names(answers.columns.begin(), answers.columns.end());
-    EXPECT_EQ(names.size(), answers.columns.size()) << "a column stands twice";
+    EXPECT_EQ(names.size(), answers.columns.size()) << "a column is a duplicate";
     std::filesystem::copy_file(scratch("answers.csv"), scratch("points.csv"),
                                std::filesystem::copy_options::overwrite_existing);
   }

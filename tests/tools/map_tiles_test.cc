@@ -65,7 +65,7 @@ TEST(MapTiles, MergedIsTheMap) {
     const auto map = json_of("map.pcd.json");
     EXPECT_EQ(merged.at("transforms"), map.at("transforms"));
     EXPECT_EQ(merged.at("frame"), map.at("frame"));
-    for (const char* count : {"scored_voxels", "edge_voxels", "graspable_voxels"})
+    for (const char* count : {"scored_voxels", "border_voxels", "graspable_voxels"})
       EXPECT_EQ(merged.at("results").at(count), map.at("results").at(count)) << count;
     ASSERT_TRUE(succeeded(graspmap({"convert", "map.tiles/", "-o", "merged.csv"})));
     ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "map.csv"})));
@@ -112,7 +112,7 @@ TEST(MapTiles, InfoCountsWhatTheMapHolds) {
   const auto info = nlohmann::json::parse(result.standard_output);
   const auto results = json_of("map.pcd.json").at("results");
   EXPECT_EQ(info.at("points"), results.at("scored_voxels"));
-  EXPECT_EQ(info.at("edge_voxels"), results.at("edge_voxels"));
+  EXPECT_EQ(info.at("border_voxels"), results.at("border_voxels"));
   EXPECT_EQ(info.at("graspable_voxels"), results.at("graspable_voxels"));
   EXPECT_GE(info.at("tiles").at("count"), 9);
   EXPECT_TRUE(info.at("broken_tiles").empty());
@@ -135,8 +135,8 @@ TEST(MapTiles, PicturesAreThoseOfTheMap) {
   }
   ASSERT_TRUE(succeeded(
       graspmap(with({"render", "map.tiles", "-o", "thin.png", "--max-points", "1000"}, small))));
-  EXPECT_EQ(json_of("map.tiles.png.json").at("results").at("columns_a_point"), 1);
-  EXPECT_GT(json_of("thin.png.json").at("results").at("columns_a_point"), 1);
+  EXPECT_EQ(json_of("map.tiles.png.json").at("results").at("columns_per_point"), 1);
+  EXPECT_GT(json_of("thin.png.json").at("results").at("columns_per_point"), 1);
   EXPECT_TRUE(bad_input(graspmap({"render", "map.tiles", "-o", "a.png", "--box", "5,5,6,6"}),
                         {"map.tiles", "--box"}));
   for (const char* box : {"1,2,3", "1,2,3,4,5", "1,2,1,4", "a,b,c,d", "1,2,3,4,", ",,,"})

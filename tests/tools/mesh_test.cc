@@ -21,7 +21,7 @@ using graspmap_test::succeeded;
 using ::testing::HasSubstr;
 using Words = std::vector<std::string>;
 
-// A ball of 0.2 m, coloured, a point about each 12 mm.
+// A ball of 0.2 m, colored, a point about each 12 mm.
 libmap::PointCloud ball(bool with_normals) {
   libmap::PointCloud cloud;
   constexpr int count = 3500;
@@ -130,7 +130,7 @@ TEST(Mesh, CloudsWithoutASurface) {
   libmap::write_cloud(scratch("sheet.ply"), sheet);
   EXPECT_TRUE(bad_input(
       graspmap({"mesh", "sheet.ply", "-o", "mesh.ply", "--quiet", "--trim-distance-cells", "0.1"}),
-      {"sheet.ply: trim_distance_cells is 0.1: no surface lies so near"}));
+      {"sheet.ply: trim_distance_cells is 0.1: no surface is so near"}));
   sheet.positions.insert(sheet.positions.end(), sheet.positions.begin(), sheet.positions.end());
   sheet.normals.insert(sheet.normals.end(), 4, -Eigen::Vector3f::UnitZ());
   libmap::write_cloud(scratch("both.ply"), sheet);

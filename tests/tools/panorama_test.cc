@@ -61,7 +61,7 @@ TEST(PanoramaCommand, WallsOfARoom) {
   ASSERT_EQ(cloud.size(), 6U * width * height);
   const std::vector<double>& camera = cloud.find_field("camera")->values;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
-    // 1600 units of 0.5 mm from a camera 0.2 m off the centre: 1 m along the wall's normal.
+    // 1600 units of 0.5 mm from a camera 0.2 m off the center: 1 m along the wall's normal.
     const double angle = camera[n] * M_PI / 3;
     ASSERT_NEAR(cloud.positions[n].dot(Eigen::Vector3d(std::cos(angle), std::sin(angle), 0)), 1.0,
                 1e-6);
@@ -158,7 +158,7 @@ TEST(PanoramaCommand, BrokenImagesOfAllCamerasAreAnError) {
   EXPECT_EQ(result.exit_code, 3);
   EXPECT_NE(result.standard_error.find("camera_5 is left out\n"), std::string::npos);
   EXPECT_TRUE(result.standard_error.ends_with(
-      "graspmap fuse: error: run: no image of the moment can be read\n"))
+      "graspmap fuse: error: run: no image of that time can be read\n"))
       << result.standard_error;
   EXPECT_FALSE(fs::exists(scratch("cloud.pcd")));
 }

@@ -233,7 +233,7 @@ TEST(PosesOfFiles, OddOnesAreNamed) {
       {"j.g2o", "VERTEX_SE2 1 0 0 0\n", {"line 1", "planar"}},
       {"k.toro", "VERTEX3 1 0 0 0 0 0\n", {"line 1", "columns"}},
       {"l.txt", "1 2 3\n", {"line 1", "3 columns"}},
-      {"m.txt", "\n\n", {"holds no pose"}},
+      {"m.txt", "\n\n", {"contains no pose"}},
       {"n.tum", "12345678901234567890123" + pose + "\n", {"within 20 ms"}},
       {"o.tum", "1" + pose + " 99\n", {"none of the poses"}},
   };

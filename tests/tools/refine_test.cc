@@ -208,16 +208,16 @@ TEST(Refine, ReportsInJsonAndInText) {
                                   "r.json", "--report", "r.txt"})));
   const std::string text = content("r.txt");
   const nlohmann::json report = json_of("r.json");
-  std::size_t judged = 0;
+  std::size_t evaluated = 0;
   for (const nlohmann::json& stage : report.at("stages")) {
     const bool undone = stage.at("undone");
     const std::string name = stage.at("stage");
     EXPECT_NE(text.find("\n" + name + (undone ? ": undone\n" : "\n")), std::string::npos) << name;
     if (!stage.contains("held_out")) continue;
-    ++judged;
+    ++evaluated;
     EXPECT_TRUE(undone || stage.at("held_out").at("change").get<double>() <= 1e-6) << name;
   }
-  EXPECT_GE(judged, 3U);
+  EXPECT_GE(evaluated, 3U);
   for (const std::string words :
        {"absolute error: rmse", "relative error: rmse", "held-out matches", "held-out surfaces",
         "links of neighbor", "standard deviations"})

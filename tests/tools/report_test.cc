@@ -40,7 +40,7 @@ TEST(Report, OfARun) {
   EXPECT_EQ(content("run/report.html"), html);
 }
 
-TEST(Report, LargeMapsAreThinned) {
+TEST(Report, LargeMapsAreDownsampled) {
   make_run();
   ASSERT_TRUE(succeeded(
       graspmap({"report", "run", "-o", "r.html", "--max-cells", "500", "--max-size-mb", "1.5"})));
@@ -49,7 +49,7 @@ TEST(Report, LargeMapsAreThinned) {
   EXPECT_LE(html.size(), 1'500'000U);
 }
 
-// A store is thinned tile by tile to the cells of the same map in one file, walls included.
+// A store is downsampled tile by tile to the cells of the same map in one file, walls included.
 TEST(Report, AStoreIsShownAsItsMap) {
   std::string corner = "x,y,z\n";
   for (int a = 0; a < 120; ++a)

@@ -54,7 +54,7 @@ TEST_F(ScoreBadInput, EmptyFileAndFolder) {
   write_text(scratch("empty.pcd"), "");
   EXPECT_TRUE(bad_input(score({"empty.pcd"}), {"empty.pcd: is empty"}));
   std::filesystem::create_directory(scratch("folder.pcd"));
-  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {"folder.pcd: the folder holds no cloud"}));
+  EXPECT_TRUE(bad_input(score({"folder.pcd"}), {"folder.pcd: the folder contains no cloud"}));
 }
 
 TEST_F(ScoreBadInput, EmptyCloud) {
@@ -119,7 +119,7 @@ TEST_F(ScoreBadInput, Grippers) {
   EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 90"),
                         {"gripper.yaml", "opening_angle_deg is 90", "< 90"}));
   EXPECT_TRUE(bad_input(with_gripper("name: SCAR-E", "name: SCAR-E\nname: other"),
-                        {"gripper.yaml", "name", "stands twice"}));
+                        {"gripper.yaml", "name", "is a duplicate"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", "scare"}),
                         {"gripper is scare", "did you mean 'scar-e'"}));
   EXPECT_TRUE(
@@ -191,7 +191,7 @@ TEST_F(ScoreBadInput, Scenarios) {
                         {"scenario.yaml", "method is thesiss", "did you mean 'thesis'"}));
   EXPECT_TRUE(bad_input(with_scenario("method: [thesis]\n"), {"scenario.yaml", "method"}));
   EXPECT_TRUE(bad_input(with_scenario("method: thesis\nmethod: corrected\n"),
-                        {"scenario.yaml", "method", "stands twice"}));
+                        {"scenario.yaml", "method", "is a duplicate"}));
   EXPECT_TRUE(bad_input(with_scenario("a: b: c\n"), {"scenario.yaml", "line 1"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "none.yaml"}), {"none.yaml"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--config", "artificial_rocks_prescam"}),

@@ -97,7 +97,7 @@ class Merge : public testing::Test {
     EXPECT_TRUE(succeeded(share("a.pcd", "1/2", {})));
     EXPECT_TRUE(succeeded(share("b.pcd", "2/2", {})));
   }
-  // Convexity is not judged: quick.
+  // Convexity is not evaluated: quick.
   static ProgramResult share(const std::string& output, const std::string& tile, Words more) {
     more.insert(more.end(), {"--tile", tile, "--curvature-radius", "0"});
     return score_to(output, more);
@@ -158,13 +158,13 @@ TEST_F(Merge, MissingShare) {
 }
 
 TEST_F(Merge, ShareTwice) {
-  EXPECT_TRUE(bad_input(merge({"a.pcd", "a.pcd"}), {"a.pcd", "two files hold this share"}));
+  EXPECT_TRUE(bad_input(merge({"a.pcd", "a.pcd"}), {"a.pcd", "two files contain this share"}));
   EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd", "b.pcd"}), {"b.pcd"}));
   // By another name.
   std::filesystem::copy_file(scratch("a.pcd"), scratch("b.pcd"),
                              std::filesystem::copy_options::overwrite_existing);
   EXPECT_TRUE(bad_input(merge({"a.pcd", "b.pcd"}),
-                        {"a.pcd: i, j, k is ", "two parts hold the same voxel"}));
+                        {"a.pcd: i, j, k is ", "two parts contain the same voxel"}));
 }
 
 TEST_F(Merge, SharesOfDifferentScenarios) {

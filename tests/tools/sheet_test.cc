@@ -131,7 +131,7 @@ bool near(const libmap::Color& a, const libmap::Color& b) {
   return difference <= 2;
 }
 
-// The squares of the sections, found in the picture by their colours alone, against the mask.
+// The squares of the sections, found in the picture by their colors alone, against the mask.
 TEST(Mask, SectionsShowTheMask) {
   ASSERT_TRUE(succeeded(graspmap(
       {"mask", "--method", "envelope", "--sections", "--cell-width", "400", "-o", "s.png"})));

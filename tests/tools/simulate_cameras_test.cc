@@ -19,12 +19,12 @@ using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using graspmap_test::write_text;
 
-const Eigen::Vector3d ball_centre(0.8, 0.3, 0.2);
+const Eigen::Vector3d ball_center(0.8, 0.3, 0.2);
 
 void write_ground() {
   libmap::write_mesh(scratch("ground.ply"),
                      libmap::join_meshes(graspmap_test::square_mesh(0.1, 3.0),
-                                         graspmap_test::ball_mesh(60, 120, ball_centre, 0.3)));
+                                         graspmap_test::ball_mesh(60, 120, ball_center, 0.3)));
 }
 
 std::vector<std::string> cameras(std::vector<std::string> words) {
@@ -46,7 +46,7 @@ TEST(SimulateCamerasCommand, PanoramaPutsTheImagesBackOnTheMesh) {
     const double unit = scale == "0" ? 0.001 : 0.0001;
     std::size_t on_ball = 0;
     for (const Eigen::Vector3d& point : cloud.positions) {
-      const double ball = std::abs((point - ball_centre).norm() - 0.3);
+      const double ball = std::abs((point - ball_center).norm() - 0.3);
       on_ball += ball < std::abs(point.z() - 0.1);
       // Half a unit along rays of up to 1.5 z, and the ball's facets.
       EXPECT_LT(std::min(std::abs(point.z() - 0.1), ball), 0.75 * unit + 5e-4);
@@ -81,7 +81,7 @@ TEST(SimulateCamerasCommand, PlacesOfTheMeshAreFoundOnTheRobotsMap) {
   ASSERT_TRUE(succeeded(
       graspmap({"score", "cloud.pcd", "--curvature-radius", "0", "-o", "map.pcd", "--quiet"})));
   // On the ball, towards the robot, which stands about (-0.1, 0, 0.4); the ground; out of sight.
-  const Eigen::Vector3d seen = ball_centre + 0.3 * Eigen::Vector3d(-0.9, -0.3, 0.2).normalized();
+  const Eigen::Vector3d seen = ball_center + 0.3 * Eigen::Vector3d(-0.9, -0.3, 0.2).normalized();
   write_text(scratch("places.csv"), "place,x,y,z\nball," + std::to_string(seen.x()) + "," +
                                         std::to_string(seen.y()) + "," + std::to_string(seen.z()) +
                                         "\nground,0.6,-0.5,0.1\nbehind,1.25,0.5,0.1\n");
@@ -128,7 +128,7 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
     return graspmap(cameras(more));
   };
   EXPECT_TRUE(bad_input(run({}), {"error: far.yaml: depth_scale_m is 1e-05: 16-bit images cannot "
-                                  "hold what camera front measures",
+                                  "contain what camera front measures",
                                   "(must be >= far_m / 65534, 2.2888882e-05)"}));
   EXPECT_TRUE(bad_input(run({"--depth-scale", "0.00002"}),
                         {"error: depth_scale_m is 2e-05: 16-bit images"}));

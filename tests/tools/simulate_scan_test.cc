@@ -21,12 +21,12 @@ using graspmap_test::wrong_usage;
 using libmap::LinkType;
 using libmap::PoseSource;
 
-const Eigen::Vector3d ball_centre(0.2, 0.1, 0.3);
+const Eigen::Vector3d ball_center(0.2, 0.1, 0.3);
 
-// With colours of its own, which are quicker to draw than rock.
+// With colors of its own, which are quicker to draw than rock.
 void write_site() {
   libmap::TriangleMesh mesh = libmap::join_meshes(
-      graspmap_test::square_mesh(0.0, 1.5), graspmap_test::ball_mesh(60, 120, ball_centre, 0.3));
+      graspmap_test::square_mesh(0.0, 1.5), graspmap_test::ball_mesh(60, 120, ball_center, 0.3));
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
     mesh.vertex_colors.push_back({static_cast<std::uint8_t>(40 * (i % 6)), 120, 90});
   libmap::write_mesh(scratch("site.ply"), mesh);
@@ -67,8 +67,8 @@ TEST(SimulateScanCommand, WritesAScanWhoseTruePosesPutItOnTheMesh) {
       ++points;
       const Eigen::Vector3d point =
           *node.truth_from_base * (camera.base_from_camera * (depth * rays[p].homogeneous()));
-      // Whole millimetres along rays of up to 1.3 z, and the ball's facets.
-      EXPECT_LT(std::min(std::abs(point.z()), std::abs((point - ball_centre).norm() - 0.3)),
+      // Whole millimeters along rays of up to 1.3 z, and the ball's facets.
+      EXPECT_LT(std::min(std::abs(point.z()), std::abs((point - ball_center).norm() - 0.3)),
                 0.0015);
     }
   }

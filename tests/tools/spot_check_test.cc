@@ -18,7 +18,7 @@ using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using Words = std::vector<std::string>;
 
-// A site of 3 x 2 m whose ground rises by 1 mm for each metre along x from z = 0 in its middle.
+// A site of 3 x 2 m whose ground rises by 1 mm for each meter along x from z = 0 in its middle.
 double height_at(double x) { return 0.001 * x; }
 
 libmap::PointCloud site_cloud(const libmap::Pose& map_from_site = libmap::Pose::Identity()) {
@@ -114,7 +114,7 @@ TEST(SpotCheckCommand, PlacesWithoutDataAreCounted) {
   const auto result = graspmap(
       {"compare", "--edges", "site.ply", "--ground", "zero", "--places", "4", "-o", "check.csv"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_output.find("places without data: 4"), std::string::npos);
+  EXPECT_NE(result.standard_output.find("locations without data: 4"), std::string::npos);
   const libmap::Table table = libmap::read_csv(scratch("check.csv"));
   EXPECT_EQ(table.rows[0][3], "");
   EXPECT_EQ(table.rows[1][1], "");

@@ -130,7 +130,7 @@ TEST(Texture, RealScanAsObjAndGlb) {
     colors.insert(a.pixels[i]);
   }
   EXPECT_LT(different, a.pixels.size() / 100);
-  EXPECT_GT(colors.size(), 1000U) << "a texture has many colours";
+  EXPECT_GT(colors.size(), 1000U) << "a texture has many colors";
   EXPECT_TRUE(bad_input(graspmap({"render", "site.ply", "--color", "texture", "-o", "p.png"}),
                         {"site.ply", "texture"}));
 }
@@ -254,7 +254,7 @@ TEST(Texture, CroppedSitesCarryThePosesWithThem) {
   EXPECT_NE(result.standard_error.find("carried into the site's frame"), std::string::npos);
   EXPECT_EQ(json_of("part.glb.json").at("frame"), "site");
   EXPECT_TRUE(json_of("part.glb.json").at("transforms").contains("site_from_map"));
-  // The same places have the same colours.
+  // The same places have the same colors.
   const auto whole = libmap::read_textured_mesh(scratch("whole.glb"));
   const auto part = libmap::read_textured_mesh(scratch("part.glb"));
   const libmap::SurfaceDistance surface(whole.mesh);

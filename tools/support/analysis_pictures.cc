@@ -23,15 +23,15 @@ constexpr Color obstacle_color{110, 60, 30};
 constexpr Color gained_color{0, 114, 178};
 constexpr Color lost_color{213, 94, 0};
 constexpr Color only_one_color{190, 175, 205};
-constexpr std::size_t most_labels = 8;
+constexpr std::size_t max_labels = 8;
 
 double percent(double part, double whole) { return whole > 0.0 ? 100.0 * part / whole : 0.0; }
 
 // Level ground is light, upright ground dark.
 Color ground_color(float slope_deg) {
   const double slope = std::isnan(slope_deg) ? 0.0 : static_cast<double>(slope_deg);
-  const auto grey = static_cast<std::uint8_t>(std::lround(228.0 - 110.0 * slope / 90.0));
-  return {grey, grey, grey};
+  const auto gray = static_cast<std::uint8_t>(std::lround(228.0 - 110.0 * slope / 90.0));
+  return {gray, gray, gray};
 }
 
 // In the terrain frame.
@@ -48,7 +48,7 @@ libmap::PointCloud cloud_of(const libgtd::VoxelMap& map, const libgtd::MapSurfac
   return cloud;
 }
 
-// Entries of colours that the cloud has.
+// Entries of colors that the cloud has.
 libmap::Legend legend_of(const libmap::PointCloud& cloud, const std::string& title,
                          const std::vector<libmap::LegendEntry>& known) {
   libmap::Legend legend;
@@ -102,10 +102,10 @@ libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::st
   libmap::Chart chart;
   chart.title = title;
   chart.x_axis = {.title = "score", .range = {}};
-  chart.y_axis = {.title = "share of judged voxels [%]", .range = {}};
+  chart.y_axis = {.title = "share of evaluated voxels [%]", .range = {}};
   chart.legend = libmap::LegendCorner::top_left;
   const std::vector<libgtd::ScoreBin>& bins = analysis.score_bins;
-  const double judged = static_cast<double>(analysis.ground.voxels);
+  const double evaluated = static_cast<double>(analysis.ground.voxels);
   const double all = static_cast<double>(analysis.voxels - analysis.without_score);
   libmap::ChartCurve line;
   line.name = "all voxels";
@@ -121,7 +121,8 @@ libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::st
       for (const libmap::ScoreClass& one : libmap::score_classes)
         if (one.color == color) next.name = one.text;
     }
-    chart.histograms.back().heights.push_back(percent(static_cast<double>(bins[b].judged), judged));
+    chart.histograms.back().heights.push_back(
+        percent(static_cast<double>(bins[b].evaluated), evaluated));
     for (const double edge : {bins[b].low, bins[b].high}) {
       line.x.push_back(edge);
       line.y.push_back(percent(static_cast<double>(bins[b].all), all));
@@ -176,7 +177,7 @@ libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegi
                         : reachable                          ? reachable_color
                                                              : unreachable_color;
     for (const std::uint32_t voxel : regions.regions[r].voxels) cloud.colors[voxel] = color;
-    if (r < most_labels)
+    if (r < max_labels)
       markers.push_back({.position = picture.map.center_in_terrain(regions.regions[r].best_voxel),
                          .label = std::to_string(r + 1)});
   }

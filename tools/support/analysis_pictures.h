@@ -13,7 +13,7 @@
 
 namespace graspmap_tools {
 
-// Bars of the judged voxels in the legend's colours, and a line for all voxels.
+// Bars of the evaluated voxels in the legend's colors, and a line for all voxels.
 libmap::Chart histogram_chart(const libgtd::MapAnalysis& analysis, const std::string& title);
 
 // Bars: which share of the ground in a bin can be held. Line: which share of all ground is in it.

@@ -46,7 +46,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
   }
   if (result.pixels_beyond > 0)
     run.warn(
-        fmt::format("{}: {} pixels are deeper than 16 bits hold and are left out "
+        fmt::format("{}: {} pixels are deeper than 16 bits can represent and are left out "
                     "(--depth-scale)",
                     options.input, result.pixels_beyond));
   std::size_t fullest = 0;

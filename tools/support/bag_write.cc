@@ -54,7 +54,7 @@ double radius_of(const std::optional<Manifest>& manifest) {
   return radius && *radius > 0 ? *radius : defaults.radius_m;
 }
 
-// The map with the curvatures at its voxels, coloured by convexity as `render --color flags`.
+// The map with the curvatures at its voxels, colored by convexity as `render --color flags`.
 PointCloud curvature_map(const CloudFile& map) {
   const libgtd::CurvatureOptions options{.radius_m = radius_of(map.manifest),
                                          .up = up_of_map(map.manifest)};

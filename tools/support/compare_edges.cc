@@ -226,11 +226,16 @@ Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
   Json corners = Json::array();
   for (const Eigen::Vector2d& corner : check.site.corners)
     corners.push_back({corner.x(), corner.y()});
-  return {{"file", options.file},         {"ground", check.ground},
-          {"corners_m", corners},         {"edges", edges},
-          {"measured", result.measured},  {"missing", result.missing},
-          {"mean_m", result.mean_size_m}, {"mean_signed_m", result.mean_error_m},
-          {"max_m", result.max_size_m},   {"published_mean_m", published_mean_m}};
+  return {{"file", options.file},
+          {"ground", check.ground},
+          {"corners_m", corners},
+          {"edges", edges},
+          {"measured", result.measured},
+          {"missing", result.missing},
+          {"mean_m", result.mean_abs_error_m},
+          {"mean_signed_m", result.mean_error_m},
+          {"max_m", result.max_abs_error_m},
+          {"published_mean_m", published_mean_m}};
 }
 
 void print_check(const Check& check, const SpotCheckCommandOptions& options) {
@@ -252,9 +257,9 @@ void print_check(const Check& check, const SpotCheckCommandOptions& options) {
       std::cout << fmt::format("{:>8}", row[n].empty() ? "-" : row[n]);
     std::cout << "\n";
   }
-  std::cout << fmt::format("mean of {} places: {:.4f} m, largest {:.4f} m\n", result.measured,
-                           result.mean_size_m, result.max_size_m);
-  if (result.missing > 0) std::cout << fmt::format("places without data: {}\n", result.missing);
+  std::cout << fmt::format("mean of {} locations: {:.4f} m, largest {:.4f} m\n", result.measured,
+                           result.mean_abs_error_m, result.max_abs_error_m);
+  if (result.missing > 0) std::cout << fmt::format("locations without data: {}\n", result.missing);
   std::cout << fmt::format("published (thesis of 2023, table B 2-2, mean of 28): {:.3f} m\n",
                            published_mean_m);
 }
@@ -281,9 +286,9 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
   add("ground", check.ground);
   add("measured", static_cast<std::int64_t>(check.result.measured));
   add("missing", static_cast<std::int64_t>(check.result.missing));
-  add("mean_m", check.result.mean_size_m);
+  add("mean_m", check.result.mean_abs_error_m);
   add("mean_signed_m", check.result.mean_error_m);
-  add("max_m", check.result.max_size_m);
+  add("max_m", check.result.max_abs_error_m);
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_text(temporary, libmap::to_csv(table_of(check.result)));
   });

@@ -46,8 +46,8 @@ struct Counts {
 struct NodeImages {
   libmap::RgbdFrame frame;
   libmap::StoredImages stored;
-  bool is_rounded = false;            // depth, to millimetres
-  std::size_t lost_depth_pixels = 0;  // beyond what millimetres of 16 bits hold
+  bool is_rounded = false;            // depth, to millimeters
+  std::size_t lost_depth_pixels = 0;  // beyond what millimeters of 16 bits hold
   std::optional<libmap::Error> error{};
 };
 
@@ -68,7 +68,7 @@ void keep_files(const libmap::RtabmapDatabase& database, NodeImages& images) {
 // Floats, or 16 bits of another unit.
 void round_depth(NodeImages& images) {
   constexpr double told_m = 1e-5;
-  const libmap::MillimetreImage rounded = libmap::to_millimetres(images.frame.depth);
+  const libmap::MillimeterImage rounded = libmap::to_millimeters(images.frame.depth);
   for (std::size_t n = 0; n < rounded.pixels.size(); ++n) {
     const double depth_m = static_cast<double>(images.frame.depth.pixels[n]);
     if (!(depth_m > 0.0)) continue;
@@ -100,16 +100,16 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
   Counts counts;
   run.progress().begin("frames", nodes.size());
   std::vector<NodeImages> batch(1);
-  std::size_t most_pixels = 0;
+  std::size_t max_pixels = 0;
   for (std::size_t first = 0; first < nodes.size(); first += batch.size()) {
     // The first by itself: it tells how large they are.
-    const std::size_t count = first == 0 ? 1 : libmap::frames_in_batch(most_pixels);
+    const std::size_t count = first == 0 ? 1 : libmap::frames_in_batch(max_pixels);
     batch = std::vector<NodeImages>(std::min(count, nodes.size() - first));
     libmap::parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) batch[i] = read_images(scan, nodes[first + i].id);
     });
     for (const NodeImages& images : batch) {
-      most_pixels = std::max(most_pixels, libmap::image_pixels(images.frame));
+      max_pixels = std::max(max_pixels, libmap::image_pixels(images.frame));
       if (images.error && options.strict) throw libmap::Error(*images.error);
       if (images.error) {
         run.warn(std::string(images.error->what()) + "; its images are left out");
@@ -156,14 +156,14 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
     if (!writer) return;
     const libmap::FrameFolderCounts written = writer->finish(scan.graph());
     add_results(run.manifest(), scan.graph(), counts, written);
-    run.say(fmt::format("{} nodes: {} colour, {} depth images, {} calibrations, {} links",
+    run.say(fmt::format("{} nodes: {} color, {} depth images, {} calibrations, {} links",
                         scan.graph().nodes.size(), written.color_images, written.depth_images,
                         written.calibrations, scan.graph().links.size()));
     if (written.right_images > 0)
       run.say(fmt::format("{} right images of stereo pairs", written.right_images));
     if (counts.rounded_depth_images > 0)
       run.say(
-          fmt::format("{} depth images were rounded to millimetres", counts.rounded_depth_images));
+          fmt::format("{} depth images were rounded to millimeters", counts.rounded_depth_images));
     if (counts.lost_depth_pixels > 0)
       run.warn(fmt::format("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels));
   };

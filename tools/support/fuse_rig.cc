@@ -48,10 +48,10 @@ std::optional<double> parse_stamp(const std::string& text) {
   if (text == "fullest") return std::nullopt;
   const std::optional<double> stamp = libmap::parse_double(text);
   if (!stamp || !std::isfinite(*stamp))
-    throw libmap::Error("no such moment", {.file = {},
-                                           .field = "--stamp",
-                                           .value = text,
-                                           .bound = "a number of seconds, or fullest"});
+    throw libmap::Error("no such time", {.file = {},
+                                         .field = "--stamp",
+                                         .value = text,
+                                         .bound = "a number of seconds, or fullest"});
   return stamp;
 }
 
@@ -65,7 +65,7 @@ std::string absence(const std::string& name, const RigMoment::Camera& camera) {
 void report_absent(const libmap::CameraRig& rig, const RigMoment& moment,
                    const PanoramaCommandOptions& options, Run& run) {
   if (moment.seen() == 0)
-    throw libmap::Error("no camera saw anything at that moment",
+    throw libmap::Error("no camera saw anything at that time",
                         {.file = options.folder,
                          .field = "--stamp",
                          .value = libmap::to_text(moment.stamp_s),
@@ -157,7 +157,7 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
-    throw libmap::Error("no image of the moment can be read", {.file = options.folder});
+    throw libmap::Error("no image of that time can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
   add_rig_results(rig, moment, result, views, run.manifest());
   graspmap_tools::carry_transforms(options.folder, run);

@@ -117,7 +117,7 @@ Json errors_json(const libmap::PoseGraph& graph) {
   const Trajectory truth = trajectory_of(graph, PoseSource::ground_truth);
   Json json = Json::object();
   if (truth.empty()) return nullptr;
-  // Odometry begins anew with each session.
+  // Odometry starts again with each session.
   const auto sessions = by_session(graph, trajectory_of(graph, PoseSource::odometry));
   for (const auto& [session, part] : sessions)
     add_error(json, sessions.size() == 1 ? "odometry" : fmt::format("odometry {}", session), part,
@@ -182,7 +182,7 @@ Json counts_json(const Counts& counts) {
 
 std::string image_text(const libmap::ImageInfo& info) {
   return fmt::format("{} {} x {}, {}{}", to_text(info.format), info.width, info.height,
-                     info.channels == 1 ? "gray" : "colour",
+                     info.channels == 1 ? "gray" : "color",
                      info.bits == 8 ? "" : fmt::format(", {} bits", info.bits));
 }
 
@@ -328,7 +328,7 @@ Json file_json(const ScanSource& scan, const RtabmapDatabase* database) {
   return {{"format", "RTAB-Map database"},
           {"bytes", std::filesystem::file_size(scan.path())},
           {"version", database->version().empty() ? Json(nullptr) : Json(database->version())},
-          {"schema", database->recognised_version()}};
+          {"schema", database->recognized_version()}};
 }
 
 Json verification_json(const libmap::ScanVerificationResult& result) {

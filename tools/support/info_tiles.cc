@@ -43,18 +43,18 @@ TilesInfo tiles_info(const std::string& store, bool verify, libmap::Progress& pr
   const libgtd::TileStoreIndex& index = tiles.index();
   Eigen::AlignedBox3d box;
   std::uint64_t bytes = 0;
-  std::uint64_t edge = 0;
+  std::uint64_t border = 0;
   std::uint64_t graspable = 0;
   for (std::size_t n = 0; n < index.tiles.size(); ++n) {
     box.extend(tiles.box(n));
     bytes += index.tiles[n].bytes;
-    edge += index.tiles[n].edge_voxels;
+    border += index.tiles[n].border_voxels;
     graspable += index.tiles[n].graspable_voxels;
   }
   TilesInfo info;
   info.json = {{"kind", "graspability map in tiles"},
                {"points", index.voxels()},
-               {"edge_voxels", edge},
+               {"border_voxels", border},
                {"graspable_voxels", graspable},
                {"bounds_m", {{"min", numbers(box.min())}, {"max", numbers(box.max())}}},
                {"tiles",

@@ -11,7 +11,7 @@ namespace graspmap_tools {
 
 struct TilesInfo {
   nlohmann::ordered_json json;
-  std::vector<std::string> faults;  // found with `verify`: one line a tile that is broken
+  std::vector<std::string> faults;  // found with `verify`: one line per tile that is broken
 };
 TilesInfo tiles_info(const std::string& store, bool verify, libmap::Progress& progress);
 

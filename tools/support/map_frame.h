@@ -27,7 +27,7 @@ const std::vector<std::pair<std::string, PointFrame>>& listed_point_frame_names(
 PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
                            Run& run);
 
-// The columns x, y, z, in metres. Throws Error naming the file, the row and the column.
+// The columns x, y, z, in meters. Throws Error naming the file, the row and the column.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
 // The name of the transform of what was scored.

@@ -51,7 +51,7 @@ libmap::PointCloud MapTiles::read(const std::filesystem::path& file,
                                   const libgtd::StoredTile& tile) const {
   libmap::PointCloud cloud = libmap::read_cloud(file).cloud;
   if (cloud.size() != tile.voxels)
-    throw libmap::Error("holds other points than the store's index says",
+    throw libmap::Error("contains other points than the store's index says",
                         {.file = file.string(),
                          .field = "points",
                          .value = std::to_string(cloud.size()),

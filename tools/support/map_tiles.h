@@ -34,7 +34,7 @@ class MapTiles {
   // The same, and the file's hash is compared with the index.
   libmap::PointCloud load_checked(std::size_t tile) const;
 
-  // Around the centres of a tile's voxels, in the frame of the map's points.
+  // Around the centers of a tile's voxels, in the frame of the map's points.
   Eigen::AlignedBox3d box(std::size_t tile) const;
   // Whether the file of the merged map holds positions in double precision.
   bool float64_positions() const { return float64_positions_; }

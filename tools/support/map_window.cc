@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "libgtd/score/graspability_map.h"
-#include "libgtd/score/map_thinning.h"
+#include "libgtd/score/map_downsampling.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
@@ -38,8 +38,8 @@ std::vector<SeenTile> seen_tiles(const MapTiles& tiles,
   return seen;
 }
 
-int columns_a_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
-                    std::uint64_t max_points) {
+int columns_per_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
+                      std::uint64_t max_points) {
   double points = 0.0;
   for (const SeenTile& one : seen)
     points += one.share * static_cast<double>(tiles.index().tiles[one.tile].voxels);
@@ -81,21 +81,22 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
                       std::uint64_t max_points) {
   const std::vector<SeenTile> seen = seen_tiles(tiles, box);
   MapWindow window;
-  window.columns_a_point = columns_a_point(tiles, seen, max_points);
+  window.columns_per_point = columns_per_point(tiles, seen, max_points);
   std::vector<libmap::PointCloud> parts(seen.size());
   libmap::parallel_for(seen.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       parts[n] = tiles.load(seen[n].tile);
       if (box) parts[n] = points_in_box(parts[n], *box);
-      if (window.columns_a_point > 1) parts[n] = libgtd::thin_map(parts[n], window.columns_a_point);
+      if (window.columns_per_point > 1)
+        parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
     }
   });
   if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
   if (window.cloud.empty())
     throw libmap::Error("nothing of the map lies in it", {.field = "--box"});
-  if (window.columns_a_point > 1) {
-    window.cloud = libgtd::thin_map(window.cloud, window.columns_a_point);
-    libgtd::center_in_squares(tiles.index(), window.columns_a_point, window.cloud);
+  if (window.columns_per_point > 1) {
+    window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
+    libgtd::center_in_squares(tiles.index(), window.columns_per_point, window.cloud);
   }
   return window;
 }

@@ -11,7 +11,7 @@
 
 namespace graspmap_tools {
 
-// "X0,Y0,X1,Y1" in metres, or nothing for an empty text. Throws Error naming --box.
+// "X0,Y0,X1,Y1" in meters, or nothing for an empty text. Throws Error naming --box.
 std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text);
 
 // The points within the box, level, in the cloud's own frame.
@@ -19,12 +19,12 @@ libmap::PointCloud points_in_box(const libmap::PointCloud& cloud, const Eigen::A
 
 struct MapWindow {
   libmap::PointCloud cloud;
-  int columns_a_point = 1;  // width of the squares of columns that became one point
+  int columns_per_point = 1;  // width of the squares of columns that became one point
 };
 
 // Loads the tiles that the box touches, a few at a time. Where they hold more than about
-// `max_points`, squares of columns become one point each (thin_map). Throws Error if nothing is in
-// the box.
+// `max_points`, squares of columns become one point each (downsample_map). Throws Error if nothing
+// is in the box.
 MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedBox2d>& box,
                       std::uint64_t max_points);
 

@@ -80,7 +80,7 @@ void require_all_shares(const std::vector<libmap::Manifest>& manifests,
     count = of;
     for (const std::string& seen : shares)
       if (seen == share)
-        throw libmap::Error("two files hold this share",
+        throw libmap::Error("two files contain this share",
                             {.file = names[n], .field = "tile", .value = share});
     shares.push_back(share);
   }
@@ -130,8 +130,8 @@ double number_of(const libmap::ManifestValue* value) {
   return 0.0;
 }
 
-// A share has slopes alone: obstacles are judged by the whole map.
-void judge_obstacles(const libmap::Manifest& part, libmap::PointCloud& whole, Run& run) {
+// A share has slopes alone: obstacles are evaluated by the whole map.
+void evaluate_obstacles(const libmap::Manifest& part, libmap::PointCloud& whole, Run& run) {
   if (whole.find_field("slope_deg") == nullptr) return;
   const auto parameter = [&](const char* name) { return number_of(part.find_parameter(name)); };
   const std::size_t count =
@@ -196,10 +196,10 @@ void write_store(const graspmap_tools::MapTiles& tiles, const std::string& store
 void merge_store(const std::string& store, const std::string& output, Run& run) {
   const graspmap_tools::MapTiles tiles(store);
   const libgtd::TileStoreIndex& index = tiles.index();
-  std::uint64_t edge = 0;
+  std::uint64_t border = 0;
   std::uint64_t graspable = 0;
   for (const libgtd::StoredTile& tile : index.tiles) {
-    edge += tile.edge_voxels;
+    border += tile.border_voxels;
     graspable += tile.graspable_voxels;
   }
   copy_common_facts(index.manifest, run.manifest());
@@ -207,7 +207,7 @@ void merge_store(const std::string& store, const std::string& output, Run& run) 
   run.add_input(graspmap_tools::store_index_path(store));
   const graspmap_tools::ResultCounts count(run.manifest());
   count("scored_voxels", index.voxels());
-  count("edge_voxels", edge);
+  count("border_voxels", border);
   count("graspable_voxels", graspable);
   run.write_output(output,
                    [&](const auto& temporary) { write_store(tiles, store, temporary, run); });
@@ -249,11 +249,11 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
   run.manifest().inputs = manifests.front().inputs;
   for (const std::string& tile : tiles) run.add_input(tile);
   run.manifest().results.emplace_back("scored_voxels", static_cast<std::int64_t>(whole.size()));
-  run.manifest().results.emplace_back("edge_voxels", count_of(whole, "edge"));
+  run.manifest().results.emplace_back("border_voxels", count_of(whole, "border"));
   run.manifest().results.emplace_back("graspable_voxels", count_of(whole, "graspable"));
   run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
   try {
-    judge_obstacles(manifests.front(), whole, run);
+    evaluate_obstacles(manifests.front(), whole, run);
   } catch (const libmap::Error& error) {
     throw error.in_file(libmap::manifest_path(tiles.front()).string());
   }

@@ -73,7 +73,7 @@ libmap::Pose parse_transform(const std::string& text, const std::string& field) 
   if (text.empty()) return libmap::Pose::Identity();
   if (fs::exists(text)) return read_matrix(text);
   const std::vector<double> n = parse_numbers(
-      text, 6, field, "X,Y,Z,ROLL,PITCH,YAW in metres and degrees, or a file of a 4 x 4 matrix");
+      text, 6, field, "X,Y,Z,ROLL,PITCH,YAW in meters and degrees, or a file of a 4 x 4 matrix");
   return libmap::make_pose_from_rpy({n[0], n[1], n[2]}, {n[3], n[4], n[5]});
 }
 
@@ -95,7 +95,7 @@ std::string transform_text(const libmap::Pose& pose) {
 
 std::optional<libmap::Bounds3d> parse_box(const std::string& text) {
   if (text.empty()) return std::nullopt;
-  const char* bound = "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX in metres";
+  const char* bound = "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX in meters";
   const std::vector<double> n = parse_numbers(text, 6, "--box", bound);
   const libmap::Bounds3d box{{n[0], n[1], n[2]}, {n[3], n[4], n[5]}};
   if ((box.min.array() > box.max.array()).any())

@@ -15,14 +15,14 @@ namespace graspmap_tools {
 std::vector<double> parse_numbers(const std::string& text, std::size_t count,
                                   const std::string& field, const std::string& bound);
 
-// "X,Y,Z,ROLL,PITCH,YAW" in metres and degrees about the fixed axes, roll first; or the name of a
+// "X,Y,Z,ROLL,PITCH,YAW" in meters and degrees about the fixed axes, roll first; or the name of a
 // file of four rows of four numbers, as `crop` writes. Empty: the identity. Throws Error.
 libmap::Pose parse_transform(const std::string& text, const std::string& field);
 
 // The six numbers that parse_transform reads back as `pose`.
 std::string transform_text(const libmap::Pose& pose);
 
-// "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX" in metres; nothing where empty. Throws Error.
+// "XMIN,YMIN,ZMIN,XMAX,YMAX,ZMAX" in meters; nothing where empty. Throws Error.
 std::optional<libmap::Bounds3d> parse_box(const std::string& text);
 
 bool is_inside(const std::optional<libmap::Bounds3d>& box, const Eigen::Vector3d& point);

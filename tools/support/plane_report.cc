@@ -6,7 +6,7 @@ namespace graspmap_tools {
 
 namespace {
 
-// Third standardised moment of the heights. Rocks and holds on their ground have +0.5 to +3, the
+// Third standardized moment of the heights. Rocks and holds on their ground have +0.5 to +3, the
 // same upside down as much below 0; rolling ground has about 0.
 constexpr double upside_down_skewness = -1.0;
 

@@ -61,7 +61,7 @@ Json error_json(const libmap::TrajectoryError& error) {
           {"max_rotation_deg", error.max_rotation_deg}};
 }
 
-Json held_out_json(const libmap::HeldOutJudgement& held_out) {
+Json held_out_json(const libmap::HeldOutEvaluatement& held_out) {
   const auto part = [](const libmap::HeldOutChange& change) -> Json {
     return {{"count", change.count},
             {"cost_before", change.before},

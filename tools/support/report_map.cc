@@ -9,7 +9,7 @@
 
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
-#include "libgtd/score/map_thinning.h"
+#include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -23,7 +23,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-struct ThinnedMap {
+struct DownsampledMap {
   libmap::PointCloud points;  // in the terrain frame
   std::uint64_t voxels = 0;   // of the whole map
   libmap::MapViewOptions options;
@@ -37,7 +37,7 @@ libmap::Pose terrain_from_map(const std::optional<libmap::Manifest>& manifest) {
                                        : *terrain_from_input;
 }
 
-void set_zero_plane(const std::optional<libmap::Manifest>& manifest, ThinnedMap& map) {
+void set_zero_plane(const std::optional<libmap::Manifest>& manifest, DownsampledMap& map) {
   const std::optional<double> height =
       manifest ? libmap::number_of(manifest->find_parameter("zero_plane_m")) : std::nullopt;
   if (!height) return;
@@ -51,11 +51,11 @@ int first_width(std::uint64_t voxels, std::size_t max_cells) {
       1, static_cast<int>(std::sqrt(static_cast<double>(voxels) / static_cast<double>(max_cells))));
 }
 
-ThinnedMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
+DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
   const auto manifest = libmap::read_manifest_of(path);
   const libmap::PointCloud whole =
       libmap::transform_cloud(libmap::read_cloud(path).cloud, terrain_from_map(manifest));
-  ThinnedMap map;
+  DownsampledMap map;
   map.voxels = whole.size();
   const auto lattice = manifest ? libgtd::facts_of(*manifest).lattice : std::nullopt;
   if (lattice)
@@ -82,10 +82,10 @@ libmap::PointCloud thin_tiles(const MapTiles& tiles, int width) {
   return libgtd::thin_map_in_cubes(libgtd::merge_map_clouds(parts), width);
 }
 
-// The same cells, but thinned tile by tile: a store is never whole in memory.
-ThinnedMap read_store_map(const fs::path& path, std::size_t max_cells) {
+// The same cells, but downsampled tile by tile: a store is never whole in memory.
+DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
   const MapTiles tiles(path.string());
-  ThinnedMap map;
+  DownsampledMap map;
   const auto& index = tiles.index();
   map.voxels = index.voxels();
   const std::optional<libmap::Manifest> manifest = index.manifest;
@@ -105,7 +105,8 @@ ThinnedMap read_store_map(const fs::path& path, std::size_t max_cells) {
 libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path>& lookup,
                               std::size_t max_cells, Run& run) {
   const bool store = is_tile_store(path.string());
-  const ThinnedMap map = store ? read_store_map(path, max_cells) : read_cloud_map(path, max_cells);
+  const DownsampledMap map =
+      store ? read_store_map(path, max_cells) : read_cloud_map(path, max_cells);
   libmap::MapView view = libmap::make_map_view(map.points, map.options);
   view.voxels = map.voxels;
   if (!lookup) return view;

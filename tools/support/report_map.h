@@ -10,7 +10,7 @@
 
 namespace graspmap_tools {
 
-// Reads a map or tile store, thinned to at most `max_cells` cells, in its terrain frame. With
+// Reads a map or tile store, downsampled to at most `max_cells` cells, in its terrain frame. With
 // `lookup`, a CSV file as `lookup` writes it, the view has a marker for each of its rows. Throws
 // Error: the map or its points cannot be read.
 libmap::MapView load_map_view(const std::filesystem::path& map,

@@ -154,8 +154,8 @@ void Run::write_outputs(const fs::path& path, const Files& files) {
   std::vector<fs::path> paths;
   for (const auto& [file, writer] : files) paths.push_back(file);
   require_own_companions(path, paths);
-  // The manifest goes first: an output without one would not be recognised as ours, and `make`
-  // judges by the output, which is then still the old one.
+  // The manifest goes first: an output without one would not be recognized as ours, and `make`
+  // evaluates by the output, which is then still the old one.
   std::vector<libmap::OutputFile> outputs;
   outputs.push_back(begin_manifest(path));
   timed("write", [&] {
@@ -187,7 +187,7 @@ void Run::require_own_folder(const fs::path& given, const std::string& remedy) {
       throw libmap::Error("is not empty and was not written by graspmap" + remedy,
                           {.file = folder.string()});
     if (manifest->command != command_)
-      throw libmap::Error("holds what graspmap " + manifest->command + " wrote" + remedy,
+      throw libmap::Error("contains what graspmap " + manifest->command + " wrote" + remedy,
                           {.file = folder.string()});
   }
   if (!options_.force) require_no_foreign_manifest(folder);

@@ -93,7 +93,7 @@ std::vector<Picture> find_pictures(const libmap::ScanSource& scan, const libmap:
   }
   run.progress().end();
   if (pictures.empty())
-    throw libmap::Error("no frame has a pose, a calibration and a colour image",
+    throw libmap::Error("no frame has a pose, a calibration and a color image",
                         {.file = scan.path().string()});
   return pictures;
 }

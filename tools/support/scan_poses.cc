@@ -22,7 +22,7 @@ using libmap::PoseSource;
 
 namespace {
 
-// The best first: optimised, else by odometry, else ground truth.
+// The best first: optimized, else by odometry, else ground truth.
 constexpr PoseSource sources[] = {PoseSource::stored, PoseSource::odometry,
                                   PoseSource::ground_truth};
 

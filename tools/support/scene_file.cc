@@ -38,12 +38,12 @@ std::vector<libmap::Marker> read_markers(const SceneFileOptions& options) {
       options.label == "auto" || options.label == "none" ? 0 : table.column(options.label);
   const std::string& first = table.columns.front();
   const bool nameless = first == "x" || first == "y" || first == "z";
-  const bool labelled = options.label != "none" && !(options.label == "auto" && nameless);
+  const bool labeled = options.label != "none" && !(options.label == "auto" && nameless);
   std::vector<libmap::Marker> markers;
   for (std::size_t row = 0; row < positions.size(); ++row) {
     libmap::Marker& marker = markers.emplace_back();
     marker.position = positions[row];
-    if (labelled) marker.label = table.rows[row][label];
+    if (labeled) marker.label = table.rows[row][label];
     if (!options.verdict.empty())
       marker.verdict = verdict_of(table, row, table.column(options.verdict));
   }
@@ -93,7 +93,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   const auto box = parse_rectangle(options.box);
   if (is_tile_store(file)) {
     MapWindow window = read_window(MapTiles(file), box, options.max_points);
-    read.columns_a_point = static_cast<std::int64_t>(window.columns_a_point);
+    read.columns_per_point = static_cast<std::int64_t>(window.columns_per_point);
     layer.shape = std::move(window.cloud);
   } else if (libmap::is_textured_format(file)) {
     layer.shape = libmap::read_textured_mesh(file);
@@ -145,15 +145,15 @@ const std::vector<std::pair<std::string, MapHeading>>& map_heading_names() {
 }
 
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
-  table.add("color", options.coloring.mode, libmap::color_mode_names(), "what colours show");
+  table.add("color", options.coloring.mode, libmap::color_mode_names(), "what colors show");
   table.add("field", options.coloring.field, "field that is shown with color: field");
   table.add("color_scale", options.coloring.scale, libmap::color_scale_names(),
-            "colours of continuous values; diverging: blue below and red above 0");
+            "colors of continuous values; diverging: blue below and red above 0");
   table.add("range_min", options.coloring.range_min, libmap::any_number,
-            "value at the lower end of the colours");
+            "value at the lower end of the colors");
   table.add("range_max", options.coloring.range_max, libmap::any_number,
             "value at their upper end; equal to range_min: from the data");
-  table.add("single_color", options.coloring.color, "colour with color: single, #rrggbb");
+  table.add("single_color", options.coloring.color, "color with color: single, #rrggbb");
   table.add(
       "zero_plane", options.zero_plane,
       "height in the terrain frame below which ground is white, m; auto: the map's own, none");
@@ -163,7 +163,7 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("box", options.box,
             "show this rectangle of a cloud or map alone: X0,Y0,X1,Y1 in its frame, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
-            "of a tile store: larger parts are thinned to about so many points");
+            "of a tile store: larger parts are downsampled to about so many points");
   table.add("shading", options.shading, libmap::shading_names(), "where light falls");
   table.add("label", options.label,
             "column of the marked points' names; auto: the first column, unless it is x, y or z; "

@@ -41,7 +41,8 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options);
 
 struct SceneFile {
   libmap::Scene scene;
-  std::int64_t columns_a_point = 0;  // side of the thinned columns of a tile store; 0: no store
+  std::int64_t columns_per_point =
+      0;  // side of the downsampled columns of a tile store; 0: no store
 };
 
 // A cloud, a mesh, a graspability map or a tile store. Throws Error naming the file.

@@ -140,7 +140,7 @@ class StoreScoring {
     const auto earlier = run_.options().force ? std::nullopt : progress_.plan();
     if (!earlier && !run_.options().force && fs::exists(progress_.store() / "index.json"))
       throw libmap::Error(
-          "is complete, but its folder `progress` is not there: --force begins anew",
+          "is complete, but its folder `progress` is not there: --force starts again",
           {.file = options_.store});
     std::vector<TerrainPiece> pieces =
         survey(files_, earlier ? earlier->pieces : std::vector<TerrainPiece>{});
@@ -248,7 +248,7 @@ class StoreScoring {
   // The key is right, but something else was changed.
   libmap::Error not_of_this_terrain(const std::string& field) const {
     return libmap::Error(
-        "is not of this terrain and these parameters: --force begins anew",
+        "is not of this terrain and these parameters: --force starts again",
         {.file = (progress_.store() / "progress" / "plan.json").string(), .field = field});
   }
 
@@ -259,7 +259,7 @@ class StoreScoring {
     };
     if (earlier.index.manifest.parameters != plan.index.manifest.parameters ||
         earlier.index.manifest.version != plan.index.manifest.version)
-      refuse("holds tiles of other parameters: --force begins anew");
+      refuse("contains tiles of other parameters: --force starts again");
     const auto same = [](const TerrainPiece& a, const TerrainPiece& b) {
       return a.input.sha256 == b.input.sha256;
     };
@@ -267,15 +267,15 @@ class StoreScoring {
     for (const TerrainPiece& piece : earlier.pieces) {
       at = std::find_if(at, plan.pieces.end(), [&](const auto& one) { return same(one, piece); });
       if (at == plan.pieces.end())
-        refuse("holds tiles of another terrain or gripper: --force begins anew");
+        refuse("contains tiles of another terrain or gripper: --force starts again");
       ++at;
     }
     if (earlier.pieces.size() == plan.pieces.size())
-      refuse("holds tiles of another gripper file: --force begins anew");
+      refuse("contains tiles of another gripper file: --force starts again");
     if (!options_.append)
       refuse(
-          fmt::format("holds tiles of {} of these {} pieces: --append adds the others, --force "
-                      "begins anew",
+          fmt::format("contains tiles of {} of these {} pieces: --append adds the others, --force "
+                      "starts again",
                       earlier.pieces.size(), plan.pieces.size()));
     if (options_.detection.plane != libgtd::PlaneSource::none)
       refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
@@ -419,7 +419,7 @@ class StoreScoring {
                     std::min(stored.min.k, voxel.k)};
       stored.max = {std::max(stored.max.i, voxel.i), std::max(stored.max.j, voxel.j),
                     std::max(stored.max.k, voxel.k)};
-      stored.edge_voxels += one.edge ? 1 : 0;
+      stored.border_voxels += one.border ? 1 : 0;
       stored.graspable_voxels += one.graspable ? 1 : 0;
     }
     libgtd::GraspabilityMap map;

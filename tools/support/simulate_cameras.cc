@@ -44,7 +44,7 @@ void bind(libmap::ParameterTable& table, SimulateCamerasOptions& options) {
   using libmap::any_number;
   table.add("rig", options.rig, "robot of the toolkit, or a rig file (.yaml)");
   table.add("depth_scale_m", options.depth_scale_m, libmap::not_negative,
-            "metres a unit of the images; 0: the rig's own");
+            "meters a unit of the images; 0: the rig's own");
   table.add("x_m", options.x_m, any_number, "place of the robot's body in the mesh's frame, m");
   table.add("y_m", options.y_m, any_number, "place of the robot's body in the mesh's frame, m");
   table.add("z_m", options.z_m, any_number, "height of the body above the ground beneath it, m");
@@ -65,7 +65,7 @@ libmap::CameraRig load_rig(const SimulateCamerasOptions& options, Run& run) {
     // 16 bits hold no more; 65535 stands for saturated pixels.
     constexpr double largest = 65534;
     if (std::round(camera.far_m / camera.depth_scale_m) > largest)
-      throw libmap::Error("16-bit images cannot hold what camera " + camera.name + " measures",
+      throw libmap::Error("16-bit images cannot represent what camera " + camera.name + " measures",
                           {.file = options.depth_scale_m > 0 ? "" : file.string(),
                            .field = "depth_scale_m",
                            .value = libmap::to_text(camera.depth_scale_m),
@@ -82,7 +82,7 @@ libmap::Pose body_pose(const libmap::TriangleMesh& mesh, const SimulateCamerasOp
                                     {options.roll_deg, options.pitch_deg, options.yaw_deg});
 }
 
-// One file a camera, whatever its stamp, so that a second run leaves none of the first.
+// One file per camera, whatever its stamp, so that a second run leaves none of the first.
 std::string image_name(const libmap::RigCamera& camera) { return camera.name + ".png"; }
 
 std::string images_table(const libmap::CameraRig& rig,

@@ -35,10 +35,10 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             "calibration file of the camera (.yaml); empty: a Kinect v2, 512 x 424 pixels");
   bind(table, simulation.trajectory);
   table.add("target", options.target,
-            "what is looked at, X,Y,Z in the mesh's frame; auto: the site's centre");
+            "what is looked at, X,Y,Z in the mesh's frame; auto: the site's center");
   bind(table, simulation.depth);
   table.add("texture", simulation.texture, libmap::texture_source_names(),
-            "the mesh's own colours, or rock; auto: rock where the mesh has but one colour");
+            "the mesh's own colors, or rock; auto: rock where the mesh has but one color");
   bind(table, simulation.photo);
   bind(table, simulation.odometry);
   bind(table, simulation.closures);
@@ -46,10 +46,10 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             {{"rvl", libmap::DepthFormat::rvl},
              {"png", libmap::DepthFormat::png16},
              {"float", libmap::DepthFormat::float_png}},
-            "how depth is stored; float keeps fractions of a millimetre");
+            "how depth is stored; float keeps fractions of a millimeter");
   table.add("color_format", options.writer.color,
             {{"jpeg", libmap::ImageFormat::jpeg}, {"png", libmap::ImageFormat::png}},
-            "how colour is stored");
+            "how color is stored");
   table.add("seed", simulation.seed, libmap::not_negative, "of all that is random");
 }
 

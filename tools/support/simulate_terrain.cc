@@ -31,7 +31,7 @@ void parse_size(const std::string& text, libmap::TerrainPiecesOptions& options) 
   const auto y = cross == std::string::npos ? x : libmap::parse_double(text.substr(cross + 1));
   if (!x || !y || !(*x > 0.0) || !(*y > 0.0))
     throw libmap::Error("not a size",
-                        {.field = "--size", .value = text, .bound = "M or XxY, metres, > 0"});
+                        {.field = "--size", .value = text, .bound = "M or XxY, meters, > 0"});
   options.size_x_m = *x;
   options.size_y_m = *y;
 }

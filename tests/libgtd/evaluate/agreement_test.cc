@@ -18,10 +18,11 @@ using libgtd::cohens_kappa;
 using libgtd::Confusion;
 using libgtd::Kappa;
 
-// Both yes, judged alone yes, reference alone yes, both no.
-Confusion table_of(std::size_t both, std::size_t judged, std::size_t reference, std::size_t none) {
+// Both yes, evaluated alone yes, reference alone yes, both no.
+Confusion table_of(std::size_t both, std::size_t evaluated, std::size_t reference,
+                   std::size_t none) {
   return {.true_positives = both,
-          .false_positives = judged,
+          .false_positives = evaluated,
           .true_negatives = none,
           .false_negatives = reference};
 }
@@ -115,28 +116,28 @@ TEST(CohensKappa, ErrorIsTheScatterOfSamples) {
 }
 
 TEST(Agreement, CountsAndTheirTransposition) {
-  std::vector<std::uint8_t> judged;
+  std::vector<std::uint8_t> evaluated;
   std::vector<std::uint8_t> reference;
   for (int n = 0; n < 300000; ++n) {
-    judged.push_back(uniform(0.0, 1.0) < 0.3 ? 7 : 0);
+    evaluated.push_back(uniform(0.0, 1.0) < 0.3 ? 7 : 0);
     reference.push_back(uniform(0.0, 1.0) < 0.6 ? 1 : 0);
   }
   Confusion slow;
-  for (std::size_t n = 0; n < judged.size(); ++n) {
-    slow.true_positives += judged[n] != 0 && reference[n] != 0;
-    slow.false_positives += judged[n] != 0 && reference[n] == 0;
-    slow.false_negatives += judged[n] == 0 && reference[n] != 0;
-    slow.true_negatives += judged[n] == 0 && reference[n] == 0;
+  for (std::size_t n = 0; n < evaluated.size(); ++n) {
+    slow.true_positives += evaluated[n] != 0 && reference[n] != 0;
+    slow.false_positives += evaluated[n] != 0 && reference[n] == 0;
+    slow.false_negatives += evaluated[n] == 0 && reference[n] != 0;
+    slow.true_negatives += evaluated[n] == 0 && reference[n] == 0;
   }
   for (const unsigned threads : {1U, 2U}) {
     const libmap::ThreadLimit limit(threads);
-    const Confusion counts = libgtd::confusion_of(judged, reference);
+    const Confusion counts = libgtd::confusion_of(evaluated, reference);
     EXPECT_EQ(counts.true_positives, slow.true_positives);
     EXPECT_EQ(counts.false_positives, slow.false_positives);
     EXPECT_EQ(counts.true_negatives, slow.true_negatives);
     EXPECT_EQ(counts.false_negatives, slow.false_negatives);
   }
-  const Confusion other = libgtd::confusion_of(reference, judged);
+  const Confusion other = libgtd::confusion_of(reference, evaluated);
   EXPECT_EQ(other.false_positives, slow.false_negatives);
   EXPECT_EQ(other.false_negatives, slow.false_positives);
   EXPECT_EQ(other.positives(), slow.predicted_positives());

@@ -28,7 +28,7 @@ std::string parse_error(const std::string& rows) {
   return error_of([&] { parse(rows); }).what();
 }
 
-// One point a voxel, `score` at each; all are graspable where `flags` are not given.
+// One point per voxel, `score` at each; all are graspable where `flags` are not given.
 libmap::PointCloud map_of(const std::vector<Eigen::Vector3d>& positions,
                           const std::vector<double>& scores, const std::vector<double>& flags) {
   libmap::PointCloud map;
@@ -176,7 +176,7 @@ TEST(ExpectedMap, HostileTables) {
               HasSubstr("radius"));
   EXPECT_THAT(of_text("region,x,y,z,radius,graspable,why\na,0,0,0,1,1,\n"), HasSubstr("to_x"));
   EXPECT_THAT(of_text("region,x,y,z,to_x,to_y,to_z,radius,graspable,why,y\n"),
-              HasSubstr("e.csv: y: stands twice"));
+              HasSubstr("e.csv: y: is a duplicate"));
 }
 
 // Two verdicts on one place: balls, a ball on a segment, crossing and passing segments.
@@ -228,7 +228,7 @@ TEST(MapSummary, CountsByHand) {
   map.positions[4].z() = -0.095;
   map.add_field("score", libmap::ScalarType::float32).values = scores;
   map.add_field("graspable", libmap::ScalarType::uint8).values = {0, 1, 0, 0, 1};
-  map.add_field("edge", libmap::ScalarType::uint8).values = {0, 0, 0, 1, 0};
+  map.add_field("border", libmap::ScalarType::uint8).values = {0, 0, 0, 1, 0};
   map.add_field("ssv", libmap::ScalarType::uint32).values = {10, 200, 119, 120, 5};
   map.add_field("i", libmap::ScalarType::int32).values = {0, 1, 2, 3, 4};
   map.add_field("j", libmap::ScalarType::int32).values = {0, 0, 0, 0, 0};
@@ -239,7 +239,7 @@ TEST(MapSummary, CountsByHand) {
       libgtd::summarize_map(map, libgtd::voxel_map_of(map, facts),
                             {.graspability_threshold = 0.8, .solid_voxel_threshold = 120.0});
   EXPECT_EQ(summary.voxels, 5U);
-  EXPECT_EQ(summary.judged, 3U);  // one at the edge, one below the zero plane
+  EXPECT_EQ(summary.evaluated, 3U);  // one at the edge, one below the zero plane
   EXPECT_EQ(summary.reached, 2U);
   EXPECT_EQ(summary.graspable, 1U);
   EXPECT_EQ(*summary.few_solid, 2U);

@@ -112,7 +112,7 @@ TEST(VoxelMap, HostileMapsAreSaid) {
   cloud.positions[1991].x() = std::nan("");
   const VoxelMap map = libgtd::voxel_map_of(cloud);
   EXPECT_EQ(map.size(), 1999U);
-  EXPECT_FALSE(map.judged(1990, true));
+  EXPECT_FALSE(map.evaluated(1990, true));
   EXPECT_EQ(map.graspable[1990], 0);
 }
 
@@ -159,7 +159,7 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   for (std::size_t n = 0; n < cloud.size(); ++n) {
     // 20 of the best are obstacles; the first row along y is at the edges.
     if (cloud.find_field("i")->values[n] == 99.0) cloud.find_field("convex");
-    cloud.find_field("edge")->values[n] = cloud.find_field("j")->values[n] == 0.0 ? 1.0 : 0.0;
+    cloud.find_field("border")->values[n] = cloud.find_field("j")->values[n] == 0.0 ? 1.0 : 0.0;
   }
   cloud.add_field("obstacle", libmap::ScalarType::uint8);
   for (std::size_t n = 0; n < cloud.size(); ++n)
@@ -167,7 +167,7 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   const VoxelMap map = libgtd::voxel_map_of(cloud);
   const MapAnalysis result = libgtd::analyze_map(map, level_surface(map));
   EXPECT_EQ(result.voxels, 2000U);
-  EXPECT_EQ(result.at_edges, 100U);
+  EXPECT_EQ(result.at_border, 100U);
   EXPECT_EQ(result.obstacles, 20U);
   EXPECT_EQ(result.graspable, 19U * 20U);  // 0.805 to 0.985
   EXPECT_EQ(result.ground.voxels, 1900U);
@@ -181,7 +181,7 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   EXPECT_EQ(result.column_coverage, 1.0);
   ASSERT_EQ(result.classes.size(), libmap::score_classes.size());
   EXPECT_EQ(result.classes[0].all, 200U);
-  EXPECT_EQ(result.classes[0].judged, 190U);
+  EXPECT_EQ(result.classes[0].evaluated, 190U);
   EXPECT_EQ(result.classes[0].graspable, 171U);
   EXPECT_EQ(result.classes[6].all, 800U);
   ASSERT_EQ(result.score_bins.size(), 20U);
@@ -189,7 +189,7 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   ASSERT_EQ(result.by_height.size(), 1U);
   ASSERT_EQ(result.by_slope.size(), 18U);
   EXPECT_EQ(result.by_slope[0].voxels, 1900U);
-  const MapAnalysis with_edges = libgtd::analyze_map(map, level_surface(map), {.edges = true});
+  const MapAnalysis with_edges = libgtd::analyze_map(map, level_surface(map), {.border = true});
   EXPECT_EQ(with_edges.ground.voxels, 2000U);
 }
 

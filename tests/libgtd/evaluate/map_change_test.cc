@@ -41,11 +41,11 @@ TEST(MapChange, OfAMapAgainstItself) {
   EXPECT_EQ(change.matching, VoxelMatching::lattice);
   EXPECT_EQ(change.pairs.size(), map.size());
   EXPECT_TRUE(change.only_map.empty() && change.only_other.empty());
-  EXPECT_EQ(change.judged.kappa->value, 1.0);
-  EXPECT_EQ(change.judged.difference.max, 0.0);
-  EXPECT_EQ(change.judged.difference.min, 0.0);
-  EXPECT_NEAR(*change.judged.difference.correlation, 1.0, 1e-9);
-  EXPECT_EQ(change.judged.lost_area_m2 + change.judged.gained_area_m2, 0.0);
+  EXPECT_EQ(change.evaluated.kappa->value, 1.0);
+  EXPECT_EQ(change.evaluated.difference.max, 0.0);
+  EXPECT_EQ(change.evaluated.difference.min, 0.0);
+  EXPECT_NEAR(*change.evaluated.difference.correlation, 1.0, 1e-9);
+  EXPECT_EQ(change.evaluated.lost_area_m2 + change.evaluated.gained_area_m2, 0.0);
 }
 
 // Independent of the order in which pairs are found.
@@ -67,12 +67,12 @@ TEST(MapChange, CountsOfTheDefinitionOnOneLattice) {
   EXPECT_EQ(change.pairs.size(), pairs);
   EXPECT_EQ(change.only_map.size(), 20U * 60U);
   EXPECT_EQ(change.only_other.size(), 20U * 60U);
-  EXPECT_EQ(change.judged.graspable.true_positives, counts[1][1]);
-  EXPECT_EQ(change.judged.lost(), counts[1][0]);
-  EXPECT_EQ(change.judged.gained(), counts[0][1]);
-  EXPECT_EQ(change.judged.graspable.true_negatives, counts[0][0]);
-  EXPECT_NEAR(change.judged.difference.mean, sum / static_cast<double>(pairs), 1e-12);
-  EXPECT_NEAR(change.judged.lost_area_m2, static_cast<double>(counts[1][0]) * 1e-4, 1e-8);
+  EXPECT_EQ(change.evaluated.graspable.true_positives, counts[1][1]);
+  EXPECT_EQ(change.evaluated.lost(), counts[1][0]);
+  EXPECT_EQ(change.evaluated.gained(), counts[0][1]);
+  EXPECT_EQ(change.evaluated.graspable.true_negatives, counts[0][0]);
+  EXPECT_NEAR(change.evaluated.difference.mean, sum / static_cast<double>(pairs), 1e-12);
+  EXPECT_NEAR(change.evaluated.lost_area_m2, static_cast<double>(counts[1][0]) * 1e-4, 1e-8);
   std::size_t by_height = 0;
   for (const libgtd::ChangeSummary& bin : change.by_height) by_height += bin.graspable.size();
   EXPECT_EQ(by_height, pairs);
@@ -89,14 +89,14 @@ TEST(MapChange, ExchangedMapsTranspose) {
     ASSERT_EQ(there.pairs.size(), back.pairs.size());
     EXPECT_GT(there.pairs.size(), 500U);
     EXPECT_EQ(there.only_map, back.only_other);
-    EXPECT_EQ(there.judged.lost(), back.judged.gained());
-    EXPECT_EQ(there.judged.gained(), back.judged.lost());
-    EXPECT_EQ(there.judged.graspable.true_positives, back.judged.graspable.true_positives);
-    EXPECT_NEAR(there.judged.kappa->value, back.judged.kappa->value, 1e-12);
-    EXPECT_NEAR(there.judged.difference.mean, -back.judged.difference.mean, 1e-12);
-    EXPECT_EQ(there.judged.difference.median, -back.judged.difference.median);
-    EXPECT_EQ(there.judged.difference.low_5, -back.judged.difference.high_95);
-    EXPECT_EQ(there.judged.difference.high_95, -back.judged.difference.low_5);
+    EXPECT_EQ(there.evaluated.lost(), back.evaluated.gained());
+    EXPECT_EQ(there.evaluated.gained(), back.evaluated.lost());
+    EXPECT_EQ(there.evaluated.graspable.true_positives, back.evaluated.graspable.true_positives);
+    EXPECT_NEAR(there.evaluated.kappa->value, back.evaluated.kappa->value, 1e-12);
+    EXPECT_NEAR(there.evaluated.difference.mean, -back.evaluated.difference.mean, 1e-12);
+    EXPECT_EQ(there.evaluated.difference.median, -back.evaluated.difference.median);
+    EXPECT_EQ(there.evaluated.difference.low_5, -back.evaluated.difference.high_95);
+    EXPECT_EQ(there.evaluated.difference.high_95, -back.evaluated.difference.low_5);
   }
 }
 
@@ -106,7 +106,7 @@ TEST(MapChange, PercentilesByHand) {
   const VoxelMap other = libgtd::voxel_map_of(
       map_cloud(voxels, [](const Voxel& voxel) { return voxel.i == 0 ? 0.375 : 0.75; }));
   const auto difference =
-      libgtd::compare_maps(map, level_surface(map), other, same).judged.difference;
+      libgtd::compare_maps(map, level_surface(map), other, same).evaluated.difference;
   EXPECT_EQ(difference.low_5, 0.125);
   EXPECT_EQ(difference.median, 0.3125);
   EXPECT_EQ(difference.high_95, 0.5);
@@ -120,13 +120,13 @@ TEST(MapChange, LatticesShiftedByWholeVoxelsAreOne) {
   MapChange change = libgtd::compare_maps(map, level_surface(map), other, shift);
   EXPECT_EQ(change.matching, VoxelMatching::lattice);
   EXPECT_EQ(change.pairs.size(), map.size());
-  EXPECT_EQ(change.judged.kappa->value, 1.0);
+  EXPECT_EQ(change.evaluated.kappa->value, 1.0);
   // A tenth of a voxel more: by nearness, each still with itself.
   const libmap::Pose more(Eigen::Translation3d(-0.039, 0.02, -0.07));
   change = libgtd::compare_maps(map, level_surface(map), other, more);
   EXPECT_EQ(change.matching, VoxelMatching::nearest);
   EXPECT_EQ(change.pairs.size(), map.size());
-  EXPECT_EQ(change.judged.kappa->value, 1.0);
+  EXPECT_EQ(change.evaluated.kappa->value, 1.0);
 }
 
 TEST(MapChange, NearestPairsAreThoseOfTheDefinition) {
@@ -174,21 +174,21 @@ TEST(MapChange, CloudHoldsEveryVoxelOnce) {
     ++counts[static_cast<std::size_t>(classes[n])];
     EXPECT_EQ(std::isnan(cloud.find_field("difference")->values[n]), classes[n] >= 4.0);
   }
-  EXPECT_EQ(counts[2], change.judged.gained());
-  EXPECT_EQ(counts[3], change.judged.lost());
+  EXPECT_EQ(counts[2], change.evaluated.gained());
+  EXPECT_EQ(counts[3], change.evaluated.lost());
   EXPECT_EQ(counts[4], change.only_map.size());
   EXPECT_EQ(counts[5], change.only_other.size());
 }
 
-TEST(MapChange, WhatIsNotJudgedDoesNotCount) {
+TEST(MapChange, WhatIsNotEvaluatedDoesNotCount) {
   VoxelMap map = random_map(0);
   VoxelMap other = random_map(0);
-  for (std::size_t n = 0; n < 100; ++n) map.edge[n] = 1;
+  for (std::size_t n = 0; n < 100; ++n) map.border[n] = 1;
   for (std::size_t n = 50; n < 200; ++n) other.scores[n] = std::numeric_limits<float>::quiet_NaN();
   const MapChange change = libgtd::compare_maps(map, level_surface(map), other, same);
   EXPECT_EQ(change.common.graspable.size(), map.size());
   EXPECT_EQ(change.common.difference.count, map.size() - 150);
-  EXPECT_EQ(change.judged.graspable.size(), map.size() - 200);
+  EXPECT_EQ(change.evaluated.graspable.size(), map.size() - 200);
 }
 
 TEST(MapChange, MapsApartAndOptionsOutOfBounds) {

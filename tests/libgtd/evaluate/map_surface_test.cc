@@ -28,7 +28,7 @@ VoxelMap map_of(const std::set<Voxel>& voxels) {
   map.voxels.assign(voxels.begin(), voxels.end());
   map.scores.assign(map.size(), 0.5F);
   map.graspable.assign(map.size(), 0);
-  map.edge = map.obstacle = map.graspable;
+  map.border = map.obstacle = map.graspable;
   return map;
 }
 

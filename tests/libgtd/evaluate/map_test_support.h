@@ -26,7 +26,7 @@ inline libmap::PointCloud map_cloud(const std::vector<libgtd::Voxel>& voxels,
   add("score", libmap::ScalarType::float32, score_of);
   add("graspable", libmap::ScalarType::uint8,
       [&](const libgtd::Voxel& voxel) { return score_of(voxel) >= 0.8 ? 1.0 : 0.0; });
-  add("edge", libmap::ScalarType::uint8, [](const libgtd::Voxel&) { return 0.0; });
+  add("border", libmap::ScalarType::uint8, [](const libgtd::Voxel&) { return 0.0; });
   add("i", libmap::ScalarType::int32, [](const libgtd::Voxel& voxel) { return voxel.i; });
   add("j", libmap::ScalarType::int32, [](const libgtd::Voxel& voxel) { return voxel.j; });
   add("k", libmap::ScalarType::int32, [](const libgtd::Voxel& voxel) { return voxel.k; });

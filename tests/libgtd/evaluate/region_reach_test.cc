@@ -114,7 +114,7 @@ TEST(MapRegions, AreThoseOfTheDefinition) {
 }
 
 TEST(RegionReach, StrideAgainstKnownDistances) {
-  // Gaps of 10 voxels between the first two and of 30 to the third, from centre to centre.
+  // Gaps of 10 voxels between the first two and of 30 to the third, from center to center.
   const VoxelMap map = map_of({{0, 0, 4}, {13, 0, 3}, {45, 0, 2}});
   const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
   const auto reach_of = [&](double stride) {
@@ -280,7 +280,7 @@ TEST(RegionReach, TooFarApartForDistances) {
   const MapRegionResult regions = libgtd::find_regions(map, level_surface(map));
   map.lattice.voxel_size_m = 1e200;
   const libmap::Error error = error_of([&] { libgtd::find_reach(map, regions); });
-  EXPECT_EQ(error.reason(), "the regions lie too far apart: their distances are no numbers");
+  EXPECT_EQ(error.reason(), "the regions are too far apart: their distances are no numbers");
   EXPECT_EQ(error.context().field, "voxel_size_m");
   map.lattice.voxel_size_m = 0.01;
   const RegionReach reach =

@@ -131,7 +131,7 @@ TEST(RocPublished, EveryRowOfTheAccuracyTables) {
   }
   EXPECT_THAT(without_scores, testing::ElementsAre("prescan_combined", "realtime_inclined_pose"));
   for (const std::string& name : without_scores)
-    std::printf("NOTE: artificial_rocks %s: no table holds its scores; not recomputed\n",
+    std::printf("NOTE: artificial_rocks %s: no table contains its scores; not recomputed\n",
                 name.c_str());
 }
 
@@ -146,7 +146,7 @@ TEST(RocPublished, TheRowThatThePrintLost) {
   EXPECT_EQ(rates.at("acc"), "0.7000");
 }
 
-// The interpolated case was published without its cutoff: of the ten, 0.6 and its neighbour 0.7,
+// The interpolated case was published without its cutoff: of the ten, 0.6 and its neighbor 0.7,
 // between which no score lies, give the published rates, and 0.8, the other cases' cutoff, does
 // not.
 TEST(RocPublished, TheInterpolatedCaseNeedsAnotherCutoff) {

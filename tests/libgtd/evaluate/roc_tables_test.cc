@@ -58,7 +58,7 @@ TEST(RocTables, EvaluatesEachColumnOnItsOwnLocations) {
   ASSERT_EQ(evaluation.columns.size(), 2u);
   EXPECT_EQ(evaluation.columns[0].name, "map");
   EXPECT_EQ(evaluation.columns[0].result.area->trapezoid, 3.5 / 4);
-  EXPECT_EQ(evaluation.columns[0].result.left_out_unlabelled, 1u);
+  EXPECT_EQ(evaluation.columns[0].result.left_out_unlabeled, 1u);
   EXPECT_EQ(evaluation.columns[1].result.left_out_unscored, 1u);
   EXPECT_EQ(evaluation.columns[1].result.area->trapezoid, 0.25);
 }
@@ -85,11 +85,11 @@ TEST(RocTables, UndefinedRatesAreEmptyCellsAndNulls) {
               ElementsAre("score", "0.8", "positive_predictive_value", "0", "0", "", "", ""));
   const std::string json = libgtd::to_json(evaluation);
   EXPECT_THAT(json, HasSubstr("\"trapezoid\": null"));
-  EXPECT_THAT(json, HasSubstr("all 2 locations are labelled true"));
+  EXPECT_THAT(json, HasSubstr("all 2 locations are labeled true"));
   EXPECT_THAT(json, Not(HasSubstr("nan")));
   const std::string markdown = libgtd::to_markdown(evaluation, "");
   EXPECT_THAT(markdown, HasSubstr("| score | 2 | 2 | 0 | not defined | not defined |"));
-  EXPECT_THAT(markdown, HasSubstr("score: all 2 locations are labelled true"));
+  EXPECT_THAT(markdown, HasSubstr("score: all 2 locations are labeled true"));
 }
 
 TEST(RocTables, MarkdownSaysWhichAreaThePublishedOneIs) {

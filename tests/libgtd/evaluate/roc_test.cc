@@ -251,14 +251,14 @@ TEST(Roc, OneClassAloneHasNoAreaAndSaysWhy) {
   const RocResult positive = evaluate_roc({true, true, true}, {0.1, 0.8, 0.9});
   EXPECT_FALSE(positive.area.has_value());
   EXPECT_EQ(positive.area_note,
-            "all 3 locations are labelled true: the area under the curve is not defined");
+            "all 3 locations are labeled true: the area under the curve is not defined");
   EXPECT_FALSE(positive.at_rate_cutoff.counts.false_positive_rate().value().has_value());
   EXPECT_FALSE(positive.at_rate_cutoff.counts.true_negative_rate().wilson_95().has_value());
   EXPECT_DOUBLE_EQ(*positive.at_rate_cutoff.counts.true_positive_rate().value(), 2.0 / 3);
 
   const RocResult negative = evaluate_roc({true, false}, {std::nullopt, 0.9});
   EXPECT_FALSE(negative.area.has_value());
-  EXPECT_THAT(negative.area_note, testing::HasSubstr("all 1 locations are labelled false"));
+  EXPECT_THAT(negative.area_note, testing::HasSubstr("all 1 locations are labeled false"));
 
   const RocResult empty = evaluate_roc({}, {});
   EXPECT_FALSE(empty.area.has_value());
@@ -272,7 +272,7 @@ TEST(Roc, LocationsWithoutLabelOrScoreAreLeftOutAndCounted) {
       evaluate_roc({true, std::nullopt, false, std::nullopt, true, false},
                    {0.9, 0.9, 0.1, std::nullopt, nan_value, infinity}, without_bootstrap());
   EXPECT_EQ(result.left_out_unscored, 2u);
-  EXPECT_EQ(result.left_out_unlabelled, 1u);
+  EXPECT_EQ(result.left_out_unlabeled, 1u);
   EXPECT_EQ(result.at_rate_cutoff.counts.size(), 3u);
   EXPECT_EQ(result.area->trapezoid, 0.5);
 }

@@ -103,7 +103,7 @@ std::vector<Eigen::Vector3d> places(const TiledMap& map) {
   std::vector<Eigen::Vector3d> points;
   for (int n = 0; n < 400; ++n)
     points.emplace_back(uniform(-0.5, 0.6), uniform(-0.4, 0.5), uniform(-0.1, 0.35));
-  // Corners of voxels are as near to several centres.
+  // Corners of voxels are as near to several centers.
   for (int n = 0; n < 200; ++n)
     points.push_back(map.index().lattice.origin_m +
                      0.02 * Eigen::Vector3d(std::floor(uniform(-20, 25)),
@@ -240,7 +240,7 @@ TEST(TileLookupErrors, MapsThatCannotBeAsked) {
 }
 
 // A tile whose points stand farther apart than any terrain's: as much memory and work as for two
-// neighbours.
+// neighbors.
 TEST(TileLookup, ColumnsFarApart) {
   constexpr double far_column = 5e8;
   TileStoreIndex index;

@@ -63,7 +63,7 @@ TEST(GripperMask, MeasuresFarApart) {
     EXPECT_NE(error.reason().find("e+29 voxels wide or high, more than 2^20"), std::string::npos)
         << error.what();
   }
-  // Its voxels a millimetre are infinite in single precision.
+  // Its voxels a millimeter are infinite in single precision.
   Gripper tiny = gripper_named("scar-e");
   for (double* measure :
        {&tiny.palm_diameter_mm, &tiny.finger_joint_diameter_mm, &tiny.finger_length_mm,

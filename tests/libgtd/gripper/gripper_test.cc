@@ -79,7 +79,7 @@ INSTANTIATE_TEST_SUITE_P(All, BadGripperFile,
                                          BadGripper{"opening_angle_deg", "opening_angle_deg: 90"},
                                          BadGripper{"closing_angle_deg", "closing_angle_deg: 86"},
                                          BadGripper{"closing_angle_deg", "closing_angle_deg: 85"},
-                                         BadGripper{"palm_diameter_mm", "palm_diametre_mm: 71"},
+                                         BadGripper{"palm_diameter_mm", "palm_diamter_mm: 71"},
                                          BadGripper{"palm_diameter_mm", ""},
                                          BadGripper{"spine_depth_mm", "spine_depth_mm: [5]"}));
 

@@ -36,14 +36,14 @@ DetectionOptions corrected_options() {
 
 bool same_voxel(const MapVoxel& a, const MapVoxel& b) {
   return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.convex == b.convex &&
-         a.graspable == b.graspable && a.edge == b.edge;
+         a.graspable == b.graspable && a.border == b.border;
 }
 
 bool same_map(const GraspabilityMap& a, const GraspabilityMap& b) {
   return std::equal(a.voxels.begin(), a.voxels.end(), b.voxels.begin(), b.voxels.end(), same_voxel);
 }
 
-// Fault 6: the centre of an even mask lies half a voxel off the pivot.
+// Fault 6: the center of an even mask lies half a voxel off the pivot.
 TEST(Corrected, MaskIsSymmetricAboutItsPivot) {
   for (const double voxel_size_m : {0.004, 0.005, 0.01, 0.013}) {
     const GripperMask mask =
@@ -90,7 +90,7 @@ TEST(Corrected, QuarterTurnTurnsTheMap) {
   for (const ScoredVoxel& one : scored) {
     const ScoredVoxel& other = by_voxel.at({-1 - one.voxel.j, one.voxel.i, one.voxel.k});
     EXPECT_EQ(one.score, other.score);
-    EXPECT_EQ(one.edge, other.edge);
+    EXPECT_EQ(one.border, other.border);
   }
 }
 
@@ -151,7 +151,7 @@ TEST(Corrected, EveryVoxelIsScoredAndTheBorderIsFlagged) {
     const bool near_border =
         one.voxel.i < result.grid_min.i + reach || one.voxel.i > result.grid_max.i - reach ||
         one.voxel.j < result.grid_min.j + reach || one.voxel.j > result.grid_max.j - reach;
-    EXPECT_EQ(one.edge, near_border) << one.voxel.i << " " << one.voxel.j;
+    EXPECT_EQ(one.border, near_border) << one.voxel.i << " " << one.voxel.j;
   }
 }
 

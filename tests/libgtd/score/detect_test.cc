@@ -72,10 +72,10 @@ TEST_P(Detection, MapReturnsIntoTheInputFrame) {
   const auto result = detect(cloud, options);
   const PointCloud map = to_cloud(result.map, MapFrame::input);
   ASSERT_FALSE(map.empty());
-  // Each voxel's centre lies within a voxel's diagonal of a point of the cloud; the thinning of
+  // Each voxel's center lies within a voxel's diagonal of a point of the cloud; the downsampling of
   // `thesis` and its second lattice move it by another voxel.
-  const bool thins = GetParam() == Method::thesis || GetParam() == Method::envelope;
-  const double reach = thins ? 0.03 : 0.00867;
+  const bool downsamples = GetParam() == Method::thesis || GetParam() == Method::envelope;
+  const double reach = downsamples ? 0.03 : 0.00867;
   for (std::size_t n = 0; n < map.size(); n += 7) {
     double nearest = 1.0;
     for (const Eigen::Vector3d& point : cloud.positions)

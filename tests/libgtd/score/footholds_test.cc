@@ -36,7 +36,7 @@ PointCloud map_of(
   map.add_field("score", ScalarType::float32).values = scores;
   std::vector<double>& graspable = map.add_field("graspable", ScalarType::uint8).values;
   for (std::size_t n = 0; n < scores.size(); ++n) graspable[n] = scores[n] >= 0.8 ? 1.0 : 0.0;
-  map.add_field("edge", ScalarType::uint8);
+  map.add_field("border", ScalarType::uint8);
   return map;
 }
 
@@ -142,8 +142,8 @@ TEST(Footholds, ScoresThatAreNotFinite) {
 
 TEST(Footholds, OptionsLeaveOut) {
   PointCloud map = random_map();
-  for (std::size_t n = 0; n < map.size() / 2; ++n) map.find_field("edge")->values[n] = 1.0;
-  const auto all = libgtd::find_footholds(map, {.graspable_only = false, .edges = true});
+  for (std::size_t n = 0; n < map.size() / 2; ++n) map.find_field("border")->values[n] = 1.0;
+  const auto all = libgtd::find_footholds(map, {.graspable_only = false, .border = true});
   EXPECT_EQ(all.candidates, map.size());
   for (const Foothold& one : libgtd::find_footholds(map).footholds)
     EXPECT_GE(one.map_point, map.size() / 2);
@@ -215,9 +215,9 @@ TEST(Footholds, ErrorsNameTheField) {
                 .context()
                 .field,
             "up");
-  std::erase_if(map.fields, [](const auto& field) { return field.name == "edge"; });
-  EXPECT_EQ(error_of([&] { libgtd::find_footholds(map); }).context().field, "edge");
-  EXPECT_NO_THROW(libgtd::find_footholds(map, {.edges = true}));
+  std::erase_if(map.fields, [](const auto& field) { return field.name == "border"; });
+  EXPECT_EQ(error_of([&] { libgtd::find_footholds(map); }).context().field, "border");
+  EXPECT_NO_THROW(libgtd::find_footholds(map, {.border = true}));
   EXPECT_THROW(libgtd::find_footholds(PointCloud{}), libmap::Error);
 }
 

@@ -23,7 +23,7 @@ GraspabilityMap small_map() {
   return map;
 }
 
-TEST(MapCloud, HoldsCentersFieldsAndColours) {
+TEST(MapCloud, HoldsCentersFieldsAndColors) {
   const PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
   cloud.check();
   EXPECT_TRUE(cloud.positions[1].isApprox(Eigen::Vector3d(0.005, 0.005, 0.045)));
@@ -32,7 +32,7 @@ TEST(MapCloud, HoldsCentersFieldsAndColours) {
   EXPECT_EQ(cloud.find_field("score")->values, (std::vector<double>{0.95, 0.4615, 0.0}));
   EXPECT_EQ(cloud.find_field("convex")->values, (std::vector<double>{1, 0, 0}));
   EXPECT_EQ(cloud.find_field("graspable")->values, (std::vector<double>{1, 0, 0}));
-  EXPECT_EQ(cloud.find_field("edge")->values, (std::vector<double>{0, 1, 0}));
+  EXPECT_EQ(cloud.find_field("border")->values, (std::vector<double>{0, 1, 0}));
   EXPECT_EQ(cloud.find_field("i")->values, (std::vector<double>{-3, 0, 5}));
   EXPECT_EQ(cloud.colors[0], libmap::below_plane_color);
   EXPECT_EQ(cloud.colors[1], libmap::score_color(0.4615));
@@ -57,14 +57,14 @@ TEST(Merge, RefusesWhatIsNoMapAndVoxelsThatStandTwice) {
   error_of([&] { merge_map_clouds({cloud, other}); });
 }
 
-TEST(Merge, RefusesPartsOfWhichOnlySomeHaveColoursOrNormals) {
+TEST(Merge, RefusesPartsOfWhichOnlySomeHaveColorsOrNormals) {
   const PointCloud cloud = to_cloud(small_map(), MapFrame::terrain);
   PointCloud other = libmap::select_points(cloud, {1, 2});
   other.colors.clear();
   EXPECT_EQ(error_of([&] {
               merge_map_clouds({libmap::select_points(cloud, {0}), other});
             }).reason(),
-            "only some parts have colours");
+            "only some parts have colors");
   other = libmap::select_points(cloud, {1, 2});
   other.normals.assign(2, Eigen::Vector3f::UnitZ());
   EXPECT_EQ(error_of([&] {

@@ -44,7 +44,7 @@ struct Limits {
 
 using Counts = std::map<Obstacle, std::size_t>;
 
-DetectionResult judge(const PointCloud& cloud, const Limits& limits) {
+DetectionResult evaluate(const PointCloud& cloud, const Limits& limits) {
   DetectionOptions options;
   options.gripper = gripper_named("scar-e");
   options.plane = PlaneSource::none;
@@ -65,11 +65,11 @@ double step_of_25_cm(double x, double) { return x < 0.1 ? 0.0 : 0.25; }
 
 TEST(Obstacles, StepIsOneAboveTheHeightAndBelowItNone) {
   const PointCloud cloud = terrain_of(step_of_25_cm);
-  const Counts above = counts_of(judge(cloud, {.height_m = 0.24}));
+  const Counts above = counts_of(evaluate(cloud, {.height_m = 0.24}));
   EXPECT_GT(above.at(Obstacle::face), 1000U);
   // The smaller part is out of reach: 0.5 of 1.2 m.
   EXPECT_NEAR(static_cast<double>(above.at(Obstacle::unreachable)), 120.0 * 50.0, 700.0);
-  const auto below = counts_of(judge(cloud, {.height_m = 0.26}));
+  const auto below = counts_of(evaluate(cloud, {.height_m = 0.26}));
   EXPECT_EQ(below.size(), 1U);
   EXPECT_TRUE(below.contains(Obstacle::none));
 }
@@ -77,16 +77,16 @@ TEST(Obstacles, StepIsOneAboveTheHeightAndBelowItNone) {
 TEST(Obstacles, RampIsOneBeyondTheSlopeAlone) {
   const PointCloud cloud =
       terrain_of([](double x, double) { return std::clamp(x, 0.0, 0.3); });  // 45 deg
-  EXPECT_FALSE(counts_of(judge(cloud, {.slope_deg = 47.0})).contains(Obstacle::face));
-  EXPECT_TRUE(counts_of(judge(cloud, {.slope_deg = 43.0})).contains(Obstacle::face));
+  EXPECT_FALSE(counts_of(evaluate(cloud, {.slope_deg = 47.0})).contains(Obstacle::face));
+  EXPECT_TRUE(counts_of(evaluate(cloud, {.slope_deg = 43.0})).contains(Obstacle::face));
   EXPECT_FALSE(
-      counts_of(judge(cloud, {.height_m = 0.31, .slope_deg = 43.0})).contains(Obstacle::face));
+      counts_of(evaluate(cloud, {.height_m = 0.31, .slope_deg = 43.0})).contains(Obstacle::face));
 }
 
 double table(double x, double y) { return std::max(std::abs(x), std::abs(y)) < 0.2 ? 0.3 : 0.0; }
 
 TEST(Obstacles, TopOfATableRockIsOutOfReach) {
-  const auto result = judge(terrain_of(table), {});
+  const auto result = evaluate(terrain_of(table), {});
   for (const MapVoxel& one : result.map.voxels) {
     const Eigen::Vector3d place = result.map.lattice.center_of(one.voxel);
     const double out = std::max(std::abs(place.x()), std::abs(place.y()));
@@ -103,12 +103,12 @@ TEST(Obstacles, TopOfATableRockIsOutOfReach) {
 }
 
 TEST(Obstacles, RampToTheTableLeadsUp) {
-  const auto result = judge(terrain_of([](double x, double y) {
-                              const double ramp =
-                                  std::abs(y) < 0.12 && x < 0.0 ? 0.3 + 0.8 * (x + 0.2) : 0.0;
-                              return std::max(table(x, y), std::min(ramp, 0.3));
-                            }),
-                            {});
+  const auto result = evaluate(terrain_of([](double x, double y) {
+                                 const double ramp =
+                                     std::abs(y) < 0.12 && x < 0.0 ? 0.3 + 0.8 * (x + 0.2) : 0.0;
+                                 return std::max(table(x, y), std::min(ramp, 0.3));
+                               }),
+                               {});
   const Counts counts = counts_of(result);
   EXPECT_GT(counts.at(Obstacle::face), 500U);
   for (const MapVoxel& one : result.map.voxels) {
@@ -122,14 +122,14 @@ TEST(Obstacles, RampToTheTableLeadsUp) {
 // A pit is too low, not too high; nor is ground that a shadow cuts off.
 TEST(Obstacles, PitsAndGroundBehindGapsAreNone) {
   const Counts pit =
-      counts_of(judge(terrain_of([](double x, double y) { return 0.3 - table(x, y); }), {}));
+      counts_of(evaluate(terrain_of([](double x, double y) { return 0.3 - table(x, y); }), {}));
   EXPECT_GT(pit.at(Obstacle::face), 500U);
   EXPECT_FALSE(pit.contains(Obstacle::unreachable));
   PointCloud shadow = terrain_of([](double x, double y) { return table(x - 0.4, y); });
   std::erase_if(shadow.positions, [](const Eigen::Vector3d& p) {
     return p.x() > 0.35 && p.z() < 0.28 && std::abs(std::abs(p.y()) - 0.3) < 0.06;
   });
-  const auto result = judge(shadow, {});
+  const auto result = evaluate(shadow, {});
   for (const MapVoxel& one : result.map.voxels)
     if (result.map.lattice.center_of(one.voxel).z() < 0.02) {
       EXPECT_NE(one.obstacle, Obstacle::unreachable);
@@ -139,14 +139,14 @@ TEST(Obstacles, PitsAndGroundBehindGapsAreNone) {
 TEST(Obstacles, MapsWithoutLimitsHaveNoField) {
   const PointCloud cloud = terrain_of(step_of_25_cm);
   for (const Limits& limits : {Limits{.height_m = 0.0}, Limits{.slope_deg = 0.0}}) {
-    const PointCloud map = to_cloud(judge(cloud, limits).map, MapFrame::terrain);
+    const PointCloud map = to_cloud(evaluate(cloud, limits).map, MapFrame::terrain);
     EXPECT_EQ(map.find_field("obstacle"), nullptr);
     EXPECT_EQ(map.find_field("slope_deg"), nullptr);
     EXPECT_FALSE(map.has_normals());
   }
 }
 
-TEST(Obstacles, AnyMethodJudgesThem) {
+TEST(Obstacles, AnyMethodEvaluatesThem) {
   const PointCloud cloud = terrain_of(table);
   for (const Method method : {Method::thesis, Method::climblab}) {
     DetectionOptions options;

@@ -14,7 +14,8 @@ const auto scratch = [](const char* name) { return graspmap_test::scratch_folder
 
 TEST(ReadScenario, EveryScenarioOfTheToolkit) {
   int count = 0;
-  for (const auto& entry : std::filesystem::directory_iterator(libmap::data_folder() / "scenarios")) {
+  for (const auto& entry :
+       std::filesystem::directory_iterator(libmap::data_folder() / "scenarios")) {
     const auto options = libgtd::read_scenario(entry.path().stem().string());
     ASSERT_TRUE(options.gripper);
     const auto expected = libgtd::find_gripper(options.scenario.gripper);
@@ -25,8 +26,8 @@ TEST(ReadScenario, EveryScenarioOfTheToolkit) {
 }
 
 TEST(ReadScenario, OverridesReachTheGripper) {
-  graspmap_test::write_text(scratch("s.yaml"),
-                            "gripper: hubrobo\nvoxel_size_m: 0.002\ngripper.palm_diameter_mm: 33\n");
+  graspmap_test::write_text(
+      scratch("s.yaml"), "gripper: hubrobo\nvoxel_size_m: 0.002\ngripper.palm_diameter_mm: 33\n");
   const auto options = libgtd::read_scenario(scratch("s.yaml").string());
   EXPECT_EQ(options.scenario.voxel_size_m, 0.002);
   EXPECT_EQ(options.gripper->palm_diameter_mm, 33.0);

@@ -89,7 +89,7 @@ TEST(SurfaceOrientation, TiltedPlaneCountsAsLevelGroundAtAnyAngle) {
   }
 }
 
-TEST(SurfaceOrientation, LevelGroundIsJudgedAsByTheUprightMask) {
+TEST(SurfaceOrientation, LevelGroundIsEvaluatedAsByTheUprightMask) {
   PointCloud cloud;
   for (int n = 0; n < 4000; ++n) {
     cloud.positions.emplace_back(uniform(-0.3, 0.3), uniform(-0.3, 0.3), 0.0041);
@@ -98,11 +98,11 @@ TEST(SurfaceOrientation, LevelGroundIsJudgedAsByTheUprightMask) {
   const auto plane = score(cloud, Orientation::plane);
   const auto surface = score(cloud, Orientation::surface);
   ASSERT_EQ(plane.map.voxels.size(), surface.map.voxels.size());
-  EXPECT_GT(plane.edge_voxels, 100U);
-  EXPECT_LT(plane.edge_voxels, plane.map.voxels.size());
+  EXPECT_GT(plane.border_voxels, 100U);
+  EXPECT_LT(plane.border_voxels, plane.map.voxels.size());
   for (std::size_t n = 0; n < plane.map.voxels.size(); ++n) {
     EXPECT_EQ(plane.map.voxels[n].counts, surface.map.voxels[n].counts);
-    EXPECT_EQ(plane.map.voxels[n].edge, surface.map.voxels[n].edge);
+    EXPECT_EQ(plane.map.voxels[n].border, surface.map.voxels[n].border);
   }
 }
 
@@ -181,7 +181,7 @@ TEST(SurfaceOrientation, BallScoresTheSameAtAnyLatitude) {
     const auto result = score(ball, orientation);
     // Nothing lies around the ball, and no place of the mask's square looks past it.
     if (orientation == Orientation::surface) {
-      EXPECT_EQ(result.edge_voxels, 0U);
+      EXPECT_EQ(result.border_voxels, 0U);
     }
     std::array<double, 6> sums{}, counts{};
     for (const MapVoxel& one : result.map.voxels) {
@@ -222,7 +222,7 @@ TEST(SurfaceOrientation, BumpOnAVerticalWallIsGraspable) {
   EXPECT_LT(best_at(score(wall, Orientation::surface), {0.0, 0.2, 0.0}), 0.4);
 }
 
-TEST(SurfaceOrientation, TurnedTerrainIsJudgedAlike) {
+TEST(SurfaceOrientation, TurnedTerrainIsEvaluatedAlike) {
   const PointCloud cloud = rough_boulder();
   const libmap::Pose turn = libmap::make_pose_from_rpy({0.4, -1.2, 0.3}, {35.0, 70.0, -110.0});
   const auto first = score(cloud, Orientation::surface);
@@ -282,7 +282,7 @@ TEST(SurfaceOrientation, TilesThreadsAndSharesChangeNothing) {
   EXPECT_EQ(merged.normals, expected.normals);
 }
 
-TEST(SurfaceOrientation, PlacesWithoutANormalAreJudgedUpright) {
+TEST(SurfaceOrientation, PlacesWithoutANormalAreEvaluatedUpright) {
   PointCloud cloud = ground(0.2, 0.005, [](double, double) { return 0.003; });
   cloud.normals.clear();
   cloud.positions.emplace_back(0.0, 0.0, 0.5);  // alone: no plane
@@ -316,11 +316,11 @@ TEST(SurfaceOrientation, EdgesAreWhereTheScanEnds) {
     const Vector3d place = result.map.lattice.center_of(one.voxel);
     if (std::abs(place.x()) > 0.02 || place.z() < 0.1 || place.z() > 0.29) continue;
     if (std::abs(place.y()) < 0.2) {
-      EXPECT_FALSE(one.edge) << place.transpose();
+      EXPECT_FALSE(one.border) << place.transpose();
       ++middle;
     }
     if (std::abs(place.y()) > 0.33) {
-      EXPECT_TRUE(one.edge) << place.transpose();
+      EXPECT_TRUE(one.border) << place.transpose();
       ++end;
     }
   }

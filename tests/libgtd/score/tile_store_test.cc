@@ -115,7 +115,7 @@ TEST(TileProgress, PlanAndIndexComeBackToTheBit) {
   EXPECT_EQ(std::get<std::int64_t>(*index.manifest.find_result("graspable_voxels")), 6);
 }
 
-TEST(TileStore, RestoredPositionsAreTheVoxelsCentres) {
+TEST(TileStore, RestoredPositionsAreTheVoxelsCenters) {
   TileStoreIndex index;
   index.lattice.voxel_size_m = 0.01;
   libmap::PointCloud cloud;
@@ -216,7 +216,7 @@ TEST(TileStore, HostileIndex) {
   expect_error("\"min\": [\n  -9", "\"min\": [\n  10", "min is [10,2,-3]: out of range");
   expect_error("\"max\": [\n  9", "\"max\": [\n  -5", "number of a tile is 0, 0");
   expect_error("\"voxels\": 3", "\"voxels\": 0", "file of tile -1, 0 is tiles/-1_0.pcd");
-  for (const char* count : {"voxels", "occupied_voxels", "edge_voxels", "graspable_voxels"}) {
+  for (const char* count : {"voxels", "occupied_voxels", "border_voxels", "graspable_voxels"}) {
     const std::string key = "\"" + std::string(count) + "\": ";
     expect_error(key, key + "1844674407370955161", std::string(count) + " is 1844674407370955161");
   }

@@ -12,7 +12,7 @@
 namespace libgtd {
 
 bool operator==(const ScoredVoxel& a, const ScoredVoxel& b) {
-  return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.edge == b.edge;
+  return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.border == b.border;
 }
 
 namespace tiling_test {

@@ -77,7 +77,7 @@ TEST(Voxelize, BadSizesAreErrorsThatSayHowMuchMemory) {
   EXPECT_NE(std::string(error.what()).find("GiB"), std::string::npos) << error.what();
 }
 
-TEST(Thinning, AveragesThePointsOfACell) {
+TEST(Downsampling, AveragesThePointsOfACell) {
   const std::vector<Eigen::Vector3f> points = {
       {0.001F, 0.001F, 0.001F}, {0.003F, 0.005F, 0.001F}, {0.015F, 0.001F, 0.001F}};
   const auto centroids = libgtd::thin_to_centroids(points, 0.01);
@@ -103,7 +103,7 @@ TEST(Voxelize, SortsVoxelsOfAnyBox) {
   }
 }
 
-TEST(Thinning, CellsOfAnyBoxInOrder) {
+TEST(Downsampling, CellsOfAnyBoxInOrder) {
   for (const float extent_m : {0.2F, 4e6F}) {
     std::vector<Eigen::Vector3f> points;
     std::map<std::array<int, 3>, std::vector<Eigen::Vector3f>> cells;

@@ -170,7 +170,7 @@ TEST(Curvature, OfACylinderIsOneOverItsRadiusAndZero) {
 }
 
 TEST(Curvature, FirstDerivativesCountWherePlaneAndTangentDiffer) {
-  // At the rim of a half ball's cloud the neighbours lie on one side only, so that their plane is
+  // At the rim of a half ball's cloud the neighbors lie on one side only, so that their plane is
   // tilted against the tangent plane.
   PointCloud half;
   half.positions.emplace_back(0, 0, 0.5);
@@ -224,11 +224,11 @@ TEST(Curvature, DoesNotDependOnTheDensity) {
 
 TEST(Curvature, ScalesWithTheInverseOfTheLength) {
   PointCloud cloud = surface(2000, 0.3, [](double x, double y) { return -x * x + 0.5 * y * y; });
-  const Curvature at_metres = at_first(cloud, within(0.09));
+  const Curvature at_meters = at_first(cloud, within(0.09));
   for (Vector3d& p : cloud.positions) p *= 1000;
-  const Curvature at_millimetres = at_first(cloud, within(90));
-  EXPECT_NEAR(at_millimetres.k1 * 1000, at_metres.k1, 1e-4);
-  EXPECT_NEAR(at_millimetres.k2 * 1000, at_metres.k2, 1e-4);
+  const Curvature at_millimeters = at_first(cloud, within(90));
+  EXPECT_NEAR(at_millimeters.k1 * 1000, at_meters.k1, 1e-4);
+  EXPECT_NEAR(at_millimeters.k2 * 1000, at_meters.k2, 1e-4);
 }
 
 TEST(Curvature, NoiseAveragesOut) {
@@ -325,7 +325,7 @@ TEST(Curvature, AWallAlongUpHasNoOutsideUnlessItsNormalsSaySo) {
   EXPECT_LT(result.points[0].normal.x(), -0.999F);
 }
 
-TEST(Curvature, PointsThatAreNotFiniteAreNobodysNeighbours) {
+TEST(Curvature, PointsThatAreNotFiniteAreNobodysNeighbors) {
   PointCloud cloud = surface(500, 0.2, [](double x, double y) { return x * x - y * y; });
   const CurvatureResult clean = estimate_curvature(cloud, within(0.1));
   cloud.positions.emplace_back(nan, 0, 0);

@@ -13,7 +13,7 @@ namespace thesis_curvature_test {
 
 using graspmap_test::uniform;
 
-// PCL's usual calls, with its usual search tree: neighbours come sorted by distance.
+// PCL's usual calls, with its usual search tree: neighbors come sorted by distance.
 void expect_pcls_own(const libmap::PointCloud& cloud, double radius_m) {
   pcl::PointCloud<pcl::PointXYZ>::Ptr points(new pcl::PointCloud<pcl::PointXYZ>);
   for (const Eigen::Vector3d& position : cloud.positions) {

@@ -324,7 +324,7 @@ TEST(Interpolation, PointsThatAreNotFiniteAreSkipped) {
 }
 
 TEST(Interpolation, OfAGridOfPointsEachNodeIsFound) {
-  PointCloud grid;  // all circles through neighbours hold four points
+  PointCloud grid;  // all circles through neighbors hold four points
   for (int i = 0; i < 50; ++i)
     for (int j = 0; j < 50; ++j) grid.positions.emplace_back(i * 0.25, j * 0.25, i - 2 * j);
   const InterpolationResult result = interpolate(grid, spacing(0.125));

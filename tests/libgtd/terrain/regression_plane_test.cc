@@ -370,8 +370,8 @@ void PrintTo(const ReferenceCase& set, std::ostream* out) { *out << set.frame; }
 
 class RegressionPlaneReference : public testing::TestWithParam<ReferenceCase> {
  protected:
-  // The author's program thins the cloud before it fits the plane.
-  static PointCloud thinned(const ReferenceCase& set) {
+  // The author's program downsamples the cloud before it fits the plane.
+  static PointCloud downsampled(const ReferenceCase& set) {
     const auto path = graspmap_test::data_folder() / "clouds" / (std::string(set.cloud) + ".pcd");
     pcl::PointCloud<pcl::PointXYZ>::Ptr dense(new pcl::PointCloud<pcl::PointXYZ>);
     for (const Vector3d& p : libmap::read_cloud(path).cloud.positions)
@@ -395,7 +395,7 @@ TEST_P(RegressionPlaneReference, ThesisFrame) {
   GRASPMAP_REQUIRE_DATA();
   GRASPMAP_REQUIRE_REFERENCE();
   const auto frame = graspmap_test::read_frame(reference(GetParam(), ".frame.txt"));
-  const PointCloud cloud = thinned(GetParam());
+  const PointCloud cloud = downsampled(GetParam());
   ASSERT_EQ(cloud.size(), static_cast<std::size_t>(frame.downsampled));
   const RegressionPlane plane =
       fit_regression_plane(cloud, upwards(frame.rotation.col(2), PlaneMethod::thesis));
@@ -420,7 +420,7 @@ TEST_P(RegressionPlaneReference, TransformWithTheGivenFrameToTheBit) {
   plane.terrain_from_input.linear() = frame.rotation.transpose();
   plane.terrain_from_input.translation() = -(frame.rotation.transpose() * frame.centroid);
   const PointCloud terrain =
-      libgtd::transform_to_terrain(thinned(GetParam()), plane, PlaneMethod::thesis);
+      libgtd::transform_to_terrain(downsampled(GetParam()), plane, PlaneMethod::thesis);
   const auto expected =
       graspmap_test::read_points_f32_gz(reference(GetParam(), ".transformed.f32.gz"));
   ASSERT_EQ(terrain.size(), expected.size());

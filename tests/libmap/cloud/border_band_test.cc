@@ -25,10 +25,10 @@ struct FloorOptions {
   double half_y = 1.5;
   double width = 0.075;  // of the band
   double yaw_deg = 0;
-  Vector2d centre = {0, 0};
+  Vector2d center = {0, 0};
   double gaps = 0;     // share of the band that is missing
   bool rocks = false;  // white ones inside, one of them against the band
-  double grain = 6;    // of the colours, standard deviation
+  double grain = 6;    // of the colors, standard deviation
   double white = 215;
   double skew = 0;  // the right side leans outwards by this slope
 };
@@ -60,7 +60,7 @@ PointCloud floor_with_band(const FloorOptions& o) {
       const auto channel = [](double value) {
         return static_cast<std::uint8_t>(std::clamp(value, 0.0, 255.0));
       };
-      const Vector2d at = o.centre + turn * p;
+      const Vector2d at = o.center + turn * p;
       cloud.positions.emplace_back(at.x(), at.y(), z);
       cloud.colors.push_back(
           {channel(level + (is_white ? 0 : 40)), channel(level + 10), channel(level)});
@@ -75,7 +75,7 @@ double corner_error(const BorderBand& band, const FloorOptions& o) {
   for (const double x : {-1.0, 1.0})
     for (const double y : {-1.0, 1.0}) {
       const double half_x = x > 0 ? o.half_x + o.skew * y * o.half_y : o.half_x;
-      const Vector2d corner = o.centre + turn * Vector2d(x * half_x, y * o.half_y);
+      const Vector2d corner = o.center + turn * Vector2d(x * half_x, y * o.half_y);
       double nearest = 1e9;
       for (const Vector2d& found : band.corners)
         nearest = std::min(nearest, (found - corner).norm());
@@ -99,7 +99,7 @@ TEST(BorderBand, TurnedWithGapsNoiseAndWhiteRocks) {
   for (const double yaw : {0.0, 12.0, -37.0, 44.0}) {
     FloorOptions o;
     o.yaw_deg = yaw;
-    o.centre = {3, -8};
+    o.center = {3, -8};
     o.gaps = 0.25;
     o.rocks = true;
     o.grain = 20;
@@ -158,7 +158,7 @@ TEST(BorderBand, WhatHasNone) {
   PointCloud cloud = floor_with_band(o);
   PointCloud gray = cloud;
   gray.colors.clear();
-  EXPECT_NE(reason(gray).find("no colours"), std::string::npos);
+  EXPECT_NE(reason(gray).find("no colors"), std::string::npos);
   PointCloud high = cloud;
   for (Eigen::Vector3d& point : high.positions) point.z() += 3;
   EXPECT_NE(reason(high).find("heights"), std::string::npos);

@@ -1,4 +1,4 @@
-// What frames fusion takes: several cameras, colours of another size, frames without depth.
+// What frames fusion takes: several cameras, colors of another size, frames without depth.
 #include <gmock/gmock.h>
 
 #include <atomic>
@@ -53,7 +53,7 @@ TEST(DepthFusionFrames, SeveralCamerasOfOneFrameCountAsOneView) {
   }
 }
 
-TEST(DepthFusionFrames, BestViewsGiveTheColour) {
+TEST(DepthFusionFrames, BestViewsGiveTheColor) {
   const Color green = {20, 200, 30};
   const Color red = {220, 10, 20};
   MemoryScan scan;
@@ -75,7 +75,7 @@ TEST(DepthFusionFrames, BestViewsGiveTheColour) {
   EXPECT_FALSE(fuse_depth(scan, scan.poses, options).cloud.has_colors());
 }
 
-TEST(DepthFusionFrames, ColourImageOfAnotherSize) {
+TEST(DepthFusionFrames, ColorImageOfAnotherSize) {
   MemoryScan scan = ring_scan(plane_z(0), 1, {});
   RgbdFrame& frame = scan.frames[1];
   // Left half blue, right half yellow, at twice the size.
@@ -176,7 +176,7 @@ TEST(DepthFusionFrames, OptionsOutOfTheirRangesAreNamed) {
   MemoryScan far = ring_scan(plane_z(0), 2, {});
   far.poses[1].world_from_base.translation().x() += 1e6;
   EXPECT_THAT(error_of([&] { fuse_depth(far, far.poses); }).what(),
-              HasSubstr("poses lie too far apart"));
+              HasSubstr("poses are too far apart"));
 }
 
 }  // namespace depth_fusion_frames_test

@@ -45,7 +45,7 @@ TEST(DepthFusion, PlaneOfOneFrame) {
     ASSERT_GT(result.cloud.normals[n].z(), 0.9999F);
     ASSERT_EQ(result.cloud.find_field("views")->values[n], 1);
   }
-  // One point a voxel column, and none is missing around the middle.
+  // One point per voxel column, and none is missing around the middle.
   std::set<std::pair<int, int>> columns;
   for (const Eigen::Vector3d& point : result.cloud.positions)
     EXPECT_TRUE(columns
@@ -89,7 +89,7 @@ TEST(DepthFusion, NoBiasOnASlantedPlane) {
 }
 
 TEST(DepthFusion, SphereFromAllAround) {
-  const Eigen::Vector3d centre(0.02, -0.03, 0.4);
+  const Eigen::Vector3d center(0.02, -0.03, 0.4);
   MemoryScan scan;
   for (int n = 0; n < 24; ++n) {
     // Fibonacci's spiral.
@@ -97,7 +97,7 @@ TEST(DepthFusion, SphereFromAllAround) {
     const double angle = 2.399963 * n;
     const double r = std::sqrt(1 - z * z);
     const Eigen::Vector3d eye(r * std::cos(angle), r * std::sin(angle), z);
-    scan.see(sphere(centre, 0.25), looking(centre + 1.1 * eye, centre), small_camera(), kinect,
+    scan.see(sphere(center, 0.25), looking(center + 1.1 * eye, center), small_camera(), kinect,
              random_engine());
   }
   const PointCloud cloud = fuse_depth(scan, scan.poses).cloud;
@@ -106,7 +106,7 @@ TEST(DepthFusion, SphereFromAllAround) {
   double mean = 0;
   std::size_t well_turned = 0;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
-    const Eigen::Vector3d arm = cloud.positions[n] - centre;
+    const Eigen::Vector3d arm = cloud.positions[n] - center;
     errors.push_back(arm.norm() - 0.25);
     mean += errors.back();
     const double turn = arm.normalized().dot(cloud.normals[n].cast<double>());
@@ -252,7 +252,7 @@ TEST(DepthFusion, OrderOfTheNodesChangesNoMoreThanRounding) {
   EXPECT_NEAR(rms(a), rms(b), 0.01 * rms(a));
 }
 
-TEST(DepthFusion, OneKilometreAway) {
+TEST(DepthFusion, OneKilometerAway) {
   const MemoryScan scan = ring_scan(step_scene, 8, kinect);
   const Eigen::Vector3d offset(1000, -2000, 300);  // whole voxels
   Trajectory moved = scan.poses;

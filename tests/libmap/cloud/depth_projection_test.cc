@@ -42,12 +42,12 @@ TEST(DepthProjection, PlaneAndSphereComeBackThroughAnyLens) {
         render_depth(plane_z(1.7), camera, Pose::Identity(), {}, random_engine()), camera, 0.1, 4);
     EXPECT_GT(wall.size(), 12000U);
     for (const Eigen::Vector3d& point : wall) ASSERT_NEAR(point.z(), 1.7, 1e-6);
-    const Eigen::Vector3d centre(0.1, -0.05, 1.2);
+    const Eigen::Vector3d center(0.1, -0.05, 1.2);
     const auto ball = back_project(
-        render_depth(sphere(centre, 0.4), camera, Pose::Identity(), {}, random_engine()), camera,
+        render_depth(sphere(center, 0.4), camera, Pose::Identity(), {}, random_engine()), camera,
         0.1, 4);
     EXPECT_GT(ball.size(), 2000U);
-    for (const Eigen::Vector3d& point : ball) ASSERT_NEAR((point - centre).norm(), 0.4, 1e-6);
+    for (const Eigen::Vector3d& point : ball) ASSERT_NEAR((point - center).norm(), 0.4, 1e-6);
   }
 }
 

@@ -27,9 +27,9 @@ inline Surface plane_z(double z) {
   };
 }
 
-inline Surface sphere(const Eigen::Vector3d& centre, double radius) {
+inline Surface sphere(const Eigen::Vector3d& center, double radius) {
   return [=](const Eigen::Vector3d& origin, const Eigen::Vector3d& direction) {
-    const Eigen::Vector3d arm = origin - centre;
+    const Eigen::Vector3d arm = origin - center;
     const double a = direction.squaredNorm();
     const double b = arm.dot(direction);
     const double root = b * b - a * (arm.squaredNorm() - radius * radius);

@@ -160,7 +160,7 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
   constexpr int places = 40;
   std::vector<SurfaceElement> elements(places);
   std::vector<SurfaceObservation> observations;
-  const std::vector<Eigen::Vector3d> centres = {{1, 0, 1}, {-1, 0.5, 1.2}, {0, -1, 0.8}};
+  const std::vector<Eigen::Vector3d> centers = {{1, 0, 1}, {-1, 0.5, 1.2}, {0, -1, 0.8}};
   for (std::uint32_t e = 0; e < places; ++e) {
     elements[e].position = Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), 0).cast<float>();
     elements[e].normal =
@@ -173,7 +173,7 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
   FrameRegistrationOptions options;
   options.independent_heights = 1e9;
   options.scatter_m = 1.0;  // far beyond the heights: weights stay as they are
-  const FrameRegistration found = register_frames(elements, observations, centres, options);
+  const FrameRegistration found = register_frames(elements, observations, centers, options);
 
   Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(6 * frames + places, 6 * frames + places);
   Eigen::VectorXd right = Eigen::VectorXd::Zero(6 * frames + places);
@@ -183,7 +183,7 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
       normal(6 * f + k, 6 * f + k) = 1 / std::pow(k < 3 ? turn : options.place_error_m, 2);
   for (const SurfaceObservation& one : observations) {
     const Eigen::Vector3d n = elements[one.element].normal.cast<double>();
-    const Eigen::Vector3d arm = elements[one.element].position.cast<double>() - centres[one.frame];
+    const Eigen::Vector3d arm = elements[one.element].position.cast<double>() - centers[one.frame];
     Eigen::VectorXd row = Eigen::VectorXd::Zero(right.size());
     row.segment<3>(6 * one.frame) = arm.cross(n);
     row.segment<3>(6 * one.frame + 3) = n;
@@ -196,7 +196,7 @@ TEST(FrameRegistration, SolvesTheLeastSquaresProblem) {
   for (int f = 0; f < frames; ++f) {
     const Pose& pose = found.corrected_from_given[static_cast<std::size_t>(f)];
     const Eigen::Vector3d shift =
-        pose * centres[static_cast<std::size_t>(f)] - centres[static_cast<std::size_t>(f)];
+        pose * centers[static_cast<std::size_t>(f)] - centers[static_cast<std::size_t>(f)];
     const Eigen::AngleAxisd rotation(pose.linear());
     EXPECT_LT((shift - solution.segment<3>(6 * f + 3)).norm(), 1e-10);
     EXPECT_LT((rotation.angle() * rotation.axis() - solution.segment<3>(6 * f)).norm(), 1e-9);

@@ -100,8 +100,8 @@ TEST(GroundPlane, RocksOverMoreThanHalfDoNotTiltIt) {
     const Points points = moved(covered_site(sigma), map_from_site);
     const GroundPlane plane = find_ground_plane(points);
     EXPECT_LT(degrees_between(plane.normal, map_from_site.linear().col(2)), 0.01) << sigma;
-    EXPECT_NEAR((map_from_site.inverse() * plane.centre).z(), 0, sigma / 6 + 1e-9);
-    EXPECT_LT(plane.share, 0.25) << "walls and tops of the boxes hold the rest";
+    EXPECT_NEAR((map_from_site.inverse() * plane.center).z(), 0, sigma / 6 + 1e-9);
+    EXPECT_LT(plane.share, 0.25) << "walls and tops of the boxes contain the rest";
     // Within the tolerance there are the boxes' feet, too.
     EXPECT_NEAR(plane.rmse_m, sigma, 0.006);
   }
@@ -228,12 +228,12 @@ TEST(GroundPlane, LevelIsTheLeastRotation) {
   GroundPlane plane;
   plane.normal = Vector3d(0.1, -0.2, 0.9).normalized();
   plane.offset_m = 2;
-  plane.centre = {4, 5, 0};  // off the plane: its foot counts
+  plane.center = {4, 5, 0};  // off the plane: its foot counts
   const Pose level = level_from_map(plane);
   const Eigen::AngleAxisd turn(level.linear());
   EXPECT_NEAR(turn.axis().z(), 0, 1e-12);
   EXPECT_NEAR(turn.angle(), std::acos(plane.normal.z()), 1e-12);
-  const Vector3d on_plane = plane.centre - (plane.normal.dot(plane.centre) - 2) * plane.normal;
+  const Vector3d on_plane = plane.center - (plane.normal.dot(plane.center) - 2) * plane.normal;
   EXPECT_LT((level * on_plane - Vector3d(on_plane.x(), on_plane.y(), 0)).norm(), 1e-12);
   EXPECT_NEAR((level * (on_plane + 3 * plane.normal)).z(), 3, 1e-12);
   GroundPlane flat;

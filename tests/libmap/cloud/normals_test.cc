@@ -18,14 +18,14 @@ using graspmap_test::uniform;
 using ::testing::HasSubstr;
 
 // Nearly even on a sphere (Fibonacci lattice).
-PointCloud ball(int count, double radius, const Eigen::Vector3d& centre = {0, 0, 0}) {
+PointCloud ball(int count, double radius, const Eigen::Vector3d& center = {0, 0, 0}) {
   PointCloud cloud;
   for (int n = 0; n < count; ++n) {
     const double z = 1 - (2 * n + 1.0) / count;
     const double angle = n * std::numbers::pi * (3 - std::sqrt(5.0));
     const double r = std::sqrt(1 - z * z);
     cloud.positions.push_back(
-        centre + radius * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), z));
+        center + radius * Eigen::Vector3d(r * std::cos(angle), r * std::sin(angle), z));
   }
   return cloud;
 }
@@ -49,11 +49,11 @@ TEST(Normals, OfATiltedPlaneAreExactAndUp) {
 }
 
 TEST(Normals, OfABallLookOutwards) {
-  const Eigen::Vector3d centre(5, -3, 2);
-  const PointCloud cloud = ball(4000, 0.3, centre);
+  const Eigen::Vector3d center(5, -3, 2);
+  const PointCloud cloud = ball(4000, 0.3, center);
   const NormalEstimationResult result = estimate_normals(cloud);
   for (std::size_t n = 0; n < cloud.size(); ++n) {
-    const Eigen::Vector3d out = (cloud.positions[n] - centre).normalized();
+    const Eigen::Vector3d out = (cloud.positions[n] - center).normalized();
     EXPECT_GT(result.normals[n].cast<double>().dot(out), 0.99);
   }
 }

@@ -33,7 +33,7 @@ Camera camera_of(DistortionModel model, std::vector<double> terms) {
 }
 
 // A sphere of radius 2 m around the robot's origin, seen from within by six cameras 60 degrees
-// apart and 20 cm from the centre: the depth of each pixel is that of the ray which the lens bends
+// apart and 20 cm from the center: the depth of each pixel is that of the ray which the lens bends
 // there.
 std::vector<PanoramaView> sphere_views(DistortionModel model, const std::vector<double>& terms) {
   std::vector<PanoramaView> views;
@@ -166,7 +166,7 @@ TEST(Panorama, NormalsOfASphereLookInward) {
   }
 }
 
-TEST(Panorama, NormalsWhereNeighboursAreMissing) {
+TEST(Panorama, NormalsWhereNeighborsAreMissing) {
   PanoramaView view;
   view.camera = camera_of(DistortionModel::none, {});
   view.depth = libmap::DepthImage(64, 36);

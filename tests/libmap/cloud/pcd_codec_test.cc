@@ -86,7 +86,7 @@ TEST(PcdFiles, NumbersMayLieAnywhere) {
   }
 }
 
-TEST(PcdFiles, PackedColoursInText) {
+TEST(PcdFiles, PackedColorsInText) {
   const std::string header =
       "FIELDS x y z rgba\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\nWIDTH 1\nHEIGHT 1\nPOINTS 1\n"
       "DATA ascii\n";
@@ -117,7 +117,7 @@ TEST(PcdFiles, HeadersThatLie) {
   EXPECT_THAT(error_as(".pcd", pcd_header("11", "binary") + ten),
               HasSubstr("promises 11 points of 12 bytes, but only 120 bytes of data follow (10"));
   EXPECT_THAT(error_as(".pcd", pcd_header("3", "ascii") + "1 2 3\n4 5 6\n7777777 8\n"),
-              HasSubstr("line 14 holds 2 of 3 numbers"));
+              HasSubstr("line 14 contains 2 of 3 numbers"));
   EXPECT_THAT(error_as(".pcd", pcd_header("3", "ascii") + "1.25 2.25 3.25\n4.25 5.25 6.25\n"),
               HasSubstr("promises 3 points, but only 2 lines of data follow"));
   EXPECT_THAT(error_as(".pcd", pcd_header("1", "ascii") + "1 2 three\n"), HasSubstr("three"));
@@ -143,13 +143,13 @@ TEST(PcdFiles, CompressedSizesThatLie) {
   };
   EXPECT_THAT(error_as(".pcd", header + sizes(1000, 120) + "abc"),
               HasSubstr("end after 3 of 1000 bytes"));
-  EXPECT_THAT(error_as(".pcd", header + sizes(3, 119) + "abc"), HasSubstr("hold 119 bytes"));
-  EXPECT_THAT(error_as(".pcd", header + sizes(0, 120)), HasSubstr("cannot hold"));
+  EXPECT_THAT(error_as(".pcd", header + sizes(3, 119) + "abc"), HasSubstr("contain 119 bytes"));
+  EXPECT_THAT(error_as(".pcd", header + sizes(0, 120)), HasSubstr("cannot contain"));
   EXPECT_THAT(error_as(".pcd", header + sizes(3, 120) + "\xff\xff\xff"), HasSubstr("broken"));
   EXPECT_THAT(error_as(".pcd", header + "abc"), HasSubstr("no size"));
   EXPECT_THAT(error_as(".pcd", pcd_header("300000000", "binary_compressed") +
                                    sizes(3, 3600000000U) + "abc"),
-              HasSubstr("cannot hold"));
+              HasSubstr("cannot contain"));
 }
 
 TEST(PcdFiles, HeaderLinesThatDoNotFit) {

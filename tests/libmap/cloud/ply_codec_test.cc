@@ -31,7 +31,7 @@ TEST(PlyFiles, ForeignElementsListsAndNames) {
   const std::string bytes =
       "ply\r\nformat ascii 1.0\r\ncomment made elsewhere\r\nobj_info 3\r\nelement camera 1\r\n"
       "property float view_px\r\nelement vertex 2\r\nproperty double Y\r\nproperty double X\r\n"
-      "property list uchar int neighbours\r\nproperty float64 Z\r\nproperty float diffuse_red\r\n"
+      "property list uchar int neighbors\r\nproperty float64 Z\r\nproperty float diffuse_red\r\n"
       "property float diffuse_green\r\nproperty float diffuse_blue\r\nproperty uint16 quality\r\n"
       "element face 1\r\nproperty list uchar int vertex_indices\r\nend_header\r\n"
       "7\r\n2 1 3 5 6 7 3 1 0.5 0 77\r\n\r\n5 4 0 6 0 0 1 78\r\n3 0 1 0\r\n";
@@ -43,7 +43,7 @@ TEST(PlyFiles, ForeignElementsListsAndNames) {
   ASSERT_EQ(read.cloud.fields.size(), 1U);
   EXPECT_EQ(read.cloud.fields[0].type, ScalarType::uint16);
   EXPECT_EQ(read.cloud.fields[0].values, (std::vector<double>{77, 78}));
-  EXPECT_THAT(read.info.skipped, ElementsAre("element camera", "list neighbours", "1 faces"));
+  EXPECT_THAT(read.info.skipped, ElementsAre("element camera", "list neighbors", "1 faces"));
 }
 
 TEST(PlyFiles, ListsInBinary) {
@@ -92,7 +92,7 @@ TEST(PlyFiles, HeaderLinesThatDoNotFit) {
   EXPECT_THAT(error_as(".ply",
                        "ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\n"
                        "element vertex 1\nproperty float x\nend_header\n1\n1\n"),
-              HasSubstr("PLY header line 5 is vertex: this element stands twice"));
+              HasSubstr("PLY header line 5 is vertex: this element is a duplicate"));
 }
 
 // Names are compared with all before them.

@@ -21,31 +21,31 @@ Vector2d turned(const Vector2d& place, double yaw_deg) {
   return Eigen::Rotation2Dd(yaw_deg * std::numbers::pi / 180) * place;
 }
 
-// A grid of points each 2 cm over the rectangle about `centre`, turned.
-Places field(const Vector2d& size, double yaw_deg = 0, const Vector2d& centre = {0, 0}) {
+// A grid of points each 2 cm over the rectangle about `center`, turned.
+Places field(const Vector2d& size, double yaw_deg = 0, const Vector2d& center = {0, 0}) {
   Places places;
   const int columns = static_cast<int>(std::lround(size.x() / 0.02));
   const int rows = static_cast<int>(std::lround(size.y() / 0.02));
   for (int i = 0; i <= columns; ++i)
     for (int j = 0; j <= rows; ++j)
       places.push_back(
-          centre + turned(Vector2d(0.02 * i, 0.02 * j) - Vector2d(columns, rows) / 100, yaw_deg));
+          center + turned(Vector2d(0.02 * i, 0.02 * j) - Vector2d(columns, rows) / 100, yaw_deg));
   return places;
 }
 
-TEST(SiteRectangle, CentredInTheData) {
+TEST(SiteRectangle, CenteredInTheData) {
   const SiteRectangle site = find_site_rectangle(field({4, 4}), {3, 3});
   EXPECT_EQ(site.yaw_deg, 0);
-  EXPECT_LT(site.centre.norm(), 0.015);
+  EXPECT_LT(site.center.norm(), 0.015);
   EXPECT_NEAR(site.clearance_m, 0.5, 0.011);
 }
 
 TEST(SiteRectangle, TurnsWithTheData) {
   for (const double yaw : {17.3, -31.0, 44.0, 5.0}) {
-    const Vector2d centre(12, -7);
-    const SiteRectangle site = find_site_rectangle(field({3.4, 3.4}, yaw, centre), {3, 3});
+    const Vector2d center(12, -7);
+    const SiteRectangle site = find_site_rectangle(field({3.4, 3.4}, yaw, center), {3, 3});
     EXPECT_NEAR(site.yaw_deg, yaw, 0.5);
-    EXPECT_LT((site.centre - centre).norm(), 0.025);
+    EXPECT_LT((site.center - center).norm(), 0.025);
     EXPECT_NEAR(site.clearance_m, 0.2, 0.021);
   }
 }
@@ -54,13 +54,13 @@ TEST(SiteRectangle, LongSideAlongTheLongData) {
   const SiteRectangle site = find_site_rectangle(field({2.4, 4.4}, 20), {4, 2});
   EXPECT_NEAR(site.yaw_deg, -70, 0.5);
   EXPECT_NEAR(site.clearance_m, 0.2, 0.021);
-  EXPECT_LT(site.centre.norm(), 0.025);
+  EXPECT_LT(site.center.norm(), 0.025);
 }
 
 TEST(SiteRectangle, ExactlyTheData) {
   const SiteRectangle site = find_site_rectangle(field({3, 3}), {3, 3});
   EXPECT_EQ(site.yaw_deg, 0);
-  EXPECT_LT(site.centre.norm(), 0.011);
+  EXPECT_LT(site.center.norm(), 0.011);
 }
 
 TEST(SiteRectangle, KeepsAwayFromHoles) {
@@ -69,17 +69,17 @@ TEST(SiteRectangle, KeepsAwayFromHoles) {
     if ((place - Vector2d(-2, 0)).norm() > 0.4) places.push_back(place);
   const SiteRectangle site = find_site_rectangle(places, {3, 3});
   EXPECT_NEAR(site.clearance_m, 0.5, 0.03);
-  EXPECT_GT(site.centre.x() - 1.5 - site.clearance_m, -1.62);
+  EXPECT_GT(site.center.x() - 1.5 - site.clearance_m, -1.62);
   // A square of 0.5 m fits into the hole, one of 0.7 m does not.
   SiteRectangleOptions options;
   options.max_gap_m = 0.9;
   const SiteRectangle over = find_site_rectangle(places, {3, 3}, options);
-  EXPECT_LT(std::abs(over.centre.x()), 0.02) << "the hole counts as data";
+  EXPECT_LT(std::abs(over.center.x()), 0.02) << "the hole counts as data";
 }
 
 TEST(SiteRectangle, InTheMiddleOfEquallyGoodPlaces) {
   const SiteRectangle site = find_site_rectangle(field({8, 3.2}), {3, 3});
-  EXPECT_LT(site.centre.norm(), 0.03);
+  EXPECT_LT(site.center.norm(), 0.03);
   EXPECT_EQ(site.yaw_deg, 0);
 }
 
@@ -88,7 +88,7 @@ TEST(SiteRectangle, SparsePointsHaveNoGaps) {
   for (int n = 0; n < 8000; ++n)
     places.emplace_back(graspmap_test::uniform(-2, 2), graspmap_test::uniform(-2, 2));
   const SiteRectangle site = find_site_rectangle(places, {3, 3});
-  EXPECT_LT(site.centre.norm(), 0.05);
+  EXPECT_LT(site.center.norm(), 0.05);
   EXPECT_NEAR(site.clearance_m, 0.5, 0.1);
 }
 
@@ -146,7 +146,7 @@ TEST(SiteRectangle, ThreadsMakeNoDifference) {
   const SiteRectangle a = find_site_rectangle(places, {3, 2});
   const ThreadLimit more(4);
   const SiteRectangle b = find_site_rectangle(places, {3, 2});
-  EXPECT_EQ(a.centre, b.centre);
+  EXPECT_EQ(a.center, b.center);
   EXPECT_EQ(a.yaw_deg, b.yaw_deg);
 }
 

@@ -130,7 +130,7 @@ TEST(CameraTest, RayTableIsPixelByPixel) {
   }
 }
 
-// The rays through the image's corners, half a pixel outside the corner pixels' centres, do not
+// The rays through the image's corners, half a pixel outside the corner pixels' centers, do not
 // depend on the resolution.
 TEST(CameraTest, ScalingKeepsTheFieldOfView) {
   for (const Camera& camera : lenses()) {

@@ -189,7 +189,7 @@ TEST(ManifestTest, ObjectsWithoutABoundAreRefused) {
   manifest.timings_s.emplace_back("one more", 1.0);
   EXPECT_EQ(
       error_of([&] { libmap::read_manifest_of(written(libmap::to_json(manifest))); }).reason(),
-      "holds an object of more than 10000 members");
+      "contains an object of more than 10000 members");
 }
 
 TEST(ManifestTest, NumbersThatAreNotFiniteStayReadable) {

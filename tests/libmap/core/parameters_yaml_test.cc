@@ -63,8 +63,8 @@ TEST_F(ParametersYaml, UnknownKeyNamesTheNearest) {
 }
 
 TEST_F(ParametersYaml, KeyThatStandsTwice) {
-  EXPECT_EQ(message("layers: 1\nfill: no\nlayers: 2\n"), "s.yaml: layers: stands twice");
-  EXPECT_EQ(message("gripper.a: 1\ngripper.a: 2\n"), "s.yaml: gripper.a: stands twice");
+  EXPECT_EQ(message("layers: 1\nfill: no\nlayers: 2\n"), "s.yaml: layers: is a duplicate");
+  EXPECT_EQ(message("gripper.a: 1\ngripper.a: 2\n"), "s.yaml: gripper.a: is a duplicate");
 }
 
 TEST_F(ParametersYaml, ValueThatIsNoScalar) {

@@ -25,7 +25,7 @@ TEST(ScoreColorTest, SinglePrecisionKeepsTheClass) {
   }
 }
 
-TEST(ScoreColorTest, NegativeIsRedAndNaNIsGrey) {
+TEST(ScoreColorTest, NegativeIsRedAndNaNIsGray) {
   EXPECT_EQ(score_color(-3.0), score_classes.back().color);
   EXPECT_EQ(score_color(0.0), score_classes.back().color);
   EXPECT_EQ(score_color(1.0), score_classes.front().color);

@@ -119,7 +119,7 @@ TEST(TriangleMeshTest, CheckNamesWhatIsWrong) {
   EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "vertex normals");
   mesh = box({1, 1, 1});
   mesh.vertex_colors.resize(9);
-  EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "vertex colours");
+  EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "vertex colors");
   mesh = box({1, 1, 1});
   mesh.face_fields.push_back({"id", libmap::ScalarType::int32, std::vector<double>(8)});
   EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "id");

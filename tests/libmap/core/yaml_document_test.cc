@@ -29,7 +29,7 @@ TEST(YamlDocument, GivesTheOneDocument) {
 TEST(YamlDocument, FaultsNameFileAndLine) {
   EXPECT_EQ(fault_of("b: 1\na: [1\n").find("given.yaml: line 3: not valid YAML: "), 0U);
   EXPECT_EQ(fault_of("b: 1\na: high\n").find("given.yaml: line 2: not valid YAML: "), 0U);
-  EXPECT_EQ(fault_of("a: 1\n---\na: 2\n"), "given.yaml: holds more than one YAML document");
+  EXPECT_EQ(fault_of("a: 1\n---\na: 2\n"), "given.yaml: contains more than one YAML document");
   EXPECT_EQ(graspmap_test::error_of([] {
               libmap::read_yaml("a: 1\n", "given.yaml", [](const YAML::Node&) {
                 throw libmap::Error("is too small", {.field = "a"});
@@ -41,14 +41,14 @@ TEST(YamlDocument, FaultsNameFileAndLine) {
 // yaml-cpp finds documents without end there.
 TEST(YamlDocument, WhatBelongsToNoDocumentIsRefused) {
   for (const char* text : {"{a: 1}, b", "{a: 1},", ", a", "[a]\n, b"})
-    EXPECT_EQ(fault_of(text), "given.yaml: holds more than one YAML document") << text;
+    EXPECT_EQ(fault_of(text), "given.yaml: contains more than one YAML document") << text;
 }
 
 // Each takes a hundred times its letters as a node.
 TEST(YamlDocument, NodesAreCounted) {
   std::string list = "a: [1";
   for (int n = 0; n < 500'000; ++n) list += ",1";
-  EXPECT_EQ(fault_of(list + "]\n"), "given.yaml: holds more than 500000 values");
+  EXPECT_EQ(fault_of(list + "]\n"), "given.yaml: contains more than 500000 values");
 }
 
 // Who reads them walks through what they stand for, each time.
@@ -66,8 +66,8 @@ TEST(YamlDocument, AliasesCountAsWhatTheyStandFor) {
                     [&](const YAML::Node& root) { value = root["a"].as<double>(); });
   EXPECT_EQ(value, 1.5);
   add_level(5);
-  EXPECT_EQ(fault_of(bomb), "given.yaml: holds more than 500000 values");
-  EXPECT_EQ(fault_of("a: &a [1, *a]\n"), "given.yaml: holds more than 500000 values");
+  EXPECT_EQ(fault_of(bomb), "given.yaml: contains more than 500000 values");
+  EXPECT_EQ(fault_of("a: &a [1, *a]\n"), "given.yaml: contains more than 500000 values");
 }
 
 // What has no place in the text has no line.

@@ -75,7 +75,7 @@ testing::AssertionResult same_geometry(const TriangleMesh& a, const TriangleMesh
 testing::AssertionResult same_mesh(const TriangleMesh& a, const TriangleMesh& b) {
   if (const auto same = same_geometry(a, b); !same) return same;
   if (a.vertex_normals != b.vertex_normals || a.vertex_colors != b.vertex_colors)
-    return testing::AssertionFailure() << "normals or colours differ";
+    return testing::AssertionFailure() << "normals or colors differ";
   if (a.vertex_fields != b.vertex_fields || a.face_fields != b.face_fields)
     return testing::AssertionFailure() << "fields differ";
   return testing::AssertionSuccess();

@@ -12,7 +12,7 @@
 
 namespace graspmap_test {
 
-// Repairs alone: nothing that depends on lengths in metres.
+// Repairs alone: nothing that depends on lengths in meters.
 libmap::MeshCleaningOptions repairs();
 libmap::MeshCleaningOptions holes_up_to(double diameter_m);
 

@@ -122,11 +122,11 @@ TEST(Crop, BoxInTheLevelFrame) {
   EXPECT_EQ(bounds.max.y(), 0);
   EXPECT_EQ(mesh.report.outline.size(), 4U);
   options.center = true;
-  const CropMeshResult centred = crop_mesh(transform_mesh(site_mesh(), tilted), options);
-  EXPECT_EQ(bounds_of(centred.mesh.vertices).min.head<2>(), Vector2d(-1, -1));
-  EXPECT_NEAR(surface_area(centred.mesh), surface_area(mesh.mesh), 1e-9);
+  const CropMeshResult centered = crop_mesh(transform_mesh(site_mesh(), tilted), options);
+  EXPECT_EQ(bounds_of(centered.mesh.vertices).min.head<2>(), Vector2d(-1, -1));
+  EXPECT_NEAR(surface_area(centered.mesh), surface_area(mesh.mesh), 1e-9);
   const Vector3d shift =
-      centred.report.site_from_map.translation() - mesh.report.site_from_map.translation();
+      centered.report.site_from_map.translation() - mesh.report.site_from_map.translation();
   EXPECT_LT((shift - Vector3d(-2, 1, 0)).norm(), 1e-12);
 }
 
@@ -237,7 +237,7 @@ TEST(Crop, WhatCannotBe) {
   options.polygon = {{0, 0}, {1, 1}};
   EXPECT_NE(message(options).find("corners is 2"), std::string::npos);
   options.region = CropRegion::border;
-  EXPECT_NE(message(options).find("no colours"), std::string::npos);
+  EXPECT_NE(message(options).find("no colors"), std::string::npos);
   options = box_options({0, 0}, {1, 1});
   options.rectangle.margin_m = 0.1;
   EXPECT_NE(message(options).find("margin"), std::string::npos);
@@ -264,7 +264,7 @@ TEST(Crop, WhatCannotBe) {
   EXPECT_NEAR(crop_mesh(one, {}).mesh.vertices[1].z(), 0, 1e-9);
 }
 
-// Aslant over kilometres, upright ones of kilometres, and far from where a step of a cell is none.
+// Aslant over kilometers, upright ones of kilometers, and far from where a step of a cell is none.
 TEST(Crop, TrianglesOfAnyShapeAreSeenByFewSamples) {
   CropOptions options;
   options.level = false;

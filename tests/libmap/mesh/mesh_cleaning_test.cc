@@ -161,7 +161,7 @@ TEST(MeshCleaning, HostileMeshes) {
   none_left(mesh_of({{0, 0, 0}, {1, 0, 0}, {2, 0, 0}}, {{0, 1, 2}}));
   none_left(mesh_of({{1, 1, 1}, {1, 1, 1}, {1, 1, 1}}, {{0, 1, 2}}));
   none_left(mesh_of({{0, 0, 0}, {1, 0, 0}}, {{0, 0, 1}, {1, 1, 1}}));
-  // One vertex a billion metres away: the others are one place against that.
+  // One vertex a billion meters away: the others are one place against that.
   TriangleMesh far = geodesic_mesh(2, 1.0);
   far.vertices[0] = {1e9, 0, 0};
   EXPECT_NO_THROW({

@@ -50,18 +50,18 @@ TriangleMesh field_mesh(std::uint32_t count, double half, const Height& height) 
   return mesh;
 }
 
-Corners random_star(int count, const Vector2d& centre, double least, double most) {
+Corners random_star(int count, const Vector2d& center, double least, double most) {
   Corners corners;
   for (int n = 0; n < count; ++n) {
     const double angle = 2 * std::numbers::pi * n / count + 0.1;
-    corners.push_back(centre + uniform(least, most) * Vector2d(std::cos(angle), std::sin(angle)));
+    corners.push_back(center + uniform(least, most) * Vector2d(std::cos(angle), std::sin(angle)));
   }
   return corners;
 }
 
 // A closed ball: that of mesh_samples.h with one vertex at each pole.
-TriangleMesh closed_ball(std::uint32_t rows, std::uint32_t columns, const Vector3d& centre) {
-  TriangleMesh ball = ball_mesh(rows, columns, centre);
+TriangleMesh closed_ball(std::uint32_t rows, std::uint32_t columns, const Vector3d& center) {
+  TriangleMesh ball = ball_mesh(rows, columns, center);
   std::vector<Triangle> triangles;
   for (Triangle corners : ball.triangles) {
     for (std::uint32_t& v : corners) v = v < columns ? 0 : v >= rows * columns ? rows * columns : v;

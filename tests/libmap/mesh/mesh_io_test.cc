@@ -278,7 +278,7 @@ TEST(MeshFiles, GlbHasYUp) {
   EXPECT_EQ(read_mesh(path).mesh.vertices, mesh.vertices);
 }
 
-// Mid grey, 188 of 255 in sRGB, is half the light; and every byte comes back.
+// Mid gray, 188 of 255 in sRGB, is half the light; and every byte comes back.
 TEST(MeshFiles, GlbHasLinearColors) {
   TriangleMesh mesh;
   for (int n = 0; n < 256; ++n) {
@@ -308,7 +308,7 @@ TEST(MeshFiles, WhatAssimpFallsOverIsAnError) {
       graspmap_test::source_folder() / "tests/fuzz/findings/glb/primitive_without_attributes",
       path);
   EXPECT_THAT(error_of([&] { read_mesh(path); }).what(),
-              HasSubstr("mesh.glb: is broken: the library for its format fell over it"));
+              HasSubstr("mesh.glb: is broken: the library for its format crashed on it"));
 }
 
 // What the library for the format says, and numbers that it lets pass.

@@ -220,7 +220,7 @@ TEST(MeshRepair, OneSidedSurfacesAreCut) {
 
 TEST(MeshRepair, FoldIsTakenOutAndClosed) {
   TriangleMesh mesh = terrain_mesh(40, 2.0, [](double x, double y) { return 0.1 * x * y; });
-  // One vertex is pulled below its neighbours, where another one hangs down.
+  // One vertex is pulled below its neighbors, where another one hangs down.
   mesh.vertices[20 * 41 + 20] += Eigen::Vector3d(0.17, 0.02, -0.02);
   mesh.vertices[22 * 41 + 20].z() -= 0.05;
   ASSERT_GT(report_mesh(mesh).self_intersections, 0U);

@@ -20,13 +20,13 @@ inline libmap::TriangleMesh square_mesh(double z, double half = 1.0) {
 
 // A closed ball, its vertices on the sphere, of rows x columns quads.
 inline libmap::TriangleMesh ball_mesh(std::uint32_t rows, std::uint32_t columns,
-                                      const Eigen::Vector3d& centre, double radius = 1.0) {
+                                      const Eigen::Vector3d& center, double radius = 1.0) {
   libmap::TriangleMesh mesh;
   for (std::uint32_t r = 0; r <= rows; ++r)
     for (std::uint32_t c = 0; c < columns; ++c) {
       const double polar = std::numbers::pi * r / rows;
       const double around = 2 * std::numbers::pi * c / columns;
-      mesh.vertices.push_back(centre + radius * Eigen::Vector3d(std::sin(polar) * std::cos(around),
+      mesh.vertices.push_back(center + radius * Eigen::Vector3d(std::sin(polar) * std::cos(around),
                                                                 std::sin(polar) * std::sin(around),
                                                                 std::cos(polar)));
     }

@@ -179,7 +179,7 @@ TEST(PoissonDisk, BlueNoise) {
     // Whole waves on the square: its own shape has no power there.
     for (int a = -60; a <= 60; ++a)
       for (int b = 0; b <= 60; ++b) {
-        const double frequency = std::hypot(a, b) / 2.0;  // a metre
+        const double frequency = std::hypot(a, b) / 2.0;  // a meter
         if (frequency < low / radius || frequency > high / radius || (a == 0 && b == 0)) continue;
         std::complex<double> wave = 0.0;
         for (const Eigen::Vector3d& p : points)
@@ -351,7 +351,7 @@ TEST(PoissonDisk, FilesKeepTheSpacing) {
 }
 
 TEST(PoissonDisk, RadiusBelowSinglePrecision) {
-  // A step of single precision is 15 micrometres there: 15 x 15 places.
+  // A step of single precision is 15 micrometers there: 15 x 15 places.
   const TriangleMesh mesh = moved(square_mesh(0.0, 1e-4), {200.0, 200.0, 0.0});
   const PoissonDiskResult result = by_radius(mesh, 1e-6);
   EXPECT_GE(smallest_pair(result.cloud.positions), 1e-6);

@@ -28,7 +28,7 @@ using ::testing::HasSubstr;
 constexpr double pi = std::numbers::pi;
 
 // Nearly even on a sphere (Fibonacci lattice), about `spacing_m` apart.
-PointCloud ball(double radius, double spacing_m, const Eigen::Vector3d& centre = {0, 0, 0}) {
+PointCloud ball(double radius, double spacing_m, const Eigen::Vector3d& center = {0, 0, 0}) {
   PointCloud cloud;
   const int count = static_cast<int>(4 * pi * radius * radius / (spacing_m * spacing_m));
   for (int n = 0; n < count; ++n) {
@@ -36,7 +36,7 @@ PointCloud ball(double radius, double spacing_m, const Eigen::Vector3d& centre =
     const double angle = n * pi * (3 - std::sqrt(5.0));
     const double r = std::sqrt(1 - z * z);
     const Eigen::Vector3d out(r * std::cos(angle), r * std::sin(angle), z);
-    cloud.positions.push_back(centre + radius * out);
+    cloud.positions.push_back(center + radius * out);
     cloud.normals.push_back(out.cast<float>());
   }
   return cloud;
@@ -253,7 +253,7 @@ TEST(PoissonReconstruction, FarAway) {
     EXPECT_NEAR((vertex - far).norm(), 0.2, 0.001);
 }
 
-TEST(PoissonReconstruction, ColoursAndFieldsAreCarriedOver) {
+TEST(PoissonReconstruction, ColorsAndFieldsAreCarriedOver) {
   PointCloud cloud = plane(0.4, 0.01);
   cloud.colors.resize(cloud.size());
   cloud.add_field("ramp", ScalarType::float32);

@@ -58,11 +58,11 @@ TEST(SpotCheck, ErrorsOfATiltedPlaneInClosedForm) {
     EXPECT_NEAR(*result.mean_m[e], of_edge / 7, 1e-9);
     sum += of_edge;
   }
-  EXPECT_NEAR(result.mean_size_m, sum / 28, 1e-9);
+  EXPECT_NEAR(result.mean_abs_error_m, sum / 28, 1e-9);
   EXPECT_NEAR(result.mean_error_m, signed_sum / 28, 1e-9);
   EXPECT_NEAR(result.mean_error_m, 0.001, 1e-9) << "the rest is symmetric";
   // The place of edge a or c that lies farthest out in the direction of the slope.
-  EXPECT_NEAR(result.max_size_m, 0.01 * 1.5 * 6 / 7 + 0.02 * 1.45 + 0.001, 1e-9);
+  EXPECT_NEAR(result.max_abs_error_m, 0.01 * 1.5 * 6 / 7 + 0.02 * 1.45 + 0.001, 1e-9);
 }
 
 TEST(SpotCheck, TruthIsTakenAtTheSamePlace) {
@@ -72,7 +72,7 @@ TEST(SpotCheck, TruthIsTakenAtTheSamePlace) {
   for (Eigen::Vector3d& v : mesh.vertices) v.z() -= 0.004;
   const SpotCheckResult result =
       check_edges(corners_of({-1, -1}, {1, 1}), heights_of(mesh), heights_of(truth));
-  EXPECT_NEAR(result.mean_size_m, 0.004, 1e-9);
+  EXPECT_NEAR(result.mean_abs_error_m, 0.004, 1e-9);
   EXPECT_NEAR(result.mean_error_m, -0.004, 1e-9);
 }
 
@@ -87,7 +87,7 @@ TEST(SpotCheck, PlacesWithoutDataAreEmptyNotZero) {
   EXPECT_FALSE(result.edges[1][0].height_m);
   EXPECT_FALSE(result.mean_m[1]);
   EXPECT_NEAR(*result.mean_m[0], 0.002, 1e-12);
-  EXPECT_NEAR(result.mean_size_m, 0.002, 1e-12) << "not diluted by what is missing";
+  EXPECT_NEAR(result.mean_abs_error_m, 0.002, 1e-12) << "not diluted by what is missing";
   const HeightFunction nothing = [](const Eigen::Vector2d&) { return std::nullopt; };
   EXPECT_THAT(error_of([&] {
                 check_edges(corners_of({-1, -1}, {1, 1}), nothing, zero);

@@ -59,7 +59,7 @@ Eigen::Vector3d gaussian(double sigma) {
   return {x, y, normal(random_engine())};
 }
 
-// Largest entry of the difference: metres, and radians for small angles.
+// Largest entry of the difference: meters, and radians for small angles.
 double difference(const Pose& a, const Pose& b) {
   return (a.matrix() - b.matrix()).cwiseAbs().maxCoeff();
 }
@@ -173,13 +173,13 @@ TEST(SurfaceAlignment, NoisyCloudOfAPlaneDoesNotSlide) {
 }
 
 TEST(SurfaceAlignment, BallDoesNotTurn) {
-  const Eigen::Vector3d centre(0.03, 0.02, -0.01);
+  const Eigen::Vector3d center(0.03, 0.02, -0.01);
   std::vector<Eigen::Vector3d> points;
-  for (int n = 0; n < 3000; ++n) points.push_back(centre + gaussian(1.0).normalized());
+  for (int n = 0; n < 3000; ++n) points.push_back(center + gaussian(1.0).normalized());
   const SurfaceAlignmentResult result = align_to_surface(
       points, ReferenceSurface(ball_mesh(200, 400, {0, 0, 0})), {.max_distance_m = 0.5});
   EXPECT_EQ(result.free_motions, 3);
-  EXPECT_LT((result.surface_from_points * centre).norm(), 1e-3);
+  EXPECT_LT((result.surface_from_points * center).norm(), 1e-3);
   EXPECT_LT(Eigen::AngleAxisd(result.surface_from_points.linear()).angle(), 1e-3);
 }
 
@@ -208,7 +208,7 @@ TEST(SurfaceAlignment, SaysWhetherItHasConverged) {
   EXPECT_EQ(result.iterations, 2);
 }
 
-TEST(SurfaceAlignment, ThreadsMakeNoDifferenceAndPointsAreThinned) {
+TEST(SurfaceAlignment, ThreadsMakeNoDifferenceAndPointsAreDownsampled) {
   const TriangleMesh mesh = hills();
   const ReferenceSurface surface(mesh);
   const std::vector<Eigen::Vector3d> points = moved(samples_of(mesh, 3000), small_motion);

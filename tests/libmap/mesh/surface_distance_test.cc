@@ -15,14 +15,14 @@ using graspmap_test::error_of;
 using graspmap_test::uniform;
 using ::testing::HasSubstr;
 
-// A bumpy square of 2 m about `centre`, (n - 1)^2 * 2 triangles.
-TriangleMesh bumpy(std::uint32_t n, const Eigen::Vector3d& centre = Eigen::Vector3d::Zero()) {
+// A bumpy square of 2 m about `center`, (n - 1)^2 * 2 triangles.
+TriangleMesh bumpy(std::uint32_t n, const Eigen::Vector3d& center = Eigen::Vector3d::Zero()) {
   TriangleMesh mesh;
   for (std::uint32_t y = 0; y < n; ++y)
     for (std::uint32_t x = 0; x < n; ++x) {
       const double u = 2.0 * x / (n - 1) - 1;
       const double v = 2.0 * y / (n - 1) - 1;
-      mesh.vertices.push_back(centre +
+      mesh.vertices.push_back(center +
                               Eigen::Vector3d(u, v, 0.2 * std::sin(5 * u) * std::cos(4 * v)));
     }
   for (std::uint32_t y = 0; y + 1 < n; ++y)
@@ -91,11 +91,11 @@ TEST(SurfaceDistance, DegenerateTrianglesAreSegmentsAndPoints) {
 }
 
 TEST(SurfaceDistance, AgreesWithASearchOfAllTriangles) {
-  for (const Eigen::Vector3d& centre : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(4e5, -3e6, 70)}) {
-    const TriangleMesh mesh = bumpy(25, centre);
+  for (const Eigen::Vector3d& center : {Eigen::Vector3d(0, 0, 0), Eigen::Vector3d(4e5, -3e6, 70)}) {
+    const TriangleMesh mesh = bumpy(25, center);
     const SurfaceDistance surface(mesh);
     for (int round = 0; round < 300; ++round) {
-      const Eigen::Vector3d point = centre + random_point(round % 3 == 0 ? 10 : 1.2);
+      const Eigen::Vector3d point = center + random_point(round % 3 == 0 ? 10 : 1.2);
       double best = std::numeric_limits<double>::infinity();
       for (const Triangle& t : mesh.triangles)
         best = std::min(best, (nearest_on_triangle(point, mesh.vertices[t[0]], mesh.vertices[t[1]],

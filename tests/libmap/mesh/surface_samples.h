@@ -99,7 +99,7 @@ inline libmap::TriangleMesh terrain_mesh(std::uint32_t cells, double size_m,
 // A geodesic ball: an octahedron whose faces are divided `levels` times, its vertices on the
 // sphere.
 inline libmap::TriangleMesh geodesic_mesh(int levels, double radius,
-                                          const Eigen::Vector3d& centre = Eigen::Vector3d::Zero()) {
+                                          const Eigen::Vector3d& center = Eigen::Vector3d::Zero()) {
   libmap::TriangleMesh mesh;
   mesh.vertices = {{1, 0, 0}, {-1, 0, 0}, {0, 1, 0}, {0, -1, 0}, {0, 0, 1}, {0, 0, -1}};
   mesh.triangles = {{0, 2, 4}, {2, 1, 4}, {1, 3, 4}, {3, 0, 4},
@@ -126,7 +126,7 @@ inline libmap::TriangleMesh geodesic_mesh(int levels, double radius,
     }
     mesh.triangles = std::move(divided);
   }
-  for (Eigen::Vector3d& v : mesh.vertices) v = centre + radius * v;
+  for (Eigen::Vector3d& v : mesh.vertices) v = center + radius * v;
   return mesh;
 }
 

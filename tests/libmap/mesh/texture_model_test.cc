@@ -227,7 +227,7 @@ TEST(TextureModel, BesideWhatHidesItAnotherViewIsTaken) {
   EXPECT_LT(with, without / 5);
 }
 
-TEST(TextureModel, WhatNobodySeesIsGreyAndCounted) {
+TEST(TextureModel, WhatNobodySeesIsGrayAndCounted) {
   const TriangleMesh mesh = ground_and_plate();
   // From straight above: the plate hides the ground below it.
   const PaintedScan scan(mesh, red_plate, small_camera(), {looking_at({0, 0, 1.5}, {0, 0, 0})});
@@ -236,13 +236,13 @@ TEST(TextureModel, WhatNobodySeesIsGreyAndCounted) {
   EXPECT_NEAR(result.unseen_m2, shadow, 0.25 * shadow);
   EXPECT_NEAR(result.unseen_m2 + result.seen_m2, 1.0 + 0.24 * 0.24, 1e-9);
   EXPECT_EQ(result.seen_triangles + result.unseen_triangles, mesh.triangles.size());
-  std::size_t grey = 0;
+  std::size_t gray = 0;
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (!is_neutral(result, t)) continue;
-    ++grey;
+    ++gray;
     EXPECT_EQ(libmap::texture_color(result.model, t, 0.2, 0.3), Eigen::Vector3f::Constant(128));
   }
-  EXPECT_EQ(grey, result.unseen_triangles);
+  EXPECT_EQ(gray, result.unseen_triangles);
   // A mesh seen from below only has no front.
   const PaintedScan below(mesh, red_plate, small_camera(), {looking_at({0, 0, -1}, {0, 0, 0})});
   EXPECT_NE(std::string(error_of([&] { libmap::texture_mesh(mesh, below, below.poses()); }).what())

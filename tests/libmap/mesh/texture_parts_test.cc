@@ -10,7 +10,7 @@
 #include "libmap/mesh/rectangle_packing.h"
 #include "libmap/mesh/texture_atlas.h"
 #include "libmap/mesh/texture_exposure.h"
-#include "libmap/mesh/texture_labelling.h"
+#include "libmap/mesh/texture_labeling.h"
 #include "libmap/mesh/texture_painting.h"
 #include "libmap/mesh/texture_photos.h"
 #include "libmap/mesh/texture_views.h"
@@ -106,7 +106,7 @@ double energy_of(const LabelProblem& problem, const std::vector<std::uint32_t>& 
 }
 
 // By trying all combinations.
-double least_energy(const LabelProblem& problem, double seam_cost_m) {
+double min_energy(const LabelProblem& problem, double seam_cost_m) {
   std::vector<std::uint32_t> photos(problem.mesh.triangles.size(), libmap::no_photo);
   double least = 1e30;
   const std::function<void(std::size_t)> choose = [&](std::size_t t) {
@@ -144,7 +144,7 @@ TEST(LabelTriangles, TheLeastEnergyOfAStripAndOfASmallRing) {
       const double cost = uniform(0.01, 0.3);
       const libmap::TextureLabels labels =
           libmap::label_triangles(problem.mesh, problem.opposite, problem.views, {cost});
-      const double least = least_energy(problem, cost);
+      const double least = min_energy(problem, cost);
       EXPECT_NEAR(labels.energy, energy_of(problem, labels.photos, cost), 1e-5);
       if (mesh.vertices.size() == strip.vertices.size())
         EXPECT_NEAR(labels.energy, least, 1e-5);
@@ -277,7 +277,7 @@ TEST(TextureAtlas, TexelsAreThePhotographsPixels) {
   const AtlasCase c;
   const std::vector<std::uint32_t> label(c.mesh.triangles.size(), 1);
   libmap::TextureAtlasOptions options;
-  options.texels_a_pixel = 1.0;
+  options.texels_per_pixel = 1.0;
   const libmap::TextureAtlas atlas =
       libmap::make_texture_atlas(c.mesh, c.opposite, label, c.photos, options);
   ASSERT_EQ(atlas.charts.size(), 1U);
@@ -359,7 +359,7 @@ TEST(SplitLongSides, SameSurfaceWithoutGaps) {
     }
   }
   EXPECT_EQ(libmap::split_long_sides(ball, 2.0, most).mesh.triangles, ball.triangles);
-  // Kilometres are not cut into centimetres.
+  // Kilometers are not cut into centimeters.
   const TriangleMesh wide = graspmap_test::square_mesh(0.0, 5000.0);
   const libmap::SubdivisionResult bounded = libmap::split_long_sides(wide, 0.05, 10000);
   EXPECT_LT(bounded.mesh.triangles.size(), 10001U);
@@ -370,12 +370,12 @@ TEST(SplitLongSides, OnlyWhereItIsNeeded) {
   const TriangleMesh wide = graspmap_test::square_mesh(0.0, 100.0);
   const Eigen::Vector3d place(20, 30, 0);
   const auto is_near = [&place](const TriangleMesh& mesh, const libmap::Triangle& t) {
-    const Eigen::Vector3d centre =
+    const Eigen::Vector3d center =
         (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
     double radius = 0.0;
     for (const std::uint32_t corner : t)
-      radius = std::max(radius, (mesh.vertices[corner] - centre).norm());
-    return (centre - place).norm() <= radius + 1.0;
+      radius = std::max(radius, (mesh.vertices[corner] - center).norm());
+    return (center - place).norm() <= radius + 1.0;
   };
   const libmap::SubdivisionResult fine = libmap::split_long_sides(wide, 0.1, 10'000'000, is_near);
   EXPECT_EQ(fine.max_side_m, 0.1);
@@ -433,11 +433,11 @@ TEST(PhotoProjector, NoLengthInABallTakesMorePixels) {
                         .toRotationMatrix();
     pose.translation() = Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1));
     const libmap::PhotoProjector projector(camera, pose);
-    const Eigen::Vector3d centre(uniform(-3, 3), uniform(-3, 3), uniform(-3, 3));
+    const Eigen::Vector3d center(uniform(-3, 3), uniform(-3, 3), uniform(-3, 3));
     const double radius = std::pow(10.0, uniform(-3, 0.5));
     const auto in_ball = [&] {
       return Eigen::Vector3d(
-          centre +
+          center +
           radius * uniform(0, 1) *
               Eigen::Vector3d(uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)).normalized());
     };
@@ -453,9 +453,9 @@ TEST(PhotoProjector, NoLengthInABallTakesMorePixels) {
       const Eigen::Vector3d bt = projector.project(b);
       any = any || in_image(at);
       if (!in_image(at) || !in_image(bt)) continue;
-      ASSERT_LE((at - bt).head<2>().norm(), projector.most_pixels(centre, radius, (a - b).norm()));
+      ASSERT_LE((at - bt).head<2>().norm(), projector.max_pixels(center, radius, (a - b).norm()));
     }
-    const double most = projector.most_pixels(centre, radius, 1.0);
+    const double most = projector.max_pixels(center, radius, 1.0);
     ASSERT_TRUE(most > 0.0 || !any);
     shown += most > 0.0 ? 1 : 0;
     hidden += most > 0.0 ? 0 : 1;

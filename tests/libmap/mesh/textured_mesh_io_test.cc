@@ -23,7 +23,7 @@ using graspmap_test::uniform;
 using libmap::TexturedMesh;
 using Json = nlohmann::json;
 
-// Two pages of random colours, a triangle of none, and normals where `normals` is set.
+// Two pages of random colors, a triangle of none, and normals where `normals` is set.
 TexturedMesh random_model(bool normals) {
   TexturedMesh model;
   model.mesh = graspmap_test::grid_mesh(4, 2.0, 0.5);
@@ -47,7 +47,7 @@ TexturedMesh random_model(bool normals) {
   return model;
 }
 
-// Each triangle of one is one of the other, with the same places, page and colours.
+// Each triangle of one is one of the other, with the same places, page and colors.
 void expect_same(const TexturedMesh& read, const TexturedMesh& written, double color_tolerance) {
   ASSERT_EQ(read.mesh.triangles.size(), written.mesh.triangles.size());
   ASSERT_EQ(read.mesh.vertices.size(), written.mesh.vertices.size());

@@ -45,14 +45,14 @@ struct SpottedWall {
   }
 
  private:
-  void add_spot(const Eigen::Vector2d& centre, double spot_px) {
-    spots.push_back(centre);
+  void add_spot(const Eigen::Vector2d& center, double spot_px) {
+    spots.push_back(center);
     const int reach = static_cast<int>(5 * spot_px);
-    const auto x0 = static_cast<int>(centre.x());
-    const auto y0 = static_cast<int>(centre.y());
+    const auto x0 = static_cast<int>(center.x());
+    const auto y0 = static_cast<int>(center.y());
     for (int y = y0 - reach; y <= y0 + reach; ++y)
       for (int x = x0 - reach; x <= x0 + reach; ++x) {
-        const double off = (Eigen::Vector2d(x, y) - centre).squaredNorm();
+        const double off = (Eigen::Vector2d(x, y) - center).squaredNorm();
         const auto value = static_cast<std::uint8_t>(
             60.0 + std::round(180.0 * std::exp(-0.5 * off / (spot_px * spot_px))));
         view.color.at(x, y) = {value, value, value};

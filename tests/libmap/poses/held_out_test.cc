@@ -16,7 +16,7 @@ using graspmap_test::around;
 using graspmap_test::boulders;
 using graspmap_test::TexturedScan;
 using libmap::HeldOutChange;
-using libmap::HeldOutJudgement;
+using libmap::HeldOutEvaluatement;
 using libmap::Pose;
 using libmap::SampleUse;
 
@@ -39,8 +39,8 @@ TEST(HeldOut, MeansAreOfWhatBothSetsOfPosesSay) {
   EXPECT_EQ(libmap::compare_held_out({none}, {1.0}).count, 0U);
 }
 
-HeldOutJudgement judgement(double matches, double surfaces) {
-  HeldOutJudgement made;
+HeldOutEvaluatement evaluatement(double matches, double surfaces) {
+  HeldOutEvaluatement made;
   made.matches = {12000, 1.0, 1.0 + matches, 1e-4};
   made.surfaces = {36000, 1.0, 1.0 + surfaces, 1e-4};
   return made;
@@ -48,16 +48,16 @@ HeldOutJudgement judgement(double matches, double surfaces) {
 
 TEST(HeldOut, AnyRiseOfTheWholeIsWorse) {
   // Three samples of surfaces count as much as one match.
-  EXPECT_NEAR(judgement(0.002, -0.001).change(), 0.0005, 1e-12);
-  EXPECT_TRUE(judgement(1e-5, 0.0).is_worse()) << "however little";
-  EXPECT_TRUE(judgement(0.002, -0.001).is_worse());
-  EXPECT_FALSE(judgement(0.001, -0.002).is_worse());
-  EXPECT_FALSE(judgement(0.0, 0.0).is_worse());
-  EXPECT_TRUE(judgement(0.01, -0.05).is_worse()) << "a gain that the matches pay";
-  EXPECT_TRUE(judgement(-0.05, 0.01).is_worse()) << "a gain that the surfaces pay";
-  EXPECT_FALSE(judgement(0.0, -0.1).is_clearly_better()) << "only the matches tell the lens";
-  EXPECT_FALSE(judgement(-1e-4, 0.0).is_clearly_better());
-  EXPECT_TRUE(judgement(-3e-4, 0.0).is_clearly_better());
+  EXPECT_NEAR(evaluatement(0.002, -0.001).change(), 0.0005, 1e-12);
+  EXPECT_TRUE(evaluatement(1e-5, 0.0).is_worse()) << "however little";
+  EXPECT_TRUE(evaluatement(0.002, -0.001).is_worse());
+  EXPECT_FALSE(evaluatement(0.001, -0.002).is_worse());
+  EXPECT_FALSE(evaluatement(0.0, 0.0).is_worse());
+  EXPECT_TRUE(evaluatement(0.01, -0.05).is_worse()) << "a gain that the matches pay";
+  EXPECT_TRUE(evaluatement(-0.05, 0.01).is_worse()) << "a gain that the surfaces pay";
+  EXPECT_FALSE(evaluatement(0.0, -0.1).is_clearly_better()) << "only the matches tell the lens";
+  EXPECT_FALSE(evaluatement(-1e-4, 0.0).is_clearly_better());
+  EXPECT_TRUE(evaluatement(-3e-4, 0.0).is_clearly_better());
 }
 
 TEST(HeldOut, SamplesForChecksAreNoOthers) {
@@ -92,17 +92,18 @@ TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
     away.head<3>() = truth[n + 1].linear().transpose() * Eigen::Vector3d(0, 0, 0.004 * n);
     wrong[n + 1] = libmap::moved(truth[n + 1], away);
   }
-  const auto judged = libmap::judge_held_out(libmap::held_out_costs(found.frames, links, truth),
-                                             libmap::held_out_costs(found.frames, links, wrong));
-  EXPECT_GT(judged.surfaces.count, 50U);
-  EXPECT_EQ(judged.matches.count, 0U);
-  EXPECT_GT(judged.change(), 3.0 * judged.deviation());
-  EXPECT_TRUE(judged.is_worse());
+  const auto evaluated =
+      libmap::evaluate_held_out(libmap::held_out_costs(found.frames, links, truth),
+                                libmap::held_out_costs(found.frames, links, wrong));
+  EXPECT_GT(evaluated.surfaces.count, 50U);
+  EXPECT_EQ(evaluated.matches.count, 0U);
+  EXPECT_GT(evaluated.change(), 3.0 * evaluated.deviation());
+  EXPECT_TRUE(evaluated.is_worse());
   // A frame without a pose says nothing.
   wrong.erase(3);
-  const auto fewer = libmap::judge_held_out(libmap::held_out_costs(found.frames, links, truth),
-                                            libmap::held_out_costs(found.frames, links, wrong));
-  EXPECT_LT(fewer.surfaces.count, judged.surfaces.count);
+  const auto fewer = libmap::evaluate_held_out(libmap::held_out_costs(found.frames, links, truth),
+                                               libmap::held_out_costs(found.frames, links, wrong));
+  EXPECT_LT(fewer.surfaces.count, evaluated.surfaces.count);
   EXPECT_GT(fewer.surfaces.count, 0U);
 }
 

@@ -1,4 +1,4 @@
-// Where an optimisation starts, against the definition: links gone through in order, again and
+// Where an optimization starts, against the definition: links gone through in order, again and
 // again.
 #include "libmap/poses/initial_poses.h"
 

@@ -275,7 +275,7 @@ TEST(PoseImport, NamesTheFileThatIsOfNoUse) {
   EXPECT_EQ(few.context().bound, "4");
   write_text(scratch_folder() / "none.txt", "# nothing\n");
   EXPECT_THAT(error_of([&] { libmap::import_poses(scratch_folder() / "none.txt", scan); }).what(),
-              HasSubstr("holds no pose"));
+              HasSubstr("contains no pose"));
 }
 
 // The stored poses of a real scan, by each format, back to the digit of its float32.

@@ -91,7 +91,7 @@ TEST(Refinement, WithoutTextureThePosesStayAndItSaysSo) {
         result.poses[n].world_from_base.isApprox(*scan.graph_.nodes[n].odometry_from_base, 1e-9));
 }
 
-// Two patches of ground that look the same, five metres apart: their frames match perfectly, and
+// Two patches of ground that look the same, five meters apart: their frames match perfectly, and
 // only the way between tells them apart.
 TEST(Refinement, SameLookAtAnotherPlaceIsNotTheSamePlace) {
   TexturedScan scan;
@@ -222,15 +222,15 @@ TEST(Features, StandWhereTheBlobsAre) {
   TexturedScan scan;
   scan.see(plane_z(0.0), looking({0, 0, 1.2}, {0.6, 0, 0}), Vector6d::Zero(), false, {});
   libmap::ColorImage& color = scan.frames.at(1).color;
-  std::vector<Eigen::Vector2d> centres;
+  std::vector<Eigen::Vector2d> centers;
   for (int row = 1; row < 6; ++row)
     for (int column = 1; column < 8; ++column)
-      centres.emplace_back(32.0 * column + 0.37 * (row % 3), 30.0 * row + 0.41 * (column % 3));
+      centers.emplace_back(32.0 * column + 0.37 * (row % 3), 30.0 * row + 0.41 * (column % 3));
   for (int y = 0; y < color.height; ++y)
     for (int x = 0; x < color.width; ++x) {
       double value = 60.0;
-      for (const Eigen::Vector2d& centre : centres)
-        value += 150.0 * std::exp(-(Eigen::Vector2d(x, y) - centre).squaredNorm() / 18.0);
+      for (const Eigen::Vector2d& center : centers)
+        value += 150.0 * std::exp(-(Eigen::Vector2d(x, y) - center).squaredNorm() / 18.0);
       const auto gray = static_cast<std::uint8_t>(std::lround(value));
       color.at(x, y) = {gray, gray, gray};
     }
@@ -241,9 +241,9 @@ TEST(Features, StandWhereTheBlobsAre) {
   double count = 0.0;
   for (const libmap::Feature& feature : found.frames[0].features) {
     const Eigen::Vector2d pixel = libmap::distort_to_pixel(camera, feature.ray.cast<double>());
-    for (const Eigen::Vector2d& centre : centres)
-      if ((pixel - centre).norm() < 1.0) {
-        mean += pixel - centre;
+    for (const Eigen::Vector2d& center : centers)
+      if ((pixel - center).norm() < 1.0) {
+        mean += pixel - center;
         count += 1.0;
       }
     // On the plane z = 0, whose depth they know.

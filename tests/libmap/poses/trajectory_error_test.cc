@@ -32,8 +32,8 @@ Trajectory moved(const Pose& motion, Trajectory trajectory) {
   return trajectory;
 }
 
-// Six poses on the axes: moving all of them along their axes by d, away from the centre, turns
-// nothing and leaves the centre where it is.
+// Six poses on the axes: moving all of them along their axes by d, away from the center, turns
+// nothing and leaves the center where it is.
 Trajectory poses_on_axes(double distance) {
   Trajectory trajectory;
   for (int i = 0; i < 6; ++i) {

@@ -47,7 +47,7 @@ TEST(MapView, CellsLieOnTheLattice) {
   EXPECT_TRUE(libmap::lattice_of(map).origin_in_terrain.isApprox(origin, 1e-9));
   const MapView view = libmap::make_map_view(map, {});
   ASSERT_EQ(view.cells.size(), 3U);
-  // The centre of each cell is its point.
+  // The center of each cell is its point.
   for (std::size_t n = 0; n < 3; ++n) {
     Eigen::Vector3d place;
     for (Eigen::Index axis = 0; axis < 3; ++axis)
@@ -67,7 +67,7 @@ TEST(MapView, CubesOfVoxels) {
   EXPECT_EQ(view.cells[2].place[1], 3);
 }
 
-TEST(MapView, ColoursAreTheClassesOfTheLegend) {
+TEST(MapView, ColorsAreTheClassesOfTheLegend) {
   std::vector<TestVoxel> all;
   for (int n = 0; n <= 20; ++n) all.push_back({n, 0, 0, n * 0.05});
   all.push_back({21, 0, 0, std::numeric_limits<double>::quiet_NaN()});

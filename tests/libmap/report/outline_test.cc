@@ -93,7 +93,7 @@ TEST(OutlineFile, WhatIsWrongIsNamedWithItsLine) {
         << item;
   EXPECT_NE(error("title: [a\n").find("line 2: not valid YAML"), std::string::npos);
   EXPECT_NE(error("- a\n").find("no map of keys"), std::string::npos);
-  EXPECT_NE(error("title: a\ntitle: b\n").find("stands twice"), std::string::npos);
+  EXPECT_NE(error("title: a\ntitle: b\n").find("is a duplicate"), std::string::npos);
   std::string deep = "title: a\n";
   std::string indent;
   for (int level = 0; level < 20; ++level) {

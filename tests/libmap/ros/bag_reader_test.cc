@@ -144,7 +144,7 @@ TEST(BagReader, MessagesThatLieOutsideAreErrors) {
     led_astray = with_number(led_astray, entry + 8, 0x7fffffff);
   }
   write_text(bag_path(), led_astray);
-  EXPECT_THAT(error_of(rig).what(), HasSubstr("fell over it"));
+  EXPECT_THAT(error_of(rig).what(), HasSubstr("crashed on it"));
   std::size_t data = whole.find(std::string("op=\x02", 4));
   data = whole.find("time=", data) + 5 + 8;
   for (const std::uint32_t length : {0xffffffffU, 0x7fffffffU, 1U}) {

@@ -100,9 +100,9 @@ TEST(BagRig, EncodingsOfDepth) {
   rm::Image image = sample_image("a_optical", 2.0, "16UC1", 4, 3, padded);
   image.is_bigendian = 1;
   bag.write("/a/image_raw", 2.0, image);
-  const std::vector<float> metres = {1.5F,    nan,     infinity, -1,   0,    0.00014F,
+  const std::vector<float> meters = {1.5F,    nan,     infinity, -1,   0,    0.00014F,
                                      6.5534F, 6.5536F, 70,       0.1F, 0.2F, 0.3F};
-  bag.write("/a/image_raw", 3.0, sample_image("a_optical", 3.0, "32FC1", 4, 3, bytes_of(metres)));
+  bag.write("/a/image_raw", 3.0, sample_image("a_optical", 3.0, "32FC1", 4, 3, bytes_of(meters)));
   bag.write("/a/image_raw", 4.0,
             sample_image("a_optical", 4.0, "mono16", 4, 3,
                          bytes_of(std::vector<std::uint16_t>(12, 65535))));
@@ -114,7 +114,7 @@ TEST(BagRig, EncodingsOfDepth) {
           ElementsAre(3000, 3000, 3000, 3000, 3010, 3010, 3010, 3010, 3020, 3020, 3020, 3020),
           ElementsAre(15000, 0, 0, 0, 0, 1, 65534, 0, 0, 1000, 2000, 3000), testing::Each(65535)));
   EXPECT_EQ(libmap::export_bag_rig(bag_path(), fine, {}).pixels_beyond, 2U);
-  // Units of the bag's 16-bit images that are no millimetres, taken as they are.
+  // Units of the bag's 16-bit images that are no millimeters, taken as they are.
   EXPECT_EQ(images_of(plan({.depth_unit_m = 0.00025}), "a")[0][0], 300);
 }
 
@@ -364,7 +364,7 @@ TEST(BagRig, WhatIsMissingIsNamed) {
   });
   EXPECT_THAT(refusal(), HasSubstr("/a/color rgb8"));
   EXPECT_THAT(refusal({.topics = {"/a/color"}}), HasSubstr("encoding of /a/color is rgb8"));
-  EXPECT_THAT(refusal({.topics = {"/a/colour"}}), HasSubstr("did you mean '/a/color'"));
+  EXPECT_THAT(refusal({.topics = {"/a/colr"}}), HasSubstr("did you mean '/a/color'"));
   bag([](SampleBag& made) { made.write("/a/image_raw", 1.0, sample_depth("a", 1.0)); });
   EXPECT_THAT(refusal(), HasSubstr("topic is /tf_static"));
   bag([](SampleBag& made) {

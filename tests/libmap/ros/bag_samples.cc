@@ -63,9 +63,9 @@ rm::Image sample_image(const std::string& frame, double stamp_s, const std::stri
 }
 
 rm::Image sample_depth(const std::string& frame, double stamp_s) {
-  std::vector<std::uint16_t> millimetres(12);
-  std::iota(millimetres.begin(), millimetres.end(), std::uint16_t{1000});
-  return sample_image(frame, stamp_s, "16UC1", 4, 3, bytes_of(millimetres));
+  std::vector<std::uint16_t> millimeters(12);
+  std::iota(millimeters.begin(), millimeters.end(), std::uint16_t{1000});
+  return sample_image(frame, stamp_s, "16UC1", 4, 3, bytes_of(millimeters));
 }
 
 rm::CameraInfo sample_info(const std::string& frame, double stamp_s) {

@@ -87,7 +87,7 @@ TEST(Bundler, PointsFallOnTheirPixels) {
       const Eigen::Vector3d in_camera(uniform(-0.5, 0.5), uniform(-0.4, 0.4), 1.3);
       const Eigen::Vector2d pixel = *project_point(views[n].camera, in_camera);
       const Eigen::Vector2d found = cameras[n].project(views[n].world_from_camera * in_camera);
-      // Pixel centres have whole coordinates: the middle of 200 columns is 99.5.
+      // Pixel centers have whole coordinates: the middle of 200 columns is 99.5.
       EXPECT_NEAR(found.x(), pixel.x() - (views[n].camera.width - 1) / 2.0, 1e-9);
       EXPECT_NEAR(-found.y(), pixel.y() - (views[n].camera.height - 1) / 2.0, 1e-9);
     }
@@ -112,7 +112,7 @@ TEST(Bundler, CamerasThatItCannotHoldAreRefused) {
               HasSubstr("not finite"));
 }
 
-// A smooth picture: the colour says where it is.
+// A smooth picture: the color says where it is.
 ColorImage smooth_picture(int width, int height) {
   ColorImage image(width, height);
   for (int y = 0; y < height; ++y)

@@ -268,7 +268,7 @@ TEST(CalibrationCodec, RecordsThatDoNotBelongTogether) {
   EXPECT_EQ(refusal_of(32, 163),
             "'163': calibration of a stereo camera has another length than it says");
   EXPECT_EQ(error_of([&] { libmap::decode_calibration(stereo + record({.k = k})); }).reason(),
-            "calibration holds single and stereo cameras");
+            "calibration contains single and stereo cameras");
 }
 
 TEST(CalibrationCodec, FloatsHoldKAndL) {

@@ -133,7 +133,7 @@ TEST(ColmapText, NamesTheLineThatIsBroken) {
       {"cameras", "\n1 PINHOLE 640\n", "line 2", "ends too early"},
       {"cameras", "1 PINHOLE 0 480 1 1 1 1\n", "line 1", "> 0"},
       {"cameras", "1 PINHOLE 640 480 1 nan 1 1\n", "line 1", "not a number"},
-      {"cameras", "1 PINHOLE 6 4 1 1 1 1\n1 PINHOLE 6 4 1 1 1 1\n", "line 2", "stands twice"},
+      {"cameras", "1 PINHOLE 6 4 1 1 1 1\n1 PINHOLE 6 4 1 1 1 1\n", "line 2", "is a duplicate"},
       {"images", "1 1 0 0 0 0 0 0 1\n", "line 1", "no image"},
       {"images", "1 0.5 0 0 0 0 0 0 1 a.jpg\n", "line 1", "length 1"},
       {"images", "1 1 0 0 0 0 1e300 0 1 a.jpg\n", "line 1", "1e8"},
@@ -375,7 +375,7 @@ TEST(ColmapBuilder, PointsLieOnTheSurfaceAndProjectToTheirPixels) {
   for (const auto& [id, point] : model.points) {
     EXPECT_TRUE(is_on_surface(point.position)) << point.position.transpose();
     seen_thrice += point.track.size() == 3 ? 1 : 0;
-    // Coloured by the pixel in the middle of its square.
+    // Colored by the pixel in the middle of its square.
     const Eigen::Vector2d pixel =
         model.images.at(point.track[0].image).observations[point.track[0].observation].pixel;
     EXPECT_EQ(point.color[0], static_cast<int>(pixel.x()));

@@ -19,12 +19,12 @@ using graspmap_test::error_of;
 using graspmap_test::random_engine;
 using graspmap_test::sample_depth;
 using libmap::DepthImage;
-using libmap::MillimetreImage;
+using libmap::MillimeterImage;
 
 // RVL by its definition, with the stream as one long row of bits: slow and plain.
 class SlowRvl {
  public:
-  static std::string encode(const MillimetreImage& image) {
+  static std::string encode(const MillimeterImage& image) {
     SlowRvl rvl;
     std::size_t at = 0;
     int previous = 0;
@@ -73,8 +73,8 @@ class SlowRvl {
   std::vector<unsigned> nibbles_;
 };
 
-MillimetreImage random_image(int width, int height, unsigned zeros_in_100) {
-  MillimetreImage image(width, height);
+MillimeterImage random_image(int width, int height, unsigned zeros_in_100) {
+  MillimeterImage image(width, height);
   for (std::uint16_t& pixel : image.pixels) {
     const std::uint64_t draw = random_engine()();
     const bool is_smooth = draw % 7 != 0;
@@ -87,7 +87,7 @@ MillimetreImage random_image(int width, int height, unsigned zeros_in_100) {
 TEST(Rvl, AgreesWithASlowEncoder) {
   for (const unsigned zeros : {0U, 3U, 50U, 97U, 100U})
     for (const auto& [width, height] : {std::pair{1, 1}, {7, 3}, {64, 48}, {1, 300}}) {
-      const MillimetreImage image = random_image(width, height, zeros);
+      const MillimeterImage image = random_image(width, height, zeros);
       const std::string bytes = SlowRvl::encode(image);
       EXPECT_EQ(libmap::encode_rvl(image), bytes);
       EXPECT_EQ(libmap::decode_rvl(bytes), image);
@@ -97,7 +97,7 @@ TEST(Rvl, AgreesWithASlowEncoder) {
 TEST(Rvl, BytesByHand) {
   // One zero, two values 10 and 9: runs 1 and 2, deltas +10 -> 20 = 4 + 2 * 8, -1 -> 1.
   // Nibbles 1, 2, 4|8, 2, 1, padded: 0x12c21000.
-  MillimetreImage image(3, 1);
+  MillimeterImage image(3, 1);
   image.pixels = {0, 10, 9};
   const std::string bytes = std::string("DEPTHRVL\3\0\0\0\1\0\0\0\x00\x10\xc2\x12", 20);
   EXPECT_EQ(libmap::encode_rvl(image), bytes);
@@ -127,7 +127,7 @@ TEST(Rvl, FlippedBytesNeverReachBeyondTheImage) {
 TEST(Rvl, NumbersThatDoNotEnd) {
   const std::string bytes = std::string("DEPTHRVL\3\0\0\0\1\0\0\0", 16) + std::string(8, '\xff');
   EXPECT_EQ(error_of([&] { libmap::decode_rvl(bytes); }).reason(),
-            "RVL holds a number of more than 32 bits");
+            "RVL contains a number of more than 32 bits");
 }
 
 TEST(Rvl, SizesThatCannotBe) {
@@ -150,14 +150,14 @@ TEST(Rvl, SizesThatCannotBe) {
 
 // Some 130 kB stand for 8000 x 8000 zeros.
 TEST(DepthCodec, ImagesLargerThanAnyCamerasAreRefusedByTheirHeader) {
-  const std::string bytes = libmap::encode_png(MillimetreImage(4097, 4096));
+  const std::string bytes = libmap::encode_png(MillimeterImage(4097, 4096));
   const libmap::Error error = error_of([&] { libmap::decode_depth(bytes.substr(0, 40)); });
   EXPECT_EQ(error.context().value, "4097 x 4096");
   EXPECT_EQ(error.context().bound, "<= 16777216 pixels");
 }
 
-TEST(DepthCodec, MillimetresBecomeMetres) {
-  MillimetreImage image(4, 1);
+TEST(DepthCodec, MillimetersBecomeMeters) {
+  MillimeterImage image(4, 1);
   image.pixels = {0, 1, 1234, 65535};
   for (const std::string& bytes : {libmap::encode_rvl(image), libmap::encode_png(image)}) {
     const DepthImage depth = libmap::decode_depth(bytes);
@@ -165,14 +165,14 @@ TEST(DepthCodec, MillimetresBecomeMetres) {
   }
 }
 
-TEST(DepthCodec, MillimetresSurviveMetres) {
-  MillimetreImage all(256, 256);
+TEST(DepthCodec, MillimetersSurviveMeters) {
+  MillimeterImage all(256, 256);
   for (std::size_t i = 0; i < all.pixels.size(); ++i) all.pixels[i] = static_cast<std::uint16_t>(i);
   all.pixels[65535] = 0;
-  EXPECT_EQ(libmap::to_millimetres(libmap::to_metres(all)), all);
+  EXPECT_EQ(libmap::to_millimeters(libmap::to_meters(all)), all);
   DepthImage odd(5, 1);
   odd.pixels = {std::numeric_limits<float>::quiet_NaN(), -1.0F, 65.535F, 1e30F, 0.0004F};
-  EXPECT_EQ(libmap::to_millimetres(odd), MillimetreImage(5, 1));
+  EXPECT_EQ(libmap::to_millimeters(odd), MillimeterImage(5, 1));
 }
 
 TEST(DepthCodec, FloatsKeepTheirBits) {

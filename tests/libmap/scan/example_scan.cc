@@ -90,10 +90,10 @@ libmap::ColorImage random_color(int width, int height) {
 }
 
 libmap::DepthImage random_depth(int width, int height) {
-  libmap::MillimetreImage image(width, height);
+  libmap::MillimeterImage image(width, height);
   for (std::uint16_t& pixel : image.pixels)
     if (draw() < 0.6) pixel = static_cast<std::uint16_t>(uniform(1.0, 5000.0));
-  return libmap::to_metres(image);
+  return libmap::to_meters(image);
 }
 
 ExampleScan example_scan() {

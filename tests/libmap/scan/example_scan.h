@@ -17,7 +17,7 @@ struct ExampleScan {
   std::map<int, libmap::RgbdFrame> frames{};  // by node
 };
 
-// Numbers that float32 holds exactly, and whole millimetres: nothing is lost in a database.
+// Numbers that float32 holds exactly, and whole millimeters: nothing is lost in a database.
 libmap::Pose random_float_pose();
 libmap::Camera example_camera(int width, int height);
 libmap::ColorImage random_color(int width, int height);

@@ -118,7 +118,7 @@ TEST(FrameFolder, KeepsNodesOfTheSameStampApart) {
   graspmap_test::expect_same_graph(FrameFolder(folder).graph(), scan.graph, 2e-7);
 }
 
-// A node without a pose does not get that of its neighbour in time.
+// A node without a pose does not get that of its neighbor in time.
 TEST(FrameFolder, KeepsNodesOfNearStampsApart) {
   ExampleScan scan = graspmap_test::example_scan();
   double stamp_s = 5.0;
@@ -152,7 +152,7 @@ class TumFolder : public testing::Test {
  protected:
   fs::path folder_ = new_folder();
   libmap::Camera camera_ = graspmap_test::example_camera(40, 30);
-  std::map<std::string, libmap::MillimetreImage> depth_;
+  std::map<std::string, libmap::MillimeterImage> depth_;
 
   void SetUp() override {
     for (const char* name : {"rgb", "depth"}) fs::create_directory(folder_ / name);
@@ -164,7 +164,7 @@ class TumFolder : public testing::Test {
   }
 
   void write_depth(const std::string& name) {
-    libmap::MillimetreImage units(40, 30);
+    libmap::MillimeterImage units(40, 30);
     for (std::uint16_t& unit : units.pixels)
       unit = static_cast<std::uint16_t>(graspmap_test::uniform(0.0, 65535.0));
     units.pixels[0] = 65535;
@@ -194,14 +194,14 @@ TEST_F(TumFolder, PairsListsOfImagesByTime) {
   EXPECT_EQ(read.graph().nodes[0].stamp_s, 1305031102.160407);
   EXPECT_EQ(read.graph().nodes[1].stamp_s, 1305031102.226738);
   EXPECT_EQ(read.warnings(),
-            (std::vector<std::string>{"1 depth image without a colour image within 0.02 s",
-                                      "1 colour image without a depth image within 0.02 s"}));
+            (std::vector<std::string>{"1 depth image without a color image within 0.02 s",
+                                      "1 color image without a depth image within 0.02 s"}));
   const libmap::RgbdFrame frame = read.read_frame(2);
   EXPECT_TRUE(frame.color == libmap::decode_color(graspmap_test::read_text(folder_ / "rgb/b.png")));
   ASSERT_EQ(frame.cameras.size(), 1U);
   graspmap_test::expect_same_camera(frame.cameras[0], camera_);
-  // 5000 units a metre; 65535 is no measurement.
-  const libmap::MillimetreImage& units = depth_.at("y.png");
+  // 5000 units a meter; 65535 is no measurement.
+  const libmap::MillimeterImage& units = depth_.at("y.png");
   EXPECT_EQ(frame.depth.pixels[0], 0.0F);
   for (std::size_t i = 1; i < units.pixels.size(); ++i)
     EXPECT_FLOAT_EQ(frame.depth.pixels[i], static_cast<float>(units.pixels[i]) / 5000.0F);
@@ -274,7 +274,7 @@ TEST_F(TumFolder, FollowsItsOptions) {
   write_text(folder_ / "scan.yaml",
              "depth_unit_m: 0.001\ncalibration: kinect.yaml\npairing_tolerance_s: 0.4\n");
   const FrameFolder read(folder_);
-  EXPECT_TRUE(read.read_frame(1).depth == libmap::to_metres(depth_.at("1.png")));
+  EXPECT_TRUE(read.read_frame(1).depth == libmap::to_meters(depth_.at("1.png")));
   write_text(folder_ / "scan.yaml", "depth_unit: 0.001\n");
   const libmap::Error error = graspmap_test::error_of([&] { FrameFolder again(folder_); });
   EXPECT_EQ(error.context().file, (folder_ / "scan.yaml").string());

@@ -41,7 +41,7 @@ TEST(ImageCodec, PngKeepsEveryKindOfPixel) {
   EXPECT_EQ(libmap::decode_rgba(encode_png(rgba)), rgba);
 }
 
-TEST(ImageCodec, GrayBecomesColourAndColourGray) {
+TEST(ImageCodec, GrayBecomesColorAndColorGray) {
   GrayImage gray(2, 1);
   gray.pixels = {10, 200};
   const ColorImage color = libmap::decode_color(encode_png(gray));
@@ -50,7 +50,7 @@ TEST(ImageCodec, GrayBecomesColourAndColourGray) {
   EXPECT_EQ(libmap::decode_gray(encode_png(red)).pixels[0], 76);  // 0.299 * 255
 }
 
-TEST(ImageCodec, JpegKeepsColoursAndTheirOrder) {
+TEST(ImageCodec, JpegKeepsColorsAndTheirOrder) {
   ColorImage image(64, 48);
   for (int y = 0; y < 48; ++y)
     for (int x = 0; x < 64; ++x)

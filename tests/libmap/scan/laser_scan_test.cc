@@ -125,7 +125,7 @@ TEST(LaserScan, WhatIsBroken) {
     std::string info = info_76(5);
     info.replace(24, 4, bytes_of(std::vector<float>{points}));
     EXPECT_EQ(error_of([&] { libmap::decode_laser_scan(blob, info); }).reason(),
-              "scan_info holds no number of points");
+              "scan_info contains no number of points");
   }
   error_of([&] { libmap::decode_laser_scan(scan_blob(9, std::vector<float>(9, 1.0F)), ""); });
 }

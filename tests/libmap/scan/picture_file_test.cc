@@ -31,7 +31,7 @@ TEST(PictureFile, HoldsTheStoredBytesOfTheOnlyCamera) {
   EXPECT_EQ(picture.bytes, jpeg);
 }
 
-TEST(PictureFile, NodesWithoutColourOrCalibrationAreNamed) {
+TEST(PictureFile, NodesWithoutColorOrCalibrationAreNamed) {
   const std::filesystem::path file = sample_file();
   execute(file, "UPDATE Data SET image = NULL WHERE id = 1");
   execute(file, "UPDATE Data SET calibration = NULL WHERE id = 2");
@@ -39,7 +39,7 @@ TEST(PictureFile, NodesWithoutColourOrCalibrationAreNamed) {
   const auto refusal_of = [&](int node) {
     return std::string(error_of([&] { libmap::read_pictures(scan, node, {}); }).what());
   };
-  EXPECT_EQ(refusal_of(1), file.string() + ": node 1: it has no colour image");
+  EXPECT_EQ(refusal_of(1), file.string() + ": node 1: it has no color image");
   EXPECT_EQ(refusal_of(2), file.string() + ": node 2: it has no calibration");
 }
 

@@ -169,7 +169,7 @@ TEST(RigMoments, OfVeryManyImagesOfOneMoment) {
   EXPECT_EQ(fullest_rig_moment(images, 2, 0.02).seen(), 2U);
 }
 
-TEST(RigDepth, UnitsBecomeMetres) {
+TEST(RigDepth, UnitsBecomeMeters) {
   libmap::Image<std::uint16_t> units(4, 3);
   units.at(1, 2) = 4000;
   units.at(2, 0) = 65535;

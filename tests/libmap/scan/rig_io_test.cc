@@ -14,7 +14,7 @@ using libmap::CameraRig;
 using libmap::parse_rig;
 using testing::HasSubstr;
 
-// The thesis's six cameras, 60 degrees apart, 20 cm from the robot's centre.
+// The thesis's six cameras, 60 degrees apart, 20 cm from the robot's center.
 CameraRig six_cameras() {
   CameraRig rig;
   for (int n = 0; n < 6; ++n) {
@@ -81,7 +81,7 @@ TEST(RigIo, PosesByMatrixByHousingAndByCalibration) {
   EXPECT_EQ(rig.cameras[1].far_m, 2.0);
   EXPECT_EQ(rig.cameras[1].near_m, 0.28);
   EXPECT_EQ(rig.cameras[1].depth_scale_m, 0.001);
-  // A metre ahead of each camera: ahead of the robot, and to its left.
+  // A meter ahead of each camera: ahead of the robot, and to its left.
   const Eigen::Vector3d ahead(0, 0, 1);
   EXPECT_LT((rig.cameras[0].camera.base_from_camera * ahead - Eigen::Vector3d(1.2, 0, 0.1)).norm(),
             1e-12);

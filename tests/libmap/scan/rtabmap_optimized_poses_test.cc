@@ -254,7 +254,7 @@ TEST(CopyWithOptimizedPoses, RefusesPosesAndLinksThatCannotBe) {
   link.from_from_to = Pose::Identity();
   link.information(2, 2) = std::numeric_limits<double>::infinity();
   EXPECT_EQ(refusal_of({}, {link}), "link 1 -> 9: is not finite");
-  EXPECT_EQ(refusal_of({{2, lost}}, {}), "optimised pose of node 2: is not finite");
+  EXPECT_EQ(refusal_of({{2, lost}}, {}), "optimized pose of node 2: is not finite");
 }
 
 TEST(CopyWithOptimizedPoses, RefusesTablesOfAnotherForm) {

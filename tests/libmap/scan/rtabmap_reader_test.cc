@@ -174,7 +174,7 @@ TEST(RtabmapReader, RotationsAreMadeProper) {
   EXPECT_EQ(pose.translation(), Eigen::Vector3d(5, 6, 7));
 }
 
-TEST(RtabmapReader, BrokenOptimisedPosesAreLeftOut) {
+TEST(RtabmapReader, BrokenOptimizedPosesAreLeftOut) {
   const fs::path file = sample_file();
   execute(file, "UPDATE Admin SET opt_poses = substr(opt_poses, 1, 20)");
   const RtabmapDatabase scan(file);
@@ -185,7 +185,7 @@ TEST(RtabmapReader, BrokenOptimisedPosesAreLeftOut) {
   EXPECT_TRUE(RtabmapDatabase(file).warnings().empty());
 }
 
-TEST(RtabmapReader, OptimisedPosesThatDoNotFitTheirIdsAreLeftOut) {
+TEST(RtabmapReader, OptimizedPosesThatDoNotFitTheirIdsAreLeftOut) {
   const fs::path file = sample_file();
   const auto warnings_with = [&](libmap::MatrixElement element, int count) {
     const std::string ids = bytes_of(std::vector<std::int32_t>(static_cast<std::size_t>(count), 1));
@@ -208,7 +208,7 @@ TEST(RtabmapReader, PartsThatAreNotAskedForAreLeftOut) {
   const RtabmapDatabase scan(sample_file());
   const RgbdFrame depth = scan.read_frame(1, {.color = false});
   EXPECT_TRUE(depth.color.empty());
-  EXPECT_EQ(depth.depth, libmap::to_metres(sample_depth(1)));
+  EXPECT_EQ(depth.depth, libmap::to_meters(sample_depth(1)));
   const RgbdFrame none = scan.read_frame(1, {.color = false, .depth = false});
   EXPECT_TRUE(none.depth.empty());
   EXPECT_EQ(none.cameras.at(0).width, 32);
@@ -241,9 +241,9 @@ TEST(RtabmapReader, AbsentPartsAreNoError) {
   EXPECT_EQ(error_of([&] { scan.read_frame(4); }).context().value, "4");
 }
 
-TEST(RtabmapReader, DepthOfAnotherSizeThanColour) {
+TEST(RtabmapReader, DepthOfAnotherSizeThanColor) {
   const fs::path file = sample_file();
-  libmap::MillimetreImage half(16, 12, 1500);
+  libmap::MillimeterImage half(16, 12, 1500);
   execute(file, "UPDATE Data SET depth = ? WHERE id = 1", {encode_rvl(half)});
   const RtabmapDatabase scan(file);
   const auto views = camera_views(scan.read_frame(1));
@@ -400,7 +400,7 @@ TEST(RtabmapReader, RealDatabases) {
     EXPECT_EQ(scan.graph().nodes.size(), file.nodes);
     EXPECT_EQ(scan.graph().links.size(), file.links);
     EXPECT_EQ(scan.graph().optimized_map_from_base.size(), file.optimized);
-    EXPECT_EQ(scan.recognised_version(), file.schema);
+    EXPECT_EQ(scan.recognized_version(), file.schema);
     EXPECT_TRUE(scan.warnings().empty());
     EXPECT_EQ(scan.parameters().size(), 612U);
     const RgbdFrame frame = scan.read_frame(1);

@@ -75,7 +75,7 @@ TEST_P(EverySchema, Frames) {
     EXPECT_EQ(frame.node, id);
     EXPECT_EQ(frame.stamp_s, 100.25 + id);
     EXPECT_EQ(frame.color, sample_color(id));
-    EXPECT_EQ(frame.depth, libmap::to_metres(sample_depth(id)));
+    EXPECT_EQ(frame.depth, libmap::to_meters(sample_depth(id)));
     ASSERT_EQ(frame.cameras.size(), 1U);
     const libmap::Camera& camera = frame.cameras[0];
     EXPECT_EQ(camera.width, 32);
@@ -125,12 +125,12 @@ std::string name_of(const testing::TestParamInfo<SchemaVersion>& info) {
 INSTANTIATE_TEST_SUITE_P(RtabmapReader, EverySchema, testing::ValuesIn(schema_versions()), name_of);
 
 TEST(RtabmapSchema, SchemasAreToldApartByTheirColumns) {
-  const auto recognised = [](SchemaVersion version) {
+  const auto recognized = [](SchemaVersion version) {
     const fs::path file = sample_file(version);
     execute(file, "UPDATE Admin SET version = '9.99.9'");
     const RtabmapDatabase scan(file);
     EXPECT_EQ(scan.version(), "9.99.9");
-    return scan.recognised_version();
+    return scan.recognized_version();
   };
   for (const SchemaVersion version : {SchemaVersion{10, 0},
                                       {10, 7},
@@ -144,7 +144,7 @@ TEST(RtabmapSchema, SchemasAreToldApartByTheirColumns) {
                                       {20, 0},
                                       {22, 0},
                                       {23, 0}})
-    EXPECT_EQ(recognised(version), version.text());
+    EXPECT_EQ(recognized(version), version.text());
 }
 
 TEST(RtabmapSchema, WhatComesAfterTodayIsNamed) {
@@ -183,9 +183,9 @@ TEST(RtabmapSchema, ImagesInTablesOfTheirOwn) {
       {encode_png(libmap::GrayImage(32, 24, 9)), pose_bytes(libmap::optical_to_body_rotation())});
   execute(file, "INSERT INTO Link VALUES (1, 2, 0, 0.25, ?)", {pose_bytes(sample_pose(1))});
   const RtabmapDatabase scan(file);
-  EXPECT_EQ(scan.recognised_version(), "before 0.10.0");
+  EXPECT_EQ(scan.recognized_version(), "before 0.10.0");
   EXPECT_EQ(scan.graph().links.at(0).information(3, 3), 4);
-  EXPECT_EQ(scan.read_frame(1).depth, libmap::to_metres(sample_depth(1)));
+  EXPECT_EQ(scan.read_frame(1).depth, libmap::to_meters(sample_depth(1)));
   EXPECT_EQ(scan.read_frame(1).cameras.at(0).fy, 31);
   EXPECT_EQ(scan.read_frame(1).cameras.at(0).width, 32);
   // A second focal length below 1 is a baseline.

@@ -217,7 +217,7 @@ TEST(RtabmapWriter, KeepsParametersAndTheLastLocalization) {
   const libmap::RtabmapDatabase read(scratch("scan.db"));
   EXPECT_EQ(read.parameters(), parameters);
   EXPECT_EQ(read.version(), "0.23.0");
-  EXPECT_EQ(read.recognised_version(), "0.23.0");
+  EXPECT_EQ(read.recognized_version(), "0.23.0");
   ASSERT_TRUE(read.stored_map().last_localization_map_from_base);
   EXPECT_TRUE(read.stored_map().last_localization_map_from_base->isApprox(
       scan.graph.optimized_map_from_base.at(9), 1e-6));

@@ -42,7 +42,7 @@ libmap::Image<std::uint16_t> sample_depth(int node);  // mm, 32 x 24, with holes
 std::string sample_calibration(SchemaVersion version);
 
 inline constexpr int sample_nodes = 3;
-// Nodes 1 to 3 with images (PNG, RVL), poses and everything else that the schema has; neighbours in
+// Nodes 1 to 3 with images (PNG, RVL), poses and everything else that the schema has; neighbors in
 // both directions, a closure 3 -> 1, gravity at 1, a landmark -1 seen from 2, words and features, a
 // laser scan and user data at 2.
 void write_sample(const std::filesystem::path& file, SchemaVersion version = {});

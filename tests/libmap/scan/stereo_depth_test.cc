@@ -32,7 +32,7 @@ StereoCamera pair_of_cameras() {
   return cameras;
 }
 
-// A value a square of 8 mm of a wall, smooth in between, the same for every call.
+// A value per square of 8 mm of a wall, smooth in between, the same for every call.
 double texture(double x, double y) {
   const auto lattice = [](double column, double row) {
     auto hash = static_cast<std::uint64_t>(static_cast<std::int64_t>(column) * 73856093 ^

@@ -391,10 +391,10 @@ TEST(PoseAxes, ThereAndBack) {
   }
 }
 
-TEST(RecognisePoses, ByTagOrColumns) {
+TEST(RecognizePoses, ByTagOrColumns) {
   using libmap::PoseTextFormat;
   const auto format = [](const std::string& text) {
-    return libmap::recognise_poses("\xEF\xBB\xBF# 1 2 3\r\n\r\n" + text + "\n", "poses.txt");
+    return libmap::recognize_poses("\xEF\xBB\xBF# 1 2 3\r\n\r\n" + text + "\n", "poses.txt");
   };
   EXPECT_EQ(format("1 0 0 0 0 0 0 1"), PoseTextFormat::tum);
   EXPECT_EQ(format("1,0,0,0,0,0,0,1,7"), PoseTextFormat::tum);

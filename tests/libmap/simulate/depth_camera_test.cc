@@ -42,7 +42,7 @@ Pose looking_down(const Eigen::Vector3d& position) {
 }
 
 Eigen::Vector3d ray_of(const PixelRays& rays, std::size_t index) {
-  return rays.centres[index].homogeneous();
+  return rays.centers[index].homogeneous();
 }
 
 TEST(SurfaceView, DepthOfAPlaneIsExact) {
@@ -57,7 +57,7 @@ TEST(SurfaceView, DepthOfAPlaneIsExact) {
                         libmap::make_pose_from_rpy(
                             {0, 0, 0}, {uniform(-40, 40), uniform(-40, 40), uniform(-180, 180)});
       const SurfaceView view = surface.view(rays, pose);
-      for (std::size_t p = 0; p < rays.centres.size(); ++p) {
+      for (std::size_t p = 0; p < rays.centers.size(); ++p) {
         const Eigen::Vector3d ray = pose.linear() * ray_of(rays, p);
         const double depth = (0.25 - pose.translation().z()) / ray.z();
         if (depth < 0 || depth > 15) continue;
@@ -66,8 +66,8 @@ TEST(SurfaceView, DepthOfAPlaneIsExact) {
       }
       // The corner between four pixels lies between their rays.
       const Eigen::Vector2d corner = rays.corners[static_cast<std::size_t>(65 * 20 + 30)];
-      const Eigen::Vector2d mean = 0.25 * (rays.centres[64 * 19 + 29] + rays.centres[64 * 19 + 30] +
-                                           rays.centres[64 * 20 + 29] + rays.centres[64 * 20 + 30]);
+      const Eigen::Vector2d mean = 0.25 * (rays.centers[64 * 19 + 29] + rays.centers[64 * 19 + 30] +
+                                           rays.centers[64 * 20 + 29] + rays.centers[64 * 20 + 30]);
       EXPECT_LT((corner - mean).norm(), 1e-4);
     }
   }
@@ -75,15 +75,15 @@ TEST(SurfaceView, DepthOfAPlaneIsExact) {
 
 TEST(SurfaceView, DepthOfABallIsThatOfItsSphere) {
   const double radius = 0.3;
-  const Eigen::Vector3d centre(0.05, -0.02, 0.4);
-  const VisibleSurface surface(ball_mesh(250, 500, centre, radius));
+  const Eigen::Vector3d center(0.05, -0.02, 0.4);
+  const VisibleSurface surface(ball_mesh(250, 500, center, radius));
   const PixelRays rays = libmap::make_pixel_rays(small_camera());
   const Pose pose = looking_down({0, 0, 1.5});
   const SurfaceView view = surface.view(rays, pose);
   int hits = 0;
-  for (std::size_t p = 0; p < rays.centres.size(); ++p) {
+  for (std::size_t p = 0; p < rays.centers.size(); ++p) {
     const Eigen::Vector3d ray = pose.linear() * ray_of(rays, p);
-    const Eigen::Vector3d arm = pose.translation() - centre;
+    const Eigen::Vector3d arm = pose.translation() - center;
     const double a = ray.squaredNorm();
     const double b = ray.dot(arm);
     const double root = b * b - a * (arm.squaredNorm() - radius * radius);
@@ -115,7 +115,7 @@ TEST(SurfaceView, NothingBehindTheCameraOrBesideTheMesh) {
   }
 }
 
-TEST(SurfaceView, ColoursAreTheVerticesAndTheLightIsTheSameOnAPlane) {
+TEST(SurfaceView, ColorsAreTheVerticesAndTheLightIsTheSameOnAPlane) {
   libmap::TriangleMesh mesh = square_mesh(0.0);
   mesh.vertex_colors = {{200, 40, 0}, {200, 80, 0}, {200, 80, 0}, {200, 40, 0}};
   const PixelRays rays = libmap::make_pixel_rays(small_camera());
@@ -149,7 +149,7 @@ TEST(SurfaceView, RockWhereTheMeshHasNoTexture) {
   libmap::TriangleMesh mesh = square_mesh(0.0);
   EXPECT_GT(spread(mesh, libmap::TextureSource::automatic), 0.05);
   EXPECT_NE(std::string(error_of([&] { VisibleSurface(mesh, libmap::TextureSource::mesh); }).what())
-                .find("no colours"),
+                .find("no colors"),
             std::string::npos);
   mesh.vertex_colors.assign(4, {150, 150, 150});
   EXPECT_GT(spread(mesh, libmap::TextureSource::automatic), 0.05);
@@ -168,7 +168,7 @@ Residuals residuals_at(double distance, const DepthSensorOptions& options, std::
   const auto measured = libmap::measure_depth(view, rays, options, seed);
   Residuals result;
   double last = 0;
-  for (std::size_t p = 0; p < rays.centres.size(); ++p) {
+  for (std::size_t p = 0; p < rays.centers.size(); ++p) {
     const double scale = ray_of(rays, p).norm();
     const double error = (static_cast<double>(measured.depth.pixels[p]) - distance) * scale;
     const double unit = (error - options.depth_offset_m) /
@@ -202,7 +202,7 @@ TEST(MeasureDepth, NoiseHasTheStatedSizeAtEachRange) {
   }
 }
 
-TEST(MeasureDepth, WholeMillimetresWithinTheLimits) {
+TEST(MeasureDepth, WholeMillimetersWithinTheLimits) {
   const PixelRays rays = libmap::make_pixel_rays(small_camera());
   const VisibleSurface surface(square_mesh(0.0, 50.0));
   const Pose pose = looking_down({0, 0, 1.2}) * libmap::make_pose_from_rpy({0, 0, 0}, {40, 0, 0});
@@ -211,7 +211,7 @@ TEST(MeasureDepth, WholeMillimetresWithinTheLimits) {
   options.depth_step_m = 0.001;
   const auto measured = libmap::measure_depth(view, rays, options, 1);
   std::size_t count = 0;
-  for (std::size_t p = 0; p < rays.centres.size(); ++p) {
+  for (std::size_t p = 0; p < rays.centers.size(); ++p) {
     const auto depth = static_cast<double>(measured.depth.pixels[p]);
     const auto truth = static_cast<double>(view.depth.pixels[p]);
     EXPECT_EQ(depth > 0, truth >= 0.9995 && truth <= 2.0005) << truth;
@@ -221,7 +221,7 @@ TEST(MeasureDepth, WholeMillimetresWithinTheLimits) {
     EXPECT_NEAR(depth * 1000, std::round(depth * 1000), 2e-4);
   }
   EXPECT_GT(count, 500U);
-  EXPECT_LT(count, rays.centres.size());
+  EXPECT_LT(count, rays.centers.size());
   EXPECT_EQ(measured.measured, count);
 }
 
@@ -236,7 +236,7 @@ struct Step {
   }
   // Distance in pixels from the outline of the upper square's picture.
   double edge_distance(std::size_t p) const {
-    const Eigen::Vector2d ray = rays.centres[p];
+    const Eigen::Vector2d ray = rays.centers[p];
     const double x = std::abs(ray.x() + 0.013) - 0.2;
     const double y = std::abs(-ray.y() + 0.007) - 0.2;
     const double outside = std::max(x * 100.0, y * 104.0);
@@ -251,7 +251,7 @@ TEST(MeasureDepth, FlyingPixelsStandOnlyAtEdges) {
   const auto measured = libmap::measure_depth(step.view, step.rays, options, 5);
   std::size_t between = 0;
   double sum = 0;
-  for (std::size_t p = 0; p < step.rays.centres.size(); ++p) {
+  for (std::size_t p = 0; p < step.rays.centers.size(); ++p) {
     const auto depth = static_cast<double>(measured.depth.pixels[p]);
     EXPECT_GE(depth, 1.0 - 1e-6);
     EXPECT_LE(depth, 2.0 + 1e-6);
@@ -260,7 +260,7 @@ TEST(MeasureDepth, FlyingPixelsStandOnlyAtEdges) {
     sum += depth;
     EXPECT_LE(step.edge_distance(p), 0.51);
   }
-  // The outline is 4 * 0.4 m * about 102 pixels a metre long; one pixel a step of it.
+  // The outline is 4 * 0.4 m * about 102 pixels a meter long; one pixel a step of it.
   EXPECT_NEAR(static_cast<double>(between), 163.0, 8.0);
   EXPECT_EQ(measured.flying, between);
   EXPECT_EQ(measured.edges, between);
@@ -278,7 +278,7 @@ TEST(MeasureDepth, EdgePixelsAreLostInTheStatedShare) {
     lost += measured.depth.pixels.size() - measured.measured;
     edges += measured.edges;
     EXPECT_EQ(measured.flying, 0U);
-    for (std::size_t p = 0; p < step.rays.centres.size(); ++p)
+    for (std::size_t p = 0; p < step.rays.centers.size(); ++p)
       if (measured.depth.pixels[p] == 0.0F) {
         EXPECT_LE(step.edge_distance(p), 0.51);
       }
@@ -308,7 +308,7 @@ TEST(MeasureDepth, GrazingSurfacesAreLostMoreAndMore) {
   options.max_incidence_deg = 80.0;
   const auto measured = libmap::measure_depth(view, rays, options, 3);
   std::vector<double> seen(90), kept(90);
-  for (std::size_t p = 0; p < rays.centres.size(); ++p) {
+  for (std::size_t p = 0; p < rays.centers.size(); ++p) {
     if (view.depth.pixels[p] <= 0) continue;
     const double angle = std::acos(static_cast<double>(view.incidence_cos.pixels[p])) / radians;
     const auto bin = std::min<std::size_t>(89, static_cast<std::size_t>(angle));

@@ -1,4 +1,4 @@
-// Places are judged on bodies whose flats, edges and corners are known.
+// Places are evaluated on bodies whose flats, edges and corners are known.
 #include "libmap/simulate/field_points.h"
 
 #include <gtest/gtest.h>

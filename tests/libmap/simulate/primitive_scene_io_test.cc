@@ -87,7 +87,7 @@ TEST(SceneYaml, wrong_values_are_errors_that_name_key_value_and_bound) {
               HasSubstr("not a single value"));
   EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: }]"), HasSubstr("radius_m"));
   EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: 1, radius_m: 2}]"),
-              HasSubstr("stands twice"));
+              HasSubstr("is a duplicate"));
   EXPECT_THAT(message_of("shapes: [{shape: cone, radius_m: 1}]"),
               AllOf(HasSubstr("shapes[0].height_m"), HasSubstr("a cone needs it")));
   EXPECT_THAT(message_of("shapes: [{radius_m: 1}]"), HasSubstr("shape"));

@@ -112,8 +112,8 @@ TEST(SimulateOdometry, StandardDeviationsGrowWithTheMotion) {
   EXPECT_NEAR(deviations(0)[0], 0.01, 1e-12);
   EXPECT_NEAR(deviations(0)[2], 0.01, 1e-12);
   EXPECT_NEAR(deviations(0)[5], (0.2 + 0.2) * radians, 1e-12);
-  EXPECT_NEAR(deviations(1)[1], libmap::least_odometry_error_m, 1e-12);
-  EXPECT_NEAR(deviations(1)[3], libmap::least_odometry_error_deg * radians, 1e-12);
+  EXPECT_NEAR(deviations(1)[1], libmap::min_odometry_error_m, 1e-12);
+  EXPECT_NEAR(deviations(1)[3], libmap::min_odometry_error_deg * radians, 1e-12);
 }
 
 TEST(SimulateOdometry, LinksConnectAllNodesAndAddUpToTheOdometry) {
@@ -152,7 +152,7 @@ TEST(SimulateOdometry, ClosuresJoinPlacesThatAreNearInSpaceAndFarInTime) {
   const Trajectory truth = default_way(2);
   libmap::LoopClosureOptions options;
   options.closures = true;
-  options.closures_a_node = 3;
+  options.closures_per_node = 3;
   const PoseGraph graph = libmap::simulate_odometry(truth, {}, options, 1);
   std::map<int, int> of_node;
   std::set<std::pair<int, int>> pairs;
@@ -184,9 +184,9 @@ ScanSimulationOptions small_scan() {
 TEST(SimulateScan, FramesLieOnTheMeshByTheirTruePoses) {
   ScanSimulationOptions options = small_scan();
   options.depth = libmap::ideal_depth_sensor(0.5, 4.5);
-  const Eigen::Vector3d centre(0.2, 0.1, 0.4);
+  const Eigen::Vector3d center(0.2, 0.1, 0.4);
   const libmap::TriangleMesh mesh =
-      libmap::join_meshes(square_mesh(0.0, 1.5), ball_mesh(100, 200, centre, 0.3));
+      libmap::join_meshes(square_mesh(0.0, 1.5), ball_mesh(100, 200, center, 0.3));
   int last = 0;
   std::size_t on_ball = 0;
   std::size_t on_ground = 0;
@@ -204,11 +204,11 @@ TEST(SimulateScan, FramesLieOnTheMeshByTheirTruePoses) {
           const auto depth = static_cast<double>(frame.depth.pixels[p]);
           if (depth == 0) continue;
           const Eigen::Vector3d point = world_from_camera * (depth * rays[p].homogeneous());
-          const bool ball = (point - centre).norm() < 0.301;
+          const bool ball = (point - center).norm() < 0.301;
           on_ball += ball;
           on_ground += !ball;
           if (ball)
-            EXPECT_NEAR((point - centre).norm(), 0.3, 3e-4);
+            EXPECT_NEAR((point - center).norm(), 0.3, 3e-4);
           else
             EXPECT_NEAR(point.z(), 0.0, 1e-5);
         }

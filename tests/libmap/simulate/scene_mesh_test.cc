@@ -135,13 +135,13 @@ void expect_on_surface_and_outward(const PrimitiveScene& scene, const SceneMeshO
     const Triangle& triangle = mesh.triangles[i];
     const Eigen::Vector3d normal = area_normal(mesh, triangle);
     if (normal.norm() < 1e-3 * options.edge_length_m * options.edge_length_m) continue;
-    const Eigen::Vector3d centre =
+    const Eigen::Vector3d center =
         (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
         3.0;
     const SceneSolid& solid = solid_of(geometry, shapes[i]);
-    EXPECT_GT(geometry.signed_distance(solid, centre + step * normal.normalized()), 0.0);
-    EXPECT_LT(geometry.signed_distance(solid, centre - step * normal.normalized()), 0.0);
-    EXPECT_GT(geometry.signed_distance(centre), -step);
+    EXPECT_GT(geometry.signed_distance(solid, center + step * normal.normalized()), 0.0);
+    EXPECT_LT(geometry.signed_distance(solid, center - step * normal.normalized()), 0.0);
+    EXPECT_GT(geometry.signed_distance(center), -step);
   }
 }
 

@@ -54,15 +54,15 @@ Roots line_hits(const ProfileSegment& segment, const Eigen::Vector3d& origin,
 
 Roots arc_hits(const ProfileSegment& segment, const Eigen::Vector3d& origin,
                const Eigen::Vector3d& direction) {
-  const Eigen::Vector3d o = origin - Eigen::Vector3d(0.0, 0.0, segment.centre_a);
+  const Eigen::Vector3d o = origin - Eigen::Vector3d(0.0, 0.0, segment.center_a);
   return solve_quadratic(direction.squaredNorm(), o.dot(direction),
                          o.squaredNorm() - segment.radius * segment.radius, 1.0);
 }
 
 bool lies_on(const ProfileSegment& segment, const Eigen::Vector2d& point, double tolerance) {
   if (segment.is_arc) {
-    const double low = segment.centre_a + segment.radius * std::cos(segment.angle_end);
-    const double high = segment.centre_a + segment.radius * std::cos(segment.angle_start);
+    const double low = segment.center_a + segment.radius * std::cos(segment.angle_end);
+    const double high = segment.center_a + segment.radius * std::cos(segment.angle_start);
     return point.y() >= low - tolerance && point.y() <= high + tolerance;
   }
   const Eigen::Vector2d low = segment.start.cwiseMin(segment.end);
@@ -152,7 +152,7 @@ std::optional<SurfaceTruth> highest_on(const SceneGeometry& geometry, const Scen
     const ProfileSegment& segment = solid.profile[hit.segment];
     double t = 0.0;
     if (segment.is_arc) {
-      const double angle = std::atan2(at.head<2>().norm(), at.z() - segment.centre_a);
+      const double angle = std::atan2(at.head<2>().norm(), at.z() - segment.center_a);
       t = (angle - segment.angle_start) / (segment.angle_end - segment.angle_start);
     } else {
       const Eigen::Vector2d step = segment.end - segment.start;

@@ -80,7 +80,7 @@ TEST(SolidNoise, KeepsItsValues) {
 }
 
 double contrast(const std::function<Color(const Eigen::Vector3d&)>& color, double size) {
-  // Standard deviation of grey in a square of that size, mean over places.
+  // Standard deviation of gray in a square of that size, mean over places.
   double total = 0.0;
   for (int place = 0; place < 40; ++place) {
     const Eigen::Vector3d corner = somewhere(2.0);
@@ -88,21 +88,21 @@ double contrast(const std::function<Color(const Eigen::Vector3d&)>& color, doubl
     double squares = 0.0;
     for (int i = 0; i < 100; ++i) {
       const Color c = color(corner + size * Eigen::Vector3d(i % 10, i / 10, 0.0) / 10.0);
-      const double grey = 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2];
-      sum += grey;
-      squares += grey * grey;
+      const double gray = 0.299 * c[0] + 0.587 * c[1] + 0.114 * c[2];
+      sum += gray;
+      squares += gray * gray;
     }
     total += std::sqrt(std::max(0.0, squares / 100.0 - sum * sum / 1e4));
   }
   return total / 40.0;
 }
 
-TEST(RockTexture, HasContrastInEveryFiveCentimetres) {
+TEST(RockTexture, HasContrastInEveryFiveCentimeters) {
   const auto rock = [](const Eigen::Vector3d& p) { return rock_color(p, 1); };
   const auto soil = [](const Eigen::Vector3d& p) { return soil_color(p, 1); };
   EXPECT_GT(contrast(rock, 0.05), 15.0);
   EXPECT_GT(contrast(soil, 0.05), 10.0);
-  // A texture, not white noise: a millimetre changes little.
+  // A texture, not white noise: a millimeter changes little.
   EXPECT_LT(contrast(rock, 0.001), 0.3 * contrast(rock, 0.05));
 }
 

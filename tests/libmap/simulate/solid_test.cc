@@ -173,11 +173,11 @@ TEST(Booleans, FollowInclusionAndExclusion) {
   EXPECT_NEAR(volume(rest), 1.0 - common, 1e-12);
   // Each triangle keeps the label of the face that it is part of.
   for (std::size_t n = 0; n < both.triangles.size(); ++n) {
-    const Eigen::Vector3d centre =
+    const Eigen::Vector3d center =
         (both.vertices[both.triangles[n][0]] + both.vertices[both.triangles[n][1]] +
          both.vertices[both.triangles[n][2]]) /
         3.0;
-    const double to_a = (centre - Eigen::Vector3d::Constant(0.5)).cwiseAbs().maxCoeff();
+    const double to_a = (center - Eigen::Vector3d::Constant(0.5)).cwiseAbs().maxCoeff();
     EXPECT_EQ(both.labels[n], std::abs(to_a - 0.5) < 1e-9 ? 1 : 2);
   }
 }

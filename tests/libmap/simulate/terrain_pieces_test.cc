@@ -110,7 +110,7 @@ TEST(RockyTerrain, HeightsOfRocksFollowThePowerLaw) {
     options.max_rock_m = max_rock_m;
     options.rocks_per_m2 = 0.05;  // alone: each is a hill of its own
     const RockyTerrain terrain(options, rectangle(0, 0, 100, 100));
-    // Tops over squares of two metres.
+    // Tops over squares of two meters.
     std::map<std::pair<int, int>, double> tops;
     for (int x = 0; x < 1000; ++x)
       for (int y = 0; y < 1000; ++y) {

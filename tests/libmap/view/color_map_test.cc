@@ -53,7 +53,7 @@ TEST(ScoreColor, NoTwoClassesLookTheSame) {
     }
 }
 
-TEST(Diverging, IsGreyInTheMiddleAndSymmetricInItsRange) {
+TEST(Diverging, IsGrayInTheMiddleAndSymmetricInItsRange) {
   EXPECT_EQ(diverging(0.0), (Color{59, 76, 192}));
   EXPECT_EQ(diverging(0.5), (Color{221, 221, 221}));
   EXPECT_EQ(diverging(1.0), (Color{180, 4, 38}));
@@ -156,7 +156,7 @@ TEST(ColorPoints, RangeGivenOrFromThePercentiles) {
   PointCloud cloud = row_of_points(101);
   cloud.add_field("curvature", ScalarType::float64);
   for (std::size_t i = 0; i <= 100; ++i) cloud.fields[0].values[i] = double(i);
-  cloud.fields[0].values[100] = 1e9;  // an outlier must not use up the colours
+  cloud.fields[0].values[100] = 1e9;  // an outlier must not use up the colors
   Coloring coloring;
   coloring.mode = ColorMode::field;
   coloring.field = "curvature";
@@ -189,7 +189,7 @@ TEST(ColorPoints, AutomaticTakesWhatTheDataHave) {
   PointCloud cloud = row_of_points(3);
   EXPECT_EQ(color(cloud, {}).mode, ColorMode::height);
   cloud.colors.assign(3, Color{9, 9, 9});
-  EXPECT_EQ(color(cloud, {}).mode, ColorMode::height) << "one grey says nothing";
+  EXPECT_EQ(color(cloud, {}).mode, ColorMode::height) << "one gray says nothing";
   cloud.colors[1] = {1, 2, 3};
   EXPECT_EQ(color(cloud, {}).mode, ColorMode::own);
   EXPECT_EQ(color(cloud, {}).colors, cloud.colors);
@@ -208,13 +208,13 @@ TEST(ColorPoints, ErrorsNameWhatWasMeant) {
   coloring.range_min = 1.0;
   EXPECT_EQ(error_of([&] { color(cloud, coloring); }).context().field, "range_max");
   coloring.mode = ColorMode::own;
-  EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("no colours"));
+  EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("no colors"));
   coloring.mode = ColorMode::flags;
   EXPECT_EQ(error_of([&] { color(cloud, coloring); }).context().value, "convex");
   coloring = {.mode = ColorMode::field, .field = "curvature"};
   cloud.fields[0].values.pop_back();
   EXPECT_STREQ(error_of([&] { color(cloud, coloring); }).what(),
-               "curvature is 2 values: the field has not one value a point (must be 3)");
+               "curvature is 2 values: the field has not one value per point (must be 3)");
   coloring.mode = ColorMode::single;
   coloring.color = "gren";
   EXPECT_THAT(error_of([&] { color(cloud, coloring); }).what(), HasSubstr("green"));

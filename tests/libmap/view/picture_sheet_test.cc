@@ -161,7 +161,7 @@ TEST_F(PictureSheetTest, ScenesShareScaleAndPlace) {
         range = {std::min(range.first, x), std::max(range.second, x)};
     return range;
   };
-  // -1 m to 4 m over 0.9 of 200 pixels: 36 pixels a metre.
+  // -1 m to 4 m over 0.9 of 200 pixels: 36 pixels a meter.
   const auto [red_low, red_high] = bounds(0, red);
   const auto [blue_low, blue_high] = bounds(1, blue);
   EXPECT_NEAR(red_low, 10, 1);
@@ -178,8 +178,8 @@ TEST_F(PictureSheetTest, ScenesShareScaleAndPlace) {
   EXPECT_EQ(at(alone, rows.cells[1].left + 100, rows.cells[1].top + 50), blue);
 }
 
-// Two scenes with different values share one range of colours.
-TEST_F(PictureSheetTest, ContinuousColoursShareTheirRange) {
+// Two scenes with different values share one range of colors.
+TEST_F(PictureSheetTest, ContinuousColorsShareTheirRange) {
   const auto scene = [](double low, double high) {
     PointCloud cloud;
     cloud.positions = {{0, 0, 0}, {1, 0, 0}};

@@ -71,7 +71,7 @@ TEST(PrepareLayer, LeavesOutWhatIsNotFinite) {
 }
 
 // The zero plane is one of the terrain frame.
-TEST(PrepareLayer, ColoursInTheTerrainFrame) {
+TEST(PrepareLayer, ColorsInTheTerrainFrame) {
   PointCloud cloud;
   cloud.positions = {{0, 0, -5}, {0, 0, 5}};
   cloud.add_field("score", ScalarType::float32).values = {1.0, 1.0};

@@ -16,7 +16,7 @@ namespace scene_texture_test {
 using graspmap_test::error_of;
 
 // Two squares side by side, x from -1 to 1: on the left the four quarters of a page, on the right
-// another page of one colour, below both a strip without a page.
+// another page of one color, below both a strip without a page.
 TexturedMesh two_pages() {
   TexturedMesh model;
   const auto add_square = [&](double x0, double y0, double x1, double y1, std::int32_t page) {

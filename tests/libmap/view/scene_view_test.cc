@@ -67,7 +67,7 @@ class SceneViewTest : public ::testing::Test {
 
 TEST_F(SceneViewTest, ASquareIsWhereItShouldBeAndAsLarge) {
   Scene scene;
-  // Corners at +-1 m with squares of 0.2 m: 2.2 m over 0.9 of 440 pixels: 180 pixels a metre.
+  // Corners at +-1 m with squares of 0.2 m: 2.2 m over 0.9 of 440 pixels: 180 pixels a meter.
   scene.layers.push_back(
       colored_points({{-1, -1, 0}, {1, 1, 0}, {0, 0, 0}}, {blue, green, red}, 0.2));
   scene.layers[0].point_shape = PointShape::square;
@@ -123,7 +123,7 @@ TEST_F(SceneViewTest, TopViewShowsTheHighest) {
   EXPECT_EQ(color_at(image, camera_of(scene, options).pixel_of({0, 0, 0})), red);
 }
 
-TEST_F(SceneViewTest, ScoresHaveTheColoursOfTheLegendExactly) {
+TEST_F(SceneViewTest, ScoresHaveTheColorsOfTheLegendExactly) {
   Scene scene;
   PointCloud cloud;
   const std::vector<double> scores{0.95, 0.85, 0.75, 0.65, 0.55, 0.45, 0.1};
@@ -175,7 +175,7 @@ TEST_F(SceneViewTest, ALatticeIsDrawnWithoutGaps) {
       ASSERT_EQ(image.at(x, y), red) << x << ", " << y;
 }
 
-// A map of a sparse cloud has empty cells: they take a neighbour's colour, and cover no neighbour.
+// A map of a sparse cloud has empty cells: they take a neighbor's color, and cover no neighbor.
 TEST_F(SceneViewTest, EmptyCellsOfAMapAreClosed) {
   Scene scene;
   PointCloud cloud;
@@ -226,7 +226,7 @@ TEST_F(SceneViewTest, AMeshIsFilledAndShadedUnlessToldNotTo) {
   EXPECT_EQ(count(render_scene(scene, options), {0xc0, 0x80, 0x40}), 0U);
 }
 
-TEST_F(SceneViewTest, MarkersLieOverTheTerrainAndTakeTheirVerdictsColour) {
+TEST_F(SceneViewTest, MarkersLieOverTheTerrainAndTakeTheirVerdictsColor) {
   Scene scene;
   scene.layers.push_back(
       colored_points({{-1, -1, 9}, {1, 1, 9}, {0, 0, 9}}, {blue, blue, blue}, 1.2));
@@ -249,9 +249,9 @@ TEST_F(SceneViewTest, LabelsThatHaveNoRoomAreLeftOut) {
       colored_points({{-1, -1, 9}, {1, 1, 9}, {0, 0, 9}}, {blue, blue, blue}, 1.2));
   for (int i = 0; i < 6000; ++i)
     scene.markers.push_back({{uniform(-1, 1), uniform(-1, 1), 0}, "P", Verdict::pass});
-  const ColorImage labelled = render_scene(scene, bare(200, 200));
+  const ColorImage labeled = render_scene(scene, bare(200, 200));
   for (Marker& marker : scene.markers) marker.label.clear();
-  EXPECT_TRUE(labelled.pixels == render_scene(scene, bare(200, 200)).pixels);
+  EXPECT_TRUE(labeled.pixels == render_scene(scene, bare(200, 200)).pixels);
   scene.markers.resize(20);
   const ColorImage few = render_scene(scene, bare(200, 200));
   for (Marker& marker : scene.markers) marker.label = "P";
@@ -264,7 +264,7 @@ TEST_F(SceneViewTest, EqualInputGivesEqualBytes) {
   for (int i = 0; i < 5000; ++i)
     cloud.positions.emplace_back(uniform(0, 1), uniform(0, 1), uniform(0, 0.3));
   scene.layers.push_back({.shape = cloud});
-  scene.markers = {{{0.5, 0.5, 0.3}, "centre", Verdict::none}};
+  scene.markers = {{{0.5, 0.5, 0.3}, "center", Verdict::none}};
   SceneViewOptions options;
   options.width = 400;
   options.height = 300;
@@ -318,7 +318,7 @@ TEST_F(SceneViewTest, DegenerateScenesAreDrawnOrRefused) {
   error_of([&] { render_scene(torn, {}); });
 }
 
-TEST_F(SceneViewTest, RefusesSizesAndColoursThatCannotBe) {
+TEST_F(SceneViewTest, RefusesSizesAndColorsThatCannotBe) {
   Scene scene;
   scene.layers.push_back(colored_points({{0, 0, 0}}, {red}, 0.0));
   for (const int size : {0, -5, 16385}) {

@@ -20,7 +20,7 @@ namespace libmap {
 
 constexpr std::uint32_t no_photo = 0xffffffff;
 
-struct LabellingOptions {
+struct LabelingOptions {
   // A seam of 1 m costs as much as this times 1 m2 of triangles with views of half the best
   // quality.
   double seam_cost_m = 0.1;
@@ -36,6 +36,6 @@ struct TextureLabels {
 
 // `opposite` is one a half-edge (mesh_adjacency).
 TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
-                              const ViewTable& views, const LabellingOptions& options);
+                              const ViewTable& views, const LabelingOptions& options);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libgtd/score/map_thinning.h"
+#include "libgtd/score/map_downsampling.h"
 
 #include <algorithm>
 #include <cstdint>
@@ -48,7 +48,7 @@ libmap::PointCloud thin(const libmap::PointCloud& map, int width, bool by_layers
 
 }  // namespace
 
-libmap::PointCloud thin_map(const libmap::PointCloud& map, int width) {
+libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width) {
   return thin(map, width, false);
 }
 

@@ -8,9 +8,9 @@ namespace libgtd {
 
 // One point for each square of `width` x `width` columns of the lattice that holds any: the
 // uppermost of the column nearest to the square's middle, with its own values, so that each value
-// is about as frequent as among all points. Ascending by square. Thinning parts and then their
-// union gives what thinning the union at once gives. `map` is made by to_cloud.
-libmap::PointCloud thin_map(const libmap::PointCloud& map, int width);
+// is about as frequent as among all points. Ascending by square. Downsampling parts and then their
+// union gives what downsampling the union at once gives. `map` is made by to_cloud.
+libmap::PointCloud downsample_map(const libmap::PointCloud& map, int width);
 
 // One point for each cube of `width`^3 voxels of the lattice that holds any: that of the voxel
 // nearest to the cube's middle, of several as near the uppermost. Steep faces keep their points.

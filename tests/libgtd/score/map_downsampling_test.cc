@@ -1,4 +1,4 @@
-#include "libgtd/score/map_thinning.h"
+#include "libgtd/score/map_downsampling.h"
 
 #include <gtest/gtest.h>
 
@@ -6,7 +6,7 @@
 
 #include "tests/support/test_support.h"
 
-namespace map_thinning_test {
+namespace map_downsampling_test {
 
 using graspmap_test::uniform;
 using libgtd::GraspabilityMap;
@@ -30,30 +30,30 @@ std::vector<Voxel> voxels_in(const PointCloud& map) {
   return voxels;
 }
 
-TEST(MapThinning, TheUppermostOfTheMiddleColumnStays) {
+TEST(MapDownsampling, TheUppermostOfTheMiddleColumnStays) {
   const PointCloud map = map_of({{0, 0, 5},
                                  {1, 1, 2},
                                  {1, 1, 4},
                                  {1, 2, 9},  // square (0, 0)
                                  {-1, 0, 7},
                                  {-3, -1, 1}});  // (-1, 0), (-1, -1)
-  EXPECT_EQ(voxels_in(libgtd::thin_map(map, 3)),
+  EXPECT_EQ(voxels_in(libgtd::downsample_map(map, 3)),
             (std::vector<Voxel>{{-3, -1, 1}, {-1, 0, 7}, {1, 1, 4}}));
-  EXPECT_EQ(libgtd::thin_map(map, 1).size(), 5U) << "one a column";
+  EXPECT_EQ(libgtd::downsample_map(map, 1).size(), 5U) << "one a column";
 }
 
 // Squares so wide that distances from their middles, squared, need more than 32 bits; and an index
 // that is none.
-TEST(MapThinning, FarVoxelsAndNone) {
+TEST(MapDownsampling, FarVoxelsAndNone) {
   PointCloud map = map_of({{-(1 << 29), 0, 0}, {-5, 0, 0}, {5, 7, 0}, {1 << 29, 0, 1 << 29}});
-  EXPECT_EQ(voxels_in(libgtd::thin_map(map, 1 << 29)),
+  EXPECT_EQ(voxels_in(libgtd::downsample_map(map, 1 << 29)),
             (std::vector<Voxel>{{-5, 0, 0}, {5, 7, 0}, {1 << 29, 0, 1 << 29}}));
   map.fields.back().values[1] = 1e10;
-  EXPECT_EQ(graspmap_test::error_of([&] { libgtd::thin_map(map, 3); }).context().field,
+  EXPECT_EQ(graspmap_test::error_of([&] { libgtd::downsample_map(map, 3); }).context().field,
             map.fields.back().name);
 }
 
-TEST(MapThinning, PartsMakeTheWhole) {
+TEST(MapDownsampling, PartsMakeTheWhole) {
   std::set<Voxel> some;
   while (some.size() < 600)
     some.insert({static_cast<int>(uniform(-20, 20)), static_cast<int>(uniform(-20, 20)),
@@ -61,16 +61,16 @@ TEST(MapThinning, PartsMakeTheWhole) {
   std::vector<Voxel> left;
   std::vector<Voxel> right;
   for (const Voxel& voxel : some) (voxel.i < 5 ? left : right).push_back(voxel);
-  const PointCloud whole = libgtd::thin_map(map_of({some.begin(), some.end()}), 4);
+  const PointCloud whole = libgtd::downsample_map(map_of({some.begin(), some.end()}), 4);
   const PointCloud joined =
-      libgtd::thin_map(libgtd::merge_map_clouds(
-                           {libgtd::thin_map(map_of(left), 4), libgtd::thin_map(map_of(right), 4)}),
-                       4);
+      libgtd::downsample_map(libgtd::merge_map_clouds({libgtd::downsample_map(map_of(left), 4),
+                                                       libgtd::downsample_map(map_of(right), 4)}),
+                             4);
   EXPECT_EQ(voxels_in(joined), voxels_in(whole));
   EXPECT_EQ(whole.size(), 100U);
 }
 
-TEST(MapThinning, PointsComeToTheMiddleOfTheirSquares) {
+TEST(MapDownsampling, PointsComeToTheMiddleOfTheirSquares) {
   libgtd::TileStoreIndex index;
   index.lattice = {{1, 2, 3}, 0.1};
   PointCloud map = map_of({{-1, 5, 2}});
@@ -84,7 +84,7 @@ TEST(MapThinning, PointsComeToTheMiddleOfTheirSquares) {
       (terrain_from_input * map.positions[0]).isApprox(Eigen::Vector3d(0.8, 2.6, 3.25), 1e-12));
 }
 
-TEST(MapThinning, InCubesSteepFacesStay) {
+TEST(MapDownsampling, InCubesSteepFacesStay) {
   // A wall: one column, nine voxels high, and a voxel beside it.
   std::vector<Voxel> wall;
   for (int k = -3; k < 6; ++k) wall.push_back({1, 1, k});
@@ -98,4 +98,4 @@ TEST(MapThinning, InCubesSteepFacesStay) {
   EXPECT_EQ(voxels_in(libgtd::thin_map_in_cubes(map, 1)), voxels_in(map));
 }
 
-}  // namespace map_thinning_test
+}  // namespace map_downsampling_test

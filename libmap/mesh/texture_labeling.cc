@@ -1,4 +1,4 @@
-#include "libmap/mesh/texture_labelling.h"
+#include "libmap/mesh/texture_labeling.h"
 
 #include <algorithm>
 #include <cstddef>
@@ -11,8 +11,8 @@ namespace libmap {
 namespace {
 
 // The share of the energy that a cycle must save for another to follow.
-constexpr double least_gain = 1e-2;
-constexpr int most_cycles = 12;
+constexpr double min_gain = 1e-2;
+constexpr int max_cycles = 12;
 constexpr int rounds_a_cycle = 2;
 constexpr int rounds_of_regions = 3;
 
@@ -37,7 +37,7 @@ struct Label {
   float sum = 0.0F;   // with the best labels of all nodes below in the tree
 };
 
-// A neighbour of a node, and what a seam between the two costs.
+// A neighbor of a node, and what a seam between the two costs.
 struct Neighbor {
   std::uint32_t node = 0;
   float cost = 0.0F;  // m2
@@ -276,7 +276,7 @@ Regions regions_of(const Graph& graph) {
   return regions;
 }
 
-// What a view costs for each square metre: nothing for the best one, 1 for one of half its quality.
+// What a view costs for each square meter: nothing for the best one, 1 for one of half its quality.
 double lack_of(const ViewQuality& view, const ViewQuality& best) {
   constexpr double most = 50.0;
   return std::min(most, static_cast<double>(best.quality / view.quality) - 1.0);
@@ -323,7 +323,7 @@ void improve_regions(Graph& graph) {
 }  // namespace
 
 TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
-                              const ViewTable& views, const LabellingOptions& options) {
+                              const ViewTable& views, const LabelingOptions& options) {
   TextureLabels result;
   std::vector<std::uint32_t> node_of(mesh.triangles.size(), 0);
   std::uint32_t nodes = 0;
@@ -336,11 +336,11 @@ TextureLabels label_triangles(const TriangleMesh& mesh, const std::vector<HalfEd
   result.energy_before = graph.energy();
   result.energy = result.energy_before;
   ForestDescent descent(graph);
-  for (int cycle = 0; cycle < most_cycles; ++cycle) {
+  for (int cycle = 0; cycle < max_cycles; ++cycle) {
     for (int round = 0; round < rounds_a_cycle; ++round) descent.improve();
     improve_regions(graph);
     const double improved = graph.energy();
-    const bool done = result.energy - improved < least_gain * result.energy;
+    const bool done = result.energy - improved < min_gain * result.energy;
     result.energy = improved;
     if (done) break;
   }
