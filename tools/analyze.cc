@@ -226,7 +226,7 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
       percent_text(evaluated.graspable.accuracy().value()), evaluated.graspable.true_positives,
       evaluated.lost(), evaluated.gained()));
   if (evaluated.difference.count > 0)
-    run.say(fmt::format("score, OTHER less MAP: mean {:+.3f}, mean size {:.3f}, rms {:.3f}",
+    run.say(fmt::format("score, OTHER less MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
                         evaluated.difference.mean, evaluated.difference.mean_absolute,
                         evaluated.difference.rms));
 }

@@ -46,18 +46,18 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
   };
   add_cost("matches", stage.held_out.matches);
   add_cost("surfaces", stage.held_out.surfaces);
-  if (stage.undone)
+  if (stage.rejected)
     text += stage.held_out.is_worse() ? ", rejected (validation got worse)"
-                                      : ", which is no better: undone";
+                                      : ", which is no better: rejected";
   if (stage.error)
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);
   run.say(text);
   run.detail(fmt::format("{}: {:.2f} s", stage.name, stage.seconds));
-  if (stage.undone_error)
+  if (stage.rejected_error)
     run.detail(fmt::format("  given up: {:.2f} mm, {:.3f} deg",
-                           1e3 * stage.undone_error->absolute.rmse_m,
-                           stage.undone_error->absolute.mean_rotation_deg));
+                           1e3 * stage.rejected_error->absolute.rmse_m,
+                           stage.rejected_error->absolute.mean_rotation_deg));
   for (const auto& [name, value] : stage.figures)
     run.detail(fmt::format("  {} {:.6g}", name, value));
   for (const auto& [name, group] : stage.groups)
@@ -78,9 +78,9 @@ void add_results(const libmap::RefinementResult& result, libmap::Manifest& manif
   count("nodes_without_links", result.without_links.size());
   count("frames_skipped", result.skipped.size());
   count("features", result.features);
-  std::size_t undone = 0;
-  for (const libmap::StageReport& stage : result.stages) undone += stage.undone ? 1 : 0;
-  count("stages_undone", undone);
+  std::size_t rejected = 0;
+  for (const libmap::StageReport& stage : result.stages) rejected += stage.rejected ? 1 : 0;
+  count("stages_undone", rejected);
   for (const libmap::StageReport& stage : result.stages) {
     manifest.timings_s.emplace_back(stage.name, stage.seconds);
     manifest.timings_s.emplace_back(stage.name + ", processor", stage.processor_seconds);

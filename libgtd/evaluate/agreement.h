@@ -1,4 +1,4 @@
-// How far two yes/no evaluatements of the same places agree, beyond what chance alone would give.
+// How far two yes/no evaluations of the same places agree, beyond what chance alone would give.
 #pragma once
 
 #include <cstdint>
@@ -26,7 +26,7 @@ struct Kappa {
 };
 
 // (po - pe) / (1 - pe), po the share that agrees and pe the one expected of independent
-// evaluatements with the same shares of yes (Cohen 1960, eq. 1). Its variance (Fleiss, Cohen and
+// evaluations with the same shares of yes (Cohen 1960, eq. 1). Its variance (Fleiss, Cohen and
 // Everitt 1969, without weights), p_ij the shares of the table, p_i. and p_.j the sums of its rows
 // and columns:
 //   n (1 - pe)^4 var = sum_i p_ii ((1 - pe) - (p_.i + p_i.) (1 - po))^2

@@ -42,11 +42,11 @@ void add_surface_costs(const std::vector<BaseElement>& samples, const FrameFeatu
   }
 }
 
-double weight_of(const HeldOutEvaluatement& evaluatement, const HeldOutChange& change) {
-  const double matches = static_cast<double>(evaluatement.matches.count);
-  const double surfaces = surface_weight * static_cast<double>(evaluatement.surfaces.count);
+double weight_of(const HeldOutEvaluation& evaluation, const HeldOutChange& change) {
+  const double matches = static_cast<double>(evaluation.matches.count);
+  const double surfaces = surface_weight * static_cast<double>(evaluation.surfaces.count);
   const double all = matches + surfaces;
-  return all > 0.0 ? (&change == &evaluatement.matches ? matches : surfaces) / all : 0.0;
+  return all > 0.0 ? (&change == &evaluation.matches ? matches : surfaces) / all : 0.0;
 }
 
 }  // namespace
@@ -122,17 +122,17 @@ HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
   return {match_costs(frames, links, map_from_base), surface_costs(frames, links, map_from_base)};
 }
 
-double HeldOutEvaluatement::change() const {
+double HeldOutEvaluation::change() const {
   return weight_of(*this, matches) * (matches.after - matches.before) +
          weight_of(*this, surfaces) * (surfaces.after - surfaces.before);
 }
 
-double HeldOutEvaluatement::deviation() const {
+double HeldOutEvaluation::deviation() const {
   return std::hypot(weight_of(*this, matches) * matches.deviation,
                     weight_of(*this, surfaces) * surfaces.deviation);
 }
 
-bool HeldOutEvaluatement::is_worse() const {
+bool HeldOutEvaluation::is_worse() const {
   const double before =
       weight_of(*this, matches) * matches.before + weight_of(*this, surfaces) * surfaces.before;
   const auto is_clearly_worse = [](const HeldOutChange& kind) {
@@ -142,11 +142,11 @@ bool HeldOutEvaluatement::is_worse() const {
   return change() > rounding * before || is_clearly_worse(matches) || is_clearly_worse(surfaces);
 }
 
-bool HeldOutEvaluatement::is_clearly_better() const {
+bool HeldOutEvaluation::is_clearly_better() const {
   return !is_worse() && matches.before - matches.after > 2.0 * matches.deviation;
 }
 
-HeldOutEvaluatement evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after) {
+HeldOutEvaluation evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after) {
   return {compare_held_out(before.matches, after.matches),
           compare_held_out(before.surfaces, after.surfaces)};
 }

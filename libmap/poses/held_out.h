@@ -44,7 +44,7 @@ HeldOutCosts held_out_costs(const std::vector<FrameFeatures>& frames,
 
 // Both kinds. A match has three residuals, a sample one; samples are so far apart that the discs
 // their planes are fitted to hardly overlap.
-struct HeldOutEvaluatement {
+struct HeldOutEvaluation {
   HeldOutChange matches;
   HeldOutChange surfaces;
 
@@ -58,6 +58,6 @@ struct HeldOutEvaluatement {
   bool is_clearly_better() const;
 };
 inline constexpr double surface_weight = 1.0 / 3.0;
-HeldOutEvaluatement evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
+HeldOutEvaluation evaluate_held_out(const HeldOutCosts& before, const HeldOutCosts& after);
 
 }  // namespace libmap

@@ -13,7 +13,7 @@ namespace libmap {
 struct IntrinsicsEstimate {
   std::size_t frames = 0;             // that it rests on
   BundleAdjustmentResult adjustment;  // of those frames, with the steps of the intrinsics
-  HeldOutEvaluatement held_out;       // of those frames: as they were, and adjusted with the steps
+  HeldOutEvaluation held_out;       // of those frames: as they were, and adjusted with the steps
 };
 
 // A bundle adjustment with free intrinsics. Of a long scan they are estimated from the `max_frames`

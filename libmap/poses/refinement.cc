@@ -114,9 +114,9 @@ bool Refinement::evaluate(StageReport& stage, const std::map<int, Pose>& before,
                           const std::map<int, Pose>& after) const {
   stage.held_out = evaluate_held_out(held_out_costs(frames_, links_, before),
                                      held_out_costs(frames_, links_, after));
-  stage.undone = stage.held_out.is_worse();
-  if (stage.undone) stage.undone_error = error_of(after);
-  return stage.undone;
+  stage.rejected = stage.held_out.is_worse();
+  if (stage.rejected) stage.rejected_error = error_of(after);
+  return stage.rejected;
 }
 
 void Refinement::close(StageReport stage) {
@@ -329,7 +329,7 @@ void Refinement::bundle() {
       adjust_bundle(frames_, links_, poses_, without_features(graph_.links, stored_.size()),
                     graph_.components, options_.bundle_adjustment);
   evaluate(stage, poses_, adjusted.map_from_base);
-  stage.undone = stage.undone || !adjusted.converged;
+  stage.rejected = stage.rejected || !adjusted.converged;
   stage.figures = {{"tracks", static_cast<double>(adjusted.tracks)},
                    {"observations", static_cast<double>(adjusted.observations)},
                    {"conflicts", static_cast<double>(adjusted.conflicts)},
@@ -339,7 +339,7 @@ void Refinement::bundle() {
                    {"final_cost", adjusted.final_cost},
                    {"reprojection_rms_px", adjusted.reprojection_rms_px},
                    {"depth_rms_m", adjusted.depth_rms_m}};
-  if (!stage.undone) {
+  if (!stage.rejected) {
     poses_ = std::move(adjusted.map_from_base);
     information_ = std::move(adjusted.information);
   }
@@ -366,10 +366,10 @@ void Refinement::free_intrinsics() {
     stage.figures.emplace_back(camera + "cx_px", steps[n].cx_px);
     stage.figures.emplace_back(camera + "cy_px", steps[n].cy_px);
   }
-  stage.undone = !adjusted.converged || (options_.intrinsics == IntrinsicsMode::automatic
+  stage.rejected = !adjusted.converged || (options_.intrinsics == IntrinsicsMode::automatic
                                              ? !stage.held_out.is_clearly_better()
                                              : stage.held_out.is_worse());
-  if (!stage.undone) {
+  if (!stage.rejected) {
     const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
     for (FrameFeatures& frame : frames_) move_intrinsics(frame, steps);
     if (estimate.frames < frames_.size())
@@ -377,16 +377,16 @@ void Refinement::free_intrinsics() {
                                options_.bundle_adjustment);
     stage.held_out =
         evaluate_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
-    stage.undone = stage.held_out.is_worse();
-    if (stage.undone)
+    stage.rejected = stage.held_out.is_worse();
+    if (stage.rejected)
       for (FrameFeatures& frame : frames_) move_intrinsics(frame, reversed(steps));
   }
-  if (!stage.undone) {
+  if (!stage.rejected) {
     poses_ = std::move(adjusted.map_from_base);
     information_ = std::move(adjusted.information);
     result_.intrinsics = steps;
   } else {
-    stage.undone_error = error_of(adjusted.map_from_base);
+    stage.rejected_error = error_of(adjusted.map_from_base);
   }
   close(std::move(stage));
 }
@@ -406,7 +406,7 @@ void Refinement::icp() {
                    {"iterations", static_cast<double>(aligned.iterations)},
                    {"initial_rms_m", aligned.initial_rms_m},
                    {"final_rms_m", aligned.final_rms_m}};
-  if (!stage.undone) {
+  if (!stage.rejected) {
     poses_ = std::move(aligned.map_from_base);
     information_ = std::move(aligned.information);
   }

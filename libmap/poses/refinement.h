@@ -1,6 +1,6 @@
 // The whole way from a scan's odometry to refined poses: features, rounds of loop closures each
 // followed by an optimization of the pose graph, bundle adjustment, depth against depth. A stage
-// after which what was held out fits worse is undone and reported.
+// after which what was held out fits worse is rejected and reported.
 #pragma once
 
 #include <cstdint>
@@ -54,13 +54,13 @@ struct StageError {
 
 struct StageReport {
   std::string name;
-  bool undone = false;
+  bool rejected = false;
   RejectionCounts closures;                             // of this stage
-  HeldOutEvaluatement held_out;                         // of this stage's links and of those before
+  HeldOutEvaluation held_out;                         // of this stage's links and of those before
   std::map<std::string, LinkGroupResult> groups;        // of an optimized graph
   std::vector<std::pair<std::string, double>> figures;  // what else the stage counts
   std::optional<StageError> error;
-  std::optional<StageError> undone_error;  // of the poses that were given up
+  std::optional<StageError> rejected_error;  // of the poses that were given up
   double seconds = 0.0;
   double processor_seconds = 0.0;
 };

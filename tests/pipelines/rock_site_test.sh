@@ -24,7 +24,7 @@ for rmse in $(sed -n 's/^rmse: \([0-9.]*\) mm$/\1/p' "$out/scan/accuracy.txt"); 
 done
 [ "$(grep -c '^rmse' "$out/scan/accuracy.txt")" -eq 2 ] || fail "not cloud and surface were compared"
 grep -q '^manifold: yes$' "$out/scan/mesh.txt" || fail "the surface is not manifold"
-mean=$(sed -n 's/^mean of .* places: \([0-9.]*\) m.*/\1/p' "$out/scan/spot_check.txt")
+mean=$(sed -n 's/^mean of .* locations: \([0-9.]*\) m.*/\1/p' "$out/scan/spot_check.txt")
 awk -v mean="$mean" 'BEGIN { exit !(mean > 0 && mean < 0.004) }' || fail "the edges are $mean m off"
 [ "$(wc -l <"$out/scan/map/lookup.csv")" -eq 31 ] || fail "not 30 places were looked up"
 

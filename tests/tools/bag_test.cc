@@ -147,7 +147,7 @@ void write_map_parts() {
   ASSERT_TRUE(succeeded(
       graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--solid-voxel-threshold", "1"})));
   ASSERT_TRUE(succeeded(
-      graspmap({"footholds", "map.pcd", "-o", "f.csv", "--no-graspable-only", "--edges"})));
+      graspmap({"footholds", "map.pcd", "-o", "f.csv", "--no-graspable-only", "--border"})));
 }
 
 std::vector<std::string> map_bag(const std::string& output) {

@@ -201,7 +201,7 @@ TEST(Refine, FeaturesAreKeptBesideTheOutput) {
   EXPECT_FALSE(std::filesystem::exists(scratch("q.tum.features")));
 }
 
-// What raised the cost of what was held out is undone; both reports say the same.
+// What raised the cost of what was held out is rejected; both reports say the same.
 TEST(Refine, ReportsInJsonAndInText) {
   GRASPMAP_REQUIRE_DATA();
   ASSERT_TRUE(succeeded(graspmap({"refine", scan_file("site_tiny_q.db"), "-o", "p.tum", "--report",
@@ -210,12 +210,12 @@ TEST(Refine, ReportsInJsonAndInText) {
   const nlohmann::json report = json_of("r.json");
   std::size_t evaluated = 0;
   for (const nlohmann::json& stage : report.at("stages")) {
-    const bool undone = stage.at("undone");
+    const bool rejected = stage.at("rejected");
     const std::string name = stage.at("stage");
-    EXPECT_NE(text.find("\n" + name + (undone ? ": undone\n" : "\n")), std::string::npos) << name;
+    EXPECT_NE(text.find("\n" + name + (rejected ? ": rejected\n" : "\n")), std::string::npos) << name;
     if (!stage.contains("held_out")) continue;
     ++evaluated;
-    EXPECT_TRUE(undone || stage.at("held_out").at("change").get<double>() <= 1e-6) << name;
+    EXPECT_TRUE(rejected || stage.at("held_out").at("change").get<double>() <= 1e-6) << name;
   }
   EXPECT_GE(evaluated, 3U);
   for (const std::string words :

@@ -48,7 +48,7 @@ TEST(Render, FootholdsOfTheMap) {
   ASSERT_TRUE(succeeded(
       graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--solid-voxel-threshold", "1"})));
   ASSERT_TRUE(succeeded(
-      graspmap({"footholds", "map.pcd", "-o", "footholds.csv", "--no-graspable-only", "--edges"})));
+      graspmap({"footholds", "map.pcd", "-o", "footholds.csv", "--no-graspable-only", "--border"})));
   const std::vector<std::string> words = {
       "render", "map.pcd", "--points", "footholds.csv", "--width", "320", "--height", "240", "-o"};
   const std::map<std::string, std::vector<std::string>> pictures = {

@@ -104,7 +104,7 @@ TEST(ScoreOrientation, FootholdsComeAlongTheMasksAxis) {
     ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--frame", frame,
                                     "--up", "0,0,1", "--orientation", "surface", "--force"})));
     ASSERT_TRUE(succeeded(graspmap(
-        {"footholds", "map.pcd", "-o", "f.ply", "--no-graspable-only", "--edges", "--force"})));
+        {"footholds", "map.pcd", "-o", "f.ply", "--no-graspable-only", "--border", "--force"})));
     const PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
     const PointCloud found = libmap::read_cloud(scratch("f.ply")).cloud;
     ASSERT_GT(found.size(), 20U);

@@ -128,7 +128,7 @@ TEST(SimulateCamerasCommand, UnitsTooFineForTheRangeAreRefused) {
     return graspmap(cameras(more));
   };
   EXPECT_TRUE(bad_input(run({}), {"error: far.yaml: depth_scale_m is 1e-05: 16-bit images cannot "
-                                  "contain what camera front measures",
+                                  "represent what camera front measures",
                                   "(must be >= far_m / 65534, 2.2888882e-05)"}));
   EXPECT_TRUE(bad_input(run({"--depth-scale", "0.00002"}),
                         {"error: depth_scale_m is 2e-05: 16-bit images"}));

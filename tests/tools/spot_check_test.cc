@@ -67,7 +67,7 @@ TEST(SpotCheckCommand, TableOfTheThesis) {
     EXPECT_NEAR(table.number(3, n + 1), height_at(1.45), 6e-5);
   }
   for (const char* line : {"height error in m along the edges (ground: z = 0)", "edge        e1",
-                           "mean of 28 places: 0.0011 m", "0.040 m"})
+                           "mean of 28 locations: 0.0011 m", "0.040 m"})
     EXPECT_NE(result.standard_output.find(line), std::string::npos) << result.standard_output;
   const nlohmann::json results = json_of("check.csv.json").at("results");
   EXPECT_EQ(results.at("measured"), 28);

@@ -61,7 +61,7 @@ Json error_json(const libmap::TrajectoryError& error) {
           {"max_rotation_deg", error.max_rotation_deg}};
 }
 
-Json held_out_json(const libmap::HeldOutEvaluatement& held_out) {
+Json held_out_json(const libmap::HeldOutEvaluation& held_out) {
   const auto part = [](const libmap::HeldOutChange& change) -> Json {
     return {{"count", change.count},
             {"cost_before", change.before},
@@ -75,7 +75,7 @@ Json held_out_json(const libmap::HeldOutEvaluatement& held_out) {
 }
 
 Json stage_json(const libmap::StageReport& stage) {
-  Json json = {{"stage", stage.name}, {"undone", stage.undone}};
+  Json json = {{"stage", stage.name}, {"rejected", stage.rejected}};
   if (stage.closures.candidates > 0) json["closures"] = rejections_json(stage.closures);
   if (stage.held_out.any()) json["held_out"] = held_out_json(stage.held_out);
   if (!stage.groups.empty()) json["links"] = groups_json(stage.groups);
@@ -84,8 +84,8 @@ Json stage_json(const libmap::StageReport& stage) {
     json["absolute_error"] = error_json(stage.error->absolute);
     json["relative_error"] = error_json(stage.error->relative);
   }
-  if (stage.undone_error)
-    json["absolute_error_given_up"] = error_json(stage.undone_error->absolute);
+  if (stage.rejected_error)
+    json["absolute_error_given_up"] = error_json(stage.rejected_error->absolute);
   return json;
 }
 
@@ -153,12 +153,12 @@ void add_errors(const libmap::StageReport& stage, std::string& text) {
     line("absolute", stage.error->absolute);
     line("relative", stage.error->relative);
   }
-  if (stage.undone_error) line("given up: absolute", stage.undone_error->absolute);
+  if (stage.rejected_error) line("given up: absolute", stage.rejected_error->absolute);
 }
 
 void add_stage(const libmap::StageReport& stage, std::string& text) {
   const auto out = std::back_inserter(text);
-  fmt::format_to(out, "{}{}\n", stage.name, stage.undone ? ": undone" : "");
+  fmt::format_to(out, "{}{}\n", stage.name, stage.rejected ? ": rejected" : "");
   if (stage.closures.candidates > 0) {
     fmt::format_to(out, "  pairs: {} tried, {} linked", stage.closures.candidates,
                    stage.closures.accepted);

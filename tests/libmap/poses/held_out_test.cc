@@ -16,7 +16,7 @@ using graspmap_test::around;
 using graspmap_test::boulders;
 using graspmap_test::TexturedScan;
 using libmap::HeldOutChange;
-using libmap::HeldOutEvaluatement;
+using libmap::HeldOutEvaluation;
 using libmap::Pose;
 using libmap::SampleUse;
 
@@ -39,8 +39,8 @@ TEST(HeldOut, MeansAreOfWhatBothSetsOfPosesSay) {
   EXPECT_EQ(libmap::compare_held_out({none}, {1.0}).count, 0U);
 }
 
-HeldOutEvaluatement evaluatement(double matches, double surfaces) {
-  HeldOutEvaluatement made;
+HeldOutEvaluation evaluation(double matches, double surfaces) {
+  HeldOutEvaluation made;
   made.matches = {12000, 1.0, 1.0 + matches, 1e-4};
   made.surfaces = {36000, 1.0, 1.0 + surfaces, 1e-4};
   return made;
@@ -48,16 +48,16 @@ HeldOutEvaluatement evaluatement(double matches, double surfaces) {
 
 TEST(HeldOut, AnyRiseOfTheWholeIsWorse) {
   // Three samples of surfaces count as much as one match.
-  EXPECT_NEAR(evaluatement(0.002, -0.001).change(), 0.0005, 1e-12);
-  EXPECT_TRUE(evaluatement(1e-5, 0.0).is_worse()) << "however little";
-  EXPECT_TRUE(evaluatement(0.002, -0.001).is_worse());
-  EXPECT_FALSE(evaluatement(0.001, -0.002).is_worse());
-  EXPECT_FALSE(evaluatement(0.0, 0.0).is_worse());
-  EXPECT_TRUE(evaluatement(0.01, -0.05).is_worse()) << "a gain that the matches pay";
-  EXPECT_TRUE(evaluatement(-0.05, 0.01).is_worse()) << "a gain that the surfaces pay";
-  EXPECT_FALSE(evaluatement(0.0, -0.1).is_clearly_better()) << "only the matches tell the lens";
-  EXPECT_FALSE(evaluatement(-1e-4, 0.0).is_clearly_better());
-  EXPECT_TRUE(evaluatement(-3e-4, 0.0).is_clearly_better());
+  EXPECT_NEAR(evaluation(0.002, -0.001).change(), 0.0005, 1e-12);
+  EXPECT_TRUE(evaluation(1e-5, 0.0).is_worse()) << "however little";
+  EXPECT_TRUE(evaluation(0.002, -0.001).is_worse());
+  EXPECT_FALSE(evaluation(0.001, -0.002).is_worse());
+  EXPECT_FALSE(evaluation(0.0, 0.0).is_worse());
+  EXPECT_TRUE(evaluation(0.01, -0.05).is_worse()) << "a gain that the matches pay";
+  EXPECT_TRUE(evaluation(-0.05, 0.01).is_worse()) << "a gain that the surfaces pay";
+  EXPECT_FALSE(evaluation(0.0, -0.1).is_clearly_better()) << "only the matches tell the lens";
+  EXPECT_FALSE(evaluation(-1e-4, 0.0).is_clearly_better());
+  EXPECT_TRUE(evaluation(-3e-4, 0.0).is_clearly_better());
 }
 
 TEST(HeldOut, SamplesForChecksAreNoOthers) {
