@@ -5,14 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "libmap/calibration/camera_calibration.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/camera_calibration.h"
-#include "libmap/scan/camera_io.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/camera_io.h"
+#include "libmap/image/image_codec.h"
 #include "tools/support/calibration_charts.h"
 #include "tools/support/command_line.h"
 #include "tools/support/result_counts.h"

@@ -9,9 +9,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/poses/refinement.h"
-#include "libmap/poses/trajectory_io.h"
+#include "libmap/refine/refinement.h"
 #include "libmap/scan/rtabmap_writer.h"
+#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/poses_output.h"
 #include "tools/support/refine_report.h"

@@ -9,9 +9,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/mesh/texture_model.h"
-#include "libmap/mesh/textured_mesh_io.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/texture/texture_model.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/result_counts.h"

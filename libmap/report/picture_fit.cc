@@ -7,7 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 
 namespace libmap {
 

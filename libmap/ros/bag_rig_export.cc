@@ -9,11 +9,11 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/ros/bag_rig.h"
 #include "libmap/ros/depth_message.h"
 #include "libmap/ros/ros_messages.h"
-#include "libmap/scan/image_codec.h"
 
 namespace libmap {
 

@@ -15,8 +15,8 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/ros/message_encoding.h"
-#include "libmap/scan/image_codec.h"
 
 namespace libmap {
 

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "libmap/core/error.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/ros/ros_messages.h"
-#include "libmap/scan/image_codec.h"
 
 namespace libmap {
 

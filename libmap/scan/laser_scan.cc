@@ -9,7 +9,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_graph.h"
 
 namespace libmap {

@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "libmap/core/error.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 
 namespace libmap {

@@ -11,7 +11,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 
 namespace libmap {
 

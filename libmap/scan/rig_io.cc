@@ -12,7 +12,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
 #include "libmap/core/yaml_document.h"
-#include "libmap/scan/camera_io.h"
+#include "libmap/image/camera_io.h"
 
 namespace libmap {
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 
 namespace libmap {
 

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/sqlite_file.h"
 

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"

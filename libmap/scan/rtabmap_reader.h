@@ -17,9 +17,9 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/image/depth_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/scan/calibration_codec.h"
-#include "libmap/scan/depth_codec.h"
-#include "libmap/scan/image_codec.h"
 #include "libmap/scan/laser_scan.h"
 #include "libmap/scan/rtabmap_columns.h"
 #include "libmap/scan/scan_source.h"

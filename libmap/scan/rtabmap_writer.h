@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
-#include "libmap/scan/depth_codec.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/depth_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {

@@ -10,7 +10,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"

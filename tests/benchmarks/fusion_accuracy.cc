@@ -16,12 +16,12 @@
 #include "libmap/cloud/depth_fusion.h"
 #include "libmap/cloud/depth_projection.h"
 #include "libmap/core/error.h"
-#include "libmap/mesh/mesh_cleaning.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/mesh/poisson_reconstruction.h"
 #include "libmap/mesh/surface_distance.h"
-#include "libmap/poses/trajectory_error.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/surface/mesh_cleaning.h"
+#include "libmap/surface/poisson_reconstruction.h"
+#include "libmap/trajectory/trajectory_error.h"
 
 namespace {
 

@@ -1,4 +1,5 @@
 // Bags of ROS 1, and the messages in them.
+#include "libmap/image/image_codec.h"
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/ros/bag_rig.h"
@@ -6,7 +7,6 @@
 #include "libmap/ros/depth_message.h"
 #include "libmap/ros/message_encoding.h"
 #include "libmap/ros/transform_message.h"
-#include "libmap/scan/image_codec.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
 #include "tests/libmap/ros/bag_samples.h"

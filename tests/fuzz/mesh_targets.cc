@@ -1,9 +1,9 @@
 // Files that hold meshes alone, and models with pictures.
 #include <map>
 
+#include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/mesh/textured_mesh_io.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
 

@@ -3,8 +3,8 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 
 #include "libmap/core/file_output.h"
-#include "libmap/scan/image_codec.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/image_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "tests/libmap/scan/sample_database.h"
 
 namespace graspmap_fuzz {

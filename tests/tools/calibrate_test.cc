@@ -3,8 +3,8 @@
 #include <cmath>
 
 #include "libmap/core/table.h"
-#include "libmap/scan/camera_io.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/camera_io.h"
+#include "libmap/image/image_codec.h"
 #include "tests/support/chessboard_picture.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -5,8 +5,8 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/pose.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/scan/image_codec.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace compare_test {

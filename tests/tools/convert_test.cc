@@ -3,7 +3,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/mesh/textured_mesh_io.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace convert_test {

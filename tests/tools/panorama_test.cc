@@ -3,7 +3,7 @@
 #include <cmath>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/scan/rig_images.h"
 #include "tests/tools/tool_test_support.h"
 

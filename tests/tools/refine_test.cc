@@ -6,10 +6,10 @@
 #include <utility>
 
 #include "libmap/core/file_output.h"
-#include "libmap/poses/trajectory_error.h"
-#include "libmap/poses/trajectory_io.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/trajectory/trajectory_error.h"
+#include "libmap/trajectory/trajectory_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace refine_test {
@@ -212,7 +212,8 @@ TEST(Refine, ReportsInJsonAndInText) {
   for (const nlohmann::json& stage : report.at("stages")) {
     const bool rejected = stage.at("rejected");
     const std::string name = stage.at("stage");
-    EXPECT_NE(text.find("\n" + name + (rejected ? ": rejected\n" : "\n")), std::string::npos) << name;
+    EXPECT_NE(text.find("\n" + name + (rejected ? ": rejected\n" : "\n")), std::string::npos)
+        << name;
     if (!stage.contains("held_out")) continue;
     ++evaluated;
     EXPECT_TRUE(rejected || stage.at("held_out").at("change").get<double>() <= 1e-6) << name;

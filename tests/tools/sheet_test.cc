@@ -5,7 +5,7 @@
 #include "libgtd/gripper/gripper_mask.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace sheet_test {

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "libmap/image/camera_io.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/scan/camera_io.h"
 #include "libmap/scan/scan_source.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"

@@ -8,9 +8,9 @@
 #include <tuple>
 
 #include "libmap/core/error.h"
-#include "libmap/poses/trajectory_error.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
+#include "libmap/trajectory/trajectory_error.h"
 
 namespace graspmap_tools {
 

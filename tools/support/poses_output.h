@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
-#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/run.h"
 
 namespace graspmap_tools {

@@ -3,7 +3,7 @@
 
 #include <string>
 
-#include "libmap/poses/refinement.h"
+#include "libmap/refine/refinement.h"
 
 namespace graspmap_tools {
 

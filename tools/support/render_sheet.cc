@@ -10,7 +10,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/scan/image_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/view/picture_sheet.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_window.h"

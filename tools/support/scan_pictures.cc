@@ -12,11 +12,11 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
+#include "libmap/image/image_codec.h"
+#include "libmap/image/image_sharpness.h"
+#include "libmap/image/pinhole_image.h"
 #include "libmap/scan/bundler_io.h"
-#include "libmap/scan/image_codec.h"
-#include "libmap/scan/image_sharpness.h"
 #include "libmap/scan/picture_file.h"
-#include "libmap/scan/pinhole_image.h"
 #include "tools/support/placement.h"
 
 namespace graspmap_tools {

@@ -9,10 +9,10 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/poses/pose_import.h"
-#include "libmap/poses/trajectory_error.h"
-#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rtabmap_reader.h"
+#include "libmap/trajectory/pose_import.h"
+#include "libmap/trajectory/trajectory_error.h"
+#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/map_frame.h"
 
 namespace graspmap_tools {

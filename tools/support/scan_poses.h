@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
-#include "libmap/poses/pose_import.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/trajectory/pose_import.h"
 #include "tools/support/command_line.h"
 #include "tools/support/run.h"
 

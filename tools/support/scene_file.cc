@@ -10,7 +10,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/mesh/textured_mesh_io.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/map_window.h"
 

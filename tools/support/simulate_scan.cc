@@ -6,11 +6,11 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/poses/trajectory_error.h"
-#include "libmap/scan/camera_io.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/simulate/scan_simulation.h"
+#include "libmap/trajectory/trajectory_error.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/result_counts.h"

@@ -164,7 +164,7 @@ TEST(ExpectedMap, HostileTables) {
   EXPECT_THAT(parse_error("a,0,nan,0,,,,0.1,1,\n"), HasSubstr("e.csv"));
   EXPECT_THAT(parse_error("a,0,0,0,1,,,0.1,1,\n"), HasSubstr("to_x"));
   EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,maybe,\n"), HasSubstr("'maybe'"));
-  EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,1,\na,1,0,0,,,,0.1,1,\n"), HasSubstr("twice"));
+  EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,1,\na,1,0,0,,,,0.1,1,\n"), HasSubstr("duplicate"));
   EXPECT_THAT(parse_error(",0,0,0,,,,0.1,1,\n"), HasSubstr("name"));
   EXPECT_THAT(parse_error("a,0,0,0,,,,0.1,,\n"), HasSubstr("no region with a verdict"));
   EXPECT_THAT(parse_error(""), HasSubstr("no region with a verdict"));

@@ -316,7 +316,7 @@ TEST(CsvFiles, BadCells) {
   EXPECT_THAT(error_as(".csv", "x,y,z\n1,2,3\n1,2,\n"), HasSubstr("z"));
   EXPECT_THAT(error_as(".csv", "x,y,z,score\n1,2,3,1\n1,2,3,high\n"), HasSubstr("high"));
   EXPECT_THAT(error_as(".csv", "x,y\n1,2\n"), HasSubstr("x, y and z"));
-  EXPECT_THAT(error_as(".csv", "x,y,z,x\n1,2,3,4\n"), HasSubstr("twice"));
+  EXPECT_THAT(error_as(".csv", "x,y,z,x\n1,2,3,4\n"), HasSubstr("duplicate"));
 }
 
 TEST(RealClouds, HoldThePublishedNumbersOfPoints) {

@@ -171,7 +171,7 @@ TEST(PcdFiles, HeaderLinesThatDoNotFit) {
   EXPECT_THAT(changed("FIELDS x y z", "FIELDS x y z z"), HasSubstr("SIZE"));
   EXPECT_THAT(changed("FIELDS x y z", "FIELDS"), HasSubstr("FIELDS"));
   EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 2"), HasSubstr("WIDTH x HEIGHT = 2"));
-  EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 1\nHEIGHT 1"), HasSubstr("twice"));
+  EXPECT_THAT(changed("HEIGHT 1", "HEIGHT 1\nHEIGHT 1"), HasSubstr("duplicate"));
   EXPECT_THAT(changed("WIDTH 1\nHEIGHT 1", "WIDTH 4611686018427387904\nHEIGHT 2"),
               HasSubstr("times HEIGHT is no number of points"));
   EXPECT_THAT(changed("VIEWPOINT 0 0 0 1 0 0 0", "VIEWPOINT 0 0"), HasSubstr("VIEWPOINT"));

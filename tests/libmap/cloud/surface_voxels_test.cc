@@ -120,7 +120,7 @@ TEST(SurfaceVoxels, EdgesReachOneVoxelFurther) {
     const bool is_outside = x < 0 || y < 0 || x > 4 || y > 4;
     EXPECT_EQ(element.extended, is_outside) << x << " " << y;
     if (is_outside) {
-      EXPECT_TRUE(beyond.insert({x, y}).second) << "twice";
+      EXPECT_TRUE(beyond.insert({x, y}).second) << "duplicate";
     }
   }
   EXPECT_EQ(beyond.size(), 20U) << "four sides of five, no corners";

@@ -2,9 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include "libmap/image/image_codec.h"
 #include "libmap/report/html.h"
 #include "libmap/report/picture_fit.h"
-#include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
 
 namespace page_test {

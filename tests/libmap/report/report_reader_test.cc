@@ -3,9 +3,9 @@
 #include <gtest/gtest.h>
 
 #include "libmap/core/file_output.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/report/found_outline.h"
 #include "libmap/report/outline_io.h"
-#include "libmap/scan/image_codec.h"
 #include "tests/support/lower_limit.h"
 #include "tests/support/sanitizers.h"
 #include "tests/support/test_support.h"

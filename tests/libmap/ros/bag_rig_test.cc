@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "libmap/image/image_codec.h"
 #include "libmap/ros/depth_message.h"
-#include "libmap/scan/image_codec.h"
 #include "tests/libmap/ros/bag_samples.h"
 #include "tests/support/test_support.h"
 

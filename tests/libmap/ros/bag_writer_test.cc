@@ -5,9 +5,9 @@
 
 #include <map>
 
+#include "libmap/image/image_codec.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/ros/ros_messages.h"
-#include "libmap/scan/image_codec.h"
 #include "tests/support/test_support.h"
 
 namespace bag_writer_test {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "libmap/scan/image_sharpness.h"
-#include "libmap/scan/pinhole_image.h"
+#include "libmap/image/image_sharpness.h"
+#include "libmap/image/pinhole_image.h"
 #include "libmap/scan/view_selection.h"
 #include "tests/support/test_support.h"
 

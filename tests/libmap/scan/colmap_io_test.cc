@@ -142,12 +142,12 @@ TEST(ColmapText, NamesTheLineThatIsBroken) {
       {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n1 2 x\n", "line 2", "whole number"},
       // The empty line of the features is missing.
       {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n2 1 0 0 0 0 0 0 1 b.jpg\n", "line 2", "features"},
-      {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n\n1 1 0 0 0 0 0 0 1 b.jpg\n", "line 3", "twice"},
+      {"images", "1 1 0 0 0 0 0 0 1 a.jpg\n\n1 1 0 0 0 0 0 0 1 b.jpg\n", "line 3", "duplicate"},
       {"images", "99999999999 1 0 0 0 0 0 0 1 a.jpg\n", "line 1", "32 bits"},
       {"points", "1 0 0 0 256 0 0 1\n", "line 1", "0 to 255"},
       {"points", "1 0 0 0 25 0 0 1 3\n", "line 1", "ends too early"},
       {"points", "1 0 0 0 25 0 0 1 3 -1\n", "line 1", ">= 0"},
-      {"points", "1 0 0 0 2 0 0 1\n1 0 0 0 2 0 0 1\n", "line 2", "twice"},
+      {"points", "1 0 0 0 2 0 0 1\n1 0 0 0 2 0 0 1\n", "line 2", "duplicate"},
   };
   for (const Case& one : cases) {
     SCOPED_TRACE(one.text);

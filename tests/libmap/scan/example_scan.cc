@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "libmap/scan/depth_codec.h"
+#include "libmap/image/depth_codec.h"
 #include "tests/support/test_support.h"
 
 namespace graspmap_test {

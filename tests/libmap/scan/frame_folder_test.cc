@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "libmap/scan/camera_io.h"
-#include "libmap/scan/depth_codec.h"
+#include "libmap/image/camera_io.h"
+#include "libmap/image/depth_codec.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/scan/frame_folder_writer.h"
-#include "libmap/scan/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/example_scan.h"
 #include "tests/support/test_support.h"

@@ -5,7 +5,7 @@
 #include <bit>
 #include <cmath>
 
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 

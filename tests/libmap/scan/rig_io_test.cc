@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "libmap/scan/camera_io.h"
+#include "libmap/image/camera_io.h"
 #include "tests/support/test_support.h"
 
 namespace rig_io_test {
@@ -110,7 +110,7 @@ TEST(RigIo, BadFilesNameCameraAndKey) {
       {head + pose + "    near_m: -1\n", {"near_m", "-1", ">= 0"}},
       {head + pose + "    depth_scale_m: 0\n", {"depth_scale_m", "> 0"}},
       {head + pose + head.substr(9) + pose, {"two cameras", "front"}},
-      {head + pose + "    near_m: 1\n    near_m: 1\n", {"near_m", "twice"}},
+      {head + pose + "    near_m: 1\n    near_m: 1\n", {"near_m", "duplicate"}},
       {"cameras:\n  - name: a/b\n" + intrinsics + pose, {"a/b"}},
       {"cameras:\n  - name: ..\n" + intrinsics + pose, {".."}},
       {"cameras:\n  - {name: a, calibration: none.yaml}\n", {"none.yaml"}},

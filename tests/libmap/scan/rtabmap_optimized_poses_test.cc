@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "libmap/core/file_output.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_writer.h"

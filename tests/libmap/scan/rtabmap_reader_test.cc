@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "libmap/core/parallel.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/scan_verification.h"
 #include "tests/libmap/scan/sample_checks.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "libmap/core/file_output.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/database_rows.h"

@@ -2,9 +2,9 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
-#include "libmap/scan/depth_codec.h"
-#include "libmap/scan/image_codec.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/depth_codec.h"
+#include "libmap/image/image_codec.h"
+#include "libmap/image/matrix_codec.h"
 
 namespace graspmap_test {
 

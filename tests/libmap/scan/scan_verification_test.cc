@@ -9,8 +9,8 @@
 #include <cstring>
 
 #include "libmap/core/parallel.h"
-#include "libmap/scan/depth_codec.h"
-#include "libmap/scan/matrix_codec.h"
+#include "libmap/image/depth_codec.h"
+#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/sanitizers.h"

@@ -102,7 +102,7 @@ TEST(RockSiteIo, SaysWhatIsWrong) {
       {"ground: {tilt: 3}", "ground.tilt", "tilt_deg"},
       {"bumps:\n  - {height_m: 1}", "bumps[0].radius_m", "missing"},
       {"seed: -1", "seed", ">= 0"},
-      {"seed: 1\nseed: 2", "seed", "twice"},
+      {"seed: 1\nseed: 2", "seed", "duplicate"},
       {"rocks: [", "line", "YAML"},
       {"7", "", "map"},
   };

@@ -164,7 +164,7 @@ TEST_F(Charts, LinesLieWhereTheirNumbersSay) {
 
 TEST_F(Charts, EqualChartsGiveEqualPicturesAndFiles) {
   Chart chart = unit_chart();
-  chart.title = "twice";
+  chart.title = "duplicate";
   chart.curves = {curve_of({0, 0.3, 1}, {0, 0.8, 1}, red)};
   EXPECT_TRUE(libmap::draw_chart(chart) == libmap::draw_chart(chart));
   EXPECT_TRUE(svg_of(chart).text == svg_of(chart).text);

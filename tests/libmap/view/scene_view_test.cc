@@ -268,7 +268,7 @@ TEST_F(SceneViewTest, EqualInputGivesEqualBytes) {
   SceneViewOptions options;
   options.width = 400;
   options.height = 300;
-  options.title = "twice";
+  options.title = "duplicate";
   options.view = Viewpoint::oblique;
   const std::string first = to_png(render_scene(scene, options));
   EXPECT_EQ(to_png(render_scene(scene, options)), first);

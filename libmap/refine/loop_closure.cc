@@ -1,0 +1,267 @@
+#include "libmap/refine/loop_closure.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
+#include "libmap/core/random_stream.h"
+#include "libmap/refine/rigid_motion.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+constexpr std::size_t considered_per_pair = 8;  // times as many as are taken, for their directions
+
+bool is_held_out(int feature, std::size_t frame, int every) {
+  // Features stand by strength: numbers alone would pick like ones in every frame.
+  return mix_bits(static_cast<std::uint64_t>(frame), static_cast<std::uint64_t>(feature)) %
+             static_cast<std::uint64_t>(every) ==
+         0;
+}
+
+FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::max(a, b)}; }
+
+// One component's poses: each with its nearest in place and direction.
+void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<const Pose*>& poses,
+                    const LoopClosureDetectionOptions& options, std::set<FramePair>& pairs) {
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(members.size());
+  for (const std::size_t f : members) places.emplace_back(poses[f]->translation());
+  const PointTree neighbors(places);
+  const auto wanted = static_cast<std::size_t>(options.near_candidates);
+  for (std::size_t n = 0; n < members.size(); ++n) {
+    std::vector<std::pair<double, std::size_t>> ranked;
+    for (const auto& [other, square_m2] :
+         neighbors.around(n, considered_per_pair * wanted, options.radius_m)) {
+      const double angle = rotation_vector_of(poses[members[n]]->linear().transpose() *
+                                              poses[members[other]]->linear())
+                               .norm() /
+                           degree;
+      if (angle > options.angle_deg) continue;
+      ranked.emplace_back(std::sqrt(square_m2) / options.radius_m + angle / options.angle_deg,
+                          members[other]);
+    }
+    std::sort(ranked.begin(), ranked.end());
+    ranked.resize(std::min(ranked.size(), wanted));
+    for (const auto& [measure, other] : ranked) pairs.insert(ordered(members[n], other));
+  }
+}
+
+struct Verified {
+  RelativePoseOutcome outcome = RelativePoseOutcome::too_few_matches;
+  std::optional<FeatureLink> link;
+};
+
+Verified verify_pair(const FrameFeatures& a, const FrameFeatures& b, FramePair pair,
+                     const LoopClosureDetectionOptions& options, std::uint64_t seed) {
+  std::vector<FeatureMatch> used;
+  std::vector<FeatureMatch> kept;
+  for (const FeatureMatch& match :
+       match_features(descriptor_vectors(a), descriptor_vectors(b), options.max_ratio))
+    (is_held_out(match.a, pair.first, options.held_out) ? kept : used).push_back(match);
+  RelativePose pose = estimate_relative_pose(a, b, used, options.estimate, seed);
+  Verified result{pose.outcome, std::nullopt};
+  if (pose.outcome != RelativePoseOutcome::found) return result;
+  FeatureLink link;
+  link.frames = pair;
+  link.link = {a.node, b.node, LinkType::local_space_closure, pose.a_from_b, pose.information};
+  link.matches = std::move(pose.inliers);
+  link.chi_square_per_freedom = pose.chi_square_per_freedom;
+  for (const FeatureMatch& match : kept) {
+    const MatchResidual residual = match_residual(a, b, match, pose.a_from_b);
+    // Wider than for inliers: the poses of later stages are measured by them.
+    if (residual.in_front && residual.chi_square() <= 4.0 * options.estimate.max_chi_square)
+      link.held_out.push_back(match);
+  }
+  result.link = std::move(link);
+  return result;
+}
+
+// In the order of RelativePoseOutcome.
+void count(RelativePoseOutcome outcome, RejectionCounts& counts) {
+  constexpr std::array counted = {&RejectionCounts::accepted, &RejectionCounts::too_few_matches,
+                                  &RejectionCounts::too_few_inliers, &RejectionCounts::narrow,
+                                  &RejectionCounts::not_converged};
+  ++counts.candidates;
+  ++(counts.*counted.at(static_cast<std::size_t>(outcome)));
+}
+
+Matrix6d slack_of(const LoopClosureDetectionOptions& options) {
+  Vector6d square;
+  square << Eigen::Vector3d::Constant(options.graph_slack_m * options.graph_slack_m),
+      Eigen::Vector3d::Constant(std::pow(options.graph_slack_deg * degree, 2));
+  return square.asDiagonal();
+}
+
+// Whether the first component lies to the second, by one link, as it does by the other.
+bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResult& graph) {
+  const auto moved_by = [&](const PoseLink& link, bool swapped) {
+    const Pose& a = graph.map_from_base.at(link.from);
+    const Pose& b = graph.map_from_base.at(link.to);
+    return swapped ? Pose(b * link.from_from_to.inverse() * a.inverse())
+                   : Pose(a * link.from_from_to * b.inverse());
+  };
+  const auto component_of = [&](int node) {
+    for (std::size_t n = 0; n < graph.components.size(); ++n)
+      if (std::find(graph.components[n].nodes.begin(), graph.components[n].nodes.end(), node) !=
+          graph.components[n].nodes.end())
+        return n;
+    return graph.components.size();
+  };
+  const std::size_t first = component_of(one.link.from);
+  const std::size_t second = component_of(one.link.to);
+  const std::size_t other_first = component_of(other.link.from);
+  const std::size_t other_second = component_of(other.link.to);
+  if (std::minmax(first, second) != std::minmax(other_first, other_second)) return false;
+  const bool swapped = first != other_first;
+  const Pose a = moved_by(one.link, false);
+  const Pose b = moved_by(other.link, swapped);
+  // Where the one link's node would lie by the other.
+  const Pose& node = graph.map_from_base.at(one.link.to);
+  const Vector6d apart = step_between(a * node, b * node);
+  return apart.head<3>().norm() < 0.1 && apart.tail<3>().norm() < 5.0 * degree;
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, LoopClosureDetectionOptions& options) {
+  table.add("radius_m", options.radius_m, not_negative,
+            "candidates for closures lie this near to each other");
+  table.add("angle_deg", options.angle_deg, {0.0, 180.0},
+            "and look in directions that differ by this at most");
+  table.add("near_candidates", options.near_candidates, not_negative,
+            "candidates of a frame by place, at most");
+  table.add("similar_candidates", options.similar_candidates, not_negative,
+            "candidates of a frame by appearance, over the whole scan");
+  table.add("neighbors", options.neighbors, not_negative,
+            "frames that follow a frame and are matched with it");
+  table.add("max_ratio", options.max_ratio, {0.0, 1.0, true, false},
+            "distance of the best match's descriptor to that of the second best");
+  table.add("min_inliers", options.estimate.min_inliers, {6, 100000},
+            "matches that must agree on a motion");
+  table.add("min_spread", options.estimate.min_spread, not_negative,
+            "how widely they must lie in the picture, of the focal length");
+  table.add("max_graph_chi_square", options.max_graph_chi_square, positive,
+            "of a closure against the graph's own estimate");
+  table.add("words", options.appearance.words, {1, 65536}, "of the vocabulary of appearance");
+}
+
+std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors) {
+  std::set<FramePair> pairs;
+  for (std::size_t a = 0; a < frames.size(); ++a)
+    for (std::size_t b = a + 1; b < frames.size() && b - a <= static_cast<std::size_t>(neighbors);
+         ++b)
+      pairs.insert({a, b});
+  return pairs;
+}
+
+std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
+                                  const LoopClosureDetectionOptions& options, std::uint64_t seed) {
+  std::set<FramePair> pairs;
+  // Frames that follow each other look most alike and are candidates already.
+  const auto neighbors = static_cast<std::size_t>(options.neighbors);
+  const auto wanted = static_cast<std::size_t>(options.similar_candidates);
+  const auto similar =
+      find_similar_frames(frames, wanted + 2 * neighbors, options.appearance, seed);
+  for (std::size_t f = 0; f < similar.size(); ++f) {
+    std::size_t taken = 0;
+    for (const SimilarFrame& other : similar[f]) {
+      const std::size_t apart = other.frame > f ? other.frame - f : f - other.frame;
+      if (apart <= neighbors) continue;
+      if (taken++ == wanted) break;
+      pairs.insert(ordered(f, other.frame));
+    }
+  }
+  return pairs;
+}
+
+std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,
+                               const std::map<int, Pose>& map_from_base,
+                               const std::vector<GraphComponent>& components,
+                               const LoopClosureDetectionOptions& options) {
+  std::set<FramePair> pairs;
+  if (!(options.radius_m > 0.0) || !(options.angle_deg > 0.0)) return pairs;
+  std::map<int, std::size_t> frame_of;
+  for (std::size_t f = 0; f < frames.size(); ++f) frame_of[frames[f].node] = f;
+  std::vector<const Pose*> poses(frames.size(), nullptr);
+  for (const GraphComponent& component : components) {
+    std::vector<std::size_t> members;
+    for (const int node : component.nodes) {
+      const auto frame = frame_of.find(node);
+      const auto pose = map_from_base.find(node);
+      if (frame == frame_of.end() || pose == map_from_base.end()) continue;
+      members.push_back(frame->second);
+      poses[frame->second] = &pose->second;
+    }
+    if (members.size() > 1) add_near_pairs(members, poses, options, pairs);
+  }
+  return pairs;
+}
+
+PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
+                              const std::vector<FramePair>& pairs,
+                              const LoopClosureDetectionOptions& options, std::uint64_t seed,
+                              Progress& progress) {
+  std::vector<Verified> verified(pairs.size());
+  progress.begin("matching", pairs.size());
+  parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const auto [a, b] = pairs[n];
+      const std::uint64_t own = mix_bits(mix_bits(seed, static_cast<std::uint64_t>(frames[a].node)),
+                                         static_cast<std::uint64_t>(frames[b].node));
+      verified[n] = verify_pair(frames[a], frames[b], pairs[n], options, own);
+      progress.advance(1);
+    }
+  });
+  progress.end();
+  PairVerification result;
+  for (Verified& pair : verified) {
+    count(pair.outcome, result.counts);
+    if (pair.link) result.links.push_back(std::move(*pair.link));
+  }
+  return result;
+}
+
+void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,
+                         const LoopClosureDetectionOptions& options, RejectionCounts& counts) {
+  std::vector<std::pair<int, int>> pairs;
+  pairs.reserve(links.size());
+  for (const FeatureLink& link : links) pairs.emplace_back(link.link.from, link.link.to);
+  const GraphCovariance covariance(graph, pairs);
+  const Matrix6d slack = slack_of(options);
+  std::vector<FeatureLink> kept;
+  for (std::size_t n = 0; n < links.size(); ++n) {
+    const PoseLink& link = links[n].link;
+    bool good = false;
+    if (covariance.valid() && covariance.connected(link.from, link.to)) {
+      const Vector6d error =
+          step_between(link.from_from_to, graph.map_from_base.at(link.from).inverse() *
+                                              graph.map_from_base.at(link.to));
+      const Matrix6d expected =
+          covariance.of_relative(link.from, link.to) + link.information.inverse() + slack;
+      good = error.dot(expected.llt().solve(error)) <= options.max_graph_chi_square;
+      counts.against_graph += good ? 0 : 1;
+    } else {
+      for (std::size_t m = 0; m < links.size() && !good; ++m)
+        good =
+            m != n &&
+            !(covariance.valid() && covariance.connected(links[m].link.from, links[m].link.to)) &&
+            agree(links[n], links[m], graph);
+      counts.unconfirmed += good ? 0 : 1;
+    }
+    if (good)
+      kept.push_back(links[n]);
+    else
+      --counts.accepted;
+  }
+  links = std::move(kept);
+}
+
+}  // namespace libmap

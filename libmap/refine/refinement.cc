@@ -1,0 +1,476 @@
+#include "libmap/refine/refinement.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <ctime>
+#include <limits>
+#include <set>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/refine/graph_covariance.h"
+#include "libmap/refine/intrinsics_refinement.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr const char* feature_group = "features";
+constexpr double settled_share = 0.01;  // new links of those before: with less, rounds end
+constexpr const char* odometry_group = "visual odometry";
+
+// Says how two nodes lie to each other.
+bool is_motion(const PoseLink& link) {
+  return link.from > 0 && link.to > 0 && link.from != link.to;
+}
+
+std::string join_numbers(const std::vector<int>& numbers) {
+  std::string text;
+  for (const int number : numbers) text += (text.empty() ? "" : ", ") + std::to_string(number);
+  return text;
+}
+
+class Refinement {
+ public:
+  Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress,
+             const FeatureCache& cache)
+      : scan_(scan),
+        options_(options),
+        progress_(progress),
+        cache_(cache),
+        truth_(trajectory_of(scan.graph(), PoseSource::ground_truth)) {}
+  RefinementResult run();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void start();
+  void find_frames();
+  bool may_be_visual() const {
+    return options_.start == StartPoses::visual || options_.start == StartPoses::automatic;
+  }
+  bool is_all_tracked() const {
+    return std::all_of(poses_.begin(), poses_.end(), [&](const auto& pose) {
+      return pose.first < 0 || tracked_.contains(pose.first);
+    });
+  }
+  void odometry();
+  void leave_out_unjoined();
+  bool round(int number);
+  std::vector<FramePair> candidates(int number);
+  std::vector<GraphLink> with_features(const std::vector<FeatureLink>& links) const;
+  void join_new(const std::vector<FeatureLink>& links);
+  void bundle();
+  void free_intrinsics();
+  void icp();
+  void finish();
+  Trajectory trajectory(const std::map<int, Pose>& poses) const;
+  void close(StageReport stage);
+  // Compares poses with those before; true if they are worse.
+  bool evaluate(StageReport& stage, const std::map<int, Pose>& before,
+                const std::map<int, Pose>& after) const;
+  std::optional<StageError> error_of(const std::map<int, Pose>& poses) const;
+
+  const ScanSource& scan_;
+  const RefinementOptions& options_;
+  Progress& progress_;
+  const FeatureCache& cache_;
+  Trajectory truth_;
+  Clock::time_point stage_begin_ = Clock::now();
+  std::clock_t processor_begin_ = std::clock();
+  RefinementResult result_;
+  std::map<int, Pose> poses_;
+  std::vector<std::vector<int>> parts_;
+  std::vector<FrameFeatures> frames_;
+  std::vector<GraphLink> stored_;
+  std::set<int> tracked_;  // nodes whose poses are by visual odometry
+  std::vector<FeatureLink> links_;
+  std::set<FramePair> tried_;
+  PoseGraphResult graph_;
+  BlockSystem information_{0};
+};
+
+Trajectory Refinement::trajectory(const std::map<int, Pose>& poses) const {
+  Trajectory trajectory;
+  for (const auto& [node, pose] : poses)
+    if (const GraphNode* known = node > 0 ? scan_.graph().find_node(node) : nullptr)
+      trajectory.push_back({node, known->stamp_s, pose});
+  return trajectory;
+}
+
+std::optional<StageError> Refinement::error_of(const std::map<int, Pose>& poses) const {
+  if (truth_.empty()) return std::nullopt;
+  try {
+    const Trajectory estimate = trajectory(poses);
+    return StageError{absolute_trajectory_error(estimate, truth_),
+                      relative_trajectory_error(estimate, truth_)};
+  } catch (const Error&) {
+    return std::nullopt;  // fewer than three poses in common
+  }
+}
+
+bool Refinement::evaluate(StageReport& stage, const std::map<int, Pose>& before,
+                          const std::map<int, Pose>& after) const {
+  stage.held_out = evaluate_held_out(held_out_costs(frames_, links_, before),
+                                     held_out_costs(frames_, links_, after));
+  stage.rejected = stage.held_out.is_worse();
+  if (stage.rejected) stage.rejected_error = error_of(after);
+  return stage.rejected;
+}
+
+void Refinement::close(StageReport stage) {
+  const auto now = Clock::now();
+  stage.seconds = std::chrono::duration<double>(now - stage_begin_).count();
+  stage_begin_ = now;
+  const std::clock_t clock = std::clock();
+  stage.processor_seconds =
+      static_cast<double>(clock - processor_begin_) / static_cast<double>(CLOCKS_PER_SEC);
+  processor_begin_ = clock;
+  stage.error = error_of(poses_);
+  result_.stages.push_back(std::move(stage));
+}
+
+void Refinement::start() {
+  const int gauge = options_.graph.gauge_node;
+  if (gauge != 0 && scan_.graph().find_node(gauge) == nullptr)
+    throw Error("the scan has no such node",
+                {.field = "gauge_node", .value = std::to_string(gauge), .bound = {}});
+  InitialPoses initial = initial_poses(scan_.graph(), options_.start);
+  poses_ = std::move(initial.map_from_base);
+  parts_ = std::move(initial.parts);
+  result_.without_pose = std::move(initial.without_pose);
+  stored_ = stored_links(scan_.graph());
+  if (options_.start == StartPoses::visual)
+    std::erase_if(stored_, [](const GraphLink& link) { return is_motion(link.link); });
+  drop_unusable(stored_, result_.warnings);
+  if (stored_.empty() && options_.start != StartPoses::visual)
+    stored_ = odometry_links(scan_.graph());
+  if (may_be_visual()) {
+    tracked_.insert(result_.without_pose.begin(), result_.without_pose.end());
+    result_.without_pose.clear();
+  } else if (!result_.without_pose.empty()) {
+    result_.warnings.push_back(std::to_string(result_.without_pose.size()) +
+                               " nodes have no pose, by odometry or by links: they are left out");
+  }
+  StageReport stage;
+  stage.name = "start: " + initial.source;
+  close(std::move(stage));
+}
+
+void Refinement::find_frames() {
+  std::vector<int> nodes;
+  for (const auto& [node, pose] : poses_) nodes.push_back(node);
+  nodes.insert(nodes.end(), tracked_.begin(), tracked_.end());
+  std::sort(nodes.begin(), nodes.end());
+  FeatureResult found = find_features(scan_, nodes, options_.features, progress_, &cache_);
+  frames_ = std::move(found.frames);
+  result_.skipped = std::move(found.skipped);
+  std::size_t without_depth = 0;
+  for (const FrameFeatures& frame : frames_) {
+    result_.features += frame.features.size();
+    without_depth += frame.without_depth;
+  }
+  StageReport stage;
+  stage.name = "features";
+  stage.figures = {{"frames", static_cast<double>(frames_.size())},
+                   {"features", static_cast<double>(result_.features)},
+                   {"without_depth", static_cast<double>(without_depth)}};
+  close(std::move(stage));
+}
+
+// Of nodes that neither poses nor links place. Its motions are links of features like all others.
+void Refinement::odometry() {
+  if (tracked_.empty()) return;
+  TrackingStart known{{}, poses_, parts_, {}};
+  for (const GraphNode& node : scan_.graph().nodes) {
+    known.session[node.id] = node.session;
+    if (node.odometry_from_base) known.first[node.id] = *node.odometry_from_base;
+  }
+  VisualOdometryResult tracked =
+      track_frames(frames_, known, options_.closures, options_.odometry, options_.seed, progress_);
+  poses_ = std::move(tracked.map_from_base);
+  parts_ = std::move(tracked.parts);
+  links_ = std::move(tracked.links);
+  tried_ = std::move(tracked.tried);
+  result_.losses = std::move(tracked.losses);
+  StageReport stage;
+  stage.name = "odometry";
+  stage.figures = {{"frames", static_cast<double>(tracked_.size())},
+                   {"key_frames", static_cast<double>(tracked.key_frames.size())},
+                   {"links", static_cast<double>(links_.size())},
+                   {"lost_nodes", static_cast<double>(result_.losses.size())},
+                   {"relocalized", static_cast<double>(tracked.relocalized)},
+                   {"parts", static_cast<double>(parts_.size())}};
+  const LinkConsistency consistency = link_consistency(links_, truth_);
+  if (consistency.links > 0)
+    stage.figures.emplace_back("squared_error_per_freedom", consistency.squared_error_per_freedom);
+  if (!result_.losses.empty())
+    result_.warnings.push_back("visual odometry lost its way: " + describe(result_.losses));
+  close(std::move(stage));
+}
+
+// Parts that visual odometry has begun and nothing has joined lie anywhere.
+void Refinement::leave_out_unjoined() {
+  if (tracked_.empty()) return;
+  const bool nothing_known = is_all_tracked();
+  std::vector<int> left;
+  for (std::size_t n = 0; n < result_.components.size(); ++n) {
+    const std::vector<int>& nodes = result_.components[n].nodes;
+    const bool alone = std::all_of(nodes.begin(), nodes.end(),
+                                   [&](int node) { return node < 0 || tracked_.contains(node); });
+    if (alone && !(n == 0 && nothing_known)) left.insert(left.end(), nodes.begin(), nodes.end());
+  }
+  for (const int node : left) result_.covariance.erase(node);
+  std::sort(left.begin(), left.end());
+  std::erase_if(left, [](int node) { return node < 0; });
+  std::erase_if(result_.poses, [&](const TrajectoryPose& pose) {
+    return std::binary_search(left.begin(), left.end(), pose.node);
+  });
+  std::erase_if(result_.links, [&](const PoseLink& link) {
+    return std::binary_search(left.begin(), left.end(), link.from);
+  });
+  std::erase_if(result_.closures, [&](const PoseLink& link) {
+    return std::binary_search(left.begin(), left.end(), link.from);
+  });
+  for (const auto& [node, reason] : result_.skipped)
+    if (tracked_.contains(node)) left.push_back(node);
+  std::sort(left.begin(), left.end());
+  if (!left.empty())
+    result_.warnings.push_back("left out, since nothing joins them to the rest: nodes " +
+                               join_numbers(left));
+  result_.without_pose = std::move(left);
+}
+
+// First frames that follow each other: they say how good the odometry is. Then what looks alike,
+// then what is near by the poses of the last round.
+std::vector<FramePair> Refinement::candidates(int number) {
+  std::set<FramePair> pairs;
+  if (number == 0) {
+    pairs = consecutive_pairs(frames_, options_.closures.neighbors);
+  } else {
+    pairs = near_pairs(frames_, poses_, graph_.components, options_.closures);
+    if (number == 1) pairs.merge(similar_pairs(frames_, options_.closures, options_.seed));
+  }
+  std::vector<FramePair> fresh;
+  for (const FramePair& pair : pairs)
+    if (tried_.insert(pair).second) fresh.push_back(pair);
+  return fresh;
+}
+
+std::vector<GraphLink> Refinement::with_features(const std::vector<FeatureLink>& links) const {
+  std::vector<GraphLink> all = stored_;
+  for (const FeatureLink& link : links) {
+    const bool odometry = link.link.type == LinkType::neighbor;
+    all.push_back({link.link, odometry ? odometry_group : feature_group, !odometry});
+  }
+  return all;
+}
+
+// Parts that closures connect get into one frame before the graph is optimized.
+void Refinement::join_new(const std::vector<FeatureLink>& links) {
+  if (parts_.size() < 2) return;
+  std::vector<PoseLink> between;
+  between.reserve(links.size());
+  for (const FeatureLink& link : links) between.push_back(link.link);
+  parts_ = join_parts(poses_, parts_, between);
+}
+
+// False if there was nothing new to try, or hardly any link was new.
+bool Refinement::round(int number) {
+  const std::vector<FramePair> pairs = candidates(number);
+  if (pairs.empty()) return false;
+  StageReport stage;
+  stage.name = number == 0 ? "neighbors" : "closures " + std::to_string(number);
+  PairVerification verified =
+      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_);
+  stage.closures = verified.counts;
+  check_against_graph(verified.links, graph_, options_.closures, stage.closures);
+  const std::size_t before = links_.size();
+  const std::map<int, Pose> poses_before = poses_;
+  const auto parts_before = parts_;
+  links_.insert(links_.end(), verified.links.begin(), verified.links.end());
+  join_new(verified.links);
+  PoseGraphResult graph = optimize_pose_graph(poses_, with_features(links_), options_.graph);
+  stage.groups = graph.groups;
+  if (evaluate(stage, poses_before, graph.map_from_base)) {
+    links_.resize(before);
+    poses_ = poses_before;
+    parts_ = parts_before;
+  } else {
+    // Those that the optimization has rejected do not come back.
+    std::vector<FeatureLink> kept;
+    for (std::size_t n = 0; n < links_.size(); ++n)
+      if (!graph.links[stored_.size() + n].rejected) kept.push_back(links_[n]);
+    stage.figures.emplace_back("rejected_by_optimization",
+                               static_cast<double>(links_.size() - kept.size()));
+    std::vector<GraphLinkResult> results(
+        graph.links.begin(), graph.links.begin() + static_cast<std::ptrdiff_t>(stored_.size()));
+    for (std::size_t n = stored_.size(); n < graph.links.size(); ++n)
+      if (!graph.links[n].rejected) results.push_back(graph.links[n]);
+    graph.links = std::move(results);
+    links_ = std::move(kept);
+    poses_ = graph.map_from_base;
+    graph_ = std::move(graph);
+  }
+  close(std::move(stage));
+  return static_cast<double>(verified.links.size()) > settled_share * static_cast<double>(before);
+}
+
+std::vector<GraphLinkResult> without_features(const std::vector<GraphLinkResult>& links,
+                                              std::size_t stored) {
+  return {links.begin(), links.begin() + static_cast<std::ptrdiff_t>(stored)};
+}
+
+void Refinement::bundle() {
+  StageReport stage;
+  stage.name = "bundle adjustment";
+  BundleAdjustmentResult adjusted =
+      adjust_bundle(frames_, links_, poses_, without_features(graph_.links, stored_.size()),
+                    graph_.components, options_.bundle_adjustment);
+  evaluate(stage, poses_, adjusted.map_from_base);
+  stage.rejected = stage.rejected || !adjusted.converged;
+  stage.figures = {{"tracks", static_cast<double>(adjusted.tracks)},
+                   {"observations", static_cast<double>(adjusted.observations)},
+                   {"conflicts", static_cast<double>(adjusted.conflicts)},
+                   {"outliers", static_cast<double>(adjusted.outliers)},
+                   {"iterations", static_cast<double>(adjusted.iterations)},
+                   {"initial_cost", adjusted.initial_cost},
+                   {"final_cost", adjusted.final_cost},
+                   {"reprojection_rms_px", adjusted.reprojection_rms_px},
+                   {"depth_rms_m", adjusted.depth_rms_m}};
+  if (!stage.rejected) {
+    poses_ = std::move(adjusted.map_from_base);
+    information_ = std::move(adjusted.information);
+  }
+  close(std::move(stage));
+}
+
+// The same with the intrinsics free. What the camera's file says is kept unless what was held out
+// speaks against it: the pictures of RTAB-Map's own downsampling, for one, are a fraction of a
+// pixel off.
+void Refinement::free_intrinsics() {
+  StageReport stage;
+  stage.name = "intrinsics";
+  const std::vector<GraphLinkResult> others = without_features(graph_.links, stored_.size());
+  IntrinsicsEstimate estimate = estimate_intrinsics(frames_, links_, poses_, others,
+                                                    graph_.components, options_.bundle_adjustment);
+  BundleAdjustmentResult& adjusted = estimate.adjustment;
+  const std::vector<IntrinsicsStep> steps = adjusted.intrinsics;
+  stage.held_out = estimate.held_out;
+  stage.figures.emplace_back("frames", static_cast<double>(estimate.frames));
+  for (std::size_t n = 0; n < steps.size(); ++n) {
+    const std::string camera = "camera_" + std::to_string(n) + "_";
+    stage.figures.emplace_back(camera + "fx_share", steps[n].fx_share);
+    stage.figures.emplace_back(camera + "fy_share", steps[n].fy_share);
+    stage.figures.emplace_back(camera + "cx_px", steps[n].cx_px);
+    stage.figures.emplace_back(camera + "cy_px", steps[n].cy_px);
+  }
+  stage.rejected = !adjusted.converged || (options_.intrinsics == IntrinsicsMode::automatic
+                                               ? !stage.held_out.is_clearly_better()
+                                               : stage.held_out.is_worse());
+  if (!stage.rejected) {
+    const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
+    for (FrameFeatures& frame : frames_) move_intrinsics(frame, steps);
+    if (estimate.frames < frames_.size())
+      adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components,
+                               options_.bundle_adjustment);
+    stage.held_out =
+        evaluate_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
+    stage.rejected = stage.held_out.is_worse();
+    if (stage.rejected)
+      for (FrameFeatures& frame : frames_) move_intrinsics(frame, reversed(steps));
+  }
+  if (!stage.rejected) {
+    poses_ = std::move(adjusted.map_from_base);
+    information_ = std::move(adjusted.information);
+    result_.intrinsics = steps;
+  } else {
+    stage.rejected_error = error_of(adjusted.map_from_base);
+  }
+  close(std::move(stage));
+}
+
+void Refinement::icp() {
+  StageReport stage;
+  stage.name = options_.icp.mode == IcpMode::links ? "surfaces of links" : "surfaces";
+  std::vector<PoseLink> links;
+  for (const GraphLinkResult& link : graph_.links)
+    if (!link.rejected) links.push_back(link.link);
+  IcpResult aligned = align_surfaces(frames_, poses_, information_, graph_.components, links,
+                                     options_.icp, progress_);
+  evaluate(stage, poses_, aligned.map_from_base);
+  stage.figures = {{"pairs", static_cast<double>(aligned.pairs)},
+                   {"samples", static_cast<double>(aligned.samples)},
+                   {"degenerate_directions", static_cast<double>(aligned.degenerate_directions)},
+                   {"iterations", static_cast<double>(aligned.iterations)},
+                   {"initial_rms_m", aligned.initial_rms_m},
+                   {"final_rms_m", aligned.final_rms_m}};
+  if (!stage.rejected) {
+    poses_ = std::move(aligned.map_from_base);
+    information_ = std::move(aligned.information);
+  }
+  close(std::move(stage));
+}
+
+void Refinement::finish() {
+  result_.poses = trajectory(poses_);
+  for (std::size_t n = 0; n < graph_.links.size(); ++n) {
+    const GraphLinkResult& link = graph_.links[n];
+    if (link.rejected) {
+      result_.rejected_links.push_back(link.link);
+      continue;
+    }
+    result_.links.push_back(link.link);
+    if (n >= stored_.size()) result_.closures.push_back(link.link);
+  }
+  result_.components = graph_.components;
+  result_.without_links = graph_.without_links;
+  const GraphCovariance covariance(poses_, information_, graph_.components);
+  if (covariance.valid())
+    for (const auto& [node, pose] : poses_)
+      if (node > 0) result_.covariance[node] = covariance.of_node(node);
+  if (result_.components.size() > 1)
+    result_.warnings.push_back(
+        "the scan is in " + std::to_string(result_.components.size()) +
+        " parts that no link joins: their poses say nothing about each other");
+}
+
+RefinementResult Refinement::run() {
+  start();
+  find_frames();
+  // The parts of stored odometry and links, at the poses of the start: closures are checked
+  // against it.
+  odometry();
+  PoseGraphOptions as_stored = options_.graph;
+  as_stored.recalibrate = false;
+  graph_ = optimize_pose_graph(poses_, with_features(links_), as_stored);
+  for (int number = 0; number <= options_.rounds; ++number)
+    if (!round(number) && number > 0) break;
+  information_ = link_system(poses_, graph_.links);
+  for (FrameFeatures& frame : frames_) frame.descriptors = {};
+  if (links_.empty()) {
+    if (is_all_tracked())
+      throw Error(
+          "its pictures give no poses: no two of them could be matched",
+          {.file = {}, .field = "frames", .value = std::to_string(frames_.size()), .bound = {}});
+    result_.warnings.push_back(
+        "no two frames could be matched by features: the poses rest on the stored links alone");
+  } else {
+    if (options_.bundle) bundle();
+    if (options_.bundle && options_.intrinsics != IntrinsicsMode::fixed) free_intrinsics();
+    if (options_.icp.mode != IcpMode::off) icp();
+  }
+  finish();
+  leave_out_unjoined();
+  return std::move(result_);
+}
+
+}  // namespace
+
+RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options,
+                              Progress& progress, const FeatureCache& cache) {
+  return Refinement(scan, options, progress, cache).run();
+}
+
+}  // namespace libmap

@@ -1,0 +1,93 @@
+// The whole way from a scan's odometry to refined poses: features, rounds of loop closures each
+// followed by an optimization of the pose graph, bundle adjustment, depth against depth. A stage
+// after which what was held out fits worse is rejected and reported.
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parameters.h"
+#include "libmap/core/pose_graph.h"
+#include "libmap/core/progress.h"
+#include "libmap/refine/bundle_adjustment.h"
+#include "libmap/refine/feature_cache.h"
+#include "libmap/refine/features.h"
+#include "libmap/refine/held_out.h"
+#include "libmap/refine/icp_refinement.h"
+#include "libmap/refine/initial_poses.h"
+#include "libmap/refine/loop_closure.h"
+#include "libmap/refine/pose_graph_optimization.h"
+#include "libmap/refine/visual_odometry.h"
+#include "libmap/trajectory/trajectory_error.h"
+
+namespace libmap {
+
+// Whether the bundle adjustment estimates focal lengths and principal points of the pictures too.
+// automatic: if what was held out fits better then, by more than chance explains.
+enum class IntrinsicsMode { fixed, refined, automatic };
+
+struct RefinementOptions {
+  StartPoses start = StartPoses::automatic;
+  int rounds = 5;  // >= 0: of loop closures, each on the poses of the last
+  bool bundle = true;
+  IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
+  FeatureOptions features{};
+  VisualOdometryOptions odometry{};
+  LoopClosureDetectionOptions closures{};
+  PoseGraphOptions graph{};
+  BundleAdjustmentOptions bundle_adjustment{};
+  IcpOptions icp{};
+  std::uint64_t seed = 1;
+};
+void bind(ParameterTable& table, RefinementOptions& options);
+
+// Against true poses, where the scan holds any: for reports only, nothing is fitted to them.
+struct StageError {
+  AbsoluteTrajectoryError absolute;
+  TrajectoryError relative;  // from pose to pose
+};
+
+struct StageReport {
+  std::string name;
+  bool rejected = false;
+  RejectionCounts closures;                             // of this stage
+  HeldOutEvaluation held_out;                           // of this stage's links and of those before
+  std::map<std::string, LinkGroupResult> groups;        // of an optimized graph
+  std::vector<std::pair<std::string, double>> figures;  // what else the stage counts
+  std::optional<StageError> error;
+  std::optional<StageError> rejected_error;  // of the poses that were given up
+  double seconds = 0.0;
+  double processor_seconds = 0.0;
+};
+
+struct RefinementResult {
+  Trajectory poses;                // by ascending node
+  std::vector<PoseLink> links;     // stored ones as recalibrated, then those found; none rejected
+  std::vector<PoseLink> closures;  // those found, among the links
+  std::map<int, Matrix6d> covariance;  // of a step of each pose against its component's gauge node
+  std::vector<GraphComponent> components;
+  std::vector<StageReport> stages;             // "start" first
+  std::vector<std::pair<int, Error>> skipped;  // frames without features and why
+  std::vector<int> without_pose;
+  std::vector<TrackingLoss> losses;  // of visual odometry
+  std::vector<int> without_links;
+  std::vector<PoseLink> rejected_links;  // stored ones
+  std::size_t features = 0;
+  std::vector<IntrinsicsStep> intrinsics;  // as refined, of each camera of the rig; else empty
+  std::vector<std::string> warnings;
+};
+
+// Nodes that neither poses nor links place are placed by visual odometry (StartPoses::automatic,
+// visual); those of its parts that nothing joins to the largest one are left out of the poses, for
+// they would lie anywhere. The same bytes for any number of threads. Throws Error: options out of
+// their ranges, poses asked for that the scan has not, no two frames that could be matched where
+// nothing else gives poses.
+RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options = {},
+                              Progress& progress = no_progress(), const FeatureCache& cache = {});
+
+}  // namespace libmap

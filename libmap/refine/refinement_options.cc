@@ -1,0 +1,31 @@
+#include "libmap/refine/refinement.h"
+
+namespace libmap {
+
+void bind(ParameterTable& table, RefinementOptions& options) {
+  table.add("start", options.start,
+            {{"auto", StartPoses::automatic},
+             {"odometry", StartPoses::odometry},
+             {"stored", StartPoses::stored},
+             {"visual", StartPoses::visual}},
+            "poses that the work starts from; visual: by the pictures alone; auto: visual where "
+            "neither poses nor links are");
+  table.add("rounds", options.rounds, not_negative,
+            "of loop closures, each on the poses of the last, at most");
+  bind(table, options.features);
+  bind(table, options.odometry);
+  bind(table, options.closures);
+  bind(table, options.graph);
+  table.add("bundle", options.bundle, "adjust poses and points together");
+  table.add("intrinsics", options.intrinsics,
+            {{"fixed", IntrinsicsMode::fixed},
+             {"refined", IntrinsicsMode::refined},
+             {"auto", IntrinsicsMode::automatic}},
+            "focal length and principal point: as stored, or estimated; auto: estimated where the "
+            "held-out matches fit better then");
+  bind(table, options.bundle_adjustment);
+  bind(table, options.icp);
+  table.add("seed", options.seed, not_negative, "of all that is random");
+}
+
+}  // namespace libmap

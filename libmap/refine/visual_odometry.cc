@@ -1,0 +1,457 @@
+#include "libmap/refine/visual_odometry.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/refine/place_recognition.h"
+#include "libmap/refine/rigid_motion.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t none = static_cast<std::size_t>(-1);
+constexpr std::size_t longest_gap = 4;      // frames that one match alone may bridge
+constexpr std::size_t longest_run = 16;     // pairs that are verified at once
+constexpr double motion_agreement_m = 0.1;  // of two motions to one place
+constexpr double motion_agreement_rad = 5.0 * std::numbers::pi / 180.0;
+
+constexpr double min_factor = 1e-3;  // of variances: rounding, where nothing is noisy
+
+struct Trial {
+  RejectionCounts counts{};
+  std::optional<FeatureLink> link{};
+};
+
+std::string reason_of(const RejectionCounts& counts) {
+  if (counts.too_few_matches > 0) return "too few matches";
+  if (counts.too_few_inliers > 0) return "too few matches agree on a motion";
+  if (counts.narrow > 0) return "its matches lie on one spot of the picture";
+  return "its motion did not converge";
+}
+
+// The link with the noise that its matches show in place of the one that their features claim: the
+// variance factor a posteriori, sum of chi-squares over their freedom.
+void calibrate(const FrameFeatures& a, const FrameFeatures& b, FeatureLink& link) {
+  double squares = 0.0;
+  for (const FeatureMatch& match : link.matches)
+    squares += match_residual(a, b, match, link.link.from_from_to).chi_square();
+  const double freedom = 3.0 * static_cast<double>(link.matches.size()) - 6.0;
+  const double factor = std::max(min_factor, squares / freedom);
+  // What the estimate has been divided by already.
+  link.link.information *= std::max(1.0, link.chi_square_per_freedom) / factor;
+}
+
+// A frame seen again from another one.
+struct Sighting {
+  std::size_t frame = none;  // the earlier one
+  Pose map_from_base;        // of the frame that is found, in the other's part
+  std::size_t inliers = 0;
+};
+
+class Tracker {
+ public:
+  Tracker(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
+          const LoopClosureDetectionOptions& matching, const VisualOdometryOptions& options,
+          std::uint64_t seed)
+      : frames_(frames),
+        start_(start),
+        matching_(matching),
+        options_(options),
+        seed_(seed),
+        pose_(frames.size(), Pose::Identity()),
+        part_(frames.size(), none),
+        known_(frames.size(), false) {}
+
+  VisualOdometryResult run(Progress& progress);
+
+ private:
+  void take_known();
+  bool is_usable(std::size_t frame) const {
+    return frames_[frame].features.size() >=
+           static_cast<std::size_t>(std::max(6, matching_.estimate.min_inliers));
+  }
+  int session_of(std::size_t frame) const {
+    const auto session = start_.session.find(frames_[frame].node);
+    return session == start_.session.end() ? 0 : session->second;
+  }
+  bool is_fixed(std::size_t part) const { return fixed_.contains(part); }
+
+  void verify(const std::vector<FramePair>& pairs);
+  const Trial& trial(std::size_t a, std::size_t b);
+  const Trial& trial_ahead(std::size_t key, std::size_t frame);
+  Pose pose_by(std::size_t frame, std::size_t other, const FeatureLink& link) const;
+
+  void begin_part(std::size_t frame);
+  void pass_known(std::size_t frame);
+  bool track(std::size_t frame);
+  void place(std::size_t frame, std::size_t reference, const FeatureLink& link);
+  void make_key(std::size_t frame);
+  bool relocalize(std::size_t frame);
+  std::vector<std::size_t> candidates_of(std::size_t frame);
+  void add_link(FeatureLink link, LinkType type);
+  bool move_part(std::size_t from, std::size_t onto, const Pose& onto_from_from);
+  void lose(std::size_t frame, std::size_t reference, std::string reason);
+  void find_lost(std::size_t part, std::size_t frame, std::size_t at);
+  VisualOdometryResult finish();
+
+  const std::vector<FrameFeatures>& frames_;
+  const TrackingStart& start_;
+  const LoopClosureDetectionOptions& matching_;
+  const VisualOdometryOptions& options_;
+  const std::uint64_t seed_;
+  std::vector<Pose> pose_;
+  std::vector<std::size_t> part_;
+  std::vector<bool> known_;
+  std::map<int, std::size_t> known_part_;            // by node, with a frame or without
+  std::set<std::size_t> fixed_;                      // parts with known poses
+  std::set<std::size_t> loose_;                      // parts that began beside others
+  std::map<std::size_t, std::size_t> loss_of_part_;  // with which a part began
+  std::size_t parts_ = 0;
+  std::map<FramePair, Trial> trials_;
+  std::vector<std::vector<SimilarFrame>> similar_;
+  std::size_t key_ = none;      // key frame
+  std::size_t last_ = none;     // the frame tracked last
+  std::size_t earlier_ = none;  // last frame before the way was lost
+  std::size_t key_run_ = 0;     // key frames that followed each other
+  VisualOdometryResult result_;
+};
+
+void Tracker::take_known() {
+  for (const std::vector<int>& nodes : start_.parts) {
+    for (const int node : nodes) known_part_[node] = parts_;
+    fixed_.insert(parts_++);
+  }
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    const auto part = known_part_.find(frames_[f].node);
+    if (part == known_part_.end()) continue;
+    known_[f] = true;
+    pose_[f] = start_.map_from_base.at(frames_[f].node);
+    part_[f] = part->second;
+  }
+}
+
+void Tracker::verify(const std::vector<FramePair>& pairs) {
+  std::vector<FramePair> fresh;
+  for (const FramePair& pair : pairs)
+    if (!trials_.contains(pair)) fresh.push_back(pair);
+  std::vector<Trial> trials(fresh.size());
+  parallel_for(fresh.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      PairVerification verified = verify_pairs(frames_, {fresh[n]}, matching_, seed_);
+      trials[n].counts = verified.counts;
+      if (!verified.links.empty()) trials[n].link = std::move(verified.links.front());
+    }
+  });
+  for (std::size_t n = 0; n < fresh.size(); ++n) trials_.emplace(fresh[n], std::move(trials[n]));
+}
+
+const Trial& Tracker::trial(std::size_t a, std::size_t b) {
+  const FramePair pair = std::minmax(a, b);
+  verify({pair});
+  return trials_.at(pair);
+}
+
+// With the pairs that are likely to be asked for next, so that threads have work: frames go on
+// being key frames, or being bound to one, about as long as they have been.
+const Trial& Tracker::trial_ahead(std::size_t key, std::size_t frame) {
+  if (const auto known = trials_.find({key, frame}); known != trials_.end()) return known->second;
+  const bool fresh_key = key + 1 == frame;
+  const std::size_t run = std::min(longest_run, fresh_key ? 1 + key_run_ : frame - key);
+  std::vector<FramePair> pairs;
+  for (std::size_t n = 0; n < run && frame + n < frames_.size(); ++n) {
+    if (n > 0 && (!is_usable(frame + n) || known_[frame + n])) break;
+    pairs.emplace_back(fresh_key ? key + n : key, frame + n);
+  }
+  verify(pairs);
+  return trials_.at({key, frame});
+}
+
+Pose Tracker::pose_by(std::size_t frame, std::size_t other, const FeatureLink& link) const {
+  return frame > other ? Pose(pose_[other] * link.link.from_from_to)
+                       : Pose(pose_[other] * link.link.from_from_to.inverse());
+}
+
+void Tracker::add_link(FeatureLink link, LinkType type) {
+  link.link.type = type;
+  calibrate(frames_[link.frames.first], frames_[link.frames.second], link);
+  result_.links.push_back(std::move(link));
+}
+
+void Tracker::make_key(std::size_t frame) {
+  key_run_ = key_ != none && key_ + 1 == frame ? key_run_ + 1 : 0;
+  key_ = frame;
+  result_.key_frames.push_back(frames_[frame].node);
+}
+
+void Tracker::begin_part(std::size_t frame) {
+  const auto first = start_.first.find(frames_[frame].node);
+  pose_[frame] = first != start_.first.end() ? first->second : Pose::Identity();
+  part_[frame] = parts_++;
+  if (is_usable(frame) && last_ != none) loose_.insert(part_[frame]);
+}
+
+// Carries a part into the frame of another; false if both hold known poses.
+bool Tracker::move_part(std::size_t from, std::size_t onto, const Pose& onto_from_from) {
+  Pose move = onto_from_from;
+  if (is_fixed(from)) {
+    if (is_fixed(onto)) return false;
+    std::swap(from, onto);
+    move = onto_from_from.inverse();
+  }
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    if (part_[f] != from) continue;
+    pose_[f] = move * pose_[f];
+    part_[f] = onto;
+  }
+  return true;
+}
+
+// Frames before one that is known may have a way of their own.
+void Tracker::pass_known(std::size_t frame) {
+  if (!is_usable(frame)) return;
+  if (last_ != none && !is_fixed(part_[last_]) && session_of(last_) == session_of(frame) &&
+      frame - last_ <= longest_gap) {
+    const Trial& met = trial(last_, frame);
+    if (met.link && move_part(part_[last_], part_[frame],
+                              pose_[frame] * pose_by(frame, last_, *met.link).inverse()))
+      add_link(*met.link, LinkType::neighbor);
+  }
+  key_ = last_ = frame;
+  earlier_ = none;
+}
+
+void Tracker::place(std::size_t frame, std::size_t reference, const FeatureLink& link) {
+  pose_[frame] = pose_by(frame, reference, link);
+  part_[frame] = part_[reference];
+  last_ = frame;
+  add_link(link, LinkType::neighbor);
+  if (reference != key_) make_key(reference);
+  const Vector6d way = step_between(pose_[key_], pose_[frame]);
+  const double angle_deg = way.tail<3>().norm() * 180.0 / std::numbers::pi;
+  if (link.matches.size() < static_cast<std::size_t>(options_.keyframe_inliers) ||
+      way.head<3>().norm() > options_.keyframe_distance_m ||
+      angle_deg > options_.keyframe_angle_deg)
+    make_key(frame);
+}
+
+bool Tracker::track(std::size_t frame) {
+  for (const std::size_t reference : {key_, last_, earlier_}) {
+    if (reference == none) continue;
+    // A key frame holds for as long as frames are tracked.
+    if (frame - (reference == earlier_ ? earlier_ : last_) > longest_gap) continue;
+    const Trial& tried = reference == key_ ? trial_ahead(key_, frame) : trial(reference, frame);
+    if (!tried.link) continue;
+    if (reference == earlier_) earlier_ = none;
+    place(frame, reference, *tried.link);
+    return true;
+  }
+  return false;
+}
+
+std::vector<std::size_t> Tracker::candidates_of(std::size_t frame) {
+  const auto wanted = static_cast<std::size_t>(options_.relocalization_candidates);
+  if (wanted == 0) return {};
+  if (similar_.empty())
+    similar_ = find_similar_frames(frames_, 4 * wanted, matching_.appearance, seed_);
+  std::vector<std::size_t> candidates;
+  const auto add = [&](std::size_t other) {
+    if (other == none || other == frame || part_[other] == none || part_[other] == part_[frame] ||
+        !is_usable(other) ||
+        std::find(candidates.begin(), candidates.end(), other) != candidates.end())
+      return;
+    candidates.push_back(other);
+  };
+  for (const SimilarFrame& other : similar_[frame])
+    if (candidates.size() < wanted) add(other.frame);
+  // Where the way was lost, whatever it looks like.
+  for (const std::size_t before : {key_, last_, earlier_})
+    for (std::size_t back = 0; back < 3; ++back)
+      if (before != none && before >= back) add(before - back);
+  return candidates;
+}
+
+// The frame, and the part that it belongs to, carried to where two earlier frames of another part
+// see it alike.
+bool Tracker::relocalize(std::size_t frame) {
+  std::vector<FramePair> pairs;
+  const std::vector<std::size_t> candidates = candidates_of(frame);
+  pairs.reserve(candidates.size());
+  for (const std::size_t other : candidates) pairs.push_back(std::minmax(frame, other));
+  verify(pairs);
+  std::vector<Sighting> sightings;
+  for (const std::size_t other : candidates) {
+    const Trial& seen = trials_.at(std::minmax(frame, other));
+    if (seen.link)
+      sightings.push_back({other, pose_by(frame, other, *seen.link), seen.link->matches.size()});
+  }
+  const auto agree = [&](const Sighting& a, const Sighting& b) {
+    const Vector6d apart = step_between(a.map_from_base, b.map_from_base);
+    return part_[a.frame] == part_[b.frame] && apart.head<3>().norm() < motion_agreement_m &&
+           apart.tail<3>().norm() < motion_agreement_rad;
+  };
+  const Sighting* best = nullptr;
+  std::pair<std::size_t, std::size_t> most{1, 0};  // sightings that agree, inliers
+  for (const Sighting& sighting : sightings) {
+    const auto votes = static_cast<std::size_t>(
+        std::count_if(sightings.begin(), sightings.end(),
+                      [&](const Sighting& other) { return agree(sighting, other); }));
+    if (votes < 2 || std::pair(votes, sighting.inliers) <= most) continue;
+    most = {votes, sighting.inliers};
+    best = &sighting;
+  }
+  if (best == nullptr) return false;
+  const std::size_t own = part_[frame];
+  const std::size_t onto = part_[best->frame];
+  std::vector<std::size_t> witnesses;
+  for (const Sighting& sighting : sightings)
+    if (agree(*best, sighting)) witnesses.push_back(sighting.frame);
+  if (part_[frame] == none) {
+    pose_[frame] = best->map_from_base;
+    part_[frame] = onto;
+  } else if (!move_part(part_[frame], onto, best->map_from_base * pose_[frame].inverse())) {
+    return false;
+  }
+  for (const std::size_t witness : witnesses)
+    add_link(*trials_.at(std::minmax(frame, witness)).link, LinkType::local_space_closure);
+  ++result_.relocalized;
+  earlier_ = none;
+  find_lost(own, frame, best->frame);
+  return true;
+}
+
+void Tracker::lose(std::size_t frame, std::size_t reference, std::string reason) {
+  result_.losses.push_back(
+      {frames_[frame].node, reference == none ? 0 : frames_[reference].node, std::move(reason)});
+}
+
+// What the part began with is no longer lost.
+void Tracker::find_lost(std::size_t part, std::size_t frame, std::size_t at) {
+  const auto loss = loss_of_part_.find(part);
+  if (loss == loss_of_part_.end()) return;
+  result_.losses[loss->second].found_node = frames_[frame].node;
+  result_.losses[loss->second].found_at = frames_[at].node;
+}
+
+VisualOdometryResult Tracker::finish() {
+  std::map<std::size_t, std::vector<int>> parts;
+  result_.map_from_base = start_.map_from_base;
+  for (const auto& [node, part] : known_part_) parts[part].push_back(node);
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    if (known_[f]) continue;
+    result_.map_from_base[frames_[f].node] = pose_[f];
+    parts[part_[f]].push_back(frames_[f].node);
+  }
+  for (auto& [part, nodes] : parts) {
+    std::sort(nodes.begin(), nodes.end());
+    result_.parts.push_back(std::move(nodes));
+  }
+  std::sort(result_.key_frames.begin(), result_.key_frames.end());
+  result_.key_frames.erase(std::unique(result_.key_frames.begin(), result_.key_frames.end()),
+                           result_.key_frames.end());
+  std::set<FramePair> linked;
+  for (const FeatureLink& link : result_.links) linked.insert(link.frames);
+  // Motions that were found but not confirmed may be confirmed later.
+  for (const auto& [pair, tried] : trials_)
+    if (!tried.link || linked.contains(pair)) result_.tried.insert(pair);
+  return std::move(result_);
+}
+
+VisualOdometryResult Tracker::run(Progress& progress) {
+  take_known();
+  progress.begin("odometry", frames_.size());
+  for (std::size_t f = 0; f < frames_.size(); ++f, progress.advance(1)) {
+    if (known_[f]) {
+      pass_known(f);
+      continue;
+    }
+    if (!is_usable(f)) {
+      lose(f, none, "only " + std::to_string(frames_[f].features.size()) + " features with depth");
+      begin_part(f);
+      continue;
+    }
+    const bool begins = key_ == none || session_of(key_) != session_of(f);
+    if (!begins && track(f)) {
+      // A part for itself looks for the others at each key frame.
+      if (key_ == f && loose_.contains(part_[f])) relocalize(f);
+      continue;
+    }
+    if (!begins) {
+      loss_of_part_[none] = result_.losses.size();  // until the frame is in a part
+      lose(f, key_,
+           f - last_ > longest_gap ? "no frame before it" : reason_of(trial(key_, f).counts));
+    }
+    if (!relocalize(f)) {
+      if (earlier_ == none && !begins) earlier_ = last_;
+      begin_part(f);
+      if (!begins) loss_of_part_[part_[f]] = loss_of_part_.at(none);
+    }
+    loss_of_part_.erase(none);
+    make_key(f);
+    last_ = f;
+  }
+  progress.end();
+  return finish();
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, VisualOdometryOptions& options) {
+  table.add("keyframe_inliers", options.keyframe_inliers, not_negative,
+            "visual odometry: matches below which a frame becomes the next key frame");
+  table.add("keyframe_distance_m", options.keyframe_distance_m, positive,
+            "way from the key frame beyond which it does");
+  table.add("keyframe_angle_deg", options.keyframe_angle_deg, positive,
+            "turn from the key frame beyond which it does");
+  table.add("relocalization_candidates", options.relocalization_candidates, not_negative,
+            "earlier frames, by appearance, that a lost one is compared with");
+}
+
+VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
+                                  const TrackingStart& start,
+                                  const LoopClosureDetectionOptions& matching,
+                                  const VisualOdometryOptions& options, std::uint64_t seed,
+                                  Progress& progress) {
+  check_parameters(options);
+  return Tracker(frames, start, matching, options, seed).run(progress);
+}
+
+LinkConsistency link_consistency(const std::vector<FeatureLink>& links, const Trajectory& truth) {
+  std::map<int, Pose> poses;
+  for (const TrajectoryPose& pose : truth) poses.emplace(pose.node, pose.world_from_base);
+  LinkConsistency result;
+  for (const FeatureLink& link : links) {
+    const auto a = poses.find(link.link.from);
+    const auto b = poses.find(link.link.to);
+    if (a == poses.end() || b == poses.end()) continue;
+    const Vector6d error = step_between(link.link.from_from_to, a->second.inverse() * b->second);
+    result.squared_error_per_freedom += error.dot(link.link.information * error) / 6.0;
+    ++result.links;
+  }
+  if (result.links > 0) result.squared_error_per_freedom /= static_cast<double>(result.links);
+  return result;
+}
+
+std::string describe(const std::vector<TrackingLoss>& losses) {
+  constexpr std::size_t most = 5;
+  std::string text;
+  for (std::size_t n = 0; n < losses.size() && n < most; ++n) {
+    const TrackingLoss& loss = losses[n];
+    text +=
+        (n > 0 ? "; " : "") + std::string("node ") + std::to_string(loss.node) + ", " + loss.reason;
+    if (loss.found_node == loss.node)
+      text += ", found again at node " + std::to_string(loss.found_at);
+    else if (loss.found_node > 0)
+      text += ", found again by node " + std::to_string(loss.found_node) + " at node " +
+              std::to_string(loss.found_at);
+  }
+  if (losses.size() > most) text += "; and " + std::to_string(losses.size() - most) + " more";
+  return text;
+}
+
+}  // namespace libmap

@@ -1,0 +1,332 @@
+#include "libmap/surface/hole_filling.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <string_view>
+
+#include "libmap/core/parallel.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/surface/hole_patch.h"
+#include "libmap/surface/self_intersections.h"
+#include "libmap/surface/triangle_repair.h"
+
+namespace libmap {
+
+namespace {
+
+// A boundary of more edges is left open: its triangulation may take the square of them.
+constexpr std::size_t max_hole_edges = 5000;
+
+// Rings of triangles around a hole that its patch is fitted to; the curvature at the boundary
+// needs one.
+constexpr int rings = 2;
+
+constexpr std::array<PatchShape, 3> shapes = {PatchShape::faired, PatchShape::refined,
+                                              PatchShape::triangulated};
+
+std::vector<Eigen::Vector3d> positions_of(const TriangleMesh& mesh, const BoundaryLoop& loop) {
+  std::vector<Eigen::Vector3d> positions;
+  positions.reserve(loop.size());
+  for (const HalfEdge h : loop) positions.push_back(mesh.vertices[source_of(mesh.triangles, h)]);
+  return positions;
+}
+
+double length_of(const TriangleMesh& mesh, const BoundaryLoop& loop) {
+  double length = 0.0;
+  for (const HalfEdge h : loop)
+    length +=
+        (mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)])
+            .norm();
+  return length;
+}
+
+struct Reach {
+  Eigen::Vector3d middle = Eigen::Vector3d::Zero();
+  double of_boundary_m = 0.0;
+  double of_component_m = 0.0;
+};
+
+// Whether each loop is its component's outer boundary.
+std::vector<bool> outer_boundaries(const TriangleMesh& mesh,
+                                   const std::vector<BoundaryLoop>& loops) {
+  const MeshComponents components = connected_components(mesh);
+  constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
+  std::vector<std::size_t> longest(components.areas_m2.size(), none);
+  std::vector<double> length(components.areas_m2.size(), -1.0);
+  for (std::size_t n = 0; n < loops.size(); ++n) {
+    const std::uint32_t component = components.of_triangle[loops[n].front() / 3];
+    const double here = length_of(mesh, loops[n]);
+    if (here <= length[component]) continue;
+    length[component] = here;
+    longest[component] = n;
+  }
+  std::vector<Reach> reach(components.areas_m2.size());
+  for (std::size_t c = 0; c < reach.size(); ++c) {
+    if (longest[c] == none) continue;
+    const std::vector<Eigen::Vector3d> boundary = positions_of(mesh, loops[longest[c]]);
+    for (const Eigen::Vector3d& p : boundary) reach[c].middle += p;
+    reach[c].middle /= static_cast<double>(boundary.size());
+    for (const Eigen::Vector3d& p : boundary)
+      reach[c].of_boundary_m = std::max(reach[c].of_boundary_m, (p - reach[c].middle).norm());
+  }
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    Reach& here = reach[components.of_triangle[t]];
+    for (const std::uint32_t v : mesh.triangles[t])
+      here.of_component_m = std::max(here.of_component_m, (mesh.vertices[v] - here.middle).norm());
+  }
+  std::vector<bool> is_outer(loops.size(), false);
+  for (std::size_t c = 0; c < reach.size(); ++c)
+    if (longest[c] != none && 2.0 * reach[c].of_boundary_m >= reach[c].of_component_m)
+      is_outer[longest[c]] = true;
+  return is_outer;
+}
+
+// A patch with the indices of its surroundings: below `vertices.size()` those of the mesh.
+struct PlacedPatch {
+  std::vector<std::uint32_t> vertices;
+  HolePatch patch;
+  bool found() const { return !patch.triangles.empty(); }
+};
+
+// Numbers of the vertices that triangles name, ascending.
+std::vector<std::uint32_t> named_vertices(const std::vector<Triangle>& triangles) {
+  std::vector<std::uint32_t> vertices;
+  for (const Triangle& t : triangles) vertices.insert(vertices.end(), t.begin(), t.end());
+  std::sort(vertices.begin(), vertices.end());
+  vertices.erase(std::unique(vertices.begin(), vertices.end()), vertices.end());
+  return vertices;
+}
+
+std::uint32_t place_in(const std::vector<std::uint32_t>& sorted, std::uint32_t value) {
+  return static_cast<std::uint32_t>(std::lower_bound(sorted.begin(), sorted.end(), value) -
+                                    sorted.begin());
+}
+
+class HolePatcher {
+ public:
+  explicit HolePatcher(const TriangleMesh& mesh)
+      : mesh_(mesh),
+        around_(triangles_at_vertices(mesh.triangles, mesh.vertices.size())),
+        lowest_height_(degenerate_height * size_of(mesh)) {}
+
+  PlacedPatch patch(const BoundaryLoop& loop, PatchShape shape) const {
+    if (loop.size() < 3 || loop.size() > max_hole_edges) return {};
+    std::vector<Triangle> triangles = surroundings(loop);
+    PlacedPatch result;
+    result.vertices = named_vertices(triangles);
+    std::vector<Eigen::Vector3d> positions;
+    for (const std::uint32_t v : result.vertices) positions.push_back(mesh_.vertices[v]);
+    for (Triangle& t : triangles)
+      for (std::uint32_t& v : t) v = place_in(result.vertices, v);
+    result.patch = patch_hole(
+        positions, triangles, place_in(result.vertices, source_of(mesh_.triangles, loop[0])),
+        place_in(result.vertices, target_of(mesh_.triangles, loop[0])), shape);
+    if (!stands(positions, triangles, result.patch)) result.patch = {};
+    return result;
+  }
+
+ private:
+  std::vector<Triangle> surroundings(const BoundaryLoop& loop) const {
+    std::vector<std::uint32_t> vertices;
+    for (const HalfEdge h : loop) vertices.push_back(source_of(mesh_.triangles, h));
+    std::vector<std::uint32_t> numbers;
+    std::vector<Triangle> triangles;
+    for (int ring = 0; ring < rings; ++ring) {
+      numbers.clear();
+      for (const std::uint32_t v : vertices)
+        numbers.insert(numbers.end(), around_.of(v).begin(), around_.of(v).end());
+      std::sort(numbers.begin(), numbers.end());
+      numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+      triangles.clear();
+      for (const std::uint32_t t : numbers) triangles.push_back(mesh_.triangles[t]);
+      vertices = named_vertices(triangles);
+    }
+    return triangles;
+  }
+
+  // Each edge of the patch has two triangles, none of them degenerate.
+  bool stands(const std::vector<Eigen::Vector3d>& positions, const std::vector<Triangle>& around,
+              const HolePatch& patch) const {
+    TriangleMesh joined;
+    joined.vertices = positions;
+    joined.vertices.insert(joined.vertices.end(), patch.new_vertices.begin(),
+                           patch.new_vertices.end());
+    for (const Eigen::Vector3d& v : patch.new_vertices)
+      if (!v.allFinite()) return false;
+    joined.triangles = around;
+    joined.triangles.insert(joined.triangles.end(), patch.triangles.begin(), patch.triangles.end());
+    const std::vector<HalfEdge> opposite =
+        opposites_of(joined.triangles, edges_of(joined.triangles, joined.vertices.size()));
+    for (std::size_t t = around.size(); t < joined.triangles.size(); ++t) {
+      if (lowest_height(joined, joined.triangles[t]) <= lowest_height_) return false;
+      for (HalfEdge h = static_cast<HalfEdge>(3 * t); h < 3 * t + 3; ++h)
+        if (!is_joined(opposite[h]) ||
+            source_of(joined.triangles, h) == source_of(joined.triangles, opposite[h]))
+          return false;
+    }
+    return true;
+  }
+
+  const TriangleMesh& mesh_;
+  VertexTriangles around_;
+  double lowest_height_;
+};
+
+// A new vertex at `position` with the values of the boundary's vertices.
+void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
+                         const std::vector<std::uint32_t>& boundary) {
+  std::vector<double> weights;
+  double sum = 0.0;
+  for (const std::uint32_t v : boundary) {
+    weights.push_back(1.0 / std::max((mesh.vertices[v] - position).squaredNorm(),
+                                     std::numeric_limits<double>::min()));
+    sum += weights.back();
+  }
+  const std::uint32_t nearest = boundary[static_cast<std::size_t>(
+      std::max_element(weights.begin(), weights.end()) - weights.begin())];
+  const std::uint32_t added = append_vertex_between(mesh, nearest, nearest, 0.0);
+  mesh.vertices[added] = position;
+  const auto mean = [&](const auto& value_of) {
+    double total = 0.0;
+    for (std::size_t n = 0; n < boundary.size(); ++n)
+      total += weights[n] / sum * static_cast<double>(value_of(boundary[n]));
+    return total;
+  };
+  if (!mesh.vertex_colors.empty())
+    for (std::size_t c = 0; c < 3; ++c)
+      mesh.vertex_colors[added][c] = static_cast<std::uint8_t>(std::clamp(
+          std::lround(mean([&](std::uint32_t v) { return mesh.vertex_colors[v][c]; })), 0L, 255L));
+  for (ScalarField& field : mesh.vertex_fields)
+    if (field.type == ScalarType::float32 || field.type == ScalarType::float64)
+      field.values[added] = mean([&](std::uint32_t v) { return field.values[v]; });
+}
+
+// The triangle at that of the boundary's edges that is nearest to `place`.
+std::uint32_t nearest_triangle(const TriangleMesh& mesh, const BoundaryLoop& loop,
+                               const Eigen::Vector3d& place) {
+  double nearest = std::numeric_limits<double>::infinity();
+  std::uint32_t triangle = loop.front() / 3;
+  for (const HalfEdge h : loop) {
+    const Eigen::Vector3d middle = (mesh.vertices[source_of(mesh.triangles, h)] +
+                                    mesh.vertices[target_of(mesh.triangles, h)]) /
+                                   2.0;
+    const double here = (middle - place).squaredNorm();
+    if (here >= nearest) continue;
+    nearest = here;
+    triangle = h / 3;
+  }
+  return triangle;
+}
+
+void append_patch(TriangleMesh& mesh, const BoundaryLoop& loop, const PlacedPatch& placed) {
+  std::vector<std::uint32_t> boundary;
+  for (const HalfEdge h : loop) boundary.push_back(source_of(mesh.triangles, h));
+  const auto first_new = static_cast<std::uint32_t>(mesh.vertices.size());
+  for (const Eigen::Vector3d& position : placed.patch.new_vertices)
+    append_patch_vertex(mesh, position, boundary);
+  const auto old_count = static_cast<std::uint32_t>(placed.vertices.size());
+  for (Triangle triangle : placed.patch.triangles) {
+    for (std::uint32_t& v : triangle)
+      v = v < old_count ? placed.vertices[v] : first_new + (v - old_count);
+    const Eigen::Vector3d place =
+        (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
+        3.0;
+    const std::uint32_t source = nearest_triangle(mesh, loop, place);
+    mesh.triangles.push_back(triangle);
+    for (ScalarField& field : mesh.face_fields)
+      field.values.push_back(field.name == filled_field ? 1.0 : field.values[source]);
+  }
+}
+
+// Whether each patch meets no triangle but its neighbors.
+std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<BoundaryLoop>& holes,
+                               const std::vector<PlacedPatch>& patches) {
+  TriangleMesh trial;
+  trial.vertices = base.vertices;
+  trial.triangles = base.triangles;
+  std::vector<bool> is_new(base.triangles.size(), false);
+  std::vector<std::size_t> patch_of;
+  for (std::size_t n = 0; n < holes.size(); ++n) {
+    append_patch(trial, holes[n], patches[n]);
+    patch_of.resize(trial.triangles.size() - base.triangles.size(), n);
+  }
+  is_new.resize(trial.triangles.size(), true);
+  std::vector<bool> is_free(holes.size(), true);
+  for (const TrianglePair& pair : find_self_intersections(trial, is_new))
+    for (const std::uint32_t t : {pair.first, pair.second})
+      if (t >= base.triangles.size()) is_free[patch_of[t - base.triangles.size()]] = false;
+  return is_free;
+}
+
+}  // namespace
+
+std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m) {
+  std::vector<BoundaryLoop> loops = boundary_loops(
+      mesh.triangles, opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size())));
+  if (loops.empty()) return {};
+  const std::vector<bool> is_outer = outer_boundaries(mesh, loops);
+  std::vector<BoundaryLoop> holes;
+  for (std::size_t n = 0; n < loops.size(); ++n) {
+    if (is_outer[n]) continue;
+    const std::vector<Eigen::Vector3d> positions = positions_of(mesh, loops[n]);
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3d& p : positions) box.extend(p);
+    // The box's longest side is no longer than the diameter, its diagonal no shorter.
+    if (box.sizes().maxCoeff() > max_hole_m) continue;
+    if (box.diagonal().norm() <= max_hole_m || diameter_of(positions) <= max_hole_m)
+      holes.push_back(std::move(loops[n]));
+  }
+  return holes;
+}
+
+ScalarField& filled_marks(TriangleMesh& mesh) {
+  for (ScalarField& field : mesh.face_fields)
+    if (field.name == filled_field) return field;
+  mesh.face_fields.push_back(
+      {filled_field, ScalarType::uint8, std::vector<double>(mesh.triangles.size(), 0.0)});
+  return mesh.face_fields.back();
+}
+
+HoleFilling fill_holes(TriangleMesh& mesh, const std::vector<BoundaryLoop>& holes, PatchCheck check,
+                       Progress& progress) {
+  filled_marks(mesh);
+  HoleFilling result;
+  if (holes.empty()) return result;
+  std::vector<PlacedPatch> patches(holes.size());
+  std::vector<bool> is_settled(holes.size(), false);
+  const HolePatcher patcher(mesh);
+  progress.begin("filling holes", holes.size());
+  for (const PatchShape shape : shapes) {
+    std::vector<std::size_t> open;
+    for (std::size_t n = 0; n < holes.size(); ++n)
+      if (!is_settled[n]) open.push_back(n);
+    if (open.empty()) break;
+    parallel_for(open.size(), 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n)
+        patches[open[n]] = patcher.patch(holes[open[n]], shape);
+      if (shape == shapes.front()) progress.advance(end - begin);
+    });
+    std::vector<bool> is_free(holes.size(), true);
+    if (check == PatchCheck::intersection) is_free = free_patches(mesh, holes, patches);
+    for (std::size_t n = 0; n < holes.size(); ++n) {
+      is_settled[n] = patches[n].found() && is_free[n];
+      if (!is_settled[n]) patches[n] = {};
+    }
+  }
+  progress.end();
+  const std::size_t first_new = mesh.triangles.size();
+  for (std::size_t n = 0; n < holes.size(); ++n) {
+    ++(is_settled[n] ? result.holes : result.unfilled);
+    if (is_settled[n]) append_patch(mesh, holes[n], patches[n]);
+  }
+  result.triangles = mesh.triangles.size() - first_new;
+  for (std::size_t t = first_new; t < mesh.triangles.size(); ++t)
+    result.area_m2 += area_normal(mesh, mesh.triangles[t]).norm() / 2.0;
+  return result;
+}
+
+}  // namespace libmap

@@ -1,0 +1,217 @@
+#include "libmap/surface/mesh_decimation.h"
+
+#include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
+#include <OpenMesh/Tools/Decimater/DecimaterT.hh>
+#include <OpenMesh/Tools/Decimater/ModHausdorffT.hh>
+#include <OpenMesh/Tools/Decimater/ModNormalFlippingT.hh>
+#include <OpenMesh/Tools/Decimater/ModQuadricT.hh>
+#include <OpenMesh/Tools/Decimater/ModRoundnessT.hh>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <vector>
+
+#include "libmap/core/parallel.h"
+#include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/mesh/surface_distance.h"
+
+namespace libmap {
+
+namespace {
+
+// Attempts; in the later half the tolerance shrinks, should locking vertices not settle it.
+constexpr int max_attempts = 12;
+// Of the error asked for, the tolerance for removed vertices, and what each of the later attempts
+// leaves of it. Between vertices the surfaces can be farther apart.
+constexpr double tolerance_share = 0.7;
+constexpr double next_share = 0.7;
+constexpr double max_turn_deg = 30.0;
+constexpr float min_roundness = 0.2F;
+// Parts smaller than this share of what is allowed are not divided: what lies so near the bound
+// counts as above it.
+constexpr double smallest_part = 0.05;
+constexpr std::size_t triangles_grain = 1024;
+
+struct Traits : OpenMesh::DefaultTraits {
+  using Point = OpenMesh::Vec3d;
+  using Normal = OpenMesh::Vec3d;
+  VertexAttributes(OpenMesh::Attributes::Status);
+  FaceAttributes(OpenMesh::Attributes::Status | OpenMesh::Attributes::Normal);
+  EdgeAttributes(OpenMesh::Attributes::Status);
+  HalfedgeAttributes(OpenMesh::Attributes::Status | OpenMesh::Attributes::PrevHalfedge);
+};
+using Mesh = OpenMesh::TriMesh_ArrayKernelT<Traits>;
+
+// About the first vertex: some of OpenMesh's modules reckon in single precision.
+bool enter(const TriangleMesh& from, const std::vector<bool>& locked, Mesh& mesh) {
+  for (const Eigen::Vector3d& vertex : from.vertices) {
+    const Eigen::Vector3d v = vertex - from.vertices.front();
+    mesh.add_vertex({v.x(), v.y(), v.z()});
+  }
+  for (const Triangle& t : from.triangles) {
+    const std::array<Mesh::VertexHandle, 3> corners = {
+        mesh.vertex_handle(t[0]), mesh.vertex_handle(t[1]), mesh.vertex_handle(t[2])};
+    if (!mesh.add_face(corners[0], corners[1], corners[2]).is_valid()) return false;
+  }
+  mesh.update_face_normals();
+  for (std::uint32_t v = 0; v < locked.size(); ++v)
+    if (locked[v]) mesh.status(mesh.vertex_handle(v)).set_locked(true);
+  return true;
+}
+
+void collapse_edges(Mesh& mesh, double tolerance_m) {
+  OpenMesh::Decimater::DecimaterT<Mesh> decimater(mesh);
+  OpenMesh::Decimater::ModQuadricT<Mesh>::Handle quadric;
+  OpenMesh::Decimater::ModHausdorffT<Mesh>::Handle distance;
+  OpenMesh::Decimater::ModNormalFlippingT<Mesh>::Handle turn;
+  OpenMesh::Decimater::ModRoundnessT<Mesh>::Handle roundness;
+  decimater.add(quadric);
+  decimater.module(quadric).unset_max_err();
+  decimater.add(turn);
+  decimater.module(turn).set_max_normal_deviation(max_turn_deg);
+  decimater.add(roundness);
+  decimater.module(roundness).set_min_roundness(min_roundness, true);
+  decimater.add(distance);
+  decimater.module(distance).set_tolerance(tolerance_m);
+  decimater.initialize();
+  decimater.decimate();
+}
+
+TriangleMesh collapsed(const TriangleMesh& original, const std::vector<bool>& locked,
+                       double tolerance_m) {
+  Mesh mesh;
+  if (!enter(original, locked, mesh)) return original;
+  collapse_edges(mesh, tolerance_m);
+  TriangleMesh result = original;
+  std::vector<bool> keep(original.triangles.size());
+  for (std::uint32_t t = 0; t < keep.size(); ++t) {
+    const Mesh::FaceHandle face(static_cast<int>(t));
+    keep[t] = !mesh.status(face).deleted();
+    if (!keep[t]) continue;
+    auto corner = mesh.cfv_iter(face);
+    for (std::uint32_t& v : result.triangles[t]) v = static_cast<std::uint32_t>((corner++)->idx());
+  }
+  return select_triangles(result, keep);
+}
+
+using Corners = std::array<Eigen::Vector3d, 3>;
+
+constexpr std::uint32_t none = 0xffffffff;
+
+struct Deviation {
+  double bound_m = 0.0;                // infinite if a point is farther away than is allowed
+  std::uint32_t nearest_there = none;  // then the triangle nearest to such a place
+};
+
+class DeviationBound {
+ public:
+  DeviationBound(const TriangleMesh& to, double allowed_m)
+      : to_(to), surface_(to), allowed_(allowed_m) {}
+
+  Deviation of(const Corners& part) const {
+    const Eigen::Vector3d middle = (part[0] + part[1] + part[2]) / 3.0;
+    const SurfacePoint nearest = surface_.nearest(middle);
+    double largest = 0.0;
+    double radius = 0.0;
+    for (const Eigen::Vector3d& corner : part) {
+      largest = std::max(largest, distance_from(nearest.triangle, corner));
+      radius = std::max(radius, (corner - middle).norm());
+    }
+    largest = std::min(largest, nearest.distance_m + radius);
+    if (largest <= allowed_) return {.bound_m = largest};
+    if (nearest.distance_m > allowed_ || radius < smallest_part * allowed_)
+      return {.bound_m = HUGE_VAL, .nearest_there = nearest.triangle};
+    return of_quarters(part);
+  }
+
+ private:
+  Deviation of_quarters(const Corners& part) const {
+    const Eigen::Vector3d ab = (part[0] + part[1]) / 2.0;
+    const Eigen::Vector3d bc = (part[1] + part[2]) / 2.0;
+    const Eigen::Vector3d ca = (part[2] + part[0]) / 2.0;
+    Deviation largest;
+    for (const Corners& quarter : {Corners{part[0], ab, ca}, Corners{ab, part[1], bc},
+                                   Corners{ca, bc, part[2]}, Corners{ab, bc, ca}}) {
+      const Deviation here = of(quarter);
+      if (here.bound_m > largest.bound_m) largest = here;
+      if (here.nearest_there != none) break;
+    }
+    return largest;
+  }
+
+  double distance_from(std::uint32_t triangle, const Eigen::Vector3d& point) const {
+    const Triangle& t = to_.triangles[triangle];
+    return (nearest_on_triangle(point, to_.vertices[t[0]], to_.vertices[t[1]], to_.vertices[t[2]]) -
+            point)
+        .norm();
+  }
+
+  const TriangleMesh& to_;
+  SurfaceDistance surface_;
+  double allowed_;
+};
+
+std::vector<Deviation> deviations(const TriangleMesh& from, const TriangleMesh& to,
+                                  double allowed_m) {
+  const DeviationBound bound(to, allowed_m);
+  std::vector<Deviation> result(from.triangles.size());
+  parallel_for(result.size(), triangles_grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const Triangle& t = from.triangles[n];
+      result[n] = bound.of({from.vertices[t[0]], from.vertices[t[1]], from.vertices[t[2]]});
+    }
+  });
+  return result;
+}
+
+double largest_of(const std::vector<Deviation>& deviations) {
+  double largest = 0.0;
+  for (const Deviation& one : deviations) largest = std::max(largest, one.bound_m);
+  return largest;
+}
+
+// The larger of both ways. Vertices of the original at places where it is not allowed are locked,
+// with `rings` of triangles around.
+double deviation(const TriangleMesh& original, const TriangleMesh& smaller, double allowed_m,
+                 int rings, std::vector<bool>& locked) {
+  const std::vector<Deviation> there = deviations(smaller, original, allowed_m);
+  const std::vector<Deviation> back = deviations(original, smaller, allowed_m);
+  std::vector<bool> marks(original.triangles.size(), false);
+  for (const Deviation& one : there)
+    if (one.nearest_there != none) marks[one.nearest_there] = true;
+  for (std::size_t t = 0; t < back.size(); ++t)
+    if (back[t].nearest_there != none) marks[t] = true;
+  grow_marks(original, rings, marks);
+  for (std::size_t t = 0; t < marks.size(); ++t)
+    if (marks[t])
+      for (const std::uint32_t v : original.triangles[t]) locked[v] = true;
+  return std::max(largest_of(there), largest_of(back));
+}
+
+}  // namespace
+
+MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m, Progress& progress) {
+  MeshDecimation result;
+  if (max_error_m <= 0.0 || mesh.triangles.empty()) return result;
+  double tolerance = tolerance_share * max_error_m;
+  std::vector<bool> locked(mesh.vertices.size(), false);
+  progress.begin("decimating", 0);
+  for (int attempt = 0; attempt < max_attempts; ++attempt) {
+    if (attempt >= max_attempts / 2) tolerance *= next_share;
+    ++result.attempts;
+    TriangleMesh smaller = collapsed(mesh, locked, tolerance);
+    if (smaller.triangles.empty() || smaller.triangles.size() == mesh.triangles.size()) break;
+    const double proved = deviation(mesh, smaller, max_error_m, attempt, locked);
+    if (proved > max_error_m) continue;
+    result.deviation_m = proved;
+    result.removed_triangles = mesh.triangles.size() - smaller.triangles.size();
+    mesh = std::move(smaller);
+    break;
+  }
+  progress.end();
+  return result;
+}
+
+}  // namespace libmap

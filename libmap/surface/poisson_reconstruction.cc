@@ -1,0 +1,306 @@
+#include "libmap/surface/poisson_reconstruction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <tuple>
+
+#include "libmap/core/error.h"
+#include "libmap/core/median.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/point_tree.h"
+#include "libmap/core/symmetric_eigen.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/mesh_parts.h"
+#include "libmap/surface/cloud_values.h"
+#include "libmap/surface/pcl_poisson.h"
+
+namespace libmap {
+
+namespace {
+
+// Neighbors by which the distance between samples is estimated.
+constexpr std::size_t spacing_neighbors = 8;
+// Smallest weight of a point.
+constexpr double min_weight = 1.0 / 16;
+// The octree's cube against the samples' box, at least.
+constexpr double cube_margin = 1.1;
+constexpr int min_depth = 3;
+// Smallest second standard deviation of a cloud's positions, against its first, of a surface.
+constexpr double min_width = 1e-4;
+
+struct UsedPoint {
+  std::size_t index;
+  Eigen::Vector3i cell;
+  Eigen::Vector3d position;  // cells
+};
+
+class Reconstruction {
+ public:
+  Reconstruction(const PointCloud& cloud, const PoissonReconstructionOptions& options,
+                 Progress& progress)
+      : cloud_(cloud), options_(options), progress_(progress) {}
+
+  PoissonReconstructionResult run() {
+    timed("samples", [&] {
+      choose_points();
+      choose_cell_size();
+      make_samples();
+      find_spacings();
+    });
+    TriangleMesh surface;
+    timed("poisson", [&] {
+      progress_.begin("Poisson reconstruction", 0);
+      surface = solve_poisson(samples_, problem_);
+    });
+    timed("trimming", [&] { trim(surface); });
+    timed("values", [&] {
+      carry_values(cloud_, PointTree(cloud_.positions), 0.5 * result_.cell_size_m, result_.mesh);
+      result_.mesh.vertex_normals = estimate_vertex_normals(result_.mesh);
+    });
+    return std::move(result_);
+  }
+
+ private:
+  template <typename Step>
+  void timed(const char* name, const Step& step) {
+    libmap::timed(result_.timings_s, name, step);
+  }
+
+  Eigen::Vector3d in_cells(const Eigen::Vector3d& position) const {
+    return (position - origin_) / result_.cell_size_m;
+  }
+
+  void choose_points();
+  void choose_cell_size();
+  double weight_of(std::size_t point) const;
+  void make_samples();
+  void add_cell(const UsedPoint* begin, const UsedPoint* end);
+  void find_spacings();
+  void trim(TriangleMesh& surface);
+  bool is_near(const TriangleMesh& mesh, const Triangle& triangle, const PointTree& tree) const;
+
+  const PointCloud& cloud_;
+  const PoissonReconstructionOptions& options_;
+  Progress& progress_;
+  std::vector<std::size_t> used_;
+  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
+  double median_error_m_ = 0.0;
+  const ScalarField* errors_ = nullptr;
+  PoissonProblem problem_;
+  std::vector<PoissonSample> samples_;   // about the origin
+  std::vector<Eigen::Vector3d> places_;  // of the samples, so too
+  std::vector<double> spacings_m_;       // around the samples
+  PoissonReconstructionResult result_;
+};
+
+void Reconstruction::choose_points() {
+  cloud_.check();
+  if (!cloud_.has_normals()) throw Error("the cloud has no normals");
+  for (std::size_t n = 0; n < cloud_.size(); ++n) {
+    const float length = cloud_.normals[n].norm();
+    if (cloud_.positions[n].allFinite() && std::isfinite(length) && length > 0.0F)
+      used_.push_back(n);
+  }
+  result_.dropped_points = cloud_.size() - used_.size();
+  if (used_.empty()) throw Error("no point of the cloud has a normal");
+  // By position, so that the order of the points has no influence.
+  const auto& positions = cloud_.positions;
+  const auto& normals = cloud_.normals;
+  std::sort(used_.begin(), used_.end(), [&](std::size_t a, std::size_t b) {
+    return std::tie(positions[a].x(), positions[a].y(), positions[a].z(), normals[a].x(),
+                    normals[a].y(), normals[a].z()) < std::tie(positions[b].x(), positions[b].y(),
+                                                               positions[b].z(), normals[b].x(),
+                                                               normals[b].y(), normals[b].z());
+  });
+}
+
+void Reconstruction::choose_cell_size() {
+  std::vector<Eigen::Vector3d> places;
+  places.reserve(used_.size());
+  for (const std::size_t n : used_)
+    if (places.empty() || places.back() != cloud_.positions[n])
+      places.push_back(cloud_.positions[n]);
+  const auto too_thin = [&](const char* reason) {
+    return Error(reason, {.file = {},
+                          .field = "points",
+                          .value = std::to_string(places.size()) + " places",
+                          .bound = {}});
+  };
+  if (places.size() < 3) throw too_thin("too few points for a surface");
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& place : places)
+    mean += (place - places.front()) / static_cast<double>(places.size());
+  Eigen::Matrix3d moments = Eigen::Matrix3d::Zero();
+  for (const Eigen::Vector3d& place : places) {
+    const Eigen::Vector3d arm = place - places.front() - mean;
+    moments += arm * arm.transpose();
+  }
+  const Eigen::Vector3d spread = symmetric_eigen(moments).values;
+  if (!(spread[1] > min_width * min_width * spread[2]))
+    throw too_thin("the points lie on a line: there is no surface through them");
+  result_.spacing_m = median_spacing(places);
+  result_.cell_size_m = options_.cell_size_m > 0.0 ? options_.cell_size_m : result_.spacing_m;
+  const Bounds3d bounds = bounds_of(places);
+  origin_ = (bounds.min + bounds.max) / 2;
+  const double extent = (bounds.max - bounds.min).maxCoeff();
+  // The surface is kept as far as cells reach: such ones would invent ground around the points.
+  if (result_.cell_size_m > extent)
+    throw Error("cells larger than the cloud",
+                {.file = {},
+                 .field = "cell_size_m",
+                 .value = to_text(static_cast<float>(result_.cell_size_m)),
+                 .bound = "<= " + to_text(static_cast<float>(extent)) + " m"});
+  const double cells = cube_margin * extent / result_.cell_size_m;
+  const double most = std::exp2(max_octree_depth);
+  if (!(cells <= most))
+    throw Error(
+        "the octree would be deeper than " + std::to_string(max_octree_depth) + " levels",
+        {.file = {},
+         .field = "cell_size_m",
+         .value = to_text(static_cast<float>(result_.cell_size_m)),
+         .bound = ">= " + to_text(static_cast<float>(result_.cell_size_m * cells / most)) + " m"});
+  problem_.depth = std::max(min_depth, static_cast<int>(std::ceil(std::log2(cells))));
+  problem_.cube_m = result_.cell_size_m * std::exp2(problem_.depth);
+  problem_.screening = options_.screening;
+  problem_.samples_per_cell = options_.samples_per_cell;
+  result_.octree_depth = problem_.depth;
+}
+
+double Reconstruction::weight_of(std::size_t point) const {
+  if (errors_ == nullptr) return 1.0;
+  const double ratio = median_error_m_ / errors_->values[point];
+  if (std::isnan(ratio)) return 1.0;
+  return std::clamp(ratio * ratio, min_weight, 1.0);
+}
+
+void Reconstruction::make_samples() {
+  errors_ = options_.weigh_by_error ? cloud_.find_field("expected_error") : nullptr;
+  if (errors_ != nullptr) {
+    std::vector<double> errors;
+    for (const std::size_t n : used_)
+      if (errors_->values[n] > 0.0 && std::isfinite(errors_->values[n]))
+        errors.push_back(errors_->values[n]);
+    if (errors.empty()) {
+      errors_ = nullptr;
+    } else {
+      median_error_m_ = median(std::move(errors));
+    }
+  }
+  std::vector<UsedPoint> points;
+  points.reserve(used_.size());
+  for (const std::size_t n : used_) {
+    const Eigen::Vector3d position = in_cells(cloud_.positions[n]);
+    points.push_back({n, position.array().floor().cast<int>(), position});
+  }
+  // Block by block, cell by cell: what is near in space is near in memory.
+  const auto place = [](const UsedPoint& point) {
+    const Eigen::Vector3i& cell = point.cell;
+    return std::tuple(cell.z() >> 3, cell.y() >> 3, cell.x() >> 3, cell.z(), cell.y(), cell.x());
+  };
+  std::stable_sort(points.begin(), points.end(),
+                   [&](const UsedPoint& a, const UsedPoint& b) { return place(a) < place(b); });
+  for (std::size_t begin = 0; begin < points.size();) {
+    std::size_t end = begin + 1;
+    while (end < points.size() && points[end].cell == points[begin].cell) ++end;
+    add_cell(points.data() + begin, points.data() + end);
+    begin = end;
+  }
+  result_.samples = samples_.size();
+}
+
+// One sample for each side of a cell's surface.
+void Reconstruction::add_cell(const UsedPoint* begin, const UsedPoint* end) {
+  const auto normal_of = [&](const UsedPoint& point) {
+    return cloud_.normals[point.index].normalized();
+  };
+  const Eigen::Vector3f front = normal_of(*begin);
+  for (const bool back : {false, true}) {
+    double weights = 0.0;
+    std::size_t count = 0;
+    Eigen::Vector3d position = Eigen::Vector3d::Zero();
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    for (const UsedPoint* point = begin; point != end; ++point) {
+      const Eigen::Vector3f own = normal_of(*point);
+      if ((own.dot(front) < 0.0F) != back) continue;
+      const double weight = weight_of(point->index);
+      weights += weight;
+      ++count;
+      position += weight * point->position;
+      normal += static_cast<float>(weight) * own;
+    }
+    if (count == 0) continue;
+    PoissonSample sample;
+    sample.position = (position / weights * result_.cell_size_m).cast<float>();
+    sample.normal = normal.normalized();
+    sample.weight = static_cast<float>(weights / static_cast<double>(count));
+    samples_.push_back(sample);
+  }
+}
+
+void Reconstruction::find_spacings() {
+  places_.reserve(samples_.size());
+  for (const PoissonSample& sample : samples_) places_.push_back(sample.position.cast<double>());
+  spacings_m_.resize(samples_.size());
+  const PointTree tree(places_);
+  parallel_for(samples_.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
+      // The disc that reaches the last of them holds so many.
+      const double count = static_cast<double>(neighbors.size()) - 0.5;
+      spacings_m_[n] = std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count);
+    }
+  });
+}
+
+// Whether the triangle lies near samples, and on their side.
+bool Reconstruction::is_near(const TriangleMesh& mesh, const Triangle& triangle,
+                             const PointTree& tree) const {
+  const Eigen::Vector3d normal = area_normal(mesh, triangle);
+  for (const std::uint32_t corner : triangle) {
+    const NeighborPoint nearest = tree.nearest(mesh.vertices[corner]);
+    const double reach =
+        options_.trim_distance_cells * std::max(result_.cell_size_m, spacings_m_[nearest.index]);
+    if (nearest.square_m2 > reach * reach ||
+        samples_[nearest.index].normal.cast<double>().dot(normal) < 0.0)
+      return false;
+  }
+  return true;
+}
+
+void Reconstruction::trim(TriangleMesh& surface) {
+  const PointTree tree(places_);
+  std::vector<char> near(surface.triangles.size());
+  parallel_for(near.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      near[n] = is_near(surface, surface.triangles[n], tree);
+  });
+  result_.trimmed_triangles = static_cast<std::size_t>(std::count(near.begin(), near.end(), 0));
+  result_.mesh = select_triangles(surface, {near.begin(), near.end()});
+  for (Eigen::Vector3d& vertex : result_.mesh.vertices) vertex += origin_;
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, PoissonReconstructionOptions& options) {
+  table.add("cell_size_m", options.cell_size_m, not_negative,
+            "of the finest cells, and edges; 0: the distance between the cloud's points");
+  table.add("screening", options.screening, not_negative,
+            "how much the surface is held to the points against being smooth");
+  table.add("weigh_by_error", options.weigh_by_error,
+            "points count by the inverse square of their field expected_error");
+  table.add("samples_per_cell", options.samples_per_cell, positive,
+            "points in a cell; with fewer the cells are larger there");
+  table.add("trim_distance_cells", options.trim_distance_cells, positive,
+            "no surface farther than this from all points, in cells or in the points' spacing");
+}
+
+PoissonReconstructionResult reconstruct_surface(const PointCloud& cloud,
+                                                const PoissonReconstructionOptions& options,
+                                                Progress& progress) {
+  check_parameters(options);
+  return Reconstruction(cloud, options, progress).run();
+}
+
+}  // namespace libmap

@@ -1,0 +1,169 @@
+#include "libmap/texture/mesh_subdivision.h"
+
+#include <algorithm>
+#include <array>
+#include <cstddef>
+#include <utility>
+
+#include "libmap/core/parallel.h"
+#include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/mesh_parts.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::uint32_t no_vertex = 0xffffffff;
+constexpr std::size_t edges_per_chunk = 1024;
+// Of the largest coordinate: shorter sides are not halved, for their middles were rounded.
+constexpr double min_side = 1e-12;
+
+double largest_coordinate(const TriangleMesh& mesh) {
+  double largest = 0.0;
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    largest = std::max(largest, vertex.cwiseAbs().maxCoeff());
+  return largest;
+}
+
+double squared_length(const TriangleMesh& mesh, HalfEdge h) {
+  return (mesh.vertices[source_of(mesh.triangles, h)] - mesh.vertices[target_of(mesh.triangles, h)])
+      .squaredNorm();
+}
+
+bool is_long(const TriangleMesh& mesh, HalfEdge h, double max_side_m) {
+  return squared_length(mesh, h) > max_side_m * max_side_m;
+}
+
+// Parts of a triangle that needs no cutting need none: `open` says which triangles still may.
+void close_triangles(const TriangleMesh& mesh, double max_side_m, const NeedsCutting& needs_cutting,
+                     std::vector<std::uint8_t>& open) {
+  parallel_for(open.size(), edges_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) {
+      if (open[t] == 0) continue;
+      const auto h = static_cast<HalfEdge>(3 * t);
+      const bool any_long = is_long(mesh, h, max_side_m) || is_long(mesh, h + 1, max_side_m) ||
+                            is_long(mesh, h + 2, max_side_m);
+      if (!any_long || !needs_cutting(mesh, mesh.triangles[t])) open[t] = 0;
+    }
+  });
+}
+
+// The long edges of open triangles.
+std::vector<std::uint32_t> edges_to_halve(const TriangleMesh& mesh, const MeshEdges& edges,
+                                          double max_side_m,
+                                          const std::vector<std::uint8_t>& open) {
+  std::vector<std::uint32_t> found;
+  for (std::uint32_t e = 0; e < edges.size(); ++e) {
+    const auto first = edges.half_edges.begin() + edges.first[e];
+    if (is_long(mesh, *first, max_side_m) &&
+        std::any_of(first, edges.half_edges.begin() + edges.first[e + 1],
+                    [&open](HalfEdge h) { return open[h / 3] != 0; }))
+      found.push_back(e);
+  }
+  return found;
+}
+
+// Each middle of a triangle's side makes one more triangle.
+std::uint64_t new_triangles(const MeshEdges& edges, const std::vector<std::uint32_t>& halved) {
+  std::uint64_t count = 0;
+  for (const std::uint32_t e : halved) count += edges.count(e);
+  return count;
+}
+
+// The vertex in the middle of each half-edge that is halved.
+std::vector<std::uint32_t> add_middles(TriangleMesh& mesh, const MeshEdges& edges,
+                                       const std::vector<std::uint32_t>& halved) {
+  std::vector<std::uint32_t> middles(3 * mesh.triangles.size(), no_vertex);
+  for (const std::uint32_t e : halved) {
+    const HalfEdge h = edges.half_edges[edges.first[e]];
+    const std::uint32_t a = source_of(mesh.triangles, h);
+    const std::uint32_t b = target_of(mesh.triangles, h);
+    const std::uint32_t middle = append_vertex_between(mesh, std::min(a, b), std::max(a, b), 0.5);
+    for (std::size_t i = edges.first[e]; i < edges.first[e + 1]; ++i)
+      middles[edges.half_edges[i]] = middle;
+  }
+  return middles;
+}
+
+// The parts of a triangle whose sides have these middles, in its own sense.
+std::vector<Triangle> parts_of(const TriangleMesh& mesh, Triangle t,
+                               std::array<std::uint32_t, 3> middles) {
+  const auto count =
+      std::count_if(middles.begin(), middles.end(), [](std::uint32_t m) { return m != no_vertex; });
+  if (count == 0) return {t};
+  if (count == 3)
+    return {{t[0], middles[0], middles[2]},
+            {middles[0], t[1], middles[1]},
+            {middles[2], middles[1], t[2]},
+            {middles[0], middles[1], middles[2]}};
+  // Turned so that side 0 is the only one with a middle, or side 2 the only one without.
+  const auto turn = [&] {
+    std::rotate(t.begin(), t.begin() + 1, t.end());
+    std::rotate(middles.begin(), middles.begin() + 1, middles.end());
+  };
+  if (count == 1) {
+    while (middles[0] == no_vertex) turn();
+    return {{t[0], middles[0], t[2]}, {middles[0], t[1], t[2]}};
+  }
+  while (middles[2] != no_vertex) turn();
+  const Triangle tip = {middles[0], t[1], middles[1]};
+  // The quadrangle t0 m0 m1 t2, cut along its shorter diagonal.
+  const auto distance = [&mesh](std::uint32_t a, std::uint32_t b) {
+    return (mesh.vertices[a] - mesh.vertices[b]).squaredNorm();
+  };
+  if (distance(t[0], middles[1]) <= distance(middles[0], t[2]))
+    return {tip, {t[0], middles[0], middles[1]}, {t[0], middles[1], t[2]}};
+  return {tip, {t[0], middles[0], t[2]}, {middles[0], middles[1], t[2]}};
+}
+
+void cut(SubdivisionResult& result, std::vector<std::uint8_t>& open,
+         const std::vector<std::uint32_t>& middles) {
+  TriangleMesh& fine = result.mesh;
+  std::vector<Triangle> triangles;
+  std::vector<std::uint32_t> source;
+  std::vector<std::uint8_t> open_parts;
+  for (std::size_t t = 0; t < fine.triangles.size(); ++t)
+    for (const Triangle& part : parts_of(
+             fine, fine.triangles[t], {middles[3 * t], middles[3 * t + 1], middles[3 * t + 2]})) {
+      triangles.push_back(part);
+      source.push_back(result.source[t]);
+      open_parts.push_back(open[t]);
+    }
+  fine.triangles = std::move(triangles);
+  result.source = std::move(source);
+  open = std::move(open_parts);
+}
+
+}  // namespace
+
+SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
+                                   std::uint64_t max_triangles, const NeedsCutting& needs_cutting) {
+  SubdivisionResult result;
+  result.mesh = mesh;
+  result.max_side_m = std::max(max_side_m, min_side * largest_coordinate(mesh));
+  result.source.resize(mesh.triangles.size());
+  for (std::uint32_t t = 0; t < result.source.size(); ++t) result.source[t] = t;
+  TriangleMesh& fine = result.mesh;
+  const std::uint64_t most = std::max<std::uint64_t>(max_triangles, 2 * mesh.triangles.size());
+  std::vector<std::uint8_t> open(mesh.triangles.size(), 1);
+  for (;;) {
+    close_triangles(fine, result.max_side_m, needs_cutting, open);
+    const MeshEdges edges = edges_of(fine.triangles, fine.vertices.size());
+    std::vector<std::uint32_t> halved = edges_to_halve(fine, edges, result.max_side_m, open);
+    while (fine.triangles.size() + new_triangles(edges, halved) > most) {
+      result.max_side_m *= 1.25;
+      halved = edges_to_halve(fine, edges, result.max_side_m, open);
+    }
+    if (halved.empty()) break;
+    cut(result, open, add_middles(fine, edges, halved));
+  }
+  for (std::size_t f = 0; f < fine.face_fields.size(); ++f) {
+    std::vector<double> values;
+    values.reserve(result.source.size());
+    for (const std::uint32_t t : result.source) values.push_back(mesh.face_fields[f].values[t]);
+    fine.face_fields[f].values = std::move(values);
+  }
+  return result;
+}
+
+}  // namespace libmap

@@ -1,0 +1,356 @@
+#include "libmap/texture/texture_views.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "libmap/core/parallel.h"
+#include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/ray_caster.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t vertices_per_chunk = 4096;
+// Of a photograph's smaller side: within it, towards the border, a view counts less and less.
+constexpr double border_band = 0.15;
+constexpr double min_border_share = 0.05;
+// Vertices whose colors are compared between all photographs.
+constexpr std::size_t wanted_observed_vertices = 20000;
+// A triangle that is larger in the photograph is tested at its center too.
+constexpr float center_test_px = 6.0F;
+
+// What stands this much of the tolerance above a triangle's plane is no part of its own surface.
+constexpr double occluder_tolerances = 3.0;
+// Of the quality of a view beside an occluder.
+constexpr float beside_occluder = 0.02F;
+
+// A vertex in the photograph at hand.
+struct SeenVertex {
+  float x = 0.0F;
+  float y = 0.0F;
+  float z = 0.0F;  // m; 0 where the camera cannot see such a direction
+  bool in_image = false;
+  bool visible = false;
+};
+
+double smooth_step(double t) {
+  const double s = std::clamp(t, 0.0, 1.0);
+  return s * s * (3.0 - 2.0 * s);
+}
+
+class ViewFinder {
+ public:
+  ViewFinder(const TriangleMesh& mesh, const TexturePhotos& photos,
+             const TextureViewOptions& options, TextureViews& views)
+      : mesh_(mesh),
+        photos_(photos),
+        options_(options),
+        views_(views),
+        caster_(mesh),
+        around_(triangles_at_vertices(mesh.triangles, mesh.vertices.size())),
+        min_cos_(std::cos(options.max_incidence_deg * std::numbers::pi / 180.0)),
+        vertices_(mesh.vertices.size()),
+        qualities_(mesh.triangles.size()) {
+    normals_.reserve(mesh.triangles.size());
+    for (const Triangle& triangle : mesh.triangles)
+      normals_.push_back(area_normal(mesh, triangle).normalized());
+  }
+
+  void look_from(std::size_t photo) {
+    projector_ = &photos_[photo].projector;
+    project_vertices();
+    fill_cells();
+    rate_triangles(photos_[photo].sharpness);
+    cast_to_vertices();
+    test_triangles();
+    devalue_occluded_edges();
+    keep(static_cast<std::uint32_t>(photo));
+    observe(static_cast<std::uint32_t>(photo));
+  }
+
+ private:
+  void project_vertices();
+  void fill_cells();
+  bool is_beside_occluder(std::size_t triangle) const;
+  void devalue_occluded_edges();
+  void rate_triangles(double sharpness);
+  void cast_to_vertices();
+  void test_triangles();
+  void keep(std::uint32_t photo);
+  void observe(std::uint32_t photo);
+  std::size_t cell_at(const SeenVertex& vertex) const {
+    const auto side = static_cast<float>(options_.occlusion_margin_px);
+    return static_cast<std::size_t>((vertex.y + 0.5F) / side) *
+               static_cast<std::size_t>(cell_columns_) +
+           static_cast<std::size_t>((vertex.x + 0.5F) / side);
+  }
+  std::vector<bool> hidden(const std::vector<Eigen::Vector3d>& points) const;
+  float rate(std::size_t triangle, double sharpness) const;
+  float quality_at(std::uint32_t vertex) const;
+  float longest_side_px(const Triangle& triangle) const;
+
+  const TriangleMesh& mesh_;
+  const TexturePhotos& photos_;
+  const TextureViewOptions& options_;
+  TextureViews& views_;
+  RayCaster caster_;
+  VertexTriangles around_;
+  double min_cos_;
+  std::vector<Eigen::Vector3d> normals_;
+  // Of the photograph at hand.
+  const PhotoProjector* projector_ = nullptr;
+  std::vector<SeenVertex> vertices_;
+  std::vector<float> qualities_;  // 0: not seen
+  // Squares of occlusion_margin_px pixels: the least z of vertices in each, and the ray through its
+  // middle in the world's axes (zero where there is none).
+  int cell_columns_ = 0;
+  int cell_rows_ = 0;
+  std::vector<float> cell_z_;
+  std::vector<Eigen::Vector3d> cell_rays_;
+};
+
+void ViewFinder::project_vertices() {
+  const Camera& camera = projector_->camera();
+  const double border = options_.border_px;
+  parallel_for(vertices_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const Eigen::Vector3d seen = projector_->project(mesh_.vertices[v]);
+      SeenVertex& vertex = vertices_[v];
+      vertex = {static_cast<float>(seen.x()), static_cast<float>(seen.y()),
+                static_cast<float>(seen.z()), false, false};
+      vertex.in_image = seen.z() > 0.0 && seen.x() >= border && seen.y() >= border &&
+                        seen.x() <= camera.width - 1 - border &&
+                        seen.y() <= camera.height - 1 - border;
+    }
+  });
+}
+
+void ViewFinder::fill_cells() {
+  const int side = options_.occlusion_margin_px;
+  if (side == 0) return;
+  const Camera& camera = projector_->camera();
+  cell_columns_ = (camera.width - 1) / side + 1;
+  cell_rows_ = (camera.height - 1) / side + 1;
+  const auto count = static_cast<std::size_t>(cell_columns_) * static_cast<std::size_t>(cell_rows_);
+  cell_z_.assign(count, std::numeric_limits<float>::infinity());
+  for (const SeenVertex& vertex : vertices_) {
+    if (!(vertex.z > 0.0F) || !(vertex.x > -0.5F) || !(vertex.y > -0.5F)) continue;
+    if (!(vertex.x < static_cast<float>(camera.width) - 0.5F)) continue;
+    if (!(vertex.y < static_cast<float>(camera.height) - 0.5F)) continue;
+    float& z = cell_z_[cell_at(vertex)];
+    z = std::min(z, vertex.z);
+  }
+  cell_rays_.resize(count);
+  parallel_for(count, vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    const auto columns = static_cast<std::size_t>(cell_columns_);
+    for (std::size_t i = begin; i < end; ++i) {
+      const std::size_t column = i % columns;
+      const std::size_t row = i / columns;
+      const Eigen::Vector2d cell(static_cast<double>(column), static_cast<double>(row));
+      const auto ray = pixel_to_ray(camera, (side * cell).array() + (side - 1) / 2.0);
+      cell_rays_[i] = ray ? projector_->to_world(ray->homogeneous()) : Eigen::Vector3d::Zero();
+    }
+  });
+}
+
+// Whether something seen in the squares around the triangle stands before its plane.
+bool ViewFinder::is_beside_occluder(std::size_t t) const {
+  const Triangle& triangle = mesh_.triangles[t];
+  const Eigen::Vector3d& normal = normals_[t];
+  const double height = normal.dot(mesh_.vertices[triangle[0]] - projector_->position());
+  const double gap = occluder_tolerances * options_.occlusion_tolerance_m;
+  const auto cell = static_cast<int>(cell_at(vertices_[triangle[0]]));
+  for (int row = std::max(0, cell / cell_columns_ - 1);
+       row <= std::min(cell_rows_ - 1, cell / cell_columns_ + 1); ++row)
+    for (int column = std::max(0, cell % cell_columns_ - 1);
+         column <= std::min(cell_columns_ - 1, cell % cell_columns_ + 1); ++column) {
+      const int index = row * cell_columns_ + column;
+      const auto i = static_cast<std::size_t>(index);
+      if (!std::isfinite(cell_z_[i])) continue;
+      // Both are negative below the camera.
+      if (normal.dot(cell_rays_[i]) * static_cast<double>(cell_z_[i]) - height > gap) return true;
+    }
+  return false;
+}
+
+void ViewFinder::devalue_occluded_edges() {
+  if (options_.occlusion_margin_px == 0) return;
+  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      if (qualities_[t] > 0.0F && is_beside_occluder(t)) qualities_[t] *= beside_occluder;
+  });
+}
+
+// How well the photograph would show the triangle if nothing were before it.
+float ViewFinder::rate(std::size_t t, double sharpness) const {
+  const Triangle& triangle = mesh_.triangles[t];
+  for (const std::uint32_t corner : triangle)
+    if (!vertices_[corner].in_image) return 0.0F;
+  const Eigen::Vector3d center =
+      (mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] + mesh_.vertices[triangle[2]]) /
+      3.0;
+  const Eigen::Vector3d toward = projector_->position() - center;
+  const double distance2 = toward.squaredNorm();
+  const double cosine = normals_[t].dot(toward) / std::sqrt(distance2);
+  if (!(cosine > min_cos_)) return 0.0F;
+  const Camera& camera = projector_->camera();
+  const SeenVertex& a = vertices_[triangle[0]];
+  const double from_border = std::min({static_cast<double>(a.x), static_cast<double>(a.y),
+                                       camera.width - 1.0 - static_cast<double>(a.x),
+                                       camera.height - 1.0 - static_cast<double>(a.y)});
+  const double inside = smooth_step((from_border - options_.border_px) /
+                                    (border_band * std::min(camera.width, camera.height)));
+  const double slant = (cosine - min_cos_) / (1.0 - min_cos_);
+  const double resolution = camera.fx * camera.fy / distance2 * cosine;
+  return static_cast<float>(resolution * slant * std::clamp(sharpness, 0.1, 2.0) *
+                            (min_border_share + (1.0 - min_border_share) * inside));
+}
+
+void ViewFinder::rate_triangles(double sharpness) {
+  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t) qualities_[t] = rate(t, sharpness);
+  });
+}
+
+std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points) const {
+  const Eigen::Vector3d& origin = projector_->position();
+  std::vector<std::uint8_t> flags(points.size(), 0);
+  parallel_for(points.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    std::vector<Eigen::Vector3d> directions;
+    directions.reserve(end - begin);
+    // Rays end before the surface itself.
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3d way = points[i] - origin;
+      directions.push_back(way * std::max(0.0, 1.0 - options_.occlusion_tolerance_m / way.norm()));
+    }
+    std::vector<RayHit> hits(directions.size());
+    caster_.cast_bundle(origin, directions, hits, 0.0, 1.0);
+    for (std::size_t i = 0; i < hits.size(); ++i)
+      flags[begin + i] = hits[i].triangle != RayHit::no_triangle;
+  });
+  return {flags.begin(), flags.end()};
+}
+
+void ViewFinder::cast_to_vertices() {
+  std::vector<std::uint32_t> wanted;
+  std::vector<Eigen::Vector3d> points;
+  for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
+    if (!vertices_[v].in_image) continue;
+    const auto around = around_.of(v);
+    if (std::none_of(around.begin(), around.end(),
+                     [this](std::uint32_t t) { return qualities_[t] > 0.0F; }))
+      continue;
+    wanted.push_back(v);
+    points.push_back(mesh_.vertices[v]);
+  }
+  const std::vector<bool> blocked = hidden(points);
+  for (std::size_t i = 0; i < wanted.size(); ++i) vertices_[wanted[i]].visible = !blocked[i];
+}
+
+float ViewFinder::longest_side_px(const Triangle& triangle) const {
+  float longest = 0.0F;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const SeenVertex& a = vertices_[triangle[k]];
+    const SeenVertex& b = vertices_[triangle[(k + 1) % 3]];
+    longest = std::max(longest, (a.x - b.x) * (a.x - b.x) + (a.y - b.y) * (a.y - b.y));
+  }
+  return std::sqrt(longest);
+}
+
+void ViewFinder::test_triangles() {
+  std::vector<std::uint32_t> wanted;
+  std::vector<Eigen::Vector3d> centers;
+  for (std::uint32_t t = 0; t < qualities_.size(); ++t) {
+    if (!(qualities_[t] > 0.0F)) continue;
+    const Triangle& triangle = mesh_.triangles[t];
+    if (!vertices_[triangle[0]].visible || !vertices_[triangle[1]].visible ||
+        !vertices_[triangle[2]].visible) {
+      qualities_[t] = 0.0F;
+    } else if (longest_side_px(triangle) > center_test_px) {
+      wanted.push_back(t);
+      centers.push_back((mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] +
+                         mesh_.vertices[triangle[2]]) /
+                        3.0);
+    }
+  }
+  const std::vector<bool> blocked = hidden(centers);
+  for (std::size_t i = 0; i < wanted.size(); ++i)
+    if (blocked[i]) qualities_[wanted[i]] = 0.0F;
+}
+
+// The least of its triangles; 0 where one is not seen. Triangles without area do not count.
+float ViewFinder::quality_at(std::uint32_t v) const {
+  if (!vertices_[v].visible) return 0.0F;
+  float least = std::numeric_limits<float>::infinity();
+  for (const std::uint32_t t : around_.of(v))
+    if (!normals_[t].isZero()) least = std::min(least, qualities_[t]);
+  return std::isfinite(least) ? least : 0.0F;
+}
+
+void ViewFinder::keep(std::uint32_t photo) {
+  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      if (qualities_[t] > 0.0F) views_.of_triangles.insert(t, {photo, qualities_[t]});
+  });
+  parallel_for(vertices_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const float quality = quality_at(static_cast<std::uint32_t>(v));
+      if (quality > 0.0F) views_.of_vertices.insert(v, {photo, quality});
+    }
+  });
+}
+
+void ViewFinder::observe(std::uint32_t photo) {
+  const std::size_t step = std::max<std::size_t>(1, vertices_.size() / wanted_observed_vertices);
+  const Camera& camera = projector_->camera();
+  const auto image = photos_.image(photo);
+  const Eigen::Vector2d middle((camera.width - 1) / 2.0, (camera.height - 1) / 2.0);
+  for (std::size_t v = 0; v < vertices_.size(); v += step) {
+    const SeenVertex& vertex = vertices_[v];
+    if (!(quality_at(static_cast<std::uint32_t>(v)) > 0.0F)) continue;
+    const Eigen::Vector2d pixel(static_cast<double>(vertex.x), static_cast<double>(vertex.y));
+    views_.observations.push_back(
+        {static_cast<std::uint32_t>(v), photo,
+         static_cast<float>((pixel - middle).squaredNorm() / middle.squaredNorm()),
+         sample_bilinear(*image, pixel.x(), pixel.y())});
+  }
+}
+
+}  // namespace
+
+ViewTable::ViewTable(std::size_t rows, std::size_t capacity)
+    : capacity_(capacity), entries_(rows * capacity), counts_(rows, 0) {}
+
+void ViewTable::insert(std::size_t row, ViewQuality view) {
+  ViewQuality* const first = entries_.data() + row * capacity_;
+  std::size_t place = counts_[row];
+  const auto before = [](const ViewQuality& a, const ViewQuality& b) {
+    return a.quality != b.quality ? a.quality > b.quality : a.photo < b.photo;
+  };
+  if (place == capacity_ && !before(view, first[capacity_ - 1])) return;
+  if (place < capacity_) ++counts_[row];
+  place = std::min(place, capacity_ - 1);
+  for (; place > 0 && before(view, first[place - 1]); --place) first[place] = first[place - 1];
+  first[place] = view;
+}
+
+TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,
+                                const TextureViewOptions& options, std::size_t views_a_triangle,
+                                std::size_t views_a_vertex, Progress& progress) {
+  TextureViews views;
+  views.of_triangles = ViewTable(mesh.triangles.size(), views_a_triangle);
+  views.of_vertices = ViewTable(mesh.vertices.size(), views_a_vertex);
+  ViewFinder finder(mesh, photos, options, views);
+  progress.begin("views", photos.size());
+  for (std::size_t photo = 0; photo < photos.size(); ++photo) {
+    finder.look_from(photo);
+    progress.advance(1);
+  }
+  progress.end();
+  return views;
+}
+
+}  // namespace libmap

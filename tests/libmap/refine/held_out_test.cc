@@ -1,0 +1,110 @@
+#include "libmap/refine/held_out.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "libmap/refine/icp_refinement.h"
+#include "libmap/refine/surface_samples.h"
+#include "tests/libmap/refine/synthetic_features.h"
+#include "tests/libmap/refine/textured_scan.h"
+
+namespace held_out_test {
+
+using graspmap_test::around;
+using graspmap_test::boulders;
+using graspmap_test::TexturedScan;
+using libmap::HeldOutChange;
+using libmap::HeldOutEvaluation;
+using libmap::Pose;
+using libmap::SampleUse;
+
+TexturedScan bare_ground(int frames) {
+  TexturedScan scan;
+  for (int n = 0; n < frames; ++n)
+    scan.see(boulders(), around(10.0 * n), libmap::Vector6d::Zero(), false);
+  return scan;
+}
+
+TEST(HeldOut, MeansAreOfWhatBothSetsOfPosesSay) {
+  const double none = std::numeric_limits<double>::quiet_NaN();
+  const HeldOutChange change =
+      libmap::compare_held_out({1.0, none, 2.0, 5.0, 3.0}, {1.5, 2.0, none, 6.0, 3.0});
+  EXPECT_EQ(change.count, 3U);
+  EXPECT_NEAR(change.before, 3.0, 1e-12);
+  EXPECT_NEAR(change.after, 3.5, 1e-12);
+  // Differences 0.5, 1, 0: a deviation of sqrt(1/6), of three.
+  EXPECT_NEAR(change.deviation, std::sqrt(1.0 / 18.0), 1e-12);
+  EXPECT_EQ(libmap::compare_held_out({none}, {1.0}).count, 0U);
+}
+
+HeldOutEvaluation evaluation(double matches, double surfaces) {
+  HeldOutEvaluation made;
+  made.matches = {12000, 1.0, 1.0 + matches, 1e-4};
+  made.surfaces = {36000, 1.0, 1.0 + surfaces, 1e-4};
+  return made;
+}
+
+TEST(HeldOut, AnyRiseOfTheWholeIsWorse) {
+  // Three samples of surfaces count as much as one match.
+  EXPECT_NEAR(evaluation(0.002, -0.001).change(), 0.0005, 1e-12);
+  EXPECT_TRUE(evaluation(1e-5, 0.0).is_worse()) << "however little";
+  EXPECT_TRUE(evaluation(0.002, -0.001).is_worse());
+  EXPECT_FALSE(evaluation(0.001, -0.002).is_worse());
+  EXPECT_FALSE(evaluation(0.0, 0.0).is_worse());
+  EXPECT_TRUE(evaluation(0.01, -0.05).is_worse()) << "a gain that the matches pay";
+  EXPECT_TRUE(evaluation(-0.05, 0.01).is_worse()) << "a gain that the surfaces pay";
+  EXPECT_FALSE(evaluation(0.0, -0.1).is_clearly_better()) << "only the matches tell the lens";
+  EXPECT_FALSE(evaluation(-1e-4, 0.0).is_clearly_better());
+  EXPECT_TRUE(evaluation(-3e-4, 0.0).is_clearly_better());
+}
+
+TEST(HeldOut, SamplesForChecksAreNoOthers) {
+  const TexturedScan scan = bare_ground(2);
+  const auto found = libmap::find_features(scan, {1, 2});
+  std::size_t checks = 0;
+  std::size_t estimation = 0;
+  for (const libmap::FrameFeatures& frame : found.frames) {
+    // More than there are: each once.
+    const auto of_checks = libmap::surface_samples(frame, 1000000, SampleUse::checks);
+    const auto of_estimation = libmap::surface_samples(frame, 1000000, SampleUse::estimation);
+    for (const auto& one : of_checks)
+      for (const auto& other : of_estimation) ASSERT_NE(one.point, other.point);
+    checks += of_checks.size();
+    estimation += of_estimation.size();
+  }
+  EXPECT_NEAR(static_cast<double>(checks) / static_cast<double>(checks + estimation), 0.1, 0.05);
+}
+
+// The surfaces' costs see a shift across the ground that matches of no features can.
+TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
+  const TexturedScan scan = bare_ground(3);
+  const auto found = libmap::find_features(scan, {1, 2, 3});
+  std::vector<libmap::FeatureLink> links(2);
+  links[0].frames = {0, 1};
+  links[1].frames = {1, 2};
+  std::map<int, Pose> truth;
+  std::map<int, Pose> wrong;
+  for (int n = 0; n < 3; ++n) {
+    truth[n + 1] = around(10.0 * n);
+    libmap::Vector6d away = libmap::Vector6d::Zero();
+    away.head<3>() = truth[n + 1].linear().transpose() * Eigen::Vector3d(0, 0, 0.004 * n);
+    wrong[n + 1] = libmap::moved(truth[n + 1], away);
+  }
+  const auto evaluated =
+      libmap::evaluate_held_out(libmap::held_out_costs(found.frames, links, truth),
+                                libmap::held_out_costs(found.frames, links, wrong));
+  EXPECT_GT(evaluated.surfaces.count, 50U);
+  EXPECT_EQ(evaluated.matches.count, 0U);
+  EXPECT_GT(evaluated.change(), 3.0 * evaluated.deviation());
+  EXPECT_TRUE(evaluated.is_worse());
+  // A frame without a pose says nothing.
+  wrong.erase(3);
+  const auto fewer = libmap::evaluate_held_out(libmap::held_out_costs(found.frames, links, truth),
+                                               libmap::held_out_costs(found.frames, links, wrong));
+  EXPECT_LT(fewer.surfaces.count, evaluated.surfaces.count);
+  EXPECT_GT(fewer.surfaces.count, 0U);
+}
+
+}  // namespace held_out_test

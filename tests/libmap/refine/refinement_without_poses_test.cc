@@ -1,0 +1,172 @@
+// Scans whose nodes have no poses, or poses that lie: pictures alone give the way.
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/refine/initial_poses.h"
+#include "libmap/refine/refinement.h"
+#include "libmap/scan/trajectory_text.h"
+#include "tests/libmap/refine/synthetic_features.h"
+#include "tests/libmap/refine/textured_scan.h"
+
+namespace refinement_without_poses_test {
+
+using graspmap_test::around;
+using graspmap_test::beside;
+using graspmap_test::boulders;
+using graspmap_test::looking;
+using graspmap_test::plane_z;
+using graspmap_test::small_options;
+using graspmap_test::TexturedScan;
+using libmap::Pose;
+using libmap::RefinementOptions;
+using libmap::RefinementResult;
+using libmap::StartPoses;
+using libmap::Vector6d;
+
+void forget_poses(TexturedScan& scan) {
+  scan.graph_.links.clear();
+  for (libmap::GraphNode& node : scan.graph_.nodes) node.odometry_from_base.reset();
+}
+
+TexturedScan loop_of(int frames, bool textured = true) {
+  TexturedScan scan;
+  for (int n = 0; n < frames; ++n)
+    scan.see(boulders(), around(15.0 * n, 1.0 + 0.1 * std::sin(0.8 * n)), Vector6d::Zero(),
+             textured);
+  return scan;
+}
+
+const libmap::StageReport& stage_of(const RefinementResult& result, const std::string& name) {
+  for (const libmap::StageReport& stage : result.stages)
+    if (stage.name == name) return stage;
+  throw std::runtime_error("no stage " + name);
+}
+
+double figure(const libmap::StageReport& stage, const std::string& name) {
+  for (const auto& [known, value] : stage.figures)
+    if (known == name) return value;
+  throw std::runtime_error("no figure " + name);
+}
+
+TEST(RefinementWithoutPoses, PicturesAloneGiveTheWay) {
+  TexturedScan scan = loop_of(8);
+  forget_poses(scan);
+  const RefinementResult result = libmap::refine_poses(scan, small_options());
+  EXPECT_EQ(result.poses.size(), 8U);
+  EXPECT_EQ(result.stages.front().name, "start: visual");
+  EXPECT_TRUE(result.warnings.empty());
+  const libmap::StageReport& odometry = stage_of(result, "odometry");
+  EXPECT_LT(odometry.error->absolute.rmse_m, 0.008);
+  EXPECT_EQ(figure(odometry, "links"), 7.0);
+  EXPECT_EQ(figure(odometry, "lost_nodes"), 0.0);
+  EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.002);
+  EXPECT_EQ(result.components.size(), 1U);
+  EXPECT_EQ(result.covariance.size(), 8U);
+}
+
+// Poses and links that lie say nothing where the pictures alone are asked.
+TEST(RefinementWithoutPoses, VisualStartHearsNoOdometry) {
+  TexturedScan scan = loop_of(6);
+  for (std::size_t n = 1; n < 6; ++n)
+    scan.graph_.nodes[n].odometry_from_base = beside(static_cast<double>(n));
+  for (libmap::PoseLink& link : scan.graph_.links) {
+    link.from_from_to = beside(3.0);
+    link.information *= 1e6;
+  }
+  RefinementOptions options = small_options();
+  options.start = StartPoses::visual;
+  const RefinementResult result = libmap::refine_poses(scan, options);
+  EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.002);
+  EXPECT_EQ(result.links.size(), result.closures.size()) << "all were found";
+  EXPECT_TRUE(result.poses.front().world_from_base.isApprox(
+      *scan.graph_.nodes.front().odometry_from_base, 1e-12))
+      << "the first node says where the map lies";
+}
+
+TEST(RefinementWithoutPoses, WhatNothingJoinsIsLeftOutAndNamed) {
+  TexturedScan scan = loop_of(5);
+  for (int n = 0; n < 3; ++n)
+    scan.see(plane_z(0.0), looking({50 + 0.2 * n, 0, 1.1}, {50.4 + 0.2 * n, 0, 0}),
+             Vector6d::Zero());
+  scan.see(boulders(), around(70), Vector6d::Zero(), false);  // blank
+  forget_poses(scan);
+  const RefinementResult result = libmap::refine_poses(scan, small_options());
+  EXPECT_EQ(result.poses.size(), 5U);
+  EXPECT_EQ(result.without_pose, (std::vector<int>{6, 7, 8, 9}));
+  ASSERT_EQ(result.components.size(), 3U);
+  EXPECT_EQ(result.components[1].nodes, (std::vector<int>{6, 7, 8}));
+  ASSERT_EQ(result.losses.size(), 2U);
+  EXPECT_EQ(result.losses[0].node, 6);
+  EXPECT_EQ(result.losses[1].node, 9);
+  ASSERT_EQ(result.warnings.size(), 3U);
+  EXPECT_NE(result.warnings[0].find("node 6, "), std::string::npos);
+  EXPECT_NE(result.warnings[2].find("6, 7, 8, 9"), std::string::npos);
+  for (const libmap::PoseLink& link : result.links) EXPECT_LE(link.to, 5);
+  EXPECT_EQ(result.covariance.size(), 5U);
+}
+
+TEST(RefinementWithoutPoses, TwoSessionsBecomeOneMap) {
+  TexturedScan scan = loop_of(8);
+  for (std::size_t n = 4; n < 8; ++n) scan.graph_.nodes[n].session = 1;
+  forget_poses(scan);
+  const RefinementResult result = libmap::refine_poses(scan, small_options());
+  EXPECT_EQ(result.components.size(), 1U);
+  EXPECT_EQ(result.poses.size(), 8U);
+  EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.003);
+}
+
+TEST(RefinementWithoutPoses, WithoutTextureThereIsNoWay) {
+  TexturedScan scan = loop_of(3, false);
+  forget_poses(scan);
+  try {
+    libmap::refine_poses(scan, small_options());
+    FAIL();
+  } catch (const libmap::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("no two of them could be matched"), std::string::npos);
+  }
+}
+
+TEST(RefinementWithoutPoses, SameBytesForAnyNumberOfThreads) {
+  TexturedScan scan = loop_of(5);
+  forget_poses(scan);
+  const auto bytes = [&](unsigned threads) {
+    const libmap::ThreadLimit limit(threads);
+    const RefinementResult result = libmap::refine_poses(scan, small_options());
+    return libmap::to_g2o(result.poses, result.links);
+  };
+  const std::string one = bytes(1);
+  EXPECT_TRUE(one == bytes(3));
+}
+
+TEST(InitialPoses, LinksAloneGiveParts) {
+  libmap::PoseGraph graph;
+  for (const int node : {1, 2, 3, 5, 6, 9}) graph.nodes.push_back({.id = node});
+  const Pose motion = beside(0.7);
+  for (const auto& [from, to] : {std::pair(1, 2), {3, 2}, {5, 6}})
+    graph.links.push_back(
+        {from, to, libmap::LinkType::neighbor, motion, 100.0 * libmap::Matrix6d::Identity()});
+  // RTAB-Map's way to say that it does not know.
+  graph.links.push_back(
+      {6, 9, libmap::LinkType::neighbor, motion, libmap::Matrix6d::Identity() / 9999.0});
+  const libmap::InitialPoses poses = libmap::initial_poses(graph, StartPoses::automatic);
+  EXPECT_EQ(poses.source, "links");
+  ASSERT_EQ(poses.parts.size(), 2U);
+  EXPECT_EQ(poses.parts[0], (std::vector<int>{1, 2, 3}));
+  EXPECT_EQ(poses.parts[1], (std::vector<int>{5, 6}));
+  EXPECT_EQ(poses.without_pose, std::vector<int>{9});
+  EXPECT_TRUE(poses.map_from_base.at(2).isApprox(motion, 1e-12));
+  EXPECT_TRUE(poses.map_from_base.at(3).isApprox(Pose(motion * motion.inverse()), 1e-12));
+  const libmap::InitialPoses none = libmap::initial_poses(graph, StartPoses::visual);
+  EXPECT_TRUE(none.map_from_base.empty());
+  EXPECT_EQ(none.without_pose.size(), 6U);
+  EXPECT_THROW(libmap::initial_poses(graph, StartPoses::odometry), libmap::Error);
+  EXPECT_THROW(libmap::initial_poses(graph, StartPoses::stored), libmap::Error);
+}
+
+}  // namespace refinement_without_poses_test

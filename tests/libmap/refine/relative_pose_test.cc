@@ -1,0 +1,238 @@
+#include "libmap/refine/relative_pose.h"
+
+#include <gtest/gtest.h>
+
+#include "libmap/refine/bundle_adjustment.h"
+#include "libmap/refine/feature_tracks.h"
+#include "tests/libmap/refine/synthetic_features.h"
+#include "tests/support/test_support.h"
+
+namespace relative_pose_test {
+
+using graspmap_test::error_of;
+using graspmap_test::random_points;
+using graspmap_test::random_step;
+using graspmap_test::same_numbers;
+using graspmap_test::see_points;
+using graspmap_test::uniform;
+using libmap::FeatureMatch;
+using libmap::FrameFeatures;
+using libmap::Pose;
+using libmap::RelativePose;
+using libmap::RelativePoseOutcome;
+using libmap::Vector6d;
+
+Pose some_motion() { return libmap::moved(Pose::Identity(), random_step(0.3, 0.2)); }
+
+TEST(MatchFeatures, FindsEachOnesBestAndLeavesDoubtfulOnesOut) {
+  const auto points = random_points(50);
+  const FrameFeatures a = see_points(1, Pose::Identity(), points);
+  FrameFeatures b = see_points(2, some_motion(), points);
+  const auto vectors = libmap::descriptor_vectors(a);
+  EXPECT_EQ(libmap::match_features(vectors, libmap::descriptor_vectors(b), 0.8), same_numbers(50));
+  // Twice the same descriptor: neither is clearly the best.
+  std::copy_n(b.descriptors.begin(), 128, b.descriptors.begin() + 128);
+  const auto matches = libmap::match_features(vectors, libmap::descriptor_vectors(b), 0.8);
+  EXPECT_EQ(matches.size(), 48U);
+  EXPECT_EQ(matches.front(), (FeatureMatch{2, 2}));
+  EXPECT_TRUE(libmap::match_features(vectors, Eigen::MatrixXf(128, 0), 0.8).empty());
+}
+
+TEST(RelativePose, ExactMatchesGiveTheExactMotionDespiteOutliers) {
+  const auto points = random_points(120);
+  const Pose motion = some_motion();
+  const FrameFeatures a = see_points(1, Pose::Identity(), points);
+  const FrameFeatures b = see_points(2, motion, points);
+  std::vector<FeatureMatch> matches = same_numbers(120);
+  for (std::size_t n = 0; n < 48; ++n) matches[n].b = static_cast<int>((n + 17) % 120);
+  const RelativePose pose = libmap::estimate_relative_pose(a, b, matches, {}, 3);
+  ASSERT_EQ(pose.outcome, RelativePoseOutcome::found);
+  EXPECT_LT(libmap::step_between(motion, pose.a_from_b).norm(), 1e-5);
+  EXPECT_EQ(pose.inliers.size(), 72U);
+}
+
+// With the stated noise the squared errors are chi-square of six.
+TEST(RelativePose, CovarianceIsThatOfTheErrors) {
+  double sum = 0.0;
+  constexpr int trials = 200;
+  for (int n = 0; n < trials; ++n) {
+    const auto points = random_points(80);
+    const Pose motion = some_motion();
+    const FrameFeatures a = see_points(1, Pose::Identity(), points, {.apply = true});
+    const FrameFeatures b = see_points(2, motion, points, {.apply = true});
+    const RelativePose pose = libmap::estimate_relative_pose(a, b, same_numbers(80), {}, 1);
+    ASSERT_EQ(pose.outcome, RelativePoseOutcome::found);
+    const Vector6d error = libmap::step_between(motion, pose.a_from_b);
+    sum += error.dot(pose.information * error);
+  }
+  EXPECT_GT(sum / trials, 4.0);
+  EXPECT_LT(sum / trials, 8.0);
+}
+
+TEST(RelativePose, JacobianIsTheDerivative) {
+  const auto points = random_points(5);
+  const Pose motion = some_motion();
+  const FrameFeatures a = see_points(1, Pose::Identity(), points, {.apply = true});
+  const FrameFeatures b = see_points(2, motion, points, {.apply = true});
+  for (const FeatureMatch& match : same_numbers(5)) {
+    const auto at = libmap::match_residual(a, b, match, motion, true);
+    for (int n = 0; n < 6; ++n) {
+      const Vector6d step = 1e-6 * Vector6d::Unit(n);
+      const Eigen::Vector3d difference =
+          libmap::match_residual(a, b, match, libmap::moved(motion, step)).residual -
+          libmap::match_residual(a, b, match, libmap::moved(motion, -step)).residual;
+      EXPECT_LT((difference / 2e-6 - at.jacobian.col(n)).norm(), 1e-4 * at.jacobian.col(n).norm());
+    }
+  }
+}
+
+TEST(RelativePose, RefusesTooLittle) {
+  auto points = random_points(60);
+  const Pose motion = some_motion();
+  const FrameFeatures a = see_points(1, Pose::Identity(), points);
+  const FrameFeatures b = see_points(2, motion, points);
+  EXPECT_EQ(libmap::estimate_relative_pose(a, b, same_numbers(20), {}, 1).outcome,
+            RelativePoseOutcome::too_few_matches);
+  std::vector<FeatureMatch> shuffled = same_numbers(60);
+  for (std::size_t n = 0; n < 60; ++n) shuffled[n].b = static_cast<int>((7 * n + 11) % 60);
+  EXPECT_EQ(libmap::estimate_relative_pose(a, b, shuffled, {}, 1).outcome,
+            RelativePoseOutcome::too_few_inliers);
+  // All on one line of the picture.
+  for (Eigen::Vector3d& point : points) point = {1.5, uniform(-0.8, 0.8), 0.02};
+  const FrameFeatures on_line = see_points(1, Pose::Identity(), points);
+  const FrameFeatures from_elsewhere = see_points(2, motion, points);
+  EXPECT_NE(
+      libmap::estimate_relative_pose(on_line, from_elsewhere, same_numbers(60), {}, 1).outcome,
+      RelativePoseOutcome::found);
+}
+
+TEST(FeatureTracks, JoinsMatchesAndLeavesConflictsOut) {
+  const auto points = random_points(30);
+  std::vector<FrameFeatures> frames;
+  for (int node = 1; node <= 3; ++node) frames.push_back(see_points(node, some_motion(), points));
+  const auto linked = [&](std::size_t a, std::size_t b) {
+    libmap::FeatureLink link;
+    link.frames = {a, b};
+    link.link.from_from_to = Pose::Identity();
+    link.matches = same_numbers(30);
+    return link;
+  };
+  std::vector<libmap::FeatureLink> links = {linked(0, 1), linked(1, 2)};
+  // The first and the last frame have no link: no track joins them.
+  const libmap::FeatureTracks apart =
+      libmap::build_tracks(frames, links, libmap::TrackFrames::linked);
+  EXPECT_EQ(apart.tracks.size(), 30U);
+  EXPECT_EQ(apart.split, 30U);
+  for (const auto& track : apart.tracks) EXPECT_EQ(track.observations.size(), 2U);
+  libmap::FeatureTracks tracks = libmap::build_tracks(frames, links);
+  ASSERT_EQ(tracks.tracks.size(), 30U);
+  EXPECT_EQ(tracks.conflicts, 0U);
+  for (const auto& track : tracks.tracks) EXPECT_EQ(track.observations.size(), 3U);
+  links.push_back(linked(0, 2));
+  links.back().matches = {{4, 5}};
+  EXPECT_GE(libmap::build_tracks(frames, links).conflicts, 1U);
+}
+
+struct Scene {
+  std::map<int, Pose> truth;
+  std::map<int, Pose> start;
+  std::vector<FrameFeatures> frames;
+  std::vector<libmap::FeatureTrack> tracks;
+  std::vector<libmap::GraphComponent> components;
+};
+
+Scene scene_of(int frames, const graspmap_test::FeatureNoise& noise,
+               const libmap::Camera& camera = graspmap_test::feature_camera()) {
+  Scene scene;
+  const auto points = random_points(150);
+  scene.components = {{{}, 1}};
+  for (int node = 1; node <= frames; ++node) {
+    const Pose pose = libmap::moved(Pose::Identity(), random_step(0.4, 0.2));
+    scene.truth[node] = pose;
+    scene.start[node] = node == 1 ? pose : libmap::moved(pose, random_step(0.01, 0.01));
+    scene.frames.push_back(see_points(node, pose, points, noise, camera));
+    scene.components[0].nodes.push_back(node);
+  }
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    libmap::FeatureTrack track;
+    for (std::size_t f = 0; f < scene.frames.size(); ++f)
+      if ((n + f) % 3 != 0) track.observations.push_back({f, n});
+    scene.tracks.push_back(track);
+  }
+  return scene;
+}
+
+double error_of_poses(const Scene& scene, const std::map<int, Pose>& poses) {
+  double largest = 0.0;
+  for (const auto& [node, pose] : scene.truth)
+    largest = std::max(largest, libmap::step_between(pose, poses.at(node)).norm());
+  return largest;
+}
+
+TEST(BundleAdjustment, RecoversAnExactScene) {
+  const Scene scene = scene_of(6, {});
+  const auto result =
+      libmap::adjust_bundle(scene.frames, scene.tracks, scene.start, {}, scene.components);
+  EXPECT_TRUE(result.converged);
+  EXPECT_GT(error_of_poses(scene, scene.start), 5e-3);
+  EXPECT_LT(error_of_poses(scene, result.map_from_base), 2e-6);
+  EXPECT_LT(result.reprojection_rms_px, 1e-3);
+  EXPECT_EQ(result.tracks, 150U);
+}
+
+TEST(BundleAdjustment, OptionsOutOfTheirRangesAreNamed) {
+  const auto refusal = [](const libmap::BundleAdjustmentOptions& options) {
+    return std::string(error_of([&] {
+                         libmap::adjust_bundle({}, std::vector<libmap::FeatureTrack>{}, {}, {}, {},
+                                               options);
+                       }).what());
+  };
+  EXPECT_EQ(refusal({.robust_scale = 0.0}),
+            "robust_scale is 0: a bundle cannot be adjusted so (must be > 0)");
+  EXPECT_EQ(refusal({.max_iterations = 0}),
+            "max_iterations is 0: a bundle cannot be adjusted so (must be >= 1)");
+}
+
+TEST(BundleAdjustment, InformationIsThatOfTheErrors) {
+  double sum = 0.0;
+  constexpr int trials = 30;
+  for (int n = 0; n < trials; ++n) {
+    const Scene scene = scene_of(4, {.apply = true});
+    libmap::BundleAdjustmentOptions options;
+    options.robust_scale = 1e3;
+    const auto result = libmap::adjust_bundle(scene.frames, scene.tracks, scene.start, {},
+                                              scene.components, options);
+    for (std::size_t a = 1; a < 4; ++a)
+      for (std::size_t b = 1; b < 4; ++b) {
+        const auto step = [&](std::size_t place) {
+          const int node = static_cast<int>(place) + 1;
+          return libmap::step_between(scene.truth.at(node), result.map_from_base.at(node));
+        };
+        sum += step(a).dot(result.information.block(a, b) * step(b));
+      }
+  }
+  // Three free poses: chi-square of eighteen.
+  EXPECT_NEAR(sum / trials, 18.0, 4.0);
+}
+
+TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
+  const Scene scene = scene_of(8, {});
+  std::vector<FrameFeatures> frames = scene.frames;
+  for (FrameFeatures& frame : frames)  // as if pictures lay 0.4 px right and 0.3 px up
+    libmap::move_intrinsics(frame, {{0.0, 0.0, -0.4, 0.3}});
+  for (FrameFeatures& frame : frames) frame.cameras = {graspmap_test::feature_camera()};
+  libmap::BundleAdjustmentOptions options;
+  const auto held =
+      libmap::adjust_bundle(frames, scene.tracks, scene.start, {}, scene.components, options);
+  options.refine_intrinsics = true;
+  options.max_iterations = 100;
+  const auto free =
+      libmap::adjust_bundle(frames, scene.tracks, scene.start, {}, scene.components, options);
+  ASSERT_EQ(free.intrinsics.size(), 1U);
+  EXPECT_NEAR(free.intrinsics[0].cx_px, 0.4, 0.05);
+  EXPECT_NEAR(free.intrinsics[0].cy_px, -0.3, 0.05);
+  EXPECT_LT(free.final_cost, 0.2 * held.final_cost);
+  EXPECT_LT(error_of_poses(scene, free.map_from_base), error_of_poses(scene, held.map_from_base));
+}
+
+}  // namespace relative_pose_test
