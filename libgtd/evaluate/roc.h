@@ -94,7 +94,7 @@ struct RocResult {
   std::size_t left_out_unlabeled = 0;  // a score and no label
 };
 
-// One label and one score a location; a location without either, or whose score is NaN, is left
+// One label and one score per location; a location without either, or whose score is NaN, is left
 // out. Throws libmap::Error if the two differ in length. The same for any number of threads.
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,

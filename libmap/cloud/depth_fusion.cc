@@ -37,7 +37,7 @@ constexpr double first_search_voxels = 3.0;
 constexpr double min_correction_voxels = 0.05;
 
 // Decoded frames and their planes are kept for later passes as far as this reaches.
-constexpr std::size_t max_kept_bytes = std::size_t{512} << 20;
+constexpr std::size_t max_kept_bytes = std::size_t{64} << 20;
 constexpr std::size_t kept_pixel_bytes = 25;
 
 void check(const DepthFusionOptions& options) {

@@ -2,12 +2,12 @@
 //
 // Frames whose poses do not agree are moved together first (frame_registration): a map is as sharp
 // as its poses. Then two passes over the frames. The first fits a plane to the pixels around each
-// pixel (depth_planes) and averages places and normals in a hashed voxel grid (surface_voxels): a
-// coarse surface, one element a voxel. The second moves each element along its normal to the
+// pixel (depth_planes) and averages positions and normals in a hashed voxel grid (surface_voxels):
+// a coarse surface, one element per voxel. The second moves each element along its normal to the
 // weighted mean of what all frames measured within a disc around it (surface_refinement). Both
 // average where the rays meet the surface, not where noise has put the measurements: that is what
-// makes the means free of bias. Memory grows with the occupied voxels alone; besides, up to 512 MB
-// of decoded frames are kept for later passes (20 megapixels: 70 frames of 640 x 480), others are
+// makes the means free of bias. Memory grows with the occupied voxels alone; besides, up to 64 MB
+// of decoded frames are kept for later passes (2.7 megapixels: 12 frames of 512 x 424), others are
 // decoded once per pass.
 #pragma once
 

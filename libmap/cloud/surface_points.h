@@ -29,7 +29,7 @@ struct SurfacePoints {
   PointCloud cloud;
   SurfacePointCounts counts;
 };
-// The refined elements as points: contradicted ones dropped, one left a voxel, edges extended.
+// The refined elements as points: contradicted ones dropped, one left per voxel, edges extended.
 SurfacePoints make_surface_points(const RefinedSurface& surface,
                                   const SurfacePointOptions& options);
 

@@ -13,7 +13,7 @@ namespace libmap {
 using Triangle = std::array<std::uint32_t, 3>;  // vertex indices, counter-clockwise from outside
 
 // Positions in meters. `vertex_normals` and `vertex_colors` are empty or one a vertex, vertex
-// fields hold one value a vertex, face fields one a triangle.
+// fields hold one value per vertex, face fields one per triangle.
 struct TriangleMesh {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<Triangle> triangles;

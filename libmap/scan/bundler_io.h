@@ -25,7 +25,7 @@ struct BundlerView {
 // a camera with distortion, oblong pixels or a principal point off the image's middle.
 std::string to_bundle_text(const std::vector<BundlerView>& views);
 
-// list.txt: an image a line.
+// list.txt: one image per line.
 std::string to_bundler_list(const std::vector<BundlerView>& views);
 
 }  // namespace libmap

@@ -1,7 +1,7 @@
 // The folder in which the images of a camera rig lie, and which of them belong together:
 //
 //   FOLDER/rig.yaml            rig_io.h; or given apart
-//   FOLDER/NAME/STAMP.png      16-bit gray, one folder a camera; STAMP in seconds, e.g. 12.340000
+//   FOLDER/NAME/STAMP.png      16-bit gray, one folder per camera; STAMP in seconds, e.g. 12.340000
 //   FOLDER/images.csv          instead of names that are stamps: columns camera, stamp_s, file
 //                              (relative to FOLDER); where it stands, it alone counts
 #pragma once

@@ -1,4 +1,4 @@
-// Text formats of one record a line.
+// Text formats of one record per line.
 #pragma once
 
 #include <cstddef>

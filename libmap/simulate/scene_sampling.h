@@ -9,7 +9,7 @@
 namespace libmap {
 
 struct SceneSamplingOptions {
-  double spacing_m = 0.005;  // one sample a square of this side, on average
+  double spacing_m = 0.005;  // one sample per square of this side, on average
   std::uint64_t count = 0;   // if not 0, the spacing is chosen to give about so many (2 %)
   double jitter = 0.3;       // of the stratified grid, 0 to 1: gaps are up to (1 + jitter) spacing
   double noise_m = 0.0;      // standard deviation of a Gaussian shift along the normal

@@ -59,7 +59,7 @@ struct TextureAtlas {
   TexturedMesh make_model(const TriangleMesh& mesh, const TexturePhotos& photos) const;
 };
 
-// `label` is one photograph a triangle, or no_photo. Never fails for want of room.
+// `label` is one photograph per triangle, or no_photo. Never fails for want of room.
 TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                                 const std::vector<std::uint32_t>& label,
                                 const TexturePhotos& photos, const TextureAtlasOptions& options);

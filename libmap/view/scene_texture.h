@@ -1,4 +1,4 @@
-// Textured meshes as they are drawn: one layer a page.
+// Textured meshes as they are drawn: one layer per page.
 #pragma once
 
 #include <vector>

@@ -1,6 +1,6 @@
 #!/bin/sh
 # The threshold study and the masks side by side, on coarse ground: all results appear, tables have
-# a row a map, a second run does nothing.
+# one row per map, a second run does nothing.
 . "$(dirname "$0")/check.sh"
 out=$scratch/out
 

@@ -47,8 +47,8 @@ TEST(Render, FootholdsOfTheMap) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(succeeded(
       graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--solid-voxel-threshold", "1"})));
-  ASSERT_TRUE(succeeded(
-      graspmap({"footholds", "map.pcd", "-o", "footholds.csv", "--no-graspable-only", "--border"})));
+  ASSERT_TRUE(succeeded(graspmap(
+      {"footholds", "map.pcd", "-o", "footholds.csv", "--no-graspable-only", "--border"})));
   const std::vector<std::string> words = {
       "render", "map.pcd", "--points", "footholds.csv", "--width", "320", "--height", "240", "-o"};
   const std::map<std::string, std::vector<std::string>> pictures = {

@@ -15,9 +15,9 @@ MaskVoxel kind_of(const libgtd::GripperMask& mask, int x, int y, int z);
 libmap::Color color_of(MaskVoxel kind);
 
 // The vertical section through the pivot (x to the right, z up), the horizontal ones of the top
-// solid layer and of `lower_layer` (x to the right, y up), a square a voxel at its place from the
-// pivot, with measures in millimeters as they are in voxels. Throws Error if the mask has no such
-// layer.
+// solid layer and of `lower_layer` (x to the right, y up), one square per voxel at its place from
+// the pivot, with measures in millimeters as they are in voxels. Throws Error if the mask has no
+// such layer.
 std::vector<libmap::SheetCell> mask_sections(const libgtd::GripperMask& mask, int lower_layer);
 
 // Of the kinds of voxels that the mask has.

@@ -260,7 +260,7 @@ TEST(MeasureDepth, FlyingPixelsStandOnlyAtEdges) {
     sum += depth;
     EXPECT_LE(step.edge_distance(p), 0.51);
   }
-  // The outline is 4 * 0.4 m * about 102 pixels a meter long; one pixel a step of it.
+  // The outline is 4 * 0.4 m * about 102 pixels a meter long; one pixel per step of it.
   EXPECT_NEAR(static_cast<double>(between), 163.0, 8.0);
   EXPECT_EQ(measured.flying, between);
   EXPECT_EQ(measured.edges, between);
