@@ -168,6 +168,9 @@ TEST(MapAnalysis, CountsAndAreasByHand) {
   const MapAnalysis result = libgtd::analyze_map(map, level_surface(map));
   EXPECT_EQ(result.voxels, 2000U);
   EXPECT_EQ(result.at_border, 100U);
+  PointCloud earlier = cloud;  // as earlier versions wrote it
+  earlier.find_field("border")->name = "edge";
+  EXPECT_EQ(libgtd::voxel_map_of(earlier).border, map.border);
   EXPECT_EQ(result.obstacles, 20U);
   EXPECT_EQ(result.graspable, 19U * 20U);  // 0.805 to 0.985
   EXPECT_EQ(result.ground.voxels, 1900U);

@@ -147,6 +147,10 @@ TEST(Footholds, OptionsLeaveOut) {
   EXPECT_EQ(all.candidates, map.size());
   for (const Foothold& one : libgtd::find_footholds(map).footholds)
     EXPECT_GE(one.map_point, map.size() / 2);
+  PointCloud earlier = map;  // as earlier versions wrote it
+  earlier.find_field("border")->name = "edge";
+  EXPECT_EQ(libgtd::find_footholds(earlier).candidates, libgtd::find_footholds(map).candidates);
+  EXPECT_LT(libgtd::find_footholds(map).candidates, map.size() / 2 + 1);
   for (const Foothold& one : libgtd::find_footholds(map, {.min_score = 0.95}).footholds)
     EXPECT_EQ(one.score, 1.0);
   const auto three = libgtd::find_footholds(map, {.max_count = 3});
