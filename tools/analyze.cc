@@ -45,7 +45,8 @@ struct AnalyzeOptions {
   graspmap_tools::MapTableOptions table;
 };
 
-void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
+// Of one map.
+void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind(table, options.analysis);
   bind(table, options.surface);
   bind(table, options.regions);
@@ -53,13 +54,17 @@ void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   table.add("start", options.start,
             "where the robot stands: X,Y,Z in the frame of --points-frame; largest: on the largest "
             "region");
-  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
-            "frame of the start or of the expected regions: of the cloud that was scored, the "
-            "terrain's, or the map's before it was cropped");
   bind(table, options.change);
   table.add("transform", options.transform,
             "carries OTHER's points to MAP's: auto: both were scored from clouds in one frame, or "
             "cropped from one map; X,Y,Z,ROLL,PITCH,YAW in m and degrees, or a file of it");
+}
+
+void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
+  bind_one(table, options);
+  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
+            "frame of the start or of the expected regions: of the cloud that was scored, the "
+            "terrain's, or the map's before it was cropped");
   table.add("pictures", options.pictures, "draw pictures and charts");
   bind(table, options.table);
 }
@@ -336,16 +341,16 @@ void analyze(AnalyzeOptions& options, Run& run) {
     if (!options.other.empty())
       throw graspmap_tools::UsageError(
           "--against is for one MAP without --expected; --pairs compares several");
+    if (const auto key = libmap::changed_key(options, bind_one))
+      throw libmap::Error("is for one map without --expected", {.field = libmap::flag_of(*key)});
     options.table.points_frame = options.points_frame;
     options.table.pictures = options.pictures;
     return graspmap_tools::tabulate_maps(options.maps, options.folder, options.table, run);
   }
-  const graspmap_tools::MapTableOptions unset;
-  for (const auto& [name, is_given] : {std::pair{"--cutoff", options.table.cutoff != unset.cutoff},
-                                       std::pair{"--names", options.table.names != unset.names},
-                                       std::pair{"--pairs", options.table.pairs},
-                                       std::pair{"--varied", options.table.varied != unset.varied}})
-    if (is_given) throw libmap::Error("is for several maps, or with --expected", {.field = name});
+  if (const auto key =
+          libmap::changed_key<graspmap_tools::MapTableOptions>(options.table, graspmap_tools::bind))
+    throw libmap::Error("is for several maps, or with --expected",
+                        {.field = libmap::flag_of(*key)});
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
     throw libmap::Error("is for comparing with OTHER, which is not given",

@@ -211,7 +211,8 @@ void convert(ConvertOptions& options, Run& run) {
   options.input = options.inputs.front();
   if (options.inputs.size() > 1 || graspmap_tools::is_part_of_map(options.input)) {
     refuse_ignored(options);
-    return graspmap_tools::merge_tiles(options.inputs, options.output, run);
+    return graspmap_tools::merge_tiles(options.inputs, options.output,
+                                       {options.encoding, options.big_endian}, run);
   }
   const bool poses = holds_poses(options);
   if (!poses) refuse_ignored(options);

@@ -132,13 +132,12 @@ void fuse(FuseOptions options, Run& run) {
   });
 }
 
-// A folder of a camera rig, or a flag that only rigs have.
+// A folder of a camera rig, or --rig, which names the rig.
 bool names_rig(int argc, char** argv) {
   return std::any_of(argv + 1, argv + argc, [](const std::string& word) {
     std::error_code code;
-    const std::string flag = word.substr(0, word.find('='));
-    return flag == "--rig" || flag == "--stamp" || flag == "--tolerance" || flag == "--stride" ||
-           flag == "--normals" || fs::exists(fs::path(word) / libmap::rig_file_name, code);
+    return word == "--rig" || word.starts_with("--rig=") ||
+           fs::exists(fs::path(word) / libmap::rig_file_name, code);
   });
 }
 

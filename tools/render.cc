@@ -19,6 +19,7 @@ namespace {
 
 using graspmap_tools::MapHeading;
 using graspmap_tools::Run;
+using graspmap_tools::SheetOptions;
 
 struct RenderOptions {
   std::vector<std::string> files;
@@ -27,22 +28,27 @@ struct RenderOptions {
   std::string camera_target;
   graspmap_tools::SceneFileOptions scene;
   libmap::SceneViewOptions view;
-  graspmap_tools::SheetOptions sheet;
+  SheetOptions sheet;
 };
 
-void bind(libmap::ParameterTable& table, RenderOptions& options) {
+// Of a picture of one file.
+void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
   constexpr libmap::Range pixels{1.0, 16384.0};
-  table.add("view", options.view.view, libmap::viewpoint_names(), "from where");
   table.add("width_px", options.view.width, pixels, "width of the picture, pixels");
   table.add("height_px", options.view.height, pixels, "height of the picture, pixels");
-  table.add("title", options.view.title, "above the scene");
-  bind(table, options.scene);
   table.add("legend", options.view.legend, "show the legend");
   table.add("axes", options.view.axes, "show the axes");
-  table.add("scale_bar", options.view.scale_bar, "show the scale bar");
-  table.add("background", options.view.background, "#rrggbb or a name");
   table.add("camera_position", options.camera_position, "X,Y,Z with view: camera");
   table.add("camera_target", options.camera_target, "X,Y,Z with view: camera");
+}
+
+void bind(libmap::ParameterTable& table, RenderOptions& options) {
+  table.add("view", options.view.view, libmap::viewpoint_names(), "from where");
+  table.add("title", options.view.title, "above the scene");
+  bind(table, options.scene);
+  table.add("scale_bar", options.view.scale_bar, "show the scale bar");
+  table.add("background", options.view.background, "#rrggbb or a name");
+  bind_one(table, options);
   bind(table, options.sheet);
 }
 
@@ -74,13 +80,9 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
 libmap::ColorImage draw_several(const RenderOptions& options, Run& run) {
   if (options.view.view == libmap::Viewpoint::camera)
     throw libmap::Error("is for one file", {.field = "--view", .value = "camera"});
-  const libmap::SceneViewOptions unset;
-  for (const auto& [name, is_given] : {std::pair{"--width", options.view.width != unset.width},
-                                       std::pair{"--height", options.view.height != unset.height},
-                                       std::pair{"--legend", options.view.legend != unset.legend},
-                                       std::pair{"--axes", options.view.axes != unset.axes}})
-    if (is_given) throw libmap::Error("is for one file", {.field = name});
-  graspmap_tools::SheetOptions sheet = options.sheet;
+  if (const auto key = libmap::changed_key(options, bind_one))
+    throw libmap::Error("is for one file", {.field = libmap::flag_of(*key)});
+  SheetOptions sheet = options.sheet;
   sheet.files = options.files;
   sheet.view = options.view.view;
   sheet.scene = options.scene;
@@ -99,9 +101,9 @@ void render(RenderOptions& options, Run& run) {
   std::vector<std::string> inputs = options.files;
   inputs.push_back(options.scene.points);
   run.claim_output(options.output, inputs);
-  const bool several = options.files.size() > 1 || !options.sheet.captions.empty() ||
-                       !options.sheet.row_titles.empty() || !options.sheet.column_titles.empty() ||
-                       libmap::format_of(options.files.front()) == ".png";
+  // A page of several files, or of one with what only a page has, such as a caption.
+  const bool several = options.files.size() > 1 ||
+                       libmap::changed_key<SheetOptions>(options.sheet, graspmap_tools::bind);
   const libmap::ColorImage image = several ? draw_several(options, run) : draw_one(options, run);
   for (const std::string& file : options.files) run.add_input(graspmap_tools::scene_input(file));
   if (!options.scene.points.empty()) run.add_input(options.scene.points);

@@ -54,8 +54,8 @@ struct MapAnalysis {
   std::size_t at_border = 0;
   std::size_t obstacles = 0;
   std::size_t graspable = 0;
-  // Of the evaluated ones. A column is a place in plan; one with a voxel that can be held counts as
-  // one that can.
+  // Of the evaluated voxels. A column is all voxels with the same i and j; it is graspable if one
+  // of its voxels is.
   std::size_t columns = 0;
   std::size_t graspable_columns = 0;
   double plan_area_m2 = 0.0;  // of the surface, seen from above

@@ -2,8 +2,10 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <set>
 
 #include "libmap/core/yaml_document.h"
@@ -153,6 +155,12 @@ std::vector<std::pair<std::string, std::string>> ParameterTable::values() const 
   return values;
 }
 
+std::optional<std::string> ParameterTable::first_difference(const ParameterTable& other) const {
+  for (std::size_t n = 0; n < parameters_.size(); ++n)
+    if (parameters_[n].get() != other.parameters_[n].get()) return parameters_[n].key;
+  return std::nullopt;
+}
+
 void ParameterTable::set(std::string_view key, std::string_view value) const {
   const Parameter* parameter = find(key);
   if (Overrides* texts = overrides_of(key); parameter == nullptr && texts != nullptr) {
@@ -189,19 +197,31 @@ std::string flag_of(std::string_view key) {
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file) {
   std::set<std::string> seen;
+  std::vector<std::pair<std::string, std::string>> values;
+  const std::vector<std::string> known = table.keys();
+  const std::function<void(const YAML::Node&, const std::string&)> collect =
+      [&](const YAML::Node& map, const std::string& prefix) {
+        for (const auto& entry : map) {
+          const std::string key = prefix + entry.first.as<std::string>();
+          if (entry.second.IsMap() &&
+              std::any_of(known.begin(), known.end(),
+                          [&](const auto& name) { return name.starts_with(key + "."); })) {
+            collect(entry.second, key + ".");
+            continue;
+          }
+          if (!table.knows(key))
+            throw Error("unknown key" + did_you_mean(key, table.keys()), {.field = key});
+          if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
+          if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
+          values.emplace_back(key, entry.second.as<std::string>());
+        }
+      };
   read_yaml(text, file, [&](const YAML::Node& root) {
     if (root.IsNull()) return;
     if (!root.IsMap()) throw Error("not a map of keys and values");
-    for (const auto& entry : root) {
-      const std::string key = entry.first.as<std::string>();
-      if (!table.knows(key))
-        throw Error("unknown key" + did_you_mean(key, table.keys()), {.field = key});
-      if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
-      if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
-    }
-    for (const auto& entry : root)
-      table.set(entry.first.as<std::string>(), entry.second.as<std::string>());
+    collect(root, "");
   });
+  for (const auto& [key, value] : values) table.set(key, value);
   return {seen.begin(), seen.end()};
 }
 

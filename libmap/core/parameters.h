@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <functional>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -65,6 +66,9 @@ class ParameterTable {
   // Every key and its value as text, overrides included, as set_from_yaml would take them.
   std::vector<std::pair<std::string, std::string>> values() const;
 
+  // The first key whose value differs from that of `other`, a table of the same keys.
+  std::optional<std::string> first_difference(const ParameterTable& other) const;
+
   // Sets one parameter from text. Throws Error: unknown key (with the nearest known one), or a
   // value that is not of its type or outside its bound.
   void set(std::string_view key, std::string_view value) const;
@@ -89,10 +93,22 @@ void check_parameters(Options options) {
   table.check();
 }
 
+// The key of the first field that `bind` declares and that does not have its default, if any.
+template <typename Options>
+std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTable&, Options&)) {
+  Options unset;
+  ParameterTable table;
+  ParameterTable defaults;
+  bind(table, options);
+  bind(defaults, unset);
+  return table.first_difference(defaults);
+}
+
 // "voxel_size_m" -> "--voxel-size": the flag of a key, without the unit at its end.
 std::string flag_of(std::string_view key);
 
-// A flat YAML map of scalars, `text` (named `file` in errors), into the table. A key that is not
+// A YAML map of scalars, `text` (named `file` in errors), into the table; a section "a: {b: 1}" holds
+// the keys "a.b". A key that is not
 // in the table, is a duplicate or holds no scalar is an Error; nothing is set halfway: all keys are
 // known before the first is set. Returns the keys that the text holds.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,

@@ -24,14 +24,13 @@ bool is_picture(const fs::path& file) {
   return std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end();
 }
 
-// Maps are told by the command that made them. Of `convert`, those that it merged from several
-// inputs: any other is a copy of a map in another format.
+// Maps are known by their manifests.
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
   constexpr std::array<const char*, 4> extensions = {".pcd", ".ply", ".csv", ".tiles"};
   return manifest &&
          std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end() &&
          (manifest->command == "score" ||
-          (manifest->command == "convert" && manifest->inputs.size() > 1));
+          (manifest->command == "convert" && manifest->find_result("scored_voxels") != nullptr));
 }
 
 // "2_slopes_and_bumps" -> "2 Slopes and bumps".

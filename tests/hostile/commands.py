@@ -52,7 +52,7 @@ USES = [
     use("fuse {x} --strict --stereo --poses ground-truth -o out.ply", "scan", "scan.db"),
     use("fuse {good}/scan.db --poses {x} -o out.ply", "poses", "poses.tum"),
     use("fuse {x} -o out.pcd", "rig-folder", "rig", main=True),
-    use("fuse {x} --strict --normals -o out.pcd", "rig-folder", "rig"),
+    use("fuse {x} --rig {good}/rig.yaml --strict --normals -o out.pcd", "rig-folder", "rig"),
     use("fuse {good}/rig --rig {x} -o out.pcd", "rig", "rig.yaml"),
     use("mesh {x} --cell-size 0.05 -o out.ply", "cloud", "terrain.pcd"),
     use("texture {x} --scan {good}/scan.db --poses ground-truth --texture-size 256 -o out.glb", "mesh", "mesh.ply"),

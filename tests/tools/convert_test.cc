@@ -101,6 +101,19 @@ TEST(Convert, ManifestOfAMapIsPassedOn) {
   EXPECT_EQ(evaluated("map.ply"), evaluated("map.pcd"));
 }
 
+TEST(Convert, AMapTakesEveryEncoding) {
+  graspmap_test::write_terrain();
+  ASSERT_TRUE(
+      succeeded(graspmap({"score", "terrain.pcd", "--curvature-radius", "0", "-o", "map.pcd"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "text.pcd", "--encoding", "ascii"})));
+  EXPECT_NE(content("text.pcd").find("DATA ascii\n"), std::string::npos);
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "same.pcd"})));
+  EXPECT_EQ(content("same.pcd"), content("map.pcd"));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "map.pcd", "same.pcd", "-o", "two.pcd"}),
+                        {"map.pcd", "no share of a map"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("two.pcd")));
+}
+
 TEST(Convert, WhatAFormatHasNoPlaceForIsSaid) {
   libmap::TriangleMesh mesh;
   mesh.vertices = {{4.5e6 + 0.1, 0, 0}, {4.5e6 + 1.1, 0, 0}, {4.5e6, 1, 0}};

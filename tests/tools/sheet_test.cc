@@ -50,6 +50,11 @@ TEST(Sheet, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "s.png", "--row-titles", "a|b"}),
                         {"row_titles"}));
   EXPECT_TRUE(bad_input(graspmap({"render", "a.pcd", "-o", "a.pcd"}), {"a.pcd"}));
+  for (const auto& [flag, name] :
+       {std::pair{"--no-legend", "--legend"}, std::pair{"--no-axes", "--axes"},
+        std::pair{"--width=300", "--width"}, std::pair{"--camera-target=1,2,3", "--camera-target"}})
+    EXPECT_TRUE(
+        bad_input(graspmap({"render", "a.pcd", "a.pcd", "-o", "s.png", flag}), {name, "one file"}));
   EXPECT_FALSE(std::filesystem::exists(scratch("s.png")));
 }
 
@@ -90,6 +95,8 @@ TEST(Summarize, BadInputIsOneLine) {
   for (const auto& [name, value] : {std::pair{"--cutoff", "0.5"}, std::pair{"--names", "a"},
                                     std::pair{"--varied", "solid_voxel_threshold"}})
     EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "-o", "sum", name, value}), {name}));
+  EXPECT_TRUE(bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--stride", "0.4"}),
+                        {"--stride", "one map"}));
   EXPECT_TRUE(
       bad_input(graspmap({"analyze", "a.pcd", "a.pcd", "-o", "sum", "--varied", "none", "--quiet"}),
                 {"none"}));

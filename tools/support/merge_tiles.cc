@@ -63,18 +63,29 @@ void require_same_map(const libmap::Manifest& first, const libmap::Manifest& oth
     throw libmap::Error("was scored from other inputs than " + first_name, {.file = name});
 }
 
+// "K/N"; empty if it is none.
+std::string share_of(const libmap::Manifest& manifest) {
+  const libmap::ManifestValue* value = manifest.find_parameter("tile");
+  return value != nullptr && std::holds_alternative<std::string>(*value)
+             ? std::get<std::string>(*value)
+             : std::string();
+}
+
+// One of several.
+bool is_share(const libmap::Manifest& manifest) {
+  const std::string share = share_of(manifest);
+  return !share.empty() && !share.ends_with("/1");
+}
+
 // The shares K/N of the parts are 1 to N, each once.
 void require_all_shares(const std::vector<libmap::Manifest>& manifests,
                         const std::vector<std::string>& names) {
   std::vector<std::string> shares;
   std::string count;
   for (std::size_t n = 0; n < manifests.size(); ++n) {
-    const libmap::ManifestValue* value = manifests[n].find_parameter("tile");
-    const std::string share = value != nullptr && std::holds_alternative<std::string>(*value)
-                                  ? std::get<std::string>(*value)
-                                  : std::string();
+    const std::string share = share_of(manifests[n]);
     const std::string of = share.substr(std::min(share.find('/') + 1, share.size()));
-    if (share.empty() || (n > 0 && of != count))
+    if (n > 0 && of != count)
       throw libmap::Error("is not a share of the same tiles",
                           {.file = names[n], .field = "tile", .value = share});
     count = of;
@@ -176,7 +187,8 @@ libmap::PointCloud load_row(const graspmap_tools::MapTiles& tiles, const std::st
 
 // A PCD row by row; other formats need the whole map in memory.
 void write_store(const graspmap_tools::MapTiles& tiles, const std::string& store,
-                 const std::filesystem::path& file, Run& run) {
+                 const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
+                 Run& run) {
   const std::vector<TileRow> rows = rows_of(tiles.index());
   run.progress().begin("merge", rows.size());
   if (libmap::format_of(file) == ".pcd") {
@@ -188,12 +200,16 @@ void write_store(const graspmap_tools::MapTiles& tiles, const std::string& store
     }
     writer.finish();
   } else {
-    libmap::write_cloud(file, load_row(tiles, store, {0, tiles.index().tiles.size()}));
+    libmap::write_cloud(file, load_row(tiles, store, {0, tiles.index().tiles.size()}), writing);
   }
   run.progress().end();
 }
 
-void merge_store(const std::string& store, const std::string& output, Run& run) {
+void merge_store(const std::string& store, const std::string& output,
+                 const libmap::CloudWriteOptions& writing, Run& run) {
+  if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
+    throw libmap::Error("a tile store is written as binary .pcd",
+                        {.file = output, .field = "--encoding"});
   const graspmap_tools::MapTiles tiles(store);
   const libgtd::TileStoreIndex& index = tiles.index();
   std::uint64_t border = 0;
@@ -209,8 +225,8 @@ void merge_store(const std::string& store, const std::string& output, Run& run) 
   count("scored_voxels", index.voxels());
   count("border_voxels", border);
   count("graspable_voxels", graspable);
-  run.write_output(output,
-                   [&](const auto& temporary) { write_store(tiles, store, temporary, run); });
+  run.write_output(
+      output, [&](const auto& temporary) { write_store(tiles, store, temporary, writing, run); });
   run.say(fmt::format("{} scored voxels from {} tiles", index.voxels(), index.tiles.size()));
 }
 
@@ -219,24 +235,23 @@ void merge_store(const std::string& store, const std::string& output, Run& run) 
 bool graspmap_tools::is_part_of_map(const std::string& file) {
   if (is_tile_store(file)) return true;
   const auto manifest = libmap::read_manifest_of(file);
-  const libmap::ManifestValue* tile = manifest ? manifest->find_parameter("tile") : nullptr;
-  return tile != nullptr && *tile != libmap::ManifestValue(std::string());
+  return manifest && is_share(*manifest);
 }
 
 void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
-                                 Run& run) {
+                                 const libmap::CloudWriteOptions& writing, Run& run) {
   libmap::require_cloud_format(output);
   run.claim_output(output, tiles);
   const auto store = std::find_if(tiles.begin(), tiles.end(), graspmap_tools::is_tile_store);
   if (store != tiles.end()) {
     if (tiles.size() > 1) throw libmap::Error("a tile store is merged by itself", {.file = *store});
-    return merge_store(*store, output, run);
+    return merge_store(*store, output, writing, run);
   }
   std::vector<libmap::Manifest> manifests;
   for (const std::string& tile : tiles) {
-    if (tiles.size() > 1 && !is_part_of_map(tile) && libmap::read_manifest_of(tile))
-      throw libmap::Error("is no share of a map, and only shares are merged", {.file = tile});
     manifests.push_back(manifest_of(tile));
+    if (!is_share(manifests.back()))
+      throw libmap::Error("is no share of a map, and only shares are merged", {.file = tile});
     require_same_map(manifests.front(), manifests.back(), tiles.front(), tile);
   }
   require_all_shares(manifests, tiles);
@@ -257,5 +272,6 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
   } catch (const libmap::Error& error) {
     throw error.in_file(libmap::manifest_path(tiles.front()).string());
   }
-  run.write_output(output, [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
+  run.write_output(output,
+                   [&](const auto& temporary) { libmap::write_cloud(temporary, whole, writing); });
 }

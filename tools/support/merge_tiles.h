@@ -4,16 +4,19 @@
 #include <string>
 #include <vector>
 
+#include "libmap/cloud/cloud_io.h"
 #include "tools/support/run.h"
 
 namespace graspmap_tools {
 
-// A tile store, or a share of a map by its manifest.
+// A tile store, or one of several shares of a map by its manifest.
 bool is_part_of_map(const std::string& file);
 
 // Writes the same bytes as scoring in one run. `tiles` are all shares that `score --tile K/N`
 // wrote, in any order, or one tile store, which is merged row by row of tiles. Throws Error if a
 // share is missing, given twice, or of another map.
-void merge_tiles(const std::vector<std::string>& tiles, const std::string& output, Run& run);
+// A store is written as binary .pcd or in another format.
+void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
+                 const libmap::CloudWriteOptions& writing, Run& run);
 
 }  // namespace graspmap_tools

@@ -126,7 +126,8 @@ TEST(Lookup, AnswersEveryPointAlsoWithNothingThere) {
   EXPECT_TRUE(libgtd::look_up(map, {}).empty());
 }
 
-// From 10^12 m a map of a meter is all as near; squared, 10^200 m are beyond any number.
+// From 10^12 m away all points of a map of 1 m have the same distance in double precision. The
+// square of 10^200 m overflows.
 TEST(Lookup, FromVeryFarTheFirstOfTheNearest) {
   PointCloud map;
   map.positions.assign(30'000, {1, 2, 3});

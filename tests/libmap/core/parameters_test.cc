@@ -64,6 +64,35 @@ TEST(Parameters, FieldsOutsideTheirBoundsAreNamed) {
             "shape: unknown name (must be one of round square)");
 }
 
+TEST(Parameters, TheFirstChangedKey) {
+  EXPECT_EQ(libmap::changed_key<Options>({}, bind), std::nullopt);
+  Options options;
+  options.name = "other";
+  options.fill = true;
+  EXPECT_EQ(libmap::changed_key(options, bind), "fill");
+}
+
+TEST(Parameters, SectionsOfAFile) {
+  int count = 0;
+  double angle = 0.0;
+  ParameterTable table;
+  table.add("count", count, {0, 10}, "number");
+  table.add("part.angle", angle, libmap::positive, "angle");
+  EXPECT_EQ(libmap::set_from_yaml(table, "part:\n  angle: 2\ncount: 3\n", "f"),
+            (std::vector<std::string>{"count", "part.angle"}));
+  EXPECT_EQ(count, 3);
+  EXPECT_EQ(angle, 2.0);
+  const auto field = [&](const std::string& yaml) {
+    return error_of([&] { libmap::set_from_yaml(table, yaml, "f"); }).context().field;
+  };
+  EXPECT_EQ(field("part: {angel: 2}"), "part.angel");
+  EXPECT_EQ(field("part: {angle: [2]}"), "part.angle");
+  EXPECT_EQ(field("part: 1"), "part");
+  EXPECT_EQ(field("part.angle: 1\npart: {angle: 1}"), "part.angle");
+  EXPECT_EQ(field("other: {angle: 1}"), "other");
+  EXPECT_EQ(count, 3);
+}
+
 TEST_F(ParametersTest, GetsAndSetsTheFields) {
   EXPECT_EQ(table.find("size_m")->get(), "0.01");
   EXPECT_EQ(table.find("shape")->get(), "square");

@@ -24,12 +24,13 @@ void put(const std::string& name, const std::string& text) {
 }
 
 void put_manifest(const std::string& output, const std::string& command,
-                  const std::vector<libmap::ManifestInput>& inputs = {}) {
+                  const std::vector<libmap::ManifestInput>& inputs = {}, bool is_map = false) {
   libmap::Manifest manifest;
   manifest.command = command;
   manifest.version = "0";
   manifest.inputs = inputs;
   manifest.timings_s = {{"read", 0.5}};
+  if (is_map) manifest.results.emplace_back("scored_voxels", std::int64_t{9});
   put(output + ".json", libmap::to_json(manifest));
 }
 
@@ -165,9 +166,11 @@ TEST(FoundOutline, OfAFolder) {
   put("scene.png", "");
   put("2_b/map.pcd", "");
   put("10_c/table.csv", "a\n1\n");
-  put_manifest("2_b/map.pcd", "convert", {{"1.pcd", "", 1}, {"2.pcd", "", 1}});
+  put_manifest("2_b/map.pcd", "convert", {{"tiles/1-of-1.pcd", "", 1}}, true);
+  put("2_b/cloud.pcd", "");
+  put_manifest("2_b/cloud.pcd", "convert", {{"cloud.ply", "", 1}});
   put("2_b/map.ply", "");
-  put_manifest("2_b/map.ply", "convert", {{"map.pcd", "", 1}});
+  put_manifest("2_b/map.ply", "convert", {{"map.pcd", "", 1}}, true);
   put("2_b/lookup.csv", "place,graspable,score\nA,1,0.5\n");
   put_manifest("2_b/lookup.csv", "lookup", {{"elsewhere/map.pcd", "", 1}});
   put("2_b/oblique.png", "");
