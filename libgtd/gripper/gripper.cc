@@ -39,6 +39,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
 
 void Gripper::check() const {
   libmap::check_parameters(*this);
+  if (fingers) fingers->check();
   if (closing_angle_deg >= opening_angle_deg)
     throw libmap::Error("the fingers close inward",
                         {.field = "closing_angle_deg",

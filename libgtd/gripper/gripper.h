@@ -1,8 +1,10 @@
 // The measures of a spined gripper (tab. 3-2 of the thesis), as its makers give them.
 #pragma once
 
+#include <optional>
 #include <string>
 
+#include "libgtd/gripper/gripper_fingers.h"
 #include "libmap/core/parameters.h"
 
 namespace libgtd {
@@ -22,13 +24,14 @@ struct Gripper {
   double closing_height_mm = 0.0;         // palm to spine tips, closed
   double top_solid_margin_mm = 0.0;       // added to the palm's diameter on top of the mask
   double bottom_void_margin_mm = 0.0;     // taken off the radius of the void at the bottom
+  std::optional<GripperFingers> fingers;  // none: there is no virtual field test of it
 
   // Throws Error naming the field, its value and the bound that it breaks, also between fields:
   // the closing angle lies below the opening angle.
   void check() const;
 };
 
-// The keys of a gripper file, bound to `gripper`.
+// The keys of a gripper file but those of `fingers`, bound to `gripper`.
 void bind(libmap::ParameterTable& table, Gripper& gripper);
 
 }  // namespace libgtd

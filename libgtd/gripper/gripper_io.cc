@@ -22,11 +22,20 @@ void require_all_keys(const libmap::ParameterTable& table, const std::vector<std
 Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides) {
   Gripper gripper;
-  libmap::ParameterTable table;
-  bind(table, gripper);
+  GripperFingers fingers;
+  libmap::ParameterTable measures;
+  libmap::ParameterTable all;
+  bind(measures, gripper);
+  bind(all, gripper);
+  bind(all, fingers);
   try {
-    require_all_keys(table, libmap::set_from_yaml(table, yaml, file));
-    for (const auto& [key, value] : overrides) table.set(key, value);
+    const std::vector<std::string> given = libmap::set_from_yaml(all, yaml, file);
+    const bool has_fingers = std::any_of(given.begin(), given.end(), [](const std::string& key) {
+      return key.starts_with("fingers.");
+    });
+    require_all_keys(has_fingers ? all : measures, given);
+    for (const auto& [key, value] : overrides) (has_fingers ? all : measures).set(key, value);
+    if (has_fingers) gripper.fingers = fingers;
     gripper.check();
   } catch (const libmap::Error& error) {
     throw error.in_file(file);

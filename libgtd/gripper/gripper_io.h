@@ -1,4 +1,5 @@
-// Gripper files: a flat YAML map, see data/grippers/README in data/README.md.
+// Gripper files: a YAML map of measures and an optional section `fingers`, see data/grippers/README
+// in data/README.md.
 #pragma once
 
 #include <filesystem>

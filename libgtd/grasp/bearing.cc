@@ -1,0 +1,182 @@
+#include "libgtd/grasp/bearing.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+namespace libgtd {
+
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+// Chen et al. 2024: share of a concrete's asperities that a spine tip can use.
+double usable_asperities(double tip_radius_um) {
+  return std::max(0.0, 2.49 * std::pow(tip_radius_um + 39.44, -0.7116) - 0.01212);
+}
+
+}  // namespace
+
+const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names() {
+  static const std::vector<std::pair<std::string, EngagementLaw>> names = {
+      {"asperities", EngagementLaw::asperities}, {"adhesion", EngagementLaw::adhesion}};
+  return names;
+}
+
+void bind(libmap::ParameterTable& table, EngagementOptions& options) {
+  using libmap::not_negative;
+  using libmap::positive;
+  constexpr libmap::Range lean{0.0, 90.0};
+  constexpr libmap::Range cone{0.0, 89.0};
+  table.add("law", options.law, engagement_law_names(), "of the engagement of spines");
+  table.add("friction", options.friction, not_negative, "coefficient of Coulomb friction");
+  table.add("asperity_min_deg", options.asperity_min_deg, lean,
+            "smallest lean of a facet against the drag");
+  table.add("asperity_max_deg", options.asperity_max_deg, lean,
+            "largest lean of a facet against the drag");
+  table.add("engagement_per_mm", options.engagement_per_mm, not_negative,
+            "rate at which a dragged spine meets facets, 1/mm");
+  table.add("drag_mm", options.drag_mm, not_negative, "distance that spines are dragged");
+  table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
+            "law adhesion: largest tension of all fingers, N");
+  table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,
+            "law adhesion: largest angle of the lateral force to the tension");
+  table.add("adhesion_pull_deg", options.adhesion_pull_deg, cone,
+            "law adhesion: largest angle of the pull-off to the tension");
+}
+
+// An edge of a pyramid: its product with `worth`, and the edge in normal, drag and lateral.
+struct BearingContact::Edge {
+  double product = 0.0;
+  Eigen::Vector3d local = Eigen::Vector3d::Zero();
+};
+
+BearingContact::BearingContact(const GripContact& contact, std::vector<double> leans_rad,
+                               double friction, double limit_n)
+    : point_(contact.point),
+      normal_(contact.normal),
+      drag_(contact.drag),
+      lateral_(contact.normal.cross(contact.drag)),
+      outward_(contact.outward),
+      finger_(contact.finger),
+      is_link_(!contact.by_spines),
+      friction_(friction),
+      slant_(std::cos(std::atan(friction))),
+      limit_n_(limit_n) {
+  std::sort(leans_rad.begin(), leans_rad.end(), std::greater<>());
+  for (const double lean : leans_rad) {
+    cosines_.push_back(std::cos(lean));
+    sines_.push_back(std::sin(lean));
+  }
+}
+
+BearingContact::BearingContact(const GripContact& contact, const EngagementOptions& options,
+                               double limit_n)
+    : BearingContact(contact, std::vector<double>{}, options.friction, limit_n) {
+  const double side = std::tan(options.adhesion_lateral_deg * degree);
+  const double pull = std::tan(options.adhesion_pull_deg * degree);
+  adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
+}
+
+// Of the eight edges of the friction pyramid on a facet, the best one for `local`.
+BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
+                                               const Eigen::Vector3d& local) const {
+  const double axis = cosine * local.x() - sine * local.y();
+  // Along the facet, out of the corner; and lateral.
+  const double out = -sine * local.x() - cosine * local.y();
+  const double along = std::abs(out);
+  const double beside = std::abs(local.z());
+  double to_out = 0.0;
+  double to_lateral = 0.0;
+  if (const double both = (along + beside) * std::numbers::sqrt2 / 2.0;
+      both >= along && both >= beside) {
+    to_out = std::copysign(std::numbers::sqrt2 / 2.0, out);
+    to_lateral = std::copysign(std::numbers::sqrt2 / 2.0, local.z());
+  } else if (along >= beside) {
+    to_out = std::copysign(1.0, out);
+  } else {
+    to_lateral = std::copysign(1.0, local.z());
+  }
+  Edge edge;
+  edge.product = slant_ * (axis + friction_ * (to_out * out + to_lateral * local.z()));
+  edge.local =
+      slant_ * Eigen::Vector3d(cosine - friction_ * to_out * sine,
+                               -sine - friction_ * to_out * cosine, friction_ * to_lateral);
+  return edge;
+}
+
+double BearingContact::max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const {
+  const Eigen::Vector3d along = local(worth);
+  if (!adhesion_.empty()) {
+    double most = 0.0;
+    for (const Eigen::Vector3d& edge : adhesion_) most = std::max(most, edge.dot(along));
+    return limit_n_ * most;
+  }
+  const double ground = std::max(0.0, best_edge(1.0, 0.0, along).product);
+  double sum = static_cast<double>(cosines_.size()) * ground;
+  if (sharing == SpineSharing::best)
+    for (std::size_t n = 0; n < cosines_.size(); ++n)
+      sum += std::max(0.0, best_edge(cosines_[n], sines_[n], along).product);
+  else
+    for (std::size_t n = 0; n < cosines_.size(); ++n)
+      sum = std::max(sum,
+                     static_cast<double>(n + 1) * best_edge(cosines_[n], sines_[n], along).product);
+  return limit_n_ * sum;
+}
+
+Eigen::Vector3d BearingContact::best_force(const Eigen::Vector3d& worth,
+                                           SpineSharing sharing) const {
+  const Eigen::Vector3d along = local(worth);
+  const auto spines = static_cast<double>(cosines_.size());
+  Edge best;
+  for (const Eigen::Vector3d& edge : adhesion_)
+    if (edge.dot(along) > best.product) best = {edge.dot(along), edge};
+  const Edge ground = best_edge(1.0, 0.0, along);
+  if (adhesion_.empty() && ground.product > 0.0)
+    best = {spines * ground.product, spines * ground.local};
+  for (std::size_t n = 0; n < cosines_.size(); ++n) {
+    const Edge edge = best_edge(cosines_[n], sines_[n], along);
+    const auto share = static_cast<double>(n + 1);
+    if (sharing == SpineSharing::best && edge.product > 0.0)
+      best = {best.product + edge.product, best.local + edge.local};
+    else if (sharing == SpineSharing::equally && share * edge.product > best.product)
+      best = {share * edge.product, share * edge.local};
+  }
+  return limit_n_ * (best.local.x() * normal_ + best.local.y() * drag_ + best.local.z() * lateral_);
+}
+
+double engagement_share(const EngagementOptions& options, const GripperFingers& fingers) {
+  const double scale = usable_asperities(fingers.spine_tip_radius_um) / usable_asperities(25.0);
+  return -std::expm1(-scale * options.engagement_per_mm * options.drag_mm);
+}
+
+std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
+                                         const GripperFingers& fingers,
+                                         const EngagementOptions& options,
+                                         libmap::RandomStream& random) {
+  const double share = engagement_share(options, fingers);
+  std::vector<BearingContact> bearing;
+  for (const GripContact& contact : contacts) {
+    if (!contact.by_spines) {
+      bearing.emplace_back(contact, std::vector<double>{0.0}, options.friction,
+                           fingers.spines_per_finger * fingers.spine_force_limit_n);
+    } else if (options.law == EngagementLaw::adhesion) {
+      bearing.emplace_back(contact, options, options.adhesion_limit_n / fingers.count);
+    } else {
+      std::vector<double> leans;
+      for (int spine = 0; spine < fingers.spines_per_finger; ++spine) {
+        const bool engages = random.uniform() < share;
+        const double lean = random.uniform(options.asperity_min_deg, options.asperity_max_deg);
+        if (engages) leans.push_back(lean * degree);
+      }
+      if (!leans.empty())
+        bearing.emplace_back(contact, std::move(leans), options.friction,
+                             fingers.spine_force_limit_n);
+    }
+  }
+  return bearing;
+}
+
+}  // namespace libgtd

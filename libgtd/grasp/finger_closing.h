@@ -1,0 +1,70 @@
+// One finger of two links closes in its plane on the profile of the ground there. The plane holds
+// the palm's axis; its coordinates are (r, z) in meters: r away from the axis, z away from the
+// ground, the palm at z = 0. The first contact is computed in closed form, so that no ridge is
+// skipped.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "libgtd/gripper/gripper.h"
+
+namespace libgtd {
+
+// Meters and radians. At the proximal angle t, measured at the joint (joint_radius_m, 0) from the
+// palm's axis, and the curl c, the links point along (sin t, -cos t) and (sin(t - c), -cos(t - c)).
+struct FingerGeometry {
+  double joint_radius_m = 0.0;
+  double proximal_m = 0.0;
+  double distal_m = 0.0;
+  double opening_rad = 0.0;
+  double closing_rad = 0.0;
+  double curl_rad = 0.0;
+  double curl_limit_rad = 0.0;
+
+  Eigen::Vector2d joint() const { return {joint_radius_m, 0.0}; }
+  Eigen::Vector2d knuckle(double proximal_rad) const;
+  Eigen::Vector2d tip(double proximal_rad, double curl) const;
+};
+
+// Of a gripper that has `fingers`; throws Error naming them if it has none.
+FingerGeometry finger_geometry(const Gripper& gripper);
+
+// A piece of the ground's profile and the triangle that it is cut from.
+struct ProfileSegment {
+  Eigen::Vector2d a;
+  Eigen::Vector2d b;
+  std::uint32_t triangle = 0;
+  bool faces_palm = true;  // the triangle's front faces the palm
+};
+
+struct FingerTouch {
+  Eigen::Vector2d point;   // of the profile
+  Eigen::Vector2d motion;  // of the link's point there, m per rad
+};
+
+// spines: the outer half of the distal link or its tip touches. link: only another part does.
+// end_stop: nothing does.
+enum class FingerEnd { spines, link, end_stop };
+
+struct FingerClosing {
+  FingerEnd end = FingerEnd::end_stop;
+  double proximal_rad = 0.0;
+  double curl_rad = 0.0;
+  std::optional<FingerTouch> spines;
+  std::optional<FingerTouch> link;  // on the proximal link or the inner half of the distal one
+};
+
+// From the open finger, which touches nothing. The proximal link turns inward with the distal one
+// at the free curl. If the proximal link is stopped, the distal one goes on alone up to the limit
+// of the curl.
+FingerClosing close_finger(const FingerGeometry& finger, std::span<const ProfileSegment> profile);
+
+// The least height of the palm at which the open finger passes above the whole profile; nothing if
+// no part of the profile is below the finger. `profile` is relative to the palm at z = 0.
+std::optional<double> open_finger_height(const FingerGeometry& finger,
+                                         std::span<const ProfileSegment> profile);
+
+}  // namespace libgtd

@@ -1,0 +1,259 @@
+#include "libgtd/grasp/grasp_trials.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <string>
+#include <tuple>
+
+#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.0;
+
+// The same for the same place, wherever it is in a list.
+std::uint64_t key_of(const Eigen::Vector3d& location) {
+  std::uint64_t key = 0;
+  for (const double coordinate : location)
+    key = libmap::mix_bits(key, std::bit_cast<std::uint64_t>(coordinate + 0.0));
+  return key;
+}
+
+// What all trials of one location share.
+struct Site {
+  GroundPatch patch;
+  std::uint64_t key = 0;
+};
+
+Eigen::Vector3d away_from(const Ground& ground, const Gripper& gripper,
+                          const Eigen::Vector3d& location, ApproachDirection approach) {
+  const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
+  if (approach == ApproachDirection::up) return up;
+  // As far as a location may be from the ground, and farther until there is some.
+  for (double radius = 0.0005 * gripper.palm_diameter_mm; radius < 1.0; radius *= 2.0) {
+    const auto normal =
+        ground.patch(location, up, radius, radius).normal_at(Eigen::Vector3d::Zero(), radius);
+    if (normal) return *normal;
+  }
+  return up;
+}
+
+Site site_of(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
+             const GraspOptions& options) {
+  const Eigen::Vector3d away = away_from(ground, gripper, location, options.approach);
+  // Four standard deviations; draws are cut off there.
+  return {patch_around(ground, location, away, gripper, 4.0 * options.offset_m,
+                       4.0 * options.tilt_deg * degree, options.closing),
+          key_of(location)};
+}
+
+ApproachPose draw_pose(const Site& site, const Gripper& gripper, const GraspOptions& options,
+                       int number) {
+  libmap::RandomStream random(options.seed,
+                              libmap::mix_bits(site.key, static_cast<std::uint64_t>(number)));
+  const auto normal = [&] { return std::clamp(random.normal(), -4.0, 4.0); };
+  ApproachPose pose;
+  pose.yaw_rad = random.uniform(0.0, 2.0 * std::numbers::pi / gripper.fingers->count);
+  for (double& offset : pose.offset_m) offset = options.offset_m * normal();
+  for (double& tilt : pose.tilt_rad) tilt = options.tilt_deg * degree * normal();
+  return pose;
+}
+
+HoldingOptions holding_of(const ClosedGripper& closed, const Gripper& gripper,
+                          SpineSharing sharing) {
+  HoldingOptions holding;
+  holding.load_point = closed.patch_from_gripper.translation();
+  holding.holds_when_closed = gripper.fingers->holds_when_closed;
+  holding.closing_force_n = gripper.fingers->closing_force_n;
+  holding.sharing = sharing;
+  return holding;
+}
+
+std::vector<BearingContact> draw_asperities(const ClosedGripper& closed, const Site& site,
+                                            const Gripper& gripper, const GraspOptions& options,
+                                            int pose, int draw) {
+  const std::uint64_t number =
+      (static_cast<std::uint64_t>(pose) << 32U) | (static_cast<std::uint64_t>(draw) + 1);
+  libmap::RandomStream random(options.seed, libmap::mix_bits(~site.key, number));
+  return draw_bearing(closed.contacts, *gripper.fingers, options.engagement, random);
+}
+
+TrialEnd end_of(const ClosedGripper& closed, std::size_t bearing, double force_n,
+                const GraspOptions& options) {
+  if (closed.approach != ApproachEnd::on_ground) return TrialEnd::approach;
+  if (force_n >= options.load_n * options.safety) return TrialEnd::holds;
+  for (const ClosedFinger& finger : closed.fingers)
+    if (finger.unseen > options.closing.max_unseen) return TrialEnd::unseen;
+  if (bearing < 2) return TrialEnd::contact;
+  return force_n > 0.0 ? TrialEnd::load : TrialEnd::engagement;
+}
+
+// Of sorted values; the lower one of two.
+double quantile(const std::vector<double>& sorted, double share) {
+  if (sorted.empty()) return 0.0;
+  return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
+}
+
+std::array<double, 3> quantiles(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return {quantile(values, 0.1), quantile(values, 0.5), quantile(values, 0.9)};
+}
+
+// Adds the means of a pose.
+void count_pose(const ClosedGripper& closed, double weight, LocationResult& result) {
+  std::vector<bool> touches(closed.fingers.size(), false);
+  std::vector<bool> by_spines(closed.fingers.size(), false);
+  for (const GripContact& contact : closed.contacts) {
+    touches[contact.finger] = true;
+    if (contact.by_spines) by_spines[contact.finger] = true;
+  }
+  for (std::size_t n = 0; n < closed.fingers.size(); ++n)
+    (by_spines[n] ? result.spine_fingers
+     : touches[n] ? result.link_fingers
+                  : result.free_fingers) += weight;
+  result.palm_share += closed.palm_touches ? weight : 0.0;
+  result.unseen += weight * closed.unseen;
+  result.clearance_m += weight * closed.patch_from_gripper.translation().z();
+}
+
+LocationResult test_location(const Ground& ground, const Gripper& gripper,
+                             const Eigen::Vector3d& location, const GraspOptions& options) {
+  const Site site = site_of(ground, gripper, location, options);
+  LocationResult result;
+  result.location = location;
+  std::vector<double> forces;
+  std::vector<double> static_forces;
+  std::vector<std::size_t> limiting(pull_directions().size(), 0);
+  for (int pose = 0; pose < options.poses; ++pose) {
+    const ClosedGripper closed = close_gripper(
+        site.patch, gripper, draw_pose(site, gripper, options, pose), options.closing);
+    count_pose(closed, 1.0 / options.poses, result);
+    const HoldingOptions equally = holding_of(closed, gripper, SpineSharing::equally);
+    const HoldingOptions best = holding_of(closed, gripper, SpineSharing::best);
+    std::size_t guess = 0;
+    for (int draw = 0; draw < options.draws; ++draw) {
+      const auto bearing = draw_asperities(closed, site, gripper, options, pose, draw);
+      const LeastForce least = least_holding_force(bearing, equally, guess);
+      guess = least.direction;
+      forces.push_back(least.force_n);
+      if (draw < options.static_draws)
+        static_forces.push_back(least_holding_force(bearing, best, guess).force_n);
+      if (least.force_n > 0.0) ++limiting[least.direction];
+      ++result
+            .ends[static_cast<std::size_t>(end_of(closed, bearing.size(), least.force_n, options))];
+    }
+  }
+  result.trials = forces.size();
+  result.hold_probability =
+      static_cast<double>(result.ends[0]) / static_cast<double>(result.trials);
+  std::tie(result.hold_low, result.hold_high) =
+      wilson_interval(result.hold_probability, options.poses);
+  result.force_n = quantiles(forces);
+  result.static_force_n = quantiles(static_forces);
+  result.limiting_direction = static_cast<std::size_t>(
+      std::max_element(limiting.begin(), limiting.end()) - limiting.begin());
+  const auto nearest = std::min_element(forces.begin(), forces.end(), [&](double a, double b) {
+    return std::abs(a - result.force_n[1]) < std::abs(b - result.force_n[1]);
+  });
+  const auto shown = static_cast<int>(nearest - forces.begin());
+  result.shown_pose = shown / options.draws;
+  result.shown_draw = shown % options.draws;
+  return result;
+}
+
+void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& locations,
+                    double max_distance_m) {
+  for (std::size_t n = 0; n < locations.size(); ++n)
+    if (!ground.distance(locations[n], max_distance_m))
+      throw libmap::Error(
+          "is not on the mesh",
+          {.field = "location " + std::to_string(n + 1),
+           .value = libmap::to_text(locations[n].x()) + "," + libmap::to_text(locations[n].y()) +
+                    "," + libmap::to_text(locations[n].z()),
+           .bound = "within " + libmap::to_text(max_distance_m) + " m of it"});
+}
+
+}  // namespace
+
+void GraspOptions::check() const { libmap::check_parameters(*this); }
+
+void bind(libmap::ParameterTable& table, GraspOptions& options) {
+  using libmap::not_negative;
+  using libmap::positive;
+  table.add("load_n", options.load_n, positive, "pull that the gripper must hold, N");
+  table.add("safety", options.safety, positive, "factor of the load");
+  table.add("approach", options.approach,
+            {{"up", ApproachDirection::up}, {"normal", ApproachDirection::normal}},
+            "direction that the palm comes from: z, or the ground's normal");
+  table.add("trials", options.poses, {1, 100000}, "poses of the gripper at each location");
+  table.add("draws", options.draws, {1, 100000}, "draws of asperities at each pose");
+  table.add("static_draws", options.static_draws, {0, 100000},
+            "draws of a pose for which the static force is computed too");
+  table.add("seed", options.seed, not_negative, "of all draws");
+  table.add("offset_m", options.offset_m, {0.0, 1.0}, "standard deviation of the palm's place, m");
+  table.add("tilt_deg", options.tilt_deg, {0.0, 15.0}, "standard deviation of the palm's tilt");
+  table.add("max_distance_m", options.max_distance_m, positive,
+            "largest distance of a location from the mesh, m");
+  bind(table, options.closing);
+  bind(table, options.engagement);
+}
+
+const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names() {
+  static const std::vector<std::pair<std::string, TrialEnd>> names = {
+      {"holds", TrialEnd::holds},     {"approach", TrialEnd::approach},
+      {"contact", TrialEnd::contact}, {"engagement", TrialEnd::engagement},
+      {"load", TrialEnd::load},       {"unseen", TrialEnd::unseen}};
+  return names;
+}
+
+std::pair<double, double> wilson_interval(double share, double count) {
+  constexpr double z = 1.959963984540054;  // of 95 %
+  const double middle = share + z * z / (2.0 * count);
+  const double half = z * std::sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count));
+  const double scale = 1.0 + z * z / count;
+  return {std::max(0.0, (middle - half) / scale), std::min(1.0, (middle + half) / scale)};
+}
+
+std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gripper,
+                                        const std::vector<Eigen::Vector3d>& locations,
+                                        const GraspOptions& options, libmap::Progress& progress) {
+  options.check();
+  gripper.check();
+  finger_geometry(gripper);  // throws without fingers
+  require_ground(ground, locations, options.max_distance_m);
+  std::vector<LocationResult> results(locations.size());
+  progress.begin("grasp", locations.size());
+  libmap::parallel_for(locations.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      results[n] = test_location(ground, gripper, locations[n], options);
+      progress.advance(1);
+    }
+  });
+  progress.end();
+  return results;
+}
+
+Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
+                   const GraspOptions& options, int pose, int draw) {
+  const Site site = site_of(ground, gripper, location, options);
+  Trial trial;
+  trial.gripper =
+      close_gripper(site.patch, gripper, draw_pose(site, gripper, options, pose), options.closing);
+  trial.bearing = draw_asperities(trial.gripper, site, gripper, options, pose, draw);
+  const LeastForce least =
+      least_holding_force(trial.bearing, holding_of(trial.gripper, gripper, SpineSharing::equally));
+  trial.force_n = least.force_n;
+  trial.direction = least.direction;
+  trial.end = end_of(trial.gripper, trial.bearing.size(), least.force_n, options);
+  return trial;
+}
+
+}  // namespace libgtd

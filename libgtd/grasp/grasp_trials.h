@@ -1,0 +1,98 @@
+// The virtual field test: a gripper closed many times on the ground at each location, with yaw,
+// offset, tilt and asperities drawn anew, and pulled in 17 directions.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libgtd/grasp/bearing.h"
+#include "libgtd/grasp/gripper_closing.h"
+#include "libgtd/grasp/holding_force.h"
+#include "libmap/core/progress.h"
+
+namespace libgtd {
+
+// up: against gravity (the mesh's z). normal: along the ground's mean normal within the palm's
+// radius of the location.
+enum class ApproachDirection { up, normal };
+
+struct GraspOptions {
+  double load_n = 10.0;  // a trial holds if its force is at least load * safety in all directions
+  double safety = 1.0;
+  ApproachDirection approach = ApproachDirection::up;
+  int poses = 32;  // of a location
+  int draws = 32;  // of asperities at each pose
+  // Draws of a pose for which the static force is computed too, which takes longer than the
+  // progressive one.
+  int static_draws = 2;
+  std::uint64_t seed = 1;
+  double offset_m = 0.005;       // standard deviation of the palm's place, each of x and y
+  double tilt_deg = 3.0;         // standard deviation of its tilt, about each of x and y
+  double max_distance_m = 0.05;  // of a location from the ground
+  ClosingOptions closing;
+  EngagementOptions engagement;
+
+  // Throws Error naming the field, its value and the bound that it breaks.
+  void check() const;
+};
+void bind(libmap::ParameterTable& table, GraspOptions& options);
+
+// Why a trial does not hold. approach: no ground below, or the way begins inside it. contact: less
+// than two contacts. engagement: the contacts balance no pull in some direction. load: they do, but
+// not the load. unseen: one of these, and a finger had too much unseen ground.
+enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
+const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
+
+struct Trial {
+  ClosedGripper gripper;
+  std::vector<BearingContact> bearing;
+  TrialEnd end = TrialEnd::approach;
+  double force_n = 0.0;       // progressive, the least of the directions
+  std::size_t direction = 0;  // the index of that direction in pull_directions()
+};
+
+struct LocationResult {
+  Eigen::Vector3d location;  // as given
+  std::size_t trials = 0;
+  std::array<std::size_t, 6> ends{};  // by TrialEnd
+  double hold_probability = 0.0;
+  // Wilson's interval of 95 %; trials of one pose depend on each other, so a pose counts once.
+  double hold_low = 0.0;
+  double hold_high = 0.0;
+  std::array<double, 3> force_n{};         // progressive: quantiles 0.1, 0.5, 0.9 of the trials
+  std::array<double, 3> static_force_n{};  // the same of the static draws
+  std::size_t limiting_direction = 0;      // most often the weakest; of trials with any force
+  // Means over the poses.
+  double spine_fingers = 0.0;
+  double link_fingers = 0.0;  // a link touches, no spine does
+  double free_fingers = 0.0;
+  double palm_share = 0.0;   // of poses in which the palm touches the ground
+  double unseen = 0.0;       // share of the fingers' strips
+  double clearance_m = 0.0;  // of the palm above the location
+  // The trial whose force is nearest to the median.
+  int shown_pose = 0;
+  int shown_draw = 0;
+
+  bool holds() const { return hold_probability >= 0.5; }
+};
+
+// Tests all locations (m, in the mesh's frame). The result of a location depends on its coordinates
+// and the seed, not on the other locations, their order or the number of threads. Throws Error: a
+// bound of the options is broken, the gripper has no `fingers`, or a location is farther from the
+// ground than `max_distance_m` (its number from 1 is the field).
+std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gripper,
+                                        const std::vector<Eigen::Vector3d>& locations,
+                                        const GraspOptions& options, libmap::Progress& progress);
+
+// One trial of a location again, for a picture of it.
+Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
+                   const GraspOptions& options, int pose, int draw);
+
+// Wilson's score interval of a share at 95 % (Wilson 1927): {low, high}.
+std::pair<double, double> wilson_interval(double share, double count);
+
+}  // namespace libgtd

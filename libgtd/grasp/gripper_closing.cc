@@ -1,0 +1,270 @@
+#include "libgtd/grasp/gripper_closing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+namespace libgtd {
+
+namespace {
+
+// The open gripper comes to rest this far above the ground, so that a closing finger meets the
+// ground from outside.
+constexpr double clearance_m = 1e-5;
+
+// The patch's vertices in a gripper's frame.
+std::vector<Eigen::Vector3d> carried(const GroundPatch& patch,
+                                     const Eigen::Isometry3d& gripper_from_patch) {
+  std::vector<Eigen::Vector3d> vertices;
+  vertices.reserve(patch.vertices.size());
+  for (const Eigen::Vector3d& vertex : patch.vertices)
+    vertices.push_back(gripper_from_patch * vertex);
+  return vertices;
+}
+
+// The ground's cut with the half plane of a finger, beginning a little behind the palm's axis.
+std::vector<ProfileSegment> profile_of(const GroundPatch& patch,
+                                       const std::vector<Eigen::Vector3d>& vertices,
+                                       const Eigen::Vector3d& axis, double azimuth,
+                                       const FingerGeometry& finger) {
+  const Eigen::Vector2d along(std::cos(azimuth), std::sin(azimuth));
+  std::vector<double> side(vertices.size());
+  for (std::size_t n = 0; n < vertices.size(); ++n)
+    side[n] = along.x() * vertices[n].y() - along.y() * vertices[n].x();
+  const double farthest = finger.joint_radius_m + finger.proximal_m + finger.distal_m;
+  std::vector<ProfileSegment> profile;
+  for (std::uint32_t t = 0; t < patch.triangles.size(); ++t) {
+    const auto [a, b, c] = patch.triangles[t];
+    const bool above_a = side[a] >= 0.0;
+    const bool above_b = side[b] >= 0.0;
+    const bool above_c = side[c] >= 0.0;
+    if (above_a == above_b && above_b == above_c) continue;
+    // The vertex that is alone on its side, and the two others.
+    const auto [lone, first, second] = above_b == above_c   ? std::array{a, b, c}
+                                       : above_a == above_c ? std::array{b, c, a}
+                                                            : std::array{c, a, b};
+    const auto cut = [&, lone = lone](std::uint32_t other) {
+      const double share = side[lone] / (side[lone] - side[other]);
+      const Eigen::Vector3d point = vertices[lone] + share * (vertices[other] - vertices[lone]);
+      return Eigen::Vector2d(along.dot(point.head<2>()), point.z());
+    };
+    ProfileSegment segment{cut(first), cut(second), t, patch.area_normals[t].dot(axis) > 0.0};
+    const auto [low, high] = std::minmax(segment.a.x(), segment.b.x());
+    if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
+  }
+  return profile;
+}
+
+// Height of the highest point of a triangle above the disc of this radius about the origin, if any.
+std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& corners,
+                                       double radius) {
+  std::optional<double> height;
+  const auto offer = [&](double z) { height = std::max(height.value_or(z), z); };
+  const double square = radius * radius;
+  for (std::size_t n = 0; n < 3; ++n) {
+    const Eigen::Vector3d& p = corners[n];
+    const Eigen::Vector3d edge = corners[(n + 1) % 3] - p;
+    if (p.head<2>().squaredNorm() <= square) offer(p.z());
+    // |p + share * edge| = radius
+    const double dd = edge.head<2>().squaredNorm();
+    if (dd == 0.0) continue;
+    const double half = p.head<2>().dot(edge.head<2>()) / dd;
+    const double root = half * half - (p.head<2>().squaredNorm() - square) / dd;
+    if (root < 0.0) continue;
+    for (const double share : {-half - std::sqrt(root), -half + std::sqrt(root)})
+      if (share >= 0.0 && share <= 1.0) offer(p.z() + share * edge.z());
+  }
+  // The circle's highest point on the triangle's plane, where that is on the triangle.
+  const Eigen::Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  const double slope = normal.head<2>().norm();
+  if (normal.z() == 0.0) return height;
+  const Eigen::Vector2d top =
+      slope > 0.0
+          ? Eigen::Vector2d(-normal.head<2>() / (slope * std::copysign(1.0, normal.z())) * radius)
+          : Eigen::Vector2d(0.0, 0.0);
+  const double sign = std::copysign(1.0, normal.z());
+  for (std::size_t n = 0; n < 3; ++n) {
+    const Eigen::Vector2d from = corners[n].head<2>();
+    const Eigen::Vector2d edge = corners[(n + 1) % 3].head<2>() - from;
+    const Eigen::Vector2d way = top - from;
+    if (sign * (edge.x() * way.y() - edge.y() * way.x()) < 0.0) return height;
+  }
+  offer(corners[0].z() - normal.head<2>().dot(top - corners[0].head<2>()) / normal.z());
+  return height;
+}
+
+// Height at which the palm's disc meets the ground, from below `start_m`.
+std::optional<double> palm_height(const GroundPatch& patch,
+                                  const std::vector<Eigen::Vector3d>& vertices, double radius,
+                                  double start_m) {
+  std::optional<double> height;
+  for (const libmap::Triangle& triangle : patch.triangles) {
+    const std::array corners = {vertices[triangle[0]], vertices[triangle[1]],
+                                vertices[triangle[2]]};
+    const auto [low_x, high_x] = std::minmax({corners[0].x(), corners[1].x(), corners[2].x()});
+    const auto [low_y, high_y] = std::minmax({corners[0].y(), corners[1].y(), corners[2].y()});
+    if (low_x > radius || high_x < -radius || low_y > radius || high_y < -radius) continue;
+    if (std::min({corners[0].z(), corners[1].z(), corners[2].z()}) > start_m) continue;
+    if (const auto over = height_over_disc(corners, radius))
+      height = std::max(height.value_or(*over), *over);
+  }
+  return height;
+}
+
+// Whether ground that faces the palm is above `start_m` without a ceiling between: the finger would
+// begin its way inside the ground. Takes segments above `start_m` out of the profile.
+bool is_blocked(std::vector<ProfileSegment>& profile, const FingerGeometry& finger,
+                double start_m) {
+  const auto is_above = [&](const ProfileSegment& segment) {
+    return std::min(segment.a.y(), segment.b.y()) > start_m;
+  };
+  const double tip = finger.tip(finger.opening_rad, finger.curl_rad).x();
+  bool blocked = false;
+  for (const ProfileSegment& top : profile) {
+    if (!top.faces_palm || !is_above(top)) continue;
+    const Eigen::Vector2d middle = 0.5 * (top.a + top.b);
+    if (middle.x() < finger.joint_radius_m || middle.x() > tip) continue;
+    const bool has_ceiling =
+        std::any_of(profile.begin(), profile.end(), [&](const ProfileSegment& other) {
+          const auto [low, high] = std::minmax(other.a.x(), other.b.x());
+          return !other.faces_palm && low <= middle.x() && middle.x() <= high &&
+                 std::min(other.a.y(), other.b.y()) < middle.y() && is_above(other);
+        });
+    blocked |= !has_ceiling;
+  }
+  std::erase_if(profile, is_above);
+  return blocked;
+}
+
+// ClosedFinger::unseen: by the union of what the profile covers.
+double unseen_share(const std::vector<ProfileSegment>& profile, double tip_radius) {
+  std::vector<std::pair<double, double>> spans;
+  for (const ProfileSegment& segment : profile)
+    if (segment.faces_palm && std::min(segment.a.y(), segment.b.y()) < 0.0)
+      spans.push_back(std::minmax(segment.a.x(), segment.b.x()));
+  std::sort(spans.begin(), spans.end());
+  double seen = 0.0;
+  double end = 0.0;
+  for (const auto& [low, high] : spans) {
+    const double from = std::max(low, end);
+    const double to = std::min(high, tip_radius);
+    if (to <= from) continue;
+    seen += to * to - from * from;
+    end = to;
+  }
+  return std::max(0.0, 1.0 - seen / (tip_radius * tip_radius));
+}
+
+Eigen::Isometry3d patch_from_palm(const ApproachPose& pose) {
+  Eigen::Isometry3d frame = Eigen::Isometry3d::Identity();
+  frame.translation() = Eigen::Vector3d(pose.offset_m.x(), pose.offset_m.y(), 0.0);
+  const double tilt = pose.tilt_rad.norm();
+  if (tilt > 0.0)
+    frame.rotate(
+        Eigen::AngleAxisd(tilt, Eigen::Vector3d(pose.tilt_rad.x(), pose.tilt_rad.y(), 0.0) / tilt));
+  frame.rotate(Eigen::AngleAxisd(pose.yaw_rad, Eigen::Vector3d::UnitZ()));
+  return frame;
+}
+
+// Adds the contacts of a closed finger.
+void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOptions& options,
+                  ClosedGripper& gripper) {
+  const ClosedFinger& finger = gripper.fingers[number];
+  const Eigen::Vector3d outward(std::cos(finger.azimuth_rad), std::sin(finger.azimuth_rad), 0.0);
+  const auto in_patch = [&](const Eigen::Vector2d& v) -> Eigen::Vector3d {
+    return v.x() * outward + v.y() * Eigen::Vector3d::UnitZ();
+  };
+  const Eigen::Matrix3d rotation = gripper.patch_from_gripper.linear();
+  for (const bool by_spines : {false, true}) {
+    const auto& touch = by_spines ? finger.closing.spines : finger.closing.link;
+    if (!touch) continue;
+    GripContact contact;
+    contact.finger = number;
+    contact.by_spines = by_spines;
+    contact.point = gripper.patch_from_gripper * in_patch(touch->point);
+    const auto normal = patch.normal_at(contact.point, options.normal_radius_m);
+    if (!normal) continue;
+    contact.normal = *normal;
+    contact.outward = rotation * outward;
+    const auto tangential = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
+      return v - v.dot(contact.normal) * contact.normal;
+    };
+    // A motion along the normal drags nowhere; what is left is toward the axis.
+    Eigen::Vector3d drag = tangential(rotation * in_patch(touch->motion).normalized());
+    if (drag.norm() < 1e-6) drag = tangential(-contact.outward);
+    if (drag.norm() < 1e-6) drag = tangential(-rotation.col(2));
+    contact.drag = drag.normalized();
+    gripper.contacts.push_back(contact);
+  }
+}
+
+}  // namespace
+
+void bind(libmap::ParameterTable& table, ClosingOptions& options) {
+  table.add("approach_m", options.approach_m, {0.0, 10.0, true, false},
+            "height above the location at which the gripper's way begins, m");
+  table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
+            "a contact's normal is the mean of the ground within this radius, m");
+  table.add("max_unseen", options.max_unseen, libmap::zero_to_one,
+            "a finger with a larger share of its strip unseen gets no contact");
+}
+
+GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
+                         const Eigen::Vector3d& away, const Gripper& gripper, double offset_m,
+                         double tilt_rad, const ClosingOptions& options) {
+  const FingerGeometry finger = finger_geometry(gripper);
+  const double reach = finger.proximal_m + finger.distal_m;
+  const double height = options.approach_m + reach;
+  const double radius = std::max(finger.joint_radius_m + reach, 0.0005 * gripper.palm_diameter_mm) +
+                        offset_m + options.normal_radius_m + height * std::sin(tilt_rad);
+  return ground.patch(location, away, radius, height);
+}
+
+ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
+                            const ApproachPose& pose, const ClosingOptions& options) {
+  const FingerGeometry finger = finger_geometry(gripper);
+  const int count = gripper.fingers->count;
+  ClosedGripper closed;
+  closed.patch_from_gripper = patch_from_palm(pose);
+  const std::vector<Eigen::Vector3d> vertices = carried(patch, closed.patch_from_gripper.inverse());
+  const Eigen::Vector3d axis = closed.patch_from_gripper.linear().col(2);
+  std::vector<std::vector<ProfileSegment>> profiles;
+  const std::optional<double> palm =
+      palm_height(patch, vertices, 0.0005 * gripper.palm_diameter_mm, options.approach_m);
+  std::optional<double> height = palm;
+  for (int n = 0; n < count; ++n) {
+    const double azimuth = 2.0 * std::numbers::pi * n / count;
+    profiles.push_back(profile_of(patch, vertices, axis, azimuth, finger));
+    if (is_blocked(profiles.back(), finger, options.approach_m)) {
+      closed.approach = ApproachEnd::blocked;
+      return closed;
+    }
+    if (const auto needed = open_finger_height(finger, profiles.back()))
+      height = std::max(height.value_or(*needed), *needed);
+  }
+  if (!height) return closed;
+  closed.approach = ApproachEnd::on_ground;
+  closed.palm_touches = palm && *palm >= *height;
+  *height += clearance_m;
+  closed.patch_from_gripper.translate(Eigen::Vector3d(0.0, 0.0, *height));
+  const double tip = finger.tip(finger.opening_rad, finger.curl_rad).x();
+  for (int n = 0; n < count; ++n) {
+    auto& profile = profiles[static_cast<std::size_t>(n)];
+    for (ProfileSegment& segment : profile) {
+      segment.a.y() -= *height;
+      segment.b.y() -= *height;
+    }
+    ClosedFinger one;
+    one.azimuth_rad = 2.0 * std::numbers::pi * n / count;
+    one.unseen = unseen_share(profile, tip);
+    one.closing = close_finger(finger, profile);
+    closed.unseen += one.unseen / count;
+    closed.fingers.push_back(one);
+    if (one.unseen <= options.max_unseen)
+      add_contacts(patch, static_cast<std::size_t>(n), options, closed);
+  }
+  return closed;
+}
+
+}  // namespace libgtd

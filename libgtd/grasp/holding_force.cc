@@ -1,0 +1,214 @@
+#include "libgtd/grasp/holding_force.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <numbers>
+
+#include "libmap/core/random_stream.h"
+
+namespace libgtd {
+
+namespace {
+
+// Moments are divided by this length, so that all rows are forces of one size.
+constexpr double wrench_length_m = 0.1;
+
+double small_value(Eigen::Index row) {
+  return 1e-10 * (1.0 + libmap::unit_noise(static_cast<std::uint64_t>(row), 7));
+}
+
+// The primal simplex method (Dantzig 1963) with the inverse of the basis. A contact's force is a
+// combination of vertices of its set, weights up to 1 in sum; a vertex is made only when it is the
+// best one to enter (Dantzig and Wolfe 1960). Rows: six of the equilibrium, one for each contact,
+// one for each finger's drive. On the right 0 for the equilibrium, else 1.
+class EquilibriumProgram {
+ public:
+  EquilibriumProgram(const std::vector<BearingContact>& contacts, const HoldingOptions& options)
+      : contacts_(contacts), options_(options) {
+    std::size_t fingers = 0;
+    for (const BearingContact& contact : contacts) {
+      arms_.push_back(contact.point() - options.load_point);
+      fingers = std::max(fingers, contact.finger() + 1);
+    }
+    rows_ = static_cast<Eigen::Index>(6 + contacts.size() + fingers);
+    inverse_.setIdentity(rows_, rows_);
+    values_.setZero(rows_);
+    values_.tail(rows_ - 6).setOnes();
+    column_.setZero(rows_);
+    kinds_.assign(static_cast<std::size_t>(rows_), Kind::slack);
+    std::fill_n(kinds_.begin(), 6, Kind::artificial);
+  }
+
+  double max_pull(const Eigen::Vector3d& direction, double enough) {
+    column_.head<3>() = direction;
+    if (options_.holds_when_closed)
+      column_.tail(rows_ - first_drive()).setConstant(-1.0 / options_.closing_force_n);
+    if (!enter(Kind::pull)) return 0.0;
+    constexpr int max_pivots = 2000;
+    for (int pivot = 0; pivot < max_pivots; ++pivot) {
+      const Eigen::Index pull = pull_row();
+      if (pull < 0) return 0.0;  // it has left at 0: nothing can balance it
+      if (true_value(pull) >= enough) break;
+      const double gain = price(inverse_.row(pull));
+      if (gain <= 1e-11 * (1.0 + std::abs(values_[pull])) || !enter(entering_)) break;
+    }
+    const Eigen::Index pull = pull_row();
+    return pull < 0 ? 0.0 : std::max(0.0, true_value(pull));
+  }
+
+ private:
+  enum class Kind : std::uint8_t { slack, artificial, pull, contact };
+
+  Eigen::Index first_drive() const { return static_cast<Eigen::Index>(6 + contacts_.size()); }
+  Eigen::Index drive_row(const BearingContact& contact) const {
+    return first_drive() + static_cast<Eigen::Index>(contact.finger());
+  }
+  Eigen::Index pull_row() const {
+    const auto pull = std::find(kinds_.begin(), kinds_.end(), Kind::pull);
+    return pull == kinds_.end() ? -1 : pull - kinds_.begin();
+  }
+  // Of a basic variable, without the perturbation.
+  double true_value(Eigen::Index row) const { return inverse_.row(row).tail(rows_ - 6).sum(); }
+
+  // Makes the column with the largest gain, which it returns. `prices` of the rows: how much the
+  // pull grows with their right side.
+  double price(const Eigen::RowVectorXd& prices) {
+    const Eigen::Vector3d force_price = prices.head<3>();
+    const Eigen::Vector3d moment_price = prices.segment<3>(3) / wrench_length_m;
+    const auto worth_of = [&](std::size_t n) -> Eigen::Vector3d {
+      return -force_price - moment_price.cross(arms_[n]) -
+             prices[drive_row(contacts_[n])] / options_.closing_force_n * contacts_[n].outward();
+    };
+    double most = 0.0;
+    std::size_t best = contacts_.size();
+    for (std::size_t n = 0; n < contacts_.size(); ++n) {
+      const double gain = contacts_[n].max_product(worth_of(n), options_.sharing) -
+                          prices[6 + static_cast<Eigen::Index>(n)];
+      if (gain <= most) continue;
+      most = gain;
+      best = n;
+    }
+    Eigen::Index slack = -1;
+    for (Eigen::Index row = 6; row < rows_; ++row) {
+      if (-prices[row] <= most) continue;
+      most = -prices[row];
+      slack = row;
+    }
+    column_.setZero();
+    entering_ = slack >= 0 ? Kind::slack : Kind::contact;
+    if (slack >= 0) {
+      column_[slack] = 1.0;
+    } else if (best < contacts_.size()) {
+      const Eigen::Vector3d force = contacts_[best].best_force(worth_of(best), options_.sharing);
+      column_.head<3>() = force;
+      column_.segment<3>(3) = arms_[best].cross(force) / wrench_length_m;
+      column_[6 + static_cast<Eigen::Index>(best)] = 1.0;
+      column_[drive_row(contacts_[best])] =
+          contacts_[best].outward().dot(force) / options_.closing_force_n;
+    }
+    return most;
+  }
+
+  // Lets `column_` enter the basis; false if nothing bounds it.
+  bool enter(Kind kind) {
+    change_.noalias() = inverse_ * column_;
+    Eigen::Index leaving = -1;
+    // Artificial variables are 0 and must stay so: they leave as soon as they would change.
+    double largest = 1e-9;
+    for (Eigen::Index row = 0; row < rows_; ++row)
+      if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial &&
+          std::abs(change_[row]) > largest) {
+        largest = std::abs(change_[row]);
+        leaving = row;
+      }
+    double step = 0.0;
+    if (leaving < 0) {
+      perturb();
+      step = std::numeric_limits<double>::infinity();
+      for (Eigen::Index row = 0; row < rows_; ++row) {
+        if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial || change_[row] <= 1e-11)
+          continue;
+        const double bound = values_[row] / change_[row];
+        if (bound >= step) continue;
+        step = bound;
+        leaving = row;
+      }
+      if (leaving < 0) return false;
+    }
+    values_ -= step * change_;
+    values_[leaving] = step > 0.0 || !is_perturbed_ ? step : small_value(leaving);
+    inverse_.row(leaving) /= change_[leaving];
+    for (Eigen::Index row = 0; row < rows_; ++row)
+      if (row != leaving && change_[row] != 0.0)
+        inverse_.row(row) -= change_[row] * inverse_.row(leaving);
+    kinds_[static_cast<std::size_t>(leaving)] = kind;
+    return true;
+  }
+
+  // Many basic variables are 0 at first. Small different values instead keep the method from going
+  // round in circles; results are computed without them.
+  void perturb() {
+    if (is_perturbed_) return;
+    is_perturbed_ = true;
+    for (Eigen::Index row = 0; row < rows_; ++row)
+      if (kinds_[static_cast<std::size_t>(row)] != Kind::artificial)
+        values_[row] += small_value(row);
+  }
+
+  const std::vector<BearingContact>& contacts_;
+  const HoldingOptions& options_;
+  std::vector<Eigen::Vector3d> arms_;
+  Eigen::Index rows_ = 0;
+  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> inverse_;
+  Eigen::VectorXd values_;
+  Eigen::VectorXd column_;  // that enters
+  Eigen::VectorXd change_;  // of the values by it
+  std::vector<Kind> kinds_;
+  Kind entering_ = Kind::slack;
+  bool is_perturbed_ = false;
+};
+
+}  // namespace
+
+double holding_force(const std::vector<BearingContact>& contacts, const Eigen::Vector3d& direction,
+                     const HoldingOptions& options, double enough) {
+  if (contacts.size() < 2) return 0.0;  // one point balances no pull beside it
+  return EquilibriumProgram(contacts, options).max_pull(direction, enough);
+}
+
+LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
+                               const HoldingOptions& options, std::size_t first) {
+  const std::vector<PullDirection>& directions = pull_directions();
+  LeastForce least{holding_force(contacts, directions[first].vector, options), first};
+  for (std::size_t n = 0; n < directions.size() && least.force_n > 0.0; ++n) {
+    if (n == first) continue;
+    const double force = holding_force(contacts, directions[n].vector, options, least.force_n);
+    if (force < least.force_n) least = {force, n};
+  }
+  return least;
+}
+
+std::string PullDirection::name() const {
+  return tilt_deg == 0 ? "away" : fmt::format("{}@{}", tilt_deg, azimuth_deg);
+}
+
+const std::vector<PullDirection>& pull_directions() {
+  static const std::vector<PullDirection> directions = [] {
+    std::vector<PullDirection> made = {{0, 0, Eigen::Vector3d::UnitZ()}};
+    for (const int tilt : {45, 90})
+      for (int azimuth = 0; azimuth < 360; azimuth += 45) {
+        const double t = tilt * std::numbers::pi / 180.0;
+        const double a = azimuth * std::numbers::pi / 180.0;
+        made.push_back(
+            {tilt, azimuth, {std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)}});
+      }
+    return made;
+  }();
+  return directions;
+}
+
+}  // namespace libgtd
