@@ -6,11 +6,11 @@
 #include <functional>
 #include <numbers>
 
+#include "libmap/core/angle.h"
+
 namespace libgtd {
 
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 // Chen et al. 2024: share of a concrete's asperities that a spine tip can use.
 double usable_asperities(double tip_radius_um) {
@@ -75,8 +75,8 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> l
 BearingContact::BearingContact(const GripContact& contact, const EngagementOptions& options,
                                double limit_n)
     : BearingContact(contact, std::vector<double>{}, options.friction, limit_n) {
-  const double side = std::tan(options.adhesion_lateral_deg * degree);
-  const double pull = std::tan(options.adhesion_pull_deg * degree);
+  const double side = std::tan(options.adhesion_lateral_deg * libmap::radians_per_degree);
+  const double pull = std::tan(options.adhesion_pull_deg * libmap::radians_per_degree);
   adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
 }
 
@@ -169,7 +169,7 @@ std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contact
       for (int spine = 0; spine < fingers.spines_per_finger; ++spine) {
         const bool engages = random.uniform() < share;
         const double lean = random.uniform(options.asperity_min_deg, options.asperity_max_deg);
-        if (engages) leans.push_back(lean * degree);
+        if (engages) leans.push_back(lean * libmap::radians_per_degree);
       }
       if (!leans.empty())
         bearing.emplace_back(contact, std::move(leans), options.friction,

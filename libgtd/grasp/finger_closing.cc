@@ -5,13 +5,12 @@
 #include <cmath>
 #include <numbers>
 
+#include "libmap/core/angle.h"
 #include "libmap/core/error.h"
 
 namespace libgtd {
 
 namespace {
-
-constexpr double pi = std::numbers::pi;
 
 Eigen::Vector2d direction(double angle) { return {std::sin(angle), -std::cos(angle)}; }
 
@@ -60,7 +59,7 @@ class FirstContact {
 
  private:
   void offer(double turn, double along, const Eigen::Vector2d& from_pivot) {
-    if (turn > first_) turn -= 2.0 * pi;
+    if (turn > first_) turn -= 2.0 * std::numbers::pi;
     if (turn < last_ || turn > first_) return;
     if (contact_ && turn <= contact_->angle) return;
     contact_ = LinkContact{turn, along, from_pivot + link_.pivot};
@@ -149,15 +148,15 @@ Eigen::Vector2d FingerGeometry::tip(double proximal_rad, double curl) const {
 FingerGeometry finger_geometry(const Gripper& gripper) {
   if (!gripper.fingers)
     throw libmap::Error("missing: a gripper is closed by its fingers", {.field = "fingers"});
-  const auto radians = [](double degrees) { return degrees * pi / 180.0; };
+  constexpr double radians = libmap::radians_per_degree;
   FingerGeometry finger;
   finger.joint_radius_m = 0.0005 * gripper.finger_joint_diameter_mm;
   finger.proximal_m = 0.001 * gripper.finger_length_mm;
   finger.distal_m = 0.001 * gripper.spine_length_mm;
-  finger.opening_rad = radians(gripper.opening_angle_deg);
-  finger.closing_rad = radians(gripper.closing_angle_deg);
-  finger.curl_rad = radians(gripper.fingers->curl_deg);
-  finger.curl_limit_rad = radians(gripper.fingers->curl_limit_deg);
+  finger.opening_rad = radians * gripper.opening_angle_deg;
+  finger.closing_rad = radians * gripper.closing_angle_deg;
+  finger.curl_rad = radians * gripper.fingers->curl_deg;
+  finger.curl_limit_rad = radians * gripper.fingers->curl_limit_deg;
   return finger;
 }
 

@@ -8,6 +8,7 @@
 #include <string>
 #include <tuple>
 
+#include "libmap/core/angle.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
@@ -16,8 +17,6 @@
 namespace libgtd {
 
 namespace {
-
-constexpr double degree = std::numbers::pi / 180.0;
 
 // The same for the same place, wherever it is in a list.
 std::uint64_t key_of(const Eigen::Vector3d& location) {
@@ -51,7 +50,7 @@ Site site_of(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d
   const Eigen::Vector3d away = away_from(ground, gripper, location, options.approach);
   // Four standard deviations; draws are cut off there.
   return {patch_around(ground, location, away, gripper, 4.0 * options.offset_m,
-                       4.0 * options.tilt_deg * degree, options.closing),
+                       4.0 * options.tilt_deg * libmap::radians_per_degree, options.closing),
           key_of(location)};
 }
 
@@ -63,7 +62,8 @@ ApproachPose draw_pose(const Site& site, const Gripper& gripper, const GraspOpti
   ApproachPose pose;
   pose.yaw_rad = random.uniform(0.0, 2.0 * std::numbers::pi / gripper.fingers->count);
   for (double& offset : pose.offset_m) offset = options.offset_m * normal();
-  for (double& tilt : pose.tilt_rad) tilt = options.tilt_deg * degree * normal();
+  for (double& tilt : pose.tilt_rad)
+    tilt = options.tilt_deg * libmap::radians_per_degree * normal();
   return pose;
 }
 
@@ -130,7 +130,7 @@ LocationResult test_location(const Ground& ground, const Gripper& gripper,
   LocationResult result;
   result.location = location;
   std::vector<double> forces;
-  std::vector<double> static_forces;
+  std::vector<double> best_forces;
   std::vector<std::size_t> limiting(pull_directions().size(), 0);
   for (int pose = 0; pose < options.poses; ++pose) {
     const ClosedGripper closed = close_gripper(
@@ -144,8 +144,8 @@ LocationResult test_location(const Ground& ground, const Gripper& gripper,
       const LeastForce least = least_holding_force(bearing, equally, guess);
       guess = least.direction;
       forces.push_back(least.force_n);
-      if (draw < options.static_draws)
-        static_forces.push_back(least_holding_force(bearing, best, guess).force_n);
+      if (draw < options.best_draws)
+        best_forces.push_back(least_holding_force(bearing, best, guess).force_n);
       if (least.force_n > 0.0) ++limiting[least.direction];
       ++result
             .ends[static_cast<std::size_t>(end_of(closed, bearing.size(), least.force_n, options))];
@@ -157,7 +157,7 @@ LocationResult test_location(const Ground& ground, const Gripper& gripper,
   std::tie(result.hold_low, result.hold_high) =
       wilson_interval(result.hold_probability, options.poses);
   result.force_n = quantiles(forces);
-  result.static_force_n = quantiles(static_forces);
+  result.best_force_n = quantiles(best_forces);
   result.limiting_direction = static_cast<std::size_t>(
       std::max_element(limiting.begin(), limiting.end()) - limiting.begin());
   const auto nearest = std::min_element(forces.begin(), forces.end(), [&](double a, double b) {
@@ -195,8 +195,8 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
             "direction that the palm comes from: z, or the ground's normal");
   table.add("trials", options.poses, {1, 100000}, "poses of the gripper at each location");
   table.add("draws", options.draws, {1, 100000}, "draws of asperities at each pose");
-  table.add("static_draws", options.static_draws, {0, 100000},
-            "draws of a pose for which the static force is computed too");
+  table.add("best_draws", options.best_draws, {0, 100000},
+            "draws of a pose for which the force with the best sharing is computed too");
   table.add("seed", options.seed, not_negative, "of all draws");
   table.add("offset_m", options.offset_m, {0.0, 1.0}, "standard deviation of the palm's place, m");
   table.add("tilt_deg", options.tilt_deg, {0.0, 15.0}, "standard deviation of the palm's tilt");

@@ -26,9 +26,8 @@ struct GraspOptions {
   ApproachDirection approach = ApproachDirection::up;
   int poses = 32;  // of a location
   int draws = 32;  // of asperities at each pose
-  // Draws of a pose for which the static force is computed too, which takes longer than the
-  // progressive one.
-  int static_draws = 2;
+  // Draws of a pose for which the force with the best sharing (SpineSharing) is computed too.
+  int best_draws = 2;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm's place, each of x and y
   double tilt_deg = 3.0;         // standard deviation of its tilt, about each of x and y
@@ -51,7 +50,7 @@ struct Trial {
   ClosedGripper gripper;
   std::vector<BearingContact> bearing;
   TrialEnd end = TrialEnd::approach;
-  double force_n = 0.0;       // progressive, the least of the directions
+  double force_n = 0.0;       // equal sharing, the least of the directions
   std::size_t direction = 0;  // the index of that direction in pull_directions()
 };
 
@@ -63,9 +62,9 @@ struct LocationResult {
   // Wilson's interval of 95 %; trials of one pose depend on each other, so a pose counts once.
   double hold_low = 0.0;
   double hold_high = 0.0;
-  std::array<double, 3> force_n{};         // progressive: quantiles 0.1, 0.5, 0.9 of the trials
-  std::array<double, 3> static_force_n{};  // the same of the static draws
-  std::size_t limiting_direction = 0;      // most often the weakest; of trials with any force
+  std::array<double, 3> force_n{};       // equal sharing: quantiles 0.1, 0.5, 0.9 of the trials
+  std::array<double, 3> best_force_n{};  // the same of the best sharing
+  std::size_t limiting_direction = 0;    // most often the weakest; of trials with any force
   // Means over the poses.
   double spine_fingers = 0.0;
   double link_fingers = 0.0;  // a link touches, no spine does

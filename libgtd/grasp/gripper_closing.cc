@@ -202,7 +202,7 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
 }  // namespace
 
 void bind(libmap::ParameterTable& table, ClosingOptions& options) {
-  table.add("approach_m", options.approach_m, {0.0, 10.0, true, false},
+  table.add("start_height_m", options.start_height_m, {0.0, 10.0, true, false},
             "height above the location at which the gripper's way begins, m");
   table.add("normal_radius_m", options.normal_radius_m, {1e-5, 0.1},
             "a contact's normal is the mean of the ground within this radius, m");
@@ -215,7 +215,7 @@ GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
                          double tilt_rad, const ClosingOptions& options) {
   const FingerGeometry finger = finger_geometry(gripper);
   const double reach = finger.proximal_m + finger.distal_m;
-  const double height = options.approach_m + reach;
+  const double height = options.start_height_m + reach;
   const double radius = std::max(finger.joint_radius_m + reach, 0.0005 * gripper.palm_diameter_mm) +
                         offset_m + options.normal_radius_m + height * std::sin(tilt_rad);
   return ground.patch(location, away, radius, height);
@@ -231,12 +231,12 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   const Eigen::Vector3d axis = closed.patch_from_gripper.linear().col(2);
   std::vector<std::vector<ProfileSegment>> profiles;
   const std::optional<double> palm =
-      palm_height(patch, vertices, 0.0005 * gripper.palm_diameter_mm, options.approach_m);
+      palm_height(patch, vertices, 0.0005 * gripper.palm_diameter_mm, options.start_height_m);
   std::optional<double> height = palm;
   for (int n = 0; n < count; ++n) {
     const double azimuth = 2.0 * std::numbers::pi * n / count;
     profiles.push_back(profile_of(patch, vertices, axis, azimuth, finger));
-    if (is_blocked(profiles.back(), finger, options.approach_m)) {
+    if (is_blocked(profiles.back(), finger, options.start_height_m)) {
       closed.approach = ApproachEnd::blocked;
       return closed;
     }

@@ -51,7 +51,7 @@ struct ClosedGripper {
 };
 
 struct ClosingOptions {
-  double approach_m = 0.15;        // the way down begins this far above the location
+  double start_height_m = 0.15;    // the way down begins this far above the location
   double normal_radius_m = 0.002;  // of a contact: mean normal of the ground within it
   double max_unseen = 0.1;         // a finger with more of its strip unseen gets no contact
 };

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
-#include <numbers>
 
+#include "libmap/core/angle.h"
 #include "libmap/core/random_stream.h"
 
 namespace libgtd {
@@ -201,8 +201,8 @@ const std::vector<PullDirection>& pull_directions() {
     std::vector<PullDirection> made = {{0, 0, Eigen::Vector3d::UnitZ()}};
     for (const int tilt : {45, 90})
       for (int azimuth = 0; azimuth < 360; azimuth += 45) {
-        const double t = tilt * std::numbers::pi / 180.0;
-        const double a = azimuth * std::numbers::pi / 180.0;
+        const double t = tilt * libmap::radians_per_degree;
+        const double a = azimuth * libmap::radians_per_degree;
         made.push_back(
             {tilt, azimuth, {std::sin(t) * std::cos(a), std::sin(t) * std::sin(a), std::cos(t)}});
       }

@@ -28,6 +28,7 @@ constexpr CommandEntry commands[] = {
     {"Map", "score", "compute the graspability map of a terrain, tile by tile"},
     {"Map", "analyze", "analyze a map, compare it with another, or tabulate several maps"},
     {"Map", "footholds", "list the best footholds of a map for a step planner"},
+    {"Field test", "grasp", "test a gripper's hold at listed locations of a mesh, by simulation"},
     {"Field test", "lookup", "look up a map's values at listed locations"},
     {"Field test", "evaluate",
      "evaluate looked-up scores against a field test: ROC, AUC, accuracy"},

@@ -1,0 +1,67 @@
+#include "libgtd/grasp/grasp_table.h"
+
+#include "libmap/core/text.h"
+
+namespace libgtd {
+
+namespace {
+
+struct Column {
+  const char* name;
+  std::string (*cell)(const LocationResult&);
+};
+
+std::string number(double value) { return libmap::to_text(static_cast<float>(value)); }
+
+template <TrialEnd end>
+std::string share_of(const LocationResult& result) {
+  return number(static_cast<double>(result.ends[static_cast<std::size_t>(end)]) /
+                static_cast<double>(result.trials));
+}
+
+constexpr Column columns[] = {
+    {"holds", [](const LocationResult& r) { return std::string(r.holds() ? "1" : "0"); }},
+    {"hold_probability", [](const LocationResult& r) { return number(r.hold_probability); }},
+    {"hold_low", [](const LocationResult& r) { return number(r.hold_low); }},
+    {"hold_high", [](const LocationResult& r) { return number(r.hold_high); }},
+    {"force_p10_n", [](const LocationResult& r) { return number(r.force_n[0]); }},
+    {"force_median_n", [](const LocationResult& r) { return number(r.force_n[1]); }},
+    {"force_p90_n", [](const LocationResult& r) { return number(r.force_n[2]); }},
+    {"best_force_p10_n", [](const LocationResult& r) { return number(r.best_force_n[0]); }},
+    {"best_force_median_n", [](const LocationResult& r) { return number(r.best_force_n[1]); }},
+    {"best_force_p90_n", [](const LocationResult& r) { return number(r.best_force_n[2]); }},
+    {"limiting_direction",
+     [](const LocationResult& r) { return pull_directions()[r.limiting_direction].name(); }},
+    {"spine_fingers", [](const LocationResult& r) { return number(r.spine_fingers); }},
+    {"link_fingers", [](const LocationResult& r) { return number(r.link_fingers); }},
+    {"free_fingers", [](const LocationResult& r) { return number(r.free_fingers); }},
+    {"palm_share", [](const LocationResult& r) { return number(r.palm_share); }},
+    {"clearance_m", [](const LocationResult& r) { return number(r.clearance_m); }},
+    {"unseen", [](const LocationResult& r) { return number(r.unseen); }},
+    {"fails_approach", share_of<TrialEnd::approach>},
+    {"fails_contact", share_of<TrialEnd::contact>},
+    {"fails_engagement", share_of<TrialEnd::engagement>},
+    {"fails_load", share_of<TrialEnd::load>},
+    {"fails_unseen", share_of<TrialEnd::unseen>},
+    {"shown_pose", [](const LocationResult& r) { return std::to_string(r.shown_pose); }},
+    {"shown_draw", [](const LocationResult& r) { return std::to_string(r.shown_draw); }},
+};
+
+}  // namespace
+
+const std::vector<std::string>& grasp_columns() {
+  static const std::vector<std::string> names = [] {
+    std::vector<std::string> made;
+    for (const Column& column : columns) made.emplace_back(column.name);
+    return made;
+  }();
+  return names;
+}
+
+std::vector<std::string> grasp_cells(const LocationResult& result) {
+  std::vector<std::string> cells;
+  for (const Column& column : columns) cells.push_back(column.cell(result));
+  return cells;
+}
+
+}  // namespace libgtd
