@@ -51,6 +51,7 @@ class BearingContact {
   BearingContact(const GripContact& contact, const EngagementOptions& options, double limit_n);
 
   const Eigen::Vector3d& point() const { return point_; }      // m
+  const Eigen::Vector3d& normal() const { return normal_; }    // out of the ground
   const Eigen::Vector3d& outward() const { return outward_; }  // away from the palm's axis
   std::size_t finger() const { return finger_; }
   bool is_link() const { return is_link_; }

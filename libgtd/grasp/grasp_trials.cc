@@ -73,6 +73,7 @@ HoldingOptions holding_of(const ClosedGripper& closed, const Gripper& gripper,
   holding.load_point = closed.patch_from_gripper.translation();
   holding.holds_when_closed = gripper.fingers->holds_when_closed;
   holding.closing_force_n = gripper.fingers->closing_force_n;
+  holding.axis = closed.patch_from_gripper.linear().col(2);
   holding.sharing = sharing;
   return holding;
 }
@@ -183,7 +184,15 @@ void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& lo
 
 }  // namespace
 
-void GraspOptions::check() const { libmap::check_parameters(*this); }
+void GraspOptions::check() const {
+  libmap::check_parameters(*this);
+  if (engagement.asperity_min_deg > engagement.asperity_max_deg)
+    throw libmap::Error(
+        "is beyond the largest lean",
+        {.field = "asperity_min_deg",
+         .value = libmap::to_text(engagement.asperity_min_deg),
+         .bound = "<= asperity_max_deg, " + libmap::to_text(engagement.asperity_max_deg)});
+}
 
 void bind(libmap::ParameterTable& table, GraspOptions& options) {
   using libmap::not_negative;
@@ -219,7 +228,8 @@ std::pair<double, double> wilson_interval(double share, double count) {
   const double middle = share + z * z / (2.0 * count);
   const double half = z * std::sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count));
   const double scale = 1.0 + z * z / count;
-  return {std::max(0.0, (middle - half) / scale), std::min(1.0, (middle + half) / scale)};
+  return {std::clamp((middle - half) / scale, 0.0, share),
+          std::clamp((middle + half) / scale, share, 1.0)};
 }
 
 std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gripper,

@@ -1,7 +1,5 @@
 #include "libgtd/grasp/holding_force.h"
 
-#include <fmt/format.h>
-
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
@@ -34,6 +32,9 @@ class EquilibriumProgram {
       arms_.push_back(contact.point() - options.load_point);
       fingers = std::max(fingers, contact.finger() + 1);
     }
+    std::vector<bool> has_contact(fingers, false);
+    for (const BearingContact& contact : contacts) has_contact[contact.finger()] = true;
+    fingers_ = std::count(has_contact.begin(), has_contact.end(), true);
     rows_ = static_cast<Eigen::Index>(6 + contacts.size() + fingers);
     inverse_.setIdentity(rows_, rows_);
     values_.setZero(rows_);
@@ -46,7 +47,10 @@ class EquilibriumProgram {
   double max_pull(const Eigen::Vector3d& direction, double enough) {
     column_.head<3>() = direction;
     if (options_.holds_when_closed)
-      column_.tail(rows_ - first_drive()).setConstant(-1.0 / options_.closing_force_n);
+      for (const BearingContact& contact : contacts_) {
+        double& share = column_[drive_row(contact)];
+        share = std::min(share, -reaction_of(contact) / options_.closing_force_n);
+      }
     if (!enter(Kind::pull)) return 0.0;
     constexpr int max_pivots = 2000;
     for (int pivot = 0; pivot < max_pivots; ++pivot) {
@@ -63,9 +67,14 @@ class EquilibriumProgram {
  private:
   enum class Kind : std::uint8_t { slack, artificial, pull, contact };
 
-  Eigen::Index first_drive() const { return static_cast<Eigen::Index>(6 + contacts_.size()); }
   Eigen::Index drive_row(const BearingContact& contact) const {
-    return first_drive() + static_cast<Eigen::Index>(contact.finger());
+    return 6 + static_cast<Eigen::Index>(contacts_.size() + contact.finger());
+  }
+  // Of a rigid finger: c_k / m.
+  double reaction_of(const BearingContact& contact) const {
+    const double sine = contact.normal().dot(contact.outward());
+    const double cosine = contact.normal().dot(options_.axis);
+    return std::max(0.0, sine * cosine) / (1.0 + sine * sine) / static_cast<double>(fingers_);
   }
   Eigen::Index pull_row() const {
     const auto pull = std::find(kinds_.begin(), kinds_.end(), Kind::pull);
@@ -162,6 +171,7 @@ class EquilibriumProgram {
   const std::vector<BearingContact>& contacts_;
   const HoldingOptions& options_;
   std::vector<Eigen::Vector3d> arms_;
+  std::ptrdiff_t fingers_ = 0;  // with contacts
   Eigen::Index rows_ = 0;
   Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> inverse_;
   Eigen::VectorXd values_;
@@ -193,7 +203,7 @@ LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
 }
 
 std::string PullDirection::name() const {
-  return tilt_deg == 0 ? "away" : fmt::format("{}@{}", tilt_deg, azimuth_deg);
+  return tilt_deg == 0 ? "away" : std::to_string(tilt_deg) + "@" + std::to_string(azimuth_deg);
 }
 
 const std::vector<PullDirection>& pull_directions() {

@@ -13,17 +13,21 @@ namespace libgtd {
 struct HoldingOptions {
   // The pull acts here (m), without a moment.
   Eigen::Vector3d load_point{0.0, 0.0, 0.0};
-  // A finger's force toward the palm's axis is at most this, or, if the drives hold what presses
-  // them open, this and the pull.
+  // A finger's force toward the palm's axis is at most this. If the drives hold what presses them
+  // open, a finger is rigid and turns its part of the pull into such a force; see holding_force.
   double closing_force_n = 10.0;
   bool holds_when_closed = true;
+  Eigen::Vector3d axis{0.0, 0.0, 1.0};  // of the palm, away from the ground
   SpineSharing sharing = SpineSharing::best;
 };
 
 // max F so that forces f_i of the contacts, each in its set, balance the pull F w:
-//   sum f_i + F w = 0,  sum (p_i - p) x f_i = 0,  -r_k . (f of finger k) <= P (+ F)
-// (Kumar and Waldron 1988). N; 0 if no pull along the unit vector w can be balanced. The search may
-// end with a smaller value that is at least `enough`.
+//   sum f_i + F w = 0,  sum (p_i - p) x f_i = 0,  sum over finger k of r_k . f_i <= P + c_k F / m
+// (Kumar and Waldron 1988), r_k outward, m fingers with contacts. c_k is 0, or with drives that
+// hold sin g cos g / (1 + sin^2 g) of the finger's steepest contact, on ground that falls outward
+// by g: what an elastic contact that is twice as stiff along the ground as across it turns of the
+// pull into a force toward the axis (Chen et al. 2024). N; 0 if no pull along the unit vector w can
+// be balanced. The search may end with a smaller value that is at least `enough`.
 double holding_force(const std::vector<BearingContact>& contacts, const Eigen::Vector3d& direction,
                      const HoldingOptions& options,
                      double enough = std::numeric_limits<double>::infinity());

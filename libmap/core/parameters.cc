@@ -220,8 +220,8 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
     if (root.IsNull()) return;
     if (!root.IsMap()) throw Error("not a map of keys and values");
     collect(root, "");
+    for (const auto& [key, value] : values) table.set(key, value);
   });
-  for (const auto& [key, value] : values) table.set(key, value);
   return {seen.begin(), seen.end()};
 }
 

@@ -1,0 +1,276 @@
+#include "libgtd/grasp/grasp_trials.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+#include "libgtd/grasp/grasp_table.h"
+#include "libmap/core/parallel.h"
+#include "tests/libgtd/grasp/grasp_test_support.h"
+
+namespace grasp_trials_test {
+
+using grasp_test::gripper;
+using grasp_test::height_mesh;
+using graspmap_test::error_of;
+using libgtd::GraspOptions;
+using libgtd::LocationResult;
+using libgtd::TrialEnd;
+
+constexpr double degree = libmap::radians_per_degree;
+const double phi = std::atan(0.39);
+
+// No chance: each spine meets a facet of this lean, the palm comes down on the location.
+GraspOptions certain(double psi_deg) {
+  GraspOptions options;
+  options.poses = 2;
+  options.draws = 2;
+  options.offset_m = 0;
+  options.tilt_deg = 0;
+  options.engagement.asperity_min_deg = options.engagement.asperity_max_deg = psi_deg;
+  options.engagement.engagement_per_mm = 100;
+  return options;
+}
+
+std::vector<LocationResult> test_on(const libmap::TriangleMesh& mesh,
+                                    const std::vector<Eigen::Vector3d>& locations,
+                                    const GraspOptions& options,
+                                    const libgtd::Gripper& of = gripper()) {
+  const libgtd::Ground ground(mesh);
+  return libgtd::test_grasps(ground, of, locations, options, libmap::no_progress());
+}
+
+// The pull away from the ground of a gripper whose drives give way.
+double pull_away(const libmap::TriangleMesh& mesh, const Eigen::Vector3d& location,
+                 const libgtd::Gripper& of, double psi_deg) {
+  const libgtd::Ground ground(mesh);
+  const libgtd::Trial trial = libgtd::repeat_trial(ground, of, location, certain(psi_deg), 0, 0);
+  return libgtd::holding_force(trial.bearing, Eigen::Vector3d::UnitZ(),
+                               {.load_point = trial.gripper.patch_from_gripper.translation(),
+                                .closing_force_n = of.fingers->closing_force_n,
+                                .holds_when_closed = false});
+}
+
+// m P tan(g + psi + phi - 90 deg), from the mesh to the force, within 2 %.
+TEST(GraspTrials, ClosedFormsFromMeshToForce) {
+  const libgtd::Gripper of = gripper({{"fingers.spine_force_limit_n", "1000"}});
+  const auto expected = [](double slope_deg, double psi_deg) {
+    const double angle = (slope_deg + psi_deg - 90) * degree + phi;
+    return angle > 0 ? 8 * 10 * std::tan(angle) : 0;
+  };
+  for (const double psi : {30.0, 65.0, 72.0, 80.0, 88.0}) {
+    const double force = expected(0, psi);
+    EXPECT_NEAR(
+        pull_away(height_mesh(0.3, 30, [](double, double) { return 0.0; }), {0, 0, 0}, of, psi),
+        force, 0.02 * force + 1e-6)
+        << psi;
+  }
+  // Cones that fall outward at g.
+  for (const double slope : {20.0, 35.0})
+    for (const double psi : {20.0, 45.0, 60.0}) {
+      const double fall = std::tan(slope * degree);
+      const auto cone = grasp_test::revolved({{0.001, -0.001 * fall}, {0.3, -0.3 * fall}}, 720);
+      const double force = expected(slope, psi);
+      EXPECT_NEAR(pull_away(cone, {0, 0, -0.002}, of, psi), force, 0.02 * force + 1e-6)
+          << slope << " " << psi;
+    }
+  // A post: m mu P.
+  const libgtd::Gripper narrow =
+      gripper({{"fingers.spine_force_limit_n", "1000"}, {"closing_angle_deg", "1"}});
+  std::vector<Eigen::Vector2d> post = {{0.0005, 0}, {0.04, 0}};
+  for (int n = 1; n <= 60; ++n) post.emplace_back(0.04, -0.005 * n);
+  post.emplace_back(0.3, -0.3);
+  EXPECT_NEAR(pull_away(grasp_test::revolved(post, 720), {0, 0, 0}, narrow, 0), 8 * 10 * 0.39,
+              0.02 * 8 * 10 * 0.39);
+}
+
+libmap::TriangleMesh bumps() {
+  return height_mesh(0.6, 120, [](double x, double y) {
+    return 0.05 * std::cos(31 * x) * std::cos(27 * y) + 0.01 * std::sin(90 * x + 40 * y);
+  });
+}
+
+std::vector<Eigen::Vector3d> places_on(const libmap::TriangleMesh& mesh, int count) {
+  std::vector<Eigen::Vector3d> places;
+  libmap::RandomStream random(4, 4);
+  while (static_cast<int>(places.size()) < count) {
+    const Eigen::Vector3d& place = mesh.vertices[random.below(mesh.vertices.size())];
+    if (place.head<2>().cwiseAbs().maxCoeff() < 0.4) places.push_back(place);
+  }
+  return places;
+}
+
+GraspOptions few_trials() {
+  GraspOptions options;
+  options.poses = 6;
+  options.draws = 4;
+  return options;
+}
+
+std::string text_of(const std::vector<LocationResult>& results) {
+  std::string text;
+  for (const LocationResult& result : results)
+    for (const std::string& cell : libgtd::grasp_cells(result)) text += cell + ",";
+  return text;
+}
+
+TEST(GraspTrials, SameBytesForAnyThreadsAndOrder) {
+  const auto mesh = bumps();
+  auto places = places_on(mesh, 12);
+  const auto results = test_on(mesh, places, few_trials());
+  for (const unsigned threads : {1U, 2U, 8U}) {
+    const libmap::ThreadLimit limit(threads);
+    EXPECT_EQ(text_of(test_on(mesh, places, few_trials())), text_of(results));
+  }
+  std::reverse(places.begin(), places.end());
+  auto reversed = test_on(mesh, places, few_trials());
+  std::reverse(reversed.begin(), reversed.end());
+  EXPECT_EQ(text_of(reversed), text_of(results));
+  GraspOptions other = few_trials();
+  other.seed = 2;
+  std::reverse(places.begin(), places.end());
+  EXPECT_NE(text_of(test_on(mesh, places, other)), text_of(results));
+}
+
+// What only the mask needs changes nothing.
+TEST(GraspTrials, DoNotDependOnTheMask) {
+  const auto mesh = bumps();
+  const auto places = places_on(mesh, 4);
+  const std::string usual = text_of(test_on(mesh, places, few_trials()));
+  for (const auto& [key, value] : {std::pair{"top_solid_margin_mm", "30"},
+                                   {"bottom_void_margin_mm", "9"},
+                                   {"closing_height_mm", "20"},
+                                   {"opening_spine_radius_mm", "80"},
+                                   {"opening_spine_depth_mm", "50"},
+                                   {"spine_depth_mm", "20"}})
+    EXPECT_EQ(text_of(test_on(mesh, places, few_trials(), gripper({{key, value}}))), usual) << key;
+  EXPECT_NE(text_of(test_on(mesh, places, few_trials(), gripper({{"spine_length_mm", "45"}}))),
+            usual);
+}
+
+TEST(GraspTrials, CountsAddUp) {
+  const auto mesh = bumps();
+  bool any_holds = false;
+  for (const LocationResult& result : test_on(mesh, places_on(mesh, 30), few_trials())) {
+    std::size_t trials = 0;
+    for (const std::size_t count : result.ends) trials += count;
+    EXPECT_EQ(trials, 24u);
+    EXPECT_EQ(result.trials, 24u);
+    EXPECT_NEAR(result.spine_fingers + result.link_fingers + result.free_fingers,
+                8 * (1 - static_cast<double>(result.ends[1]) / 24), 1e-9);
+    EXPECT_LE(result.hold_low, result.hold_probability);
+    EXPECT_GE(result.hold_high, result.hold_probability);
+    EXPECT_LE(result.force_n[0], result.force_n[1]);
+    EXPECT_LE(result.force_n[1], result.force_n[2]);
+    any_holds |= result.holds();
+  }
+  EXPECT_TRUE(any_holds);
+}
+
+TEST(GraspTrials, ALargerLoadHoldsLess) {
+  const auto mesh = bumps();
+  const auto places = places_on(mesh, 10);
+  double last = 1.0;
+  for (const double load : {1.0, 5.0, 20.0, 100.0}) {
+    GraspOptions options = few_trials();
+    options.load_n = load;
+    double mean = 0;
+    for (const LocationResult& result : test_on(mesh, places, options))
+      mean += result.hold_probability / 10;
+    EXPECT_LE(mean, last);
+    last = mean;
+    GraspOptions twice = options;
+    twice.load_n = load / 2;
+    twice.safety = 2;
+    EXPECT_EQ(text_of(test_on(mesh, places, twice)), text_of(test_on(mesh, places, options)));
+  }
+  EXPECT_LT(last, 0.1);
+}
+
+TEST(GraspTrials, ATrialIsRepeated) {
+  const auto mesh = bumps();
+  const auto places = places_on(mesh, 6);
+  GraspOptions options = few_trials();
+  const libgtd::Ground ground(mesh);
+  for (const LocationResult& result : test_on(mesh, places, options)) {
+    const libgtd::Trial trial = libgtd::repeat_trial(ground, gripper(), result.location, options,
+                                                     result.shown_pose, result.shown_draw);
+    EXPECT_NEAR(trial.force_n, result.force_n[1], 1e-9);
+    EXPECT_EQ(trial.end == TrialEnd::holds, trial.force_n >= options.load_n);
+  }
+}
+
+TEST(GraspTrials, FailuresAreNamed) {
+  const auto end_on = [](const libmap::TriangleMesh& mesh, GraspOptions options) {
+    const LocationResult result = test_on(mesh, {{0, 0, 0}}, options)[0];
+    const auto most = std::max_element(result.ends.begin(), result.ends.end());
+    EXPECT_EQ(*most, result.trials);
+    return static_cast<TrialEnd>(most - result.ends.begin());
+  };
+  const auto flat = height_mesh(0.3, 60, [](double, double) { return 0.0; });
+  EXPECT_EQ(end_on(flat, certain(30)), TrialEnd::engagement);
+  GraspOptions strong = certain(88);
+  strong.load_n = 1000;
+  EXPECT_EQ(end_on(flat, strong), TrialEnd::load);
+  GraspOptions blunt = certain(88);
+  blunt.engagement.drag_mm = 0;
+  EXPECT_EQ(end_on(flat, blunt), TrialEnd::contact);
+  const auto step = height_mesh(0.3, 60, [](double x, double) { return x > 0.08 ? 0.6 : 0.0; });
+  EXPECT_EQ(end_on(step, certain(88)), TrialEnd::approach);
+  auto hole = flat;
+  std::erase_if(hole.triangles, [&](const libmap::Triangle& triangle) {
+    return hole.vertices[triangle[0]].head<2>().norm() > 0.06;
+  });
+  EXPECT_EQ(end_on(hole, certain(88)), TrialEnd::unseen);
+}
+
+TEST(GraspTrials, AlongTheGroundsNormal) {
+  // A wall: its normal is level.
+  auto wall = height_mesh(
+      0.3, 60, [](double x, double y) { return 0.04 * std::cos(40 * x) * std::cos(40 * y); });
+  auto tilted = wall;
+  for (Eigen::Vector3d& vertex : tilted.vertices)
+    vertex = Eigen::AngleAxisd(80 * degree, Eigen::Vector3d::UnitX()) * vertex;
+  GraspOptions options = certain(60);
+  options.approach = libgtd::ApproachDirection::normal;
+  const Eigen::Vector3d top(0, 0, 0.04);
+  const Eigen::Vector3d there = Eigen::AngleAxisd(80 * degree, Eigen::Vector3d::UnitX()) * top;
+  const LocationResult level = test_on(wall, {top}, options)[0];
+  const LocationResult steep = test_on(tilted, {there}, options)[0];
+  EXPECT_GT(level.spine_fingers, 4);
+  EXPECT_NEAR(steep.spine_fingers, level.spine_fingers, 1.1);
+  EXPECT_NEAR(steep.clearance_m, level.clearance_m, 8e-3);  // at another yaw
+}
+
+TEST(GraspTrials, WilsonsInterval) {
+  const auto [low, high] = libgtd::wilson_interval(0.5, 10);
+  EXPECT_NEAR(low, 0.2366, 1e-4);
+  EXPECT_NEAR(high, 0.7634, 1e-4);
+  EXPECT_EQ(libgtd::wilson_interval(0, 32).first, 0);
+  EXPECT_NEAR(libgtd::wilson_interval(0, 32).second, 0.1072, 1e-4);
+}
+
+TEST(GraspTrials, BadInputIsNamed) {
+  const auto mesh = bumps();
+  const auto field = [&](const GraspOptions& options, const Eigen::Vector3d& place,
+                         libgtd::Gripper of = gripper()) {
+    return error_of([&] { test_on(mesh, {{0, 0, 0.05}, place}, options, of); }).context().field;
+  };
+  EXPECT_EQ(field({}, {0, 0, 0.2}), "location 2");
+  EXPECT_EQ(field({}, {5, 0, 0}), "location 2");
+  GraspOptions options;
+  options.engagement.friction = -0.1;
+  EXPECT_EQ(field(options, {0, 0, 0.05}), "friction");
+  options = {};
+  options.poses = 0;
+  EXPECT_EQ(field(options, {0, 0, 0.05}), "trials");
+  options = {};
+  options.engagement.asperity_min_deg = 60;
+  options.engagement.asperity_max_deg = 30;
+  EXPECT_EQ(field(options, {0, 0, 0.05}), "asperity_min_deg");
+  libgtd::Gripper without = gripper();
+  without.fingers.reset();
+  EXPECT_EQ(field({}, {0, 0, 0.05}, without), "fingers");
+}
+
+}  // namespace grasp_trials_test
