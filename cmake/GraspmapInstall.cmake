@@ -17,6 +17,7 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN *_body.h EXCLUDE
   PATTERN instruction_set_loops.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
+  PATTERN named_cells.h EXCLUDE
   PATTERN pose_residuals.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)

@@ -150,17 +150,17 @@ libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleM
   results.number("island_area_m2", made.island_area_m2);
   results.count("intersecting_triangles", made.intersecting_triangles);
   results.count("remaining_intersecting_triangles", made.remaining_intersecting_triangles);
-  results.count("filled_holes", made.filled_holes);
-  results.count("filled_triangles", made.filled_triangles);
-  results.number("filled_area_m2", made.filled_area_m2);
-  results.count("unfilled_holes", made.unfilled_holes);
-  results.count("decimated_triangles", made.decimated_triangles);
+  results.count("filled_holes", made.filling.holes);
+  results.count("filled_triangles", made.filling.triangles);
+  results.number("filled_area_m2", made.filling.area_m2);
+  results.count("unfilled_holes", made.filling.unfilled);
+  results.count("decimated_triangles", made.decimation.removed_triangles);
   results.count("vertices", made.mesh.vertices.size());
   results.count("triangles", made.mesh.triangles.size());
   results.number("area_m2", libmap::surface_area(made.mesh));
   add_timings("cleaning", made.timings_s, run);
   run.say(fmt::format("{} islands dropped, {} holes filled -> {} triangles", made.islands,
-                      made.filled_holes, made.mesh.triangles.size()));
+                      made.filling.holes, made.mesh.triangles.size()));
   return std::move(made.mesh);
 }
 

@@ -26,20 +26,14 @@ double squared(double value) { return value * value; }
 Confusion confusion_of(std::span<const std::uint8_t> evaluated,
                        std::span<const std::uint8_t> reference) {
   if (evaluated.size() != reference.size())
-    throw libmap::Error("the series differ in length",
-                        {.field = "evaluated",
-                         .value = libmap::to_text(static_cast<std::int64_t>(evaluated.size())),
-                         .bound = libmap::to_text(static_cast<std::int64_t>(reference.size()))});
+    throw libmap::Error("the series differ in length", {.field = "evaluated",
+                                                        .value = std::to_string(evaluated.size()),
+                                                        .bound = std::to_string(reference.size())});
   return libmap::parallel_reduce(
       evaluated.size(), 1 << 16, Confusion{},
       [&](std::size_t begin, std::size_t end) {
         Confusion part;
-        for (std::size_t n = begin; n < end; ++n) {
-          if (reference[n] != 0)
-            ++(evaluated[n] != 0 ? part.true_positives : part.false_negatives);
-          else
-            ++(evaluated[n] != 0 ? part.false_positives : part.true_negatives);
-        }
+        for (std::size_t n = begin; n < end; ++n) part.add(reference[n] != 0, evaluated[n] != 0);
         return part;
       },
       sum_of);

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <utility>
 
 #include "libgtd/evaluate/named_cells.h"
@@ -12,10 +11,10 @@ namespace libgtd {
 
 namespace {
 
-using Json = nlohmann::ordered_json;
+using libgtd::json_of;
 using libmap::Table;
 
-std::string text(std::size_t value) { return libmap::to_text(static_cast<std::int64_t>(value)); }
+std::string text(std::size_t value) { return std::to_string(value); }
 
 // Areas are sums of single-precision numbers: more digits say nothing.
 std::string text(double value) {
@@ -31,15 +30,6 @@ void add_place(const Eigen::Vector3d& place, std::vector<std::string>& row) {
     row.push_back(std::isfinite(coordinate)
                       ? libmap::to_text(std::round(coordinate * steps_a_m) / steps_a_m)
                       : std::string());
-}
-
-Json json_of(const std::optional<double>& value) { return value ? Json(*value) : Json(nullptr); }
-
-Json json_of(const Rate& rate) {
-  Json json = {{"count", rate.count}, {"total", rate.total}, {"value", json_of(rate.value())}};
-  const std::optional<Interval> interval = rate.wilson_95();
-  json["wilson_95"] = interval ? Json::array({interval->low, interval->high}) : Json(nullptr);
-  return json;
 }
 
 Json json_of(const ScoreDifference& difference) {

@@ -115,13 +115,6 @@ Membership regions_at(const ExpectedMap& expected, const Eigen::Vector3d& point)
   return membership;
 }
 
-void count(bool expected, bool predicted, Confusion& counts) {
-  if (expected)
-    ++(predicted ? counts.true_positives : counts.false_negatives);
-  else
-    ++(predicted ? counts.false_positives : counts.true_negatives);
-}
-
 void set_scores(std::vector<double> scores, RegionResult& region) {
   if (scores.empty()) return;
   // In one order, so that the sum does not depend on that of the map.
@@ -247,8 +240,8 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
       continue;
     }
     const bool truth = *expected.regions[at.regions.front()].graspable;
-    count(truth, reached, result.voxels_by_score);
-    if (result.voxels_by_flag) count(truth, flagged, *result.voxels_by_flag);
+    result.voxels_by_score.add(truth, reached);
+    if (result.voxels_by_flag) result.voxels_by_flag->add(truth, flagged);
     labels.emplace_back(truth);
     scores.emplace_back(value);
   }
@@ -256,7 +249,7 @@ ExpectedMapResult evaluate_expected_map(const libmap::PointCloud& map, const Exp
     set_scores(std::move(region_scores[r]), result.regions[r]);
     const std::optional<bool> predicted = result.regions[r].predicted();
     if (predicted && expected.regions[r].graspable)
-      count(*expected.regions[r].graspable, *predicted, result.places);
+      result.places.add(*expected.regions[r].graspable, *predicted);
   }
   RocOptions roc;
   roc.bootstrap_replicates = 0;

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <utility>
 
+#include "libgtd/terrain/voxel_fields.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
@@ -12,7 +13,7 @@ namespace libgtd {
 
 namespace {
 
-std::vector<double> values_of(const libmap::PointCloud& map, std::size_t point) {
+std::vector<double> point_values(const libmap::PointCloud& map, std::size_t point) {
   std::vector<double> values;
   for (const libmap::ScalarField& field : map.fields) values.push_back(field.values[point]);
   return values;
@@ -41,8 +42,7 @@ std::size_t best_of(const libmap::PointCloud& map, const std::vector<double>& sc
 void check(const libmap::PointCloud& map, const LookupOptions& options) {
   libmap::check_parameters(options);
   if (map.empty()) throw libmap::Error("the map has no points");
-  if (options.mode == LookupMode::maximum && map.find_field("score") == nullptr)
-    throw libmap::Error("the map has no such field", {.field = "score"});
+  if (options.mode == LookupMode::maximum) values_of(map, "score");
 }
 
 LookupAnswer answer_of(const libmap::PointCloud& map, const libmap::PointTree& tree,
@@ -59,7 +59,7 @@ LookupAnswer answer_of(const libmap::PointCloud& map, const libmap::PointTree& t
     answer.found = answer.distance_m <= options.max_distance_m;
     if (!answer.found) return answer;
     answer.map_points = 1;
-    answer.values = values_of(map, answer.map_point);
+    answer.values = point_values(map, answer.map_point);
     return answer;
   }
   // By index, so that a mean does not depend on the tree's order.
@@ -73,7 +73,7 @@ LookupAnswer answer_of(const libmap::PointCloud& map, const libmap::PointTree& t
     answer.values = mean_values(map, points);
   } else {
     answer.map_point = best_of(map, map.find_field("score")->values, points, at);
-    answer.values = values_of(map, answer.map_point);
+    answer.values = point_values(map, answer.map_point);
   }
   return answer;
 }

@@ -91,9 +91,7 @@ class MapCounter {
     result_.graspable_plan_area_m2 += map_.graspable[n] != 0 ? plan_area_m2 : 0.0;
     add_to(result_.by_height[heights_.bin_of(map_.center_in_terrain(n).z())], n);
     const auto slope_deg = static_cast<double>(surface_.slope_deg[n]);
-    add_to(
-        std::isnan(slope_deg) ? result_.unknown_slope : result_.by_slope[slopes_.bin_of(slope_deg)],
-        n);
+    if (!std::isnan(slope_deg)) add_to(result_.by_slope[slopes_.bin_of(slope_deg)], n);
   }
 
   void add_to(ScoreBin& bin, std::size_t n) const {

@@ -68,7 +68,6 @@ struct MapAnalysis {
   std::vector<ScoreBin> score_bins;  // from 0 or the least score to 1 or the largest, ascending
   std::vector<GroundBin> by_height;  // ascending; heights in the terrain frame
   std::vector<GroundBin> by_slope;   // from 0 to 90 degrees
-  GroundBin unknown_slope;
 };
 
 // Throws Error: options out of their bounds, or bins so narrow that there are more than 100,000.

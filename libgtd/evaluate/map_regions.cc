@@ -10,8 +10,7 @@ namespace libgtd {
 
 namespace {
 
-using Parents = std::vector<std::uint32_t>;
-using Sets = boost::disjoint_sets<std::uint32_t*, std::uint32_t*>;
+using Sets = boost::disjoint_sets_with_storage<>;
 
 std::vector<std::uint32_t> graspable_voxels(const VoxelMap& map, bool border) {
   std::vector<std::uint32_t> graspable;
@@ -94,10 +93,7 @@ MapRegionResult find_regions(const VoxelMap& map, const MapSurface& surface,
   if (surface.area_m2.size() != map.size())
     throw libmap::Error("the surface is of another map", {.field = "area_m2"});
   const std::vector<std::uint32_t> graspable = graspable_voxels(map, options.border);
-  std::vector<std::uint32_t> ranks(graspable.size());
-  Parents parents(graspable.size());
-  Sets sets(ranks.data(), parents.data());
-  for (std::uint32_t n = 0; n < graspable.size(); ++n) sets.make_set(n);
+  Sets sets(graspable.size());
   join_neighbors(map, graspable, options.adjacency_voxels, sets);
   MapRegionResult result;
   for (std::vector<std::uint32_t>& voxels : members_of(graspable, sets)) {

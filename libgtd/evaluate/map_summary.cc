@@ -4,7 +4,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <string_view>
 #include <variant>
 
 #include "libmap/core/text.h"
@@ -23,9 +22,7 @@ struct Row {
     names.push_back(std::move(name));
     cells.push_back(std::move(cell));
   }
-  void add(std::string name, std::size_t count) {
-    add(std::move(name), libmap::to_text(static_cast<std::int64_t>(count)));
-  }
+  void add(std::string name, std::size_t count) { add(std::move(name), std::to_string(count)); }
   // Six decimals: no map has more voxels than they tell apart.
   void add(std::string name, std::optional<double> value) {
     add(std::move(name), value ? libmap::to_fixed_text(*value, 6) : std::string());

@@ -8,9 +8,7 @@
 
 #include "libgtd/shape/curvature.h"
 #include "libgtd/shape/point_grid.h"
-#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/text.h"
 
 namespace libgtd {
 

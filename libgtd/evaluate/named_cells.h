@@ -1,10 +1,14 @@
-// Rows of a table written together with the names of their columns; for *_tables.cc alone.
+// Rows of a table written together with the names of their columns, and rates as JSON; for
+// *_tables.cc alone.
 #pragma once
 
+#include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "libgtd/evaluate/roc.h"
 #include "libmap/core/table.h"
 
 namespace libgtd {
@@ -18,6 +22,23 @@ inline void append(const NamedCells& row, libmap::Table& table) {
     table.columns.emplace_back(name);
     table.rows.back().push_back(cell);
   }
+}
+
+using Json = nlohmann::ordered_json;
+
+inline Json json_of(const std::optional<double>& value) {
+  return value ? Json(*value) : Json(nullptr);
+}
+
+inline Json json_of(const std::optional<Interval>& interval) {
+  return interval ? Json::array({interval->low, interval->high}) : Json(nullptr);
+}
+
+inline Json json_of(const Rate& rate) {
+  return {{"count", rate.count},
+          {"total", rate.total},
+          {"value", json_of(rate.value())},
+          {"wilson_95", json_of(rate.wilson_95())}};
 }
 
 }  // namespace libgtd

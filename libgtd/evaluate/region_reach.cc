@@ -9,7 +9,6 @@
 #include <boost/graph/kruskal_min_spanning_tree.hpp>
 #include <cmath>
 #include <limits>
-#include <string>
 
 #include "libgtd/evaluate/lookup.h"
 #include "libmap/core/error.h"

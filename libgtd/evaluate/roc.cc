@@ -165,8 +165,7 @@ std::optional<Interval> bootstrap_95(const Sample& sample, const RocOptions& opt
 std::string why_no_area(const Sample& sample) {
   if (sample.positives + sample.negatives == 0)
     return "no location has both a label and a score: the area under the curve is not defined";
-  const std::string number =
-      libmap::to_text(static_cast<std::int64_t>(sample.positives + sample.negatives));
+  const std::string number = std::to_string(sample.positives + sample.negatives);
   return "all " + number + " locations are labeled " + (sample.positives > 0 ? "true" : "false") +
          ": the area under the curve is not defined";
 }
@@ -190,10 +189,9 @@ void RocOptions::check() const {
                                       .value = libmap::to_text(rate_cutoff),
                                       .bound = "a finite number"});
   if (bootstrap_replicates < 0)
-    throw libmap::Error("no number of replicates",
-                        {.field = "bootstrap_replicates",
-                         .value = libmap::to_text(std::int64_t{bootstrap_replicates}),
-                         .bound = ">= 0"});
+    throw libmap::Error("no number of replicates", {.field = "bootstrap_replicates",
+                                                    .value = std::to_string(bootstrap_replicates),
+                                                    .bound = ">= 0"});
 }
 
 std::optional<double> Rate::value() const {
@@ -221,8 +219,8 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
   if (labels.size() != scores.size())
     throw libmap::Error("labels and scores differ in number",
                         {.field = "scores",
-                         .value = libmap::to_text(static_cast<std::int64_t>(scores.size())),
-                         .bound = libmap::to_text(static_cast<std::int64_t>(labels.size()))});
+                         .value = std::to_string(scores.size()),
+                         .bound = std::to_string(labels.size())});
   RocResult result;
   std::vector<std::pair<double, bool>> locations;
   for (std::size_t i = 0; i < labels.size(); ++i) {

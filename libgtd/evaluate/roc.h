@@ -50,6 +50,11 @@ struct Confusion {
   std::size_t true_negatives = 0;
   std::size_t false_negatives = 0;
 
+  void add(bool positive, bool predicted) {
+    ++(positive ? (predicted ? true_positives : false_negatives)
+                : (predicted ? false_positives : true_negatives));
+  }
+
   std::size_t predicted_positives() const { return true_positives + false_positives; }
   std::size_t predicted_negatives() const { return true_negatives + false_negatives; }
   std::size_t positives() const { return true_positives + false_negatives; }

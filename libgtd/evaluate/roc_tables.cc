@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <nlohmann/json.hpp>
 
 #include "libgtd/evaluate/named_cells.h"
 #include "libmap/core/error.h"
@@ -11,13 +10,9 @@
 namespace libgtd {
 namespace {
 
-using Json = nlohmann::ordered_json;
+using libgtd::json_of;
 using libmap::Table;
 using libmap::to_fixed_text;
-
-std::string number_text(std::size_t value) {
-  return libmap::to_text(static_cast<std::int64_t>(value));
-}
 
 std::string text_or_empty(std::optional<double> value) {
   return value ? libmap::to_text(*value) : std::string();
@@ -63,7 +58,7 @@ std::vector<std::optional<bool>> read_labels(const Table& table, const std::stri
     if (!labels.back() && !libmap::trim(cell).empty())
       throw libmap::Error("not a label",
                           {.file = table.file,
-                           .field = "row " + number_text(row + 1) + ", column '" + name + "'",
+                           .field = "row " + std::to_string(row + 1) + ", column '" + name + "'",
                            .value = "'" + cell + "'",
                            .bound = "1/0, true/false, yes/no or graspable/not graspable"});
   }
@@ -84,28 +79,19 @@ void add_roc_row(const std::string& name, const char* at, const RocPoint& point,
   append({{"scores", name},
           {"at", at},
           {"cutoff", libmap::to_text(point.cutoff)},
-          {"predicted_positives", number_text(counts.predicted_positives())},
-          {"predicted_negatives", number_text(counts.predicted_negatives())},
-          {"true_positives", number_text(counts.true_positives)},
-          {"false_positives", number_text(counts.false_positives)},
-          {"true_negatives", number_text(counts.true_negatives)},
-          {"false_negatives", number_text(counts.false_negatives)},
+          {"predicted_positives", std::to_string(counts.predicted_positives())},
+          {"predicted_negatives", std::to_string(counts.predicted_negatives())},
+          {"true_positives", std::to_string(counts.true_positives)},
+          {"false_positives", std::to_string(counts.false_positives)},
+          {"true_negatives", std::to_string(counts.true_negatives)},
+          {"false_negatives", std::to_string(counts.false_negatives)},
           {"true_positive_rate", text_or_empty(counts.true_positive_rate().value())},
           {"false_positive_rate", text_or_empty(counts.false_positive_rate().value())},
           {"upper_sum_share", text_or_empty(share)}},
          table);
 }
 
-Json number_or_null(const std::optional<Interval>& interval) {
-  if (!interval) return nullptr;
-  return Json::array({interval->low, interval->high});
-}
-
-Json number_or_null(const std::optional<double>& value) {
-  return value ? Json(*value) : Json(nullptr);
-}
-
-Json number_or_null(const RocResult& result) {
+Json json_of(const RocResult& result) {
   const Confusion& counts = result.at_rate_cutoff.counts;
   Json json;
   json["locations"] = counts.size();
@@ -116,7 +102,7 @@ Json number_or_null(const RocResult& result) {
   Json auc;
   if (const auto& area = result.area) {
     auc["trapezoid"] = area->trapezoid;
-    auc["trapezoid_bootstrap_95"] = number_or_null(area->trapezoid_bootstrap_95);
+    auc["trapezoid_bootstrap_95"] = json_of(area->trapezoid_bootstrap_95);
     auc["upper_sum"] = area->upper_sum;
     auc["upper_sum_shares"] = area->upper_sum_shares;
     auc["upper_sum_width"] = area->upper_sum_width;
@@ -126,11 +112,7 @@ Json number_or_null(const RocResult& result) {
   }
   json["auc"] = std::move(auc);
   Json rates;
-  for (const NamedRate& named : named_rates(counts))
-    rates[named.name] = {{"count", named.rate.count},
-                         {"total", named.rate.total},
-                         {"value", number_or_null(named.rate.value())},
-                         {"wilson_95", number_or_null(named.rate.wilson_95())}};
+  for (const NamedRate& named : named_rates(counts)) rates[named.name] = json_of(named.rate);
   json["rates"] = std::move(rates);
   return json;
 }
@@ -157,8 +139,9 @@ std::string areas_markdown(const TableEvaluation& evaluation) {
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocResult& result = column.result;
     const Confusion& counts = result.at_rate_cutoff.counts;
-    text += "| " + markdown_cell(column.name) + " | " + number_text(counts.size()) + " | " +
-            number_text(counts.positives()) + " | " + number_text(result.left_out_unscored) + " | ";
+    text += "| " + markdown_cell(column.name) + " | " + std::to_string(counts.size()) + " | " +
+            std::to_string(counts.positives()) + " | " + std::to_string(result.left_out_unscored) +
+            " | ";
     if (result.area) {
       text += to_fixed_text(result.area->trapezoid, 3) +
               interval_text(result.area->trapezoid_bootstrap_95, 3) + " | " +
@@ -198,7 +181,7 @@ std::string notes_markdown(const TableEvaluation& evaluation) {
     const RocResult& result = column.result;
     if (!result.area) text += "- " + markdown_cell(column.name) + ": " + result.area_note + ".\n";
     if (result.left_out_unlabeled > 0)
-      text += "- " + markdown_cell(column.name) + ": " + number_text(result.left_out_unlabeled) +
+      text += "- " + markdown_cell(column.name) + ": " + std::to_string(result.left_out_unlabeled) +
               " locations have a score and no label and are left out.\n";
     if (result.area && result.area->upper_sum_width < 1.0)
       text += "- " + markdown_cell(column.name) +
@@ -288,7 +271,7 @@ Table rates_table(const TableEvaluation& evaluation) {
     for (const NamedRate& named : named_rates(point.counts)) {
       const std::optional<Interval> interval = named.rate.wilson_95();
       table.rows.push_back({column.name, libmap::to_text(point.cutoff), named.name,
-                            number_text(named.rate.count), number_text(named.rate.total),
+                            std::to_string(named.rate.count), std::to_string(named.rate.total),
                             text_or_empty(named.rate.value()),
                             interval ? libmap::to_text(interval->low) : std::string(),
                             interval ? libmap::to_text(interval->high) : std::string()});
@@ -302,7 +285,7 @@ Table accuracy_table(const TableEvaluation& evaluation) {
   table.columns = {"case", "locations", "cutoff", "tpr", "tnr", "fpr", "fnr", "ppv", "acc"};
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocPoint& point = column.result.at_rate_cutoff;
-    std::vector<std::string> row = {column.name, number_text(point.counts.size()),
+    std::vector<std::string> row = {column.name, std::to_string(point.counts.size()),
                                     libmap::to_text(point.cutoff)};
     for (const NamedRate& named : named_rates(point.counts)) {
       const std::optional<double> value = named.rate.value();
@@ -327,7 +310,7 @@ std::string to_json(const TableEvaluation& evaluation) {
   for (const ColumnEvaluation& column : evaluation.columns) {
     Json entry;
     entry["name"] = column.name;
-    entry.update(number_or_null(column.result));
+    entry.update(json_of(column.result));
     scores.push_back(std::move(entry));
   }
   json["scores"] = std::move(scores);
@@ -339,15 +322,15 @@ std::string to_markdown(const TableEvaluation& evaluation, const std::string& ti
   std::string text;
   if (!title.empty()) text += "# " + markdown_cell(title) + "\n\n";
   text += "Label: column `" + evaluation.options.label_column + "`, " +
-          number_text(evaluation.rows) + " rows.\n\n## Area under the ROC curve\n\n" +
+          std::to_string(evaluation.rows) + " rows.\n\n## Area under the ROC curve\n\n" +
           areas_markdown(evaluation) + "\n";
   text +=
       "The trapezoid equals the Mann-Whitney statistic, the chance that a graspable place scores "
       "higher than one that is not, ties counting one half";
   if (roc.bootstrap_replicates > 0)
     text += "; in brackets its 95 % percentile interval of " +
-            libmap::to_text(std::int64_t{roc.bootstrap_replicates}) +
-            " bootstrap replicates (seed " + std::to_string(roc.bootstrap_seed) +
+            std::to_string(roc.bootstrap_replicates) + " bootstrap replicates (seed " +
+            std::to_string(roc.bootstrap_seed) +
             ", graspable and other places drawn apart, so that each replicate has both)";
   text +=
       ". The AUC that the thesis published (0.84, 0.75, 0.72) is the upper sum over its ten "

@@ -2,8 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
-#include <string>
 #include <tuple>
 #include <utility>
 
@@ -25,12 +23,6 @@ Voxel voxel_near(const VoxelLattice& lattice, const Eigen::Vector3d& point_in_te
   const Eigen::Vector3d cell =
       lattice.cell_of(point_in_terrain).cwiseMax(-farthest_cell).cwiseMin(farthest_cell);
   return {floor_to<int>(cell.x()), floor_to<int>(cell.y()), floor_to<int>(cell.z())};
-}
-
-const std::vector<double>& field_of(const libmap::PointCloud& tile, const char* name) {
-  const libmap::ScalarField* field = tile.find_field(name);
-  if (field == nullptr) throw libmap::Error("the map has no such field", {.field = name});
-  return field->values;
 }
 
 // A tile's points, found by their columns: they ascend by i, then j.
@@ -135,7 +127,7 @@ void find_members(const TilePoints& tile, const Place& place, const VoxelLattice
   const auto reach = static_cast<std::int64_t>(
       std::min(options.radius_m / lattice.voxel_size_m + 2.0, 4 * farthest_cell));
   const std::vector<double>* scores =
-      options.mode == LookupMode::maximum ? &field_of(tile.cloud(), "score") : nullptr;
+      options.mode == LookupMode::maximum ? &values_of(tile.cloud(), "score") : nullptr;
   tile.visit_around(voxel_near(lattice, place.in_terrain), reach, [&](std::size_t n) {
     const double squared = squared_distance(tile.cloud().positions[n], place.in_map);
     if (squared > squared_radius) return;

@@ -21,11 +21,6 @@ constexpr double index_bound = 0x1p29;
 constexpr double max_offset = 0.25;
 constexpr std::size_t voxels_per_chunk = 1 << 16;
 
-const std::vector<double>& values_of(const PointCloud& map, const char* name) {
-  if (const ScalarField* field = map.find_field(name)) return field->values;
-  throw libmap::Error("the map has no such field", {.field = name});
-}
-
 const std::vector<double>* optional_values(const PointCloud& map, const char* name) {
   const ScalarField* field = map.find_field(name);
   return field == nullptr ? nullptr : &field->values;

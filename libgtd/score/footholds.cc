@@ -5,11 +5,11 @@
 #include <cstdint>
 #include <limits>
 #include <numeric>
-#include <string>
 
 #include "libgtd/shape/curvature.h"
 #include "libgtd/shape/place_order.h"
 #include "libgtd/shape/point_grid.h"
+#include "libgtd/terrain/voxel_fields.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 
@@ -26,11 +26,6 @@ void check(const FootholdOptions& options, const FootholdFrame& frame) {
   libmap::check_parameters(options);
   if (!(frame.up.norm() > 0.0) || !frame.up.allFinite())
     throw libmap::Error("has no length", {.field = "up"});
-}
-
-const std::vector<double>& values_of(const PointCloud& map, const char* name) {
-  if (const ScalarField* field = map.find_field(name)) return field->values;
-  throw libmap::Error("the map has no such field", {.field = name});
 }
 
 // Calls use(index) for the points within `radius_m` of `place`, which is at most a cell's edge.

@@ -3,10 +3,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <string>
 
 #include "libgtd/terrain/voxel_grid.h"
+#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -48,25 +48,8 @@ int extent_of(const std::vector<Voxel>& voxels) {
   return std::max({high.i - low.i, high.j - low.j, high.k - low.k});
 }
 
-// Disjoint sets of voxels (Galler and Fischer 1964); each goes by its first voxel.
-class VoxelSets {
- public:
-  explicit VoxelSets(std::size_t count) : parents_(count) {
-    std::iota(parents_.begin(), parents_.end(), std::size_t{0});
-  }
-  std::size_t find(std::size_t n) {
-    while (parents_[n] != n) n = parents_[n] = parents_[parents_[n]];
-    return n;
-  }
-  void join(std::size_t a, std::size_t b) {
-    a = find(a);
-    b = find(b);
-    parents_[std::max(a, b)] = std::min(a, b);
-  }
-
- private:
-  std::vector<std::size_t> parents_;
-};
+// Of voxels; each goes by its first one.
+using VoxelSets = libmap::DisjointSets<std::size_t>;
 
 struct Rise {
   int foot = std::numeric_limits<int>::max();

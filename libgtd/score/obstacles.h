@@ -3,7 +3,6 @@
 // in Challenging Terrain", 2016).
 #pragma once
 
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 

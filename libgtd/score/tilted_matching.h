@@ -3,13 +3,11 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "libgtd/score/tiling.h"
 #include "libgtd/shape/point_grid.h"
-#include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
 
 namespace libgtd {

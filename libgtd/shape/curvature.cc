@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <optional>
 #include <string>
 
@@ -229,13 +230,8 @@ std::vector<Curvature> fit_quadrics(const libmap::PointCloud& cloud,
 
 std::vector<std::size_t> checked_queries(const std::optional<std::vector<std::size_t>>& queries,
                                          std::size_t points) {
-  std::vector<std::size_t> indices;
-  if (queries) {
-    indices = *queries;
-  } else {
-    indices.resize(points);
-    for (std::size_t i = 0; i < points; ++i) indices[i] = i;
-  }
+  std::vector<std::size_t> indices = queries.value_or(std::vector<std::size_t>(points));
+  if (!queries) std::iota(indices.begin(), indices.end(), std::size_t{0});
   for (const std::size_t i : indices)
     if (i >= points)
       throw libmap::Error(

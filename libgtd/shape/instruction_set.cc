@@ -1,7 +1,5 @@
 #include "libgtd/shape/instruction_set.h"
 
-#include <initializer_list>
-
 namespace libgtd {
 
 bool has_instruction_set([[maybe_unused]] InstructionSet set) {

@@ -8,7 +8,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <string>
 #include <utility>
 #include <vector>
 
@@ -128,8 +127,7 @@ void check_grid(const Box& box, double spacing, std::size_t max_nodes) {
         "the grid would have too many nodes",
         {.field = "grid spacing",
          .value = libmap::to_text(spacing) + " m",
-         .bound = "at most " + libmap::to_text(static_cast<std::int64_t>(max_nodes)) +
-                  " nodes over the points' x and y"});
+         .bound = "at most " + std::to_string(max_nodes) + " nodes over the points' x and y"});
   const double farthest = std::max(
       {std::abs(box.min_x), std::abs(box.max_x), std::abs(box.min_y), std::abs(box.max_y)});
   if (!(spacing > farthest * 0x1.0p-50))
@@ -377,10 +375,9 @@ InterpolationResult interpolate(const libmap::PointCloud& cloud,
   check_options(options);
   const std::vector<Vector3d> points = finite_points(cloud, options.method);
   if (points.size() < 3)
-    throw libmap::Error("too few finite points to interpolate between",
-                        {.field = "points",
-                         .value = libmap::to_text(static_cast<std::int64_t>(points.size())),
-                         .bound = ">= 3"});
+    throw libmap::Error(
+        "too few finite points to interpolate between",
+        {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
   const Box box = box_of(points);
   const PlanarTriangulation triangulation = triangulate_in_plane(points);
   if (triangulation.triangles.empty())

@@ -1,7 +1,7 @@
 #include "libgtd/terrain/regression_plane.h"
 
+#include <array>
 #include <cmath>
-#include <limits>
 #include <string>
 
 #include "libmap/core/error.h"
@@ -299,21 +299,10 @@ libmap::PointCloud transform_to_terrain(const libmap::PointCloud& cloud,
 }
 
 std::string_view to_text(UpSource source) {
-  switch (source) {
-    case UpSource::direction:
-      return "direction";
-    case UpSource::viewpoint:
-      return "viewpoint";
-    case UpSource::normals:
-      return "normals";
-    case UpSource::frame_z:
-      return "frame_z";
-    case UpSource::camera_origin:
-      return "camera_origin";
-    case UpSource::relief:
-      return "relief";
-  }
-  return "";
+  // In the order of the enumeration.
+  constexpr std::array<std::string_view, 6> names = {"direction", "viewpoint",     "normals",
+                                                     "frame_z",   "camera_origin", "relief"};
+  return names[static_cast<std::size_t>(source)];
 }
 
 }  // namespace libgtd

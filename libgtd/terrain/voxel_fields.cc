@@ -14,6 +14,11 @@ constexpr std::array<const char*, 3> names = {"i", "j", "k"};
 
 }  // namespace
 
+const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name) {
+  if (const libmap::ScalarField* field = map.find_field(name)) return field->values;
+  throw libmap::Error("the map has no such field", {.field = name});
+}
+
 VoxelFields::VoxelFields(const libmap::PointCloud& map) {
   for (std::size_t axis = 0; axis < 3; ++axis) {
     const libmap::ScalarField* field = map.find_field(names[axis]);

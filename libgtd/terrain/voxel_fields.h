@@ -1,4 +1,4 @@
-// The voxels of a map's points, as its fields i, j and k say.
+// A map's fields: the voxels of its points, as i, j and k say, and others by name.
 #pragma once
 
 #include <array>
@@ -9,6 +9,9 @@
 #include "libmap/core/point_cloud.h"
 
 namespace libgtd {
+
+// Throws Error naming the field if it is missing.
+const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name);
 
 class VoxelFields {
  public:

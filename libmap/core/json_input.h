@@ -40,10 +40,7 @@ Integer integer_of(const Json& json, const std::string& field) {
     if (std::in_range<Integer>(value)) return static_cast<Integer>(value);
   }
   throw Error("is no whole number, or out of range",
-              {.file = {},
-               .field = field,
-               .value = json.is_number() ? json.dump() : json.type_name(),
-               .bound = {}});
+              {.field = field, .value = json.is_number() ? json.dump() : json.type_name()});
 }
 
 // The member `key` of an object as an Integer. Throws as integer_of, and what Json::at throws.

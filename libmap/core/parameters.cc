@@ -16,7 +16,7 @@ namespace {
 
 Error wrong_value(const std::string& key, std::string_view text, const std::string& reason,
                   const std::string& bound) {
-  return Error(reason, {.file = {}, .field = key, .value = std::string(text), .bound = bound});
+  return Error(reason, {.field = key, .value = std::string(text), .bound = bound});
 }
 
 void require_in_range(const std::string& key, std::string_view text, double value,

@@ -107,10 +107,10 @@ std::optional<std::string> changed_key(Options options, void (*bind)(ParameterTa
 // "voxel_size_m" -> "--voxel-size": the flag of a key, without the unit at its end.
 std::string flag_of(std::string_view key);
 
-// A YAML map of scalars, `text` (named `file` in errors), into the table; a section "a: {b: 1}" holds
-// the keys "a.b". A key that is not
-// in the table, is a duplicate or holds no scalar is an Error; nothing is set halfway: all keys are
-// known before the first is set. Returns the keys that the text holds.
+// A YAML map of scalars, `text` (named `file` in errors), into the table; a section "a: {b: 1}"
+// holds the keys "a.b". A key that is not in the table, is a duplicate or holds no scalar is an
+// Error; nothing is set halfway: all keys are known before the first is set. Returns the keys that
+// the text holds.
 std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::string& text,
                                        const std::string& file);
 
@@ -141,7 +141,7 @@ void ParameterTable::add(std::string key, Enum& field,
     std::string bound = "one of";
     for (const std::string& choice : choices) bound += " " + choice;
     throw Error("unknown name" + did_you_mean(text, choices),
-                {.file = {}, .field = key, .value = std::string(text), .bound = bound});
+                {.field = key, .value = std::string(text), .bound = bound});
   };
   parameter.check = [get = parameter.get, set = parameter.set] { set(get()); };
   parameters_.push_back(std::move(parameter));

@@ -34,9 +34,4 @@ struct TexturedMesh {
   void check() const;
 };
 
-// The texture at (1 - u - v) * a + u * b + v * c of a triangle, 0 to 255 a channel, bilinear
-// between the centers of texels. Zeros where the triangle has no page.
-Eigen::Vector3f texture_color(const TexturedMesh& model, std::uint32_t triangle, double u,
-                              double v);
-
 }  // namespace libmap

@@ -67,41 +67,4 @@ std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh) {
   return normals;
 }
 
-TriangleMesh join_meshes(const TriangleMesh& base, const TriangleMesh& addition) {
-  TriangleMesh joined = base;
-  const auto append = [](auto& to, const auto& from) {
-    to.insert(to.end(), from.begin(), from.end());
-  };
-  // Kept only if both sides have it, or one side has nothing at all to give.
-  const auto append_optional = [&](auto& to, const auto& from) {
-    const bool both = to.size() == base.vertices.size() && from.size() == addition.vertices.size();
-    if (both) {
-      append(to, from);
-    } else {
-      to.clear();
-    }
-  };
-  const auto append_fields = [&](std::vector<ScalarField>& to,
-                                 const std::vector<ScalarField>& from) {
-    std::vector<ScalarField> kept;
-    for (ScalarField& field : to)
-      for (const ScalarField& other : from)
-        if (other.name == field.name) {
-          append(field.values, other.values);
-          kept.push_back(std::move(field));
-          break;
-        }
-    to = std::move(kept);
-  };
-  append(joined.vertices, addition.vertices);
-  append_optional(joined.vertex_normals, addition.vertex_normals);
-  append_optional(joined.vertex_colors, addition.vertex_colors);
-  append_fields(joined.vertex_fields, addition.vertex_fields);
-  append_fields(joined.face_fields, addition.face_fields);
-  const auto shift = static_cast<std::uint32_t>(base.vertices.size());
-  for (const Triangle& t : addition.triangles)
-    joined.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
-  return joined;
-}
-
 }  // namespace libmap

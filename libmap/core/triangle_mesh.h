@@ -38,8 +38,4 @@ double signed_volume(const TriangleMesh& mesh);
 // Unit vertex normals: mean of the adjacent triangles' normals weighted by area.
 std::vector<Eigen::Vector3f> estimate_vertex_normals(const TriangleMesh& mesh);
 
-// `addition` behind `base`, its indices shifted. Normals and colors are kept where both have them;
-// fields only where both have one of that name.
-TriangleMesh join_meshes(const TriangleMesh& base, const TriangleMesh& addition);
-
 }  // namespace libmap

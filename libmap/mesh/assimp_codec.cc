@@ -72,11 +72,8 @@ float srgb_of(float linear) {
 
 Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
   Eigen::Affine3d affine = Eigen::Affine3d::Identity();
-  affine.matrix() << static_cast<double>(m.a1), static_cast<double>(m.a2),
-      static_cast<double>(m.a3), static_cast<double>(m.a4), static_cast<double>(m.b1),
-      static_cast<double>(m.b2), static_cast<double>(m.b3), static_cast<double>(m.b4),
-      static_cast<double>(m.c1), static_cast<double>(m.c2), static_cast<double>(m.c3),
-      static_cast<double>(m.c4), 0.0, 0.0, 0.0, 1.0;
+  affine.matrix().topRows<3>() =
+      Eigen::Map<const Eigen::Matrix<ai_real, 3, 4, Eigen::RowMajor>>(&m.a1).cast<double>();
   return affine;
 }
 
@@ -139,10 +136,8 @@ class MeshBuilder {
       corners.clear();
       for (unsigned k = 0; k < face.mNumIndices; ++k) {
         if (face.mIndices[k] >= part.mNumVertices)
-          throw Error("a corner is no vertex", {.file = {},
-                                                .field = "face " + std::to_string(i),
-                                                .value = std::to_string(face.mIndices[k]),
-                                                .bound = {}});
+          throw Error("a corner is no vertex", {.field = "face " + std::to_string(i),
+                                                .value = std::to_string(face.mIndices[k])});
         corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
       }
       std::vector<unsigned> indices(face.mIndices, face.mIndices + face.mNumIndices);
@@ -162,9 +157,7 @@ class MeshBuilder {
     const aiVector3D& p = part.mVertices[index];
     const Eigen::Vector3d position = root_from_node * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
     if (!position.allFinite())
-      throw Error(
-          "position is not finite",
-          {.file = {}, .field = "vertex " + std::to_string(index), .value = {}, .bound = {}});
+      throw Error("position is not finite", {.field = "vertex " + std::to_string(index)});
     Eigen::Vector3f normal = Eigen::Vector3f::Zero();
     if (has_normals_) {
       const aiVector3D& n = part.mNormals[index];
@@ -363,8 +356,7 @@ void require_sound_glb(std::string_view header, std::uint64_t bytes) {
   std::memcpy(&length, header.data() + text_length_at, sizeof length);
   if (text_at + std::uint64_t{length} > bytes)
     throw Error("not a readable glb file",
-                {.file = {},
-                 .field = "length of its text",
+                {.field = "length of its text",
                  .value = std::to_string(length),
                  .bound = "within its " + std::to_string(bytes) + " bytes"});
 }
@@ -432,8 +424,7 @@ void require_single_precision(const TriangleMesh& mesh, const std::string& forma
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
     const double farthest = mesh.vertices[n].cwiseAbs().maxCoeff();
     if (!(farthest <= most))
-      throw Error("too far away for " + format, {.file = {},
-                                                 .field = "vertex " + std::to_string(n),
+      throw Error("too far away for " + format, {.field = "vertex " + std::to_string(n),
                                                  .value = to_text(farthest) + " m",
                                                  .bound = "<= " + to_text(most)});
   }

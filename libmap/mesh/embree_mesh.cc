@@ -10,13 +10,6 @@ namespace libmap {
 
 namespace {
 
-struct DeviceRelease {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct SceneRelease {
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-
 void require_success(RTCDevice device) {
   if (const RTCError code = rtcGetDeviceError(device); code != RTC_ERROR_NONE)
     throw Error(
@@ -26,13 +19,7 @@ void require_success(RTCDevice device) {
 
 }  // namespace
 
-struct EmbreeMesh::Handles {
-  std::unique_ptr<RTCDeviceTy, DeviceRelease> device;
-  std::unique_ptr<RTCSceneTy, SceneRelease> scene;
-};
-
-EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust)
-    : handles_(std::make_unique<Handles>()), triangles_(mesh.triangles) {
+EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust) : triangles_(mesh.triangles) {
   if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
   mesh.check();
   for (const Eigen::Vector3d& vertex : mesh.vertices)
@@ -43,10 +30,10 @@ EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust)
   vertices_.reserve(mesh.vertices.size());
   for (const Eigen::Vector3d& vertex : mesh.vertices) vertices_.push_back(vertex - center_);
 
-  handles_->device.reset(rtcNewDevice(nullptr));
-  RTCDevice device = handles_->device.get();
+  RTCDevice device = rtcNewDevice(nullptr);
   if (device == nullptr) throw Error("Embree cannot start", {}, ErrorKind::failed);
-  handles_->scene.reset(rtcNewScene(device));
+  device_.reset(device, rtcReleaseDevice);
+  scene_.reset(rtcNewScene(device), rtcReleaseScene);
   if (robust) rtcSetSceneFlags(scene(), RTC_SCENE_FLAG_ROBUST);
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
@@ -65,9 +52,5 @@ EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust)
   rtcCommitScene(scene());
   require_success(device);
 }
-
-EmbreeMesh::~EmbreeMesh() = default;
-
-RTCSceneTy* EmbreeMesh::scene() const { return handles_->scene.get(); }
 
 }  // namespace libmap

@@ -3,13 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <memory>
 #include <vector>
 
 #include "libmap/core/triangle_mesh.h"
 
-struct RTCSceneTy;  // embree3/rtcore.h
+struct RTCDeviceTy;  // embree3/rtcore.h
+struct RTCSceneTy;
 
 namespace libmap {
 
@@ -19,22 +19,18 @@ class EmbreeMesh {
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
   // `robust`: rays do not slip through shared edges.
   EmbreeMesh(const TriangleMesh& mesh, bool robust);
-  ~EmbreeMesh();
-  EmbreeMesh(const EmbreeMesh&) = delete;
-  EmbreeMesh& operator=(const EmbreeMesh&) = delete;
 
-  RTCSceneTy* scene() const;  // embree's scene, which this object owns; coordinates less center()
+  RTCSceneTy* scene() const { return scene_.get(); }  // coordinates less center()
   const Eigen::Vector3d& center() const { return center_; }
   Eigen::Vector3d size() const { return size_; }  // of the bounding box, m
-  const std::vector<Triangle>& triangles() const { return triangles_; }
   // A corner of a triangle about the center, in double precision.
   const Eigen::Vector3d& corner(std::uint32_t triangle, int k) const {
     return vertices_[triangles_[triangle][static_cast<std::size_t>(k)]];
   }
 
  private:
-  struct Handles;
-  std::unique_ptr<Handles> handles_;
+  std::shared_ptr<RTCDeviceTy> device_;
+  std::shared_ptr<RTCSceneTy> scene_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d size_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> vertices_;

@@ -7,6 +7,7 @@
 #include <string>
 #include <utility>
 
+#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
 
 namespace libmap {
@@ -136,26 +137,17 @@ VertexTriangles triangles_at_vertices(const std::vector<Triangle>& triangles,
 
 std::vector<HalfEdge> corner_fans(const std::vector<Triangle>& triangles,
                                   const std::vector<HalfEdge>& opposite) {
-  std::vector<HalfEdge> parent(opposite.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](HalfEdge n) {
-    while (parent[n] != n) n = parent[n] = parent[parent[n]];
-    return n;
-  };
-  const auto join = [&](HalfEdge a, HalfEdge b) {
-    a = root(a);
-    b = root(b);
-    parent[std::max(a, b)] = std::min(a, b);
-  };
+  DisjointSets<HalfEdge> sets(opposite.size());
   for (HalfEdge h = 0; h < opposite.size(); ++h) {
     const HalfEdge other = opposite[h];
     if (!is_joined(other) || other < h) continue;
     const bool same_sense = source_of(triangles, h) == source_of(triangles, other);
-    join(h, same_sense ? other : next_in_triangle(other));
-    join(next_in_triangle(h), same_sense ? next_in_triangle(other) : other);
+    sets.join(h, same_sense ? other : next_in_triangle(other));
+    sets.join(next_in_triangle(h), same_sense ? next_in_triangle(other) : other);
   }
-  for (HalfEdge n = 0; n < parent.size(); ++n) parent[n] = root(n);
-  return parent;
+  std::vector<HalfEdge> fans(opposite.size());
+  for (HalfEdge n = 0; n < fans.size(); ++n) fans[n] = sets.find(n);
+  return fans;
 }
 
 std::vector<std::vector<HalfEdge>> boundary_loops(const std::vector<Triangle>& triangles,

@@ -22,6 +22,9 @@ inline std::uint32_t source_of(const std::vector<Triangle>& triangles, HalfEdge 
 inline std::uint32_t target_of(const std::vector<Triangle>& triangles, HalfEdge h) {
   return source_of(triangles, next_in_triangle(h));
 }
+inline Eigen::Vector3d along(const TriangleMesh& mesh, HalfEdge h) {
+  return mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)];
+}
 inline bool names_a_vertex_twice(const Triangle& t) {
   return t[0] == t[1] || t[1] == t[2] || t[2] == t[0];
 }
@@ -45,6 +48,9 @@ constexpr HalfEdge non_manifold_edge = 0xfffffffe;  // more than one other
 constexpr HalfEdge no_edge = 0xfffffffd;            // the triangle names a vertex twice
 inline bool is_joined(HalfEdge opposite) { return opposite < no_edge; }
 std::vector<HalfEdge> opposites_of(const std::vector<Triangle>& triangles, const MeshEdges& edges);
+inline std::vector<HalfEdge> opposites_of(const TriangleMesh& mesh) {
+  return opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));
+}
 
 // The triangles at each vertex, ascending: triangles[first[v]] .. triangles[first[v + 1] - 1].
 struct VertexTriangles {

@@ -363,10 +363,7 @@ TriangleMesh cut_mesh(TriangleMesh mesh, const UprightPrism& prism) {
   widened.min_z -= snap_m;
   widened.max_z += snap_m;
   for (const Piece& piece : cutter.pieces())
-    if (widened.contains((mesh.vertices[piece.corners[0]] + mesh.vertices[piece.corners[1]] +
-                          mesh.vertices[piece.corners[2]]) /
-                         3.0))
-      kept.push_back(piece);
+    if (widened.contains(center_of(mesh, piece.corners))) kept.push_back(piece);
   return mesh_of(std::move(mesh), std::move(kept));
 }
 

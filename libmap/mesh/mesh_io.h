@@ -17,7 +17,6 @@
 // y up by its standard, this project z: writing and reading turn it about x.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 
 #include "libmap/cloud/geometry_file.h"

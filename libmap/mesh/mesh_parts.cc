@@ -4,10 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numeric>
 #include <unordered_map>
-#include <utility>
 
+#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
 
 namespace libmap {
@@ -15,10 +14,6 @@ namespace libmap {
 namespace {
 
 constexpr std::uint32_t unused = 0xffffffff;
-
-bool is_whole(ScalarType type) {
-  return type != ScalarType::float32 && type != ScalarType::float64;
-}
 
 std::vector<ScalarField> picked(const std::vector<ScalarField>& fields,
                                 const std::vector<std::uint32_t>& from) {
@@ -70,26 +65,6 @@ double blended(const ScalarField& field, const std::array<std::uint32_t, N>& ver
   return sum;
 }
 
-struct DisjointSets {
-  std::vector<std::uint32_t> parent;
-  explicit DisjointSets(std::size_t count) : parent(count) {
-    std::iota(parent.begin(), parent.end(), 0U);
-  }
-  std::uint32_t root(std::uint32_t n) {
-    while (parent[n] != n) n = parent[n] = parent[parent[n]];
-    return n;
-  }
-  void join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    // The smaller is the root: components are named by their first triangle.
-    if (a < b)
-      parent[b] = a;
-    else
-      parent[a] = b;
-  }
-};
-
 }  // namespace
 
 std::size_t count_of(const std::vector<bool>& marks) {
@@ -129,7 +104,7 @@ TriangleMesh select_triangles(const TriangleMesh& mesh, const std::vector<bool>&
 }
 
 MeshComponents connected_components(const TriangleMesh& mesh) {
-  DisjointSets sets(mesh.triangles.size());
+  DisjointSets<std::uint32_t> sets(mesh.triangles.size());
   std::unordered_map<std::uint64_t, std::uint32_t> triangle_at;
   triangle_at.reserve(2 * mesh.triangles.size());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
@@ -144,7 +119,7 @@ MeshComponents connected_components(const TriangleMesh& mesh) {
   MeshComponents components;
   components.of_triangle.resize(mesh.triangles.size());
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const std::uint32_t root = sets.root(t);
+    const std::uint32_t root = sets.find(t);
     if (root == t) {
       components.of_triangle[t] = static_cast<std::uint32_t>(components.areas_m2.size());
       components.areas_m2.push_back(0.0);

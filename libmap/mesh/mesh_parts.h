@@ -24,12 +24,20 @@ struct MeshComponents {
 };
 MeshComponents connected_components(const TriangleMesh& mesh);
 
+inline bool is_whole(ScalarType type) {
+  return type != ScalarType::float32 && type != ScalarType::float64;
+}
+
 // A new vertex on the segment from a (t = 0) to b (t = 1), all of its values interpolated linearly;
 // normals are made unit again. Fields of whole numbers take the nearer end's value.
 std::uint32_t append_vertex_between(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b, double t);
 
 // Positions, unit normals and a known viewpoint carried by `target_from_source`.
 TriangleMesh transform_mesh(const TriangleMesh& mesh, const Pose& target_from_source);
+
+inline Eigen::Vector3d center_of(const TriangleMesh& mesh, const Triangle& t) {
+  return (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
+}
 
 // A place on a triangle: (1 - u - v) * a + u * b + v * c.
 struct TrianglePoint {

@@ -40,16 +40,13 @@ std::string without_comments(std::string_view text) {
 }
 
 Error bad_line(const TextRows& rows, const std::string& reason) {
-  return Error(
-      reason,
-      {.file = {}, .field = "line " + std::to_string(rows.line()), .value = {}, .bound = {}});
+  return Error(reason, {.field = "line " + std::to_string(rows.line())});
 }
 
 std::uint64_t index_of(const TextRows& rows, std::string_view word, std::uint64_t limit) {
   const std::optional<std::int64_t> index = parse_integer(word);
   if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= limit)
-    throw Error("not an index", {.file = {},
-                                 .field = "line " + std::to_string(rows.line()),
+    throw Error("not an index", {.field = "line " + std::to_string(rows.line()),
                                  .value = "'" + std::string(word.substr(0, 40)) + "'",
                                  .bound = "0 to " + std::to_string(limit) + " - 1"});
   return static_cast<std::uint64_t>(*index);

@@ -49,8 +49,7 @@ void require_sense(const SampledSurface& surface, const PoissonDiskOptions& opti
       std::clamp(100.0 * static_cast<double>(surface.mesh.triangles.size()), 2.5e6, max_samples);
   const double least = std::sqrt(saturation_density * surface.area_m2 / most);
   if (!(options.radius_m >= least))
-    throw Error("too many samples", {.file = {},
-                                     .field = "radius_m",
+    throw Error("too many samples", {.field = "radius_m",
                                      .value = to_text(options.radius_m),
                                      .bound = ">= " + to_text(static_cast<float>(least))});
 }

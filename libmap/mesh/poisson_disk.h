@@ -3,9 +3,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"

@@ -2,14 +2,12 @@
 
 #include <embree3/rtcore.h>
 
-#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <string>
 
 #include "libmap/core/error.h"
-#include "libmap/mesh/embree_mesh.h"
 
 namespace libmap {
 
@@ -29,25 +27,9 @@ struct LocalRay {
   double skipped = 0.0;  // unit lengths from the given origin to `origin`
 };
 
-}  // namespace
-
-struct RayCaster::Scene {
-  EmbreeMesh mesh;
-  Eigen::AlignedBox3d box;  // about the center, a little larger than the mesh
-
-  explicit Scene(const TriangleMesh& of) : mesh(of, true) {
-    const Eigen::Vector3d half =
-        0.5 * mesh.size() + Eigen::Vector3d::Constant(1e-3 * mesh.size().norm() + 1e-6);
-    box = Eigen::AlignedBox3d(-half, half);
-  }
-  LocalRay localize(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double near,
-                    double far) const;
-  RayHit refine(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                const LocalRay& ray, float found, unsigned triangle, float u, float v) const;
-};
-
-LocalRay RayCaster::Scene::localize(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                    double near, double far) const {
+LocalRay localize(const EmbreeMesh& mesh, const Eigen::AlignedBox3d& box,
+                  const Eigen::Vector3d& origin, const Eigen::Vector3d& direction, double near,
+                  double far) {
   LocalRay ray;
   ray.length = direction.stableNorm();
   if (!(ray.length > 0.0) || !std::isfinite(ray.length) || !origin.allFinite()) return ray;
@@ -74,9 +56,9 @@ LocalRay RayCaster::Scene::localize(const Eigen::Vector3d& origin, const Eigen::
   return ray;
 }
 
-RayHit RayCaster::Scene::refine(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                                const LocalRay& ray, float found, unsigned triangle, float u,
-                                float v) const {
+RayHit refine(const EmbreeMesh& mesh, const Eigen::Vector3d& origin,
+              const Eigen::Vector3d& direction, const LocalRay& ray, float found, unsigned triangle,
+              float u, float v) {
   RayHit hit;
   hit.triangle = triangle;
   const double unit_distance = ray.skipped + static_cast<double>(found);
@@ -100,13 +82,6 @@ RayHit RayCaster::Scene::refine(const Eigen::Vector3d& origin, const Eigen::Vect
   return hit;
 }
 
-RayCaster::RayCaster(const TriangleMesh& mesh) : scene_(std::make_unique<Scene>(mesh)) {}
-RayCaster::~RayCaster() = default;
-RayCaster::RayCaster(RayCaster&&) noexcept = default;
-RayCaster& RayCaster::operator=(RayCaster&&) noexcept = default;
-
-namespace {
-
 RTCRay embree_ray(const LocalRay& local) {
   RTCRay ray{};
   ray.org_x = local.origin.x();
@@ -123,31 +98,26 @@ RTCRay embree_ray(const LocalRay& local) {
 
 }  // namespace
 
+RayCaster::RayCaster(const TriangleMesh& mesh) : mesh_(mesh, true) {
+  const Eigen::Vector3d half =
+      0.5 * mesh_.size() + Eigen::Vector3d::Constant(1e-3 * mesh_.size().norm() + 1e-6);
+  box_ = Eigen::AlignedBox3d(-half, half);
+}
+
 std::optional<RayHit> RayCaster::cast(const Eigen::Vector3d& origin,
                                       const Eigen::Vector3d& direction, double near,
                                       double far) const {
-  const LocalRay local = scene_->localize(origin, direction, near, far);
+  const LocalRay local = localize(mesh_, box_, origin, direction, near, far);
   if (local.far < local.near) return std::nullopt;
   RTCRayHit ray{};
   ray.ray = embree_ray(local);
   ray.hit.geomID = RTC_INVALID_GEOMETRY_ID;
   RTCIntersectContext context;
   rtcInitIntersectContext(&context);
-  rtcIntersect1(scene_->mesh.scene(), &context, &ray);
+  rtcIntersect1(mesh_.scene(), &context, &ray);
   if (ray.hit.geomID == RTC_INVALID_GEOMETRY_ID) return std::nullopt;
-  return scene_->refine(origin, direction, local, ray.ray.tfar, ray.hit.primID, ray.hit.u,
-                        ray.hit.v);
-}
-
-bool RayCaster::is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                           double near, double far) const {
-  const LocalRay local = scene_->localize(origin, direction, near, far);
-  if (local.far < local.near) return false;
-  RTCRay ray = embree_ray(local);
-  RTCIntersectContext context;
-  rtcInitIntersectContext(&context);
-  rtcOccluded1(scene_->mesh.scene(), &context, &ray);
-  return ray.tfar < 0.0F;  // Embree's mark of a blocked ray
+  return refine(mesh_, origin, direction, local, ray.ray.tfar, ray.hit.primID, ray.hit.u,
+                ray.hit.v);
 }
 
 void RayCaster::cast_bundle(const Eigen::Vector3d& origin,
@@ -165,7 +135,7 @@ void RayCaster::cast_bundle(const Eigen::Vector3d& origin,
     alignas(32) std::array<int, packet_size> valid{};
     for (std::size_t i = 0; i < count; ++i) {
       LocalRay& ray = local[i];
-      ray = scene_->localize(origin, directions[first + i], near, far);
+      ray = localize(mesh_, box_, origin, directions[first + i], near, far);
       packet.hit.geomID[i] = RTC_INVALID_GEOMETRY_ID;
       if (ray.far < ray.near) continue;
       valid[i] = -1;
@@ -179,15 +149,15 @@ void RayCaster::cast_bundle(const Eigen::Vector3d& origin,
       packet.ray.tfar[i] = ray.far;
       packet.ray.mask[i] = ~0U;
     }
-    rtcIntersect8(valid.data(), scene_->mesh.scene(), &context, &packet);
+    rtcIntersect8(valid.data(), mesh_.scene(), &context, &packet);
     for (std::size_t i = 0; i < count; ++i) {
       RayHit& hit = hits[first + i];
       if (packet.hit.geomID[i] == RTC_INVALID_GEOMETRY_ID) {
         hit = RayHit{.triangle = RayHit::no_triangle};
         continue;
       }
-      hit = scene_->refine(origin, directions[first + i], local[i], packet.ray.tfar[i],
-                           packet.hit.primID[i], packet.hit.u[i], packet.hit.v[i]);
+      hit = refine(mesh_, origin, directions[first + i], local[i], packet.ray.tfar[i],
+                   packet.hit.primID[i], packet.hit.u[i], packet.hit.v[i]);
     }
   }
 }

@@ -4,12 +4,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
-#include <memory>
 #include <optional>
 #include <span>
 
-#include "libmap/core/triangle_mesh.h"
+#include "libmap/mesh/embree_mesh.h"
 
 namespace libmap {
 
@@ -27,17 +27,12 @@ class RayCaster {
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
   // The mesh may go away afterwards.
   explicit RayCaster(const TriangleMesh& mesh);
-  ~RayCaster();
-  RayCaster(RayCaster&&) noexcept;
-  RayCaster& operator=(RayCaster&&) noexcept;
 
   // The nearest triangle along origin + distance * direction, distance between `near` and `far`
   // (0 <= near <= far), from either side. Nothing where the direction is zero or not finite. May be
   // called from several threads at once.
   std::optional<RayHit> cast(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
                              double near = 0.0, double far = 1e30) const;
-  bool is_blocked(const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
-                  double near = 0.0, double far = 1e30) const;
 
   // The same for many rays from one place, quickest where neighbors in `directions` point nearly
   // the same way; `hits` is as long. RayHit::no_triangle marks a ray that meets nothing.
@@ -45,8 +40,8 @@ class RayCaster {
                    std::span<RayHit> hits, double near = 0.0, double far = 1e30) const;
 
  private:
-  struct Scene;
-  std::unique_ptr<Scene> scene_;
+  EmbreeMesh mesh_;
+  Eigen::AlignedBox3d box_;  // about the mesh's center, a little larger than the mesh
 };
 
 }  // namespace libmap

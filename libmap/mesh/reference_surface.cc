@@ -1,7 +1,6 @@
 #include "libmap/mesh/reference_surface.h"
 
 #include <Eigen/Geometry>
-#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>

@@ -4,7 +4,6 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
-#include <string>
 #include <utility>
 
 #include "libmap/core/error.h"
@@ -84,8 +83,7 @@ SiteCorners corners_of(const TurnedBox& box) {
   const Eigen::Vector2d& b = box.max;
   if (!(box.area() > 0.0) || !std::isfinite(box.area()))
     throw Error("the site has no area",
-                {.file = {},
-                 .field = "width and depth",
+                {.field = "width and depth",
                  .value = to_text(static_cast<float>(b.x() - a.x())) + " m, " +
                           to_text(static_cast<float>(b.y() - a.y())) + " m",
                  .bound = "> 0"});
@@ -153,8 +151,7 @@ void check(const SpotCheckOptions& options, const SiteCorners& site) {
                                 (site.corners[2] - site.corners[1]).norm());
   if (!(2.0 * options.inset_m < least))
     throw Error("no place lies so far inside the site",
-                {.file = {},
-                 .field = "inset_m",
+                {.field = "inset_m",
                  .value = to_text(options.inset_m),
                  .bound = "< " + to_text(static_cast<float>(least / 2)) + ", half a side"});
 }

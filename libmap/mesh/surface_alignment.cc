@@ -64,8 +64,7 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
   const double share = static_cast<double>(pairs.size()) / static_cast<double>(points.size());
   if (pairs.size() < 6 || share < options.min_overlap)
     throw Error("too little overlap to align by",
-                {.file = {},
-                 .field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
+                {.field = "points within " + to_text(static_cast<float>(options.max_distance_m)) +
                           " m over the surface",
                  .value = to_fixed_text(100.0 * share, 1) + " %",
                  .bound = ">= " + to_fixed_text(100.0 * options.min_overlap, 1) + " %"});
@@ -174,9 +173,8 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
   check_parameters(options);
   if (!surface.is_oriented()) throw Error("a surface without normals cannot be aligned to");
   if (points.size() < 6)
-    throw Error(
-        "too few points to align",
-        {.file = {}, .field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});
+    throw Error("too few points to align",
+                {.field = "points", .value = std::to_string(points.size()), .bound = ">= 6"});
   for (const Eigen::Vector3d& point : points)
     if (!point.allFinite()) throw Error("a point is not finite");
   const std::vector<Eigen::Vector3d> used = downsampled(points, options.max_points);

@@ -4,75 +4,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
-#include "libmap/mesh/embree_mesh.h"
-#include "libmap/mesh/ray_caster.h"
 
 namespace libmap {
-
-struct SurfaceDistance::Scene {
-  EmbreeMesh mesh;
-
-  explicit Scene(const TriangleMesh& of) : mesh(of, false) {}
-  Eigen::Vector3d nearest_on(std::uint32_t triangle, const Eigen::Vector3d& point) const {
-    return nearest_on_triangle(point, mesh.corner(triangle, 0), mesh.corner(triangle, 1),
-                               mesh.corner(triangle, 2));
-  }
-};
-
-SurfaceDistance::SurfaceDistance(const TriangleMesh& mesh)
-    : scene_(std::make_unique<Scene>(mesh)) {}
-SurfaceDistance::~SurfaceDistance() = default;
-SurfaceDistance::SurfaceDistance(SurfaceDistance&&) noexcept = default;
-SurfaceDistance& SurfaceDistance::operator=(SurfaceDistance&&) noexcept = default;
-
-SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
-  struct Search {
-    const Scene& scene;
-    Eigen::Vector3d point;
-    double slack;  // by which single precision may misplace a triangle
-    Eigen::Vector3d best;
-    std::uint32_t triangle;
-    double distance;
-  };
-  const Eigen::Vector3d local = point - scene_->mesh.center();
-  Search search{*scene_,
-                local,
-                1e-6 * (scene_->mesh.size().norm() + local.norm()),
-                scene_->nearest_on(0, local),
-                0,
-                0.0};
-  search.distance = (search.best - local).norm();
-  RTCPointQuery query{};
-  query.x = static_cast<float>(local.x());
-  query.y = static_cast<float>(local.y());
-  query.z = static_cast<float>(local.z());
-  query.radius = static_cast<float>(search.distance + search.slack);
-  RTCPointQueryContext context;
-  rtcInitPointQueryContext(&context);
-  const auto visit = [](RTCPointQueryFunctionArguments* arguments) {
-    Search& found = *static_cast<Search*>(arguments->userPtr);
-    const Eigen::Vector3d at = found.scene.nearest_on(arguments->primID, found.point);
-    const double distance = (at - found.point).norm();
-    // Among equals the first triangle, however the tree is walked.
-    if (distance > found.distance ||
-        (distance == found.distance && arguments->primID >= found.triangle))
-      return false;
-    found.best = at;
-    found.triangle = arguments->primID;
-    found.distance = distance;
-    arguments->query->radius = static_cast<float>(distance + found.slack);
-    return true;
-  };
-  rtcPointQuery(scene_->mesh.scene(), &query, &context, visit, &search);
-  return {search.best + scene_->mesh.center(), search.triangle, search.distance};
-}
 
 namespace {
 
@@ -93,7 +32,51 @@ Eigen::Vector3d nearest_on_sides(const Eigen::Vector3d& point, const Eigen::Vect
   return nearest;
 }
 
+Eigen::Vector3d nearest_on(const EmbreeMesh& mesh, std::uint32_t triangle,
+                           const Eigen::Vector3d& point) {
+  return nearest_on_triangle(point, mesh.corner(triangle, 0), mesh.corner(triangle, 1),
+                             mesh.corner(triangle, 2));
+}
+
 }  // namespace
+
+SurfacePoint SurfaceDistance::nearest(const Eigen::Vector3d& point) const {
+  struct Search {
+    const EmbreeMesh& mesh;
+    Eigen::Vector3d point;
+    double slack;  // by which single precision may misplace a triangle
+    Eigen::Vector3d best;
+    std::uint32_t triangle;
+    double distance;
+  };
+  const Eigen::Vector3d local = point - mesh_.center();
+  const double slack = 1e-6 * (mesh_.size().norm() + local.norm());
+  Search search{mesh_, local, slack, nearest_on(mesh_, 0, local), 0, 0.0};
+  search.distance = (search.best - local).norm();
+  RTCPointQuery query{};
+  query.x = static_cast<float>(local.x());
+  query.y = static_cast<float>(local.y());
+  query.z = static_cast<float>(local.z());
+  query.radius = static_cast<float>(search.distance + search.slack);
+  RTCPointQueryContext context;
+  rtcInitPointQueryContext(&context);
+  const auto visit = [](RTCPointQueryFunctionArguments* arguments) {
+    Search& found = *static_cast<Search*>(arguments->userPtr);
+    const Eigen::Vector3d at = nearest_on(found.mesh, arguments->primID, found.point);
+    const double distance = (at - found.point).norm();
+    // Among equals the first triangle, however the tree is walked.
+    if (distance > found.distance ||
+        (distance == found.distance && arguments->primID >= found.triangle))
+      return false;
+    found.best = at;
+    found.triangle = arguments->primID;
+    found.distance = distance;
+    arguments->query->radius = static_cast<float>(distance + found.slack);
+    return true;
+  };
+  rtcPointQuery(mesh_.scene(), &query, &context, visit, &search);
+  return {search.best + mesh_.center(), search.triangle, search.distance};
+}
 
 Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
                                     const Eigen::Vector3d& b, const Eigen::Vector3d& c) {
@@ -171,8 +154,7 @@ std::vector<TrianglePoint> sample_triangles(const TriangleMesh& mesh, double per
   if (!(wanted >= 0.0 && wanted <= most))
     throw Error(
         "too many samples of the surface",
-        {.file = {},
-         .field = "samples",
+        {.field = "samples",
          .value = to_text(per_m2) + " on each of " + to_text(static_cast<float>(area)) + " m2",
          .bound = "<= " + std::to_string(static_cast<std::size_t>(most)) + " in all for " +
                   std::to_string(mesh.triangles.size()) + " triangles"});
@@ -218,37 +200,6 @@ double share_of(const std::vector<bool>& flags) {
   if (flags.empty()) return 0.0;
   return static_cast<double>(std::count(flags.begin(), flags.end(), true)) /
          static_cast<double>(flags.size());
-}
-
-namespace {
-
-// Of the way to a sample: what is met nearer is before it.
-constexpr double sight_margin = 2e-3;
-
-bool sees(const ViewingCamera& viewing, const RayCaster& caster, const Eigen::Vector3d& sample,
-          double max_depth_m) {
-  const Eigen::Vector3d in_camera = viewing.mesh_from_camera.inverse() * sample;
-  if (in_camera.z() > max_depth_m) return false;
-  const auto pixel = project_point(viewing.camera, in_camera);
-  if (!pixel || !(pixel->x() >= -0.5 && pixel->y() >= -0.5) ||
-      !(pixel->x() <= viewing.camera.width - 0.5 && pixel->y() <= viewing.camera.height - 0.5))
-    return false;
-  const Eigen::Vector3d eye = viewing.mesh_from_camera.translation();
-  return !caster.is_blocked(eye, sample - eye, 0.0, 1.0 - sight_margin);
-}
-
-}  // namespace
-
-std::vector<int> count_views(const TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& samples,
-                             const std::vector<ViewingCamera>& cameras, double max_depth_m) {
-  const RayCaster caster(mesh);
-  std::vector<int> views(samples.size(), 0);
-  parallel_for(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      for (const ViewingCamera& camera : cameras)
-        views[n] += sees(camera, caster, samples[n], max_depth_m) ? 1 : 0;
-  });
-  return views;
 }
 
 }  // namespace libmap

@@ -4,11 +4,9 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 #include <vector>
 
-#include "libmap/core/camera.h"
-#include "libmap/core/triangle_mesh.h"
+#include "libmap/mesh/embree_mesh.h"
 #include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {
@@ -23,18 +21,14 @@ class SurfaceDistance {
  public:
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
   // The mesh may go away afterwards.
-  explicit SurfaceDistance(const TriangleMesh& mesh);
-  ~SurfaceDistance();
-  SurfaceDistance(SurfaceDistance&&) noexcept;
-  SurfaceDistance& operator=(SurfaceDistance&&) noexcept;
+  explicit SurfaceDistance(const TriangleMesh& mesh) : mesh_(mesh, false) {}
 
   // The surface's point nearest to a finite point (Embree finds the candidates; distances are in
   // double precision). May be called from several threads at once.
   SurfacePoint nearest(const Eigen::Vector3d& point) const;
 
  private:
-  struct Scene;
-  std::unique_ptr<Scene> scene_;
+  EmbreeMesh mesh_;
 };
 
 // The nearest point of a triangle (Ericson 2005, section 5.1.5).
@@ -68,14 +62,5 @@ std::vector<SurfacePoint> sample_surface(const TriangleMesh& mesh, double per_m2
 std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
                           const std::vector<Eigen::Vector3d>& points, double radius_m);
 double share_of(const std::vector<bool>& flags);  // 0 if there are none
-
-// How many cameras see each sample of the mesh: in the image, z within max_depth_m, nothing of the
-// mesh before it. `mesh_from_camera` are their optical frames.
-struct ViewingCamera {
-  Camera camera;
-  Pose mesh_from_camera = Pose::Identity();
-};
-std::vector<int> count_views(const TriangleMesh& mesh, const std::vector<Eigen::Vector3d>& samples,
-                             const std::vector<ViewingCamera>& cameras, double max_depth_m);
 
 }  // namespace libmap

@@ -93,9 +93,8 @@ void SurfacePieces::cut(const PlacedFragment& fragment, double longest_m, std::s
   // At least so many parts lie along its longest side.
   const double parts = std::sqrt(fragment.square_of_longest_side()) / longest_m;
   if (static_cast<double>(parts_.size()) + parts > static_cast<double>(max_parts))
-    throw Error(
-        "the mesh is too large to be cut so small",
-        {.file = {}, .field = "size of a piece", .value = to_text(longest_m) + " m", .bound = {}});
+    throw Error("the mesh is too large to be cut so small",
+                {.field = "size of a piece", .value = to_text(longest_m) + " m"});
   if (parts > 1.0) {
     for (const PlacedFragment& half : fragment.halves()) cut(half, longest_m, max_parts);
     return;

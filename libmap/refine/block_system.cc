@@ -4,7 +4,6 @@
 #include <Eigen/SparseCholesky>
 #include <Eigen/SparseCore>
 #include <algorithm>
-#include <cmath>
 
 namespace libmap {
 

@@ -1,7 +1,6 @@
 // Sparse normal equations in blocks of six: one block of unknowns a pose.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <map>
 #include <memory>

@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "libmap/core/error.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/pose_residuals.h"
 
@@ -403,12 +402,7 @@ BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
                                      const std::vector<GraphComponent>& components,
                                      const BundleAdjustmentOptions& options,
                                      const std::vector<FeatureTrack>& system_tracks) {
-  const auto fail = [](const char* field, double value, const Range& range) {
-    throw Error("a bundle cannot be adjusted so",
-                {.file = {}, .field = field, .value = to_text(value), .bound = describe(range)});
-  };
-  if (!(options.robust_scale > 0.0)) fail("robust_scale", options.robust_scale, positive);
-  if (options.max_iterations < 1) fail("max_iterations", options.max_iterations, {1.0});
+  check_parameters(options);
   return Adjustment(frames, tracks, map_from_base, options).run(links, components, system_tracks);
 }
 

@@ -1,9 +1,7 @@
 // Features kept between runs: a file each frame in one folder, named by what they were made of.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
-#include <optional>
 #include <string>
 
 #include "libmap/refine/features.h"

@@ -1,7 +1,6 @@
 #include "libmap/refine/feature_tracks.h"
 
 #include <algorithm>
-#include <map>
 #include <numeric>
 #include <set>
 #include <tuple>

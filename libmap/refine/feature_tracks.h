@@ -1,7 +1,6 @@
 // Points that several frames have seen, from the matches of pairs of frames.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstddef>
 #include <vector>
 

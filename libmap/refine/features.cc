@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <memory>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
@@ -144,8 +143,7 @@ DepthAtRay depth_at(const DepthPlanes& planes, const Camera& camera, const Eigen
 void check(const FeatureOptions& options) {
   check_parameters(options);
   if (!(options.planes.max_depth_m > options.planes.min_depth_m))
-    throw Error("out of range", {.file = {},
-                                 .field = "max_depth_m",
+    throw Error("out of range", {.field = "max_depth_m",
                                  .value = to_text(options.planes.max_depth_m),
                                  .bound = "> " + to_text(options.planes.min_depth_m)});
 }

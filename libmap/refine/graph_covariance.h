@@ -1,7 +1,6 @@
 // How certain the poses of a graph are, from the information of its links at the optimum.
 #pragma once
 
-#include <cstddef>
 #include <map>
 #include <memory>
 #include <utility>

@@ -2,7 +2,6 @@
 
 #include <cstddef>
 #include <string>
-#include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/symmetric_eigen.h"

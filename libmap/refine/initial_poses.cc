@@ -231,7 +231,7 @@ InitialPoses initial_poses(const PoseGraph& graph, StartPoses start) {
   if (result.map_from_base.empty()) {
     if (start != StartPoses::automatic)
       throw Error("the scan has no poses to start from",
-                  {.file = {}, .field = "poses", .value = result.source, .bound = {}});
+                  {.field = "poses", .value = result.source});
     result.parts = begin_by_links(graph, wanted, result.map_from_base);
     result.source = result.parts.empty() ? "visual" : "links";
   }

@@ -9,7 +9,6 @@
 #include <set>
 #include <utility>
 
-#include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/pose_residuals.h"

@@ -2,9 +2,7 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 #include <ctime>
-#include <limits>
 #include <set>
 #include <utility>
 
@@ -135,7 +133,7 @@ void Refinement::start() {
   const int gauge = options_.graph.gauge_node;
   if (gauge != 0 && scan_.graph().find_node(gauge) == nullptr)
     throw Error("the scan has no such node",
-                {.field = "gauge_node", .value = std::to_string(gauge), .bound = {}});
+                {.field = "gauge_node", .value = std::to_string(gauge)});
   InitialPoses initial = initial_poses(scan_.graph(), options_.start);
   poses_ = std::move(initial.map_from_base);
   parts_ = std::move(initial.parts);
@@ -451,9 +449,8 @@ RefinementResult Refinement::run() {
   for (FrameFeatures& frame : frames_) frame.descriptors = {};
   if (links_.empty()) {
     if (is_all_tracked())
-      throw Error(
-          "its pictures give no poses: no two of them could be matched",
-          {.file = {}, .field = "frames", .value = std::to_string(frames_.size()), .bound = {}});
+      throw Error("its pictures give no poses: no two of them could be matched",
+                  {.field = "frames", .value = std::to_string(frames_.size())});
     result_.warnings.push_back(
         "no two frames could be matched by features: the poses rest on the stored links alone");
   } else {

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "libmap/core/random_stream.h"
 #include "libmap/refine/rigid_motion.h"

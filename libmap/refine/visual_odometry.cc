@@ -1,7 +1,6 @@
 #include "libmap/refine/visual_odometry.h"
 
 #include <algorithm>
-#include <cmath>
 #include <numbers>
 #include <optional>
 #include <utility>

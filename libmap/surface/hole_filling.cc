@@ -6,7 +6,6 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <string_view>
 
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_parts.h"
@@ -37,10 +36,7 @@ std::vector<Eigen::Vector3d> positions_of(const TriangleMesh& mesh, const Bounda
 
 double length_of(const TriangleMesh& mesh, const BoundaryLoop& loop) {
   double length = 0.0;
-  for (const HalfEdge h : loop)
-    length +=
-        (mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)])
-            .norm();
+  for (const HalfEdge h : loop) length += along(mesh, h).norm();
   return length;
 }
 
@@ -159,8 +155,7 @@ class HolePatcher {
       if (!v.allFinite()) return false;
     joined.triangles = around;
     joined.triangles.insert(joined.triangles.end(), patch.triangles.begin(), patch.triangles.end());
-    const std::vector<HalfEdge> opposite =
-        opposites_of(joined.triangles, edges_of(joined.triangles, joined.vertices.size()));
+    const std::vector<HalfEdge> opposite = opposites_of(joined);
     for (std::size_t t = around.size(); t < joined.triangles.size(); ++t) {
       if (lowest_height(joined, joined.triangles[t]) <= lowest_height_) return false;
       for (HalfEdge h = static_cast<HalfEdge>(3 * t); h < 3 * t + 3; ++h)
@@ -201,7 +196,7 @@ void append_patch_vertex(TriangleMesh& mesh, const Eigen::Vector3d& position,
       mesh.vertex_colors[added][c] = static_cast<std::uint8_t>(std::clamp(
           std::lround(mean([&](std::uint32_t v) { return mesh.vertex_colors[v][c]; })), 0L, 255L));
   for (ScalarField& field : mesh.vertex_fields)
-    if (field.type == ScalarType::float32 || field.type == ScalarType::float64)
+    if (!is_whole(field.type))
       field.values[added] = mean([&](std::uint32_t v) { return field.values[v]; });
 }
 
@@ -232,9 +227,7 @@ void append_patch(TriangleMesh& mesh, const BoundaryLoop& loop, const PlacedPatc
   for (Triangle triangle : placed.patch.triangles) {
     for (std::uint32_t& v : triangle)
       v = v < old_count ? placed.vertices[v] : first_new + (v - old_count);
-    const Eigen::Vector3d place =
-        (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
-        3.0;
+    const Eigen::Vector3d place = center_of(mesh, triangle);
     const std::uint32_t source = nearest_triangle(mesh, loop, place);
     mesh.triangles.push_back(triangle);
     for (ScalarField& field : mesh.face_fields)
@@ -265,8 +258,7 @@ std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<Bound
 }  // namespace
 
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m) {
-  std::vector<BoundaryLoop> loops = boundary_loops(
-      mesh.triangles, opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size())));
+  std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposites_of(mesh));
   if (loops.empty()) return {};
   const std::vector<bool> is_outer = outer_boundaries(mesh, loops);
   std::vector<BoundaryLoop> holes;

@@ -37,8 +37,7 @@ void erase_field(std::vector<ScalarField>& fields, std::string_view name) {
 }
 
 std::vector<BoundaryLoop> loops_of(const TriangleMesh& mesh) {
-  return boundary_loops(
-      mesh.triangles, opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size())));
+  return boundary_loops(mesh.triangles, opposites_of(mesh));
 }
 
 // Intersecting and degenerate triangles.

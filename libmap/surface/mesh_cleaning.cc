@@ -1,7 +1,6 @@
 #include "libmap/surface/mesh_cleaning.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstdint>
 #include <functional>
 #include <string>
@@ -10,9 +9,7 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/surface/hole_filling.h"
 #include "libmap/surface/intersection_repair.h"
-#include "libmap/surface/mesh_decimation.h"
 #include "libmap/surface/mesh_manifold.h"
 #include "libmap/surface/mesh_smoothing.h"
 #include "libmap/surface/triangle_repair.h"
@@ -52,7 +49,10 @@ class Cleaning {
     if (options_.max_hole_m > 0.0) step("holes", [&] { fill_small_holes(); });
     if (options_.smoothing_iterations > 0)
       step("smoothing", [&] { smooth_mesh(mesh_(), options_.smoothing_iterations); });
-    if (options_.decimation_error_m > 0.0) step("decimation", [&] { decimate(); });
+    if (options_.decimation_error_m > 0.0)
+      step("decimation", [&] {
+        result_.decimation = decimate_mesh(mesh_(), options_.decimation_error_m, progress_);
+      });
     if (options_.repair && (options_.smoothing_iterations > 0 || options_.decimation_error_m > 0.0))
       step("intersections after smoothing or decimation", [&] { remove_intersections(); });
     step("islands at the end", [&] { drop_islands(); });
@@ -155,19 +155,8 @@ class Cleaning {
   }
 
   void fill_small_holes() {
-    const HoleFilling filling = fill_holes(mesh_(), find_holes(mesh_(), options_.max_hole_m),
-                                           PatchCheck::intersection, progress_);
-    result_.filled_holes = filling.holes;
-    result_.unfilled_holes = filling.unfilled;
-    result_.filled_triangles = filling.triangles;
-    result_.filled_area_m2 = filling.area_m2;
-  }
-
-  void decimate() {
-    const MeshDecimation decimation =
-        decimate_mesh(mesh_(), options_.decimation_error_m, progress_);
-    result_.decimated_triangles = decimation.removed_triangles;
-    result_.decimation_deviation_m = decimation.deviation_m;
+    result_.filling = fill_holes(mesh_(), find_holes(mesh_(), options_.max_hole_m),
+                                 PatchCheck::intersection, progress_);
   }
 
   MeshCleaningResult result_;

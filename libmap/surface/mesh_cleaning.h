@@ -15,14 +15,13 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
+#include "libmap/surface/hole_filling.h"
+#include "libmap/surface/mesh_decimation.h"
 
 namespace libmap {
 
@@ -62,12 +61,8 @@ struct MeshCleaningResult {
   std::size_t closing_triangles = 0;  // put there to close these places again
   std::size_t open_places = 0;        // boundaries that are left of them
   std::size_t remaining_intersecting_triangles = 0;
-  std::size_t filled_holes = 0;
-  std::size_t filled_triangles = 0;
-  double filled_area_m2 = 0.0;
-  std::size_t unfilled_holes = 0;  // small enough, but no filling was found that meets nothing else
-  std::size_t decimated_triangles = 0;
-  double decimation_deviation_m = 0.0;  // bound on the distance, either way, that was proved
+  HoleFilling filling;        // of step 5
+  MeshDecimation decimation;  // its deviation is proved
   StageTimings timings_s;
 };
 

@@ -200,7 +200,6 @@ MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m, Progress& p
   progress.begin("decimating", 0);
   for (int attempt = 0; attempt < max_attempts; ++attempt) {
     if (attempt >= max_attempts / 2) tolerance *= next_share;
-    ++result.attempts;
     TriangleMesh smaller = collapsed(mesh, locked, tolerance);
     if (smaller.triangles.empty() || smaller.triangles.size() == mesh.triangles.size()) break;
     const double proved = deviation(mesh, smaller, max_error_m, attempt, locked);

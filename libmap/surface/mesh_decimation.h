@@ -12,7 +12,6 @@ struct MeshDecimation {
   std::size_t removed_triangles = 0;
   // No point of either surface is farther than this from the other; not above the bound asked for.
   double deviation_m = 0.0;
-  int attempts = 0;
 };
 
 // Edges are collapsed into one of their ends (OpenMesh: quadric error first; no removed vertex

@@ -24,10 +24,10 @@ constexpr std::size_t max_paired = 16;
 // From the edge to the triangle's third corner, across the edge, of unit length.
 Eigen::Vector3d wing_of(const TriangleMesh& mesh, HalfEdge h) {
   const Eigen::Vector3d& from = mesh.vertices[source_of(mesh.triangles, h)];
-  const Eigen::Vector3d along = (mesh.vertices[target_of(mesh.triangles, h)] - from).normalized();
+  const Eigen::Vector3d edge = along(mesh, h).normalized();
   const Eigen::Vector3d to_apex =
       mesh.vertices[source_of(mesh.triangles, previous_in_triangle(h))] - from;
-  return (to_apex - along.dot(to_apex) * along).normalized();
+  return (to_apex - edge.dot(to_apex) * edge).normalized();
 }
 
 // Joins at most `max_pairs` pairs of the edge's half-edges, straightest first; opens the others.
@@ -236,8 +236,7 @@ ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m) {
 }
 
 bool is_oriented_manifold(const TriangleMesh& mesh) {
-  const std::vector<HalfEdge> opposite =
-      opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));
+  const std::vector<HalfEdge> opposite = opposites_of(mesh);
   for (HalfEdge h = 0; h < opposite.size(); ++h) {
     if (opposite[h] == open_edge) continue;
     if (!is_joined(opposite[h]) ||

@@ -13,11 +13,6 @@ namespace libmap {
 
 namespace {
 
-double length_of(const TriangleMesh& mesh, HalfEdge h) {
-  return (mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)])
-      .norm();
-}
-
 void report_triangles(const TriangleMesh& mesh, MeshReport& report) {
   report.vertices = mesh.vertices.size();
   report.triangles = mesh.triangles.size();
@@ -40,7 +35,7 @@ void report_edges(const TriangleMesh& mesh, const MeshEdges& edges, MeshReport& 
   lengths.reserve(edges.size());
   for (std::size_t e = 0; e < edges.size(); ++e) {
     const HalfEdge* half = &edges.half_edges[edges.first[e]];
-    lengths.push_back(length_of(mesh, half[0]));
+    lengths.push_back(along(mesh, half[0]).norm());
     const std::size_t count = edges.count(e);
     if (count == 1) ++report.boundary_edges;
     if (count > 2) ++report.non_manifold_edges;
@@ -88,7 +83,7 @@ void report_boundaries(const TriangleMesh& mesh, const std::vector<HalfEdge>& op
     MeshBoundary& boundary = report.boundaries.emplace_back();
     std::vector<Eigen::Vector3d> positions;
     for (const HalfEdge h : loop) {
-      boundary.length_m += length_of(mesh, h);
+      boundary.length_m += along(mesh, h).norm();
       positions.push_back(mesh.vertices[source_of(mesh.triangles, h)]);
       positions.push_back(mesh.vertices[target_of(mesh.triangles, h)]);
     }

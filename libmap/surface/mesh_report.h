@@ -58,12 +58,6 @@ struct MeshReport {
   bool is_watertight() const {
     return is_closed() && is_manifold() && is_oriented() && self_intersections == 0;
   }
-  // Nothing but boundaries sets it apart from a watertight mesh.
-  bool is_clean() const {
-    return is_manifold() && is_oriented() && degenerate_triangles == 0 &&
-           duplicate_triangles == 0 && unused_vertices == 0 && self_intersections == 0;
-  }
-
   long euler_characteristic = 0;  // used vertices - edges + triangles
   // Of a manifold and oriented mesh, the sum over its components, each boundary closed by a disc:
   // components - (euler_characteristic + boundaries) / 2. Else -1.

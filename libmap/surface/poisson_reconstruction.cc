@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numbers>
 #include <tuple>
 
@@ -13,7 +12,6 @@
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/surface/cloud_values.h"
 #include "libmap/surface/pcl_poisson.h"
 
 namespace libmap {
@@ -29,6 +27,55 @@ constexpr double cube_margin = 1.1;
 constexpr int min_depth = 3;
 // Smallest second standard deviation of a cloud's positions, against its first, of a surface.
 constexpr double min_width = 1e-4;
+
+constexpr std::size_t value_neighbors = 4;
+
+// Each vertex takes the mean of the 4 nearest points, weighted by 1 / (d^2 + radius^2); fields of
+// whole numbers the nearest point's value. A NaN of one point counts for nothing. Replaces colors
+// and fields; `tree` holds the cloud's positions.
+void carry_values(const PointCloud& cloud, const PointTree& tree, double radius_m,
+                  TriangleMesh& mesh) {
+  const std::size_t count = mesh.vertices.size();
+  mesh.vertex_colors.assign(cloud.has_colors() ? count : 0, Color{});
+  mesh.vertex_fields.clear();
+  for (const ScalarField& field : cloud.fields)
+    mesh.vertex_fields.push_back({field.name, field.type, std::vector<double>(count, 0.0)});
+  if (cloud.empty() || (!cloud.has_colors() && cloud.fields.empty())) return;
+  parallel_for(count, 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const auto neighbors = tree.nearest(mesh.vertices[v], value_neighbors);
+      const auto weight = [&](const NeighborPoint& point) {
+        return 1.0 / (point.square_m2 + radius_m * radius_m);
+      };
+      if (cloud.has_colors()) {
+        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+        double weights = 0.0;
+        for (const NeighborPoint& point : neighbors) {
+          const Color& color = cloud.colors[point.index];
+          sum += weight(point) * Eigen::Vector3d(color[0], color[1], color[2]);
+          weights += weight(point);
+        }
+        for (std::size_t c = 0; c < 3; ++c)
+          mesh.vertex_colors[v][c] = static_cast<std::uint8_t>(
+              std::lround(std::clamp(sum[static_cast<Eigen::Index>(c)] / weights, 0.0, 255.0)));
+      }
+      for (std::size_t f = 0; f < cloud.fields.size(); ++f) {
+        const ScalarField& field = cloud.fields[f];
+        double& value = mesh.vertex_fields[f].values[v];
+        value = field.values[neighbors.front().index];
+        if (is_whole(field.type)) continue;
+        double sum = 0.0;
+        double weights = 0.0;
+        for (const NeighborPoint& point : neighbors) {
+          if (std::isnan(field.values[point.index])) continue;
+          sum += weight(point) * field.values[point.index];
+          weights += weight(point);
+        }
+        if (weights > 0.0) value = sum / weights;
+      }
+    }
+  });
+}
 
 struct UsedPoint {
   std::size_t index;
@@ -123,10 +170,7 @@ void Reconstruction::choose_cell_size() {
     if (places.empty() || places.back() != cloud_.positions[n])
       places.push_back(cloud_.positions[n]);
   const auto too_thin = [&](const char* reason) {
-    return Error(reason, {.file = {},
-                          .field = "points",
-                          .value = std::to_string(places.size()) + " places",
-                          .bound = {}});
+    return Error(reason, {.field = "points", .value = std::to_string(places.size()) + " places"});
   };
   if (places.size() < 3) throw too_thin("too few points for a surface");
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
@@ -148,8 +192,7 @@ void Reconstruction::choose_cell_size() {
   // The surface is kept as far as cells reach: such ones would invent ground around the points.
   if (result_.cell_size_m > extent)
     throw Error("cells larger than the cloud",
-                {.file = {},
-                 .field = "cell_size_m",
+                {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = "<= " + to_text(static_cast<float>(extent)) + " m"});
   const double cells = cube_margin * extent / result_.cell_size_m;
@@ -157,8 +200,7 @@ void Reconstruction::choose_cell_size() {
   if (!(cells <= most))
     throw Error(
         "the octree would be deeper than " + std::to_string(max_octree_depth) + " levels",
-        {.file = {},
-         .field = "cell_size_m",
+        {.field = "cell_size_m",
          .value = to_text(static_cast<float>(result_.cell_size_m)),
          .bound = ">= " + to_text(static_cast<float>(result_.cell_size_m * cells / most)) + " m"});
   problem_.depth = std::max(min_depth, static_cast<int>(std::ceil(std::log2(cells))));

@@ -3,9 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"

@@ -29,9 +29,7 @@ HalfEdge longest_edge(const TriangleMesh& mesh, std::uint32_t t) {
   HalfEdge longest = 3 * t;
   double length = -1.0;
   for (HalfEdge h = 3 * t; h < 3 * t + 3; ++h) {
-    const double here =
-        (mesh.vertices[target_of(mesh.triangles, h)] - mesh.vertices[source_of(mesh.triangles, h)])
-            .squaredNorm();
+    const double here = along(mesh, h).squaredNorm();
     if (here <= length) continue;
     length = here;
     longest = h;
@@ -43,9 +41,7 @@ HalfEdge longest_edge(const TriangleMesh& mesh, std::uint32_t t) {
 class CapFlipper {
  public:
   explicit CapFlipper(TriangleMesh& mesh)
-      : mesh_(mesh),
-        opposite_(opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()))),
-        keep_(mesh.triangles.size(), true) {}
+      : mesh_(mesh), opposite_(opposites_of(mesh)), keep_(mesh.triangles.size(), true) {}
 
   // Whether anything was done: not if the triangle beyond is a cap that waits for another, or the
   // new edge exists.

@@ -25,13 +25,8 @@ double largest_coordinate(const TriangleMesh& mesh) {
   return largest;
 }
 
-double squared_length(const TriangleMesh& mesh, HalfEdge h) {
-  return (mesh.vertices[source_of(mesh.triangles, h)] - mesh.vertices[target_of(mesh.triangles, h)])
-      .squaredNorm();
-}
-
 bool is_long(const TriangleMesh& mesh, HalfEdge h, double max_side_m) {
-  return squared_length(mesh, h) > max_side_m * max_side_m;
+  return along(mesh, h).squaredNorm() > max_side_m * max_side_m;
 }
 
 // Parts of a triangle that needs no cutting need none: `open` says which triangles still may.

@@ -4,7 +4,8 @@
 #include <cstddef>
 #include <numeric>
 #include <span>
-#include <utility>
+
+#include "libmap/core/disjoint_sets.h"
 
 namespace libmap {
 
@@ -15,20 +16,6 @@ constexpr double min_gain = 1e-2;
 constexpr int max_cycles = 12;
 constexpr int rounds_a_cycle = 2;
 constexpr int rounds_of_regions = 3;
-
-class Sets {
- public:
-  explicit Sets(std::size_t count) : parent_(count) { reset(); }
-  void reset() { std::iota(parent_.begin(), parent_.end(), 0U); }
-  std::uint32_t find(std::uint32_t item) {
-    while (parent_[item] != item) item = parent_[item] = parent_[parent_[item]];
-    return item;
-  }
-  void join(std::uint32_t a, std::uint32_t b) { parent_[find(a)] = find(b); }
-
- private:
-  std::vector<std::uint32_t> parent_;
-};
 
 // One of the photographs that a node may get, and what it costs.
 struct Label {
@@ -95,7 +82,6 @@ class ForestDescent {
  public:
   explicit ForestDescent(Graph& graph)
       : graph_(graph),
-        sets_(graph.size()),
         order_(graph.size()),
         in_forest_(graph.size(), 1),
         parent_(graph.size()),
@@ -117,7 +103,6 @@ class ForestDescent {
   void settle(std::uint32_t node);
 
   Graph& graph_;
-  Sets sets_;
   std::vector<std::uint32_t> order_;
   std::vector<std::uint8_t> in_forest_;
   std::vector<std::uint32_t> from_root_;  // each tree's nodes, parents before children
@@ -131,16 +116,16 @@ void ForestDescent::choose_forest() {
   std::stable_partition(order_.begin(), order_.end(),
                         [this](std::uint32_t node) { return in_forest_[node] == 0; });
   std::fill(in_forest_.begin(), in_forest_.end(), std::uint8_t{0});
-  sets_.reset();
+  DisjointSets<std::uint32_t> sets(graph_.size());
   std::vector<std::uint32_t> trees;
   for (const std::uint32_t node : order_) {
     trees.clear();
     for (const Neighbor& neighbor : graph_.neighbors_of(node))
-      if (in_forest_[neighbor.node] != 0) trees.push_back(sets_.find(neighbor.node));
+      if (in_forest_[neighbor.node] != 0) trees.push_back(sets.find(neighbor.node));
     std::sort(trees.begin(), trees.end());
     if (std::adjacent_find(trees.begin(), trees.end()) != trees.end()) continue;
     in_forest_[node] = 1;
-    for (const std::uint32_t tree : trees) sets_.join(tree, node);
+    for (const std::uint32_t tree : trees) sets.join(tree, node);
   }
 }
 
@@ -301,9 +286,7 @@ Graph graph_of(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
     graph.choose(node_of[t], views[t][0].photo);
     for (HalfEdge h = 3 * t; h < 3 * t + 3; ++h) {
       if (!is_joined(opposite[h]) || views[opposite[h] / 3].empty()) continue;
-      const double length = (mesh.vertices[source_of(mesh.triangles, h)] -
-                             mesh.vertices[target_of(mesh.triangles, h)])
-                                .norm();
+      const double length = along(mesh, h).norm();
       graph.neighbors.push_back(
           {node_of[opposite[h] / 3], static_cast<float>(seam_cost_m * length)});
     }

@@ -6,7 +6,6 @@
 #include <memory>
 
 #include "libmap/core/error.h"
-#include "libmap/core/text.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/texture/mesh_subdivision.h"
 #include "libmap/texture/texture_painting.h"
@@ -24,8 +23,7 @@ constexpr std::uint64_t max_cut_triangles = 2'500'000;
 
 // Whether any photograph may show the triangle, or a part of it, so large that cutting it matters.
 bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& photos) {
-  const Eigen::Vector3d center =
-      (mesh.vertices[t[0]] + mesh.vertices[t[1]] + mesh.vertices[t[2]]) / 3.0;
+  const Eigen::Vector3d center = center_of(mesh, t);
   double radius = 0.0;
   double longest = 0.0;
   for (std::size_t k = 0; k < 3; ++k) {
@@ -114,9 +112,7 @@ TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
     return find_texture_views(mesh, *photos, options_.views, views_a_triangle,
                               static_cast<std::size_t>(options_.blend_views) + 1, progress_);
   });
-  const auto opposite = timed("edges", [&] {
-    return opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));
-  });
+  const auto opposite = timed("edges", [&] { return opposites_of(mesh); });
   const TextureLabels labels = timed("labeling", [&] {
     return label_triangles(mesh, opposite, views.of_triangles, options_.labeling);
   });

@@ -1,7 +1,6 @@
 // The colors of a texture's pages from the photographs. Inner part of libmap/mesh.
 #pragma once
 
-#include <Eigen/Core>
 #include <cstdint>
 #include <vector>
 

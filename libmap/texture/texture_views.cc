@@ -189,9 +189,7 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
   const Triangle& triangle = mesh_.triangles[t];
   for (const std::uint32_t corner : triangle)
     if (!vertices_[corner].in_image) return 0.0F;
-  const Eigen::Vector3d center =
-      (mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] + mesh_.vertices[triangle[2]]) /
-      3.0;
+  const Eigen::Vector3d center = center_of(mesh_, triangle);
   const Eigen::Vector3d toward = projector_->position() - center;
   const double distance2 = toward.squaredNorm();
   const double cosine = normals_[t].dot(toward) / std::sqrt(distance2);
@@ -271,9 +269,7 @@ void ViewFinder::test_triangles() {
       qualities_[t] = 0.0F;
     } else if (longest_side_px(triangle) > center_test_px) {
       wanted.push_back(t);
-      centers.push_back((mesh_.vertices[triangle[0]] + mesh_.vertices[triangle[1]] +
-                         mesh_.vertices[triangle[2]]) /
-                        3.0);
+      centers.push_back(center_of(mesh_, triangle));
     }
   }
   const std::vector<bool> blocked = hidden(centers);

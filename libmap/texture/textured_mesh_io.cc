@@ -11,13 +11,54 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/assimp_codec.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/texture/texture_corners.h"
 
 namespace libmap {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+struct TextureCorner {
+  std::uint32_t vertex = 0;
+  Eigen::Vector2f coordinate = Eigen::Vector2f::Zero();
+};
+
+// Corners of one vertex and texture coordinate as one, in the order of their first use.
+struct UnitedCorners {
+  std::vector<TextureCorner> corners;
+  std::vector<std::array<std::uint32_t, 3>> of_triangle;
+};
+
+UnitedCorners unite_corners(const TexturedMesh& model) {
+  UnitedCorners result;
+  constexpr std::uint32_t none = 0xffffffff;
+  // The corners of a vertex are a list: few have more than two.
+  std::vector<std::uint32_t> newest(model.mesh.vertices.size(), none);
+  std::vector<std::uint32_t> older;
+  result.of_triangle.resize(model.mesh.triangles.size());
+  for (std::size_t t = 0; t < model.mesh.triangles.size(); ++t)
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t vertex = model.mesh.triangles[t][k];
+      const Eigen::Vector2f& coordinate = model.texture_coordinates[t][k];
+      std::uint32_t corner = newest[vertex];
+      while (corner != none && result.corners[corner].coordinate != coordinate)
+        corner = older[corner];
+      if (corner == none) {
+        corner = static_cast<std::uint32_t>(result.corners.size());
+        result.corners.push_back({vertex, coordinate});
+        older.push_back(newest[vertex]);
+        newest[vertex] = corner;
+      }
+      result.of_triangle[t][k] = corner;
+    }
+  return result;
+}
+
+// A page as the bytes of a picture.
+std::string encode_page(const ColorImage& page, const TexturedMeshWriteOptions& options) {
+  return options.image_format == ImageFormat::png ? encode_png(page)
+                                                  : encode_jpeg(page, options.jpeg_quality);
+}
 
 fs::path material_path(const fs::path& model) {
   return model.parent_path() / (model.stem().string() + ".mtl");
@@ -123,10 +164,8 @@ void require_room_in_glb(const std::vector<ModelPart>& parts,
              part.mesh.triangles.size() * 3 * sizeof(std::uint32_t);
   for (const EncodedPicture& picture : pictures) bytes += picture.bytes.size();
   if (bytes > std::numeric_limits<std::uint32_t>::max())
-    throw Error("too large for a .glb file", {.file = {},
-                                              .field = "size",
-                                              .value = std::to_string(bytes) + " bytes",
-                                              .bound = "< 4 GB"});
+    throw Error("too large for a .glb file",
+                {.field = "size", .value = std::to_string(bytes) + " bytes", .bound = "< 4 GB"});
 }
 
 std::string textured_glb(const TexturedMesh& model, const TexturedMeshWriteOptions& options) {
@@ -207,11 +246,6 @@ std::vector<ModelFile> textured_mesh_files(const fs::path& path, const TexturedM
                      });
                    }});
   return files;
-}
-
-void write_textured_mesh(const fs::path& path, const TexturedMesh& model,
-                         const TexturedMeshWriteOptions& options) {
-  for (const ModelFile& file : textured_mesh_files(path, model, options)) file.write(file.path);
 }
 
 TexturedMesh read_textured_mesh(const fs::path& path) {

@@ -12,8 +12,6 @@
 #include <cstddef>
 #include <filesystem>
 #include <functional>
-#include <string>
-#include <utility>
 #include <vector>
 
 #include "libmap/core/textured_mesh.h"
@@ -47,10 +45,6 @@ std::filesystem::path texture_page_path(const std::filesystem::path& model, std:
 std::vector<ModelFile> textured_mesh_files(const std::filesystem::path& path,
                                            const TexturedMesh& model,
                                            const TexturedMeshWriteOptions& options = {});
-
-// Writes them all, straight to their paths.
-void write_textured_mesh(const std::filesystem::path& path, const TexturedMesh& model,
-                         const TexturedMeshWriteOptions& options = {});
 
 // Throws Error unless the extension is .obj or .glb.
 void require_textured_format(const std::filesystem::path& path);

@@ -220,6 +220,17 @@ std::pair<std::size_t, double> place_in(std::size_t count, double t) {
   return {below, place - static_cast<double>(below)};
 }
 
+// At t between evenly spaced points, whose channels reach `full`.
+template <typename Points>
+Color interpolated(const Points& points, double full, double t) {
+  if (std::isnan(t)) return no_value_color;
+  const auto [below, share] = place_in(points.size(), t);
+  Color color{};
+  for (std::size_t c = 0; c < 3; ++c)
+    color[c] = to_byte(((1.0 - share) * points[below][c] + share * points[below + 1][c]) / full);
+  return color;
+}
+
 }  // namespace
 
 void add_legend(const Legend& legend, std::vector<Legend>& legends) {
@@ -279,26 +290,9 @@ Legend score_legend() {
   return legend;
 }
 
-Color viridis(double t) {
-  if (std::isnan(t)) return no_value_color;
-  const auto [below, share] = place_in(viridis_points.size(), t);
-  Color color{};
-  for (std::size_t c = 0; c < 3; ++c)
-    color[c] =
-        to_byte((1.0 - share) * viridis_points[below][c] + share * viridis_points[below + 1][c]);
-  return color;
-}
+Color viridis(double t) { return interpolated(viridis_points, 1.0, t); }
 
-Color diverging(double t) {
-  if (std::isnan(t)) return no_value_color;
-  const auto [below, share] = place_in(diverging_points.size(), t);
-  Color color{};
-  for (std::size_t c = 0; c < 3; ++c)
-    color[c] = to_byte(
-        ((1.0 - share) * diverging_points[below][c] + share * diverging_points[below + 1][c]) /
-        255.0);
-  return color;
-}
+Color diverging(double t) { return interpolated(diverging_points, 255.0, t); }
 
 Color color_at(ColorScale scale, double t) {
   return scale == ColorScale::diverging ? diverging(t) : viridis(t);

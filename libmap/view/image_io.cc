@@ -61,8 +61,4 @@ std::string to_png(const ColorImage& image) {
           static_cast<std::size_t>(bytes->GetNumberOfValues())};
 }
 
-void write_png(const std::filesystem::path& path, const ColorImage& image) {
-  write_whole_file(path, to_png(image));
-}
-
 }  // namespace libmap

@@ -12,7 +12,4 @@ namespace libmap {
 // Throws Error if the size is 0 or does not fit the number of pixels.
 std::string to_png(const ColorImage& image);
 
-// to_png as a file, whole or not at all.
-void write_png(const std::filesystem::path& path, const ColorImage& image);
-
 }  // namespace libmap

@@ -75,12 +75,12 @@ std::string shortened_text(const std::string& text, const TextStyle& style, doub
   return {};
 }
 
-void Overlay::rectangle(const PixelRect& rect, const Color& color, std::uint8_t opacity) {
+void Overlay::rectangle(const PixelRect& rect, const Color& color) {
   polygon({{rect.left, rect.top},
            {rect.right(), rect.top},
            {rect.right(), rect.bottom()},
            {rect.left, rect.bottom()}},
-          color, opacity);
+          color);
 }
 
 void Overlay::disc(const Eigen::Vector2d& center, double radius_px, const Color& color) {
@@ -101,9 +101,8 @@ void Overlay::line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, doubl
   polygon({from + half, to + half, to - half, from - half}, color);
 }
 
-void Overlay::polygon(const std::vector<Eigen::Vector2d>& corners, const Color& color,
-                      std::uint8_t opacity) {
-  polygons_.push_back({corners, color, opacity});
+void Overlay::polygon(const std::vector<Eigen::Vector2d>& corners, const Color& color) {
+  polygons_.push_back({corners, color});
 }
 
 void Overlay::text(const Eigen::Vector2d& middle_left, const std::string& text,
@@ -121,7 +120,7 @@ void Overlay::add_to(vtkRenderer& renderer, int picture_height) const {
     for (const Eigen::Vector2d& corner : polygon.corners) {
       cells->InsertCellPoint(points->InsertNextPoint(corner.x(), picture_height - corner.y(), 0.0));
       const std::array<unsigned char, 4> color{polygon.color[0], polygon.color[1], polygon.color[2],
-                                               polygon.opacity};
+                                               255};
       colors->InsertNextTypedTuple(color.data());
     }
   }

@@ -34,12 +34,11 @@ std::string shortened_text(const std::string& text, const TextStyle& style, doub
 class Overlay {
  public:
   // Filled shapes and a line, in pixels; later ones lie over earlier ones.
-  void rectangle(const PixelRect& rect, const Color& color, std::uint8_t opacity = 255);
+  void rectangle(const PixelRect& rect, const Color& color);
   void disc(const Eigen::Vector2d& center, double radius_px, const Color& color);
   void line(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width_px,
             const Color& color);
-  void polygon(const std::vector<Eigen::Vector2d>& corners, const Color& color,
-               std::uint8_t opacity = 255);
+  void polygon(const std::vector<Eigen::Vector2d>& corners, const Color& color);
   // `middle_left` is the place of the text's left end (or center, or right end: as aligned), half
   // way up.
   void text(const Eigen::Vector2d& middle_left, const std::string& text, const TextStyle& style);
@@ -51,7 +50,6 @@ class Overlay {
   struct Polygon {
     std::vector<Eigen::Vector2d> corners;
     Color color{};
-    std::uint8_t opacity = 255;
   };
   struct Text {
     Eigen::Vector2d place;

@@ -33,9 +33,12 @@ struct PreparedLayer {
 // Not by its texture. Throws Error: arrays of a wrong length, and what color_points throws.
 PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene);
 
-// The same, but a textured mesh that is to be shown so is a layer a page. Throws Error too where
-// the texture is asked of a layer without any.
+// The same, but a textured mesh that is to be shown so is a layer a page, which must outlive it;
+// triangles without a page are of the color of untextured_color. Throws Error too where the texture
+// is asked of a layer without any.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
+
+inline constexpr Color untextured_color{128, 128, 128};
 
 struct PointSpacing {
   // Meters, 0 if no two points are apart: on a lattice along the axes its pitch, else the median

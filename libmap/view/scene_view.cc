@@ -24,7 +24,6 @@
 #include <numbers>
 
 #include "libmap/core/error.h"
-#include "libmap/core/text.h"
 #include "libmap/view/offscreen.h"
 #include "libmap/view/overlay.h"
 #include "libmap/view/scene_geometry.h"

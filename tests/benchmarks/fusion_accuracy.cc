@@ -17,6 +17,7 @@
 #include "libmap/cloud/depth_projection.h"
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/ray_caster.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/surface/mesh_cleaning.h"
@@ -94,20 +95,35 @@ struct Truth {
   Points seen;  // of its surface, by the true cameras
 };
 
+// Whether a camera sees the sample: in the image, near enough, nothing of the mesh before it.
+bool sees(const libmap::Camera& camera, const Pose& mesh_from_camera,
+          const libmap::RayCaster& caster, const Eigen::Vector3d& sample) {
+  constexpr double sight_margin =
+      2e-3;  // of the way to the sample: what is met nearer is before it
+  const Eigen::Vector3d in_camera = mesh_from_camera.inverse() * sample;
+  if (in_camera.z() > max_depth_m) return false;
+  const auto pixel = project_point(camera, in_camera);
+  if (!pixel || !(pixel->x() >= -0.5 && pixel->y() >= -0.5) ||
+      !(pixel->x() <= camera.width - 0.5 && pixel->y() <= camera.height - 0.5))
+    return false;
+  const Eigen::Vector3d eye = mesh_from_camera.translation();
+  return !caster.cast(eye, sample - eye, 0.0, 1.0 - sight_margin);
+}
+
 void find_seen(Truth& truth, const libmap::ScanSource& scan) {
-  std::vector<libmap::ViewingCamera> cameras;
+  std::vector<std::pair<libmap::Camera, Pose>> cameras;
   for (const auto& pose : trajectory_of(scan.graph(), PoseSource::ground_truth)) {
     const libmap::RgbdFrame frame = scan.read_frame(pose.node, {.color = false, .depth = true});
     for (const libmap::CameraView& view : camera_views(frame))
-      cameras.push_back({view.depth_camera, mesh_from_truth() * pose.world_from_base *
-                                                view.depth_camera.base_from_camera});
+      cameras.emplace_back(view.depth_camera, mesh_from_truth() * pose.world_from_base *
+                                                  view.depth_camera.base_from_camera);
   }
-  Points samples;
+  const libmap::RayCaster caster(truth.mesh);
   for (const libmap::SurfacePoint& sample : sample_surface(truth.mesh, samples_per_m2, 1))
-    samples.push_back(sample.position);
-  const std::vector<int> views = count_views(truth.mesh, samples, cameras, max_depth_m);
-  for (std::size_t n = 0; n < samples.size(); ++n)
-    if (views[n] > 0) truth.seen.push_back(samples[n]);
+    if (std::any_of(cameras.begin(), cameras.end(), [&](const auto& camera) {
+          return sees(camera.first, camera.second, caster, sample.position);
+        }))
+      truth.seen.push_back(sample.position);
 }
 
 bool is_inside_site(const Eigen::Vector3d& point) {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
 #include "libmap/view/virtual_display.h"
@@ -82,7 +83,8 @@ int main(int argc, char** argv) {
   const libmap::Table table = libmap::read_csv(argv[1]);
   const libmap::VirtualDisplay display;
   const libmap::ChartSize size{800, 600};
-  libmap::write_png(argv[2], side_by_side(libmap::draw_chart(time_chart(table), size),
-                                          libmap::draw_chart(memory_chart(table), size)));
+  libmap::write_whole_file(
+      argv[2], libmap::to_png(side_by_side(libmap::draw_chart(time_chart(table), size),
+                                           libmap::draw_chart(memory_chart(table), size))));
   return 0;
 }

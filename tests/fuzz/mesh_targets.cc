@@ -6,6 +6,7 @@
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
+#include "tests/libmap/texture/textured_samples.h"
 
 namespace graspmap_fuzz {
 
@@ -59,7 +60,7 @@ libmap::TexturedMesh small_model() {
 Seeds glb_seeds() {
   Seeds seeds = mesh_seeds<glb>();
   seeds.push_back(written("model.glb", [&](const fs::path& path) {
-    libmap::write_textured_mesh(path, small_model());
+    graspmap_test::write_textured_mesh(path, small_model());
   }));
   return seeds;
 }

@@ -62,9 +62,10 @@ void write_run(const std::string& stamp = "5", const std::string& scale = "0") {
            std::to_string(0.2 * std::sin(n * M_PI / 3)) + ", 0]\n    roll_pitch_yaw_deg: [0, 10, " +
            std::to_string(60 * n) + "]\n";
   write_text(scratch("rig.yaml"), rig);
-  libmap::write_mesh(scratch("ground.ply"),
-                     libmap::join_meshes(graspmap_test::square_mesh(0.1, 3.0),
-                                         graspmap_test::ball_mesh(20, 40, {0.8, 0, 0.2}, 0.3)));
+  libmap::write_mesh(
+      scratch("ground.ply"),
+      graspmap_test::join_meshes(graspmap_test::square_mesh(0.1, 3.0),
+                                 graspmap_test::ball_mesh(20, 40, {0.8, 0, 0.2}, 0.3)));
   ASSERT_TRUE(
       succeeded(graspmap({"simulate", "cameras", "ground.ply", "--rig", "rig.yaml", "-o", "run",
                           "--stamp", stamp, "--z", "0.4", "--roll", "3", "--depth-scale", scale})));

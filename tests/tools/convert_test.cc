@@ -4,6 +4,7 @@
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/texture/textured_mesh_io.h"
+#include "tests/libmap/texture/textured_samples.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace convert_test {
@@ -141,7 +142,7 @@ TEST(Convert, TexturesGoFromModelToModel) {
       {Eigen::Vector2f(0, 0), Eigen::Vector2f(1, 0), Eigen::Vector2f(0, 1)}};
   model.page_of_triangle = {0};
   model.pages.emplace_back(4, 4, libmap::Color{200, 10, 30});
-  libmap::write_textured_mesh(scratch("a.obj"), model);
+  graspmap_test::write_textured_mesh(scratch("a.obj"), model);
   ASSERT_TRUE(succeeded(graspmap({"convert", "a.obj", "-o", "b.glb"})));
   ASSERT_TRUE(succeeded(graspmap({"convert", "b.glb", "-o", "c.obj"})));
   const libmap::TexturedMesh read = libmap::read_textured_mesh(scratch("c.obj"));

@@ -22,9 +22,10 @@ using graspmap_test::write_text;
 const Eigen::Vector3d ball_center(0.8, 0.3, 0.2);
 
 void write_ground() {
-  libmap::write_mesh(scratch("ground.ply"),
-                     libmap::join_meshes(graspmap_test::square_mesh(0.1, 3.0),
-                                         graspmap_test::ball_mesh(60, 120, ball_center, 0.3)));
+  libmap::write_mesh(
+      scratch("ground.ply"),
+      graspmap_test::join_meshes(graspmap_test::square_mesh(0.1, 3.0),
+                                 graspmap_test::ball_mesh(60, 120, ball_center, 0.3)));
 }
 
 std::vector<std::string> cameras(std::vector<std::string> words) {

@@ -25,7 +25,7 @@ const Eigen::Vector3d ball_center(0.2, 0.1, 0.3);
 
 // With colors of its own, which are quicker to draw than rock.
 void write_site() {
-  libmap::TriangleMesh mesh = libmap::join_meshes(
+  libmap::TriangleMesh mesh = graspmap_test::join_meshes(
       graspmap_test::square_mesh(0.0, 1.5), graspmap_test::ball_mesh(60, 120, ball_center, 0.3));
   for (std::size_t i = 0; i < mesh.vertices.size(); ++i)
     mesh.vertex_colors.push_back({static_cast<std::uint8_t>(40 * (i % 6)), 120, 90});

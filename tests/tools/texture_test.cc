@@ -16,6 +16,7 @@
 #include "libmap/trajectory/trajectory_io.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/scan/sample_database.h"
+#include "tests/libmap/texture/textured_samples.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace texture_test {
@@ -83,7 +84,7 @@ void expect_colors_of_photographs(const libmap::TexturedMesh& model) {
     const int row = static_cast<int>(std::lround(pixel->y()));
     const double depth = static_cast<double>(view.depth.at(column, row));
     if (std::abs(depth - point.z()) > 0.02) continue;
-    const Eigen::Vector3f color = libmap::texture_color(model, t, 0.3, 0.3);
+    const Eigen::Vector3f color = graspmap_test::texture_color(model, t, 0.3, 0.3);
     for (std::size_t c = 0; c < 3; ++c)
       error += std::abs(static_cast<double>(color[static_cast<Eigen::Index>(c)]) -
                         view.color.at(column, row)[c]) /
@@ -273,10 +274,11 @@ TEST(Texture, CroppedSitesCarryThePosesWithThem) {
         libmap::area_normal(whole.mesh, whole.mesh.triangles[found.triangle]).normalized();
     const auto hit = caster.cast(found.position + 1e-3 * up, -up, 0.0, 2e-3);
     ASSERT_TRUE(hit);
-    error += static_cast<double>((libmap::texture_color(part, t, 0.3, 0.3) -
-                                  libmap::texture_color(whole, hit->triangle, hit->u, hit->v))
-                                     .cwiseAbs()
-                                     .mean());
+    error +=
+        static_cast<double>((graspmap_test::texture_color(part, t, 0.3, 0.3) -
+                             graspmap_test::texture_color(whole, hit->triangle, hit->u, hit->v))
+                                .cwiseAbs()
+                                .mean());
   }
   EXPECT_GT(moved / count, 0.001);
   EXPECT_LT(error / count, 3.0);

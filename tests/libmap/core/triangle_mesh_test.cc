@@ -125,41 +125,6 @@ TEST(TriangleMeshTest, CheckNamesWhatIsWrong) {
   EXPECT_EQ(error_of([&] { mesh.check(); }).context().field, "id");
 }
 
-TEST(TriangleMeshTest, JoinAddsAreasAndVolumes) {
-  const TriangleMesh joined = libmap::join_meshes(box({1, 1, 1}), box({2, 3, 5}));
-  joined.check();
-  EXPECT_EQ(joined.vertices.size(), 16U);
-  EXPECT_NEAR(libmap::surface_area(joined), 68, 1e-12);
-  EXPECT_NEAR(libmap::signed_volume(joined), 31, 1e-12);
-}
-
-TEST(TriangleMeshTest, JoinKeepsWhatBothHave) {
-  TriangleMesh base = box({1, 1, 1});
-  base.vertex_normals = libmap::estimate_vertex_normals(base);
-  base.vertex_colors.assign(8, {1, 2, 3});
-  base.vertex_fields.push_back({"a", libmap::ScalarType::float32, std::vector<double>(8, 1)});
-  base.vertex_fields.push_back({"b", libmap::ScalarType::float32, std::vector<double>(8, 2)});
-  base.face_fields.push_back({"f", libmap::ScalarType::int32, std::vector<double>(12, 3)});
-  TriangleMesh addition = base;
-  addition.vertex_colors.clear();
-  addition.vertex_fields.erase(addition.vertex_fields.begin());
-  const TriangleMesh joined = libmap::join_meshes(base, addition);
-  joined.check();
-  EXPECT_EQ(joined.vertex_normals.size(), 16U);
-  EXPECT_TRUE(joined.vertex_colors.empty());
-  ASSERT_EQ(joined.vertex_fields.size(), 1U);
-  EXPECT_EQ(joined.vertex_fields[0].name, "b");
-  EXPECT_EQ(joined.face_fields.at(0).values.size(), 24U);
-}
-
-TEST(TriangleMeshTest, JoinWithNothing) {
-  TriangleMesh base = box({1, 1, 1});
-  base.vertex_normals = libmap::estimate_vertex_normals(base);
-  EXPECT_EQ(libmap::join_meshes(base, {}).vertex_normals, base.vertex_normals);
-  EXPECT_EQ(libmap::join_meshes({}, base).vertex_normals, base.vertex_normals);
-  EXPECT_EQ(libmap::join_meshes({}, base).triangles, base.triangles);
-}
-
 TEST(TexturedMeshTest, CoordinatesThatAreNotFinite) {
   libmap::TexturedMesh model;
   model.mesh = box({1, 1, 1});

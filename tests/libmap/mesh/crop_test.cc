@@ -36,7 +36,7 @@ TriangleMesh site_mesh() {
                                   (n & 4) != 0 ? high.z() : low.z());
     block.triangles = {{4, 5, 7}, {4, 7, 6}, {0, 1, 5}, {0, 5, 4}, {1, 3, 7},
                        {1, 7, 5}, {3, 2, 6}, {3, 6, 7}, {2, 0, 4}, {2, 4, 6}};
-    mesh = join_meshes(mesh, block);
+    mesh = graspmap_test::join_meshes(mesh, block);
   };
   add_block({0.2, 0.3, 0}, {0.9, 1.0, 0.8});
   add_block({-1.3, -1.2, 0}, {-0.5, -0.7, 0.4});

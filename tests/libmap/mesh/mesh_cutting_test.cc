@@ -249,7 +249,7 @@ TEST(MeshCutting, SurfacesThatAreNoManifold) {
     fin.triangles = {{0, 1, 2}};
     return fin;
   }();
-  mesh = join_meshes(mesh, upright);
+  mesh = graspmap_test::join_meshes(mesh, upright);
   mesh.triangles.push_back(mesh.triangles[55]);  // twice
   mesh.triangles.push_back({7, 7, 9});           // no triangle at all
   const TriangleMesh cut = cut_mesh(mesh, {make_rectangle({-0.33, -0.47}, {0.51, 0.6})});

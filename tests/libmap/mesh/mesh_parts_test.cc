@@ -99,7 +99,8 @@ TEST(MeshParts, ComponentsByEdgesNotByCorners) {
 }
 
 TEST(MeshParts, ComponentsDoNotDependOnHowTrianglesAreOrdered) {
-  TriangleMesh mesh = join_meshes(ball_mesh(9, 14, {0, 0, 0}), ball_mesh(5, 9, {9, 0, 0}));
+  TriangleMesh mesh =
+      graspmap_test::join_meshes(ball_mesh(9, 14, {0, 0, 0}), ball_mesh(5, 9, {9, 0, 0}));
   std::shuffle(mesh.triangles.begin(), mesh.triangles.end(), graspmap_test::random_engine());
   const MeshComponents components = connected_components(mesh);
   ASSERT_EQ(components.areas_m2.size(), 2U);

@@ -41,4 +41,17 @@ inline libmap::TriangleMesh ball_mesh(std::uint32_t rows, std::uint32_t columns,
   return mesh;
 }
 
+// The triangles of `addition` behind those of `base`; without all that belongs to either.
+inline libmap::TriangleMesh join_meshes(const libmap::TriangleMesh& base,
+                                        const libmap::TriangleMesh& addition) {
+  libmap::TriangleMesh joined;
+  joined.vertices = base.vertices;
+  joined.vertices.insert(joined.vertices.end(), addition.vertices.begin(), addition.vertices.end());
+  joined.triangles = base.triangles;
+  const auto shift = static_cast<std::uint32_t>(base.vertices.size());
+  for (const libmap::Triangle& t : addition.triangles)
+    joined.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
+  return joined;
+}
+
 }  // namespace graspmap_test

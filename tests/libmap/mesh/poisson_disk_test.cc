@@ -161,8 +161,8 @@ TEST(PoissonDisk, DensityDoesNotDependOnTheTriangles) {
 
 TEST(PoissonDisk, WallsAsDenseAsFloors) {
   const TriangleMesh floor = square_mesh(0.0);
-  TriangleMesh mesh = join_meshes(floor, moved(floor, {10, 0, 0}, {90, 0, 0}));
-  mesh = join_meshes(mesh, moved(floor, {20, 0, 0}, {30, 40, 10}));
+  TriangleMesh mesh = graspmap_test::join_meshes(floor, moved(floor, {10, 0, 0}, {90, 0, 0}));
+  mesh = graspmap_test::join_meshes(mesh, moved(floor, {20, 0, 0}, {30, 40, 10}));
   std::array<double, 3> counts{};
   for (const Eigen::Vector3d& point : by_radius(mesh, 0.02).cloud.positions)
     counts[static_cast<std::size_t>(std::lround(point.x() / 10))] += 1.0;
@@ -238,13 +238,13 @@ TEST(PoissonDisk, Count) {
 TEST(PoissonDisk, CountOfIslandsFarApart) {
   TriangleMesh mesh;
   for (int n = 0; n < 3; ++n)
-    mesh = join_meshes(mesh, moved(square_mesh(0.0, 0.01), {n * n * 20.0, 0, 0}));
+    mesh = graspmap_test::join_meshes(mesh, moved(square_mesh(0.0, 0.01), {n * n * 20.0, 0, 0}));
   for (const std::uint64_t count : {1u, 2u, 3u, 12u})
     EXPECT_EQ(by_count(mesh, count).cloud.size(), count);
 }
 
 TEST(PoissonDisk, SameBytesForAnyThreads) {
-  TriangleMesh mesh = join_meshes(rough_mesh(0.01), square_mesh(0.5));
+  TriangleMesh mesh = graspmap_test::join_meshes(rough_mesh(0.01), square_mesh(0.5));
   PoissonDiskResult first;
   PoissonDiskResult counted;
   {
@@ -282,7 +282,8 @@ TEST(PoissonDisk, OrderOfTriangles) {
 
 TEST(PoissonDisk, SheetsNearerThanTheRadius) {
   const double radius = 0.05;
-  const TriangleMesh plate = join_meshes(square_mesh(0.0), square_mesh(0.3 * radius));
+  const TriangleMesh plate =
+      graspmap_test::join_meshes(square_mesh(0.0), square_mesh(0.3 * radius));
   const PoissonDiskResult result = by_radius(plate, radius);
   expect_maximal(plate, result);
   const auto one = static_cast<double>(by_radius(square_mesh(0.0), radius).cloud.size());
@@ -318,7 +319,8 @@ TEST(PoissonDisk, IslandsSmallerThanTheRadius) {
   for (int n = 0; n < 300; ++n) {
     TriangleMesh island = square_mesh(0.0, 0.001);
     island.triangles.pop_back();
-    mesh = join_meshes(mesh, moved(island, Eigen::Vector3i(n % 20, n / 20, 0).cast<double>()));
+    mesh = graspmap_test::join_meshes(
+        mesh, moved(island, Eigen::Vector3i(n % 20, n / 20, 0).cast<double>()));
   }
   const PoissonDiskResult result = by_radius(mesh, 0.5);
   EXPECT_EQ(result.cloud.size(), 300U);

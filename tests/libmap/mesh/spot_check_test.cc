@@ -111,7 +111,7 @@ TEST(SpotCheck, HeightsOfACloudAreMedians) {
 }
 
 TEST(SpotCheck, HeightsOfAMeshAreSeenFromAbove) {
-  TriangleMesh mesh = join_meshes(square_mesh(0.0), square_mesh(1.0, 0.5));
+  TriangleMesh mesh = graspmap_test::join_meshes(square_mesh(0.0), square_mesh(1.0, 0.5));
   EXPECT_NEAR(*heights_of(mesh)({0.1, 0.2}), 1.0, 1e-12);
   EXPECT_NEAR(*heights_of(mesh)({0.7, 0.2}), 0.0, 1e-12);
   EXPECT_NEAR(*heights_of(mesh, 0.8)({0.1, 0.2}), 0.0, 1e-12) << "from below the upper one";

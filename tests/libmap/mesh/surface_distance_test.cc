@@ -6,6 +6,7 @@
 #include <limits>
 
 #include "libmap/core/parallel.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -182,31 +183,6 @@ TEST(SurfaceDistance, CoverageAgreesWithASearchOfAllPoints) {
   EXPECT_LT(share_of(flags), 0.9);
   EXPECT_EQ(share_of(covered(samples, {}, 0.15)), 0.0);
   EXPECT_EQ(share_of({}), 0.0);
-}
-
-TEST(SurfaceDistance, ViewsStopAtWhatStandsBefore) {
-  // A floor of 1 m with a small plate above its middle, seen from straight above.
-  TriangleMesh mesh = unit_square();
-  TriangleMesh plate = unit_square();
-  for (Eigen::Vector3d& vertex : plate.vertices)
-    vertex = 0.2 * (vertex - Eigen::Vector3d(0.5, 0.5, 0)) + Eigen::Vector3d(0.5, 0.5, 0.5);
-  mesh = join_meshes(mesh, plate);
-  ViewingCamera above;
-  above.camera.width = 101;
-  above.camera.height = 101;
-  above.camera.fx = above.camera.fy = 150;
-  above.camera.cx = above.camera.cy = 50;
-  above.mesh_from_camera =
-      make_pose_from_rpy({0.5, 0.5, 1.5}, {180, 0, 0});  // looks down the z axis
-  const std::vector<Eigen::Vector3d> samples = {{0.5, 0.5, 0.5},  {0.5, 0.5, 0.0},
-                                                {0.3, 0.5, 0.0},  {0.63, 0.5, 0.0},
-                                                {0.66, 0.5, 0.0}, {0.01, 0.5, 0.0}};
-  EXPECT_EQ(count_views(mesh, samples, {above, above}, 4.0), (std::vector<int>{2, 0, 2, 0, 2, 2}));
-  EXPECT_EQ(count_views(mesh, samples, {above}, 1.2), (std::vector<int>{1, 0, 0, 0, 0, 0}));
-  above.camera.fx = 155;  // the image ends before x = 0.01
-  EXPECT_EQ(count_views(mesh, samples, {above}, 4.0), (std::vector<int>{1, 0, 1, 0, 1, 0}));
-  above.mesh_from_camera = make_pose_from_rpy({0.5, 0.5, 1.5}, {0, 0, 0});  // looks up
-  EXPECT_EQ(count_views(mesh, samples, {above}, 4.0), std::vector<int>(6, 0));
 }
 
 TEST(SurfaceDistance, ThreadsMakeNoDifference) {

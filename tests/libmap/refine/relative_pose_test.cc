@@ -187,10 +187,9 @@ TEST(BundleAdjustment, OptionsOutOfTheirRangesAreNamed) {
                                                options);
                        }).what());
   };
-  EXPECT_EQ(refusal({.robust_scale = 0.0}),
-            "robust_scale is 0: a bundle cannot be adjusted so (must be > 0)");
+  EXPECT_EQ(refusal({.robust_scale = 0.0}), "observation_scale is 0: out of range (must be > 0)");
   EXPECT_EQ(refusal({.max_iterations = 0}),
-            "max_iterations is 0: a bundle cannot be adjusted so (must be >= 1)");
+            "bundle_iterations is 0: out of range (must be >= 1 and <= 10000)");
 }
 
 TEST(BundleAdjustment, InformationIsThatOfTheErrors) {

@@ -231,7 +231,7 @@ struct Step {
   SurfaceView view;
   Step() {
     const libmap::TriangleMesh mesh =
-        libmap::join_meshes(square_mesh(0.0, 50.0), square_mesh(1.0, 0.2));
+        graspmap_test::join_meshes(square_mesh(0.0, 50.0), square_mesh(1.0, 0.2));
     view = VisibleSurface(mesh).view(rays, looking_down({0.013, 0.007, 2.0}), false);
   }
   // Distance in pixels from the outline of the upper square's picture.
@@ -342,7 +342,7 @@ TEST(TakePhoto, DarkerCornersAndNoiseOfTheStatedSize) {
 
 TEST(DepthCamera, SameImagesForAnyThreadCountAndOthersForAnotherSeed) {
   const libmap::TriangleMesh mesh =
-      libmap::join_meshes(square_mesh(0.0, 2.0), ball_mesh(20, 40, {0, 0, 0.3}, 0.4));
+      graspmap_test::join_meshes(square_mesh(0.0, 2.0), ball_mesh(20, 40, {0, 0, 0.3}, 0.4));
   const PixelRays rays = libmap::make_pixel_rays(small_camera(2));
   std::vector<libmap::DepthImage> depths;
   std::vector<libmap::ColorImage> colors;

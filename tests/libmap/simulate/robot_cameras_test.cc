@@ -58,7 +58,7 @@ TEST(SimulateRobotCameras, ImagesLieOnTheMeshInWholeUnits) {
   rig.cameras[1].depth_scale_m = 1e-4;
   rig.cameras[2].far_m = 0.9;
   const libmap::TriangleMesh mesh =
-      libmap::join_meshes(square_mesh(0.1, 5.0), ball_mesh(200, 400, {0.9, 0.1, 0.3}, 0.3));
+      graspmap_test::join_meshes(square_mesh(0.1, 5.0), ball_mesh(200, 400, {0.9, 0.1, 0.3}, 0.3));
   const Pose pose = libmap::make_pose_from_rpy({0.05, -0.1, 0.45}, {3, -5, 20});
   const auto images = libmap::simulate_robot_cameras(mesh, rig, pose, {});
   ASSERT_EQ(images.size(), 6U);
@@ -141,7 +141,7 @@ TEST(SimulateRobotCameras, NoiseIsSeededAndUnitsThatDoNotFitAreNone) {
 
 TEST(GroundHeight, IsThatOfTheHighestSurface) {
   const libmap::TriangleMesh mesh =
-      libmap::join_meshes(square_mesh(-0.5, 2.0), ball_mesh(200, 400, {0, 0, 0}, 0.3));
+      graspmap_test::join_meshes(square_mesh(-0.5, 2.0), ball_mesh(200, 400, {0, 0, 0}, 0.3));
   EXPECT_NEAR(libmap::ground_height(mesh, 1.0, 1.0), -0.5, 1e-12);
   EXPECT_NEAR(libmap::ground_height(mesh, 0.1, 0.2), std::sqrt(0.09 - 0.05), 1e-4);
   EXPECT_EQ(error_of([&] { libmap::ground_height(mesh, 3.0, 0.0); }).context().value, "3, 0");

@@ -186,7 +186,7 @@ TEST(SimulateScan, FramesLieOnTheMeshByTheirTruePoses) {
   options.depth = libmap::ideal_depth_sensor(0.5, 4.5);
   const Eigen::Vector3d center(0.2, 0.1, 0.4);
   const libmap::TriangleMesh mesh =
-      libmap::join_meshes(square_mesh(0.0, 1.5), ball_mesh(100, 200, center, 0.3));
+      graspmap_test::join_meshes(square_mesh(0.0, 1.5), ball_mesh(100, 200, center, 0.3));
   int last = 0;
   std::size_t on_ball = 0;
   std::size_t on_ground = 0;
@@ -229,7 +229,7 @@ struct Recording {
 Recording record(const ScanSimulationOptions& options) {
   Recording recording;
   const libmap::TriangleMesh mesh =
-      libmap::join_meshes(square_mesh(0.0, 1.5), ball_mesh(20, 40, {0, 0, 0.3}, 0.4));
+      graspmap_test::join_meshes(square_mesh(0.0, 1.5), ball_mesh(20, 40, {0, 0, 0.3}, 0.4));
   recording.graph =
       libmap::simulate_scan(mesh, options, [&](const auto&, const libmap::RgbdFrame& frame) {
         recording.frames.push_back(frame);

@@ -8,6 +8,7 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/libmap/surface/cleaning_checks.h"
 
@@ -37,11 +38,11 @@ TEST(HoleFilling, HoleInAPlaneIsFilled) {
   });
   const double diameter = std::hypot(0.2, 0.16);
   const MeshCleaningResult kept = cleaned(mesh, holes_up_to(diameter - 0.001));
-  EXPECT_EQ(kept.filled_holes, 0U);
+  EXPECT_EQ(kept.filling.holes, 0U);
   EXPECT_EQ(kept.mesh.triangles.size(), mesh.triangles.size());
   const MeshCleaningResult result = cleaned(mesh, holes_up_to(diameter + 0.001));
-  EXPECT_EQ(result.filled_holes, 1U);
-  EXPECT_NEAR(result.filled_area_m2, 0.2 * 0.16, 1e-12);
+  EXPECT_EQ(result.filling.holes, 1U);
+  EXPECT_NEAR(result.filling.area_m2, 0.2 * 0.16, 1e-12);
   EXPECT_NEAR(libmap::surface_area(result.mesh), 1.44, 1e-12);
   // What there was before stays in its place.
   for (std::size_t v = 0; v < mesh.vertices.size(); ++v)
@@ -50,10 +51,10 @@ TEST(HoleFilling, HoleInAPlaneIsFilled) {
   EXPECT_EQ(filled.type, libmap::ScalarType::uint8);
   for (std::size_t t = 0; t < filled.values.size(); ++t)
     ASSERT_EQ(filled.values[t], t < mesh.triangles.size() ? 0.0 : 1.0);
-  EXPECT_EQ(result.filled_triangles, filled.values.size() - mesh.triangles.size());
+  EXPECT_EQ(result.filling.triangles, filled.values.size() - mesh.triangles.size());
   // Triangles about as large as those around.
-  EXPECT_GT(result.filled_triangles, 50U);
-  EXPECT_LT(result.filled_triangles, 600U);
+  EXPECT_GT(result.filling.triangles, 50U);
+  EXPECT_LT(result.filling.triangles, 600U);
   const MeshReport report = report_mesh(result.mesh);
   ASSERT_EQ(report.boundaries.size(), 1U);
   EXPECT_NEAR(report.boundaries[0].length_m, 4.8, 1e-12);
@@ -91,7 +92,7 @@ TEST(HoleFilling, HoleInABallIsFilledRound) {
   const TriangleMesh ball = geodesic_mesh(5, 1.0);
   const TriangleMesh mesh = kept_where(ball, [](const Eigen::Vector3d& p) { return p.z() < 0.9; });
   const MeshCleaningResult result = cleaned(mesh, holes_up_to(0.95));
-  EXPECT_EQ(result.filled_holes, 1U);
+  EXPECT_EQ(result.filling.holes, 1U);
   const MeshReport report = report_mesh(result.mesh);
   EXPECT_TRUE(report.is_watertight());
   EXPECT_EQ(report.genus, 0);
@@ -117,7 +118,7 @@ TEST(HoleFilling, OuterBoundariesAreNeverFilled) {
             4, 30, graspmap_test::Seam::open, graspmap_test::Seam::open,
             [](double u, double v) { return Eigen::Vector3d(v, 0.1 * u, 0); })}) {
     const MeshCleaningResult result = cleaned(open, options);
-    EXPECT_EQ(result.filled_holes, 0U);
+    EXPECT_EQ(result.filling.holes, 0U);
     EXPECT_TRUE(same_geometry(result.mesh, open));
   }
   // A ring keeps its outer boundary, and its inner one is filled.
@@ -127,7 +128,7 @@ TEST(HoleFilling, OuterBoundariesAreNeverFilled) {
         return Eigen::Vector3d(r * std::cos(2 * pi * v), r * std::sin(2 * pi * v), 0);
       });
   const MeshCleaningResult result = cleaned(ring, options);
-  EXPECT_EQ(result.filled_holes, 1U);
+  EXPECT_EQ(result.filling.holes, 1U);
   ASSERT_EQ(report_mesh(result.mesh).boundaries.size(), 1U);
   EXPECT_NEAR(report_mesh(result.mesh).boundaries[0].length_m, 2 * pi * 1.3, 0.02);
 }
@@ -135,7 +136,7 @@ TEST(HoleFilling, OuterBoundariesAreNeverFilled) {
 TEST(HoleFilling, LongTubeIsClosedAtItsEnds) {
   const TriangleMesh tube = graspmap_test::cylinder_mesh(60, 24, 0.1, 1.5);
   const MeshCleaningResult result = cleaned(tube, holes_up_to(0.25));
-  EXPECT_EQ(result.filled_holes, 2U);
+  EXPECT_EQ(result.filling.holes, 2U);
   EXPECT_TRUE(report_mesh(result.mesh).is_watertight());
 }
 
@@ -144,12 +145,12 @@ TEST(HoleFilling, PatchesMeetNothingElse) {
   TriangleMesh mesh = kept_where(terrain_mesh(40, 1.0, [](double, double) { return 0.0; }),
                                  [](const Eigen::Vector3d& p) { return p.norm() > 0.1; });
   const double area = libmap::surface_area(mesh);
-  mesh = libmap::join_meshes(mesh, graspmap_test::cylinder_mesh(20, 12, 0.02, 0.5));
+  mesh = graspmap_test::join_meshes(mesh, graspmap_test::cylinder_mesh(20, 12, 0.02, 0.5));
   for (std::size_t v = mesh.vertices.size() - 21 * 12; v < mesh.vertices.size(); ++v)
     mesh.vertices[v].z() -= 0.25;
   const MeshCleaningResult result = cleaned(mesh, holes_up_to(0.3));
-  EXPECT_EQ(result.unfilled_holes, 1U);
-  EXPECT_EQ(result.filled_holes, 2U);  // the tube's ends
+  EXPECT_EQ(result.filling.unfilled, 1U);
+  EXPECT_EQ(result.filling.holes, 2U);  // the tube's ends
   EXPECT_GT(libmap::surface_area(result.mesh), area);
 }
 

@@ -13,6 +13,7 @@
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_report.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/libmap/surface/cleaning_checks.h"
 #include "tests/support/test_support.h"
@@ -58,8 +59,8 @@ TEST(MeshCleaning, CleanMeshesPassUnchanged) {
 
 TEST(MeshCleaning, IslandsAreDropped) {
   TriangleMesh mesh = geodesic_mesh(4, 1.0);
-  mesh = libmap::join_meshes(mesh, geodesic_mesh(2, 0.2, {3, 0, 0}));  // 0.5 m2
-  mesh = libmap::join_meshes(mesh, geodesic_mesh(1, 0.1, {4, 0, 0}));  // 0.1 m2
+  mesh = graspmap_test::join_meshes(mesh, geodesic_mesh(2, 0.2, {3, 0, 0}));  // 0.5 m2
+  mesh = graspmap_test::join_meshes(mesh, geodesic_mesh(1, 0.1, {4, 0, 0}));  // 0.1 m2
   MeshCleaningOptions options = repairs();
   options.min_island_area_m2 = 0.2;
   MeshCleaningResult result = cleaned(mesh, options);
@@ -101,8 +102,8 @@ TEST(MeshCleaning, TheSameWhereverItLies) {
   pose.rotate(Eigen::AngleAxisd(0.7, Eigen::Vector3d(1, 2, 3).normalized()));
   const MeshCleaningResult here = clean_mesh(mesh, {});
   const MeshCleaningResult there = clean_mesh(libmap::transform_mesh(mesh, pose), {});
-  EXPECT_GT(here.filled_holes, 20U);
-  EXPECT_EQ(here.filled_holes, there.filled_holes);
+  EXPECT_GT(here.filling.holes, 20U);
+  EXPECT_EQ(here.filling.holes, there.filling.holes);
   EXPECT_EQ(here.split_vertices, there.split_vertices);
   EXPECT_EQ(here.intersecting_triangles, there.intersecting_triangles);
   EXPECT_NEAR(libmap::surface_area(here.mesh), libmap::surface_area(there.mesh), 1e-3);
@@ -179,7 +180,7 @@ TEST(MeshCleaning, FarFromTheOrigin) {
     return (p - Eigen::Vector3d(5e5, 4.2e6, 100)).norm() > 0.4;
   });
   const MeshCleaningResult result = cleaned(holed, holes_up_to(1.5));
-  EXPECT_EQ(result.filled_holes, 1U);
+  EXPECT_EQ(result.filling.holes, 1U);
   EXPECT_NEAR(libmap::surface_area(result.mesh), libmap::surface_area(mesh), 0.01);
 }
 
@@ -235,8 +236,8 @@ TEST(MeshCleaning, TrueSiteWithTrianglesKnockedOut) {
   MeshCleaningOptions options;
   const MeshCleaningResult result = clean_mesh(mesh, options);
   expect_clean(result.mesh);
-  EXPECT_GT(result.filled_holes, knocked_out / 2);
-  EXPECT_EQ(result.unfilled_holes, 0U);
+  EXPECT_GT(result.filling.holes, knocked_out / 2);
+  EXPECT_EQ(result.filling.unfilled, 0U);
   EXPECT_NEAR(libmap::surface_area(result.mesh), libmap::surface_area(whole),
               0.003 * libmap::surface_area(whole));
   const auto distances =

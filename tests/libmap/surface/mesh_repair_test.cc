@@ -12,6 +12,7 @@
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
 #include "libmap/surface/triangle_repair.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/libmap/surface/cleaning_checks.h"
 #include "tests/support/test_support.h"
@@ -245,7 +246,7 @@ TEST(MeshRepair, ScrapsOfIntersectionsAreDropped) {
   const TriangleMesh ground = terrain_mesh(40, 2.0, [](double, double) { return 0.0; });
   TriangleMesh tube = graspmap_test::cylinder_mesh(25, 12, 0.3, 0.6);
   for (Eigen::Vector3d& v : tube.vertices) v += Eigen::Vector3d(0.012, 0.017, -0.31);
-  const MeshCleaningResult result = cleaned(libmap::join_meshes(ground, tube), repairs());
+  const MeshCleaningResult result = cleaned(graspmap_test::join_meshes(ground, tube), repairs());
   EXPECT_EQ(result.open_places, 0U);
   EXPECT_LT(result.intersecting_triangles, 450U);  // one round's
   const MeshReport report = report_mesh(result.mesh);
@@ -267,7 +268,7 @@ TEST(MeshRepair, NoisyBallBecomesClean) {
 
 TEST(MeshRepair, CrossingBallsAreParted) {
   const TriangleMesh mesh =
-      libmap::join_meshes(geodesic_mesh(4, 1.0), geodesic_mesh(4, 0.7, {1.1, 0.2, 0.13}));
+      graspmap_test::join_meshes(geodesic_mesh(4, 1.0), geodesic_mesh(4, 0.7, {1.1, 0.2, 0.13}));
   ASSERT_GT(report_mesh(mesh).self_intersections, 50U);
   const MeshCleaningResult result = cleaned(mesh, repairs());
   EXPECT_EQ(result.remaining_intersecting_triangles, 0U);

@@ -82,12 +82,13 @@ TEST(MeshDecimation, KeepsItsBound) {
     options.decimation_error_m = bound;
     const MeshCleaningResult result = clean_mesh(mesh, options);
     expect_clean(result.mesh);
-    EXPECT_GT(result.decimated_triangles, mesh.triangles.size() / 3);
-    EXPECT_EQ(result.decimated_triangles + result.mesh.triangles.size(), mesh.triangles.size());
-    EXPECT_LE(result.decimation_deviation_m, bound);
-    EXPECT_GT(result.decimation_deviation_m, 0.3 * bound);
-    EXPECT_LE(sampled_distance(result.mesh, mesh), result.decimation_deviation_m + 1e-12);
-    EXPECT_LE(sampled_distance(mesh, result.mesh), result.decimation_deviation_m + 1e-12);
+    EXPECT_GT(result.decimation.removed_triangles, mesh.triangles.size() / 3);
+    EXPECT_EQ(result.decimation.removed_triangles + result.mesh.triangles.size(),
+              mesh.triangles.size());
+    EXPECT_LE(result.decimation.deviation_m, bound);
+    EXPECT_GT(result.decimation.deviation_m, 0.3 * bound);
+    EXPECT_LE(sampled_distance(result.mesh, mesh), result.decimation.deviation_m + 1e-12);
+    EXPECT_LE(sampled_distance(mesh, result.mesh), result.decimation.deviation_m + 1e-12);
     // What stays keeps its values.
     const libmap::SurfaceDistance original(mesh);
     const auto& height = field_of(result.mesh.vertex_fields, "height").values;

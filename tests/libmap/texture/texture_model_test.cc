@@ -8,7 +8,9 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_parts.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/texture/painted_scan.h"
+#include "tests/libmap/texture/textured_samples.h"
 #include "tests/support/test_support.h"
 
 namespace texture_model_test {
@@ -47,7 +49,7 @@ ColorErrors errors_of(const libmap::TexturedMesh& model, const graspmap_test::Pa
     double v = uniform(0, 1);
     if (u + v > 1) u = 1 - u, v = 1 - v;
     const Eigen::Vector3d point = libmap::position_on(model.mesh, {t, u, v});
-    const Eigen::Vector3d color = libmap::texture_color(model, t, u, v).cast<double>();
+    const Eigen::Vector3d color = graspmap_test::texture_color(model, t, u, v).cast<double>();
     const Eigen::Vector3d right = truth(t, point);
     const Eigen::Vector3d error = (color - right).cwiseAbs();
     errors.mean += error.mean();
@@ -167,7 +169,7 @@ TEST(TextureModel, EvensOutExposureAndCorners) {
 // A red plate above the ground.
 TriangleMesh ground_and_plate() {
   TriangleMesh plate = grid_mesh(12, 0.24, 0.25);
-  return libmap::join_meshes(grid_mesh(50, 1.0, 0.0), plate);
+  return graspmap_test::join_meshes(grid_mesh(50, 1.0, 0.0), plate);
 }
 const std::uint32_t ground_triangles = 2 * 50 * 50;
 // The ground has as much red as green.
@@ -181,7 +183,7 @@ int red_places_on_ground(const TextureResult& result) {
   int count = 0;
   for (std::uint32_t t = 0; t < ground_triangles; ++t)
     for (const auto& [u, v] : {std::pair{0.33, 0.33}, {0.05, 0.05}, {0.9, 0.05}, {0.05, 0.9}}) {
-      const Eigen::Vector3f color = libmap::texture_color(result.model, t, u, v);
+      const Eigen::Vector3f color = graspmap_test::texture_color(result.model, t, u, v);
       count += !is_neutral(result, t) && color[0] - color[1] > 12.0F ? 1 : 0;
     }
   return count;
@@ -240,7 +242,8 @@ TEST(TextureModel, WhatNobodySeesIsGrayAndCounted) {
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
     if (!is_neutral(result, t)) continue;
     ++gray;
-    EXPECT_EQ(libmap::texture_color(result.model, t, 0.2, 0.3), Eigen::Vector3f::Constant(128));
+    EXPECT_EQ(graspmap_test::texture_color(result.model, t, 0.2, 0.3),
+              Eigen::Vector3f::Constant(128));
   }
   EXPECT_EQ(gray, result.unseen_triangles);
   // A mesh seen from below only has no front.

@@ -13,6 +13,7 @@
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
 #include "tests/libmap/texture/painted_scan.h"
+#include "tests/libmap/texture/textured_samples.h"
 #include "tests/support/test_support.h"
 
 namespace textured_mesh_io_test {
@@ -72,10 +73,10 @@ void expect_same(const TexturedMesh& read, const TexturedMesh& written, double c
       for (std::size_t k = 0; k < 3; ++k)
         EXPECT_LT((read.texture_coordinates[r][k] - written.texture_coordinates[t][k]).norm(),
                   1e-6F);
-      EXPECT_LT(
-          (libmap::texture_color(read, r, 0.3, 0.2) - libmap::texture_color(written, t, 0.3, 0.2))
-              .norm(),
-          static_cast<float>(color_tolerance) + 1e-3F);
+      EXPECT_LT((graspmap_test::texture_color(read, r, 0.3, 0.2) -
+                 graspmap_test::texture_color(written, t, 0.3, 0.2))
+                    .norm(),
+                static_cast<float>(color_tolerance) + 1e-3F);
     }
   EXPECT_EQ(found, static_cast<int>(written.mesh.triangles.size()));
 }
@@ -85,7 +86,7 @@ TEST(TexturedMeshIo, ReadsBackWhatItWrote) {
     for (const std::string name : {"model.obj", "model.glb", "a model.obj", "MODEL.GLB"}) {
       const TexturedMesh model = random_model(normals);
       const auto path = scratch_folder() / name;
-      libmap::write_textured_mesh(path, model);
+      graspmap_test::write_textured_mesh(path, model);
       const TexturedMesh read = libmap::read_textured_mesh(path);
       expect_same(read, model, 0.0);
       ASSERT_EQ(read.mesh.vertex_normals.size(), normals ? read.mesh.vertices.size() : 0U);
@@ -116,7 +117,7 @@ TEST(TexturedMeshIo, FilesOfAModel) {
         for (int x = 0; x < page.width; ++x)
           page.at(x, y) = {static_cast<std::uint8_t>(100 + x), static_cast<std::uint8_t>(90 + y),
                            80};
-    libmap::write_textured_mesh(folder / name, smooth, options);
+    graspmap_test::write_textured_mesh(folder / name, smooth, options);
     expect_same(libmap::read_textured_mesh(folder / name), smooth, 6.0);
   }
   EXPECT_TRUE(std::filesystem::exists(folder / "j_1.jpg"));
@@ -125,7 +126,7 @@ TEST(TexturedMeshIo, FilesOfAModel) {
 TEST(TexturedMeshIo, GlbIsWhatItsStandardSays) {
   const TexturedMesh model = random_model(false);
   const auto path = scratch_folder() / "m.glb";
-  libmap::write_textured_mesh(path, model);
+  graspmap_test::write_textured_mesh(path, model);
   const std::string bytes = graspmap_test::read_text(path);
   const auto word = [&](std::size_t at) {
     std::uint32_t value = 0;
@@ -194,14 +195,16 @@ TEST(TexturedMeshIo, MeshesWithoutTexture) {
 TEST(TexturedMeshIo, FilesThatAreBroken) {
   const auto folder = scratch_folder();
   const TexturedMesh model = random_model(false);
-  EXPECT_EQ(error_of([&] { libmap::write_textured_mesh(folder / "m.ply", model); }).context().bound,
+  EXPECT_EQ(error_of([&] { graspmap_test::write_textured_mesh(folder / "m.ply", model); })
+                .context()
+                .bound,
             ".obj or .glb");
   EXPECT_THROW(libmap::read_textured_mesh(folder / "none.obj"), libmap::Error);
   graspmap_test::write_text(folder / "endless.obj", "v 0 0 0\n");
   std::filesystem::resize_file(folder / "endless.obj", std::uintmax_t{1} << 43U);
   EXPECT_EQ(error_of([&] { libmap::read_textured_mesh(folder / "endless.obj"); }).context().field,
             "size");
-  libmap::write_textured_mesh(folder / "m.obj", model);
+  graspmap_test::write_textured_mesh(folder / "m.obj", model);
   std::filesystem::remove(folder / "m_1.png");
   EXPECT_NE(std::string(error_of([&] { libmap::read_textured_mesh(folder / "m.obj"); }).what())
                 .find("m_1.png: no such file"),
@@ -213,7 +216,7 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   // Without its materials it has no texture.
   std::filesystem::remove(folder / "m.mtl");
   EXPECT_FALSE(libmap::read_textured_mesh(folder / "m.obj").has_texture());
-  libmap::write_textured_mesh(folder / "m.glb", model);
+  graspmap_test::write_textured_mesh(folder / "m.glb", model);
   const std::string whole = graspmap_test::read_text(folder / "m.glb");
   for (const double share : {0.0, 0.01, 0.3, 0.8, 0.999}) {
     graspmap_test::write_text(
@@ -231,12 +234,14 @@ TEST(TexturedMeshIo, FilesThatAreBroken) {
   }
   TexturedMesh wrong = model;
   wrong.page_of_triangle[3] = 2;
-  EXPECT_EQ(error_of([&] { libmap::write_textured_mesh(folder / "w.glb", wrong); }).context().field,
+  EXPECT_EQ(error_of([&] { graspmap_test::write_textured_mesh(folder / "w.glb", wrong); })
+                .context()
+                .field,
             "triangle 3");
   wrong = model;
   wrong.texture_coordinates.pop_back();
-  EXPECT_THROW(libmap::write_textured_mesh(folder / "w.glb", wrong), libmap::Error);
-  EXPECT_THROW(libmap::write_textured_mesh(folder / "w.glb", TexturedMesh{}), libmap::Error);
+  EXPECT_THROW(graspmap_test::write_textured_mesh(folder / "w.glb", wrong), libmap::Error);
+  EXPECT_THROW(graspmap_test::write_textured_mesh(folder / "w.glb", TexturedMesh{}), libmap::Error);
 }
 
 TEST(TexturedMesh, APictureOfManyNamesIsOnePage) {
@@ -263,7 +268,7 @@ TEST(TexturedMesh, WhatSinglePrecisionCannotHoldIsNotWritten) {
   model.mesh.vertices[2].x() = 1e39;
   for (const char* name : {"far.obj", "far.glb"}) {
     const auto path = scratch_folder() / name;
-    EXPECT_EQ(error_of([&] { libmap::write_textured_mesh(path, model); }).context().field,
+    EXPECT_EQ(error_of([&] { graspmap_test::write_textured_mesh(path, model); }).context().field,
               "vertex 2");
     EXPECT_FALSE(std::filesystem::exists(path));
   }

