@@ -164,7 +164,7 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
 void CameraTrajectoryOptions::check() const {
   check_parameters(*this);
   if (target && !target->allFinite())
-    throw Error("not a place", {.file = {}, .field = "target", .value = {}, .bound = "finite"});
+    throw Error("not a place", {.field = "target", .value = {}, .bound = "finite"});
 }
 
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {

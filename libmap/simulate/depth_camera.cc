@@ -240,12 +240,10 @@ DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {
 
 void DepthSensorOptions::check() const {
   if (!(far_m > near_m))
-    throw Error(
-        "nothing lies between near_m and far_m",
-        {.file = {}, .field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
+    throw Error("nothing lies between near_m and far_m",
+                {.field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
   if (!(flying_pixels + edge_dropouts <= 1.0))
-    throw Error("more edge pixels than there are", {.file = {},
-                                                    .field = "flying_pixels + edge_dropouts",
+    throw Error("more edge pixels than there are", {.field = "flying_pixels + edge_dropouts",
                                                     .value = to_text(flying_pixels + edge_dropouts),
                                                     .bound = "<= 1"});
 }

@@ -105,21 +105,4 @@ PrimitiveScene load_scene(const std::filesystem::path& path) {
   return parse_scene(read_whole_file(path, max_yaml_bytes), path.string());
 }
 
-std::string to_yaml(const PrimitiveScene& scene) {
-  YAML::Emitter yaml;
-  yaml << YAML::BeginMap << YAML::Key << "shapes" << YAML::Value << YAML::BeginSeq;
-  for (SceneShape shape : scene.shapes) {
-    yaml << YAML::BeginMap << YAML::Key << "shape" << YAML::Value << shape_kind(shape);
-    const ParameterTable table = shape_parameters(shape);
-    for (const Parameter& parameter : table.parameters()) {
-      yaml << YAML::Key << parameter.key << YAML::Value;
-      if (parameter.key == "name") yaml << YAML::DoubleQuoted;
-      yaml << parameter.get();
-    }
-    yaml << YAML::EndMap;
-  }
-  yaml << YAML::EndSeq << YAML::EndMap;
-  return std::string(yaml.c_str()) + "\n";
-}
-
 }  // namespace libmap

@@ -66,7 +66,7 @@ double ground_height(const TriangleMesh& mesh, double x_m, double y_m) {
   const auto hit = caster.cast({x_m, y_m, above}, {0.0, 0.0, -1.0});
   if (!hit)
     throw Error("the mesh has no ground beneath the robot",
-                {.file = {}, .field = "x, y", .value = to_text(x_m) + ", " + to_text(y_m)});
+                {.field = "x, y", .value = to_text(x_m) + ", " + to_text(y_m)});
   return above - hit->distance;
 }
 

@@ -8,7 +8,6 @@
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
-#include "libmap/simulate/scene_geometry.h"
 #include "libmap/simulate/solid_noise.h"
 
 namespace libmap {
@@ -154,8 +153,7 @@ void RockSite::check() const {
     if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,
                    0.5 * ground.size_y_m - margin_m))
       throw Error("reaches over the edge of the ground",
-                  {.file = {},
-                   .field = rock_place(n, rocks[n]) + ".x_m, y_m",
+                  {.field = rock_place(n, rocks[n]) + ".x_m, y_m",
                    .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
                    .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
                             to_text(ground.size_y_m) + " m"});
@@ -230,39 +228,28 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
     }
     if (!is_placed)
       throw Error("no room is left for it between the free square and the site's edge",
-                  {.file = {},
-                   .field = rock_place(one.rock, rock),
-                   .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m",
-                   .bound = {}});
+                  {.field = rock_place(one.rock, rock),
+                   .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m"});
     taken.push_back(footprint_of(rock));
   }
 }
 
-struct GroundRelief::Parts {
-  std::optional<SceneGeometry> bumps;
-  double unevenness_m = 0.0;
-  std::uint64_t seed = 0;
-};
-
-GroundRelief::GroundRelief(const RockSite& site) : parts_(std::make_unique<Parts>()) {
-  parts_->unevenness_m = site.ground.unevenness_m;
-  parts_->seed = mix_bits(site.seed, 3);
+GroundRelief::GroundRelief(const RockSite& site)
+    : unevenness_m_(site.ground.unevenness_m), seed_(mix_bits(site.seed, 3)) {
   if (site.bumps.empty()) return;
   PrimitiveScene scene;
   scene.shapes.push_back({Plane{site.ground.size_x_m, site.ground.size_y_m}, {}, "ground"});
   scene.shapes.insert(scene.shapes.end(), site.bumps.begin(), site.bumps.end());
-  parts_->bumps.emplace(scene);
+  bumps_.emplace(scene);
 }
-
-GroundRelief::~GroundRelief() = default;
 
 double GroundRelief::height(double x_m, double y_m) const {
   const Eigen::Vector3d at(x_m, y_m, 0.37);
-  const double relief = 0.6 * gradient_noise(at / 0.8, parts_->seed) +
-                        0.25 * gradient_noise(at / 0.25, parts_->seed + 1) +
-                        0.15 * gradient_noise(at / 0.07, parts_->seed + 2);
-  const double bumps = parts_->bumps ? parts_->bumps->ground_height(x_m, y_m).value : 0.0;
-  return bumps + parts_->unevenness_m * relief;
+  const double relief = 0.6 * gradient_noise(at / 0.8, seed_) +
+                        0.25 * gradient_noise(at / 0.25, seed_ + 1) +
+                        0.15 * gradient_noise(at / 0.07, seed_ + 2);
+  const double bumps = bumps_ ? bumps_->ground_height(x_m, y_m).value : 0.0;
+  return bumps + unevenness_m_ * relief;
 }
 
 }  // namespace libmap

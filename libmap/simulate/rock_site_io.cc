@@ -75,8 +75,7 @@ void parse_list(const YAML::Node& root, const std::string& key,
   if (!list || list.IsNull()) return;
   if (!list.IsSequence()) throw Error("not a list", {.field = key});
   if (list.size() > max_entries)
-    throw Error("too many entries", {.file = {},
-                                     .field = key,
+    throw Error("too many entries", {.field = key,
                                      .value = std::to_string(list.size()),
                                      .bound = "at most " + std::to_string(max_entries)});
   for (std::size_t n = 0; n < list.size(); ++n) {

@@ -56,8 +56,7 @@ void RockyTerrainOptions::check() const {
   check_parameters(*this);
   if (max_rock_m < min_rock_m)
     throw Error("the highest rocks are lower than the lowest",
-                {.file = {},
-                 .field = "max_rock_m",
+                {.field = "max_rock_m",
                  .value = to_text(max_rock_m),
                  .bound = ">= min_rock_m, " + to_text(min_rock_m)});
 }
