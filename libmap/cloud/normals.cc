@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/pending/disjoint_sets.hpp>
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <tuple>
@@ -56,27 +56,6 @@ struct GraphEdge {
   float turn;  // 1 - |cosine| between the normals
   std::uint32_t a;
   std::uint32_t b;
-};
-
-// Groups that are joined (Tarjan 1975).
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
-  }
-  std::uint32_t root(std::uint32_t n) {
-    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-  bool join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-    return a != b;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
 };
 
 class SpanningTree {
@@ -141,10 +120,15 @@ void SpanningTree::choose_tree() {
   std::sort(edges_.begin(), edges_.end(), [](const GraphEdge& one, const GraphEdge& two) {
     return std::tie(one.turn, one.a, one.b) < std::tie(two.turn, two.a, two.b);
   });
-  Groups groups(normals_.size());
+  boost::disjoint_sets_with_storage<> groups(normals_.size());
   std::vector<GraphEdge> kept;
-  for (const GraphEdge& edge : edges_)
-    if (groups.join(edge.a, edge.b)) kept.push_back(edge);
+  for (const GraphEdge& edge : edges_) {
+    const std::size_t a = groups.find_set(edge.a);
+    const std::size_t b = groups.find_set(edge.b);
+    if (a == b) continue;
+    groups.link(a, b);
+    kept.push_back(edge);
+  }
   edges_.clear();
   starts_.assign(normals_.size() + 1, 0);
   for (const GraphEdge& edge : kept) {

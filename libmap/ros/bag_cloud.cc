@@ -23,8 +23,7 @@ std::string only_cloud_topic(const BagListing& listing) {
   }
   if (count == 1) return names;
   throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
-              {.file = {},
-               .field = "topics of " + ros_message::type_of<PointCloud2>(),
+              {.field = "topics of " + ros_message::type_of<PointCloud2>(),
                .value = count == 0 ? "none" : names,
                .bound = count == 0 ? "" : "named by --topic"});
 }

@@ -276,19 +276,18 @@ const BagTopic& require_topic(const BagListing& listing, const std::string& name
   for (const BagTopic& topic : listing.topics) {
     if (topic.name == name && topic.type == type && topic.md5sum == md5sum) return topic;
     if (topic.name == name && topic.type == type)
-      throw Error(
-          "is another definition of " + type,
-          {.file = {}, .field = "md5sum of " + name, .value = topic.md5sum, .bound = md5sum});
+      throw Error("is another definition of " + type,
+                  {.field = "md5sum of " + name, .value = topic.md5sum, .bound = md5sum});
     if (topic.name == name)
       throw Error("is of another type",
-                  {.file = {}, .field = "type of " + name, .value = topic.type, .bound = type});
+                  {.field = "type of " + name, .value = topic.type, .bound = type});
     names.push_back(topic.name);
   }
   std::string known;
   for (const BagTopic& topic : listing.topics)
     if (topic.type == type) known += (known.empty() ? "one of " : ", ") + topic.name;
   throw Error("no such topic with messages" + did_you_mean(name, names),
-              {.file = {}, .field = "topic", .value = name, .bound = known});
+              {.field = "topic", .value = name, .bound = known});
 }
 
 }  // namespace libmap

@@ -84,8 +84,7 @@ class ImageWriter {
           decode_depth(one.bytes, one.compressed, {plan_.depth_unit_m, camera.depth_scale_m});
       if (depth.image.width != camera.camera.width || depth.image.height != camera.camera.height)
         throw Error("does not fit the calibration",
-                    {.file = {},
-                     .field = "size",
+                    {.field = "size",
                      .value = std::to_string(depth.image.width) + " x " +
                               std::to_string(depth.image.height),
                      .bound = std::to_string(camera.camera.width) + " x " +

@@ -117,8 +117,7 @@ Pose best_alignment(const std::vector<PosePair>& pairs) {
 }
 
 Error too_few(std::size_t count, std::size_t least) {
-  return Error("too few poses are in both trajectories", {.file = {},
-                                                          .field = "common poses",
+  return Error("too few poses are in both trajectories", {.field = "common poses",
                                                           .value = std::to_string(count),
                                                           .bound = ">= " + std::to_string(least)});
 }
@@ -146,8 +145,7 @@ AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
 TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth,
                                           std::size_t step) {
   if (step == 0)
-    throw Error("not a distance between poses",
-                {.file = {}, .field = "step", .value = "0", .bound = ">= 1"});
+    throw Error("not a distance between poses", {.field = "step", .value = "0", .bound = ">= 1"});
   const std::vector<PosePair> pairs = pair_poses(estimate, truth);
   if (pairs.size() <= step) throw too_few(pairs.size(), step + 1);
   std::vector<double> distances_m;

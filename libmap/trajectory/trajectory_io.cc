@@ -80,8 +80,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
     std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
     throw Error("has neither nodes nor stamps and another number of poses than the scan has nodes",
-                {.file = {},
-                 .field = "poses",
+                {.field = "poses",
                  .value = std::to_string(trajectory.size()),
                  .bound = std::to_string(valid)});
   NodePairs pairs;
@@ -98,17 +97,7 @@ std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
 
 TrajectoryFormat format_of_text(const std::string& text, const fs::path& path) {
   if (const auto format = format_of_extension(path)) return *format;
-  switch (recognize_poses(text, path.string())) {
-    case PoseTextFormat::tum:
-      return TrajectoryFormat::tum;
-    case PoseTextFormat::kitti:
-      return TrajectoryFormat::kitti;
-    case PoseTextFormat::toro:
-      return TrajectoryFormat::toro;
-    case PoseTextFormat::g2o:
-      return TrajectoryFormat::g2o;
-  }
-  return TrajectoryFormat::tum;
+  return *format_of_extension("poses" + recognize_poses(text, path.string()));
 }
 
 PoseAxes axes_of(TrajectoryFormat format) {
@@ -263,8 +252,7 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
   for (const auto& [node, pose] : pairs)
     if (!poses.emplace(node->id, TrajectoryPose{node->id, node->stamp_s, pose->world_from_base})
              .second)
-      throw Error("two poses for one node",
-                  {.file = {}, .field = "node", .value = std::to_string(node->id)});
+      throw Error("two poses for one node", {.field = "node", .value = std::to_string(node->id)});
   NodeTrajectory result;
   for (const auto& [id, pose] : poses) result.poses.push_back(pose);
   result.foreign = trajectory.size() - pairs.size();
