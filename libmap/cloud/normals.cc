@@ -10,7 +10,6 @@
 #include <string>
 #include <tuple>
 
-#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
@@ -206,8 +205,6 @@ NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options) {
   check_parameters(options);
   cloud.check();
-  for (const Eigen::Vector3d& position : cloud.positions)
-    if (!position.allFinite()) throw Error("a position is not finite");
   NormalEstimationResult result;
   result.normals.resize(cloud.size());
   const PointTree tree(cloud.positions);

@@ -253,11 +253,8 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
 SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vector2d& size_m,
                                   const SiteRectangleOptions& options) {
   require_ranges(size_m, options);
-  std::vector<Vector2d> finite;
-  for (const Vector2d& point : points)
-    if (point.allFinite()) finite.push_back(point);
-  if (finite.empty()) throw Error("there are no data to lay a site into");
-  const Ground ground = make_ground(finite, options);
+  if (points.empty()) throw Error("there are no data to lay a site into");
+  const Ground ground = make_ground(points, options);
   if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_a_site))
     throw Error("the data reach too far for a site of this size: are there stray points?",
                 {.field = "size of the data",

@@ -44,7 +44,6 @@ BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,
         messages++ == 0 || (stamp_s ? std::abs(stamp - *stamp_s) < std::abs(best.stamp_s - *stamp_s)
                                     : cloud.cloud.size() > best.cloud.size());
     if (better) best = {name, cloud.frame, stamp, std::move(cloud.cloud), cloud.dropped_points, 0};
-    return true;
   });
   best.messages = messages;
   return best;

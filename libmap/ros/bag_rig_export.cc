@@ -85,10 +85,8 @@ class ImageWriter {
       if (depth.image.width != camera.camera.width || depth.image.height != camera.camera.height)
         throw Error("does not fit the calibration",
                     {.field = "size",
-                     .value = std::to_string(depth.image.width) + " x " +
-                              std::to_string(depth.image.height),
-                     .bound = std::to_string(camera.camera.width) + " x " +
-                              std::to_string(camera.camera.height)});
+                     .value = size_text(depth.image.width, depth.image.height),
+                     .bound = size_text(camera.camera.width, camera.camera.height)});
       one.beyond = depth.beyond;
       one.png = encode_png(depth.image);
     } catch (const Error& error) {
@@ -152,10 +150,7 @@ BagRigExport export_bag_rig(const fs::path& bag, const BagRigPlan& plan, const f
   for (const std::string& topic : plan.topics)
     if (!topic.empty()) requests.push_back({topic});
   ImageWriter writer(plan, folder);
-  read_bag(bag, requests, [&](const BagMessage& message) {
-    writer.take(message);
-    return true;
-  });
+  read_bag(bag, requests, [&](const BagMessage& message) { writer.take(message); });
   BagRigExport result = writer.finish();
   if (result.images == 0)
     throw Error(result.warnings.empty() ? "no image can be used" : result.warnings.front(),

@@ -210,7 +210,6 @@ void write_bag(const fs::path& path, const BagContent& content, BagCompression c
 
 void write_rig_bag(const fs::path& path, const CameraRig& rig, const std::vector<RigImage>& images,
                    const RigBagOptions& options) {
-  rig.check();
   const std::vector<RigImage> ordered = in_recording_order(images);
   if (ordered.empty()) throw Error("there are no images to write");
   std::vector<BagTransform> transforms;

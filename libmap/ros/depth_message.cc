@@ -71,7 +71,7 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
   const std::uint64_t width = message.width;
   const std::uint64_t height = message.height;
   const std::uint64_t row = width * (is_float ? 4 : 2);
-  const std::string size = std::to_string(width) + " x " + std::to_string(height);
+  const std::string size = size_text(width, height);
   if (width == 0 || height == 0 || width > max_pixels || width * height > max_pixels)
     throw Error("no image has this size",
                 {.field = "size", .value = size, .bound = "1 to 2^27 pixels"});
@@ -210,7 +210,6 @@ DepthMessageImage decode_depth(std::string_view bytes, bool compressed, const De
 CameraInfoMessage decode_camera_info(std::string_view bytes, bool rectified) {
   const auto info = ros_message::decode<ros_message::CameraInfo>(bytes);
   CameraInfoMessage message{ros_message::nanoseconds_of(info.header.stamp),
-                            ros_message::from_ros(info.header.frame_id),
                             camera_of(info, rectified)};
   apply_region(info, message.camera);
   message.camera.check();

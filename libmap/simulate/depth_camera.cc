@@ -51,7 +51,6 @@ std::vector<Eigen::Vector2d> lattice_rays(const Camera& camera, int width, int h
 }  // namespace
 
 PixelRays make_pixel_rays(const Camera& camera) {
-  camera.check();
   return {camera.width, camera.height, ray_table(camera),
           lattice_rays(camera, camera.width + 1, camera.height + 1, -0.5)};
 }
@@ -326,7 +325,6 @@ std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double inc
 
 DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
                                const DepthSensorOptions& options, std::uint64_t seed) {
-  options.check();
   DepthMeasurement result{.depth = DepthImage(view.depth.width, view.depth.height)};
   struct Counts {
     std::size_t measured = 0, edges = 0, flying = 0;

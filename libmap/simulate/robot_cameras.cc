@@ -38,7 +38,6 @@ void bind(ParameterTable& table, RobotCamerasOptions& options) {
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options) {
-  rig.check();
   const VisibleSurface surface(mesh);
   RandomStream stamps(options.seed, stamp_key);
   std::vector<RobotCameraImage> images;

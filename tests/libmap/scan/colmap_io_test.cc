@@ -362,17 +362,9 @@ TEST(ColmapBuilder, WithoutDepthThereAreCamerasAlone) {
   EXPECT_EQ(builder.model().images.size(), 2U);
 }
 
-TEST(ColmapBuilder, RefusesNoSpacingAndPosesThatAreNotFinite) {
+TEST(ColmapBuilder, RefusesNoSpacing) {
   EXPECT_EQ(std::string(error_of([] { ColmapBuilder({.point_spacing_px = 0}); }).what()),
             "point_spacing_px is 0: out of range (must be >= 1 and <= 10000)");
-  ColmapBuilder builder;
-  Pose lost = above(0.0);
-  lost.translation().x() = NAN;
-  EXPECT_EQ(std::string(
-                error_of([&] { builder.add_image("a.jpg", view_from(above(0.0)), lost); }).what()),
-            "image a.jpg: the pose is not finite");
-  EXPECT_TRUE(builder.model().images.empty());
-  EXPECT_TRUE(builder.model().cameras.empty());
 }
 
 TEST(ColmapBuilder, SameForAnyNumberOfThreads) {
