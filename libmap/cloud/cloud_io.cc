@@ -82,10 +82,7 @@ void require_cloud_file(const std::filesystem::path& path) {
 }
 
 std::string format_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
+  return lower_case(path.extension().string());
 }
 
 std::string read_head(const std::filesystem::path& path) {

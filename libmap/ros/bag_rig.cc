@@ -172,9 +172,7 @@ void rig_from_bag(const BagSurvey& survey, const BagListing& listing, const BagR
       camera.camera = calibrated_camera(images, listing);
       camera.camera.base_from_camera = survey.transforms.target_from_source(base, images.frame);
     } catch (const Error& error) {
-      ErrorContext context = error.context();
-      context.field = images.topic + ": " + context.field;
-      throw Error(error.reason(), context);
+      throw error.in_field(images.topic);
     }
   }
 }

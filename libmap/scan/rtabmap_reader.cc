@@ -109,19 +109,13 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
       refuse(std::string("its table ") + table + " has no column id");
 }
 
-std::string joined(const std::string& place, const std::string& field) {
-  return place.empty() || field.empty() ? place + field : place + ": " + field;
-}
-
 // `step` with its Errors naming `part`.
 template <typename Step>
 void decode_part(const char* part, const Step& step) {
   try {
     step();
   } catch (const Error& error) {
-    ErrorContext context = error.context();
-    context.field = joined(part, context.field);
-    throw Error(error.reason(), std::move(context), error.kind());
+    throw error.in_field(part);
   }
 }
 
@@ -209,10 +203,7 @@ RgbdFrame RtabmapDatabase::read_frame(int node, FrameParts parts) const {
     return frame;
   } catch (const Error& error) {
     if (!error.context().file.empty()) throw;
-    ErrorContext context = error.context();
-    context.file = path_.string();
-    context.field = joined("node " + std::to_string(node), context.field);
-    throw Error(error.reason(), std::move(context), error.kind());
+    throw error.in_field("node " + std::to_string(node)).in_file(path_.string());
   }
 }
 

@@ -51,14 +51,11 @@ struct ParameterAdder {
 };
 
 Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
-  ErrorContext context = error.context();
-  context.field = "shapes[" + std::to_string(i) + "]." + context.field;
-  return Error(error.reason() + " in " + shape_kind(shape), context);
+  return Error(error.reason() + " in " + shape_kind(shape),
+               error.in_field("shapes[" + std::to_string(i) + "]", ".").context());
 }
 
 void check_shape(const SceneShape& shape) {
-  SceneShape copy = shape;
-  shape_parameters(copy).check();
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
       throw Error("shorter than wide", {.field = "length_m",

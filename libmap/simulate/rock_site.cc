@@ -57,16 +57,6 @@ bool is_within(const Footprint& footprint, double half_x, double half_y) {
          std::abs(footprint.center.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
 }
 
-void check_table(const ParameterTable& table, const std::string& place) {
-  try {
-    table.check();
-  } catch (const Error& error) {
-    ErrorContext context = error.context();
-    context.field = place + "." + context.field;
-    throw Error(error.reason(), context);
-  }
-}
-
 std::string rock_place(std::size_t n, const SiteRock& rock) {
   return "rocks[" + std::to_string(n) + "]" + (rock.name.empty() ? "" : " (" + rock.name + ")");
 }
@@ -142,12 +132,13 @@ ParameterTable field_point_parameters(FieldPointOptions& options) {
 }
 
 void RockSite::check() const {
-  RockSite copy = *this;
-  check_table(ground_parameters(copy.ground), "ground");
-  check_table(layout_parameters(copy.layout), "layout");
-  check_table(field_point_parameters(copy.field_points), "field_points");
   for (std::size_t n = 0; n < rocks.size(); ++n) {
-    check_table(rock_parameters(copy.rocks[n]), rock_place(n, rocks[n]));
+    SiteRock copy = rocks[n];
+    try {
+      rock_parameters(copy).check();
+    } catch (const Error& error) {
+      throw error.in_field(rock_place(n, copy), ".");
+    }
     // The outline of the ground stays whole.
     constexpr double margin_m = 0.05;
     if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,

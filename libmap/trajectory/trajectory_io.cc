@@ -11,6 +11,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
 #include "libmap/scan/colmap_io.h"
 #include "libmap/scan/stamp_pairing.h"
 #include "libmap/scan/trajectory_text.h"
@@ -30,13 +31,6 @@ constexpr std::array<std::pair<const char*, TrajectoryFormat>, 4> extensions = {
 
 // Of vertices that are the places of poses in their order.
 constexpr std::string_view numbered_head = "# graspmap: poses without nodes, numbered in order";
-
-std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
-}
 
 std::vector<const GraphNode*> valid_nodes(const PoseGraph& graph) {
   std::vector<const GraphNode*> nodes;
@@ -89,7 +83,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
 }
 
 std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_case(path.extension().string());
   for (const auto& [name, format] : extensions)
     if (extension == name) return format;
   return std::nullopt;
