@@ -20,6 +20,7 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN named_cells.h EXCLUDE
   PATTERN pose_residuals.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
+  PATTERN rtabmap_rows.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
 install(DIRECTORY data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)

@@ -19,9 +19,6 @@ struct Chessboard {
   int columns = 8;          // >= 3
   int rows = 6;             // >= 3
   double square_mm = 30.0;  // > 0
-
-  // Throws Error naming the field, its value and its bound.
-  void check() const;
 };
 
 // "8x6". Throws Error naming `field`.
@@ -81,8 +78,8 @@ struct CameraCalibrationResult {
 };
 
 // Pictures whose corners lie within 1 px (root mean square) of an earlier one's are left out: their
-// errors are not independent. Throws Error: fewer than 3 pictures are left, corners that do not fit
-// the board, pictures that do not determine the camera (for instance all seen straight on).
+// errors are not independent. Throws Error: fewer than 3 pictures are left,
+// pictures that do not determine the camera (for instance all seen straight on).
 CameraCalibrationResult calibrate_camera(const std::vector<BoardPicture>& pictures, int width,
                                          int height, const CameraCalibrationOptions& options = {});
 

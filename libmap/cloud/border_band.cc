@@ -62,7 +62,7 @@ Picture take_picture(const PointCloud& cloud, const BorderBandOptions& options) 
   Vector2d high = -low;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
     const Eigen::Vector3d& point = cloud.positions[n];
-    if (!point.allFinite() || point.z() < options.min_z_m || point.z() > options.max_z_m) continue;
+    if (point.z() < options.min_z_m || point.z() > options.max_z_m) continue;
     used.push_back(n);
     low = low.cwiseMin(point.head<2>());
     high = high.cwiseMax(point.head<2>());

@@ -139,8 +139,7 @@ void require_readable_back(const ColumnSet& set, const std::vector<ScalarField>&
     if (field.name.empty()) throw Error("a scalar field has no name");
     alone.columns.push_back({.name = field.name});
   }
-  std::vector<std::string> names = names_of(set);
-  require_unique(names);
+  require_unique(names_of(set));
   for (const auto& triple : {find_triple(alone, position_names), find_triple(alone, normal_names),
                              find_triple(alone, color_names)})
     if (triple)
@@ -167,25 +166,15 @@ CloudFromColumns cloud_from_columns(const ColumnSet& set, NotFinite not_finite) 
   return without_holes(std::move(cloud), not_finite);
 }
 
-std::vector<Column> position_columns(const std::vector<Column>& columns) {
-  ColumnSet set;
-  set.columns = columns;
-  const std::optional<Triple> positions = find_triple(set, position_names);
-  std::vector<Column> kept;
-  for (const Column& column : set.columns)
-    if (uses(positions, column)) kept.push_back(column);
-  return kept;
-}
-
-std::vector<Column> geometry_columns(const std::vector<Column>& columns) {
+std::vector<Column> geometry_columns(const std::vector<Column>& columns, bool with_normals) {
   ColumnSet set;
   set.columns = columns;
   const std::optional<Triple> positions = find_triple(set, position_names);
   const std::optional<Triple> normals = find_triple(set, normal_names);
-  std::vector<Column> geometry;
+  std::vector<Column> kept;
   for (const Column& column : set.columns)
-    if (uses(positions, column) || uses(normals, column)) geometry.push_back(column);
-  return geometry;
+    if (uses(positions, column) || (with_normals && uses(normals, column))) kept.push_back(column);
+  return kept;
 }
 
 std::vector<ScalarField> fields_of_columns(const ColumnSet& set) {

@@ -25,9 +25,8 @@ struct CloudFromColumns {
 // Throws Error: no x, y or z; two fields of one name; a position that is not finite, if refused.
 CloudFromColumns cloud_from_columns(const ColumnSet& columns, NotFinite not_finite);
 
-// Those of the columns that make the cloud's positions, and its normals.
-std::vector<Column> position_columns(const std::vector<Column>& columns);
-std::vector<Column> geometry_columns(const std::vector<Column>& columns);
+// Those of the columns that make the cloud's positions and, where they are wanted, its normals.
+std::vector<Column> geometry_columns(const std::vector<Column>& columns, bool with_normals);
 
 // The columns of a format: normals as nx ny nz (PLY, CSV) or normal_x normal_y normal_z (PCD).
 enum class NormalNames { short_names, long_names };

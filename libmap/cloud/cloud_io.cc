@@ -63,15 +63,6 @@ GeometryColumns decode(const std::filesystem::path& path) {
   return decode_csv(*bytes, {});
 }
 
-// The file's first MiB: more than any header.
-std::string read_head(const std::filesystem::path& path) {
-  std::string head(1 << 20, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  return head;
-}
-
 }  // namespace
 
 void require_cloud_format(const std::filesystem::path& path) { require_format(path, false); }
@@ -91,10 +82,15 @@ void require_cloud_file(const std::filesystem::path& path) {
 }
 
 std::string format_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
+  return lower_case(path.extension().string());
+}
+
+std::string read_head(const std::filesystem::path& path) {
+  std::string head(std::min<std::uint64_t>(std::filesystem::file_size(path), 1 << 20), '\0');
+  std::ifstream file(path, std::ios::binary);
+  file.read(head.data(), static_cast<std::streamsize>(head.size()));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return head;
 }
 
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path) {
@@ -137,7 +133,7 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
   }
 }
 
-CloudFileInfo read_cloud_info(const std::filesystem::path& path) {
+GeometryFileInfo read_cloud_info(const std::filesystem::path& path) {
   require_cloud_file(path);
   const std::string format = format_of(path);
   try {

@@ -26,12 +26,10 @@
 
 namespace libmap {
 
-using CloudFileInfo = GeometryFileInfo;
-
 struct CloudReadResult {
   PointCloud cloud;
   std::size_t dropped_points = 0;  // those with a position that is NaN or infinite
-  CloudFileInfo info;
+  GeometryFileInfo info;
 };
 
 struct CloudWriteOptions {
@@ -45,7 +43,7 @@ struct CloudWriteOptions {
 CloudReadResult read_cloud(const std::filesystem::path& path);
 
 // The same of the header alone where the format has one (PCD, PLY); CSV is read whole.
-CloudFileInfo read_cloud_info(const std::filesystem::path& path);
+GeometryFileInfo read_cloud_info(const std::filesystem::path& path);
 
 // Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
 // temporary path. Throws Error: unknown extension, a field's name that the format cannot hold or
@@ -64,6 +62,9 @@ void refuse_vtp(const std::filesystem::path& path);
 
 // The extension in lower case, e.g. ".ply".
 std::string format_of(const std::filesystem::path& path);
+
+// The file's first MiB: more than any header.
+std::string read_head(const std::filesystem::path& path);
 
 // The file's bytes, for the codecs. Throws Error: no such file, a folder, not readable, empty.
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path);

@@ -19,15 +19,6 @@ namespace {
 
 constexpr std::size_t max_block_bytes = std::size_t{1} << 22;
 
-// The first MiB, more than any header, of a file of so many bytes.
-std::string read_head(std::ifstream& file, std::uint64_t bytes) {
-  std::string head(std::min<std::uint64_t>(bytes, 1 << 20), '\0');
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(std::max<std::streamsize>(file.gcount(), 0)));
-  file.clear();
-  return head;
-}
-
 void append_points(const PointCloud& from, std::size_t begin, std::size_t end, PointCloud& to) {
   const auto add = [&](const auto& source, auto& target) {
     if (source.empty()) return;
@@ -38,110 +29,113 @@ void append_points(const PointCloud& from, std::size_t begin, std::size_t end, P
   add(from.normals, to.normals);
 }
 
-}  // namespace
+// One file, from its first point on.
+class CloudBlockReader {
+ public:
+  // Throws Error naming the file, as read_cloud does.
+  explicit CloudBlockReader(fs::path path) : path_(std::move(path)) {
+    require_cloud_file(path_);
+    try {
+      if (!open_records()) read_whole();
+    } catch (const Error& error) {
+      throw error.in_file(path_.string());
+    }
+  }
 
-struct CloudBlockReader::State {
-  fs::path path;
-  Pose viewpoint = Pose::Identity();
-  bool has_normals = false;
-  std::size_t rows_left = 0;
-  std::size_t dropped = 0;
+  // Of the file as its header says: no points; with normals; cloud_from_sensor.
+  bool is_empty() const { return rows_left_ == 0; }
+  bool has_normals() const { return has_normals_; }
+  const Pose& viewpoint() const { return viewpoint_; }
+  std::size_t dropped_points() const { return dropped_; }  // so far
 
-  // Records in blocks ...
-  std::ifstream file;
-  std::vector<std::byte> block;
-  std::size_t record_bytes = 0;
-  std::vector<Column> columns;
-  // ... or the whole file.
-  PointCloud whole;
+  // Appends the next `rows` points, or as many as are left, without those whose position is not
+  // finite. False if none is left.
+  bool append(std::size_t rows, PointCloud& cloud) {
+    rows = std::min(rows, rows_left_);
+    if (rows == 0) return false;
+    const std::size_t begin = whole_.size() - rows_left_;
+    if (record_bytes_ > 0)
+      append_records(rows, cloud);
+    else
+      append_points(whole_, begin, begin + rows, cloud);
+    rows_left_ -= rows;
+    return true;
+  }
 
+  // From now on, normals are passed over.
+  void leave_out_normals() {
+    columns_ = geometry_columns(columns_, false);
+    whole_.normals.clear();
+  }
+
+ private:
   bool open_records() {
-    const std::string format = format_of(path);
+    const std::string format = format_of(path_);
     if (format != ".pcd" && format != ".ply") return false;
-    file.open(path, std::ios::binary);
-    const std::uint64_t bytes = fs::file_size(path);
-    const std::string head = read_head(file, bytes);
+    file_.open(path_, std::ios::binary);
+    const std::uint64_t bytes = fs::file_size(path_);
+    const std::string head = read_head(path_);
     // Thousands of small pieces are opened, each more than once.
-    block.resize(std::min<std::uint64_t>(bytes, max_block_bytes));
-    const auto records = format == ".pcd" ? pcd_records(head, bytes, block.data())
-                                          : ply_records(head, bytes, block.data());
-    if (!records || records->bytes == 0 || records->bytes > block.size()) {
-      std::vector<std::byte>().swap(block);
+    block_.resize(std::min<std::uint64_t>(bytes, max_block_bytes));
+    const auto records = format == ".pcd" ? pcd_records(head, bytes, block_.data())
+                                          : ply_records(head, bytes, block_.data());
+    if (!records || records->bytes == 0 || records->bytes > block_.size()) {
+      std::vector<std::byte>().swap(block_);
       return false;
     }
-    columns = geometry_columns(records->columns);
+    columns_ = geometry_columns(records->columns, true);
     ColumnSet none;
     none.columns = records->columns;
     cloud_from_columns(none, NotFinite::drop);  // throws where there is no x, y or z
-    has_normals = columns.size() > 3;
-    record_bytes = records->bytes;
-    rows_left = records->count;
-    viewpoint = records->viewpoint;
-    file.seekg(static_cast<std::streamoff>(records->begin));
+    has_normals_ = columns_.size() > 3;
+    record_bytes_ = records->bytes;
+    rows_left_ = records->count;
+    viewpoint_ = records->viewpoint;
+    file_.seekg(static_cast<std::streamoff>(records->begin));
     return true;
   }
 
   void read_whole() {
-    CloudReadResult read = read_cloud(path);
-    dropped = read.dropped_points;
-    viewpoint = read.cloud.viewpoint;
-    has_normals = read.cloud.has_normals();
-    whole.positions = std::move(read.cloud.positions);
-    whole.normals = std::move(read.cloud.normals);
-    rows_left = whole.size();
+    CloudReadResult read = read_cloud(path_);
+    dropped_ = read.dropped_points;
+    viewpoint_ = read.cloud.viewpoint;
+    has_normals_ = read.cloud.has_normals();
+    whole_.positions = std::move(read.cloud.positions);
+    whole_.normals = std::move(read.cloud.normals);
+    rows_left_ = whole_.size();
   }
 
   void append_records(std::size_t rows, PointCloud& cloud) {
     while (rows > 0) {
-      const std::size_t count = std::min(rows, block.size() / record_bytes);
-      file.read(reinterpret_cast<char*>(block.data()),
-                static_cast<std::streamsize>(count * record_bytes));
-      if (!file) throw Error("cannot be read", {.file = path.string()});
+      const std::size_t count = std::min(rows, block_.size() / record_bytes_);
+      file_.read(reinterpret_cast<char*>(block_.data()),
+                 static_cast<std::streamsize>(count * record_bytes_));
+      if (!file_) throw Error("cannot be read", {.file = path_.string()});
       ColumnSet set;
       set.rows = count;
-      set.columns = columns;
+      set.columns = columns_;
       const CloudFromColumns read = cloud_from_columns(set, NotFinite::drop);
-      dropped += read.dropped_points;
+      dropped_ += read.dropped_points;
       append_points(read.cloud, 0, read.cloud.size(), cloud);
       rows -= count;
     }
   }
+
+  fs::path path_;
+  Pose viewpoint_ = Pose::Identity();
+  bool has_normals_ = false;
+  std::size_t rows_left_ = 0;
+  std::size_t dropped_ = 0;
+  // Records in blocks ...
+  std::ifstream file_;
+  std::vector<std::byte> block_;
+  std::size_t record_bytes_ = 0;
+  std::vector<Column> columns_;
+  // ... or the whole file.
+  PointCloud whole_;
 };
 
-CloudBlockReader::CloudBlockReader(fs::path path) : state_(std::make_unique<State>()) {
-  require_cloud_file(path);
-  state_->path = std::move(path);
-  try {
-    if (!state_->open_records()) state_->read_whole();
-  } catch (const Error& error) {
-    throw error.in_file(state_->path.string());
-  }
-}
-CloudBlockReader::~CloudBlockReader() = default;
-CloudBlockReader::CloudBlockReader(CloudBlockReader&&) noexcept = default;
-
-bool CloudBlockReader::is_empty() const { return state_->rows_left == 0; }
-bool CloudBlockReader::has_normals() const { return state_->has_normals; }
-const Pose& CloudBlockReader::viewpoint() const { return state_->viewpoint; }
-std::size_t CloudBlockReader::dropped_points() const { return state_->dropped; }
-
-bool CloudBlockReader::append(std::size_t rows, PointCloud& cloud) {
-  rows = std::min(rows, state_->rows_left);
-  if (rows == 0) return false;
-  if (state_->record_bytes > 0) {
-    state_->append_records(rows, cloud);
-  } else {
-    const std::size_t begin = state_->whole.size() - state_->rows_left;
-    append_points(state_->whole, begin, begin + rows, cloud);
-  }
-  state_->rows_left -= rows;
-  return true;
-}
-
-void CloudBlockReader::leave_out_normals() {
-  state_->columns = position_columns(state_->columns);
-  state_->whole.normals.clear();
-}
+}  // namespace
 
 std::vector<fs::path> cloud_pieces(const fs::path& given) {
   if (!fs::is_directory(given)) {

@@ -5,37 +5,12 @@
 
 #include <cstddef>
 #include <filesystem>
-#include <memory>
 #include <vector>
 
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/point_stream.h"
 
 namespace libmap {
-
-// One file, from its first point on.
-class CloudBlockReader {
- public:
-  // Throws Error naming the file, as read_cloud does.
-  explicit CloudBlockReader(std::filesystem::path path);
-  ~CloudBlockReader();
-  CloudBlockReader(CloudBlockReader&&) noexcept;
-
-  // Of the file as its header says: no points; with normals; cloud_from_sensor.
-  bool is_empty() const;
-  bool has_normals() const;
-  const Pose& viewpoint() const;
-  // Appends the next `rows` points, or as many as are left, without those whose position is not
-  // finite. False if none is left.
-  bool append(std::size_t rows, PointCloud& cloud);
-  // From now on, normals are passed over.
-  void leave_out_normals();
-  std::size_t dropped_points() const;  // so far
-
- private:
-  struct State;
-  std::unique_ptr<State> state_;
-};
 
 // The file itself, or the cloud files of a folder in the order of their names; hidden files are
 // passed over. Throws Error: nothing there, or a folder without a cloud file.

@@ -58,28 +58,6 @@ void store_rows(const Column& column, std::size_t rows, bool swap_bytes, char* a
   });
 }
 
-void store_rows(const Column& column, std::size_t rows, bool swap_bytes, char* at,
-                std::size_t step) {
-  switch (column.type) {
-    case ScalarType::int8:
-      return store_rows<std::int8_t>(column, rows, swap_bytes, at, step);
-    case ScalarType::uint8:
-      return store_rows<std::uint8_t>(column, rows, swap_bytes, at, step);
-    case ScalarType::int16:
-      return store_rows<std::int16_t>(column, rows, swap_bytes, at, step);
-    case ScalarType::uint16:
-      return store_rows<std::uint16_t>(column, rows, swap_bytes, at, step);
-    case ScalarType::int32:
-      return store_rows<std::int32_t>(column, rows, swap_bytes, at, step);
-    case ScalarType::uint32:
-      return store_rows<std::uint32_t>(column, rows, swap_bytes, at, step);
-    case ScalarType::float32:
-      return store_rows<float>(column, rows, swap_bytes, at, step);
-    case ScalarType::float64:
-      return store_rows<double>(column, rows, swap_bytes, at, step);
-  }
-}
-
 std::string number_text(double value, ScalarType type) {
   const double held = as_type(value, type);
   if (type == ScalarType::float64) return to_text(held);
@@ -90,15 +68,8 @@ std::string number_text(double value, ScalarType type) {
 }  // namespace
 
 std::string to_text(FileEncoding encoding) {
-  switch (encoding) {
-    case FileEncoding::ascii:
-      return "ascii";
-    case FileEncoding::binary:
-      return "binary";
-    case FileEncoding::binary_compressed:
-      return "binary_compressed";
-  }
-  return {};
+  constexpr std::array<const char*, 3> names = {"ascii", "binary", "binary_compressed"};
+  return names[static_cast<std::size_t>(encoding)];
 }
 
 std::string to_text(ScalarType type) { return traits(type).name; }
@@ -156,7 +127,9 @@ void append_records(const std::vector<Column>& columns, std::size_t begin, std::
     char* at = out.data() + start + first * record;
     for (Column column : columns) {
       column.first += (begin + first) * column.stride;
-      store_rows(column, last - first, swap_bytes, at, record);
+      with_type(stored_as(column.type), [&](auto number) {
+        store_rows<decltype(number)>(column, last - first, swap_bytes, at, record);
+      });
       at += size_of(stored_as(column.type));
     }
   });
@@ -175,6 +148,29 @@ void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, 
     }
     out += '\n';
   }
+}
+
+void write_rows(std::size_t rows, std::ostream& out,
+                const std::function<void(std::size_t, std::size_t, std::string&)>& append) {
+  constexpr std::size_t rows_at_once = 65536;
+  std::string text;
+  for (std::size_t row = 0; row < rows; row += rows_at_once) {
+    text.clear();
+    append(row, std::min(rows, row + rows_at_once), text);
+    out.write(text.data(), static_cast<std::streamsize>(text.size()));
+  }
+}
+
+std::array<double, 7> viewpoint_numbers(const Pose& viewpoint) {
+  const Eigen::Quaterniond q(viewpoint.rotation());
+  const Eigen::Vector3d t = viewpoint.translation();
+  return {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()};
+}
+
+std::string viewpoint_words(const Pose& viewpoint) {
+  std::string words;
+  for (const double number : viewpoint_numbers(viewpoint)) words += " " + to_text(number);
+  return words;
 }
 
 }  // namespace libmap

@@ -7,8 +7,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
+#include <functional>
 #include <memory>
 #include <optional>
+#include <ostream>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -91,6 +93,15 @@ std::size_t record_size(const std::vector<Column>& columns);
 // The same as text, shortest form that reads back as the same number.
 void append_rows_of_text(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
                          char separator, std::string& out);
+// All rows, block by block: append(begin, end, text) gives the bytes of some.
+void write_rows(
+    std::size_t rows, std::ostream& out,
+    const std::function<void(std::size_t begin, std::size_t end, std::string& text)>& append);
+
+// cloud_from_sensor in files: tx ty tz qw qx qy qz, as numbers and as words with a space before
+// each.
+std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
+std::string viewpoint_words(const Pose& viewpoint);
 
 inline constexpr std::size_t rows_a_chunk = 16384;  // that one thread takes
 
@@ -107,30 +118,37 @@ void for_each_stored(const Column& column, std::size_t rows, const Body& body) {
   }
 }
 
+// use(T{}), T being the type.
+template <typename Use>
+void with_type(StoredType type, const Use& use) {
+  switch (type) {
+    case StoredType::int8:
+      return use(std::int8_t{});
+    case StoredType::uint8:
+      return use(std::uint8_t{});
+    case StoredType::int16:
+      return use(std::int16_t{});
+    case StoredType::uint16:
+      return use(std::uint16_t{});
+    case StoredType::int32:
+      return use(std::int32_t{});
+    case StoredType::uint32:
+      return use(std::uint32_t{});
+    case StoredType::float32:
+      return use(float{});
+    case StoredType::float64:
+      return use(double{});
+    case StoredType::int64:
+      return use(std::int64_t{});
+    case StoredType::uint64:
+      return use(std::uint64_t{});
+  }
+}
+
 template <typename Body>
 void for_each_value(const Column& column, std::size_t rows, const Body& body) {
-  switch (column.stored) {
-    case StoredType::int8:
-      return for_each_stored<std::int8_t>(column, rows, body);
-    case StoredType::uint8:
-      return for_each_stored<std::uint8_t>(column, rows, body);
-    case StoredType::int16:
-      return for_each_stored<std::int16_t>(column, rows, body);
-    case StoredType::uint16:
-      return for_each_stored<std::uint16_t>(column, rows, body);
-    case StoredType::int32:
-      return for_each_stored<std::int32_t>(column, rows, body);
-    case StoredType::uint32:
-      return for_each_stored<std::uint32_t>(column, rows, body);
-    case StoredType::float32:
-      return for_each_stored<float>(column, rows, body);
-    case StoredType::float64:
-      return for_each_stored<double>(column, rows, body);
-    case StoredType::int64:
-      return for_each_stored<std::int64_t>(column, rows, body);
-    case StoredType::uint64:
-      return for_each_stored<std::uint64_t>(column, rows, body);
-  }
+  with_type(column.stored,
+            [&](auto number) { for_each_stored<decltype(number)>(column, rows, body); });
 }
 
 template <typename Body>

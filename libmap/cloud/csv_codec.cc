@@ -69,14 +69,9 @@ void encode_csv(const ColumnSet& columns, std::ostream& out) {
   Table header;
   for (const Column& column : columns.columns) header.columns.push_back(column.name);
   out << to_csv(header);
-  constexpr std::size_t rows_at_once = 65536;
-  std::string chunk;
-  for (std::size_t row = 0; row < columns.rows; row += rows_at_once) {
-    chunk.clear();
-    append_rows_of_text(columns.columns, row, std::min(columns.rows, row + rows_at_once), ',',
-                        chunk);
-    out.write(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-  }
+  write_rows(columns.rows, out, [&](std::size_t begin, std::size_t end, std::string& text) {
+    append_rows_of_text(columns.columns, begin, end, ',', text);
+  });
 }
 
 }  // namespace libmap

@@ -5,8 +5,6 @@
 #include <numbers>
 #include <utility>
 
-#include "libmap/core/error.h"
-
 namespace libmap {
 
 namespace {
@@ -307,8 +305,6 @@ DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
 
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options) {
-  if (depth.width != rays.width || depth.height != rays.height)
-    throw Error("depth image and rays differ in size");
   return PlaneFit(depth, rays, options).run();
 }
 

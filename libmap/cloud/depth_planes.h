@@ -52,7 +52,7 @@ struct DepthPlanes {
 // For each pixel those pairs of opposite neighbors whose mean agrees with it within the noise:
 // their mean inverse depth and its least-squares slopes. A pixel with too few such pairs, at the
 // edge of a surface, takes the plane next to it that predicts its depth within the noise; if there
-// is none, it is flying. Throws Error if image and rays differ in size.
+// is none, it is flying. Image and rays have one size.
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {});
 

@@ -53,26 +53,4 @@ std::shared_ptr<const PixelRays> PixelRayCache::rays_of(const Camera& camera) {
   return known_.back().second;
 }
 
-void require_size_of(const Camera& camera, int width, int height) {
-  if (width == camera.width && height == camera.height) return;
-  throw Error("a depth image is not of its camera's size",
-              {.field = "depth image",
-               .value = size_text(width, height),
-               .bound = size_text(camera.width, camera.height)});
-}
-
-std::vector<Eigen::Vector3d> back_project(const DepthImage& depth, const Camera& camera,
-                                          double min_depth_m, double max_depth_m) {
-  require_size_of(camera, depth.width, depth.height);
-  const std::vector<Eigen::Vector2d> rays = ray_table(camera);
-  std::vector<Eigen::Vector3d> points;
-  for (std::size_t n = 0; n < rays.size(); ++n) {
-    const auto z = static_cast<double>(depth.pixels[n]);
-    // Not true either where z is not a number.
-    if (!(z > 0.0 && z >= min_depth_m && z <= max_depth_m) || !rays[n].allFinite()) continue;
-    points.emplace_back(rays[n].x() * z, rays[n].y() * z, z);
-  }
-  return points;
-}
-
 }  // namespace libmap

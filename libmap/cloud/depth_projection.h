@@ -1,4 +1,4 @@
-// Depth images as points: the rays of a camera's pixels, and what they meet.
+// The rays of a camera's pixels.
 #pragma once
 
 #include <Eigen/Core>
@@ -44,14 +44,5 @@ class PixelRayCache {
   std::size_t max_pixels_;
   std::size_t pixels_ = 0;
 };
-
-// Every measurement with min_depth_m <= z <= max_depth_m as a point of the camera's optical frame:
-// x = z (u - cx) / fx, y = z (v - cy) / fy where the lens does not distort; by row and column.
-// Throws Error if the image is not of the camera's size.
-std::vector<Eigen::Vector3d> back_project(const DepthImage& depth, const Camera& camera,
-                                          double min_depth_m, double max_depth_m);
-
-// Throws Error if an image of that size does not belong to the camera.
-void require_size_of(const Camera& camera, int width, int height);
 
 }  // namespace libmap

@@ -248,15 +248,7 @@ void require_ranges(const GroundPlaneOptions& options) {
     throw Error("not a direction", {.field = "up", .bound = "finite, of some length"});
 }
 
-// Finite points, and evenly drawn ones of them in random order.
-Points finite_points(const Points& points) {
-  Points finite;
-  finite.reserve(points.size());
-  for (const Eigen::Vector3d& point : points)
-    if (point.allFinite()) finite.push_back(point);
-  return finite;
-}
-
+// Evenly drawn points in random order.
 Points drawn_points(const Points& points, std::uint64_t seed) {
   RandomStream random(seed, points_stream);
   Points drawn;
@@ -301,11 +293,10 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                               const GroundPlaneOptions& options) {
   require_ranges(options);
   const Eigen::Vector3d up = options.up.normalized();
-  const Points finite = finite_points(points);
-  require_plane_spread(finite);
+  require_plane_spread(points);
   double largest_share = 0.0;
   const std::vector<Candidate> candidates =
-      find_candidates(drawn_points(finite, options.seed), options, up, largest_share);
+      find_candidates(drawn_points(points, options.seed), options, up, largest_share);
   if (candidates.empty())
     throw Error("no plane within " + to_text(options.max_tilt_deg) + " degrees of up, (" +
                     to_text(up.x()) + ", " + to_text(up.y()) + ", " + to_text(up.z()) +
@@ -316,12 +307,12 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
   const Candidate* ground = &candidates.front();
   for (const Candidate& other : candidates)
     if (&other != ground && lies_under(other, *ground, up, options.tolerance_m)) ground = &other;
-  const Plane plane = fit_robustly(finite, ground->plane, up, options.tolerance_m);
+  const Plane plane = fit_robustly(points, ground->plane, up, options.tolerance_m);
   GroundPlane result;
   result.normal = plane.normal;
   double squares = 0.0;
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3d& point : finite) {
+  for (const Eigen::Vector3d& point : points) {
     const double height = plane.height(point);
     if (std::abs(height) > options.tolerance_m) continue;
     ++result.inliers;
@@ -336,7 +327,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
     result.center += mean - plane.normal.dot(mean) * plane.normal;
   }
   result.offset_m = result.normal.dot(result.center);
-  result.share = count / static_cast<double>(finite.size());
+  result.share = count / static_cast<double>(points.size());
   result.tilt_deg = degrees_between(result.normal, up);
   return result;
 }

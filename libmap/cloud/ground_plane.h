@@ -34,7 +34,7 @@ struct GroundPlane {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();   // of the inliers, on the plane
   double rmse_m = 0.0;                                // of the inliers
   std::size_t inliers = 0;                            // points within the tolerance
-  double share = 0.0;                                 // of all finite points
+  double share = 0.0;                                 // of all points
   double tilt_deg = 0.0;                              // of the normal from `up`
 };
 
@@ -42,9 +42,9 @@ struct GroundPlane {
 // RANSAC (Fischler and Bolles 1981) among the points that the ones before do not hold; the ground
 // is the one that the others lie above. It is then fitted to its inliers by least squares with
 // Tukey's weights until it stands still, so that the feet of rocks do not lift it. Every point
-// counts alike: give points that are spread evenly over the surface. Points that are not finite are
-// passed over. The same for any number of threads. Throws Error: options out of their ranges, fewer
-// than three finite points, all on one line, no plane.
+// counts alike: give finite points that are spread evenly over the surface. The same for any number
+// of threads. Throws Error: options out of their ranges, fewer than three points, all on one line,
+// no plane.
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                               const GroundPlaneOptions& options = {});
 

@@ -2,15 +2,14 @@
 
 #include <algorithm>
 #include <array>
+#include <boost/pending/disjoint_sets.hpp>
 #include <cmath>
 #include <cstdint>
 #include <functional>
-#include <numeric>
 #include <optional>
 #include <string>
 #include <tuple>
 
-#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
@@ -56,27 +55,6 @@ struct GraphEdge {
   float turn;  // 1 - |cosine| between the normals
   std::uint32_t a;
   std::uint32_t b;
-};
-
-// Groups that are joined (Tarjan 1975).
-class Groups {
- public:
-  explicit Groups(std::size_t count) : parent_(count) {
-    std::iota(parent_.begin(), parent_.end(), 0U);
-  }
-  std::uint32_t root(std::uint32_t n) {
-    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-  bool join(std::uint32_t a, std::uint32_t b) {
-    a = root(a);
-    b = root(b);
-    parent_[std::max(a, b)] = std::min(a, b);
-    return a != b;
-  }
-
- private:
-  std::vector<std::uint32_t> parent_;
 };
 
 class SpanningTree {
@@ -141,10 +119,15 @@ void SpanningTree::choose_tree() {
   std::sort(edges_.begin(), edges_.end(), [](const GraphEdge& one, const GraphEdge& two) {
     return std::tie(one.turn, one.a, one.b) < std::tie(two.turn, two.a, two.b);
   });
-  Groups groups(normals_.size());
+  boost::disjoint_sets_with_storage<> groups(normals_.size());
   std::vector<GraphEdge> kept;
-  for (const GraphEdge& edge : edges_)
-    if (groups.join(edge.a, edge.b)) kept.push_back(edge);
+  for (const GraphEdge& edge : edges_) {
+    const std::size_t a = groups.find_set(edge.a);
+    const std::size_t b = groups.find_set(edge.b);
+    if (a == b) continue;
+    groups.link(a, b);
+    kept.push_back(edge);
+  }
   edges_.clear();
   starts_.assign(normals_.size() + 1, 0);
   for (const GraphEdge& edge : kept) {
@@ -222,8 +205,6 @@ NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options) {
   check_parameters(options);
   cloud.check();
-  for (const Eigen::Vector3d& position : cloud.positions)
-    if (!position.allFinite()) throw Error("a position is not finite");
   NormalEstimationResult result;
   result.normals.resize(cloud.size());
   const PointTree tree(cloud.positions);

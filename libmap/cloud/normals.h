@@ -38,7 +38,7 @@ struct NormalEstimationResult {
 // minimum spanning tree of the graph of neighbors, by which the least turning neighbor decides
 // (section 3.3); of each part they are such that it looks away from its middle or, where it rather
 // has an up than an outside, up. The same for any number of threads. Throws Error: an option out of
-// its range, a position that is not finite.
+// its range.
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options = {});
 

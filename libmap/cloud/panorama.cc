@@ -4,7 +4,6 @@
 #include <optional>
 #include <utility>
 
-#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 
 namespace libmap {
@@ -121,20 +120,6 @@ class ViewProjection {
   const PanoramaOptions& options_;
 };
 
-void check(const PanoramaView& view) {
-  try {
-    view.camera.check();
-  } catch (const Error& error) {
-    throw error.in_file(view.name);
-  }
-  if (view.depth.width != view.camera.width || view.depth.height != view.camera.height)
-    throw Error("does not fit its calibration",
-                {.file = view.name,
-                 .field = "image size",
-                 .value = size_text(view.depth.width, view.depth.height),
-                 .bound = size_text(view.camera.width, view.camera.height)});
-}
-
 }  // namespace
 
 void bind(ParameterTable& table, PanoramaOptions& options) {
@@ -153,7 +138,6 @@ PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
   PanoramaResult result;
   std::vector<double> camera;
   for (const PanoramaView& view : views) {
-    check(view);
     const ViewProjection projection(view, options);
     const int rows_in_steps = (view.depth.height - 1) / options.stride_px + 1;
     const auto rows = static_cast<std::size_t>(rows_in_steps);

@@ -51,8 +51,8 @@ struct PanoramaResult {
 };
 
 // Back-projection (thesis eq. 2-12: x = (u - cx) d / fx, y = (v - cy) d / fy, z = d, with the lens
-// distortion removed first), then robot_from_camera (eq. 3-1 to 3-4). Throws Error naming the
-// camera whose image has another size than its calibration.
+// distortion removed first), then robot_from_camera (eq. 3-1 to 3-4). Images are as large as their
+// calibrations say.
 PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
                              const PanoramaOptions& options = {});
 

@@ -42,9 +42,8 @@ using HeaderLines = std::map<std::string, std::vector<std::string>, std::less<>>
 
 Error bad_header(const std::string& reason, const std::string& key, const std::string& text = {},
                  const std::string& bound = {}) {
-  return Error(
-      reason,
-      {.file = {}, .field = "header line " + key, .value = text.substr(0, 80), .bound = bound});
+  return Error(reason,
+               {.field = "header line " + key, .value = text.substr(0, 80), .bound = bound});
 }
 
 std::uint64_t header_count(const std::string& key, const std::string& word, std::uint64_t min) {
@@ -78,7 +77,7 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
     const bool is_data = key == "DATA";
     if (!is_data && std::find(known.begin(), known.end(), key) == known.end())
       throw Error(lines.empty() ? "not a PCD file" : "unknown line in the PCD header",
-                  {.file = {}, .field = "line " + std::to_string(header.data_line - 1)});
+                  {.field = "line " + std::to_string(header.data_line - 1)});
     if (key == "COLUMNS") key = "FIELDS";
     if (!lines.try_emplace(key, words.begin() + 1, words.end()).second)
       throw bad_header("is a duplicate", key);
@@ -118,8 +117,7 @@ StoredType stored_type(const std::string& type, const std::string& size, const s
   const auto found = types.find(type + size);
   if (found == types.end())
     throw Error("no such number type",
-                {.file = {},
-                 .field = "TYPE and SIZE of field '" + name.substr(0, 40) + "'",
+                {.field = "TYPE and SIZE of field '" + name.substr(0, 40) + "'",
                  .value = (type + " " + size).substr(0, 80),
                  .bound = "I or U with 1, 2, 4 or 8, or F with 4 or 8"});
   return found->second;
@@ -361,7 +359,7 @@ void require_name(const Column& column, bool is_color) {
   const bool reserved = column.name == "_" || column.name == "rgb" || column.name == "rgba";
   if ((reserved && !is_color) || column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
     throw Error("this name cannot be used in a PCD header",
-                {.file = {}, .field = "field '" + column.name + "'"});
+                {.field = "field '" + column.name + "'"});
 }
 
 std::string header_text(const ColumnSet& set, const Pose& viewpoint, FileEncoding encoding) {
@@ -373,16 +371,11 @@ std::string header_text(const ColumnSet& set, const Pose& viewpoint, FileEncodin
     types += type.front() == 'f' ? " F" : type.front() == 'u' ? " U" : " I";
     counts += " 1";
   }
-  const Eigen::Quaterniond q(viewpoint.rotation());
-  const Eigen::Vector3d t = viewpoint.translation();
-  std::string sensor;
-  for (const double number : {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()})
-    sensor += " " + to_text(number);
   const std::string points = std::to_string(set.rows);
   return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS" + names + "\nSIZE" +
          sizes + "\nTYPE" + types + "\nCOUNT" + counts + "\nWIDTH " + points +
-         "\nHEIGHT 1\nVIEWPOINT" + sensor + "\nPOINTS " + points + "\nDATA " + to_text(encoding) +
-         "\n";
+         "\nHEIGHT 1\nVIEWPOINT" + viewpoint_words(viewpoint) + "\nPOINTS " + points + "\nDATA " +
+         to_text(encoding) + "\n";
 }
 
 void write_compressed(const ColumnSet& set, std::ostream& out) {
@@ -390,9 +383,8 @@ void write_compressed(const ColumnSet& set, std::ostream& out) {
   const std::uint64_t size = static_cast<std::uint64_t>(record_size(set.columns)) * set.rows;
   // The buffer for LZF's output, half as large again, is counted in 32 bits as well.
   if (size / 2 * 3 + 16 > std::numeric_limits<std::uint32_t>::max())
-    throw Error(
-        "too large for binary_compressed PCD; write it as binary",
-        {.file = {}, .field = "data", .value = std::to_string(size) + " bytes", .bound = {}});
+    throw Error("too large for binary_compressed PCD; write it as binary",
+                {.field = "data", .value = std::to_string(size) + " bytes"});
   data.reserve(size);
   for (const Column& column : set.columns) append_records({column}, 0, set.rows, false, data);
   std::string compressed(size + size / 2 + 16, '\0');
@@ -457,17 +449,12 @@ void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding en
   const ColumnSet set = with_packed_color(columns);
   out << header_text(set, viewpoint, encoding);
   if (encoding == FileEncoding::binary_compressed) return write_compressed(set, out);
-  constexpr std::size_t rows_at_once = 65536;
-  std::string chunk;
-  for (std::size_t row = 0; row < set.rows; row += rows_at_once) {
-    chunk.clear();
-    const std::size_t end = std::min(set.rows, row + rows_at_once);
+  write_rows(set.rows, out, [&](std::size_t begin, std::size_t end, std::string& text) {
     if (encoding == FileEncoding::ascii)
-      append_rows_of_text(set.columns, row, end, ' ', chunk);
+      append_rows_of_text(set.columns, begin, end, ' ', text);
     else
-      append_records(set.columns, row, end, false, chunk);
-    out.write(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-  }
+      append_records(set.columns, begin, end, false, text);
+  });
 }
 
 }  // namespace libmap

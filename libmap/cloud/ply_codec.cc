@@ -244,7 +244,7 @@ void write_header(const PlyContent& content, const PlyEncoding& encoding, std::o
                                 : "binary_little_endian")
       << " 1.0\n";
   if (content.viewpoint != nullptr && !content.viewpoint->matrix().isIdentity(0.0))
-    out << ply_viewpoint_comment(*content.viewpoint);
+    out << "comment viewpoint" << viewpoint_words(*content.viewpoint) << '\n';
   out << "element vertex " << std::to_string(content.vertices->rows) << '\n';
   write_property_lines(*content.vertices, out);
   if (content.triangles != nullptr) {
@@ -255,24 +255,14 @@ void write_header(const PlyContent& content, const PlyEncoding& encoding, std::o
   out << "end_header\n";
 }
 
-void append_rows(const std::vector<Column>& columns, std::size_t begin, std::size_t end,
-                 const PlyEncoding& encoding, std::string& out) {
-  const bool swap_bytes = encoding.big_endian == (std::endian::native == std::endian::little);
-  if (encoding.ascii)
-    append_rows_of_text(columns, begin, end, ' ', out);
-  else
-    append_records(columns, begin, end, swap_bytes, out);
-}
-
-constexpr std::size_t rows_at_once = 65536;
-
 void write_rows(const ColumnSet& set, const PlyEncoding& encoding, std::ostream& out) {
-  std::string chunk;
-  for (std::size_t row = 0; row < set.rows; row += rows_at_once) {
-    chunk.clear();
-    append_rows(set.columns, row, std::min(set.rows, row + rows_at_once), encoding, chunk);
-    out.write(chunk.data(), static_cast<std::streamsize>(chunk.size()));
-  }
+  const bool swap_bytes = encoding.big_endian == (std::endian::native == std::endian::little);
+  libmap::write_rows(set.rows, out, [&](std::size_t begin, std::size_t end, std::string& text) {
+    if (encoding.ascii)
+      append_rows_of_text(set.columns, begin, end, ' ', text);
+    else
+      append_records(set.columns, begin, end, swap_bytes, text);
+  });
 }
 
 // A list of three is written as four numbers: its length, and the corners.

@@ -146,13 +146,4 @@ PlyHeader read_ply_header(std::string_view text) {
 
 std::string ply_type_name(ScalarType type) { return type_names[static_cast<std::size_t>(type)]; }
 
-std::string ply_viewpoint_comment(const Pose& viewpoint) {
-  const Eigen::Quaterniond q(viewpoint.rotation());
-  const Eigen::Vector3d t = viewpoint.translation();
-  std::string text = "comment viewpoint";
-  for (const double number : {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()})
-    text += " " + to_text(number);
-  return text + "\n";
-}
-
 }  // namespace libmap

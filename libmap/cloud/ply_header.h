@@ -46,6 +46,5 @@ PlyHeader read_ply_header(std::string_view text);
 
 // "char", "uchar", ... "double".
 std::string ply_type_name(ScalarType type);
-std::string ply_viewpoint_comment(const Pose& viewpoint);
 
 }  // namespace libmap

@@ -32,31 +32,6 @@ const char* take(const char* at, T& value) {
   return at + sizeof(T);
 }
 
-// Places in the order of all points, and where the points are; ascending runs one after the other.
-struct Order {
-  struct Item {
-    std::uint64_t place = 0;
-    std::size_t index = 0;
-  };
-  std::vector<Item> items;
-  std::vector<std::size_t> ends;  // of the runs
-
-  void merge_runs() {
-    const auto at = [&](std::size_t n) { return items.begin() + static_cast<std::ptrdiff_t>(n); };
-    const auto is_before = [](const Item& a, const Item& b) { return a.place < b.place; };
-    while (ends.size() > 1) {
-      std::vector<std::size_t> merged;
-      for (std::size_t r = 0; r < ends.size(); r += 2) {
-        const std::size_t begin = r == 0 ? 0 : ends[r - 1];
-        const std::size_t last = std::min(r + 1, ends.size() - 1);
-        std::inplace_merge(at(begin), at(ends[r]), at(ends[last]), is_before);
-        merged.push_back(ends[last]);
-      }
-      ends = std::move(merged);
-    }
-  }
-};
-
 }  // namespace
 
 PointSpool::PointSpool(std::filesystem::path folder, const PointSpoolOptions& options)
@@ -147,28 +122,26 @@ void PointSpool::for_squares_in(const Eigen::Vector2d& low, const Eigen::Vector2
 
 PointCloud PointSpool::points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
   PointCloud found;
-  Order order;
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;  // place, and index in `found`
   std::vector<char> bytes;
   for_squares_in(low, high, [&](const Records& records) {
     read_square(records, bytes);
     for (const char* at = bytes.data(); at < bytes.data() + bytes.size(); at += record_bytes_) {
-      Order::Item item;
+      std::uint64_t place = 0;
       Eigen::Vector3d position;
-      const char* rest = take(take(at, item.place), position);
+      const char* rest = take(take(at, place), position);
       if (!(position.x() >= low.x() && position.x() <= high.x() && position.y() >= low.y() &&
             position.y() <= high.y()))
         continue;
-      item.index = found.size();
-      order.items.push_back(item);
+      order.emplace_back(place, found.size());
       found.positions.push_back(position);
       if (options_.has_normals) take(rest, found.normals.emplace_back());
     }
-    order.ends.push_back(order.items.size());
   });
-  order.merge_runs();
+  std::sort(order.begin(), order.end());
   std::vector<std::size_t> indices;
-  indices.reserve(order.items.size());
-  for (const Order::Item& item : order.items) indices.push_back(item.index);
+  indices.reserve(order.size());
+  for (const auto& [place, index] : order) indices.push_back(index);
   return libmap::select_points(found, indices);
 }
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <opencv2/imgproc.hpp>
 #include <optional>
 #include <string>
 
@@ -68,26 +69,6 @@ struct Ground {
   }
 };
 
-// Every cell within `reach` cells of a set one, along both axes.
-Mask dilated(const Mask& mask, int reach) {
-  const AreaTable table(mask);
-  Mask result(mask.width, mask.height);
-  for (int y = 0; y < mask.height; ++y)
-    for (int x = 0; x < mask.width; ++x) {
-      const int left = std::max(x - reach, 0);
-      const int low = std::max(y - reach, 0);
-      const int right = std::min(x + reach, mask.width - 1);
-      const int high = std::min(y + reach, mask.height - 1);
-      result.at(x, y) = table.sum(left, low, right - left + 1, high - low + 1) > 0 ? 1 : 0;
-    }
-  return result;
-}
-
-Mask inverted(Mask mask) {
-  for (std::uint8_t& cell : mask.pixels) cell = cell == 0 ? 1 : 0;
-  return mask;
-}
-
 Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptions& options) {
   Ground ground;
   Vector2d low = points.front();
@@ -112,7 +93,10 @@ Ground make_ground(const std::vector<Vector2d>& points, const SiteRectangleOptio
     ground.mask.at(std::min(static_cast<int>(index.x()), ground.mask.width - 1),
                    std::min(static_cast<int>(index.y()), ground.mask.height - 1)) = 1;
   }
-  if (reach > 0) ground.mask = inverted(dilated(inverted(dilated(ground.mask, reach)), reach));
+  cv::Mat cells_of_mask(ground.mask.height, ground.mask.width, CV_8UC1, ground.mask.pixels.data());
+  const cv::Size square(2 * reach + 1, 2 * reach + 1);
+  cv::morphologyEx(cells_of_mask, cells_of_mask, cv::MORPH_CLOSE,
+                   cv::getStructuringElement(cv::MORPH_RECT, square));
   return ground;
 }
 
@@ -269,11 +253,8 @@ void bind(ParameterTable& table, SiteRectangleOptions& options) {
 SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vector2d& size_m,
                                   const SiteRectangleOptions& options) {
   require_ranges(size_m, options);
-  std::vector<Vector2d> finite;
-  for (const Vector2d& point : points)
-    if (point.allFinite()) finite.push_back(point);
-  if (finite.empty()) throw Error("there are no data to lay a site into");
-  const Ground ground = make_ground(finite, options);
+  if (points.empty()) throw Error("there are no data to lay a site into");
+  const Ground ground = make_ground(points, options);
   if (ground.cell > std::max(options.cell_m, size_m.minCoeff() / min_on_a_site))
     throw Error("the data reach too far for a site of this size: are there stray points?",
                 {.field = "size of the data",

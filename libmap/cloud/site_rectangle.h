@@ -25,7 +25,7 @@ struct SiteRectangle {
 // clearance, over all places and directions; among equals the least turned, in their middle.
 // `points` are the data seen from above, spread so densely that no gap between neighbors is as
 // wide as max_gap_m. A rectangle fits if no more than one cell is missing. Throws Error: options
-// out of their ranges, no finite point, none fits (it names the largest that does).
+// out of their ranges, no point, none fits (it names the largest that does).
 SiteRectangle find_site_rectangle(const std::vector<Eigen::Vector2d>& points,
                                   const Eigen::Vector2d& size_m,
                                   const SiteRectangleOptions& options = {});

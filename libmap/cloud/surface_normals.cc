@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "libmap/cloud/surface_voxels.h"
-#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 
 namespace libmap {
@@ -119,8 +118,6 @@ Eigen::Vector3f fitted_normal(const Neighbor& point, const std::vector<Neighbor>
 }  // namespace
 
 void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m) {
-  if (deviations_m.size() != cloud.size() || cloud.normals.size() != cloud.size())
-    throw Error("normals are fitted to points with normals and deviations");
   if (cloud.empty()) return;
   const NeighborCells cells(cloud, radius_m, deviations_m);
   std::vector<Eigen::Vector3f> fitted(cloud.size());

@@ -49,25 +49,9 @@ class ClassicLocale {
 };
 
 int vtk_type_of(ScalarType type) {
-  switch (type) {
-    case ScalarType::int8:
-      return VTK_SIGNED_CHAR;
-    case ScalarType::uint8:
-      return VTK_UNSIGNED_CHAR;
-    case ScalarType::int16:
-      return VTK_SHORT;
-    case ScalarType::uint16:
-      return VTK_UNSIGNED_SHORT;
-    case ScalarType::int32:
-      return VTK_INT;
-    case ScalarType::uint32:
-      return VTK_UNSIGNED_INT;
-    case ScalarType::float32:
-      return VTK_FLOAT;
-    case ScalarType::float64:
-      return VTK_DOUBLE;
-  }
-  return VTK_DOUBLE;
+  constexpr std::array types = {VTK_SIGNED_CHAR, VTK_UNSIGNED_CHAR, VTK_SHORT, VTK_UNSIGNED_SHORT,
+                                VTK_INT,         VTK_UNSIGNED_INT,  VTK_FLOAT, VTK_DOUBLE};
+  return types[static_cast<std::size_t>(type)];
 }
 
 // Columns of one type as an array with a part for each.
@@ -127,12 +111,9 @@ void set_cells(const VtpContent& content, vtkPolyData& data) {
 
 void set_viewpoint(const Pose& viewpoint, vtkPolyData& data) {
   if (viewpoint.matrix().isIdentity(0.0)) return;
-  const Eigen::Quaterniond q(viewpoint.rotation());
-  const Eigen::Vector3d t = viewpoint.translation();
   vtkNew<vtkDoubleArray> array;
   array->SetName("viewpoint");
-  for (const double number : {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()})
-    array->InsertNextValue(number);
+  for (const double number : viewpoint_numbers(viewpoint)) array->InsertNextValue(number);
   data.GetFieldData()->AddArray(array);
 }
 

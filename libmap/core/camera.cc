@@ -119,19 +119,6 @@ void Camera::check() const {
     refuse("number of distortion terms", static_cast<double>(n), "4, 5, 8 or 12");
 }
 
-Camera scale_camera(const Camera& camera, int width, int height) {
-  Camera scaled = camera;
-  const double sx = static_cast<double>(width) / camera.width;
-  const double sy = static_cast<double>(height) / camera.height;
-  scaled.width = width;
-  scaled.height = height;
-  scaled.fx = camera.fx * sx;
-  scaled.fy = camera.fy * sy;
-  if (width != camera.width) scaled.cx = (camera.cx + 0.5) * sx - 0.5;
-  if (height != camera.height) scaled.cy = (camera.cy + 0.5) * sy - 0.5;
-  return scaled;
-}
-
 Camera without_distortion(Camera camera) {
   camera.distortion_model = DistortionModel::none;
   camera.distortion.clear();

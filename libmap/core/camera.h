@@ -37,10 +37,6 @@ struct Camera {
   void check() const;
 };
 
-// The same camera with its image resampled to another size. Pixels are areas: the image's edges,
-// half a pixel outside the centers of its border pixels, stay where they are.
-Camera scale_camera(const Camera& camera, int width, int height);
-
 // The same camera without its distortion.
 Camera without_distortion(Camera camera);
 

@@ -35,4 +35,10 @@ Error Error::in_file(const std::string& file) const {
   return Error(reason_, std::move(context), kind_);
 }
 
+Error Error::in_field(const std::string& place, const char* joint) const {
+  ErrorContext context = context_;
+  context.field = context.field.empty() ? place : place + joint + context.field;
+  return Error(reason_, std::move(context), kind_);
+}
+
 }  // namespace libmap

@@ -30,6 +30,8 @@ class Error : public std::runtime_error {
 
   // The same error naming `file`, unless it names one already.
   Error in_file(const std::string& file) const;
+  // The same error of a field within `place`: "PLACE: FIELD", or the place where it names no field.
+  Error in_field(const std::string& place, const char* joint = ": ") const;
 
  private:
   std::string reason_;

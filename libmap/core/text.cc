@@ -5,6 +5,7 @@
 #include <charconv>
 #include <limits>
 #include <numeric>
+#include <utility>
 
 namespace libmap {
 
@@ -37,6 +38,8 @@ std::string_view without_plus(std::string_view text) {
   return text.size() > 1 && text[0] == '+' && text[1] != '-' ? text.substr(1) : text;
 }
 
+}  // namespace
+
 std::string lower_case(std::string_view text) {
   std::string lower(text);
   // Not std::tolower: it follows the locale.
@@ -44,8 +47,6 @@ std::string lower_case(std::string_view text) {
     if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
   return lower;
 }
-
-}  // namespace
 
 std::string to_text(double value) { return shortest_text(value); }
 std::string to_text(float value) { return shortest_text(value); }
@@ -99,6 +100,12 @@ std::optional<std::int64_t> parse_integer(std::string_view text) {
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
   return value;
+}
+
+std::optional<int> parse_int(std::string_view text) {
+  const std::optional<std::int64_t> value = parse_integer(text);
+  return value && std::in_range<int>(*value) ? std::optional(static_cast<int>(*value))
+                                             : std::nullopt;
 }
 
 std::optional<bool> parse_bool(std::string_view text) {

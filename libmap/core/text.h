@@ -19,10 +19,12 @@ std::string to_fixed_text(double value, int decimals);
 // The whole of `text` (spaces around it allowed) as a number, or nothing.
 std::optional<double> parse_double(std::string_view text);
 std::optional<std::int64_t> parse_integer(std::string_view text);
+std::optional<int> parse_int(std::string_view text);
 // true/false, yes/no, on/off, 1/0.
 std::optional<bool> parse_bool(std::string_view text);
 
-std::string_view trim(std::string_view text);  // without white space at both ends
+std::string_view trim(std::string_view text);   // without white space at both ends
+std::string lower_case(std::string_view text);  // of ASCII
 
 // "a, b,,c" -> a, b, c.
 std::vector<std::string> split_list(std::string_view text);

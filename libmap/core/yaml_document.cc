@@ -3,12 +3,14 @@
 #include <yaml-cpp/eventhandler.h>
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <map>
+#include <set>
 #include <sstream>
 #include <utility>
 #include <vector>
 
-#include "libmap/core/error.h"
+#include "libmap/core/text.h"
 
 namespace libmap {
 
@@ -88,6 +90,25 @@ void read_yaml(const std::string& text, const std::string& file,
   } catch (const Error& error) {
     throw error.in_file(file);
   }
+}
+
+void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
+                const std::string& whose) {
+  std::set<std::string> seen;
+  for (const auto& entry : map) {
+    if (!entry.first.IsScalar()) throw Error("a key is not a name");
+    const std::string& key = entry.first.Scalar();
+    if (std::find(known.begin(), known.end(), key) == known.end())
+      throw Error("unknown key" + whose + did_you_mean(key, known), {.field = key});
+    if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
+  }
+}
+
+Error at_node(const Error& error, const std::string& place, const YAML::Node& node) {
+  ErrorContext context = error.in_field(place, ".").context();
+  if (!node.Mark().is_null())
+    context.field += " (line " + std::to_string(node.Mark().line + 1) + ")";
+  return Error(error.reason(), context);
 }
 
 }  // namespace libmap

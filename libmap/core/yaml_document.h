@@ -4,6 +4,9 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <vector>
+
+#include "libmap/core/error.h"
 
 namespace YAML {
 class Node;
@@ -18,5 +21,13 @@ inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 // `file` where the text is no YAML or holds more documents, and names `file` in what `read` throws.
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read);
+
+// Each key of the map known and there once: YAML itself lets the first or the last of two stand.
+// Throws Error: another one, of which it says "unknown key" and then `whose`.
+void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
+                const std::string& whose = "");
+
+// The error of what `node` holds, at PLACE.FIELD (line N).
+Error at_node(const Error& error, const std::string& place, const YAML::Node& node);
 
 }  // namespace libmap

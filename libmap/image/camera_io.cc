@@ -125,40 +125,6 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
   camera.distortion = terms;
 }
 
-Pose pose_of(const YAML::Node& node, const std::string& field) {
-  const std::vector<double> m = matrix_of(node, field);
-  if (m.size() != 12 && m.size() != 16)
-    refuse(field, std::to_string(m.size()) + " numbers", "wrong size", "3 x 4 or 4 x 4");
-  Pose pose = Pose::Identity();
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column)
-      pose.matrix()(row, column) =
-          m[4 * static_cast<std::size_t>(row) + static_cast<std::size_t>(column)];
-  const Eigen::Matrix3d written = pose.linear();
-  const Eigen::Matrix3d rotation = nearest_rotation(written);
-  const double deviation = (rotation - written).cwiseAbs().maxCoeff();
-  if (!(deviation <= 1e-3))
-    refuse(field, "off by " + to_text(deviation), "its 3 x 3 part is no rotation", "<= 0.001");
-  // Exact numbers stay as they are.
-  if (deviation > 1e-9) pose.linear() = rotation;
-  return pose;
-}
-
-CameraFile camera_of(const YAML::Node& root) {
-  if (!root.IsMap()) throw Error("a camera is a map of keys and values");
-  CameraFile file;
-  if (root["camera_name"] && root["camera_name"].IsScalar())
-    file.name = root["camera_name"].Scalar();
-  file.camera.width = side_of(root, "image_width");
-  file.camera.height = side_of(root, "image_height");
-  read_matrix(root, file.camera);
-  read_distortion(root, file.camera);
-  if (root["local_transform"])
-    file.camera.base_from_camera = pose_of(root["local_transform"], "local_transform");
-  file.camera.check();
-  return file;
-}
-
 // As cv::FileStorage, which does not take a flow map after a tag.
 std::string matrix_text(const std::string& key, int rows, int cols,
                         const std::vector<double>& numbers) {
@@ -188,9 +154,43 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
+Pose pose_from_yaml(const YAML::Node& node, const std::string& field) {
+  const std::vector<double> m = matrix_of(node, field);
+  if (m.size() != 12 && m.size() != 16)
+    refuse(field, std::to_string(m.size()) + " numbers", "wrong size", "3 x 4 or 4 x 4");
+  Pose pose = Pose::Identity();
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column)
+      pose.matrix()(row, column) =
+          m[4 * static_cast<std::size_t>(row) + static_cast<std::size_t>(column)];
+  const Eigen::Matrix3d written = pose.linear();
+  const Eigen::Matrix3d rotation = nearest_rotation(written);
+  const double deviation = (rotation - written).cwiseAbs().maxCoeff();
+  if (!(deviation <= 1e-3))
+    refuse(field, "off by " + to_text(deviation), "its 3 x 3 part is no rotation", "<= 0.001");
+  // Exact numbers stay as they are.
+  if (deviation > 1e-9) pose.linear() = rotation;
+  return pose;
+}
+
+CameraFile camera_from_yaml(const YAML::Node& root) {
+  if (!root.IsMap()) throw Error("a camera is a map of keys and values");
+  CameraFile file;
+  if (root["camera_name"] && root["camera_name"].IsScalar())
+    file.name = root["camera_name"].Scalar();
+  file.camera.width = side_of(root, "image_width");
+  file.camera.height = side_of(root, "image_height");
+  read_matrix(root, file.camera);
+  read_distortion(root, file.camera);
+  if (root["local_transform"])
+    file.camera.base_from_camera = pose_from_yaml(root["local_transform"], "local_transform");
+  file.camera.check();
+  return file;
+}
+
 CameraFile parse_camera(const std::string& text, const std::string& file) {
   CameraFile camera;
-  read_yaml(text, file, [&](const YAML::Node& root) { camera = camera_of(root); });
+  read_yaml(text, file, [&](const YAML::Node& root) { camera = camera_from_yaml(root); });
   return camera;
 }
 
@@ -200,7 +200,6 @@ CameraFile read_camera(const std::filesystem::path& path) {
 
 std::string to_yaml(const CameraFile& file, const std::string& comment) {
   const Camera& camera = file.camera;
-  camera.check();
   std::string text = "%YAML:1.0\n---\n";
   std::istringstream lines(comment);
   for (std::string line; std::getline(lines, line);) text += "# " + line + "\n";

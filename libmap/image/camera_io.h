@@ -28,6 +28,10 @@
 
 #include "libmap/core/camera.h"
 
+namespace YAML {
+class Node;
+}
+
 namespace libmap {
 
 struct CameraFile {
@@ -39,6 +43,9 @@ struct CameraFile {
 // matrix of another size, skew, a transform that is no rotation, terms that are no known model's.
 CameraFile parse_camera(const std::string& text, const std::string& file);
 CameraFile read_camera(const std::filesystem::path& path);
+CameraFile camera_from_yaml(const YAML::Node& root);
+// Of a matrix of 3 x 4 or 4 x 4.
+Pose pose_from_yaml(const YAML::Node& matrix, const std::string& field);
 
 // Text that parse_camera reads back as the same numbers, and cv::FileStorage and RTAB-Map as well.
 // `comment` stands at its head, line by line.

@@ -141,10 +141,6 @@ void decode_jpeg(std::string_view bytes, const ImageInfo& info, int pixel_format
 std::string encode_jpeg(const std::uint8_t* pixels, int width, int height, int pixel_format,
                         int subsampling, int quality) {
   if (width <= 0 || height <= 0) throw Error("an empty image cannot be written");
-  if (quality < 1 || quality > 100)
-    throw Error(
-        "no such JPEG quality",
-        {.field = "jpeg_quality", .value = std::to_string(quality), .bound = ">= 1 and <= 100"});
   const JpegHandle handle(tjInitCompress(), &tjDestroy);
   if (!handle) throw Error("libjpeg-turbo cannot be used", {}, ErrorKind::failed);
   unsigned char* buffer = nullptr;

@@ -120,18 +120,11 @@ StoredMatrix decode_matrix(std::string_view blob) {
 }
 
 std::string encode_matrix(const StoredMatrix& matrix) {
-  const std::uint64_t wanted =
-      static_cast<std::uint64_t>(matrix.rows) * static_cast<std::uint64_t>(matrix.columns) *
-      static_cast<std::uint64_t>(matrix.channels) * bytes_of(matrix.element);
-  if (matrix.bytes.size() != wanted)
-    throw Error(
-        "matrix whose bytes do not fit its size",
-        {.value = std::to_string(matrix.bytes.size()) + " bytes", .bound = std::to_string(wanted)});
-  uLongf size = compressBound(static_cast<uLong>(wanted));
+  const auto wanted = static_cast<uLong>(matrix.bytes.size());
+  uLongf size = compressBound(wanted);
   std::string blob(size, '\0');
-  const int result =
-      compress(reinterpret_cast<Bytef*>(blob.data()), &size,
-               reinterpret_cast<const Bytef*>(matrix.bytes.data()), static_cast<uLong>(wanted));
+  const int result = compress(reinterpret_cast<Bytef*>(blob.data()), &size,
+                              reinterpret_cast<const Bytef*>(matrix.bytes.data()), wanted);
   if (result != Z_OK) throw Error(zError(result), {}, ErrorKind::failed);
   blob.resize(size);
   append_int32(blob, matrix.rows);
@@ -147,16 +140,6 @@ std::string decode_compressed_text(std::string_view blob) {
   std::string text = std::move(matrix.bytes);
   text.resize(std::strlen(text.c_str()));
   return text;
-}
-
-std::string encode_compressed_text(std::string_view text) {
-  StoredMatrix matrix{.rows = 1,
-                      .columns = static_cast<int>(text.size() + 1),
-                      .channels = 1,
-                      .element = MatrixElement::int8,
-                      .bytes = std::string(text)};
-  matrix.bytes.push_back('\0');
-  return encode_matrix(matrix);
 }
 
 }  // namespace libmap

@@ -61,6 +61,5 @@ std::string encode_matrix(const StoredMatrix& matrix);
 
 // A text as a matrix of one row of int8 that ends with NUL.
 std::string decode_compressed_text(std::string_view blob);
-std::string encode_compressed_text(std::string_view text);
 
 }  // namespace libmap

@@ -23,8 +23,7 @@ std::string only_cloud_topic(const BagListing& listing) {
   }
   if (count == 1) return names;
   throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
-              {.file = {},
-               .field = "topics of " + ros_message::type_of<PointCloud2>(),
+              {.field = "topics of " + ros_message::type_of<PointCloud2>(),
                .value = count == 0 ? "none" : names,
                .bound = count == 0 ? "" : "named by --topic"});
 }
@@ -45,7 +44,6 @@ BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,
         messages++ == 0 || (stamp_s ? std::abs(stamp - *stamp_s) < std::abs(best.stamp_s - *stamp_s)
                                     : cloud.cloud.size() > best.cloud.size());
     if (better) best = {name, cloud.frame, stamp, std::move(cloud.cloud), cloud.dropped_points, 0};
-    return true;
   });
   best.messages = messages;
   return best;

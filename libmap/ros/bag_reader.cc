@@ -30,7 +30,7 @@ struct Parcel {
   Kind kind = Kind::end;
   std::uint32_t topic = 0;     // index
   std::uint64_t bytes = 0;     // that follow
-  std::uint64_t size = 0;      // of the whole message; of a topic: how many messages
+  std::uint64_t size = 0;      // of a topic: how many messages
   std::int64_t stamp_ns = 0;   // of a message; of a topic: of its first one
   std::int64_t last_ns = 0;    // of a topic's last message
   std::uint32_t latching = 0;  // of a topic
@@ -216,7 +216,6 @@ void send_messages(const rosbag::Bag& bag, const std::vector<BagRequest>& reques
     const std::uint32_t topic = topics.of(message);
     sender.send({.kind = Parcel::Kind::message,
                  .topic = topic,
-                 .size = size,
                  .stamp_ns = ros_message::nanoseconds_of(message.getTime())},
                 std::string_view(bytes).substr(0, wanted[topic]));
   }
@@ -254,7 +253,7 @@ BagListing list_bag(const fs::path& path) {
 }
 
 void read_bag(const fs::path& path, const std::vector<BagRequest>& requests,
-              const std::function<bool(const BagMessage&)>& take) {
+              const std::function<void(const BagMessage&)>& take) {
   require_bag(path);
   if (requests.empty()) return;
   GuardedBag bag(path, [&](const rosbag::Bag& opened, Sender& sender) {
@@ -265,8 +264,8 @@ void read_bag(const fs::path& path, const std::vector<BagRequest>& requests,
   while (const std::optional<Parcel> parcel = bag.receive(bytes)) {
     if (parcel->kind == Parcel::Kind::topic)
       topics.push_back(topic_from(*parcel, bytes));
-    else if (!take({topics.at(parcel->topic), parcel->stamp_ns, parcel->size, bytes}))
-      return;
+    else
+      take({topics.at(parcel->topic), parcel->stamp_ns, bytes});
   }
 }
 
@@ -276,19 +275,18 @@ const BagTopic& require_topic(const BagListing& listing, const std::string& name
   for (const BagTopic& topic : listing.topics) {
     if (topic.name == name && topic.type == type && topic.md5sum == md5sum) return topic;
     if (topic.name == name && topic.type == type)
-      throw Error(
-          "is another definition of " + type,
-          {.file = {}, .field = "md5sum of " + name, .value = topic.md5sum, .bound = md5sum});
+      throw Error("is another definition of " + type,
+                  {.field = "md5sum of " + name, .value = topic.md5sum, .bound = md5sum});
     if (topic.name == name)
       throw Error("is of another type",
-                  {.file = {}, .field = "type of " + name, .value = topic.type, .bound = type});
+                  {.field = "type of " + name, .value = topic.type, .bound = type});
     names.push_back(topic.name);
   }
   std::string known;
   for (const BagTopic& topic : listing.topics)
     if (topic.type == type) known += (known.empty() ? "one of " : ", ") + topic.name;
   throw Error("no such topic with messages" + did_you_mean(name, names),
-              {.file = {}, .field = "topic", .value = name, .bound = known});
+              {.field = "topic", .value = name, .bound = known});
 }
 
 }  // namespace libmap

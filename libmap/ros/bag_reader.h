@@ -50,14 +50,13 @@ struct BagRequest {
 struct BagMessage {
   const BagTopic& topic;
   std::int64_t recorded_ns = 0;
-  std::size_t size = 0;      // of the whole message
   std::string_view bytes{};  // valid during the call alone
 };
 
-// Calls take(message) for each message of the topics, in the order of recording, until it returns
-// false. Throws as list_bag, and what `take` throws.
+// Calls take(message) for each message of the topics, in the order of recording. Throws as
+// list_bag, and what `take` throws.
 void read_bag(const std::filesystem::path& path, const std::vector<BagRequest>& requests,
-              const std::function<bool(const BagMessage&)>& take);
+              const std::function<void(const BagMessage&)>& take);
 
 // The topic of that name. Throws Error naming the nearest known one, or all that are of `type`,
 // and where its messages are of another type or of another definition of it than `md5sum`.

@@ -138,18 +138,17 @@ std::size_t camera_of_rig(const CameraRig& rig, const Choice& choice, const std:
       if (names[n] == candidate) return n;
   throw Error("belongs to none of the rig's cameras (name it: CAMERA=TOPIC)" +
                   did_you_mean(candidates.front(), names),
-              {.file = {}, .field = "topic", .value = choice.topic});
+              {.field = "topic", .value = choice.topic});
 }
 
 Camera calibrated_camera(const SurveyedImages& images, const BagListing& listing) {
   if (!images.calibrations.empty())
     return images.calibrations[images.calibration_at(images.stamps_ns.front())];
   if (!images.info_error.empty())
-    throw Error("no camera info can be used: " + images.info_error,
-                {.file = {}, .field = images.info_topic});
+    throw Error("no camera info can be used: " + images.info_error, {.field = images.info_topic});
   require_topic(listing, images.info_topic, ros_message::type_of<ros_message::CameraInfo>(),
                 ros_message::md5sum_of<ros_message::CameraInfo>());
-  throw Error("contains no camera info", {.file = {}, .field = images.info_topic});
+  throw Error("contains no camera info", {.field = images.info_topic});
 }
 
 std::string base_frame_of(const BagSurvey& survey, const BagRigOptions& options) {
@@ -173,9 +172,7 @@ void rig_from_bag(const BagSurvey& survey, const BagListing& listing, const BagR
       camera.camera = calibrated_camera(images, listing);
       camera.camera.base_from_camera = survey.transforms.target_from_source(base, images.frame);
     } catch (const Error& error) {
-      ErrorContext context = error.context();
-      context.field = images.topic + ": " + context.field;
-      throw Error(error.reason(), context);
+      throw error.in_field(images.topic);
     }
   }
 }
@@ -271,14 +268,12 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   const std::string found = topics_with_encodings(survey);
   if (options.topics.empty()) keep_depth_topics(choices, survey);
   if (choices.empty())
-    throw Error("no topic contains depth images", {.file = {},
-                                                   .field = "topics of images",
+    throw Error("no topic contains depth images", {.field = "topics of images",
                                                    .value = found.empty() ? "none" : found,
                                                    .bound = "16UC1, 32FC1 or compressedDepth"});
   for (const SurveyedImages& images : survey.images)
     if (!is_depth_encoding(images.encoding, images.compressed))
-      throw Error("contains no depth images", {.file = {},
-                                               .field = "encoding of " + images.topic,
+      throw Error("contains no depth images", {.field = "encoding of " + images.topic,
                                                .value = images.encoding,
                                                .bound = "16UC1, 32FC1 or compressedDepth"});
   const std::vector<std::string> names = names_by_difference(survey.images);
@@ -293,10 +288,10 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
     if (!options.rig)
       plan.rig.cameras[n].name = choices[n].name.empty() ? names[n] : choices[n].name;
     if (std::find(plan.topics.begin(), plan.topics.end(), choices[n].topic) != plan.topics.end())
-      throw Error("is named twice", {.file = {}, .field = "topic", .value = choices[n].topic});
+      throw Error("is named twice", {.field = "topic", .value = choices[n].topic});
     if (!plan.topics[camera].empty())
       throw Error("belongs to the same camera as " + plan.topics[camera],
-                  {.file = {}, .field = "topic", .value = choices[n].topic});
+                  {.field = "topic", .value = choices[n].topic});
     plan.topics[camera] = choices[n].topic;
     add_images(survey.images[n], camera, !options.rig && !survey.images[n].calibrations.empty(),
                plan);

@@ -84,12 +84,9 @@ class ImageWriter {
           decode_depth(one.bytes, one.compressed, {plan_.depth_unit_m, camera.depth_scale_m});
       if (depth.image.width != camera.camera.width || depth.image.height != camera.camera.height)
         throw Error("does not fit the calibration",
-                    {.file = {},
-                     .field = "size",
-                     .value = std::to_string(depth.image.width) + " x " +
-                              std::to_string(depth.image.height),
-                     .bound = std::to_string(camera.camera.width) + " x " +
-                              std::to_string(camera.camera.height)});
+                    {.field = "size",
+                     .value = size_text(depth.image.width, depth.image.height),
+                     .bound = size_text(camera.camera.width, camera.camera.height)});
       one.beyond = depth.beyond;
       one.png = encode_png(depth.image);
     } catch (const Error& error) {
@@ -153,10 +150,7 @@ BagRigExport export_bag_rig(const fs::path& bag, const BagRigPlan& plan, const f
   for (const std::string& topic : plan.topics)
     if (!topic.empty()) requests.push_back({topic});
   ImageWriter writer(plan, folder);
-  read_bag(bag, requests, [&](const BagMessage& message) {
-    writer.take(message);
-    return true;
-  });
+  read_bag(bag, requests, [&](const BagMessage& message) { writer.take(message); });
   BagRigExport result = writer.finish();
   if (result.images == 0)
     throw Error(result.warnings.empty() ? "no image can be used" : result.warnings.front(),

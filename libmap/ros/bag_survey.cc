@@ -62,9 +62,7 @@ void take_transforms(const BagMessage& message, TransformTree& tree) {
   try {
     add_transforms(message.bytes, tree);
   } catch (const Error& error) {
-    ErrorContext context = error.context();
-    context.field = message.topic.name + (context.field.empty() ? "" : ": " + context.field);
-    throw Error(error.reason(), context, error.kind());
+    throw error.in_field(message.topic.name);
   }
 }
 
@@ -113,7 +111,6 @@ BagSurvey survey_bag(const std::filesystem::path& bag,
           message.topic.md5sum == ros_message::md5sum_of<ros_message::CameraInfo>())
         take_info(message, images);
     }
-    return true;
   });
   for (SurveyedImages& images : survey.images) std::sort(images.infos.begin(), images.infos.end());
   return survey;

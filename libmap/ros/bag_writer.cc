@@ -27,10 +27,8 @@ namespace fs = std::filesystem;
 ros::Time time_of(double stamp_s) {
   constexpr double end = 4294967295.0;
   if (!(stamp_s >= 1e-9) || !(stamp_s < end))
-    throw Error("ROS has no such time", {.file = {},
-                                         .field = "stamp",
-                                         .value = to_text(stamp_s),
-                                         .bound = ">= 1e-9 and < 2^32 - 1 s"});
+    throw Error("ROS has no such time",
+                {.field = "stamp", .value = to_text(stamp_s), .bound = ">= 1e-9 and < 2^32 - 1 s"});
   const double seconds = std::floor(stamp_s);
   const auto nanoseconds = static_cast<std::uint32_t>(std::llround((stamp_s - seconds) * 1e9));
   const auto whole = static_cast<std::uint32_t>(seconds);
@@ -51,9 +49,8 @@ void require_topic_name(const std::string& topic) {
   };
   if (topic.size() < 2 || topic.front() != '/' || topic.back() == '/' ||
       !std::all_of(topic.begin(), topic.end(), allowed))
-    throw Error(
-        "is no name of a ROS topic",
-        {.file = {}, .field = "topic", .value = topic, .bound = "'/', letters, digits and '_'"});
+    throw Error("is no name of a ROS topic",
+                {.field = "topic", .value = topic, .bound = "'/', letters, digits and '_'"});
 }
 
 rosbag::CompressionType to_rosbag(BagCompression compression) {
@@ -213,7 +210,6 @@ void write_bag(const fs::path& path, const BagContent& content, BagCompression c
 
 void write_rig_bag(const fs::path& path, const CameraRig& rig, const std::vector<RigImage>& images,
                    const RigBagOptions& options) {
-  rig.check();
   const std::vector<RigImage> ordered = in_recording_order(images);
   if (ordered.empty()) throw Error("there are no images to write");
   std::vector<BagTransform> transforms;

@@ -32,8 +32,7 @@ constexpr std::pair<std::uint8_t, StoredType> field_types[] = {
 StoredType type_of(const PointField& field) {
   for (const auto& [number, type] : field_types)
     if (number == field.datatype) return type;
-  throw Error("unknown type", {.file = {},
-                               .field = "datatype of field " + ros_message::from_ros(field.name),
+  throw Error("unknown type", {.field = "datatype of field " + ros_message::from_ros(field.name),
                                .value = std::to_string(field.datatype),
                                .bound = "1 to 8"});
 }
@@ -46,10 +45,9 @@ std::uint8_t number_of(ScalarType type) {
 }
 
 Error does_not_fit(const std::string& field, std::uint64_t value, std::uint64_t least) {
-  return Error("shorter than what it is to contain", {.file = {},
-                                                      .field = field,
-                                                      .value = std::to_string(value),
-                                                      .bound = ">= " + std::to_string(least)});
+  return Error(
+      "shorter than what it is to contain",
+      {.field = field, .value = std::to_string(value), .bound = ">= " + std::to_string(least)});
 }
 
 // Throws Error unless the data hold what the sizes say.
@@ -90,7 +88,7 @@ void add_columns(const PointField& field, const PointCloud2& message, const std:
     return add_packed_color_columns(first + field.offset, message.point_step,
                                     message.is_bigendian != 0, set);
   if (count > max_columns || set.columns.size() + count > max_columns)
-    throw Error("more than 1024 numbers per point", {.file = {}, .field = "field " + name});
+    throw Error("more than 1024 numbers per point", {.field = "field " + name});
   for (std::size_t n = 0; n < count; ++n)
     set.columns.push_back({count == 1 ? name : name + "_" + std::to_string(n), scalar_type_of(type),
                            type, first + field.offset + n * bytes, message.point_step, swapped});
@@ -137,7 +135,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
   constexpr std::uint64_t most = 0xFFFF0000;
   if (set.rows > most / std::max<std::size_t>(offset, 1))
     throw Error("a ROS message can contain at most 4 GiB",
-                {.file = {}, .field = "points", .value = std::to_string(set.rows)});
+                {.field = "points", .value = std::to_string(set.rows)});
   std::string records;
   append_records(set.columns, 0, set.rows, false, records);
   // With PCL's alpha of 255 colors are NaN as float32, and Python's readers skip such points.

@@ -66,25 +66,23 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
   const std::string encoding = ros_message::from_ros(message.encoding);
   if (!is_depth_encoding(encoding, false))
     throw Error("no depth image",
-                {.file = {}, .field = "encoding", .value = encoding, .bound = "16UC1 or 32FC1"});
+                {.field = "encoding", .value = encoding, .bound = "16UC1 or 32FC1"});
   const bool is_float = encoding == "32FC1";
   const std::uint64_t width = message.width;
   const std::uint64_t height = message.height;
   const std::uint64_t row = width * (is_float ? 4 : 2);
-  const std::string size = std::to_string(width) + " x " + std::to_string(height);
+  const std::string size = size_text(width, height);
   if (width == 0 || height == 0 || width > max_pixels || width * height > max_pixels)
     throw Error("no image has this size",
-                {.file = {}, .field = "size", .value = size, .bound = "1 to 2^27 pixels"});
+                {.field = "size", .value = size, .bound = "1 to 2^27 pixels"});
   if (message.step < row)
     throw Error("shorter than a row of " + std::to_string(width) + " pixels",
-                {.file = {},
-                 .field = "step",
+                {.field = "step",
                  .value = std::to_string(message.step),
                  .bound = ">= " + std::to_string(row)});
   if (message.data.size() < message.step * (height - 1) + row)
     throw Error("its data end too early",
-                {.file = {},
-                 .field = "data",
+                {.field = "data",
                  .value = std::to_string(message.data.size()) + " bytes",
                  .bound = std::to_string(message.step * height) + " for " + size});
   const bool swapped = (message.is_bigendian != 0) != (std::endian::native == std::endian::big);
@@ -105,17 +103,15 @@ DepthMessageImage decode_compressed(const ros_message::CompressedImage& message,
   const std::string format = ros_message::from_ros(message.format);
   if (!is_depth_encoding(format, true))
     throw Error("no compressed depth image",
-                {.file = {},
-                 .field = "format",
+                {.field = "format",
                  .value = format,
                  .bound = "16UC1; compressedDepth or 32FC1; compressedDepth"});
   if (format.find("rvl") != std::string::npos)
-    throw Error("only PNG is read", {.file = {}, .field = "format", .value = format});
+    throw Error("only PNG is read", {.field = "format", .value = format});
   CompressionHeader header;
   if (message.data.size() < sizeof header)
     throw Error("its data end too early",
-                {.file = {},
-                 .field = "data",
+                {.field = "data",
                  .value = std::to_string(message.data.size()) + " bytes",
                  .bound = ">= " + std::to_string(sizeof header) + " bytes"});
   std::memcpy(&header, message.data.data(), sizeof header);
@@ -159,8 +155,7 @@ Camera camera_of(const ros_message::CameraInfo& info, bool rectified) {
   else if (model == "plumb_bob" || model == "rational_polynomial")
     camera.distortion_model = DistortionModel::radial_tangential;
   else
-    throw Error("unknown model", {.file = {},
-                                  .field = "distortion_model",
+    throw Error("unknown model", {.field = "distortion_model",
                                   .value = model,
                                   .bound = "plumb_bob, rational_polynomial or equidistant"});
   return camera;
@@ -215,7 +210,6 @@ DepthMessageImage decode_depth(std::string_view bytes, bool compressed, const De
 CameraInfoMessage decode_camera_info(std::string_view bytes, bool rectified) {
   const auto info = ros_message::decode<ros_message::CameraInfo>(bytes);
   CameraInfoMessage message{ros_message::nanoseconds_of(info.header.stamp),
-                            ros_message::from_ros(info.header.frame_id),
                             camera_of(info, rectified)};
   apply_region(info, message.camera);
   message.camera.check();

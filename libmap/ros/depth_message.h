@@ -42,7 +42,6 @@ DepthMessageImage decode_depth(std::string_view bytes, bool compressed, const De
 
 struct CameraInfoMessage {
   std::int64_t stamp_ns = 0;
-  std::string frame{};
   Camera camera{};  // base_from_camera is not set
 };
 

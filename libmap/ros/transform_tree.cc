@@ -23,9 +23,9 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const std::string frame = plain_frame(child);
   if (above.empty() || frame.empty() || above == frame)
     throw Error("a transform must lead from one frame to another",
-                {.file = {}, .field = "frames", .value = above + " and " + frame});
+                {.field = "frames", .value = above + " and " + frame});
   if (!parent_from_child.matrix().allFinite())
-    throw Error("a transform is not finite", {.file = {}, .field = "frame", .value = frame});
+    throw Error("a transform is not finite", {.field = "frame", .value = frame});
   const auto found = links_.find(frame);
   if (found == links_.end()) {
     links_[frame] = {above, parent_from_child};
@@ -36,8 +36,7 @@ void TransformTree::add(const std::string& parent, const std::string& child,
   const double change =
       (link.parent_from_child.matrix() - parent_from_child.matrix()).cwiseAbs().maxCoeff();
   if (link.parent != above || change > same_pose)
-    throw Error("a transform changes: the frame is not static",
-                {.file = {}, .field = "frame", .value = frame});
+    throw Error("a transform changes: the frame is not static", {.field = "frame", .value = frame});
 }
 
 bool TransformTree::has(const std::string& frame) const {
@@ -50,13 +49,13 @@ std::vector<std::string> TransformTree::chain_of(const std::string& given) const
   const std::string frame = plain_frame(given);
   if (!frames_.contains(frame))
     throw Error("no static transform is known of this frame" + did_you_mean(frame, frames()),
-                {.file = {}, .field = "frame", .value = frame});
+                {.field = "frame", .value = frame});
   std::vector<std::string> chain = {frame};
   for (auto link = links_.find(frame); link != links_.end();
        link = links_.find(link->second.parent)) {
     if (chain.size() > links_.size())
       throw Error("the transforms above this frame lead back to it",
-                  {.file = {}, .field = "frame", .value = frame});
+                  {.field = "frame", .value = frame});
     chain.push_back(link->second.parent);
   }
   return chain;
@@ -82,7 +81,7 @@ Pose TransformTree::target_from_source(const std::string& target, const std::str
       common_from_source = link->second.parent_from_child * common_from_source;
   }
   throw Error("no transforms lead from it to " + plain_frame(target),
-              {.file = {}, .field = "frame", .value = plain_frame(source)});
+              {.field = "frame", .value = plain_frame(source)});
 }
 
 }  // namespace libmap

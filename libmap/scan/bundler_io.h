@@ -21,8 +21,7 @@ struct BundlerView {
 // f k1 k2, three rows of R and t. Bundler's camera looks along -z with x right and y up:
 //   P = R * X + t,  p = -P.xy / P.z,  pixel = f * (1 + k1 |p|^2 + k2 |p|^4) * p
 // from the middle of the image, x to the right, y up. k1 = k2 = 0: not all readers agree on them.
-// There are no points: they are not needed to place pictures. Throws Error naming the image:
-// a camera with distortion, oblong pixels or a principal point off the image's middle.
+// There are no points: they are not needed to place pictures.
 std::string to_bundle_text(const std::vector<BundlerView>& views);
 
 // list.txt: one image per line.

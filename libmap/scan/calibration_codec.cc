@@ -242,20 +242,6 @@ Calibration read_floats(std::string_view bytes, CalibrationLayout layout, bool i
   return calibration;
 }
 
-void append_floats(std::string& bytes, const CalibrationRecord& record, CalibrationLayout layout,
-                   std::optional<float> baseline_m) {
-  if (record.k.size() != 9 || record.l.size() != local_transform_numbers)
-    throw Error("calibration without K and L does not fit its layout");
-  for (const std::size_t place : {0U, 4U, 2U, 5U})
-    append(bytes, static_cast<float>(record.k[place]));
-  if (baseline_m) append(bytes, *baseline_m);
-  if (layout == CalibrationLayout::floats_with_size) {
-    append(bytes, static_cast<float>(record.width));
-    append(bytes, static_cast<float>(record.height));
-  }
-  append_list(bytes, record.l);
-}
-
 // ---------------------------------------------------------------------------------------- cameras
 
 Pose base_from_camera_of(const CalibrationRecord& record) {
@@ -352,16 +338,9 @@ Calibration decode_calibration(std::string_view bytes) {
 
 std::string encode_calibration(const Calibration& calibration) {
   std::string bytes;
-  if (calibration.layout == CalibrationLayout::records) {
-    for (const CalibrationRecord& record : calibration.cameras) append_record(bytes, record);
-    for (const StereoCalibrationRecord& stereo : calibration.stereo)
-      append_stereo_record(bytes, stereo);
-    return bytes;
-  }
-  for (const CalibrationRecord& record : calibration.cameras)
-    append_floats(bytes, record, calibration.layout, std::nullopt);
+  for (const CalibrationRecord& record : calibration.cameras) append_record(bytes, record);
   for (const StereoCalibrationRecord& stereo : calibration.stereo)
-    append_floats(bytes, stereo.left, calibration.layout, stereo.baseline_m);
+    append_stereo_record(bytes, stereo);
   return bytes;
 }
 

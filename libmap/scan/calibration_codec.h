@@ -1,5 +1,4 @@
-// Calibrations as RTAB-Map stores them with each node, in all of their layouts. A calibration keeps
-// what was stored: encode_calibration(decode_calibration(bytes)) gives the same bytes.
+// Calibrations as RTAB-Map stores them with each node, in all of their layouts.
 #pragma once
 
 #include <array>
@@ -59,6 +58,7 @@ struct Calibration {
 // The layout is recognized by the bytes themselves. Throws Error if they fit none, or are not
 // whole.
 Calibration decode_calibration(std::string_view bytes);
+// In layout `records`, of which decode_calibration keeps all that is stored.
 std::string encode_calibration(const Calibration& calibration);
 
 // The cameras of the stored images: P where it is stored, since images are rectified then, else K

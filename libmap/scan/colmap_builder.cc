@@ -84,8 +84,6 @@ int ColmapBuilder::add_camera(const ColmapCamera& camera) {
 
 void ColmapBuilder::add_image(const std::string& name, const CameraView& view,
                               const Pose& world_from_camera) {
-  if (!world_from_camera.matrix().allFinite())
-    throw Error("the pose is not finite", {.field = "image " + name});
   ColmapImage image{.camera = add_camera(to_colmap(view.color_camera)),
                     .name = name,
                     .camera_from_world = world_from_camera.inverse()};

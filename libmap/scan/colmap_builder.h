@@ -29,7 +29,7 @@ class ColmapBuilder {
   explicit ColmapBuilder(const ColmapBuilderOptions& options = {});  // an empty model
 
   // Image ids count from 1 in this order. Without depth the image gets neither points nor features.
-  // Throws Error: COLMAP has no such camera, the pose is not finite.
+  // Throws Error: COLMAP has no such camera.
   void add_image(const std::string& name, const CameraView& view, const Pose& world_from_camera);
 
   const ColmapModel& model() const { return model_; }

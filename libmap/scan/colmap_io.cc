@@ -16,50 +16,6 @@ namespace fs = std::filesystem;
 
 namespace {
 
-constexpr const char* cameras_file = "cameras.txt";
-constexpr const char* images_file = "images.txt";
-constexpr const char* points_file = "points3D.txt";
-// Of COLMAP's pixels against ours.
-
-// Parameters are focal_lengths, the principal point and then the terms of the distortion, in the
-// order of Camera::distortion; those that a model does not have are 0.
-struct CameraModel {
-  const char* name;
-  std::size_t focal_lengths;
-  DistortionModel distortion;
-  std::size_t terms;       // in COLMAP's model
-  std::size_t full_terms;  // in Camera's
-};
-
-using enum DistortionModel;
-constexpr std::array<CameraModel, 9> camera_models = {{
-    {"SIMPLE_PINHOLE", 1, none, 0, 0},
-    {"PINHOLE", 2, none, 0, 0},
-    {"SIMPLE_RADIAL", 1, radial_tangential, 1, 4},
-    {"RADIAL", 1, radial_tangential, 2, 4},
-    {"OPENCV", 2, radial_tangential, 4, 4},
-    {"FULL_OPENCV", 2, radial_tangential, 8, 8},
-    {"OPENCV_FISHEYE", 2, equidistant, 4, 4},
-    {"SIMPLE_RADIAL_FISHEYE", 1, equidistant, 1, 4},
-    {"RADIAL_FISHEYE", 1, equidistant, 2, 4},
-}};
-
-const CameraModel& model_named(const std::string& name) {
-  std::string known;
-  for (const CameraModel& model : camera_models) {
-    if (model.name == name) return model;
-    known += std::string(" ") + model.name;
-  }
-  throw Error("a model of cameras that is not known",
-              {.field = "camera", .value = name, .bound = "one of" + known});
-}
-
-int positive_integer_of(const TextLine& line, std::size_t word, const std::string& file) {
-  const int value = integer_of(line, word, file);
-  if (value <= 0) throw in_line("no size of an image", line, file, std::to_string(value), "> 0");
-  return value;
-}
-
 // From word `first` to the end of the line: names may hold spaces and commas.
 std::string rest_of(const TextLine& line, std::size_t first) {
   return std::string(trim(
@@ -91,29 +47,6 @@ bool is_model(const fs::path& folder, const char* ending) {
 
 }  // namespace
 
-Camera to_camera(const ColmapCamera& given) {
-  const CameraModel& model = model_named(given.model);
-  const std::size_t wanted = model.focal_lengths + 2 + model.terms;
-  if (given.parameters.size() != wanted)
-    throw Error("another number of parameters than its model has",
-                {.field = "camera " + given.model,
-                 .value = std::to_string(given.parameters.size()),
-                 .bound = std::to_string(wanted)});
-  const auto* parameter = given.parameters.data();
-  Camera camera;
-  camera.width = given.width;
-  camera.height = given.height;
-  camera.fx = *parameter;
-  camera.fy = model.focal_lengths == 2 ? *++parameter : camera.fx;
-  camera.cx = *++parameter - colmap_pixel_offset;
-  camera.cy = *++parameter - colmap_pixel_offset;
-  camera.distortion_model = model.distortion;
-  camera.distortion.assign(model.full_terms, 0.0);
-  std::copy_n(++parameter, model.terms, camera.distortion.begin());
-  camera.check();
-  return camera;
-}
-
 ColmapCamera to_colmap(const Camera& camera) {
   camera.check();
   ColmapCamera result{.model = "PINHOLE", .width = camera.width, .height = camera.height};
@@ -121,7 +54,7 @@ ColmapCamera to_colmap(const Camera& camera) {
                        camera.cy + colmap_pixel_offset};
   if (!camera.is_distorted()) return result;
   std::vector<double> terms = camera.distortion;
-  if (camera.distortion_model == equidistant) {
+  if (camera.distortion_model == DistortionModel::equidistant) {
     result.model = "OPENCV_FISHEYE";
   } else {
     while (!terms.empty() && terms.back() == 0.0) terms.pop_back();
@@ -134,22 +67,6 @@ ColmapCamera to_colmap(const Camera& camera) {
   }
   result.parameters.insert(result.parameters.end(), terms.begin(), terms.end());
   return result;
-}
-
-std::map<int, ColmapCamera> parse_colmap_cameras(std::string_view text, const std::string& file) {
-  std::map<int, ColmapCamera> cameras;
-  for (const TextLine& line : split_lines(text)) {
-    if (is_comment(line)) continue;
-    const int id = integer_of(line, 0, file);
-    ColmapCamera camera;
-    camera.width = positive_integer_of(line, 2, file);
-    camera.height = positive_integer_of(line, 3, file);
-    camera.model = std::string(line.words[1]);
-    camera.parameters = numbers_of(line, 4, line.words.size() - 4, file);
-    if (!cameras.emplace(id, std::move(camera)).second)
-      throw duplicate(line, "camera " + std::to_string(id), file);
-  }
-  return cameras;
 }
 
 std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file) {
@@ -175,35 +92,6 @@ std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std:
       throw duplicate(line, "image " + std::to_string(id), file);
   }
   return images;
-}
-
-std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
-                                                        const std::string& file) {
-  constexpr std::size_t columns = 8;
-  std::map<std::int64_t, ColmapPoint> points;
-  for (const TextLine& line : split_lines(text)) {
-    if (is_comment(line)) continue;
-    const std::int64_t id = large_integer_of(line, 0, file);
-    const std::vector<double> position = numbers_of(line, 1, 3, file);
-    ColmapPoint point;
-    point.position = {position[0], position[1], position[2]};
-    for (std::size_t c = 0; c < point.color.size(); ++c) {
-      const int value = integer_of(line, 4 + c, file);
-      if (value < 0 || value > 255)
-        throw in_line("no color", line, file, std::to_string(value), "0 to 255");
-      point.color[c] = static_cast<std::uint8_t>(value);
-    }
-    point.error_px = numbers_of(line, 7, 1, file).front();
-    for (std::size_t word = columns; word < line.words.size(); word += 2) {
-      const std::int64_t observation = large_integer_of(line, word + 1, file);
-      if (observation < 0)
-        throw in_line("no feature of an image", line, file, std::to_string(observation), ">= 0");
-      point.track.push_back({integer_of(line, word, file), static_cast<std::size_t>(observation)});
-    }
-    if (!points.emplace(id, std::move(point)).second)
-      throw duplicate(line, "point " + std::to_string(id), file);
-  }
-  return points;
 }
 
 std::string to_colmap_cameras(const ColmapModel& model) {
@@ -266,27 +154,10 @@ fs::path find_colmap_model(const fs::path& path) {
               {.file = path.string()});
 }
 
-ColmapModel read_colmap_model(const fs::path& path) {
-  const fs::path folder = find_colmap_model(path);
-  const auto text_of = [&](const char* name) { return read_whole_file(folder / name); };
-  const auto name_of_file = [&](const char* name) { return (folder / name).string(); };
-  ColmapModel model;
-  model.cameras = parse_colmap_cameras(text_of(cameras_file), name_of_file(cameras_file));
-  model.images = parse_colmap_images(text_of(images_file), name_of_file(images_file));
-  for (const auto& [id, image] : model.images)
-    if (!model.cameras.contains(image.camera))
-      throw Error("names a camera that is not there", {.file = name_of_file(images_file),
-                                                       .field = "image " + std::to_string(id),
-                                                       .value = std::to_string(image.camera)});
-  if (fs::exists(folder / points_file))
-    model.points = parse_colmap_points(text_of(points_file), name_of_file(points_file));
-  return model;
-}
-
 void write_colmap_model(const fs::path& folder, const ColmapModel& model) {
-  write_text(folder / cameras_file, to_colmap_cameras(model));
-  write_text(folder / images_file, to_colmap_images(model));
-  write_text(folder / points_file, to_colmap_points(model));
+  write_text(folder / "cameras.txt", to_colmap_cameras(model));
+  write_text(folder / "images.txt", to_colmap_images(model));
+  write_text(folder / "points3D.txt", to_colmap_points(model));
 }
 
 }  // namespace libmap

@@ -29,10 +29,6 @@ struct ColmapCamera {
   std::vector<double> parameters{};  // of the model, in COLMAP's own order and pixels
 };
 
-// Throws Error for a model that Camera has no distortion for: SIMPLE_PINHOLE, PINHOLE,
-// SIMPLE_RADIAL, RADIAL, OPENCV, FULL_OPENCV, OPENCV_FISHEYE, SIMPLE_RADIAL_FISHEYE and
-// RADIAL_FISHEYE are known.
-Camera to_camera(const ColmapCamera& camera);
 // PINHOLE, OPENCV, FULL_OPENCV or OPENCV_FISHEYE. Throws Error for distortion by thin prisms.
 ColmapCamera to_colmap(const Camera& camera);
 
@@ -69,12 +65,9 @@ struct ColmapModel {
   std::map<std::int64_t, ColmapPoint> points{};  // by POINT3D_ID
 };
 
-// The three files' texts. The parsers throw Error naming `file` and the line: columns that are
-// missing, no finite number, a quaternion that is none, an id that is a duplicate.
-std::map<int, ColmapCamera> parse_colmap_cameras(std::string_view text, const std::string& file);
+// The three files' texts. Throws Error naming `file` and the line: columns that are missing, no
+// finite number, a quaternion that is none, an id that is a duplicate.
 std::map<int, ColmapImage> parse_colmap_images(std::string_view text, const std::string& file);
-std::map<std::int64_t, ColmapPoint> parse_colmap_points(std::string_view text,
-                                                        const std::string& file);
 std::string to_colmap_cameras(const ColmapModel& model);
 std::string to_colmap_images(const ColmapModel& model);
 std::string to_colmap_points(const ColmapModel& model);
@@ -82,10 +75,6 @@ std::string to_colmap_points(const ColmapModel& model);
 // The folder that holds images.txt: `path` itself, or `path`/sparse or `path`/sparse/0, where
 // COLMAP's tools put it. Throws Error if there is none; says so if the model is a binary one.
 std::filesystem::path find_colmap_model(const std::filesystem::path& path);
-
-// Reads the folder that find_colmap_model finds. points3D.txt may be missing. Throws Error, also
-// if an image names a camera that is not there.
-ColmapModel read_colmap_model(const std::filesystem::path& path);
 
 // Writes the three files into `folder`, which is there.
 void write_colmap_model(const std::filesystem::path& folder, const ColmapModel& model);

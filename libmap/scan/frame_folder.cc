@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <functional>
 #include <initializer_list>
-#include <limits>
 #include <optional>
 #include <system_error>
 
@@ -47,11 +46,9 @@ Error wrong_cell(const std::string& reason, const Table& table, std::size_t row,
 int integer_in(const Table& table, std::size_t row, const char* column, int missing) {
   const std::string cell = cell_of(table, row, column);
   if (cell.empty()) return missing;
-  const std::optional<std::int64_t> value = parse_integer(cell);
-  if (!value || *value < std::numeric_limits<int>::min() ||
-      *value > std::numeric_limits<int>::max())
-    throw wrong_cell("not a whole number", table, row, column, "of 32 bits");
-  return static_cast<int>(*value);
+  const std::optional<int> value = parse_int(cell);
+  if (!value) throw wrong_cell("not a whole number", table, row, column, "of 32 bits");
+  return *value;
 }
 
 // Numbers with spaces between them.
@@ -398,10 +395,7 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
     try {
       decode(read_whole_file(file));
     } catch (const Error& error) {
-      ErrorContext context = error.context();
-      context.file = file.string();
-      context.field = context.field.empty() ? field : field + ": " + context.field;
-      throw Error(error.reason(), context, error.kind());
+      throw error.in_field(field).in_file(file.string());
     }
   };
   if (parts.color)

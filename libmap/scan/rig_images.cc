@@ -32,12 +32,7 @@ double stamp_of(const std::string& text, const std::string& file, const std::str
   return *stamp;
 }
 
-bool is_png(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension == ".png";
-}
+bool is_png(const fs::path& path) { return lower_case(path.extension().string()) == ".png"; }
 
 void append_folder(const fs::path& folder, std::size_t camera, std::vector<RigImage>& images) {
   std::error_code code;
@@ -169,15 +164,12 @@ Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& came
     throw error.in_file(image.file.string());
   }
   const Camera& calibrated = camera.camera;
-  const auto size = [](int width, int height) {
-    return std::to_string(width) + " x " + std::to_string(height);
-  };
   if (units.width != calibrated.width || units.height != calibrated.height)
     throw Error("does not fit the calibration of " + camera.name,
                 {.file = image.file.string(),
                  .field = "image size",
-                 .value = size(units.width, units.height),
-                 .bound = size(calibrated.width, calibrated.height)});
+                 .value = size_text(units.width, units.height),
+                 .bound = size_text(calibrated.width, calibrated.height)});
   return units;
 }
 

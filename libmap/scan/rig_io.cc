@@ -2,7 +2,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <set>
@@ -48,18 +47,6 @@ std::vector<double> numbers_of(const YAML::Node& node, const std::string& field,
   return numbers;
 }
 
-// Each key known and there once: YAML itself lets the first or the last of two stand.
-void check_keys(const YAML::Node& map, const std::vector<std::string>& known) {
-  std::set<std::string> seen;
-  for (const auto& entry : map) {
-    if (!entry.first.IsScalar()) throw Error("a key is not a name");
-    const std::string& key = entry.first.Scalar();
-    if (std::find(known.begin(), known.end(), key) == known.end())
-      throw Error("unknown key" + did_you_mean(key, known), {.field = key});
-    if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
-  }
-}
-
 void read_limits(const YAML::Node& map, RigCamera& camera) {
   if (map["depth_scale_m"])
     camera.depth_scale_m = rig_number(map["depth_scale_m"], "depth_scale_m");
@@ -68,29 +55,13 @@ void read_limits(const YAML::Node& map, RigCamera& camera) {
 }
 
 Camera intrinsics_of(const YAML::Node& map, const fs::path& folder) {
-  if (!map["calibration"]) return parse_camera(YAML::Dump(map), "").camera;
+  if (!map["calibration"]) return camera_from_yaml(map).camera;
   if (!map["calibration"].IsScalar()) throw Error("not a file name", {.field = "calibration"});
   for (const char* key : {"image_width", "image_height", "camera_matrix", "distortion_model",
                           "distortion_coefficients"})
     if (map[key])
       throw Error("is given beside a calibration file that contains it", {.field = key});
   return read_camera(folder / map["calibration"].Scalar()).camera;
-}
-
-// The 3 x 4 matrix goes the way of camera_io's own transform, with its checks.
-Pose pose_of_matrix(const YAML::Node& node) {
-  YAML::Node carrier;
-  carrier["image_width"] = 1;
-  carrier["image_height"] = 1;
-  carrier["camera_matrix"] = YAML::Load("[1, 0, 0, 0, 1, 0, 0, 0, 1]");
-  carrier["local_transform"] = node;
-  try {
-    return parse_camera(YAML::Dump(carrier), "").camera.base_from_camera;
-  } catch (const Error& error) {
-    ErrorContext context = error.context();
-    context.field = "robot_from_camera";
-    throw Error(error.reason(), context);
-  }
 }
 
 void read_pose(const YAML::Node& map, Camera& camera) {
@@ -100,7 +71,7 @@ void read_pose(const YAML::Node& map, Camera& camera) {
     if (position || angles)
       throw Error("is given beside position_m or roll_pitch_yaw_deg",
                   {.field = "robot_from_camera"});
-    camera.base_from_camera = pose_of_matrix(map["robot_from_camera"]);
+    camera.base_from_camera = pose_from_yaml(map["robot_from_camera"], "robot_from_camera");
     return;
   }
   if (!position && !angles) {
@@ -129,12 +100,10 @@ RigCamera camera_of(const YAML::Node& map, const RigCamera& defaults, const fs::
 }
 
 Error at_camera(const Error& error, std::size_t index, const YAML::Node& map) {
-  ErrorContext context = error.context();
   std::string place = "cameras[" + std::to_string(index) + "]";
   if (map.IsMap() && map["name"] && map["name"].IsScalar())
     place += " (" + map["name"].Scalar() + ")";
-  context.field = context.field.empty() ? place : place + "." + context.field;
-  return Error(error.reason(), context);
+  return error.in_field(place, ".");
 }
 
 CameraRig rig_of(const YAML::Node& root, const fs::path& folder) {
@@ -224,7 +193,6 @@ CameraRig read_rig(const fs::path& path) {
 }
 
 std::string to_yaml(const CameraRig& rig) {
-  rig.check();
   std::string text = "%YAML:1.0\n---\ncameras:\n";
   for (const RigCamera& camera : rig.cameras) text += camera_entry(camera);
   return text;

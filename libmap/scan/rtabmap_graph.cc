@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstring>
 #include <functional>
-#include <limits>
 #include <map>
 #include <tuple>
 #include <utility>
@@ -66,9 +65,7 @@ class Warnings {
 };
 
 std::optional<int> as_id(std::int64_t number) {
-  if (number < std::numeric_limits<int>::min() || number > std::numeric_limits<int>::max())
-    return std::nullopt;
-  return static_cast<int>(number);
+  return std::in_range<int>(number) ? std::optional(static_cast<int>(number)) : std::nullopt;
 }
 
 std::string node_text(std::int64_t id) { return "node " + std::to_string(id); }

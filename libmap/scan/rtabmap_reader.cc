@@ -109,19 +109,13 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
       refuse(std::string("its table ") + table + " has no column id");
 }
 
-std::string joined(const std::string& place, const std::string& field) {
-  return place.empty() || field.empty() ? place + field : place + ": " + field;
-}
-
 // `step` with its Errors naming `part`.
 template <typename Step>
 void decode_part(const char* part, const Step& step) {
   try {
     step();
   } catch (const Error& error) {
-    ErrorContext context = error.context();
-    context.field = joined(part, context.field);
-    throw Error(error.reason(), std::move(context), error.kind());
+    throw error.in_field(part);
   }
 }
 
@@ -175,22 +169,10 @@ bool is_about_unknown_part(const std::string& warning) { return warning.ends_wit
 
 RtabmapDatabase::~RtabmapDatabase() = default;
 
-Error RtabmapDatabase::in_part(const Error& error, int node, const std::string& part) const {
-  if (!error.context().file.empty()) return error;
-  ErrorContext context = error.context();
-  context.file = path_.string();
-  context.field = joined(joined("node " + std::to_string(node), part), context.field);
-  return Error(error.reason(), std::move(context), error.kind());
-}
-
-void RtabmapDatabase::require_node(int node) const {
+FrameBlobs RtabmapDatabase::read_blobs(int node, FrameParts parts) const {
   if (graph_.find_node(node) == nullptr)
     throw Error("there is no such node",
                 {.file = path_.string(), .field = "node", .value = std::to_string(node)});
-}
-
-FrameBlobs RtabmapDatabase::read_blobs(int node, FrameParts parts) const {
-  require_node(node);
   FrameBlobs blobs;
   if (!columns_.has_table("Data") && !columns_.has_table("Image")) return blobs;
   const ImageColumns of = image_columns(columns_);
@@ -220,37 +202,8 @@ RgbdFrame RtabmapDatabase::read_frame(int node, FrameParts parts) const {
     frame.stamp_s = graph_.find_node(node)->stamp_s;
     return frame;
   } catch (const Error& error) {
-    throw in_part(error, node, {});
-  }
-}
-
-Calibration RtabmapDatabase::calibration(int node) const {
-  const std::string bytes = read_blobs(node, {.color = false, .depth = false}).calibration;
-  if (bytes.empty()) return {};
-  try {
-    return decode_calibration(bytes);
-  } catch (const Error& error) {
-    throw in_part(error, node, "calibration");
-  }
-}
-
-std::optional<LaserScan> RtabmapDatabase::laser_scan(int node) const {
-  require_node(node);
-  if (!columns_.has_table("Data") && !columns_.has_table("Image")) return std::nullopt;
-  const ImageColumns of = image_columns(columns_);
-  std::string scan;
-  std::string info;
-  file_->each_row("SELECT " + of.scan + ", " + columns_.or_null("Data", "scan_info") + " FROM " +
-                      of.from + " WHERE " + of.id + " = ? LIMIT 1",
-                  {node}, [&](const SqliteRow& row) {
-                    scan = or_empty(row.bytes(0));
-                    info = or_empty(row.bytes(1));
-                  });
-  if (scan.empty()) return std::nullopt;
-  try {
-    return decode_laser_scan(scan, info);
-  } catch (const Error& error) {
-    throw in_part(error, node, "scan");
+    if (!error.context().file.empty()) throw;
+    throw error.in_field("node " + std::to_string(node)).in_file(path_.string());
   }
 }
 
@@ -291,39 +244,9 @@ std::string feature_table(const RtabmapColumns& columns) {
   return {};
 }
 
-float float_in(const SqliteRow& row, int column) { return static_cast<float>(row.real(column)); }
-
 int int_in(const SqliteRow& row, int column) {
   return static_cast<int>(std::clamp<std::int64_t>(
       row.integer(column), std::numeric_limits<int>::min(), std::numeric_limits<int>::max()));
-}
-
-// Columns: word_id pos_x pos_y size dir response octave depth_x depth_y depth_z descriptor_size
-// descriptor.
-StoredFeature feature_in(const SqliteRow& row) {
-  StoredFeature feature{.word = int_in(row, 0),
-                        .x = float_in(row, 1),
-                        .y = float_in(row, 2),
-                        .size = int_in(row, 3),
-                        .angle_deg = float_in(row, 4),
-                        .response = float_in(row, 5),
-                        .octave = int_in(row, 6)};
-  const Eigen::Vector3f point(float_in(row, 7), float_in(row, 8), float_in(row, 9));
-  if (point.allFinite()) feature.point_in_base = point;
-  const std::string descriptor = row.bytes(11);
-  const auto size = static_cast<std::size_t>(std::max(int_in(row, 10), 0));
-  if (size == 0 || descriptor.empty()) return feature;
-  if (descriptor.size() == size) {
-    feature.binary_descriptor.assign(descriptor.begin(), descriptor.end());
-  } else if (descriptor.size() == sizeof(float) * size) {
-    feature.float_descriptor.resize(size);
-    std::memcpy(feature.float_descriptor.data(), descriptor.data(), descriptor.size());
-  } else {
-    throw Error("descriptor of another length than it says",
-                {.value = std::to_string(descriptor.size()) + " bytes",
-                 .bound = std::to_string(size) + " or " + std::to_string(sizeof(float) * size)});
-  }
-  return feature;
 }
 
 }  // namespace
@@ -335,24 +258,6 @@ std::size_t RtabmapDatabase::word_count() const {
 std::size_t RtabmapDatabase::feature_count() const {
   const std::string table = feature_table(columns_);
   return table.empty() ? 0 : count_rows(*file_, table);
-}
-
-std::vector<StoredFeature> RtabmapDatabase::features(int node) const {
-  require_node(node);
-  std::vector<StoredFeature> features;
-  const std::string table = feature_table(columns_);
-  if (!columns_.has(table, "node_id")) return features;
-  std::string list;
-  for (const char* name : {"word_id", "pos_x", "pos_y", "size", "dir", "response", "octave",
-                           "depth_x", "depth_y", "depth_z", "descriptor_size", "descriptor"})
-    list += (list.empty() ? "" : ", ") + columns_.or_null(table, name);
-  try {
-    file_->each_row("SELECT " + list + " FROM " + table + " WHERE node_id = ? ORDER BY rowid",
-                    {node}, [&](const SqliteRow& row) { features.push_back(feature_in(row)); });
-  } catch (const Error& error) {
-    throw in_part(error, node, "features");
-  }
-  return features;
 }
 
 namespace {

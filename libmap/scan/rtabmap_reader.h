@@ -20,27 +20,12 @@
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/calibration_codec.h"
-#include "libmap/scan/laser_scan.h"
 #include "libmap/scan/rtabmap_columns.h"
 #include "libmap/scan/scan_source.h"
 
 namespace libmap {
 
 class SqliteFile;
-
-struct StoredFeature {
-  int word = 0;    // negative: not in the dictionary
-  float x = 0.0F;  // pixels, in the image of all cameras side by side
-  float y = 0.0F;
-  int size = 0;  // pixels
-  float angle_deg = 0.0F;
-  float response = 0.0F;
-  int octave = 0;
-  std::optional<Eigen::Vector3f> point_in_base{};
-  // One of them, or none.
-  std::vector<std::uint8_t> binary_descriptor{};
-  std::vector<float> float_descriptor{};
-};
 
 // What a node's row of images holds, by the first bytes of each.
 struct NodeContent {
@@ -98,9 +83,6 @@ class RtabmapDatabase : public ScanSource {
   std::map<std::string, std::string> parameters() const;
   std::size_t word_count() const;
   std::size_t feature_count() const;
-  std::vector<StoredFeature> features(int node) const;
-  Calibration calibration(int node) const;  // empty if not stored
-  std::optional<LaserScan> laser_scan(int node) const;
   StoredMap stored_map() const;
   // Nodes in ascending order, from headers alone.
   void each_content(const std::function<void(const NodeContent&)>& use) const;
@@ -113,9 +95,6 @@ class RtabmapDatabase : public ScanSource {
 
  private:
   FrameBlobs read_blobs(int node, FrameParts parts) const;
-  void require_node(int node) const;
-  // Error with the file, "node N: PART" and the reason of `error`.
-  Error in_part(const Error& error, int node, const std::string& part) const;
 
   std::filesystem::path path_;
   std::unique_ptr<SqliteFile> file_;

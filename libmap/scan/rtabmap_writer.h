@@ -17,8 +17,6 @@ namespace libmap {
 struct RtabmapWriterOptions {
   DepthFormat depth = DepthFormat::rvl;   // rvl and png16: whole millimeters up to 65.534 m
   ImageFormat color = ImageFormat::jpeg;  // of the right image of a stereo pair too
-  int jpeg_quality = 95;                  // RTAB-Map's default
-  std::map<std::string, std::string> parameters{};  // into Info.parameters
 };
 
 // The same calls in the same order give the same bytes: where RTAB-Map writes the present time, the
@@ -26,25 +24,20 @@ struct RtabmapWriterOptions {
 class RtabmapWriter {
  public:
   // Makes a new file at `path`, which callers give as an OutputFile's temporary path; what stood
-  // there is lost. Throws Error.
+  // there is lost. Throws Error, as all calls do where the file cannot be written.
   explicit RtabmapWriter(const std::filesystem::path& path,
                          const RtabmapWriterOptions& options = {});
   ~RtabmapWriter();
   RtabmapWriter(const RtabmapWriter&) = delete;
   RtabmapWriter& operator=(const RtabmapWriter&) = delete;
 
-  // One node with its images, in any order of ids; poses are kept as float32. Throws Error if the
-  // id or the label is taken, an id is not above 0, a camera is no camera, or the frame is another
-  // node's.
+  // One node with its images, in any order of ids; poses are kept as float32.
   void add_node(const GraphNode& node, const RgbdFrame& frame);
   // Stored in both directions, the inverse with the same information matrix, as RTAB-Map does;
-  // priors, gravity and landmarks in one. The nodes may come later. Throws Error for a link that
-  // is there already, in either direction, and for numbers that are not finite.
+  // priors, gravity and landmarks in one. The nodes may come later.
   void add_link(const PoseLink& link);
-  void set_optimized_poses(const std::map<int, Pose>& map_from_base);
-  // Writes what is left and closes the file: no journal is left beside it. Throws Error if a link
-  // or an optimized pose names a node that is not there. A writer that goes away without it leaves
-  // a file that is no whole scan.
+  // Writes what is left and closes the file: no journal is left beside it. A writer that goes away
+  // without it leaves a file that is no whole scan.
   void finish();
 
  private:
@@ -53,12 +46,12 @@ class RtabmapWriter {
 };
 
 // `source` copied to `target`, whatever stood there, with other optimized poses (Admin.opt_ids,
-// opt_poses); everything else stays as it is, row for row. Where the last localisation stood at an
-// optimized pose it moves with its node, else it is dropped; landmarks among the optimized poses
-// move with the first node that sees them. A grid, cloud or mesh that RTAB-Map stored with the
-// earlier poses goes: it makes them anew. `links` are added, in both directions, where the two
-// nodes have no link yet. `source` may be open elsewhere. Throws Error: no database of RTAB-Map
-// 0.13 or later, a pose or a link of a node that is not there.
+// opt_poses) of its nodes; everything else stays as it is, row for row. Where the last localisation
+// stood at an optimized pose it moves with its node, else it is dropped; landmarks among the
+// optimized poses move with the first node that sees them. A grid, cloud or mesh that RTAB-Map
+// stored with the earlier poses goes: it makes them anew. `links` between its nodes are added, in
+// both directions, where the two have no link yet. `source` may be open elsewhere. Throws Error: no
+// database of RTAB-Map 0.13 or later.
 void copy_with_optimized_poses(const std::filesystem::path& source,
                                const std::filesystem::path& target,
                                const std::map<int, Pose>& map_from_base,

@@ -11,6 +11,7 @@
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/image/matrix_codec.h"
+#include "libmap/scan/laser_scan.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
@@ -133,8 +134,7 @@ std::string part_of(const char* table, const char* column) {
 // What decoding takes at most, by what the blobs say of themselves; what is broken takes nothing.
 std::uint64_t scan_bytes(const std::string& blob) {
   const StoredMatrix size = read_matrix_header(blob);
-  // A point of two float32 becomes one of three float64.
-  return 4 * static_cast<std::uint64_t>(size.rows) * static_cast<std::uint64_t>(size.columns) *
+  return static_cast<std::uint64_t>(size.rows) * static_cast<std::uint64_t>(size.columns) *
          static_cast<std::uint64_t>(size.channels) * bytes_of(size.element);
 }
 
@@ -264,7 +264,7 @@ class DatabaseVerification {
     if (blobs.size() < 7) return;
     findings_.check(node, "Data.scan", blobs[0], [&](const std::string& scan) {
       const MemoryBudget::Share share = memory_.take(scan_bytes(scan));
-      decode_laser_scan(scan, is_absent(blobs[1]) ? std::string() : blobs[1]);
+      check_laser_scan(scan, is_absent(blobs[1]) ? std::string() : blobs[1]);
     });
     for (std::size_t i = 0; i < matrices.size(); ++i)
       findings_.check(node, part_of("Data", matrices[i]), blobs[2 + i], check_matrix);
@@ -316,11 +316,6 @@ void verify_frames(const ScanSource& scan, ScanVerificationResult& result, Progr
 }
 
 }  // namespace
-
-std::string to_text(const ScanFault& fault) {
-  const std::string place = fault.node > 0 ? "node " + std::to_string(fault.node) + ": " : "";
-  return place + fault.part + ": " + fault.reason;
-}
 
 ScanVerificationResult verify_scan(const ScanSource& scan, Progress& progress) {
   ScanVerificationResult result;

@@ -16,8 +16,6 @@ struct ScanFault {
   std::string part{};  // table and column, e.g. "Data.depth"
   std::string reason{};
 };
-// "node 17: Data.depth: REASON".
-std::string to_text(const ScanFault& fault);
 
 struct ScanVerificationResult {
   std::size_t nodes = 0;            // whose frames were decoded

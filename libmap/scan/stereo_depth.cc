@@ -112,9 +112,6 @@ DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const Ste
   check(cameras);
   check(left, cameras.left, "left");
   check(right, cameras.right, "right");
-  if (left.height != right.height || left.width != right.width)
-    refuse_pair("images of a pair differ in size", "right image",
-                size_text(right.width, right.height), size_text(left.width, left.height));
   const StereoDepthOptions in_force = checked(options);
   const int largest = in_force.min_disparity_px + in_force.disparities_px;
   const int border_left = std::max(0, largest);
@@ -167,9 +164,7 @@ DepthImage stereo_depth(const RgbdFrame& frame, const StereoDepthOptions& option
                          frame.stereo[static_cast<std::size_t>(n)], options),
             n * width, depth);
     } catch (const Error& error) {
-      ErrorContext context = error.context();
-      context.field = context.field.empty() ? node : node + ": " + context.field;
-      throw Error(error.reason(), context, error.kind());
+      throw error.in_field(node);
     }
   }
   return depth;

@@ -26,7 +26,7 @@ void bind(ParameterTable& table, StereoDepthOptions& options);
 
 // Depth of the left image's pixels, meters, 0 where no match was found:
 // z = fx b / (d - (cx_left - cx_right)), d the disparity x_left - x_right. Throws Error naming the
-// field: images of different sizes or not of the cameras' sizes, cameras that are not rectified
+// field: images not of the cameras' sizes, cameras that are not rectified
 // (distorted, or with different fx), no baseline, options out of their ranges.
 DepthImage stereo_depth(const GrayImage& left, const GrayImage& right, const StereoCamera& cameras,
                         const StereoDepthOptions& options = {});

@@ -2,7 +2,6 @@
 
 #include <cmath>
 #include <cstdint>
-#include <limits>
 #include <optional>
 
 #include "libmap/core/error.h"
@@ -72,11 +71,10 @@ std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std:
 
 int integer_of(const TextLine& line, std::size_t word, const std::string& file) {
   require_word(line, word, file);
-  const std::optional<std::int64_t> value = parse_integer(line.words[word]);
-  if (!value || *value < std::numeric_limits<int>::min() ||
-      *value > std::numeric_limits<int>::max())
+  const std::optional<int> value = parse_int(line.words[word]);
+  if (!value)
     throw in_line("not a whole number", line, file, std::string(line.words[word]), "of 32 bits");
-  return static_cast<int>(*value);
+  return *value;
 }
 
 Error in_line(const std::string& reason, const TextLine& line, const std::string& file,

@@ -322,16 +322,16 @@ Pose to_axes(PoseAxes axes, const Pose& world_from_base) {
   return world_from_base;
 }
 
-PoseTextFormat recognize_poses(std::string_view text, const std::string& file) {
+std::string recognize_poses(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
     const std::string_view tag = line.words[0];
     for (const char* start : {"VERTEX_", "EDGE_", "PARAMS_", "FIX"})
-      if (tag.starts_with(start)) return PoseTextFormat::g2o;
+      if (tag.starts_with(start)) return ".g2o";
     for (const char* start : {"VERTEX", "EDGE"})
-      if (tag.starts_with(start)) return PoseTextFormat::toro;
-    if (line.words.size() == 12) return PoseTextFormat::kitti;
-    if (line.words.size() == 8 || line.words.size() == 9) return PoseTextFormat::tum;
+      if (tag.starts_with(start)) return ".toro";
+    if (line.words.size() == 12) return ".kitti";
+    if (line.words.size() == 8 || line.words.size() == 9) return ".tum";
     throw wrong_columns("no known format of poses", line, file,
                         "8 or 9 of TUM, 12 of KITTI, or VERTEX... of g2o or TORO");
   }

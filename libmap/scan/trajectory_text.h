@@ -68,8 +68,8 @@ Pose from_axes(PoseAxes axes, const Pose& pose_in_file);
 Pose to_axes(PoseAxes axes, const Pose& world_from_base);
 
 // Which of the formats above a text is, by its first line that is no comment: by its tag or its
-// number of columns. Throws Error if it is none of them.
-enum class PoseTextFormat { tum, kitti, toro, g2o };
-PoseTextFormat recognize_poses(std::string_view text, const std::string& file);
+// number of columns; as its extension, ".tum", ".kitti", ".toro" or ".g2o". Throws Error if it is
+// none of them.
+std::string recognize_poses(std::string_view text, const std::string& file);
 
 }  // namespace libmap

@@ -4,9 +4,6 @@
 #include <cmath>
 #include <numbers>
 #include <numeric>
-#include <string>
-
-#include "libmap/core/error.h"
 
 namespace libmap {
 
@@ -27,24 +24,11 @@ bool resemble(const Pose& a, const Pose& b, const ViewSelectionOptions& options)
   return angle <= options.angle_deg * std::numbers::pi / 180.0;
 }
 
-void check(const ViewSelectionOptions& options, const std::vector<Pose>& poses,
-           const std::vector<double>& qualities) {
-  check_parameters(options);
-  if (poses.size() != qualities.size())
-    throw Error("not one quality per view", {.field = "qualities",
-                                             .value = std::to_string(qualities.size()),
-                                             .bound = std::to_string(poses.size())});
-  for (std::size_t n = 0; n < poses.size(); ++n)
-    if (!poses[n].matrix().allFinite() || !std::isfinite(qualities[n]))
-      throw Error("its pose or quality is not finite", {.field = "view " + std::to_string(n)});
-}
-
 }  // namespace
 
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options) {
-  check(options, world_from_camera, qualities);
   std::vector<std::size_t> order(world_from_camera.size());
   std::iota(order.begin(), order.end(), std::size_t{0});
   std::stable_sort(order.begin(), order.end(),

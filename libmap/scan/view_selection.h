@@ -19,8 +19,7 @@ void bind(ParameterTable& table, ViewSelectionOptions& options);
 // resemble each other if they lie nearer than the radius and look within the angle. So no two that
 // are kept resemble each other, and each that is not kept resembles a better one that is.
 // `qualities`, one a view, say which is better; of equal ones the first. Poses are of optical
-// frames. Throws Error: options out of their ranges, a number of qualities other than of views, a
-// pose or quality that is not finite.
+// frames.
 std::vector<std::size_t> select_views(const std::vector<Pose>& world_from_camera,
                                       const std::vector<double>& qualities,
                                       const ViewSelectionOptions& options = {});

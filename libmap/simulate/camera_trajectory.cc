@@ -161,12 +161,6 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
 
 }  // namespace
 
-void CameraTrajectoryOptions::check() const {
-  check_parameters(*this);
-  if (target && !target->allFinite())
-    throw Error("not a place", {.file = {}, .field = "target", .value = {}, .bound = "finite"});
-}
-
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
   table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
@@ -209,7 +203,6 @@ double surrounding_ground_height(const TriangleMesh& mesh) {
 
 Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
                         std::uint64_t seed) {
-  options.check();
   const Way way = way_of(mesh, options);
   const std::vector<double> loops = paced_loops(way, options);
   // A hand sways with the steps of a walk; a look wanders in some ten seconds.

@@ -31,8 +31,6 @@ struct CameraTrajectoryOptions {
   double sway_m = 0.01;           // standard deviation of the hand about its way, in each axis
   double tremor_deg = 1.0;        // and of its turns about each axis
   double frame_interval_s = 1.0;  // between two poses
-
-  void check() const;  // throws Error naming the first field that cannot be
 };
 // All but the target.
 void bind(ParameterTable& table, CameraTrajectoryOptions& options);

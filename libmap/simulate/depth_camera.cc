@@ -51,7 +51,6 @@ std::vector<Eigen::Vector2d> lattice_rays(const Camera& camera, int width, int h
 }  // namespace
 
 PixelRays make_pixel_rays(const Camera& camera) {
-  camera.check();
   return {camera.width, camera.height, ray_table(camera),
           lattice_rays(camera, camera.width + 1, camera.height + 1, -0.5)};
 }
@@ -240,12 +239,10 @@ DepthSensorOptions ideal_depth_sensor(double near_m, double far_m) {
 
 void DepthSensorOptions::check() const {
   if (!(far_m > near_m))
-    throw Error(
-        "nothing lies between near_m and far_m",
-        {.file = {}, .field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
+    throw Error("nothing lies between near_m and far_m",
+                {.field = "far_m", .value = to_text(far_m), .bound = "> " + to_text(near_m)});
   if (!(flying_pixels + edge_dropouts <= 1.0))
-    throw Error("more edge pixels than there are", {.file = {},
-                                                    .field = "flying_pixels + edge_dropouts",
+    throw Error("more edge pixels than there are", {.field = "flying_pixels + edge_dropouts",
                                                     .value = to_text(flying_pixels + edge_dropouts),
                                                     .bound = "<= 1"});
 }
@@ -328,7 +325,6 @@ std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double inc
 
 DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
                                const DepthSensorOptions& options, std::uint64_t seed) {
-  options.check();
   DepthMeasurement result{.depth = DepthImage(view.depth.width, view.depth.height)};
   struct Counts {
     std::size_t measured = 0, edges = 0, flying = 0;

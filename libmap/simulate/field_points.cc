@@ -7,6 +7,7 @@
 #include <limits>
 #include <map>
 #include <optional>
+#include <tuple>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
@@ -203,7 +204,7 @@ class Chooser {
     for (std::size_t n = 0; n < candidates_.size(); ++n) {
       if (distances_[n] < spacing_m_) continue;
       const int own = candidates_[n].point.rock;
-      if (!rock || uses(own) < uses(*rock) || (uses(own) == uses(*rock) && own < *rock)) rock = own;
+      if (!rock || std::pair(uses(own), own) < std::pair(uses(*rock), *rock)) rock = own;
     }
     return rock;
   }
@@ -218,17 +219,12 @@ class Chooser {
   }
 
   bool is_better(std::size_t a, std::size_t b) const {
-    const FieldPoint& first = candidates_[a].point;
-    const FieldPoint& second = candidates_[b].point;
-    const int on_rock = uses_on_rock(first) - uses_on_rock(second);
-    if (on_rock != 0) return on_rock < 0;
-    if (uses(first) != uses(second)) return uses(first) < uses(second);
-    if (first.kind != second.kind) return first.kind < second.kind;
-    const int first_difficulty = by_difficulty_[first.is_hard ? 1 : 0];
-    const int second_difficulty = by_difficulty_[second.is_hard ? 1 : 0];
-    if (first_difficulty != second_difficulty) return first_difficulty < second_difficulty;
-    if (distances_[a] != distances_[b]) return distances_[a] > distances_[b];
-    return first.height_m > second.height_m;
+    const auto rank = [this](std::size_t n) {
+      const FieldPoint& point = candidates_[n].point;
+      return std::tuple(uses_on_rock(point), uses(point), point.kind,
+                        by_difficulty_[point.is_hard ? 1 : 0], -distances_[n], -point.height_m);
+    };
+    return rank(a) < rank(b);
   }
 
   void take(std::size_t index) {
@@ -263,8 +259,7 @@ std::vector<FieldPoint> choose_field_points(const RockSite& site, const Triangle
   for (int n = 0; n < site.field_points.count; ++n) {
     if (!chooser.choose_next())
       throw Error("the rocks have too few places high enough",
-                  {.file = {},
-                   .field = "field_points.count",
+                  {.field = "field_points.count",
                    .value = std::to_string(site.field_points.count),
                    .bound = "at most " + std::to_string(n) + " here"});
   }

@@ -51,18 +51,14 @@ struct ParameterAdder {
 };
 
 Error shape_error(std::size_t i, const SceneShape& shape, const Error& error) {
-  ErrorContext context = error.context();
-  context.field = "shapes[" + std::to_string(i) + "]." + context.field;
-  return Error(error.reason() + " in " + shape_kind(shape), context);
+  return Error(error.reason() + " in " + shape_kind(shape),
+               error.in_field("shapes[" + std::to_string(i) + "]", ".").context());
 }
 
 void check_shape(const SceneShape& shape) {
-  SceneShape copy = shape;
-  shape_parameters(copy).check();
   if (const auto* capsule = std::get_if<Capsule>(&shape.geometry)) {
     if (capsule->length_m < 2.0 * capsule->radius_m)
-      throw Error("shorter than wide", {.file = {},
-                                        .field = "length_m",
+      throw Error("shorter than wide", {.field = "length_m",
                                         .value = to_text(capsule->length_m),
                                         .bound = ">= " + to_text(2.0 * capsule->radius_m)});
   }
@@ -71,8 +67,7 @@ void check_shape(const SceneShape& shape) {
     if (up < 1e-6)
       throw Error(
           "the plane does not face up (a box can stand or overhang)",
-          {.file = {},
-           .field = "roll_deg, pitch_deg",
+          {.field = "roll_deg, pitch_deg",
            .value = to_text(shape.placement.roll_deg) + ", " + to_text(shape.placement.pitch_deg),
            .bound = "less than 90 degrees from upright"});
   }
@@ -102,7 +97,7 @@ ShapeGeometry make_shape_geometry(const std::string& kind) {
   std::string bound = "one of";
   for (const std::string& known : shape_kinds()) bound += " " + known;
   throw Error("unknown shape" + did_you_mean(kind, shape_kinds()),
-              {.file = {}, .field = "shape", .value = kind, .bound = bound});
+              {.field = "shape", .value = kind, .bound = bound});
 }
 
 ParameterTable shape_parameters(SceneShape& shape) {

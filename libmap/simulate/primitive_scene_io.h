@@ -20,7 +20,4 @@ namespace libmap {
 PrimitiveScene parse_scene(const std::string& text, const std::string& file);
 PrimitiveScene load_scene(const std::filesystem::path& path);
 
-// Text that parse_scene reads back as an equal scene.
-std::string to_yaml(const PrimitiveScene& scene);
-
 }  // namespace libmap

@@ -38,7 +38,6 @@ void bind(ParameterTable& table, RobotCamerasOptions& options) {
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options) {
-  rig.check();
   const VisibleSurface surface(mesh);
   RandomStream stamps(options.seed, stamp_key);
   std::vector<RobotCameraImage> images;
@@ -66,7 +65,7 @@ double ground_height(const TriangleMesh& mesh, double x_m, double y_m) {
   const auto hit = caster.cast({x_m, y_m, above}, {0.0, 0.0, -1.0});
   if (!hit)
     throw Error("the mesh has no ground beneath the robot",
-                {.file = {}, .field = "x, y", .value = to_text(x_m) + ", " + to_text(y_m)});
+                {.field = "x, y", .value = to_text(x_m) + ", " + to_text(y_m)});
   return above - hit->distance;
 }
 

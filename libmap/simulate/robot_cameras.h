@@ -30,8 +30,8 @@ struct RobotCameraImage {
   DepthMeasurement measurement;
 };
 
-// One image for each of the rig's cameras. The robot stands still. Throws Error for a rig that
-// cannot be used and a mesh without triangles; an image may be empty.
+// One image for each of the rig's cameras. The robot stands still. Throws Error for a mesh
+// without triangles; an image may be empty.
 std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, const CameraRig& rig,
                                                      const Pose& world_from_robot,
                                                      const RobotCamerasOptions& options);

@@ -8,7 +8,6 @@
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
-#include "libmap/simulate/scene_geometry.h"
 #include "libmap/simulate/solid_noise.h"
 
 namespace libmap {
@@ -56,16 +55,6 @@ Footprint square(double size) {
 bool is_within(const Footprint& footprint, double half_x, double half_y) {
   return std::abs(footprint.center.x()) + footprint.reach(Eigen::Vector2d::UnitX()) <= half_x &&
          std::abs(footprint.center.y()) + footprint.reach(Eigen::Vector2d::UnitY()) <= half_y;
-}
-
-void check_table(const ParameterTable& table, const std::string& place) {
-  try {
-    table.check();
-  } catch (const Error& error) {
-    ErrorContext context = error.context();
-    context.field = place + "." + context.field;
-    throw Error(error.reason(), context);
-  }
 }
 
 std::string rock_place(std::size_t n, const SiteRock& rock) {
@@ -143,19 +132,19 @@ ParameterTable field_point_parameters(FieldPointOptions& options) {
 }
 
 void RockSite::check() const {
-  RockSite copy = *this;
-  check_table(ground_parameters(copy.ground), "ground");
-  check_table(layout_parameters(copy.layout), "layout");
-  check_table(field_point_parameters(copy.field_points), "field_points");
   for (std::size_t n = 0; n < rocks.size(); ++n) {
-    check_table(rock_parameters(copy.rocks[n]), rock_place(n, rocks[n]));
+    SiteRock copy = rocks[n];
+    try {
+      rock_parameters(copy).check();
+    } catch (const Error& error) {
+      throw error.in_field(rock_place(n, copy), ".");
+    }
     // The outline of the ground stays whole.
     constexpr double margin_m = 0.05;
     if (!is_within(footprint_of(rocks[n]), 0.5 * ground.size_x_m - margin_m,
                    0.5 * ground.size_y_m - margin_m))
       throw Error("reaches over the edge of the ground",
-                  {.file = {},
-                   .field = rock_place(n, rocks[n]) + ".x_m, y_m",
+                  {.field = rock_place(n, rocks[n]) + ".x_m, y_m",
                    .value = to_text(rocks[n].x_m) + ", " + to_text(rocks[n].y_m),
                    .bound = "5 cm within " + to_text(ground.size_x_m) + " x " +
                             to_text(ground.size_y_m) + " m"});
@@ -230,39 +219,28 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks) {
     }
     if (!is_placed)
       throw Error("no room is left for it between the free square and the site's edge",
-                  {.file = {},
-                   .field = rock_place(one.rock, rock),
-                   .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m",
-                   .bound = {}});
+                  {.field = rock_place(one.rock, rock),
+                   .value = to_text(rock.width_m) + " x " + to_text(rock.depth_m) + " m"});
     taken.push_back(footprint_of(rock));
   }
 }
 
-struct GroundRelief::Parts {
-  std::optional<SceneGeometry> bumps;
-  double unevenness_m = 0.0;
-  std::uint64_t seed = 0;
-};
-
-GroundRelief::GroundRelief(const RockSite& site) : parts_(std::make_unique<Parts>()) {
-  parts_->unevenness_m = site.ground.unevenness_m;
-  parts_->seed = mix_bits(site.seed, 3);
+GroundRelief::GroundRelief(const RockSite& site)
+    : unevenness_m_(site.ground.unevenness_m), seed_(mix_bits(site.seed, 3)) {
   if (site.bumps.empty()) return;
   PrimitiveScene scene;
   scene.shapes.push_back({Plane{site.ground.size_x_m, site.ground.size_y_m}, {}, "ground"});
   scene.shapes.insert(scene.shapes.end(), site.bumps.begin(), site.bumps.end());
-  parts_->bumps.emplace(scene);
+  bumps_.emplace(scene);
 }
-
-GroundRelief::~GroundRelief() = default;
 
 double GroundRelief::height(double x_m, double y_m) const {
   const Eigen::Vector3d at(x_m, y_m, 0.37);
-  const double relief = 0.6 * gradient_noise(at / 0.8, parts_->seed) +
-                        0.25 * gradient_noise(at / 0.25, parts_->seed + 1) +
-                        0.15 * gradient_noise(at / 0.07, parts_->seed + 2);
-  const double bumps = parts_->bumps ? parts_->bumps->ground_height(x_m, y_m).value : 0.0;
-  return bumps + parts_->unevenness_m * relief;
+  const double relief = 0.6 * gradient_noise(at / 0.8, seed_) +
+                        0.25 * gradient_noise(at / 0.25, seed_ + 1) +
+                        0.15 * gradient_noise(at / 0.07, seed_ + 2);
+  const double bumps = bumps_ ? bumps_->ground_height(x_m, y_m).value : 0.0;
+  return bumps + unevenness_m_ * relief;
 }
 
 }  // namespace libmap

@@ -8,7 +8,7 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +17,7 @@
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
 #include "libmap/simulate/primitive_scene.h"
+#include "libmap/simulate/scene_geometry.h"
 
 namespace libmap {
 
@@ -103,14 +104,12 @@ void place_rocks(RockSite& site, std::vector<RockToPlace> rocks);
 class GroundRelief {
  public:
   explicit GroundRelief(const RockSite& site);  // of the site's ground, drawn from its seed
-  ~GroundRelief();
-  GroundRelief(const GroundRelief&) = delete;
-  GroundRelief& operator=(const GroundRelief&) = delete;
   double height(double x_m, double y_m) const;  // meters above the ground's plane
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  std::optional<SceneGeometry> bumps_;
+  double unevenness_m_;
+  std::uint64_t seed_;
 };
 
 }  // namespace libmap

@@ -17,15 +17,6 @@ namespace {
 
 constexpr std::size_t max_entries = 10'000;
 
-Error with_place(const Error& error, std::string place, const YAML::Node& node) {
-  ErrorContext context = error.context();
-  if (!context.field.empty()) place += "." + context.field;
-  if (!node.Mark().is_null()) place += " (line " + std::to_string(node.Mark().line + 1) + ")";
-  context.field = place;
-  context.file.clear();
-  return Error(error.reason(), context);
-}
-
 // The keys that the node gives.
 std::vector<std::string> set_from_node(const ParameterTable& table, const YAML::Node& node) {
   if (!node.IsMap()) throw Error("not a map of keys and values");
@@ -75,15 +66,14 @@ void parse_list(const YAML::Node& root, const std::string& key,
   if (!list || list.IsNull()) return;
   if (!list.IsSequence()) throw Error("not a list", {.field = key});
   if (list.size() > max_entries)
-    throw Error("too many entries", {.file = {},
-                                     .field = key,
+    throw Error("too many entries", {.field = key,
                                      .value = std::to_string(list.size()),
                                      .bound = "at most " + std::to_string(max_entries)});
   for (std::size_t n = 0; n < list.size(); ++n) {
     try {
       parse(list[n]);
     } catch (const Error& error) {
-      throw with_place(error, key + "[" + std::to_string(n) + "]", list[n]);
+      throw at_node(error, key + "[" + std::to_string(n) + "]", list[n]);
     }
   }
 }
@@ -94,26 +84,13 @@ void parse_part(const YAML::Node& root, const std::string& key, const ParameterT
   try {
     set_from_node(table, node);
   } catch (const Error& error) {
-    throw with_place(error, key, node);
-  }
-}
-
-void check_keys(const YAML::Node& root) {
-  const std::vector<std::string> known = {"seed",         "ground", "layout",
-                                          "field_points", "bumps",  "rocks"};
-  if (!root.IsMap()) throw Error("a site is a map with keys such as 'rocks'");
-  std::vector<std::string> seen;
-  for (const auto& entry : root) {
-    const std::string key = entry.first.IsScalar() ? entry.first.Scalar() : "";
-    if (!is_given(known, key))
-      throw Error("unknown key" + did_you_mean(key, known), {.field = key});
-    if (is_given(seen, key)) throw Error("is a duplicate", {.field = key});
-    seen.push_back(key);
+    throw at_node(error, key, node);
   }
 }
 
 RockSite parse_root(const YAML::Node& root, std::optional<std::uint64_t> seed) {
-  check_keys(root);
+  if (!root.IsMap()) throw Error("a site is a map with keys such as 'rocks'");
+  check_keys(root, {"seed", "ground", "layout", "field_points", "bumps", "rocks"});
   RockSite site;
   ParameterTable own;
   own.add("seed", site.seed, not_negative, "seed");

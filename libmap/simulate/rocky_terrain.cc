@@ -53,11 +53,9 @@ void bind(ParameterTable& table, RockyTerrainOptions& options) {
 }
 
 void RockyTerrainOptions::check() const {
-  check_parameters(*this);
   if (max_rock_m < min_rock_m)
     throw Error("the highest rocks are lower than the lowest",
-                {.file = {},
-                 .field = "max_rock_m",
+                {.field = "max_rock_m",
                  .value = to_text(max_rock_m),
                  .bound = ">= min_rock_m, " + to_text(min_rock_m)});
 }
@@ -65,7 +63,6 @@ void RockyTerrainOptions::check() const {
 RockyTerrain::RockyTerrain(const RockyTerrainOptions& options,
                            const Eigen::AlignedBox2d& rectangle_m)
     : options_(options), rectangle_m_(rectangle_m) {
-  options_.check();
   const double margin = largest_reach * options_.max_rock_m;
   const auto first_i = cell_below(rectangle_m.min().x() - margin, rock_cell_m);
   const auto last_i = cell_below(rectangle_m.max().x() + margin, rock_cell_m);

@@ -132,7 +132,6 @@ Camera kinect_v2_camera() {
 
 ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress) {
-  options.depth.check();
   const PixelRays rays = make_pixel_rays(options.camera);
   const VisibleSurface surface(mesh, options.texture, options.seed);
   const Trajectory truth =

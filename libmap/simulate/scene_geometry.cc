@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -212,13 +213,6 @@ double SceneGeometry::signed_distance(const SceneSolid& solid, const Eigen::Vect
       {std::abs(local.x()) - face.half_x, std::abs(local.y()) - face.half_y, above});
 }
 
-double SceneGeometry::signed_distance(const Eigen::Vector3d& point) const {
-  double distance = std::numeric_limits<double>::infinity();
-  for (const SceneSolid& solid : solids_)
-    distance = std::min(distance, signed_distance(solid, point));
-  return distance;
-}
-
 double SceneGeometry::height_of(const Eigen::Vector3d& point) const {
   return ground() == nullptr ? point.z() : (ground()->solid_from_scene * point).z();
 }
@@ -302,9 +296,17 @@ bool SceneGeometry::is_visible(const SceneSolid& solid, const Eigen::Vector3d& p
   });
 }
 
-std::string count_text(double count) {
-  const double rounded = std::round(count);
-  return rounded < 9e18 ? to_text(static_cast<std::int64_t>(rounded)) : to_text(rounded);
+void require_count(double count, std::uint64_t max_count, const std::string& what,
+                   const std::string& field, const std::string& value) {
+  const auto text = [](double number) {
+    const double rounded = std::round(number);
+    return rounded < 9e18 ? to_text(static_cast<std::int64_t>(rounded)) : to_text(rounded);
+  };
+  const auto limit = static_cast<double>(max_count);
+  if (count > limit)
+    throw Error("asks for about " + text(count) + " " + what + "; the limit is " + text(limit) +
+                    " (max_" + what + ")",
+                {.field = field, .value = value});
 }
 
 }  // namespace libmap

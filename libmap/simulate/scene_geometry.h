@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <string>
 #include <vector>
 
@@ -56,9 +57,8 @@ class SceneGeometry {
 
   GroundHeight ground_height(double x, double y) const;  // of the ground at (x, y), bumps included
 
-  // To the surface of one solid, or of all together: negative inside.
+  // To the surface of one solid: negative inside.
   double signed_distance(const SceneSolid& solid, const Eigen::Vector3d& point) const;
-  double signed_distance(const Eigen::Vector3d& point) const;
 
   // The truth at parameters of a face.
   SurfaceTruth on_profile(const SceneSolid& solid, std::size_t segment, double t,
@@ -85,7 +85,8 @@ class SceneGeometry {
   int ground_ = -1;
 };
 
-// A whole number in digits, as far as 64 bits hold it.
-std::string count_text(double count);
+// Throws Error, because of the option `field`, if it asks for more "triangles" than max_triangles.
+void require_count(double count, std::uint64_t max_count, const std::string& what,
+                   const std::string& field, const std::string& value);
 
 }  // namespace libmap

@@ -14,6 +14,7 @@
 #include "libmap/core/text.h"
 #include "libmap/simulate/scene_geometry.h"
 #include "libmap/simulate/scene_tessellation.h"
+#include "libmap/simulate/solid.h"
 
 namespace libmap {
 
@@ -55,19 +56,8 @@ TriangleSoup visible_part(const SceneGeometry& geometry, const SceneSolid& solid
       continue;
     soup = cut_by(geometry, soup, solid, other);
   }
-  std::vector<std::uint32_t> renumbered(soup.vertices.size(), no_vertex);
-  TriangleSoup used;
-  for (Triangle& triangle : soup.triangles) {
-    for (std::uint32_t& vertex : triangle) {
-      if (renumbered[vertex] == no_vertex) {
-        renumbered[vertex] = static_cast<std::uint32_t>(used.vertices.size());
-        used.vertices.push_back(soup.vertices[vertex]);
-      }
-      vertex = renumbered[vertex];
-    }
-    used.triangles.push_back(triangle);
-  }
-  return used;
+  drop_unused_vertices(soup.vertices, soup.triangles);
+  return soup;
 }
 
 // The ground, triangulated around the edges at which the other solids' meshes meet it.
@@ -174,30 +164,17 @@ class GroundMesher {
   Triangulation triangulation_;
 };
 
-void require_positive(double value, const char* field) {
-  if (value > 0.0 && std::isfinite(value)) return;
-  throw Error("out of range",
-              {.file = {}, .field = field, .value = to_text(value), .bound = "> 0"});
-}
-
 void check(const SceneGeometry& geometry, const SceneMeshOptions& options) {
   double triangles = 0.0;
   for (const SceneSolid& solid : geometry.solids())
     triangles += estimated_triangles(solid, options);
-  // Vertex indices have 32 bits.
-  const double limit = std::min(static_cast<double>(options.max_triangles), 2e9);
-  if (triangles <= limit) return;
-  throw Error(
-      "asks for about " + count_text(triangles) + " triangles; the limit is " + count_text(limit) +
-          " (max_triangles)",
-      {.file = {}, .field = "edge_length_m", .value = to_text(options.edge_length_m), .bound = {}});
+  require_count(triangles, options.max_triangles, "triangles", "edge_length_m",
+                to_text(options.edge_length_m));
 }
 
 }  // namespace
 
 TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options) {
-  require_positive(options.edge_length_m, "edge_length_m");
-  require_positive(options.chord_error_m, "chord_error_m");
   const SceneGeometry geometry(scene);
   check(geometry, options);
   TriangleMesh mesh;

@@ -9,8 +9,9 @@
 namespace libmap {
 
 struct SceneMeshOptions {
-  double edge_length_m = 0.01;    // longest edge along a row or ring; diagonals are up to 1.5 times
-  double chord_error_m = 0.0002;  // of round shapes (bent ground follows edge_length_m alone)
+  double edge_length_m =
+      0.01;  // > 0: longest edge along a row or ring; diagonals are up to 1.5 times
+  double chord_error_m = 0.0002;  // > 0: of round shapes (bent ground follows edge_length_m alone)
   std::uint64_t max_triangles = 20'000'000;  // more is an Error
 };
 
@@ -21,7 +22,7 @@ struct SceneMeshOptions {
 // overlap each other, their cut edges agree to within the sag of a chord of edge_length_m, not by
 // vertices; parts thinner than edge_length_m can be missed. Where a solid reaches over the outline
 // of the ground, the ground's last triangles are kept or dropped whole.
-// Throws Error: a bad option or scene, or too many triangles.
+// Throws Error: a bad scene, or too many triangles.
 TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options);
 
 }  // namespace libmap

@@ -219,46 +219,20 @@ SceneSamples sample_at(const SceneGeometry& geometry, const std::vector<Patch>& 
     RandomStream noise(options.seed, 2 * i + 1);
     for (std::size_t k = 0; k < samples.size(); ++k) {
       const double shift = options.noise_m > 0.0 ? options.noise_m * noise.normal() : 0.0;
-      if (visible[k] != 0) {
-        append(samples[k], shift, cloud, fields);
-      } else {
-        ++result.hidden_points;
-      }
+      if (visible[k] != 0) append(samples[k], shift, cloud, fields);
     }
   }
   return result;
 }
 
-void require_limit(double points, const SceneSamplingOptions& options, const char* field,
-                   const std::string& value) {
-  const auto limit = static_cast<double>(options.max_points);
-  if (points <= limit) return;
-  throw Error("asks for about " + count_text(points) + " points; the limit is " +
-                  count_text(limit) + " (max_points)",
-              {.file = {}, .field = field, .value = value, .bound = {}});
-}
-
-void require(double value, const char* field, const char* bound, bool holds) {
-  if (holds && std::isfinite(value)) return;
-  throw Error("out of range",
-              {.file = {}, .field = field, .value = to_text(value), .bound = bound});
-}
-
-void check(const SceneSamplingOptions& options) {
-  require(options.jitter, "jitter", ">= 0 and <= 1",
-          options.jitter >= 0.0 && options.jitter <= 1.0);
-  require(options.noise_m, "noise_m", ">= 0", options.noise_m >= 0.0);
-  if (options.count == 0) require(options.spacing_m, "spacing_m", "> 0", options.spacing_m > 0.0);
-}
-
 }  // namespace
 
 SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOptions& options) {
-  check(options);
   const SceneGeometry geometry(scene);
   const std::vector<Patch> patches = patches_of(geometry);
   const auto wanted = static_cast<double>(options.count);
-  if (options.count > 0) require_limit(wanted, options, "count", std::to_string(options.count));
+  if (options.count > 0)
+    require_count(wanted, options.max_points, "points", "count", std::to_string(options.count));
   double spacing = options.spacing_m;
   const PatchAreas areas = measure_areas(geometry, patches, 20'000.0);
   if (options.count > 0) spacing = std::sqrt(areas.visible / wanted);
@@ -266,8 +240,8 @@ SceneSamples sample_scene(const PrimitiveScene& scene, const SceneSamplingOption
   // at ten times the limit.
   const double points = areas.visible / spacing / spacing;
   const double drawn = 0.1 * areas.whole / spacing / spacing;
-  require_limit(std::max(points, drawn), options, options.count > 0 ? "count" : "spacing_m",
-                to_text(spacing));
+  require_count(std::max(points, drawn), options.max_points, "points",
+                options.count > 0 ? "count" : "spacing_m", to_text(spacing));
   SceneSamples samples = sample_at(geometry, patches, spacing, options);
   for (int round = 0; round < 3 && options.count > 0 && !samples.cloud.empty(); ++round) {
     const double share = static_cast<double>(samples.cloud.size()) / wanted;

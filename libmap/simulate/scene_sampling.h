@@ -21,8 +21,7 @@ struct SceneSamples {
   // Positions (with noise), true normals and the fields shape, height, curvature_min and
   // curvature_max of SurfaceTruth, which are those of the point before noise.
   PointCloud cloud;
-  double spacing_m = 0.0;           // as used
-  std::uint64_t hidden_points = 0;  // drawn, but inside another shape
+  double spacing_m = 0.0;  // as used
 };
 
 // Samples of the visible surface, even by area: a jittered grid on the parametrization of each

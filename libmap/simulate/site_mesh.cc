@@ -3,13 +3,12 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
-#include <limits>
-#include <numeric>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
+#include "libmap/mesh/mesh_parts.h"
 #include "libmap/simulate/rock_shape.h"
 #include "libmap/simulate/rock_texture.h"
 #include "libmap/simulate/scene_geometry.h"
@@ -30,11 +29,6 @@ double edge_length_of(const SiteRock& rock, double edge_length_m) {
 }
 
 void check(const RockSite& site, const SiteMeshOptions& options) {
-  if (!(options.edge_length_m > 0.0) || !std::isfinite(options.edge_length_m))
-    throw Error("out of range", {.file = {},
-                                 .field = "edge_length_m",
-                                 .value = to_text(options.edge_length_m),
-                                 .bound = "> 0"});
   site.check();
   double triangles = 2.0 * site.ground.size_x_m * site.ground.size_y_m /
                      (options.edge_length_m * options.edge_length_m);
@@ -44,14 +38,8 @@ void check(const RockSite& site, const SiteMeshOptions& options) {
     triangles += (rock.width_m * rock.depth_m + around * (rock.height_m + base_depth_m)) /
                  (0.43 * edge * edge);
   }
-  const double limit = std::min(static_cast<double>(options.max_triangles), 2e9);
-  if (triangles > limit)
-    throw Error("asks for about " + count_text(triangles) + " triangles; the limit is " +
-                    count_text(limit) + " (max_triangles)",
-                {.file = {},
-                 .field = "edge_length_m",
-                 .value = to_text(options.edge_length_m),
-                 .bound = {}});
+  require_count(triangles, options.max_triangles, "triangles", "edge_length_m",
+                to_text(options.edge_length_m));
 }
 
 Solid ground_solid(const RockSite& site, const GroundRelief& relief, double edge_length_m) {
@@ -96,61 +84,32 @@ Solid placed_rock(const SiteRock& rock, int number, const GroundRelief& relief,
   return solid;
 }
 
-// Numbers of the connected parts, by triangle, and how many there are.
-std::pair<std::vector<std::size_t>, std::size_t> parts_of(const Solid& solid) {
-  std::vector<std::uint32_t> parent(solid.vertices.size());
-  std::iota(parent.begin(), parent.end(), 0U);
-  const auto root = [&](std::uint32_t vertex) {
-    while (parent[vertex] != vertex) vertex = parent[vertex] = parent[parent[vertex]];
-    return vertex;
-  };
-  for (const Triangle& triangle : solid.triangles)
-    for (std::size_t k = 1; k < 3; ++k) {
-      const std::uint32_t a = root(triangle[0]);
-      const std::uint32_t b = root(triangle[k]);
-      parent[std::max(a, b)] = std::min(a, b);
-    }
-  std::vector<std::size_t> number(solid.vertices.size(), 0);
-  std::size_t count = 0;
-  std::vector<std::size_t> parts;
-  parts.reserve(solid.triangles.size());
-  for (const Triangle& triangle : solid.triangles) {
-    const std::uint32_t at = root(triangle[0]);
-    if (number[at] == 0) number[at] = ++count;
-    parts.push_back(number[at]);
-  }
-  return {std::move(parts), count};
-}
-
-// Keeps the triangles that `keep` names and the vertices that they use.
+// The triangles that `keep` names and the vertices that they use.
 template <typename Keep>
 Solid select(const Solid& solid, const Keep& keep) {
-  constexpr auto unused = std::numeric_limits<std::uint32_t>::max();
-  std::vector<std::uint32_t> renumbered(solid.vertices.size(), unused);
   Solid kept;
+  kept.vertices = solid.vertices;
   for (std::size_t n = 0; n < solid.triangles.size(); ++n) {
     if (!keep(n)) continue;
-    Triangle triangle = solid.triangles[n];
-    for (std::uint32_t& vertex : triangle) {
-      if (renumbered[vertex] == unused) {
-        renumbered[vertex] = static_cast<std::uint32_t>(kept.vertices.size());
-        kept.vertices.push_back(solid.vertices[vertex]);
-      }
-      vertex = renumbered[vertex];
-    }
-    kept.triangles.push_back(triangle);
+    kept.triangles.push_back(solid.triangles[n]);
     kept.labels.push_back(solid.labels[n]);
   }
+  drop_unused_vertices(kept.vertices, kept.triangles);
   return kept;
 }
 
 // The part that holds the ground's base. Hollows without a way out are dropped; a part that bears
 // a rock's outside is a rock in the air.
 Solid part_of_ground(const Solid& solid, const RockSite& site) {
-  const auto [parts, count] = parts_of(solid);
+  TriangleMesh mesh;
+  mesh.vertices = solid.vertices;
+  mesh.triangles = solid.triangles;
+  const MeshComponents components = connected_components(mesh);
+  const std::vector<std::uint32_t>& parts = components.of_triangle;
+  const std::size_t count = components.areas_m2.size();
   if (count == 1) return solid;
-  std::vector<double> volumes(count + 1, 0.0);
-  std::vector<int> labels(count + 1, 0);
+  std::vector<double> volumes(count, 0.0);
+  std::vector<int> labels(count, 0);
   std::size_t ground = 0;
   for (std::size_t n = 0; n < solid.triangles.size(); ++n) {
     const Triangle& t = solid.triangles[n];
@@ -158,14 +117,14 @@ Solid part_of_ground(const Solid& solid, const RockSite& site) {
     labels[parts[n]] = solid.labels[n];
     if (solid.labels[n] < 0) ground = parts[n];
   }
-  for (std::size_t part = 1; part <= count; ++part) {
+  for (std::size_t part = 0; part < count; ++part) {
     if (part == ground || volumes[part] < 0.0) continue;
     const SiteRock& rock = site.rocks[static_cast<std::size_t>(labels[part]) - 1];
     const std::string name = rock.name.empty() ? "" : " (" + rock.name + ")";
     throw Error("does not touch the ground",
                 {.field = "rocks[" + std::to_string(labels[part] - 1) + "]" + name});
   }
-  return select(solid, [&, &owner = parts](std::size_t n) { return owner[n] == ground; });
+  return select(solid, [&](std::size_t n) { return parts[n] == ground; });
 }
 
 Color color_of(const RockSite& site, int label, const Eigen::Vector3d& point) {

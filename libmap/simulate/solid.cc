@@ -55,20 +55,14 @@ class ConvexBody {
 
   Solid solid() const {
     Solid result;
-    std::map<std::uint32_t, std::uint32_t> renumbered;
-    const auto number = [&](std::uint32_t corner) {
-      const auto [entry, is_new] =
-          renumbered.emplace(corner, static_cast<std::uint32_t>(result.vertices.size()));
-      if (is_new) result.vertices.push_back(vertices_[corner]);
-      return entry->second;
-    };
+    result.vertices = vertices_;
     for (const Face& face : faces_) {
       for (std::size_t n = 2; n < face.corners.size(); ++n) {
-        result.triangles.push_back(
-            {number(face.corners[0]), number(face.corners[n - 1]), number(face.corners[n])});
+        result.triangles.push_back({face.corners[0], face.corners[n - 1], face.corners[n]});
         result.labels.push_back(face.label);
       }
     }
+    drop_unused_vertices(result.vertices, result.triangles);
     return result;
   }
 
@@ -171,6 +165,22 @@ Solid ellipsoid_solid(const Eigen::Vector3d& radii_m, double edge_length_m) {
   }
   solid.labels.assign(solid.triangles.size(), 0);
   return solid;
+}
+
+void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices,
+                          std::vector<Triangle>& triangles) {
+  constexpr auto unused = std::numeric_limits<std::uint32_t>::max();
+  std::vector<std::uint32_t> renumbered(vertices.size(), unused);
+  std::vector<Eigen::Vector3d> used;
+  for (Triangle& triangle : triangles)
+    for (std::uint32_t& vertex : triangle) {
+      if (renumbered[vertex] == unused) {
+        renumbered[vertex] = static_cast<std::uint32_t>(used.size());
+        used.push_back(vertices[vertex]);
+      }
+      vertex = renumbered[vertex];
+    }
+  vertices = std::move(used);
 }
 
 Solid in_order(const Solid& solid) {

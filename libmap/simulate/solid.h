@@ -41,6 +41,9 @@ struct HeightGrid {
 };
 Solid block_solid(const HeightGrid& top, double base_m);
 
+// Leaves the vertices that the triangles use, in the order of their first use.
+void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices, std::vector<Triangle>& triangles);
+
 // The same surface in an order that follows from its geometry alone: vertices by x, y, z, triangles
 // by their vertices. CGAL goes through triangulations in the order of addresses in memory; what
 // leaves it is put in this order, so that equal input gives equal bytes.
@@ -52,10 +55,9 @@ Solid refine_facets(const Solid& solid, double edge_length_m);
 
 // Unions and differences of solids in general position (CGAL's corefinement with exact
 // predicates). Throws Error if the result is no manifold. solid_boolean.cc.
-Solid unite(const std::vector<Solid>& solids);
-// The union without the splinters that cuts leave: edges shorter than `min_edge_m` are collapsed
-// where the surface stays a manifold and no triangle turns over.
-Solid unite(const std::vector<Solid>& solids, double min_edge_m);
+// Without the splinters that cuts leave: edges shorter than `min_edge_m` are collapsed where the
+// surface stays a manifold and no triangle turns over.
+Solid unite(const std::vector<Solid>& solids, double min_edge_m = 0.0);
 Solid subtract(const Solid& solid, const Solid& removed);
 
 }  // namespace libmap

@@ -126,22 +126,11 @@ void collapse_short_edges(Mesh& mesh, double min_edge_m) {
   }
 }
 
-struct Box {
-  Eigen::Vector3d min;
-  Eigen::Vector3d max;
-  bool overlaps(const Box& other) const {
-    return (min.array() <= other.max.array()).all() && (other.min.array() <= max.array()).all();
-  }
-};
-
-Box box_of(const Solid& solid) {
-  const Bounds3d bounds = bounds_of(solid.vertices);
-  return {bounds.min, bounds.max};
+bool overlap(const Bounds3d& a, const Bounds3d& b) {
+  return (a.min.array() <= b.max.array()).all() && (b.min.array() <= a.max.array()).all();
 }
 
 }  // namespace
-
-Solid unite(const std::vector<Solid>& solids) { return unite(solids, 0.0); }
 
 // CGAL goes through its two operands in the order of their addresses: the meshes lie in one array,
 // so that the result does not depend on where memory happens to be.
@@ -151,12 +140,12 @@ Solid unite(const std::vector<Solid>& solids, double min_edge_m) {
   std::vector<Mesh> meshes;
   meshes.reserve(solids.size());
   append(meshes.emplace_back(), solids.front());
-  std::vector<std::vector<Box>> boxes(1);
+  std::vector<std::vector<Bounds3d>> boxes(1);
   for (std::size_t n = 1; n < solids.size(); ++n) {
-    const Box box = box_of(solids[n]);
+    const Bounds3d box = bounds_of(solids[n].vertices);
     const auto place = std::find_if(boxes.begin() + 1, boxes.end(), [&](const auto& others) {
       return std::none_of(others.begin(), others.end(),
-                          [&](const Box& other) { return other.overlaps(box); });
+                          [&](const Bounds3d& other) { return overlap(other, box); });
     });
     const auto index = static_cast<std::size_t>(place - boxes.begin());
     if (index == meshes.size()) {

@@ -110,13 +110,11 @@ void TerrainPiecesOptions::check() const {
   terrain.check();
   const double cells = piece_m / spacing_m;
   if (cells < 1.0 || cells * cells > 1e8)
-    throw Error("a piece has too few or too many points", {.file = {},
-                                                           .field = "piece_m",
-                                                           .value = to_text(piece_m),
-                                                           .bound = "1 to 10,000 times spacing_m"});
+    throw Error(
+        "a piece has too few or too many points",
+        {.field = "piece_m", .value = to_text(piece_m), .bound = "1 to 10,000 times spacing_m"});
   if (std::ceil(size_x_m / piece_m) * std::ceil(size_y_m / piece_m) > 1e6)
-    throw Error("too many pieces", {.file = {},
-                                    .field = "piece_m",
+    throw Error("too many pieces", {.field = "piece_m",
                                     .value = to_text(piece_m),
                                     .bound = "large enough for at most 1,000,000 pieces"});
 }

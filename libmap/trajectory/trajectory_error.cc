@@ -117,8 +117,7 @@ Pose best_alignment(const std::vector<PosePair>& pairs) {
 }
 
 Error too_few(std::size_t count, std::size_t least) {
-  return Error("too few poses are in both trajectories", {.file = {},
-                                                          .field = "common poses",
+  return Error("too few poses are in both trajectories", {.field = "common poses",
                                                           .value = std::to_string(count),
                                                           .bound = ">= " + std::to_string(least)});
 }
@@ -143,18 +142,14 @@ AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
   return error;
 }
 
-TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth,
-                                          std::size_t step) {
-  if (step == 0)
-    throw Error("not a distance between poses",
-                {.file = {}, .field = "step", .value = "0", .bound = ">= 1"});
+TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth) {
   const std::vector<PosePair> pairs = pair_poses(estimate, truth);
-  if (pairs.size() <= step) throw too_few(pairs.size(), step + 1);
+  if (pairs.size() < 2) throw too_few(pairs.size(), 2);
   std::vector<double> distances_m;
   std::vector<double> angles_deg;
-  for (std::size_t i = 0; i + step < pairs.size(); ++i) {
+  for (std::size_t i = 0; i + 1 < pairs.size(); ++i) {
     const PosePair& begin = pairs[i];
-    const PosePair& end = pairs[i + step];
+    const PosePair& end = pairs[i + 1];
     const Pose estimated_motion = begin.estimate.inverse() * end.estimate;
     const Pose true_motion = begin.truth.inverse() * end.truth;
     const Pose error = true_motion.inverse() * estimated_motion;

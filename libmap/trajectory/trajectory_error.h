@@ -29,8 +29,7 @@ struct AbsoluteTrajectoryError : TrajectoryError {
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
                                                   const Trajectory& truth);
 
-// Errors of the motion between pairs of poses that follow each other `step` poses apart.
-TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth,
-                                          std::size_t step = 1);
+// Errors of the motion between poses that follow each other.
+TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth);
 
 }  // namespace libmap

@@ -11,6 +11,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/text.h"
 #include "libmap/scan/colmap_io.h"
 #include "libmap/scan/stamp_pairing.h"
 #include "libmap/scan/trajectory_text.h"
@@ -30,13 +31,6 @@ constexpr std::array<std::pair<const char*, TrajectoryFormat>, 4> extensions = {
 
 // Of vertices that are the places of poses in their order.
 constexpr std::string_view numbered_head = "# graspmap: poses without nodes, numbered in order";
-
-std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension)
-    if (c >= 'A' && c <= 'Z') c = static_cast<char>(c - 'A' + 'a');
-  return extension;
-}
 
 std::vector<const GraphNode*> valid_nodes(const PoseGraph& graph) {
   std::vector<const GraphNode*> nodes;
@@ -80,8 +74,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
     std::erase_if(nodes, [&](const GraphNode* node) { return !has_stored_pose(node); });
   if (trajectory.size() != nodes.size())
     throw Error("has neither nodes nor stamps and another number of poses than the scan has nodes",
-                {.file = {},
-                 .field = "poses",
+                {.field = "poses",
                  .value = std::to_string(trajectory.size()),
                  .bound = std::to_string(valid)});
   NodePairs pairs;
@@ -90,7 +83,7 @@ NodePairs pair_by_order(const Trajectory& trajectory, const PoseGraph& graph,
 }
 
 std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
-  const std::string extension = extension_of(path);
+  const std::string extension = lower_case(path.extension().string());
   for (const auto& [name, format] : extensions)
     if (extension == name) return format;
   return std::nullopt;
@@ -98,17 +91,7 @@ std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
 
 TrajectoryFormat format_of_text(const std::string& text, const fs::path& path) {
   if (const auto format = format_of_extension(path)) return *format;
-  switch (recognize_poses(text, path.string())) {
-    case PoseTextFormat::tum:
-      return TrajectoryFormat::tum;
-    case PoseTextFormat::kitti:
-      return TrajectoryFormat::kitti;
-    case PoseTextFormat::toro:
-      return TrajectoryFormat::toro;
-    case PoseTextFormat::g2o:
-      return TrajectoryFormat::g2o;
-  }
-  return TrajectoryFormat::tum;
+  return *format_of_extension("poses" + recognize_poses(text, path.string()));
 }
 
 PoseAxes axes_of(TrajectoryFormat format) {
@@ -263,8 +246,7 @@ NodeTrajectory assign_nodes(const Trajectory& trajectory, const PoseGraph& graph
   for (const auto& [node, pose] : pairs)
     if (!poses.emplace(node->id, TrajectoryPose{node->id, node->stamp_s, pose->world_from_base})
              .second)
-      throw Error("two poses for one node",
-                  {.file = {}, .field = "node", .value = std::to_string(node->id)});
+      throw Error("two poses for one node", {.field = "node", .value = std::to_string(node->id)});
   NodeTrajectory result;
   for (const auto& [id, pose] : poses) result.poses.push_back(pose);
   result.foreign = trajectory.size() - pairs.size();

@@ -52,6 +52,19 @@ Points voxel_means(const Points& points) {
   return means;
 }
 
+// Every measurement up to the greatest depth, in the camera's optical frame.
+Points back_project(const libmap::DepthImage& depth, const libmap::Camera& camera,
+                    double max_depth) {
+  const std::vector<Eigen::Vector2d> rays = ray_table(camera);
+  Points points;
+  for (std::size_t n = 0; n < rays.size(); ++n) {
+    const auto z = static_cast<double>(depth.pixels[n]);
+    if (z >= 0.01 && z <= max_depth && rays[n].allFinite())
+      points.emplace_back(rays[n].x() * z, rays[n].y() * z, z);
+  }
+  return points;
+}
+
 struct Baselines {
   Points each_frame;  // as RTAB-Map's export
   Points all_frames;  // one lattice for all of them
@@ -64,8 +77,7 @@ Baselines make_baselines(const libmap::ScanSource& scan, const libmap::Trajector
     const libmap::RgbdFrame frame = scan.read_frame(pose.node, {.color = false, .depth = true});
     for (const libmap::CameraView& view : camera_views(frame)) {
       const Pose world_from_camera = pose.world_from_base * view.depth_camera.base_from_camera;
-      const Points measured =
-          libmap::back_project(view.depth, view.depth_camera, 0.01, max_depth_m);
+      const Points measured = back_project(view.depth, view.depth_camera, max_depth_m);
       for (const Eigen::Vector3d& point : voxel_means(measured))
         made.each_frame.push_back(world_from_camera * point);
       for (const Eigen::Vector3d& point : measured) all.push_back(world_from_camera * point);

@@ -1,5 +1,7 @@
 #include "tools/support/map_frame.h"
 
+#include <cmath>
+
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -164,7 +166,7 @@ Eigen::Vector3d parse_vector(const std::string& text, const std::string& field) 
   for (Eigen::Index axis = 0; axis < 3; ++axis) {
     const std::size_t comma = rest.find(',');
     const auto value = libmap::parse_double(rest.substr(0, comma));
-    if (!value || (comma == std::string_view::npos) != (axis == 2))
+    if (!value || !std::isfinite(*value) || (comma == std::string_view::npos) != (axis == 2))
       throw libmap::Error("not three numbers", {.field = field, .value = text, .bound = "X,Y,Z"});
     vector[axis] = *value;
     rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);

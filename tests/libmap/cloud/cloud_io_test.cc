@@ -108,8 +108,8 @@ TEST_P(CloudFormat, KeepsEveryFieldBothWays) {
 
 TEST_P(CloudFormat, InfoSaysWhatTheReaderFinds) {
   const fs::path path = write_sample(GetParam(), sample_cloud(40));
-  const CloudFileInfo info = read_cloud_info(path);
-  const CloudFileInfo read = read_cloud(path).info;
+  const GeometryFileInfo info = read_cloud_info(path);
+  const GeometryFileInfo read = read_cloud(path).info;
   EXPECT_EQ(info.format, std::string(GetParam().extension).substr(1));
   EXPECT_EQ(info.encoding, GetParam().encoding);
   EXPECT_EQ(info.big_endian, GetParam().big_endian);

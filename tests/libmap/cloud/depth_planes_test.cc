@@ -140,13 +140,6 @@ TEST(DepthPlanes, GrazingSurfacesAreDropped) {
     }
 }
 
-TEST(DepthPlanes, RaysOfAnotherSize) {
-  const Camera camera = small_camera();
-  const DepthImage depth(camera.width, camera.height - 1, 1.0F);
-  EXPECT_EQ(error_of([&] { fit_depth_planes(depth, pixel_rays(camera)); }).reason(),
-            "depth image and rays differ in size");
-}
-
 TEST(DepthPlanes, TinyImages) {
   for (const auto& [width, height] : {std::pair{1, 1}, {2, 3}, {5, 1}, {3, 3}}) {
     Camera camera = small_camera();

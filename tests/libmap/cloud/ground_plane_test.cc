@@ -273,14 +273,8 @@ TEST(GroundPlane, UpOfNormals) {
 }
 
 TEST(GroundPlane, WhatCannotBe) {
-  const double nan = std::numeric_limits<double>::quiet_NaN();
   EXPECT_EQ(error_of([] { find_ground_plane({}); }).context().value, "0");
-  EXPECT_EQ(error_of([&] {
-              find_ground_plane({{0, 0, 0}, {1, 0, 0}, {nan, 1, 0}});
-            })
-                .context()
-                .value,
-            "2");
+  EXPECT_EQ(error_of([&] { find_ground_plane({{0, 0, 0}, {1, 0, 0}}); }).context().value, "2");
   Points line;
   for (int n = 0; n < 100; ++n) line.emplace_back(0.3 * n, 0.1 * n, 1);
   EXPECT_NE(error_of([&] { find_ground_plane(line); }).reason().find("one line"),

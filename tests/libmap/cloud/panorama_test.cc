@@ -194,14 +194,6 @@ TEST(Panorama, SameForAnyNumberOfThreads) {
 
 TEST(Panorama, NoViewsAndWrongArguments) {
   EXPECT_TRUE(make_panorama({}).cloud.empty());
-  PanoramaView view;
-  view.name = "front";
-  view.camera = camera_of(DistortionModel::none, {});
-  view.depth = libmap::DepthImage(32, 36);
-  EXPECT_THAT(error_of([&] { make_panorama({view}); }).what(),
-              testing::AllOf(HasSubstr("front"), HasSubstr("32 x 36"), HasSubstr("64 x 36")));
-  view.camera.fx = 0;
-  EXPECT_THAT(error_of([&] { make_panorama({view}); }).what(), HasSubstr("fx is 0"));
   PanoramaOptions options;
   options.stride_px = 0;
   EXPECT_THAT(error_of([&] { make_panorama({}, options); }).what(), HasSubstr("stride_px"));

@@ -130,25 +130,6 @@ TEST(CameraTest, RayTableIsPixelByPixel) {
   }
 }
 
-// The rays through the image's corners, half a pixel outside the corner pixels' centers, do not
-// depend on the resolution.
-TEST(CameraTest, ScalingKeepsTheFieldOfView) {
-  for (const Camera& camera : lenses()) {
-    const Camera small = libmap::scale_camera(camera, 64, 53);
-    EXPECT_EQ(small.width, 64);
-    EXPECT_EQ(small.height, 53);
-    const auto corner = libmap::pixel_to_ray(camera, Vector2d(-0.5, -0.5));
-    const auto small_corner = libmap::pixel_to_ray(small, Vector2d(-0.5, -0.5));
-    EXPECT_LT((*corner - *small_corner).norm(), 1e-9);
-    const auto end = libmap::pixel_to_ray(camera, Vector2d(511.5, 423.5));
-    const auto small_end = libmap::pixel_to_ray(small, Vector2d(63.5, 52.5));
-    EXPECT_LT((*end - *small_end).norm(), 1e-9);
-  }
-  const Camera same = libmap::scale_camera(kinect(), 512, 424);
-  EXPECT_EQ(same.cx, kinect().cx);
-  EXPECT_EQ(same.cy, kinect().cy);
-}
-
 TEST(CameraTest, OpticalAxesInTheBody) {
   const libmap::Pose pose = libmap::optical_to_body_rotation();
   EXPECT_EQ(pose * Vector3d::UnitZ(), Vector3d::UnitX());

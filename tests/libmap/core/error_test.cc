@@ -47,4 +47,12 @@ TEST(ErrorTest, InFileNamesAFileOnce) {
   EXPECT_STREQ(error.what(), "x: missing") << "the original stays as it was";
 }
 
+TEST(ErrorTest, InFieldNamesThePlaceAroundAField) {
+  const Error error("missing", {.field = "x"}, ErrorKind::failed);
+  EXPECT_STREQ(error.in_field("point 3").what(), "point 3: x: missing");
+  EXPECT_STREQ(error.in_field("points[3]", ".").what(), "points[3].x: missing");
+  EXPECT_STREQ(Error("missing").in_field("point 3").what(), "point 3: missing");
+  EXPECT_EQ(error.in_field("point 3").kind(), ErrorKind::failed);
+}
+
 }  // namespace error_test

@@ -97,6 +97,17 @@ TEST(TextTest, ParsesIntegers) {
     EXPECT_FALSE(parse_integer(text)) << text;
 }
 
+TEST(TextTest, ParsesIntegersOf32Bits) {
+  EXPECT_EQ(libmap::parse_int("-2147483648"), std::numeric_limits<int>::min());
+  EXPECT_EQ(libmap::parse_int("2147483647"), std::numeric_limits<int>::max());
+  for (const char* text : {"2147483648", "-2147483649", "1.0", ""})
+    EXPECT_FALSE(libmap::parse_int(text)) << text;
+}
+
+TEST(TextTest, SmallLettersOfAsciiAlone) {
+  EXPECT_EQ(libmap::lower_case(".PnG \xC3\x84"), ".png \xC3\x84");
+}
+
 TEST(TextTest, ParsesSwitches) {
   for (const char* yes : {"true", "TRUE", "yes", "on", "1", " On "})
     EXPECT_EQ(parse_bool(yes), true) << yes;

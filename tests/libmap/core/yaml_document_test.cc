@@ -76,4 +76,23 @@ TEST(YamlDocument, FaultsWithoutAPlace) {
   EXPECT_EQ(fault.find("given.yaml: not valid YAML: "), 0U) << fault;
 }
 
+TEST(YamlDocument, KeysAreKnownAndThereOnce) {
+  const auto fault = [](const std::string& text) {
+    const YAML::Node map = YAML::Load(text);
+    return std::string(graspmap_test::error_of([&] {
+                         libmap::check_keys(map, {"radius", "name"}, " of a ball");
+                       }).what());
+  };
+  EXPECT_EQ(fault("{name: a, radus: 1}"), "radus: unknown key of a ball (did you mean 'radius'?)");
+  EXPECT_EQ(fault("{name: a, name: b}"), "name: is a duplicate");
+  EXPECT_EQ(fault("{[1]: a}"), "a key is not a name");
+  EXPECT_NO_THROW(libmap::check_keys(YAML::Load("{name: a}"), {"radius", "name"}));
+}
+
+TEST(YamlDocument, ErrorsNameTheLineOfTheirNode) {
+  const YAML::Node list = YAML::Load("- a\n- b\n");
+  const libmap::Error error("missing", {.field = "x"});
+  EXPECT_STREQ(libmap::at_node(error, "list[1]", list[1]).what(), "list[1].x (line 2): missing");
+}
+
 }  // namespace yaml_document_test

@@ -71,23 +71,23 @@ TEST(BagReader, TopicsOfOtherTypesAreSaid) {
             "tf2_msgs/TFMessage)");
 }
 
-TEST(BagReader, MessagesOfTheWantedTopicsUntilItIsEnough) {
+TEST(BagReader, MessagesOfTheWantedTopics) {
   write_sample();
   std::vector<std::string> seen;
   std::vector<std::size_t> lengths;
   const auto take = [&](const libmap::BagMessage& message) {
     seen.push_back(message.topic.name);
     lengths.push_back(message.bytes.size());
-    EXPECT_GT(message.size, 30U);
-    return seen.size() < 2;
   };
   libmap::read_bag(bag_path(), {{"/rear/image_raw", 10}, {"/front/image_raw"}}, take);
-  EXPECT_EQ(seen, (std::vector<std::string>{"/front/image_raw", "/rear/image_raw"}));
+  ASSERT_GE(seen.size(), 2U);
+  EXPECT_EQ(seen[0], "/front/image_raw");
+  EXPECT_EQ(seen[1], "/rear/image_raw");
   EXPECT_EQ(lengths[1], 10U);
-  libmap::read_bag(bag_path(), {{"/none"}}, [](const auto&) -> bool { throw 1; });
+  libmap::read_bag(bag_path(), {{"/none"}}, [](const auto&) { throw 1; });
   // What `take` throws comes out, and the reading process ends.
   EXPECT_THROW(libmap::read_bag(bag_path(), {{"/tf_static"}},
-                                [](const auto&) -> bool { throw libmap::Error("enough"); }),
+                                [](const auto&) { throw libmap::Error("enough"); }),
                libmap::Error);
 }
 

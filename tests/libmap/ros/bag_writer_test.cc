@@ -30,7 +30,6 @@ std::map<std::string, std::string> messages_of(const fs::path& path) {
   std::map<std::string, std::string> messages;
   libmap::read_bag(path, requests, [&](const libmap::BagMessage& message) {
     messages[message.topic.name] = message.bytes;
-    return true;
   });
   return messages;
 }

@@ -51,7 +51,9 @@ std::string stereo_record(const Parts& left, const Parts& right, const std::vect
 // The stored bytes, and the camera that a reader of that version takes them for.
 Camera only_camera(const std::string& bytes, int width = 0, int height = 0) {
   const Calibration calibration = libmap::decode_calibration(bytes);
-  EXPECT_EQ(encode_calibration(calibration), bytes);
+  if (calibration.layout == CalibrationLayout::records) {
+    EXPECT_EQ(encode_calibration(calibration), bytes);
+  }
   const std::vector<Camera> cameras = cameras_of(calibration, width, height);
   EXPECT_EQ(cameras.size(), 1U);
   return cameras.at(0);
@@ -170,7 +172,6 @@ TEST(CalibrationCodec, FloatsOfEarlierVersions) {
                                (has_size ? bytes_of(size) : "") + bytes_of(local);
     EXPECT_EQ(stereo.size(), has_size ? 76U : 68U);
     const Calibration calibration = libmap::decode_calibration(stereo);
-    EXPECT_EQ(encode_calibration(calibration), stereo);
     const auto pair = stereo_cameras_of(calibration, 320, 240).at(0);
     EXPECT_EQ(pair.baseline_m, 0.25);
     EXPECT_EQ(pair.left.width, 320);
@@ -190,8 +191,6 @@ TEST(CalibrationCodec, SizesTellApartWhatTheLengthDoesNot) {
   ASSERT_EQ(eight.size(), nine.size());
   EXPECT_EQ(libmap::decode_calibration(eight).cameras.size(), 8U);
   EXPECT_EQ(libmap::decode_calibration(nine).cameras.size(), 9U);
-  EXPECT_EQ(encode_calibration(libmap::decode_calibration(eight)), eight);
-  EXPECT_EQ(encode_calibration(libmap::decode_calibration(nine)), nine);
 }
 
 TEST(CalibrationCodec, RandomRecordsKeepTheirBytes) {
@@ -269,13 +268,6 @@ TEST(CalibrationCodec, RecordsThatDoNotBelongTogether) {
             "'163': calibration of a stereo camera has another length than it says");
   EXPECT_EQ(error_of([&] { libmap::decode_calibration(stereo + record({.k = k})); }).reason(),
             "calibration contains single and stereo cameras");
-}
-
-TEST(CalibrationCodec, FloatsHoldKAndL) {
-  Calibration calibration = libmap::decode_calibration(record({.k = k, .l = {}}));
-  calibration.layout = CalibrationLayout::floats;
-  EXPECT_EQ(error_of([&] { encode_calibration(calibration); }).reason(),
-            "calibration without K and L does not fit its layout");
 }
 
 TEST(CalibrationCodec, StereoCamerasAtOnePlace) {

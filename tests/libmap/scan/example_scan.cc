@@ -1,8 +1,10 @@
 #include "tests/libmap/scan/example_scan.h"
 
+#include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
 #include "libmap/image/depth_codec.h"
+#include "libmap/scan/rtabmap_blobs.h"
 #include "tests/support/test_support.h"
 
 namespace graspmap_test {
@@ -58,6 +60,21 @@ void expect_same_link(const libmap::PoseLink& actual, const libmap::PoseLink& ex
   expect_same_pose(actual.from_from_to, expected.from_from_to, tolerance);
   const double scale = expected.information.cwiseAbs().maxCoeff();
   EXPECT_LE((actual.information - expected.information).cwiseAbs().maxCoeff(), tolerance * scale);
+}
+
+// As RTAB-Map does, with the last localization at the last of them.
+void store_optimized_poses(const std::filesystem::path& path,
+                           const std::map<int, Pose>& map_from_base) {
+  if (map_from_base.empty()) return;
+  const libmap::OptimizedPoseBlobs blobs = libmap::to_blobs(map_from_base);
+  const std::string localization = libmap::to_blob(map_from_base.rbegin()->second);
+  SQLite::Database database(path.string(), SQLite::OPEN_READWRITE);
+  SQLite::Statement update(
+      database, "UPDATE Admin SET opt_ids = ?, opt_poses = ?, opt_last_localization = ?");
+  int index = 0;
+  for (const std::string* blob : {&blobs.ids, &blobs.poses, &localization})
+    update.bind(++index, blob->data(), static_cast<int>(blob->size()));
+  update.exec();
 }
 
 }  // namespace
@@ -137,8 +154,8 @@ void write_database(const std::filesystem::path& path, const ExampleScan& scan,
   for (const libmap::PoseLink& link : scan.graph.links) writer.add_link(link);
   for (const libmap::GraphNode& node : scan.graph.nodes)
     writer.add_node(node, scan.frames.at(node.id));
-  writer.set_optimized_poses(scan.graph.optimized_map_from_base);
   writer.finish();
+  store_optimized_poses(path, scan.graph.optimized_map_from_base);
 }
 
 void expect_same_camera(const libmap::Camera& actual, const libmap::Camera& expected,

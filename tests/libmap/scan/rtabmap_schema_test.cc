@@ -93,21 +93,6 @@ TEST_P(EverySchema, EverythingElse) {
   const RtabmapDatabase scan(sample_file(version));
   EXPECT_EQ(scan.word_count(), 2U);
   EXPECT_EQ(scan.feature_count(), 2U);
-  const auto features = scan.features(1);
-  ASSERT_EQ(features.size(), 2U);
-  EXPECT_EQ(features[0].word, 1);
-  EXPECT_EQ(features[0].x, 3.5F);
-  EXPECT_EQ(features[0].octave, version >= (SchemaVersion{12, 0}) ? 2 : 0);
-  EXPECT_EQ(features[0].point_in_base, Eigen::Vector3f(1.5F, 2, 0.25F));
-  EXPECT_FALSE(features[1].point_in_base);
-  if (version >= SchemaVersion{11, 2}) {
-    EXPECT_EQ(features[0].binary_descriptor, std::vector<std::uint8_t>(32, 0x5a));
-    EXPECT_EQ(features[1].float_descriptor, (std::vector<float>{1, 2, 3}));
-  }
-  const auto laser = scan.laser_scan(2);
-  ASSERT_TRUE(laser);
-  EXPECT_EQ(laser->points.positions.at(1), Eigen::Vector3d(4, 5, 6));
-  EXPECT_FALSE(scan.laser_scan(1));
   const auto parameters = scan.parameters();
   if (version >= SchemaVersion{11, 8}) {
     EXPECT_EQ(parameters.size(), 3U);
@@ -116,7 +101,7 @@ TEST_P(EverySchema, EverythingElse) {
     EXPECT_EQ(parameters.at("Empty"), "");
   }
   EXPECT_TRUE(libmap::verify_scan(scan).faults.empty())
-      << to_text(libmap::verify_scan(scan).faults.front());
+      << libmap::verify_scan(scan).faults.front().reason;
 }
 
 std::string name_of(const testing::TestParamInfo<SchemaVersion>& info) {

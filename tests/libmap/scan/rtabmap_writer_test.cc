@@ -2,9 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
 #include <cstring>
-#include <limits>
 #include <set>
 #include <string>
 #include <vector>
@@ -209,20 +207,6 @@ TEST(RtabmapWriter, WritesNullsWhereNothingIsKnown) {
   EXPECT_TRUE(read.read_frame(3).depth.empty());
 }
 
-TEST(RtabmapWriter, KeepsParametersAndTheLastLocalization) {
-  const ExampleScan scan = graspmap_test::example_scan();
-  const std::map<std::string, std::string> parameters = {
-      {"Kp/MaxFeatures", "500"}, {"Mem/Folder", "a:b c"}, {"Vis/Empty", ""}};
-  write_database(scratch("scan.db"), scan, {.parameters = parameters});
-  const libmap::RtabmapDatabase read(scratch("scan.db"));
-  EXPECT_EQ(read.parameters(), parameters);
-  EXPECT_EQ(read.version(), "0.23.0");
-  EXPECT_EQ(read.recognized_version(), "0.23.0");
-  ASSERT_TRUE(read.stored_map().last_localization_map_from_base);
-  EXPECT_TRUE(read.stored_map().last_localization_map_from_base->isApprox(
-      scan.graph.optimized_map_from_base.at(9), 1e-6));
-}
-
 // Equal input gives equal bytes, whatever the time and whatever stood in the file and in memory.
 TEST(RtabmapWriter, WritesTheSameBytesEachTime) {
   const ExampleScan scan = graspmap_test::example_scan();
@@ -325,80 +309,6 @@ TEST(RtabmapWriter, ReportsAFullDisk) {
   EXPECT_EQ(error.context().file, scratch("scan.db").string());
   EXPECT_EQ(error.reason().find("cannot be written: "), 0U) << error.what();
   EXPECT_EQ(error.kind(), libmap::ErrorKind::failed);
-}
-
-class RtabmapWriterRefusal : public testing::Test {
- protected:
-  ExampleScan scan_ = graspmap_test::example_scan();
-  RtabmapWriter writer_{scratch("scan.db")};
-
-  void SetUp() override { writer_.add_node(scan_.graph.nodes[0], scan_.frames.at(1)); }
-
-  std::string reason_of(const std::function<void()>& action) {
-    const libmap::Error error = graspmap_test::error_of(action);
-    return error.what();
-  }
-  std::string refusal_of_node(const libmap::GraphNode& node, const libmap::RgbdFrame& frame) {
-    return reason_of([&] { writer_.add_node(node, frame); });
-  }
-};
-
-TEST_F(RtabmapWriterRefusal, OfNodesThatCannotBe) {
-  libmap::GraphNode node = scan_.graph.nodes[1];
-  libmap::RgbdFrame frame = scan_.frames.at(2);
-  EXPECT_NE(refusal_of_node(scan_.graph.nodes[0], scan_.frames.at(1)).find("node 1"),
-            std::string::npos);
-  EXPECT_NE(refusal_of_node(node, scan_.frames.at(1)).find("another node's"), std::string::npos);
-  node.label = "start";
-  EXPECT_NE(refusal_of_node(node, frame).find("label"), std::string::npos);
-  node.label = "";
-  node.stamp_s = std::numeric_limits<double>::infinity();
-  EXPECT_NE(refusal_of_node(node, frame).find("stamp"), std::string::npos);
-  node.stamp_s = 0.0;
-  node.truth_from_base->translation().x() = std::nan("");
-  EXPECT_NE(refusal_of_node(node, frame).find("ground-truth pose"), std::string::npos);
-  node.truth_from_base.reset();
-  frame.right = libmap::GrayImage(40, 30);
-  EXPECT_NE(refusal_of_node(node, frame).find("both"), std::string::npos);
-  frame.right = {};
-  const libmap::StereoCamera pair{.left = frame.cameras[0], .right = frame.cameras[0]};
-  frame.stereo = {pair, pair};
-  EXPECT_EQ(refusal_of_node(node, frame),
-            "node 2: cameras is 1: a stereo frame has no cameras but its left ones (must be 2)");
-  frame.stereo.clear();
-  frame.cameras[0].fx = -1.0;
-  EXPECT_NE(refusal_of_node(node, frame).find("node 2: camera"), std::string::npos);
-  EXPECT_NE(refusal_of_node({.id = 0}, empty_frame(0)).find("> 0"), std::string::npos);
-  frame.cameras[0].fx = 30.0;
-  writer_.add_node(node, frame);  // what was refused left nothing behind
-  writer_.finish();
-  EXPECT_EQ(libmap::RtabmapDatabase(scratch("scan.db")).graph().nodes.size(), 2U);
-}
-
-TEST_F(RtabmapWriterRefusal, OfLinksThatCannotBe) {
-  libmap::PoseLink link = scan_.graph.links[0];
-  writer_.add_link(link);
-  std::swap(link.from, link.to);
-  EXPECT_NE(reason_of([&] { writer_.add_link(link); }).find("already"), std::string::npos);
-  link.type = LinkType::user_closure;
-  link.information(2, 3) = std::nan("");
-  EXPECT_NE(reason_of([&] { writer_.add_link(link); }).find("information"), std::string::npos);
-  // Node 2 is not there.
-  EXPECT_NE(reason_of([&] { writer_.finish(); }).find("link 1 -> 2"), std::string::npos);
-}
-
-TEST_F(RtabmapWriterRefusal, OfOptimizedPosesOfMissingNodes) {
-  writer_.set_optimized_poses({{1, Pose::Identity()}, {4, Pose::Identity()}});
-  const libmap::Error error = graspmap_test::error_of([&] { writer_.finish(); });
-  EXPECT_EQ(error.context().value, "4");
-}
-
-TEST_F(RtabmapWriterRefusal, OfParametersThatTheFormatCannotHold) {
-  for (const auto& [key, value] :
-       std::map<std::string, std::string>{{"a:b", "c"}, {"a;b", "c"}, {"a", "b;c"}, {"", "c"}}) {
-    SCOPED_TRACE(key + "=" + value);
-    EXPECT_THROW(RtabmapWriter(scratch("other.db"), {.parameters = {{key, value}}}), libmap::Error);
-  }
 }
 
 }  // namespace rtabmap_writer_test

@@ -392,18 +392,17 @@ TEST(PoseAxes, ThereAndBack) {
 }
 
 TEST(RecognizePoses, ByTagOrColumns) {
-  using libmap::PoseTextFormat;
   const auto format = [](const std::string& text) {
     return libmap::recognize_poses("\xEF\xBB\xBF# 1 2 3\r\n\r\n" + text + "\n", "poses.txt");
   };
-  EXPECT_EQ(format("1 0 0 0 0 0 0 1"), PoseTextFormat::tum);
-  EXPECT_EQ(format("1,0,0,0,0,0,0,1,7"), PoseTextFormat::tum);
-  EXPECT_EQ(format("1 0 0 0 0 1 0 0 0 0 1 0"), PoseTextFormat::kitti);
-  EXPECT_EQ(format("VERTEX3 1 0 0 0 0 0 0"), PoseTextFormat::toro);
-  EXPECT_EQ(format("EDGE2 1 2 0 0 0"), PoseTextFormat::toro);
-  EXPECT_EQ(format("VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1"), PoseTextFormat::g2o);
-  EXPECT_EQ(format("PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1"), PoseTextFormat::g2o);
-  EXPECT_EQ(format("FIX 1"), PoseTextFormat::g2o);
+  EXPECT_EQ(format("1 0 0 0 0 0 0 1"), ".tum");
+  EXPECT_EQ(format("1,0,0,0,0,0,0,1,7"), ".tum");
+  EXPECT_EQ(format("1 0 0 0 0 1 0 0 0 0 1 0"), ".kitti");
+  EXPECT_EQ(format("VERTEX3 1 0 0 0 0 0 0"), ".toro");
+  EXPECT_EQ(format("EDGE2 1 2 0 0 0"), ".toro");
+  EXPECT_EQ(format("VERTEX_SE3:QUAT 1 0 0 0 0 0 0 1"), ".g2o");
+  EXPECT_EQ(format("PARAMS_SE3OFFSET 0 0 0 0 0 0 0 1"), ".g2o");
+  EXPECT_EQ(format("FIX 1"), ".g2o");
   const libmap::Error error = graspmap_test::error_of([&] { format("1 2 3 4 5 6 7"); });
   EXPECT_EQ(error.context().field, "line 3");
   EXPECT_EQ(error.context().value, "7 columns");

@@ -366,9 +366,6 @@ TEST(DepthCamera, RefusesWhatCannotBe) {
   options.flying_pixels = 0.7;
   options.edge_dropouts = 0.7;
   EXPECT_EQ(error_of([&] { options.check(); }).context().value, "1.4");
-  Camera camera = small_camera();
-  camera.fx = 0;
-  EXPECT_EQ(error_of([&] { libmap::make_pixel_rays(camera); }).context().field, "fx");
 }
 
 TEST(DepthCamera, InsideAClosedBallOnlyWhatIsNotTooNear) {

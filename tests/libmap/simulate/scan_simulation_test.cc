@@ -176,7 +176,7 @@ TEST(SimulateOdometry, ClosuresJoinPlacesThatAreNearInSpaceAndFarInTime) {
 
 ScanSimulationOptions small_scan() {
   ScanSimulationOptions options;
-  options.camera = libmap::scale_camera(libmap::kinect_v2_camera(), 64, 53);
+  options.camera = {.width = 64, .height = 53, .fx = 45.6, .fy = 45.6, .cx = 31.6, .cy = 26.1};
   options.trajectory.frames = 11;
   return options;
 }

@@ -11,6 +11,7 @@
 #include "libmap/simulate/scene_geometry.h"
 #include "libmap/simulate/scene_sampling.h"
 #include "scene_test_support.h"
+#include "tests/libmap/simulate/scene_query.h"
 #include "tests/support/test_support.h"
 #include "tests/support/thesis_scene.h"
 
@@ -125,7 +126,7 @@ void expect_on_surface_and_outward(const PrimitiveScene& scene, const SceneMeshO
   EXPECT_EQ(std::set<double>(shapes.begin(), shapes.end()).size(), scene.shapes.size());
   std::size_t exact = 0;
   for (const Eigen::Vector3d& vertex : mesh.vertices) {
-    const double distance = std::abs(geometry.signed_distance(vertex));
+    const double distance = std::abs(graspmap_test::distance_to_scene(geometry, vertex));
     EXPECT_LT(distance, 2.0 * options.chord_error_m);
     exact += distance < 2e-9 ? 1 : 0;
   }
@@ -141,7 +142,7 @@ void expect_on_surface_and_outward(const PrimitiveScene& scene, const SceneMeshO
     const SceneSolid& solid = solid_of(geometry, shapes[i]);
     EXPECT_GT(geometry.signed_distance(solid, center + step * normal.normalized()), 0.0);
     EXPECT_LT(geometry.signed_distance(solid, center - step * normal.normalized()), 0.0);
-    EXPECT_GT(geometry.signed_distance(center), -step);
+    EXPECT_GT(graspmap_test::distance_to_scene(geometry, center), -step);
   }
 }
 
@@ -222,8 +223,6 @@ TEST(SceneMesh, refuses_what_it_cannot_do) {
     return std::string(error_of([&] { scene_mesh(thesis_primitive_scene(), options); }).what());
   };
   EXPECT_THAT(message({.edge_length_m = 1e-5}), testing::HasSubstr("the limit is 20000000"));
-  EXPECT_THAT(message({.edge_length_m = -1.0}), testing::HasSubstr("edge_length_m is -1"));
-  EXPECT_THAT(message({.chord_error_m = std::nan("")}), testing::HasSubstr("chord_error_m is nan"));
 }
 
 TEST(SceneMesh, is_the_same_on_every_run) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -187,6 +188,13 @@ std::optional<SurfaceTruth> from_above(const SceneGeometry& geometry, double x, 
       highest = truth;
   }
   return highest;
+}
+
+double distance_to_scene(const libmap::SceneGeometry& geometry, const Eigen::Vector3d& point) {
+  double distance = std::numeric_limits<double>::infinity();
+  for (const libmap::SceneSolid& solid : geometry.solids())
+    distance = std::min(distance, geometry.signed_distance(solid, point));
+  return distance;
 }
 
 }  // namespace graspmap_test

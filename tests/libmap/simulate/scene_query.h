@@ -11,4 +11,7 @@ namespace graspmap_test {
 std::optional<libmap::SurfaceTruth> from_above(const libmap::SceneGeometry& geometry, double x,
                                                double y);
 
+// To the surface of all solids together: negative inside.
+double distance_to_scene(const libmap::SceneGeometry& geometry, const Eigen::Vector3d& point);
+
 }  // namespace graspmap_test

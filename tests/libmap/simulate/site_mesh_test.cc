@@ -210,11 +210,8 @@ TEST(SiteMesh, ARockInTheAirIsAnError) {
 
 TEST(SiteMesh, BadOptionsAreErrors) {
   RockSite site = small_site();
-  EXPECT_EQ(error_of([&] { site_mesh(site, {.edge_length_m = 0.0}); }).context().field,
-            "edge_length_m");
   EXPECT_NE(error_of([&] { site_mesh(site, {.edge_length_m = 1e-4}); }).reason().find("limit"),
             std::string::npos);
-  EXPECT_NE(error_of([&] { site_mesh(site, {.edge_length_m = std::nan("")}); }).reason(), "");
   site.rocks[1].x_m = 0.6;
   EXPECT_NE(error_of([&] { site_mesh(site, {}); }).context().field.find("rocks[1]"),
             std::string::npos);
