@@ -8,15 +8,15 @@
 #        [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] -j2
 #
 # SCAN is an RTAB-Map database or a folder of images. POSES is refined (by graspmap refine), odometry,
-# stored, ground-truth or a file of poses (stored). With TRUTH, a mesh in the frame of the scan's true poses, the cloud is
-# carried into that frame. POINTS lie in the cloud's frame. FUSE, MESH, CROP, RESAMPLE and SCORE hold
+# optimized, ground-truth or a file of poses (optimized). With TRUTH, a mesh in the frame of the
+# scan's true poses, the cloud is carried into that frame. POINTS lie in the cloud's frame. FUSE, MESH, CROP, RESAMPLE and SCORE hold
 # further flags of their commands; without CROP the map is levelled and kept whole. TEXTURE= leaves
 # the texture out. A second run does nothing; other variables or changed files make again what
 # depends on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
-POSES ?= stored
+POSES ?= optimized
 TRUTH ?=
 POINTS ?=
 SCENARIO ?= artificial_rocks_prescan

@@ -1,30 +1,20 @@
 // graspmap analyze: how much of a map can be held, where, what joins it; what differs from another.
-#include <fmt/format.h>
-
-#include <cmath>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "libgtd/evaluate/analysis_tables.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/view/virtual_display.h"
 #include "tools/support/analysis_pictures.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_table.h"
 #include "tools/support/map_tiles.h"
+#include "tools/support/option_values.h"
 #include "tools/support/placement.h"
-#include "tools/support/result_counts.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 
 constexpr const char* no_start = "largest";
 
@@ -34,7 +24,7 @@ struct AnalyzeOptions {
   std::string other;
   std::string folder;
   std::string start = no_start;
-  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::input;
+  PointFrame points_frame = PointFrame::input;
   std::string transform = "auto";
   bool pictures = true;
   libgtd::MapSurfaceOptions surface;
@@ -42,7 +32,7 @@ struct AnalyzeOptions {
   libgtd::MapRegionOptions regions;
   libgtd::RegionReachOptions reach;
   libgtd::MapChangeOptions change;
-  graspmap_tools::MapTableOptions table;
+  MapTableOptions table;
 };
 
 // Of one map.
@@ -62,7 +52,7 @@ void bind_one(libmap::ParameterTable& table, AnalyzeOptions& options) {
 
 void bind(libmap::ParameterTable& table, AnalyzeOptions& options) {
   bind_one(table, options);
-  table.add("points_frame", options.points_frame, graspmap_tools::point_frame_names(),
+  table.add("points_frame", options.points_frame, point_frame_names(),
             "frame of the start or of the expected regions: of the cloud that was scored, the "
             "terrain's, or the map's before it was cropped");
   table.add("pictures", options.pictures, "draw pictures and charts");
@@ -77,52 +67,40 @@ struct ReadMap {
 };
 
 ReadMap read_map(const std::string& file, Run& run) {
-  if (graspmap_tools::is_tile_store(file))
+  if (is_tile_store(file))
     throw libmap::Error("is a tile store: `graspmap convert` makes one map of it first",
                         {.file = file});
   ReadMap map;
   map.cloud = libmap::read_cloud(file).cloud;
   map.manifest = libmap::read_manifest_of(file);
-  try {
-    map.voxels = libgtd::voxel_map_of(
+  map.voxels = in_file(file, [&] {
+    return libgtd::voxel_map_of(
         map.cloud, map.manifest ? libgtd::facts_of(*map.manifest) : libgtd::MapFacts{});
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file);
-  }
+  });
   if (!map.manifest)
     run.warn(file +
-             ": no manifest beside it: its points are taken in the terrain frame, all above "
-             "the zero plane");
+             ": no manifest beside it: its points are taken in the terrain frame, all above the "
+             "zero plane");
   else if (map.manifest->find_parameter("zero_plane_m") == nullptr)
     run.warn(file + ": its manifest tells no zero plane: all its points are taken to lie above");
   run.add_input(file);
   return map;
 }
 
-// From the frame of the cloud that was scored to that of the map's points.
-libmap::Pose map_from_input(const ReadMap& map) {
-  if (!map.manifest || map.manifest->frame != "terrain") return libmap::Pose::Identity();
-  const libmap::Pose* pose = map.manifest->find_transform("terrain_from_input");
-  return pose == nullptr ? libmap::Pose::Identity() : *pose;
-}
-
 // Carries OTHER's points to the frame of MAP's.
 libmap::Pose map_from_other(const AnalyzeOptions& options, const ReadMap& map, const ReadMap& other,
                             Run& run) {
-  if (options.transform != "auto")
-    return graspmap_tools::parse_transform(options.transform, "--transform");
+  if (options.transform != "auto") return parse_transform(options.transform, "--transform");
   const auto has_crop = [](const ReadMap& one) {
-    return one.manifest &&
-           one.manifest->find_transform(graspmap_tools::site_from_map_name) != nullptr;
+    return one.manifest && one.manifest->find_transform(site_from_map_name) != nullptr;
   };
   if (has_crop(map) && has_crop(other))
-    return *graspmap_tools::site_from_map_of(options.map) *
-           graspmap_tools::site_from_map_of(options.other)->inverse();
+    return *site_from_map_of(options.map) * site_from_map_of(options.other)->inverse();
   if (has_crop(map) != has_crop(other))
     run.warn("only " + (has_crop(map) ? options.map : options.other) +
              " was cropped: the frames of the clouds that were scored are taken for one "
              "(--transform says otherwise)");
-  return map_from_input(map) * map_from_input(other).inverse();
+  return map_from_input(map.manifest) * map_from_input(other.manifest).inverse();
 }
 
 struct Analysis {
@@ -137,24 +115,20 @@ Analysis analyze_map(AnalyzeOptions& options, const ReadMap& map, Run& run) {
     const libmap::Pose map_from_points =
         graspmap_tools::map_from_points(options.map, options.points_frame, run);
     options.reach.start =
-        map.voxels.terrain_from_map *
-        (map_from_points * graspmap_tools::parse_vector(options.start, "--start"));
+        map.voxels.terrain_from_map * (map_from_points * parse_vector(options.start, "--start"));
   }
-  Analysis analysis;
-  try {
+  return in_file(options.map, [&] {
+    Analysis analysis;
     analysis.surface =
         run.timed("surface", [&] { return measure_surface(map.voxels, options.surface); });
-    analysis.ground = run.timed("ground", [&] {
-      return libgtd::analyze_map(map.voxels, analysis.surface, options.analysis);
-    });
+    analysis.ground = run.timed(
+        "ground", [&] { return analyze_map(map.voxels, analysis.surface, options.analysis); });
     analysis.regions = run.timed(
         "regions", [&] { return find_regions(map.voxels, analysis.surface, options.regions); });
     analysis.reach =
         run.timed("reach", [&] { return find_reach(map.voxels, analysis.regions, options.reach); });
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.map);
-  }
-  return analysis;
+    return analysis;
+  });
 }
 
 struct Comparison {
@@ -170,14 +144,12 @@ Comparison compare(const AnalyzeOptions& options, const ReadMap& map, const Anal
   const libmap::Pose map_from_points = map_from_other(options, map, comparison.other, run);
   comparison.map_terrain_from_other_terrain = map.voxels.terrain_from_map * map_from_points *
                                               comparison.other.voxels.terrain_from_map.inverse();
-  try {
-    comparison.change = run.timed("change", [&] {
+  comparison.change = in_file(options.other, [&] {
+    return run.timed("change", [&] {
       return compare_maps(map.voxels, analysis.surface, comparison.other.voxels,
                           comparison.map_terrain_from_other_terrain, options.change);
     });
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.other);
-  }
+  });
   return comparison;
 }
 
@@ -187,41 +159,38 @@ std::string percent_text(const std::optional<double>& share) {
 
 void say_ground(const Analysis& analysis, const AnalyzeOptions& options, Run& run) {
   const libgtd::MapAnalysis& ground = analysis.ground;
-  run.say(fmt::format("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) can be held",
-                      ground.ground.voxels, ground.voxels, ground.ground.area_m2,
-                      ground.ground.graspable_area_m2,
-                      percent_text(ground.ground.graspable_share())));
+  run.say("{} of {} voxels evaluated: {:.3f} m2 of ground, {:.4f} m2 ({}) can be held",
+          ground.ground.voxels, ground.voxels, ground.ground.area_m2,
+          ground.ground.graspable_area_m2, percent_text(ground.ground.graspable_share()));
   if (ground.column_coverage < 0.95)
-    run.warn(fmt::format(
+    run.warn(
         "{}: {:.0f} % of the columns inside the ground have a voxel: regions fall apart "
         "(--adjacency-voxels 2 joins them across one empty voxel)",
-        options.map, 100.0 * ground.column_coverage));
+        options.map, 100.0 * ground.column_coverage);
   const libgtd::RegionReach& reach = analysis.reach;
   if (analysis.regions.regions.empty()) {
     run.say("no graspable region");
     return;
   }
-  run.say(fmt::format(
+  run.say(
       "{} regions, the largest {:.4f} m2; strides of {:g} m make {} groups of them, {:.3f} m one",
       analysis.regions.regions.size(), analysis.regions.regions.front().area_m2,
-      options.reach.stride_m, reach.groups, *reach.joining_stride_m));
-  run.say(fmt::format("{} regions ({:.4f} m2) can be reached from {}", reach.reachable_regions,
-                      reach.reachable_area_m2,
-                      options.start == no_start ? "region 1" : options.start));
+      options.reach.stride_m, reach.groups, *reach.joining_stride_m);
+  run.say("{} regions ({:.4f} m2) can be reached from {}", reach.reachable_regions,
+          reach.reachable_area_m2, options.start == no_start ? "region 1" : options.start);
   if (reach.reachable_regions == 0)
-    run.warn(fmt::format("the nearest region, {}, is {:.3f} m from the start",
-                         *reach.start_region + 1, reach.start_distance_m));
+    run.warn("the nearest region, {}, is {:.3f} m from the start", *reach.start_region + 1,
+             reach.start_distance_m);
 }
 
 void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, Run& run) {
   const libgtd::ChangeSummary& evaluated = change.evaluated;
-  run.say(fmt::format(
-      "{} voxels in common ({}), {} in MAP alone, {} in OTHER alone", change.pairs.size(),
-      change.matching == libgtd::VoxelMatching::lattice
-          ? std::string("same lattice")
-          : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
-      change.only_map.size(), change.only_other.size()));
-  run.say(fmt::format(
+  run.say("{} voxels in common ({}), {} in MAP alone, {} in OTHER alone", change.pairs.size(),
+          change.matching == libgtd::VoxelMatching::lattice
+              ? std::string("same lattice")
+              : fmt::format("nearest within {:g} voxels", options.change.match_distance_voxels),
+          change.only_map.size(), change.only_other.size());
+  run.say(
       "of {} evaluated in both: kappa {}, accuracy {}; can be held in both {}, in MAP alone {}, in "
       "OTHER alone {}",
       evaluated.graspable.size(),
@@ -229,46 +198,39 @@ void say_change(const libgtd::MapChange& change, const AnalyzeOptions& options, 
                                     evaluated.kappa->standard_error)
                       : "not defined",
       percent_text(evaluated.graspable.accuracy().value()), evaluated.graspable.true_positives,
-      evaluated.lost(), evaluated.gained()));
+      evaluated.lost(), evaluated.gained());
   if (evaluated.difference.count > 0)
-    run.say(fmt::format("score, OTHER less MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
-                        evaluated.difference.mean, evaluated.difference.mean_absolute,
-                        evaluated.difference.rms));
+    run.say("score, OTHER less MAP: mean {:+.3f}, mean absolute {:.3f}, rms {:.3f}",
+            evaluated.difference.mean, evaluated.difference.mean_absolute,
+            evaluated.difference.rms);
 }
 
 void note_results(const Analysis& analysis, const Comparison* comparison, Run& run) {
-  auto& results = run.manifest().results;
-  const graspmap_tools::ResultCounts count(run.manifest());
   const libgtd::MapAnalysis& ground = analysis.ground;
-  count("voxels", ground.voxels);
-  count("evaluated_voxels", ground.ground.voxels);
-  results.emplace_back("surface_area_m2", ground.ground.area_m2);
-  results.emplace_back("graspable_surface_area_m2", ground.ground.graspable_area_m2);
-  results.emplace_back("column_coverage", ground.column_coverage);
-  count("regions", analysis.regions.regions.size());
-  count("groups", analysis.reach.groups);
-  count("reachable_regions", analysis.reach.reachable_regions);
-  if (analysis.reach.joining_stride_m)
-    results.emplace_back("joining_stride_m", *analysis.reach.joining_stride_m);
+  run.add_results({{"voxels", ground.voxels},
+                   {"evaluated_voxels", ground.ground.voxels},
+                   {"surface_area_m2", ground.ground.area_m2},
+                   {"graspable_surface_area_m2", ground.ground.graspable_area_m2},
+                   {"column_coverage", ground.column_coverage},
+                   {"regions", analysis.regions.regions.size()},
+                   {"groups", analysis.reach.groups},
+                   {"reachable_regions", analysis.reach.reachable_regions},
+                   {"joining_stride_m", analysis.reach.joining_stride_m}});
   if (comparison == nullptr) return;
   const libgtd::MapChange& change = comparison->change;
-  results.emplace_back("matching", std::string(to_text(change.matching)));
-  count("voxels_in_common", change.pairs.size());
-  count("evaluated_in_both", change.evaluated.graspable.size());
-  if (change.evaluated.kappa) results.emplace_back("kappa", change.evaluated.kappa->value);
+  run.add_results({{"matching", to_text(change.matching)},
+                   {"voxels_in_common", change.pairs.size()},
+                   {"evaluated_in_both", change.evaluated.graspable.size()}});
+  if (change.evaluated.kappa) run.add_results({{"kappa", change.evaluated.kappa->value}});
   run.manifest().transforms.emplace_back("map_terrain_from_other_terrain",
                                          comparison->map_terrain_from_other_terrain);
 }
 
-using Names = std::vector<std::string>;
-const Names& output_names() {
-  static const Names names = {
-      "summary.json",  "histogram.csv",    "histogram.svg",   "histogram.png", "by_height.csv",
-      "by_height.svg", "by_height.png",    "by_slope.csv",    "by_slope.svg",  "by_slope.png",
-      "regions.csv",   "region_links.csv", "regions.pcd",     "regions.png",   "change.csv",
-      "change.pcd",    "change.png",       "change_score.png"};
-  return names;
-}
+const std::vector<std::string> output_names = {
+    "summary.json",  "histogram.csv",    "histogram.svg",   "histogram.png", "by_height.csv",
+    "by_height.svg", "by_height.png",    "by_slope.csv",    "by_slope.svg",  "by_slope.png",
+    "regions.csv",   "region_links.csv", "regions.pcd",     "regions.png",   "change.csv",
+    "change.pcd",    "change.png",       "change_score.png"};
 
 // With the folder: pipelines name every map alike.
 std::string short_name(const std::string& file) {
@@ -286,29 +248,26 @@ void write_pictures(const fs::path& folder, const AnalyzeOptions& options, const
   const libmap::VirtualDisplay display;
   const std::string name = short_name(options.map);
   const libgtd::MapAnalysis& ground = analysis.ground;
-  write_chart(folder, "histogram", graspmap_tools::histogram_chart(ground, "Scores of " + name));
+  write_chart(folder, "histogram", histogram_chart(ground, "Scores of " + name));
   write_chart(folder, "by_height",
-              graspmap_tools::ground_chart(ground.by_height, "height [m]",
-                                           "Graspable ground by height, " + name));
+              ground_chart(ground.by_height, "height [m]", "Graspable ground by height, " + name));
   write_chart(folder, "by_slope",
-              graspmap_tools::ground_chart(ground.by_slope, "slope [deg]",
-                                           "Graspable ground by slope, " + name));
-  graspmap_tools::MapPicture picture{map.voxels, analysis.surface, ""};
+              ground_chart(ground.by_slope, "slope [deg]", "Graspable ground by slope, " + name));
+  MapPicture picture{map.voxels, analysis.surface, ""};
   const auto write = [&](const char* file, const libmap::ColorImage& image) {
     libmap::write_text(folder / file, libmap::to_png(image));
   };
   picture.title = fmt::format("{}: {} regions, stride {:g} m", name,
                               analysis.regions.regions.size(), options.reach.stride_m);
-  write("regions.png", graspmap_tools::draw_regions(picture, analysis.regions, analysis.reach));
+  write("regions.png", draw_regions(picture, analysis.regions, analysis.reach));
   if (comparison == nullptr) return;
   const libgtd::MapChange& change = comparison->change;
   picture.title = fmt::format(
       "MAP {}, OTHER {}{}", name, short_name(options.other),
       change.evaluated.kappa ? fmt::format(": kappa {:.2f}", change.evaluated.kappa->value) : "");
-  write("change.png", graspmap_tools::draw_change(picture, change, comparison->other.voxels,
-                                                  comparison->map_terrain_from_other_terrain));
-  write("change_score.png",
-        graspmap_tools::draw_score_change(picture, change, comparison->other.voxels));
+  write("change.png", draw_change(picture, change, comparison->other.voxels,
+                                  comparison->map_terrain_from_other_terrain));
+  write("change_score.png", draw_score_change(picture, change, comparison->other.voxels));
 }
 
 void write_tables(const fs::path& folder, const AnalyzeOptions& options, const ReadMap& map,
@@ -339,23 +298,19 @@ void write_tables(const fs::path& folder, const AnalyzeOptions& options, const R
 void analyze(AnalyzeOptions& options, Run& run) {
   if (options.maps.size() > 1 || !options.table.expected.empty()) {
     if (!options.other.empty())
-      throw graspmap_tools::UsageError(
-          "--against is for one MAP without --expected; --pairs compares several");
-    if (const auto key = libmap::changed_key(options, bind_one))
-      throw libmap::Error("is for one map without --expected", {.field = libmap::flag_of(*key)});
+      throw UsageError("--against is for one MAP without --expected; --pairs compares several");
+    refuse_set(options, bind_one, "is for one map without --expected");
     options.table.points_frame = options.points_frame;
     options.table.pictures = options.pictures;
-    return graspmap_tools::tabulate_maps(options.maps, options.folder, options.table, run);
+    return tabulate_maps(options.maps, options.folder, options.table, run);
   }
-  if (const auto key =
-          libmap::changed_key<graspmap_tools::MapTableOptions>(options.table, graspmap_tools::bind))
-    throw libmap::Error("is for several maps, or with --expected",
-                        {.field = libmap::flag_of(*key)});
+  refuse_set<MapTableOptions>(options.table, graspmap_tools::bind,
+                              "is for several maps, or with --expected");
   options.map = options.maps.front();
   if (options.other.empty() && options.transform != "auto")
     throw libmap::Error("is for comparing with OTHER, which is not given",
                         {.field = "--transform", .value = options.transform});
-  run.claim_output_tree(options.folder, output_names(), {options.map, options.other});
+  run.claim_output_tree(options.folder, output_names, {options.map, options.other});
   options.regions.border = options.change.border = options.analysis.border;
   options.change.height_bin_m = options.analysis.height_bin_m;
   options.change.slope_bin_deg = options.analysis.slope_bin_deg;
@@ -366,14 +321,12 @@ void analyze(AnalyzeOptions& options, Run& run) {
   say_ground(analysis, options, run);
   if (comparison) say_change(comparison->change, options, run);
   const Comparison* against = comparison ? &*comparison : nullptr;
-  note_results(analysis, against, run);
   if (map.manifest) {
     run.manifest().frame = map.manifest->frame;
-    const auto& transforms = map.manifest->transforms;
-    run.manifest().transforms.insert(run.manifest().transforms.begin(), transforms.begin(),
-                                     transforms.end());
+    run.manifest().transforms = map.manifest->transforms;
   }
-  run.write_output_tree(options.folder, output_names(), [&](const fs::path& folder) {
+  note_results(analysis, against, run);
+  run.write_output_tree(options.folder, output_names, [&](const fs::path& folder) {
     if (folder.empty()) return;
     write_tables(folder, options, map, analysis, against);
     if (options.pictures) write_pictures(folder, options, map, analysis, against);
@@ -384,13 +337,13 @@ void analyze(AnalyzeOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   AnalyzeOptions options;
-  graspmap_tools::Command command("analyze");
+  Command command("analyze");
   command.inputs("MAP", options.maps, "graspability map; several give one table");
   command.option("--against", "OTHER", options.other,
                  "map of the same ground, with which MAP is compared");
-  command.option("--expected", "EXPECTED.csv", options.table.expected,
-                 "regions of expected graspability for the table, e.g. "
-                 "data/expected/primitive_shapes.csv");
+  command.option(
+      "--expected", "EXPECTED.csv", options.table.expected,
+      "regions of expected graspability for the table, e.g. data/expected/primitive_shapes.csv");
   command.output(options.folder,
                  "folder of summary.json, histogram, by_height, by_slope, regions, region_links "
                  "and, with OTHER, change; of several maps, of maps.csv, histograms.csv and, if "

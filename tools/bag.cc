@@ -1,26 +1,17 @@
 // graspmap bag: ROS 1 bags in and out, offline.
-#include <cmath>
-#include <filesystem>
-#include <initializer_list>
-#include <map>
-#include <optional>
-#include <string>
-
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
-#include "libmap/core/text.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/scan/rig_io.h"
 #include "tools/support/bag_commands.h"
 #include "tools/support/command_line.h"
+#include "tools/support/option_values.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::BagCommandOptions;
-using graspmap_tools::Run;
 
 void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
   table.add("stamp_s", options.stamp,
@@ -39,20 +30,11 @@ void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
 
 bool is_bag(const std::string& path) { return libmap::format_of(path) == ".bag"; }
 
-void require_output(const BagCommandOptions& options) {
-  if (options.output.empty())
-    throw graspmap_tools::UsageError("is missing (or --list)", {.file = {}, .field = "--output"});
-}
-
-// Options that what is asked for would ignore.
-void refuse(const BagCommandOptions& options, std::initializer_list<const char*> names,
-            const std::string& reason) {
-  const std::map<std::string, bool> given = {
-      {"--topic", !options.topics.empty()},        {"--rig", !options.rig.empty()},
-      {"--stamp", options.stamp != "auto"},        {"--terrain", !options.terrain.empty()},
-      {"--curvature", !options.curvature.empty()}, {"--footholds", !options.footholds.empty()}};
-  for (const char* name : names)
-    if (given.at(name)) throw libmap::Error(reason, {.file = {}, .field = name});
+void refuse_map_options(const BagCommandOptions& options, const std::string& reason) {
+  refuse_given({{"--terrain", !options.terrain.empty()},
+                {"--curvature", !options.curvature.empty()},
+                {"--footholds", !options.footholds.empty()}},
+               reason);
 }
 
 void write_bag(const BagCommandOptions& options, Run& run) {
@@ -60,17 +42,18 @@ void write_bag(const BagCommandOptions& options, Run& run) {
     throw libmap::Error("one of the two must be something else than a bag",
                         {.file = options.input});
   const bool rig = fs::is_directory(options.input);
+  refuse_given({{"--topic", !options.topics.empty()}},
+               rig ? "is not for a rig's folder" : "is not for a map");
   if (rig) {
-    refuse(options, {"--topic", "--terrain", "--curvature", "--footholds"},
-           "is not for a rig's folder");
-    refuse(options, {"--stamp"}, "is not for a rig's folder: --stamp-offset moves its stamps");
+    refuse_map_options(options, "is not for a rig's folder");
+    refuse_given({{"--stamp", options.stamp != "auto"}},
+                 "is not for a rig's folder: --stamp-offset moves its stamps");
   } else {
-    refuse(options, {"--topic", "--rig"}, "is not for a map");
+    refuse_given({{"--rig", !options.rig.empty()}}, "is not for a map");
     libmap::require_readable_file(options.input);
   }
   try {
-    return rig ? graspmap_tools::write_rig_folder_bag(options, run)
-               : graspmap_tools::write_map_bag(options, run);
+    return rig ? write_rig_folder_bag(options, run) : write_map_bag(options, run);
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
   }
@@ -78,29 +61,23 @@ void write_bag(const BagCommandOptions& options, Run& run) {
 
 void run_bag(const BagCommandOptions& options, Run& run) {
   libmap::require_ros();
-  if (options.list) return graspmap_tools::list_bag_topics(options);
-  require_output(options);
+  if (options.list) return list_bag_topics(options);
+  if (options.output.empty()) throw UsageError("is missing (or --list)", {.field = "--output"});
   if (is_bag(options.output)) return write_bag(options, run);
-  refuse(options, {"--terrain", "--curvature", "--footholds"}, "is for a bag that is written");
+  refuse_map_options(options, "is for a bag that is written");
   if (fs::path(options.output).has_extension()) {
     libmap::require_cloud_format(options.output);
-    refuse(options, {"--rig"}, "is not for a cloud");
-    return graspmap_tools::read_bag_into_cloud(options, run);
+    refuse_given({{"--rig", !options.rig.empty()}}, "is not for a cloud");
+    return read_bag_into_cloud(options, run);
   }
-  graspmap_tools::read_bag_into_folder(options, run);
+  read_bag_into_folder(options, run);
 }
 
 }  // namespace
 
 std::optional<double> graspmap_tools::bag_stamp(const BagCommandOptions& options) {
-  if (options.stamp == "auto") return std::nullopt;
-  const std::optional<double> stamp = libmap::parse_double(options.stamp);
-  if (!stamp || !std::isfinite(*stamp))
-    throw libmap::Error("no such time", {.file = {},
-                                         .field = "--stamp",
-                                         .value = options.stamp,
-                                         .bound = "a number of seconds, or auto"});
-  return stamp;
+  return parse_number_or("auto", options.stamp, "no such time", "--stamp",
+                         "a number of seconds, or auto");
 }
 
 libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& run) {
@@ -112,7 +89,7 @@ libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& r
 
 int main(int argc, char** argv) {
   BagCommandOptions options;
-  graspmap_tools::Command command("bag");
+  Command command("bag");
   command.input("IN", options.input,
                 "out of a bag: IN.bag; into one: a map (.pcd, .ply, .vtp, .csv), or a rig's folder "
                 "as `fuse` reads it");

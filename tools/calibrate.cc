@@ -1,26 +1,17 @@
 // graspmap calibrate: pictures of a chessboard -> intrinsics and lens distortion of the camera.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <string>
-#include <vector>
-
 #include "libmap/calibration/camera_calibration.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
-#include "libmap/core/text.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/image/image_codec.h"
 #include "tools/support/calibration_charts.h"
 #include "tools/support/command_line.h"
-#include "tools/support/result_counts.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 using libmap::CalibratedPicture;
 using libmap::CameraCalibrationResult;
 
@@ -42,10 +33,10 @@ struct CalibrateOptions {
 };
 
 struct Picture {
-  std::string name;
+  std::string name{};
   int width = 0;
   int height = 0;
-  std::optional<std::vector<Eigen::Vector2d>> corners;
+  std::optional<std::vector<Eigen::Vector2d>> corners{};
   std::optional<libmap::Error> fault{};  // it cannot be read
 };
 
@@ -97,7 +88,7 @@ Picture read_picture(const std::string& file, const libmap::Chessboard& board) {
                                             : libmap::decode_gray(bytes);
     return {file, image.width, image.height, libmap::find_chessboard(image, board)};
   } catch (const libmap::Error& error) {
-    return {.name = file, .corners = std::nullopt, .fault = error.in_file(file)};
+    return {.name = file, .fault = error.in_file(file)};
   }
 }
 
@@ -112,11 +103,9 @@ std::vector<Picture> read_pictures(const std::vector<std::string>& files,
                                    const libmap::Chessboard& board, Run& run) {
   std::vector<Picture> pictures(files.size());
   run.progress().begin("boards", files.size());
-  libmap::parallel_for(files.size(), 1, [&](std::size_t first, std::size_t last) {
-    for (std::size_t n = first; n < last; ++n) {
-      pictures[n] = read_picture(files[n], board);
-      run.progress().advance(1);
-    }
+  libmap::parallel_each(files.size(), [&](std::size_t n) {
+    pictures[n] = read_picture(files[n], board);
+    run.progress().advance(1);
   });
   run.progress().end();
   const Picture& first = first_readable(pictures);
@@ -143,39 +132,43 @@ std::vector<libmap::BoardPicture> boards_of(const std::vector<Picture>& pictures
     if (picture.corners) boards.push_back({picture.name, *picture.corners});
   if (boards.empty())
     throw libmap::Error("no image shows the whole board",
-                        {.file = {},
-                         .field = "--board",
+                        {.field = "--board",
                          .value = options.board,
                          .bound = "the number of inner corners, one less than of squares"});
   for (const Picture& picture : pictures)
     if (!picture.corners && !picture.fault)
-      run.warn(fmt::format("{}: no board of {} inner corners", picture.name, options.board));
+      run.warn("{}: no board of {} inner corners", picture.name, options.board);
   return boards;
 }
 
-std::vector<std::string> value_names(const libmap::Camera& camera) {
+struct Term {
+  std::string name;
+  double value = 0.0;
+  double deviation = 0.0;
+};
+
+// The intrinsics, from the fifth on those of the lens.
+std::vector<Term> terms_of(const CameraCalibrationResult& result) {
+  const libmap::Camera& camera = result.camera;
   std::vector<std::string> names = {"fx", "fy", "cx", "cy"};
   if (camera.distortion_model == libmap::DistortionModel::equidistant)
     names.insert(names.end(), {"k1", "k2", "k3", "k4"});
   else
     names.insert(names.end(), {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"});
-  names.resize(4 + camera.distortion.size());
-  return names;
-}
-
-std::vector<double> values_of(const libmap::Camera& camera) {
   std::vector<double> values = {camera.fx, camera.fy, camera.cx, camera.cy};
   values.insert(values.end(), camera.distortion.begin(), camera.distortion.end());
-  return values;
+  std::vector<Term> terms;
+  for (std::size_t n = 0; n < values.size(); ++n)
+    terms.push_back({names[n], values[n], result.deviations[n]});
+  return terms;
 }
 
 // "365.23 +- 0.18", to two digits of the deviation.
-std::string with_deviation(double value, double deviation) {
-  const int decimals =
-      deviation > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(deviation))), 0, 12)
-                    : 6;
-  return libmap::to_fixed_text(value, decimals) + " +- " +
-         libmap::to_fixed_text(deviation, decimals);
+std::string with_deviation(const Term& term) {
+  const double exponent = term.deviation > 0 ? std::floor(std::log10(term.deviation)) : -5.0;
+  const int decimals = std::clamp(1 - static_cast<int>(exponent), 0, 12);
+  return libmap::to_fixed_text(term.value, decimals) + " +- " +
+         libmap::to_fixed_text(term.deviation, decimals);
 }
 
 std::string summary(const CameraCalibrationResult& result, const CalibrateOptions& options) {
@@ -184,10 +177,7 @@ std::string summary(const CameraCalibrationResult& result, const CalibrateOption
       "reprojection error {:.3f} px (root mean square)\n",
       result.pictures.size(), options.board, libmap::to_text(options.calibration.board.square_mm),
       result.rms_px);
-  const std::vector<std::string> names = value_names(result.camera);
-  const std::vector<double> values = values_of(result.camera);
-  for (std::size_t n = 0; n < values.size(); ++n)
-    text += names[n] + " " + with_deviation(values[n], result.deviations[n]) + "\n";
+  for (const Term& term : terms_of(result)) text += term.name + " " + with_deviation(term) + "\n";
   return text + "+-: one standard deviation\n";
 }
 
@@ -234,27 +224,23 @@ libmap::Table residual_table(const CameraCalibrationResult& result,
 }
 
 void note_results(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
-                  libmap::Manifest& manifest) {
-  const graspmap_tools::ResultCounts count(manifest);
-  count("images", pictures.size());
-  const auto count_if = [&](const std::string& name, const auto& is) {
-    count(name, static_cast<std::size_t>(std::count_if(pictures.begin(), pictures.end(), is)));
+                  Run& run) {
+  const auto count = [&](const auto& is) {
+    return std::count_if(pictures.begin(), pictures.end(), is);
   };
-  count_if("images_unreadable", [](const Picture& p) { return p.fault.has_value(); });
-  count_if("images_without_board", [](const Picture& p) { return !p.corners && !p.fault; });
-  count("images_repeated", result.repeated.size());
-  count("images_rejected", result.rejected.size());
-  count("images_used", result.pictures.size());
-  manifest.results.emplace_back("rms_px", result.rms_px);
-  manifest.results.emplace_back("sigma_px", result.sigma_px);
-  const std::vector<std::string> names = value_names(result.camera);
-  const std::vector<double> values = values_of(result.camera);
-  for (std::size_t n = 0; n < values.size(); ++n) {
-    manifest.results.emplace_back(names[n], values[n]);
-    manifest.results.emplace_back(names[n] + "_deviation", result.deviations[n]);
-  }
-  manifest.results.emplace_back("corners_width_share", result.corners_width_share);
-  manifest.results.emplace_back("corners_height_share", result.corners_height_share);
+  run.add_results(
+      {{"images", pictures.size()},
+       {"images_unreadable", count([](const Picture& p) { return p.fault.has_value(); })},
+       {"images_without_board", count([](const Picture& p) { return !p.corners && !p.fault; })},
+       {"images_repeated", result.repeated.size()},
+       {"images_rejected", result.rejected.size()},
+       {"images_used", result.pictures.size()},
+       {"rms_px", result.rms_px},
+       {"sigma_px", result.sigma_px}});
+  for (const Term& term : terms_of(result))
+    run.add_results({{term.name, term.value}, {term.name + "_deviation", term.deviation}});
+  run.add_results({{"corners_width_share", result.corners_width_share},
+                   {"corners_height_share", result.corners_height_share}});
 }
 
 void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
@@ -264,46 +250,37 @@ void warn_of_weaknesses(const CameraCalibrationResult& result, Run& run) {
     run.warn(name + ": left out for its reprojection error");
   for (const CalibratedPicture& picture : result.pictures)
     if (picture.rms_px > good_error_px)
-      run.warn(fmt::format("{}: reprojection error {:.2f} px, above {} px", picture.name,
-                           picture.rms_px, good_error_px));
+      run.warn("{}: reprojection error {:.2f} px, above {} px", picture.name, picture.rms_px,
+               good_error_px);
   if (result.relative_focal_deviation() > good_focal_deviation)
     run.warn(
-        fmt::format("the focal length is known to {:.1f} % only: more pictures, tilted by 30 "
-                    "degrees and more about both axes of the board, would tell it",
-                    100 * result.relative_focal_deviation()));
-  const std::vector<std::string> names = value_names(result.camera);
-  for (std::size_t n = 4; n < names.size(); ++n) {
-    if (result.deviations[n] <= good_term_deviation) continue;
-    run.warn(fmt::format("the pictures do not tell the lens's {}, {}: a simpler --lens would do",
-                         names[n],
-                         with_deviation(result.camera.distortion[n - 4], result.deviations[n])));
-    break;
-  }
+        "the focal length is known to {:.1f} % only: more pictures, tilted by 30 degrees and more "
+        "about both axes of the board, would tell it",
+        100 * result.relative_focal_deviation());
+  const std::vector<Term> terms = terms_of(result);
+  const auto vague = std::find_if(terms.begin() + 4, terms.end(), [](const Term& term) {
+    return term.deviation > good_term_deviation;
+  });
+  if (vague != terms.end())
+    run.warn("the pictures do not tell the lens's {}, {}: a simpler --lens would do", vague->name,
+             with_deviation(*vague));
   if (std::min(result.corners_width_share, result.corners_height_share) < good_coverage)
     run.warn(
-        fmt::format("the corners span {:.0f} % of the image's width and {:.0f} % of its height: "
-                    "the distortion beyond is a guess",
-                    100 * result.corners_width_share, 100 * result.corners_height_share));
+        "the corners span {:.0f} % of the image's width and {:.0f} % of its height: the distortion "
+        "beyond is a guess",
+        100 * result.corners_width_share, 100 * result.corners_height_share);
 }
 
 void write_report(const std::vector<Picture>& pictures, const CameraCalibrationResult& result,
                   const CalibrateOptions& options, Run& run) {
-  std::vector<graspmap_tools::PictureResiduals> residuals;
-  for (const CalibratedPicture& picture : result.pictures)
-    residuals.push_back({picture.name, picture.rms_px, picture.corners, picture.residuals_px});
-  const auto text = [](std::string content) {
-    return [content = std::move(content)](const fs::path& temporary) {
-      libmap::write_text(temporary, content);
-    };
+  const auto csv = [](const libmap::Table& table) {
+    return Run::text_writer(libmap::to_csv(table));
   };
-  const libmap::Camera& camera = result.camera;
   run.write_output_folder(
-      options.report,
-      {{"images.csv", text(libmap::to_csv(picture_table(pictures, result)))},
-       {"residuals.csv", text(libmap::to_csv(residual_table(result, options.calibration.board)))},
-       {"residuals.png",
-        text(graspmap_tools::draw_residuals(residuals, camera.width, camera.height))},
-       {"errors.png", text(graspmap_tools::draw_errors(residuals, good_error_px))}});
+      options.report, {{"images.csv", csv(picture_table(pictures, result))},
+                       {"residuals.csv", csv(residual_table(result, options.calibration.board))},
+                       {"residuals.png", Run::text_writer(draw_residuals(result))},
+                       {"errors.png", Run::text_writer(draw_errors(result, good_error_px))}});
 }
 
 void calibrate(CalibrateOptions& options, Run& run) {
@@ -315,7 +292,7 @@ void calibrate(CalibrateOptions& options, Run& run) {
   run.claim_output(options.output, files);
   if (!options.output.ends_with(".yaml") && !options.output.ends_with(".yml"))
     throw libmap::Error("a camera is written as YAML",
-                        {.file = options.output, .field = {}, .value = {}, .bound = "a name.yaml"});
+                        {.file = options.output, .bound = "a name.yaml"});
   if (!options.report.empty()) run.claim_output_folder(options.report);
   const std::vector<Picture> pictures = run.timed(
       "find boards", [&] { return read_pictures(files, options.calibration.board, run); });
@@ -325,35 +302,27 @@ void calibrate(CalibrateOptions& options, Run& run) {
     const Picture& first = first_readable(pictures);
     return libmap::calibrate_camera(boards, first.width, first.height, options.calibration);
   });
-  note_results(pictures, result, run.manifest());
+  note_results(pictures, result, run);
   warn_of_weaknesses(result, run);
   const std::string said = summary(result, options);
   run.say(said.substr(0, said.size() - 1));
   if (!options.report.empty())
     run.timed("report", [&] { write_report(pictures, result, options, run); });
-  run.write_output(options.output, [&](const fs::path& temporary) {
-    libmap::write_text(temporary, libmap::to_yaml({options.name, result.camera}, said));
-  });
-}
-
-// Boards are sold by millimeters: the flag may carry its unit.
-void drop_unit_of_square(std::vector<std::string>& words) {
-  const std::string with_unit = "--square-mm";
-  for (std::string& word : words)
-    if (word == with_unit || word.starts_with(with_unit + "="))
-      word = "--square" + word.substr(with_unit.size());
+  run.write_text(options.output, libmap::to_yaml({options.name, result.camera}, said));
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   std::vector<std::string> words(argv, argv + argc);
-  drop_unit_of_square(words);
   std::vector<char*> arguments;
-  arguments.reserve(words.size());
-  for (std::string& word : words) arguments.push_back(word.data());
+  for (std::string& word : words) {
+    // Boards are sold by millimeters: the flag may carry its unit.
+    if (word == "--square-mm" || word.starts_with("--square-mm=")) word.erase(8, 3);
+    arguments.push_back(word.data());
+  }
   CalibrateOptions options;
-  graspmap_tools::Command command("calibrate");
+  Command command("calibrate");
   command.inputs("IMAGES", options.images, "images, or folders of images (.png, .jpg)");
   command.output(options.output, "the camera (.yaml)");
   command.option("--report", "DIR", options.report,

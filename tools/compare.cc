@@ -1,21 +1,10 @@
 // graspmap compare: how far one cloud or mesh lies from another.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <numbers>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/pose.h"
-#include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/reference_surface.h"
@@ -23,13 +12,14 @@
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
-#include "tools/support/compare_edges.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
-using graspmap_tools::Run;
 using Json = nlohmann::ordered_json;
 
 struct CompareOptions {
@@ -80,12 +70,10 @@ Shape read_shape(const std::string& file, const CompareOptions& options) {
     return shape;
   }
   shape.mesh = libmap::read_mesh(file).mesh;
-  try {
-    shape.points = libmap::points_on_surface(
+  shape.points = in_file(file, [&] {
+    return libmap::points_on_surface(
         *shape.mesh, libmap::sample_triangles(*shape.mesh, options.samples_per_m2, options.seed));
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file);
-  }
+  });
   return shape;
 }
 
@@ -109,27 +97,23 @@ void require_nearness(const libmap::ReferenceSurface& surface, const libmap::Poi
 }
 
 libmap::ReferenceSurface reference_of(const Shape& shape, const std::string& file) {
-  try {
-    if (shape.mesh) return libmap::ReferenceSurface(*shape.mesh);
-    return libmap::ReferenceSurface(shape.points);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file);
-  }
+  return in_file(file, [&] {
+    return shape.mesh ? libmap::ReferenceSurface(*shape.mesh)
+                      : libmap::ReferenceSurface(shape.points);
+  });
 }
 
 // `crop`: by the crops that the manifests of A and B tell of.
 libmap::Pose b_from_a_of(const CompareOptions& options) {
-  if (options.transform != "crop")
-    return graspmap_tools::parse_transform(options.transform, "--transform");
-  const auto a_from_map = graspmap_tools::site_from_map_of(options.a);
-  const auto b_from_map = graspmap_tools::site_from_map_of(options.b);
+  if (options.transform != "crop") return parse_transform(options.transform, "--transform");
+  const auto a_from_map = site_from_map_of(options.a);
+  const auto b_from_map = site_from_map_of(options.b);
   if (!a_from_map && !b_from_map)
-    throw libmap::Error(
-        "neither A nor B was cropped",
-        {.file = options.a,
-         .field = "--transform",
-         .value = options.transform,
-         .bound = "a manifest with " + std::string(graspmap_tools::site_from_map_name)});
+    throw libmap::Error("neither A nor B was cropped",
+                        {.file = options.a,
+                         .field = "--transform",
+                         .value = options.transform,
+                         .bound = "a manifest with " + std::string(site_from_map_name)});
   return b_from_map.value_or(libmap::Pose::Identity()) *
          a_from_map.value_or(libmap::Pose::Identity()).inverse();
 }
@@ -146,6 +130,11 @@ struct Comparison {
   std::size_t samples = 0;    // of B, in the box
 };
 
+auto count_within(const std::vector<double>& distances, double bound_m) {
+  return std::count_if(distances.begin(), distances.end(),
+                       [&](double distance) { return distance <= bound_m; });
+}
+
 // Which points of B, in the box, A comes near to. All of A counts: what lies just outside covers
 // the border.
 void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& options,
@@ -153,7 +142,7 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
   const libmap::Pose a_from_b = comparison.b_from_a.inverse();
   std::vector<Eigen::Vector3d> samples;
   for (const Eigen::Vector3d& point : b.points.positions)
-    if (graspmap_tools::is_inside(box, point)) samples.push_back(a_from_b * point);
+    if (is_inside(box, point)) samples.push_back(a_from_b * point);
   comparison.samples = samples.size();
   if (!a.mesh) {
     comparison.completeness =
@@ -164,57 +153,47 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
   const libmap::Bounds3d bounds = libmap::bounds_of(a.mesh->vertices);
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(options.within_m);
   const libmap::Bounds3d near{bounds.min - margin, bounds.max + margin};
-  std::erase_if(samples,
-                [&](const auto& point) { return !graspmap_tools::is_inside(near, point); });
-  std::size_t covered = 0;
-  for (const double distance : libmap::distances_to_surface(samples, *a.mesh))
-    covered += distance <= options.within_m ? 1 : 0;
+  std::erase_if(samples, [&](const auto& point) { return !is_inside(near, point); });
+  const std::vector<double> distances = libmap::distances_to_surface(samples, *a.mesh);
   if (comparison.samples > 0)
-    comparison.completeness =
-        static_cast<double>(covered) / static_cast<double>(comparison.samples);
+    comparison.completeness = static_cast<double>(count_within(distances, options.within_m)) /
+                              static_cast<double>(comparison.samples);
 }
 
 void align(const Shape& a, const libmap::ReferenceSurface& surface, const CompareOptions& options,
            const std::optional<libmap::Bounds3d>& box, Comparison& comparison, Run& run) {
-  const libmap::PointCloud start = graspmap_tools::part_in_box(
-      libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
+  const libmap::PointCloud start =
+      part_in_box(libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
   require_nearness(surface, start, options);
-  try {
-    comparison.alignment = libmap::align_to_surface(start.positions, surface, options.alignment);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(surface.is_oriented() ? options.a : options.b);
-  }
+  comparison.alignment = in_file(surface.is_oriented() ? options.a : options.b, [&] {
+    return libmap::align_to_surface(start.positions, surface, options.alignment);
+  });
   const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
   comparison.b_from_a = found.surface_from_points * comparison.b_from_a;
-  if (!found.converged)
-    run.warn(fmt::format("ICP has not converged in {} iterations", found.iterations));
+  if (!found.converged) run.warn("ICP has not converged in {} iterations", found.iterations);
   if (found.free_motions > 0)
-    run.warn(fmt::format("{} of 6 motions are not determined by the surface: ICP left them alone",
-                         found.free_motions));
+    run.warn("{} of 6 motions are not determined by the surface: ICP left them alone",
+             found.free_motions);
 }
 
 Comparison compare_shapes(const Shape& a, const Shape& b, const CompareOptions& options, Run& run) {
-  const auto box = graspmap_tools::parse_box(options.box);
+  const auto box = parse_box(options.box);
   Comparison comparison;
   comparison.b_from_a = b_from_a_of(options);
   const libmap::ReferenceSurface surface =
       run.timed("reference", [&] { return reference_of(b, options.b); });
   if (options.icp) run.timed("icp", [&] { align(a, surface, options, box, comparison, run); });
-  comparison.points = graspmap_tools::part_in_box(
-      libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
+  comparison.points =
+      part_in_box(libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
   require_nearness(surface, comparison.points, options);
   comparison.distances = run.timed(
       "distances", [&] { return libmap::distances_to(surface, comparison.points.positions); });
   const std::vector<double>& distances = comparison.distances.distance_m;
   comparison.statistics = libmap::distance_statistics(distances);
-  std::size_t near = 0;
   double sum = 0.0;
-  for (std::size_t n = 0; n < distances.size(); ++n) {
-    near += distances[n] <= options.within_m ? 1 : 0;
-    sum += comparison.distances.signed_distance_m[n];
-  }
+  for (const double distance : comparison.distances.signed_distance_m) sum += distance;
   const auto count = static_cast<double>(distances.size());
-  comparison.precision = static_cast<double>(near) / count;
+  comparison.precision = static_cast<double>(count_within(distances, options.within_m)) / count;
   if (surface.is_oriented()) comparison.bias_m = sum / count;
   run.timed("completeness", [&] { measure_completeness(a, b, options, box, comparison); });
   return comparison;
@@ -231,24 +210,28 @@ double moved_m(const Comparison& comparison) {
   return (comparison.alignment->surface_from_points.inverse() * middle - middle).norm();
 }
 
-Json to_json(const Comparison& comparison, const Shape& a, const Shape& b,
-             const CompareOptions& options) {
+Results distance_results(const Comparison& comparison) {
   const libmap::DistanceStatistics& statistics = comparison.statistics;
+  return {{"points", statistics.count},  {"rmse_m", statistics.rmse_m},
+          {"mean_m", statistics.mean_m}, {"median_m", statistics.median_m},
+          {"p95_m", statistics.p95_m},   {"max_m", statistics.max_m},
+          {"bias_m", comparison.bias_m}};
+}
+
+Results share_results(const Comparison& comparison) {
+  return {{"precision", comparison.precision}, {"completeness", comparison.completeness}};
+}
+
+Json json_of(const Comparison& comparison, const Shape& a, const Shape& b,
+             const CompareOptions& options) {
   Json json = {{"a", options.a},
                {"a_kind", a.mesh ? "mesh" : "cloud"},
                {"b", options.b},
-               {"b_kind", b.mesh ? "mesh" : "cloud"},
-               {"points", statistics.count},
-               {"rmse_m", statistics.rmse_m},
-               {"mean_m", statistics.mean_m},
-               {"median_m", statistics.median_m},
-               {"p95_m", statistics.p95_m},
-               {"max_m", statistics.max_m},
-               {"bias_m", comparison.bias_m ? Json(*comparison.bias_m) : Json()},
-               {"within_m", options.within_m},
-               {"precision", comparison.precision},
-               {"completeness", comparison.completeness},
-               {"surface_samples", comparison.samples}};
+               {"b_kind", b.mesh ? "mesh" : "cloud"}};
+  json.update(to_json(distance_results(comparison)));
+  json["within_m"] = options.within_m;
+  json.update(to_json(share_results(comparison)));
+  json["surface_samples"] = comparison.samples;
   Json rows = Json::array();
   for (int row = 0; row < 4; ++row) {
     Json numbers = Json::array();
@@ -274,12 +257,7 @@ Json to_json(const Comparison& comparison, const Shape& a, const Shape& b,
 
 void print(const Comparison& comparison, const Shape& a, const Shape& b,
            const CompareOptions& options) {
-  if (options.json) {
-    std::cout
-        << to_json(comparison, a, b, options).dump(2, ' ', false, Json::error_handler_t::replace)
-        << "\n";
-    return;
-  }
+  if (options.json) return print_json(json_of(comparison, a, b, options));
   if (comparison.alignment) {
     const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
     std::cout << fmt::format(
@@ -287,7 +265,7 @@ void print(const Comparison& comparison, const Shape& a, const Shape& b,
         "deg\ntransform: {}\n",
         found.converged ? "converged" : "not converged", found.iterations, found.inliers,
         found.points, 1e3 * found.rmse_m, 1e3 * moved_m(comparison),
-        turn_deg(found.surface_from_points), graspmap_tools::transform_text(comparison.b_from_a));
+        turn_deg(found.surface_from_points), transform_text(comparison.b_from_a));
   }
   const libmap::DistanceStatistics& statistics = comparison.statistics;
   std::cout << fmt::format(
@@ -303,30 +281,19 @@ void print(const Comparison& comparison, const Shape& a, const Shape& b,
                            1e2 * comparison.completeness);
 }
 
-void add_results(const Comparison& comparison, libmap::Manifest& manifest) {
-  manifest.frame = "b";
-  manifest.transforms.emplace_back("b_from_a", comparison.b_from_a);
-  const auto add = [&](const char* name, const libmap::ManifestValue& value) {
-    manifest.results.emplace_back(name, value);
-  };
-  const libmap::DistanceStatistics& statistics = comparison.statistics;
-  add("points", static_cast<std::int64_t>(statistics.count));
-  add("rmse_m", statistics.rmse_m);
-  add("mean_m", statistics.mean_m);
-  add("median_m", statistics.median_m);
-  add("p95_m", statistics.p95_m);
-  add("max_m", statistics.max_m);
-  if (comparison.bias_m) add("bias_m", *comparison.bias_m);
-  add("precision", comparison.precision);
-  add("completeness", comparison.completeness);
+void add_results(const Comparison& comparison, Run& run) {
+  run.manifest().frame = "b";
+  run.manifest().transforms.emplace_back("b_from_a", comparison.b_from_a);
+  run.add_results(distance_results(comparison));
+  run.add_results(share_results(comparison));
   if (!comparison.alignment) return;
   const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
-  add("icp_converged", found.converged);
-  add("icp_iterations", static_cast<std::int64_t>(found.iterations));
-  add("icp_overlap", static_cast<std::int64_t>(found.overlap));
-  add("icp_inliers", static_cast<std::int64_t>(found.inliers));
-  add("icp_rmse_m", found.rmse_m);
-  add("icp_free_motions", static_cast<std::int64_t>(found.free_motions));
+  run.add_results({{"icp_converged", found.converged},
+                   {"icp_iterations", found.iterations},
+                   {"icp_overlap", found.overlap},
+                   {"icp_inliers", found.inliers},
+                   {"icp_rmse_m", found.rmse_m},
+                   {"icp_free_motions", found.free_motions}});
 }
 
 // The points of A by their signed distance, in millimeters.
@@ -361,13 +328,11 @@ void write_outputs(Comparison& comparison, const CompareOptions& options, Run& r
   if (std::filesystem::is_regular_file(options.transform)) run.add_input(options.transform);
   run.manifest().parameters.emplace_back("transform", options.transform);
   run.manifest().parameters.emplace_back("box", options.box);
-  add_results(comparison, run.manifest());
+  add_results(comparison, run);
   if (!options.picture.empty()) {
     const libmap::ColorImage image =
         run.timed("picture", [&] { return picture_of(comparison, options); });
-    run.write_output(options.picture, [&](const auto& temporary) {
-      libmap::write_text(temporary, libmap::to_png(image));
-    });
+    run.write_text(options.picture, libmap::to_png(image));
   }
   if (options.output.empty()) return;
   libmap::PointCloud& cloud = comparison.points;
@@ -398,7 +363,7 @@ void compare(const CompareOptions& options, Run& run) {
 
 int compare_surfaces(int argc, char** argv) {
   CompareOptions options;
-  graspmap_tools::Command command("compare");
+  Command command("compare");
   command.input("A", options.a, "cloud or mesh (.pcd, .ply, .csv, .obj, .stl, .off, .glb)");
   command.input("B", options.b, "the surface that A is measured by: a mesh, or a cloud");
   command.output(options.output,
@@ -421,6 +386,5 @@ int compare_surfaces(int argc, char** argv) {
 int main(int argc, char** argv) {
   const bool edges =
       std::any_of(argv, argv + argc, [](const std::string& word) { return word == "--edges"; });
-  return graspmap_tools::run_usage(argc, argv, edges, compare_surfaces,
-                                   graspmap_tools::compare_edges);
+  return run_usage(argc, argv, edges, compare_surfaces, compare_edges);
 }

@@ -1,26 +1,18 @@
 // graspmap convert: any format to any other.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <string>
-#include <vector>
-
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
 #include "libmap/core/single_precision.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
-#include "tools/support/convert_scan.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/merge_tiles.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
-using graspmap_tools::Run;
 using libmap::FileEncoding;
 using libmap::TrajectoryFormat;
 
@@ -43,11 +35,6 @@ bool holds_poses(const ConvertOptions& options) {
 bool holds_meshes_alone(const std::string& path) {
   const std::string format = libmap::format_of(path);
   return format == ".obj" || format == ".stl" || format == ".off" || format == ".glb";
-}
-
-bool holds_clouds_alone(const std::string& path) {
-  const std::string format = libmap::format_of(path);
-  return format == ".pcd" || format == ".csv";
 }
 
 libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
@@ -86,7 +73,7 @@ void refuse_ignored(const ConvertOptions& options) {
   if (options.encoding == FileEncoding::binary_compressed && format != ".pcd")
     throw libmap::Error(
         "is an encoding of .pcd",
-        {.file = options.output, .field = "--encoding", .value = "binary_compressed", .bound = {}});
+        {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.big_endian && format != ".ply")
     throw libmap::Error("is for .ply", {.file = options.output, .field = "--big-endian"});
 }
@@ -108,23 +95,22 @@ void tell_losses(const libmap::TriangleMesh& mesh, const std::string& format, Ru
   if (no_fields)
     for (const auto* fields : {&mesh.vertex_fields, &mesh.face_fields})
       for (const libmap::ScalarField& field : *fields) lost.push_back(field.name);
-  if (!lost.empty())
-    run.warn(fmt::format("{} has no place for: {}", format, fmt::join(lost, ", ")));
+  if (!lost.empty()) run.warn("{} has no place for: {}", format, fmt::join(lost, ", "));
   constexpr double told_m = 1e-5;
   if (const double moved_m = rounding_of(mesh.vertices);
       (format == ".stl" || format == ".glb") && moved_m > told_m)
-    run.warn(fmt::format("{} keeps single precision: coordinates are off by up to {:.3g} mm",
-                         format, 1e3 * moved_m));
+    run.warn("{} keeps single precision: coordinates are off by up to {:.3g} mm", format,
+             1e3 * moved_m);
 }
 
 void convert_cloud(const ConvertOptions& options, Run& run) {
   const libmap::CloudReadResult read = libmap::read_cloud(options.input);
   if (read.dropped_points > 0)
-    run.warn(fmt::format("{} points without a position were dropped", read.dropped_points));
+    run.warn("{} points without a position were dropped", read.dropped_points);
   if (holds_meshes_alone(options.output))
     throw libmap::Error("a cloud has no faces: this format contains meshes alone",
                         {.file = options.output});
-  run.manifest().results.emplace_back("points", static_cast<std::int64_t>(read.cloud.size()));
+  run.add_results({{"points", read.cloud.size()}});
   add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_cloud(temporary, read.cloud, {options.encoding, options.big_endian});
@@ -138,7 +124,7 @@ libmap::TexturedMesh read_model(const std::string& file, Run& run) {
   } catch (const libmap::Error& error) {
     libmap::TexturedMesh model;
     model.mesh = libmap::read_mesh(file).mesh;
-    run.warn(fmt::format("the texture is left out: {}", error.what()));
+    run.warn("the texture is left out: {}", error.what());
     return model;
   }
 }
@@ -154,7 +140,7 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
   }
   const libmap::TexturedMeshWriteOptions writing;
   run.require_own_companions(options.output, libmap::companions_of_model(options.output, writing));
-  run.manifest().results.emplace_back("pages", static_cast<std::int64_t>(model.pages.size()));
+  run.add_results({{"pages", model.pages.size()}});
   add_input(options, run);
   Run::Files writers;
   for (const libmap::ModelFile& file : libmap::textured_mesh_files(options.output, model, writing))
@@ -166,12 +152,11 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 void convert_mesh(const ConvertOptions& options, Run& run) {
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
-  tell_losses(mesh, libmap::format_of(options.output), run);
-  const bool to_cloud = holds_clouds_alone(options.output);
+  const std::string format = libmap::format_of(options.output);
+  tell_losses(mesh, format, run);
+  const bool to_cloud = format == ".pcd" || format == ".csv";
   if (to_cloud) run.say("the output contains the mesh's vertices alone");
-  run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
-  run.manifest().results.emplace_back("triangles",
-                                      static_cast<std::int64_t>(mesh.triangles.size()));
+  run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
   add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
     if (to_cloud)
@@ -188,8 +173,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   if (!read.images.empty())
     throw libmap::Error("poses of photographs: only those of the scan know its base (fuse --poses)",
                         {.file = options.input});
-  run.manifest().results.emplace_back("poses", static_cast<std::int64_t>(read.poses.size()));
-  run.manifest().results.emplace_back("links", static_cast<std::int64_t>(read.links.size()));
+  run.add_results({{"poses", read.poses.size()}, {"links", read.links.size()}});
   add_input(options, run);
   const bool nodes = read.poses.front().node != 0;
   const auto is_output = [&](TrajectoryFormat format, const char* extension) {
@@ -209,10 +193,9 @@ void convert_poses(const ConvertOptions& options, Run& run) {
 
 void convert(ConvertOptions& options, Run& run) {
   options.input = options.inputs.front();
-  if (options.inputs.size() > 1 || graspmap_tools::is_part_of_map(options.input)) {
+  if (options.inputs.size() > 1 || is_part_of_map(options.input)) {
     refuse_ignored(options);
-    return graspmap_tools::merge_tiles(options.inputs, options.output,
-                                       {options.encoding, options.big_endian}, run);
+    return merge_tiles(options.inputs, options.output, {options.encoding, options.big_endian}, run);
   }
   const bool poses = holds_poses(options);
   if (!poses) refuse_ignored(options);
@@ -237,21 +220,20 @@ bool names_scan(int argc, char** argv) {
     if (is_output) to_file = std::filesystem::path(word).has_extension();
     if (is_output || word.starts_with("-")) continue;
     if (word.ends_with(".db")) return true;
-    has_scan = has_scan || graspmap_tools::is_scan_path(word);
+    has_scan = has_scan || is_scan_path(word);
   }
   return has_scan && !to_file;
 }
 
 int convert_file(int argc, char** argv) {
   ConvertOptions options;
-  graspmap_tools::Command command("convert");
+  Command command("convert");
   command.inputs("IN", options.inputs,
                  "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), poses (.tum .kitti .g2o .toro "
                  "...), tile store (.tiles), or all shares of a map");
   command.output(options.output,
                  "the same in the format of this extension, or .vtp for ParaView; of tiles and "
-                 "shares the whole map, the "
-                 "same bytes as in one run");
+                 "shares the whole map, the same bytes as in one run");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
@@ -262,14 +244,13 @@ int convert_file(int argc, char** argv) {
                            "of poses in IN; auto: by its extension, else by its content");
   command.parameters().add(
       "output_poses_format", options.output_poses_format, libmap::trajectory_format_names(),
-      "of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, "
-      "1 tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
+      "of poses in OUT; auto: by its extension. RTAB-Map's formats are 0 kitti, 1 "
+      "tum-motion-capture, 2 kitti-optical, 3 toro, 4 g2o, 10 and 11 tum");
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
-  return graspmap_tools::run_usage(argc, argv, names_scan(argc, argv), convert_file,
-                                   graspmap_tools::convert_scan);
+  return run_usage(argc, argv, names_scan(argc, argv), convert_file, convert_scan);
 }

@@ -1,22 +1,16 @@
 // graspmap evaluate: ROC curve, areas under it and rates of the scores in a table, against the
 // labels in it.
-#include <cmath>
-#include <string>
-#include <vector>
-
 #include "libgtd/evaluate/roc_tables.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
-#include "libmap/core/text.h"
 #include "libmap/view/charts.h"
 #include "libmap/view/image_io.h"
 #include "libmap/view/virtual_display.h"
 #include "tools/support/command_line.h"
 
+using namespace graspmap_tools;
+
 namespace {
 
-namespace fs = std::filesystem;
-using graspmap_tools::Run;
 using libgtd::ColumnEvaluation;
 using libgtd::TableEvaluation;
 
@@ -66,21 +60,19 @@ std::string rounded_text(double value) {
 }
 
 void note_results(const TableEvaluation& evaluation, Run& run) {
-  auto& results = run.manifest().results;
-  results.emplace_back("rows", static_cast<std::int64_t>(evaluation.rows));
+  run.add_results({{"rows", evaluation.rows}});
   for (const ColumnEvaluation& column : evaluation.columns) {
     const libgtd::RocResult& result = column.result;
     const std::size_t locations = result.at_rate_cutoff.counts.size();
-    results.emplace_back(column.name + ".locations", static_cast<std::int64_t>(locations));
+    run.add_results({{column.name + ".locations", locations}});
     if (!result.area) {
       run.warn(column.name + ": " + result.area_note);
       continue;
     }
-    results.emplace_back(column.name + ".auc_trapezoid", result.area->trapezoid);
-    results.emplace_back(column.name + ".auc_upper_sum", result.area->upper_sum);
-    run.say(column.name + ": " + libmap::to_text(static_cast<std::int64_t>(locations)) +
-            " locations, AUC " + rounded_text(result.area->trapezoid) + " (trapezoid), " +
-            rounded_text(result.area->upper_sum) + " (upper sum, as in the thesis)");
+    run.add_results({{column.name + ".auc_trapezoid", result.area->trapezoid},
+                     {column.name + ".auc_upper_sum", result.area->upper_sum}});
+    run.say("{}: {} locations, AUC {} (trapezoid), {} (upper sum, as in the thesis)", column.name,
+            locations, rounded_text(result.area->trapezoid), rounded_text(result.area->upper_sum));
   }
 }
 
@@ -89,22 +81,21 @@ void write_results(const EvaluateOptions& options, const TableEvaluation& evalua
   const libmap::VirtualDisplay display;
   const libmap::ColorImage picture =
       run.timed("draw", [&] { return libmap::draw_chart(chart, libmap::roc_chart_size); });
-  const auto text = [](std::string content) {
-    return [content = std::move(content)](const fs::path& temporary) {
-      libmap::write_text(temporary, content);
-    };
+  const auto text = &Run::text_writer;
+  const auto csv = [](const libmap::Table& table) {
+    return Run::text_writer(libmap::to_csv(table));
   };
-  run.write_output_folder(
-      options.folder, {{"roc.csv", text(libmap::to_csv(libgtd::roc_table(evaluation)))},
-                       {"rates.csv", text(libmap::to_csv(libgtd::rates_table(evaluation)))},
-                       {"accuracy.csv", text(libmap::to_csv(libgtd::accuracy_table(evaluation)))},
-                       {"summary.json", text(libgtd::to_json(evaluation))},
-                       {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
-                       {"roc.svg",
-                        [&](const fs::path& temporary) {
-                          libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
-                        }},
-                       {"roc.png", text(libmap::to_png(picture))}});
+  run.write_output_folder(options.folder,
+                          {{"roc.csv", csv(libgtd::roc_table(evaluation))},
+                           {"rates.csv", csv(libgtd::rates_table(evaluation))},
+                           {"accuracy.csv", csv(libgtd::accuracy_table(evaluation))},
+                           {"summary.json", text(libgtd::to_json(evaluation))},
+                           {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
+                           {"roc.svg",
+                            [&](const auto& temporary) {
+                              libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
+                            }},
+                           {"roc.png", text(libmap::to_png(picture))}});
 }
 
 void evaluate(EvaluateOptions& options, Run& run) {
@@ -122,7 +113,7 @@ void evaluate(EvaluateOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   EvaluateOptions options;
-  graspmap_tools::Command command("evaluate");
+  Command command("evaluate");
   command.input("TABLE.csv", options.table, "labels and scores, one row per location");
   command.output(
       options.folder,

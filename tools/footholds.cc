@@ -1,19 +1,12 @@
 // graspmap footholds: the best places of a map, for a planner of steps.
-#include <fmt/format.h>
-
-#include <optional>
-#include <string>
-
 #include "libgtd/score/footholds.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/core/manifest.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 
-namespace {
+using namespace graspmap_tools;
 
-using graspmap_tools::Run;
+namespace {
 
 struct FootholdsCommandOptions {
   std::string map;
@@ -26,15 +19,11 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
   run.claim_output(options.output, {options.map});
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
   const std::optional<libmap::Manifest> manifest = libmap::read_manifest_of(options.map);
-  libgtd::FootholdResult result;
-  try {
-    result = run.timed("footholds", [&] {
-      return libgtd::find_footholds(map, options.footholds,
-                                    {.up = graspmap_tools::up_of_map(manifest)});
+  const libgtd::FootholdResult result = in_file(options.map, [&] {
+    return run.timed("footholds", [&] {
+      return libgtd::find_footholds(map, options.footholds, {.up = up_of_map(manifest)});
     });
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.map);
-  }
+  });
   if (manifest) {
     run.manifest().frame = manifest->frame;
     run.manifest().transforms = manifest->transforms;
@@ -42,19 +31,16 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     run.warn(options.map + ": no manifest beside it: the z axis is taken as up");
   }
   run.add_input(options.map);
-  run.manifest().results.emplace_back("candidates", static_cast<std::int64_t>(result.candidates));
-  run.manifest().results.emplace_back("footholds",
-                                      static_cast<std::int64_t>(result.footholds.size()));
-  run.say(fmt::format("{} footholds among {} voxels that may be one", result.footholds.size(),
-                      result.candidates));
-  run.manifest().results.emplace_back("candidates_at_border",
-                                      static_cast<std::int64_t>(result.at_border));
+  run.add_results({{"candidates", result.candidates},
+                   {"footholds", result.footholds.size()},
+                   {"candidates_at_border", result.at_border}});
+  run.say("{} footholds among {} voxels that may be one", result.footholds.size(),
+          result.candidates);
   if (result.footholds.empty())
-    run.warn(fmt::format(
-        "{}: no voxel may be a foothold{}", options.map,
-        result.at_border == 0
-            ? ""
-            : fmt::format("; {} at the scan's edges are left out (--edges)", result.at_border)));
+    run.warn("{}: no voxel may be a foothold{}", options.map,
+             result.at_border == 0 ? ""
+                                   : fmt::format("; {} at the scan's edges are left out (--edges)",
+                                                 result.at_border));
   const libmap::PointCloud cloud = libgtd::to_cloud(result, map);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
@@ -64,7 +50,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   FootholdsCommandOptions options;
-  graspmap_tools::Command command("footholds");
+  Command command("footholds");
   command.input("MAP", options.map, "graspability map");
   command.output(options.output,
                  "the footholds, best first, with normals and directions of approach (.csv, .vtp, "

@@ -58,14 +58,14 @@ void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) 
     probability += result.hold_probability / static_cast<double>(results.size());
     unseen += result.unseen / static_cast<double>(results.size());
   }
-  run.manifest().results.emplace_back("locations", static_cast<std::int64_t>(results.size()));
-  run.manifest().results.emplace_back("holding", holding);
-  run.manifest().results.emplace_back("mean_hold_probability", probability);
-  run.manifest().results.emplace_back("mean_unseen", unseen);
+  run.add_results({{"locations", results.size()},
+                   {"holding", holding},
+                   {"mean_hold_probability", probability},
+                   {"mean_unseen", unseen}});
   run.say(
-      fmt::format("{} of {} locations hold; mean probability {:.2f}, {:.1f} % of the ground "
-                  "under the gripper unseen",
-                  holding, results.size(), probability, 100.0 * unseen));
+      "{} of {} locations hold; mean probability {:.2f}, {:.1f} % of the ground under the "
+      "gripper unseen",
+      holding, results.size(), probability, 100.0 * unseen);
 }
 
 void grasp(const GraspCommandOptions& options, Run& run) {
@@ -102,11 +102,9 @@ void grasp(const GraspCommandOptions& options, Run& run) {
   for (std::size_t row = 0; row < results.size(); ++row)
     for (std::string& cell : libgtd::grasp_cells(results[row]))
       table.rows[row].push_back(std::move(cell));
-  run.manifest().results.emplace_back("parameters_sha256", parameters_hash(gripper, options.grasp));
+  run.add_results({{"parameters_sha256", parameters_hash(gripper, options.grasp)}});
   note_results(results, run);
-  run.write_output(options.output, [&](const auto& temporary) {
-    libmap::write_text(temporary, libmap::to_csv(table));
-  });
+  run.write_text(options.output, libmap::to_csv(table));
 }
 
 }  // namespace

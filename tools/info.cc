@@ -1,29 +1,23 @@
 // graspmap info: what a scan, a cloud, a mesh, a map or a bag holds.
-#include <fmt/format.h>
-
-#include <cmath>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <set>
-#include <string>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/core/manifest.h"
-#include "libmap/core/text.h"
+#include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/surface/mesh_report.h"
-#include "tools/support/bag_json.h"
 #include "tools/support/command_line.h"
+#include "tools/support/info_json.h"
 #include "tools/support/info_scan.h"
-#include "tools/support/info_tiles.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 
+using namespace graspmap_tools;
+
 namespace {
 
-using graspmap_tools::Run;
 using Json = nlohmann::ordered_json;
 
 struct InfoOptions {
@@ -48,13 +42,6 @@ Json range_of(const std::vector<double>& values) {
   }
   if (finite == 0) return nullptr;
   return Json::array({low, high});
-}
-
-Json bounds_json(const std::vector<Eigen::Vector3d>& positions) {
-  if (positions.empty()) return nullptr;
-  const libmap::Bounds3d bounds = libmap::bounds_of(positions);
-  const auto numbers = [](const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); };
-  return {{"min", numbers(bounds.min)}, {"max", numbers(bounds.max)}};
 }
 
 Json fields_json(const std::vector<libmap::ScalarField>& fields) {
@@ -126,18 +113,12 @@ Json surface_json(const libmap::MeshReport& report) {
          report.self_intersections_counted ? Json(report.self_intersections) : Json(nullptr)}}}};
 }
 
-libmap::MeshReport report_of(const libmap::TriangleMesh& mesh, const InfoOptions& options) {
-  try {
-    return libmap::report_mesh(mesh, {.self_intersections = !options.quick});
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.file);
-  }
-}
-
 Json mesh_json(const InfoOptions& options) {
   const libmap::MeshReadResult read = libmap::read_mesh(options.file);
   const libmap::TriangleMesh& mesh = read.mesh;
-  const libmap::MeshReport report = report_of(mesh, options);
+  const libmap::MeshReport report = in_file(options.file, [&] {
+    return libmap::report_mesh(mesh, {.self_intersections = !options.quick});
+  });
   return {{"kind", "mesh"},
           {"file", file_json(read.info)},
           {"vertices", mesh.vertices.size()},
@@ -208,8 +189,7 @@ Json plane_json(const libmap::Manifest& manifest) {
     return std::atan2(up.head<2>().norm(), up.z()) * 180.0 / M_PI;
   };
   Json json = {{"tilt_from_input_z_deg", tilt_deg(*terrain_from_input)}};
-  if (const libmap::Pose* input_from_map =
-          manifest.find_transform(graspmap_tools::site_from_map_name))
+  if (const libmap::Pose* input_from_map = manifest.find_transform(site_from_map_name))
     json["tilt_from_map_z_deg"] = tilt_deg(*terrain_from_input * *input_from_map);
   return json;
 }
@@ -220,16 +200,54 @@ struct Faults {
   std::vector<std::string> tiles;
 };
 
-Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
-  if (graspmap_tools::is_tile_store(options.file)) {
-    graspmap_tools::TilesInfo tiles =
-        graspmap_tools::tiles_info(options.file, options.verify, run.progress());
-    faults.tiles = std::move(tiles.faults);
-    return std::move(tiles.json);
+// Reads every tile; why those that cannot be used cannot, in their order.
+std::vector<std::string> broken_tiles(const MapTiles& tiles, libmap::Progress& progress) {
+  std::vector<std::string> reasons(tiles.index().tiles.size());
+  progress.begin("verify", reasons.size());
+  libmap::parallel_each(reasons.size(), [&](std::size_t n) {
+    try {
+      tiles.load_checked(n);
+    } catch (const libmap::Error& error) {
+      reasons[n] = error.what();
+    }
+    progress.advance(1);
+  });
+  progress.end();
+  std::erase(reasons, "");
+  return reasons;
+}
+
+Json tiles_json(const InfoOptions& options, Run& run, Faults& faults) {
+  const MapTiles tiles(options.file);
+  const libgtd::TileStoreIndex& index = tiles.index();
+  Eigen::AlignedBox3d box;
+  std::uint64_t bytes = 0;
+  for (std::size_t n = 0; n < index.tiles.size(); ++n) {
+    box.extend(tiles.box(n));
+    bytes += index.tiles[n].bytes;
   }
-  if (graspmap_tools::may_be_scan(options.file)) {
-    graspmap_tools::ScanInfo scan =
-        graspmap_tools::scan_info(options.file, options.verify, run.progress());
+  Json json = {{"kind", "graspability map in tiles"},
+               {"points", index.voxels()},
+               {"border_voxels", index.border_voxels()},
+               {"graspable_voxels", index.graspable_voxels()},
+               {"bounds_m", bounds_json({box.min(), box.max()})},
+               {"tiles",
+                {{"count", index.tiles.size()},
+                 {"width_m", index.tile_voxels * index.lattice.voxel_size_m},
+                 {"bytes", bytes}}},
+               {"lattice",
+                {{"voxel_size_m", index.lattice.voxel_size_m},
+                 {"origin_m", numbers_json(index.lattice.origin_m)}}}};
+  if (!options.verify) return json;
+  faults.tiles = broken_tiles(tiles, run.progress());
+  json["broken_tiles"] = faults.tiles;
+  return json;
+}
+
+Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
+  if (is_tile_store(options.file)) return tiles_json(options, run, faults);
+  if (may_be_scan(options.file)) {
+    ScanInfo scan = scan_info(options.file, options.verify, run.progress());
     faults.scan = std::move(scan.faults);
     return std::move(scan.json);
   }
@@ -238,7 +256,7 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
                         {.file = options.file, .field = "--verify"});
   if (libmap::format_of(options.file) == ".bag") {
     Json json = {{"kind", "bag of ROS 1"}};
-    json.update(graspmap_tools::bag_json(libmap::list_bag(options.file)));
+    json.update(bag_json(libmap::list_bag(options.file)));
     return json;
   }
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
@@ -264,21 +282,19 @@ void require_sound(const std::string& file, const Faults& found) {
 }
 
 void info(InfoOptions& options, Run& run) {
-  options.file = graspmap_tools::without_trailing_slash(options.file);
+  options.file = without_trailing_slash(options.file);
   Json json = {{"path", options.file}};
   Faults faults;
   json.update(content_json(options, run, faults));
   if (const auto manifest = libmap::read_manifest_of(options.file)) {
     json["made_by"] = "graspmap " + manifest->command + " " + manifest->version;
     json["frame"] = manifest->frame;
-    Json results = Json::object();
-    for (const auto& [name, value] : manifest->results)
-      results[name] = std::visit([](const auto& held) { return Json(held); }, value);
-    json["results"] = results;
+    json["results"] = Json::object();
+    for (const auto& [name, value] : manifest->results) json["results"][name] = to_json(value);
     if (Json plane = plane_json(*manifest); !plane.is_null()) json["plane"] = std::move(plane);
   }
   if (options.json)
-    std::cout << json.dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    print_json(json);
   else
     print_plainly(json, "");
   require_sound(options.file, faults);
@@ -288,7 +304,7 @@ void info(InfoOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   InfoOptions options;
-  graspmap_tools::Command command("info");
+  Command command("info");
   command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or ROS 1 bag");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify,

@@ -1,33 +1,24 @@
 // graspmap lookup: the map's values at listed locations.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <optional>
 #include <ostream>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libgtd/evaluate/lookup.h"
 #include "libgtd/evaluate/roc.h"
 #include "libgtd/evaluate/tile_lookup.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
 #include "libmap/core/table.h"
-#include "libmap/core/text.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 
-namespace {
+using namespace graspmap_tools;
 
-using graspmap_tools::Run;
+namespace {
 
 struct LookupCommandOptions {
   std::string map;
   std::string points;
   std::string output;
-  graspmap_tools::PointFrame points_frame = graspmap_tools::PointFrame::automatic;
+  PointFrame points_frame = PointFrame::automatic;
   libgtd::LookupOptions lookup;
   std::string columns;  // empty: found, distance_m and every field
   std::string visible;  // a cloud, if not empty
@@ -36,7 +27,7 @@ struct LookupCommandOptions {
 
 void bind(libmap::ParameterTable& table, LookupCommandOptions& options) {
   bind(table, options.lookup);
-  table.add("points_frame", options.points_frame, graspmap_tools::listed_point_frame_names(),
+  table.add("points_frame", options.points_frame, listed_point_frame_names(),
             "frame of the points: of the cloud that was scored, the terrain's, or the map's before "
             "it was cropped or a simulated robot stood in it; auto: as the manifest of POINTS "
             "says, else input");
@@ -75,10 +66,9 @@ std::vector<AddedColumn> parse_columns(const std::string& text) {
       column.cutoff = libmap::parse_double(rest.substr(comparison + 2));
     if (column.name.empty() || column.name.ends_with('>') || column.field.empty() ||
         (comparison != std::string_view::npos && !column.cutoff))
-      throw libmap::Error("names no column", {.file = {},
-                                              .field = "--column",
-                                              .value = part,
-                                              .bound = "NAME=FIELD or NAME=FIELD>=VALUE"});
+      throw libmap::Error(
+          "names no column",
+          {.field = "--column", .value = part, .bound = "NAME=FIELD or NAME=FIELD>=VALUE"});
     columns.push_back(std::move(column));
   }
   return columns;
@@ -99,8 +89,7 @@ std::vector<std::string> field_names(const libmap::PointCloud& map) {
 // To the frame of the map's points.
 std::vector<Eigen::Vector3d> carried(const LookupCommandOptions& options,
                                      std::vector<Eigen::Vector3d> positions, Run& run) {
-  const libmap::Pose transform =
-      graspmap_tools::map_from_points(options.map, options.points_frame, run);
+  const libmap::Pose transform = map_from_points(options.map, options.points_frame, run);
   for (Eigen::Vector3d& position : positions) position = transform * position;
   return positions;
 }
@@ -119,20 +108,18 @@ MapAnswers ask_map(const LookupCommandOptions& options, std::vector<Eigen::Vecto
 
 MapAnswers ask_tiles(const LookupCommandOptions& options, std::vector<Eigen::Vector3d> positions,
                      Run& run) {
-  const graspmap_tools::MapTiles tiles(options.map);
+  const MapTiles tiles(options.map);
   positions = carried(options, std::move(positions), run);
-  run.add_input(graspmap_tools::store_index_path(options.map));
+  run.add_input(store_index_path(options.map));
   const auto load = [&](std::size_t tile) { return tiles.load(tile); };
-  try {
+  return in_file(options.map, [&] {
     MapAnswers asked = {field_names(tiles.load(0)), std::move(positions), {}};
     asked.answers = run.timed("look-up", [&] {
       return libgtd::look_up_tiles(tiles.index(), load, asked.positions, options.lookup,
                                    run.progress());
     });
     return asked;
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.map);
-  }
+  });
 }
 
 // Places with no point of the cloud near them were not seen: the map has no answer for them, what
@@ -141,7 +128,8 @@ std::int64_t hide_unseen(const LookupCommandOptions& options, MapAnswers& map, R
   const libmap::PointCloud seen = libmap::read_cloud(options.visible).cloud;
   if (seen.empty()) throw libmap::Error("the cloud has no points", {.file = options.visible});
   run.add_input(options.visible);
-  const libmap::Pose input_from_map = graspmap_tools::input_from_map(options.map);
+  const libmap::Pose input_from_map =
+      map_from_input(libmap::read_manifest_of(options.map)).inverse();
   std::vector<Eigen::Vector3d> positions = map.positions;
   for (Eigen::Vector3d& position : positions) position = input_from_map * position;
   const libgtd::LookupOptions near_by = {.max_distance_m = options.visible_radius_m};
@@ -210,25 +198,20 @@ void lookup(LookupCommandOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("look-ups are written as .csv", {.file = options.output});
   const std::vector<AddedColumn> columns = parse_columns(options.columns);
-  options.map = graspmap_tools::without_trailing_slash(options.map);
+  options.map = without_trailing_slash(options.map);
   run.claim_output(options.output, {options.map, options.points, options.visible});
-  options.points_frame =
-      graspmap_tools::frame_of_points(options.points, options.points_frame, options.map, run);
-  if (options.points_frame == graspmap_tools::PointFrame::terrain)
-    graspmap_tools::carry_terrain_transform(options.map, run);
+  options.points_frame = frame_of_points(options.points, options.points_frame, options.map, run);
+  if (options.points_frame == PointFrame::terrain) carry_terrain_transform(options.map, run);
   libmap::Table table = libmap::read_csv(options.points);
-  MapAnswers map = graspmap_tools::is_tile_store(options.map)
-                       ? ask_tiles(options, graspmap_tools::positions_of(table), run)
-                       : ask_map(options, graspmap_tools::positions_of(table), run);
+  MapAnswers map = is_tile_store(options.map) ? ask_tiles(options, positions_of(table), run)
+                                              : ask_map(options, positions_of(table), run);
   const std::vector<Cell> cells = add_columns(table, columns, map, options.map);
-  if (!options.visible.empty())
-    run.manifest().results.emplace_back("visible", hide_unseen(options, map, run));
-  std::int64_t found = 0;
-  for (const libgtd::LookupAnswer& answer : map.answers) found += answer.found ? 1 : 0;
+  if (!options.visible.empty()) run.add_results({{"visible", hide_unseen(options, map, run)}});
+  const auto found = std::count_if(map.answers.begin(), map.answers.end(),
+                                   [](const auto& answer) { return answer.found; });
   run.add_input(options.points);
-  run.manifest().results.emplace_back("points", static_cast<std::int64_t>(map.answers.size()));
-  run.manifest().results.emplace_back("found", found);
-  run.say(fmt::format("{} of {} points are on the map", found, map.answers.size()));
+  run.add_results({{"points", map.answers.size()}, {"found", found}});
+  run.say("{} of {} points are on the map", found, map.answers.size());
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_geometry_file(temporary,
                                 [&](std::ostream& out) { write_answers(out, table, cells, map); });
@@ -239,7 +222,7 @@ void lookup(LookupCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   LookupCommandOptions options;
-  graspmap_tools::Command command("lookup");
+  Command command("lookup");
   command.input("MAP", options.map, "graspability map, or a tile store (.tiles)");
   command.input("POINTS", options.points, "CSV with the columns x, y, z in meters, and any others");
   command.output(options.output, "CSV: the points, each with the map's values there");

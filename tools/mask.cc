@@ -1,22 +1,19 @@
 // graspmap mask: a gripper's mask as text, cloud or picture.
-#include <fmt/format.h>
-
-#include <string>
+#include <array>
+#include <set>
 
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/view/picture_sheet.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
-#include "tools/support/mask_sections.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
-using graspmap_tools::Run;
 using libgtd::GripperMask;
 
 struct MaskOptions {
@@ -30,6 +27,13 @@ struct MaskOptions {
   int cell_width_px = 640;  // of a section
 };
 
+// Of sections alone.
+void bind_sections(libmap::ParameterTable& table, MaskOptions& options) {
+  table.add("section_layer", options.section_layer, {0, 1e6},
+            "layer of the lower horizontal section; 0 is the lowest");
+  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "width of a section, pixels");
+}
+
 void bind(libmap::ParameterTable& table, MaskOptions& options) {
   table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
@@ -39,14 +43,164 @@ void bind(libmap::ParameterTable& table, MaskOptions& options) {
             "void layers on top (H_add), voxels");
   table.add("view", options.view, libmap::viewpoint_names(), "from where a picture is taken");
   table.add("sections", options.sections, "three sections of the mask in place of a view of it");
-  table.add("section_layer", options.section_layer, {0, 1e6},
-            "layer of the lower horizontal section; 0 is the lowest");
-  table.add("cell_width_px", options.cell_width_px, {64, 5000}, "width of a section, pixels");
+  bind_sections(table, options);
 }
 
 std::string title_of(const GripperMask& mask, const MaskOptions& options) {
   return fmt::format("{} mask, {}, {} mm", options.gripper, name_of(mask.method),
                      libmap::to_text(static_cast<float>(mask.voxel_size_m * 1000.0)));
+}
+
+// Of a voxel in a section; what is not counted enters neither SSV nor GSV.
+enum class MaskVoxel { solid, void_space, solid_not_counted, void_not_counted, pivot };
+
+struct KindLook {
+  MaskVoxel kind;
+  libmap::Color color;
+  const char* text;
+};
+
+constexpr std::array<KindLook, 5> looks{
+    {{MaskVoxel::solid, {0, 114, 178}, "solid"},
+     {MaskVoxel::void_space, {205, 211, 218}, "void"},
+     {MaskVoxel::solid_not_counted, {150, 200, 226}, "solid, not counted"},
+     {MaskVoxel::void_not_counted, {252, 240, 214}, "void, not counted"},
+     {MaskVoxel::pivot, {213, 94, 0}, "pivot"}}};
+
+MaskVoxel kind_of(const GripperMask& mask, const Eigen::Vector3i& at) {
+  const int x = at.x(), y = at.y(), z = at.z();
+  if (x == mask.pivot_xy && y == mask.pivot_xy && z == mask.pivot_z) return MaskVoxel::pivot;
+  if (mask.is_counted(x, y, z))
+    return mask.is_solid(x, y, z) ? MaskVoxel::solid : MaskVoxel::void_space;
+  return mask.is_solid(x, y, z) ? MaskVoxel::solid_not_counted : MaskVoxel::void_not_counted;
+}
+
+constexpr double square_share = 0.94;  // of a voxel's side: lines show between them
+constexpr double offset_share = 0.1;   // of the mask's side: measures lie as far outside
+
+// A place in the mask by the two directions of a section.
+using PlaceInMask = std::function<Eigen::Vector3i(int, int)>;
+
+Eigen::Vector3d center_of(const GripperMask& mask, const Eigen::Vector3i& voxel) {
+  return mask.voxel_size_m *
+         (voxel - Eigen::Vector3i(mask.pivot_xy, mask.pivot_xy, mask.pivot_z)).cast<double>();
+}
+
+libmap::Scene scene_of(const GripperMask& mask, const PlaceInMask& place, int width, int height) {
+  libmap::Scene scene;
+  for (const KindLook& look : looks) {
+    libmap::PointCloud cloud;
+    for (int u = 0; u < width; ++u)
+      for (int v = 0; v < height; ++v) {
+        const Eigen::Vector3i at = place(u, v);
+        if (kind_of(mask, at) == look.kind) cloud.positions.push_back(center_of(mask, at));
+      }
+    if (cloud.empty()) continue;
+    libmap::SceneLayer layer;
+    layer.coloring.mode = libmap::ColorMode::single;
+    layer.coloring.color =
+        fmt::format("#{:02x}{:02x}{:02x}", look.color[0], look.color[1], look.color[2]);
+    layer.shape = std::move(cloud);
+    layer.point_shape = libmap::PointShape::square;
+    layer.shading = libmap::Shading::none;
+    layer.point_size_m = square_share * mask.voxel_size_m;
+    scene.layers.push_back(std::move(layer));
+  }
+  return scene;
+}
+
+// A measure along a direction of the section, over `count` voxels from `first` on, moved aside.
+libmap::DimensionLine measure(const GripperMask& mask, const Eigen::Vector3i& first,
+                              const Eigen::Vector3i& along, int count, const Eigen::Vector3d& aside,
+                              const std::string& name) {
+  const Eigen::Vector3d start =
+      center_of(mask, first) - 0.5 * mask.voxel_size_m * along.cast<double>() + aside;
+  const double length_m = count * mask.voxel_size_m;
+  return {start, start + length_m * along.cast<double>(),
+          fmt::format("{}{}{:.4g} mm", name, name.empty() ? "" : " ", 1000.0 * length_m)};
+}
+
+// The voxels with the pivot's column among them, along x through the axis, that are all solid or
+// all void: first and number.
+std::pair<int, int> run_through_axis(const GripperMask& mask, int z) {
+  const int y = mask.pivot_xy;
+  const bool solid = mask.is_solid(mask.pivot_xy, y, z);
+  int first = mask.pivot_xy;
+  int last = first;
+  while (first > 0 && mask.is_solid(first - 1, y, z) == solid) --first;
+  while (last + 1 < mask.side && mask.is_solid(last + 1, y, z) == solid) ++last;
+  return {first, last - first + 1};
+}
+
+libmap::SheetCell cell_of(std::string caption, libmap::Scene scene, libmap::Viewpoint view) {
+  libmap::SheetCell cell;
+  cell.caption = std::move(caption);
+  cell.scene = [scene = std::move(scene)] { return scene; };
+  cell.view = view;
+  return cell;
+}
+
+libmap::SheetCell vertical(const GripperMask& mask) {
+  const int y = mask.pivot_xy;
+  libmap::Scene scene = scene_of(
+      mask, [y](int x, int z) { return Eigen::Vector3i(x, y, z); }, mask.side, mask.layers);
+  const double aside = (offset_share * mask.side + 0.5) * mask.voxel_size_m;
+  const Eigen::Vector3i x_axis = Eigen::Vector3i::UnitX();
+  const Eigen::Vector3i z_axis = Eigen::Vector3i::UnitZ();
+  scene.dimension_lines.push_back(
+      measure(mask, {0, y, 0}, x_axis, mask.side, -aside * Eigen::Vector3d::UnitZ(), ""));
+  const Eigen::Vector3d right = aside * Eigen::Vector3d::UnitX();
+  scene.dimension_lines.push_back(
+      measure(mask, {mask.side - 1, y, 0}, z_axis, mask.solid_layers, right, ""));
+  if (mask.layers > mask.solid_layers)
+    scene.dimension_lines.push_back(measure(mask, {mask.side - 1, y, mask.solid_layers}, z_axis,
+                                            mask.layers - mask.solid_layers, right, "+"));
+  // Room for the texts beside the lines that stand: nothing is drawn of a line without length.
+  const Eigen::Vector3d corner = center_of(mask, {mask.side - 1, y, 0}) + 3.0 * right;
+  scene.dimension_lines.push_back({corner, corner, ""});
+  return cell_of("x-z through the pivot", std::move(scene), libmap::Viewpoint::front);
+}
+
+libmap::SheetCell horizontal(const GripperMask& mask, int z, const std::string& name) {
+  libmap::Scene scene = scene_of(
+      mask, [z](int x, int y) { return Eigen::Vector3i(x, y, z); }, mask.side, mask.side);
+  const double aside = (offset_share * mask.side + 0.5) * mask.voxel_size_m;
+  const Eigen::Vector3i x_axis = Eigen::Vector3i::UnitX();
+  const auto [first, count] = run_through_axis(mask, z);
+  scene.dimension_lines.push_back(
+      measure(mask, {first, 0, z}, x_axis, count, -aside * Eigen::Vector3d::UnitY(),
+              mask.is_solid(mask.pivot_xy, mask.pivot_xy, z) ? "solid" : "void"));
+  return cell_of(fmt::format("x-y, {} (z = {:+.4g} mm)", name,
+                             1000.0 * mask.voxel_size_m * (z - mask.pivot_z)),
+                 std::move(scene), libmap::Viewpoint::top);
+}
+
+// The mask cut in three, as the thesis draws it (figures 3-11 and 5-1): the vertical section
+// through the pivot (x to the right, z up), the horizontal ones of the top solid layer and of
+// `lower_layer` (x to the right, y up), one square per voxel at its place from the pivot, with
+// measures in millimeters as they are in voxels.
+std::vector<libmap::SheetCell> mask_sections(const GripperMask& mask, int lower_layer) {
+  if (lower_layer < 0 || lower_layer >= mask.layers)
+    throw libmap::Error("the mask has no such layer",
+                        {.field = "section_layer",
+                         .value = std::to_string(lower_layer),
+                         .bound = ">= 0 and <= " + std::to_string(mask.layers - 1)});
+  return {vertical(mask), horizontal(mask, mask.solid_layers - 1, "top solid layer"),
+          horizontal(mask, lower_layer,
+                     lower_layer == 0 ? "lowest layer" : fmt::format("layer {}", lower_layer))};
+}
+
+// Of the kinds of voxels that the mask has.
+libmap::Legend mask_legend(const GripperMask& mask) {
+  libmap::Legend legend;
+  legend.title = "voxels";
+  std::set<MaskVoxel> kinds;
+  for (int x = 0; x < mask.side; ++x)
+    for (int y = 0; y < mask.side; ++y)
+      for (int z = 0; z < mask.layers; ++z) kinds.insert(kind_of(mask, {x, y, z}));
+  for (const KindLook& look : looks)
+    if (kinds.contains(look.kind)) legend.entries.push_back({look.color, look.text});
+  return legend;
 }
 
 std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
@@ -56,9 +210,8 @@ std::string to_sections(const GripperMask& mask, const MaskOptions& options) {
   sheet.title = fmt::format("{}: {} x {} x {} voxels", title_of(mask, options), mask.side,
                             mask.side, mask.layers);
   sheet.background = "white";
-  sheet.legends = {graspmap_tools::mask_legend(mask)};
-  return libmap::to_png(
-      libmap::draw_sheet(graspmap_tools::mask_sections(mask, options.section_layer), sheet));
+  sheet.legends = {mask_legend(mask)};
+  return libmap::to_png(libmap::draw_sheet(mask_sections(mask, options.section_layer), sheet));
 }
 
 std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
@@ -77,34 +230,21 @@ std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
   return libmap::to_png(libmap::render_scene(scene, view));
 }
 
-// Options of another output than the one that is asked for.
-void refuse_ignored(const MaskOptions& options, const std::string& extension) {
-  const MaskOptions unset;
-  const auto refuse = [](const char* name, const std::string& reason) {
-    throw libmap::Error(reason, {.file = {}, .field = name});
-  };
-  if (!options.sections && options.section_layer != unset.section_layer)
-    refuse("--section-layer", "is for --sections");
-  if (!options.sections && options.cell_width_px != unset.cell_width_px)
-    refuse("--cell-width", "is for --sections");
-  if (options.view != unset.view && (options.sections || extension != ".png"))
-    refuse("--view", "is for a picture (.png) without --sections");
-}
-
 void mask(const MaskOptions& options, Run& run) {
   const std::string extension = std::filesystem::path(options.output).extension().string();
   if (extension != ".txt" && extension != ".png") libmap::require_cloud_format(options.output);
   if (options.sections && extension != ".png")
     throw libmap::Error("sections are drawn as .png", {.file = options.output});
-  refuse_ignored(options, extension);
+  if (!options.sections) refuse_set(options, bind_sections, "is for --sections");
+  if (options.view != MaskOptions{}.view && (options.sections || extension != ".png"))
+    throw libmap::Error("is for a picture (.png) without --sections", {.field = "--view"});
   run.claim_output(options.output);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
   const GripperMask made = libgtd::make_gripper_mask(gripper, options.mask);
   run.add_input(file);
   run.manifest().frame = "mask";
-  run.manifest().results.emplace_back("side_voxels", static_cast<std::int64_t>(made.side));
-  run.manifest().results.emplace_back("layers", static_cast<std::int64_t>(made.layers));
+  run.add_results({{"side_voxels", made.side}, {"layers", made.layers}});
   run.write_output(options.output, [&](const auto& temporary) {
     if (extension == ".txt")
       libmap::write_text(temporary, to_text(made));
@@ -113,14 +253,14 @@ void mask(const MaskOptions& options, Run& run) {
     else
       libmap::write_cloud(temporary, to_cloud(made));
   });
-  run.say(fmt::format("{} x {} x {} voxels", made.side, made.side, made.layers));
+  run.say("{} x {} x {} voxels", made.side, made.side, made.layers);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   MaskOptions options;
-  graspmap_tools::Command command("mask");
+  Command command("mask");
   command.output(options.output,
                  "layers as text (.txt), solid voxels as a cloud (.vtp .pcd .ply .csv), or .png");
   bind(command.parameters(), options);

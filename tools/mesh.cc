@@ -1,18 +1,9 @@
 // graspmap mesh: a cloud of points -> a clean surface.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cstdint>
 #include <iostream>
 #include <nlohmann/json.hpp>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/normals.h"
-#include "libmap/core/error.h"
-#include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
@@ -21,9 +12,10 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 
+using namespace graspmap_tools;
+
 namespace {
 
-using graspmap_tools::Run;
 using Json = nlohmann::ordered_json;
 
 // Whose normals the surface is made from.
@@ -41,13 +33,12 @@ struct MeshOptions {
 };
 
 void bind(libmap::ParameterTable& table, MeshOptions& options) {
-  table.add(
-      "normals", options.normals,
-      {{"auto", NormalSource::automatic},
-       {"cloud", NormalSource::cloud},
-       {"estimate", NormalSource::estimate}},
-      "auto: the cloud's, estimated if it has none; cloud: an error if it has none; estimate: "
-      "always estimated");
+  table.add("normals", options.normals,
+            {{"auto", NormalSource::automatic},
+             {"cloud", NormalSource::cloud},
+             {"estimate", NormalSource::estimate}},
+            "auto: the cloud's, estimated if it has none; cloud: an error if it has none; "
+            "estimate: always estimated");
   libmap::bind(table, options.estimation);
   libmap::bind(table, options.reconstruction);
   libmap::bind(table, options.cleaning);
@@ -56,8 +47,7 @@ void bind(libmap::ParameterTable& table, MeshOptions& options) {
 libmap::PointCloud read_points(const std::string& file, Run& run) {
   libmap::CloudReadResult read = libmap::read_cloud(file);
   if (read.dropped_points > 0)
-    run.warn(fmt::format("{}: {} points without a finite position are left out", file,
-                         read.dropped_points));
+    run.warn("{}: {} points without a finite position are left out", file, read.dropped_points);
   if (read.cloud.empty()) throw libmap::Error("the cloud has no points", {.file = file});
   return std::move(read.cloud);
 }
@@ -69,8 +59,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
   if (options.normals != NormalSource::estimate && cloud.has_normals()) {
     if (has_any) return;
     throw libmap::Error(
-        "none of the cloud's normals says a direction; --normals estimate makes "
-        "others",
+        "none of the cloud's normals says a direction; --normals estimate makes others",
         {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
   }
   if (options.normals == NormalSource::cloud)
@@ -82,33 +71,9 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
       run.timed("normals", [&] { return libmap::estimate_normals(cloud, options.estimation); });
   cloud.normals = estimated.normals;
   const std::string way(to_text(estimated.orientation));
-  run.say(fmt::format(
-      "normals estimated{}, their sides chosen by {}",
-      options.normals == NormalSource::automatic ? ", since the cloud has none" : "", way));
-  run.manifest().results.emplace_back("normals_oriented_by", way);
-  run.manifest().results.emplace_back("normals_undefined",
-                                      static_cast<std::int64_t>(estimated.undefined));
-}
-
-class Results {
- public:
-  explicit Results(libmap::Manifest& manifest) : manifest_(manifest) {}
-  void count(const char* name, std::size_t value) {
-    manifest_.results.emplace_back(name, static_cast<std::int64_t>(value));
-  }
-  void number(const char* name, double value) { manifest_.results.emplace_back(name, value); }
-  void yes_or_no(const char* name, bool value) { manifest_.results.emplace_back(name, value); }
-
- private:
-  libmap::Manifest& manifest_;
-};
-
-void add_timings(const std::string& stage,
-                 const std::vector<std::pair<std::string, double>>& timings_s, Run& run) {
-  for (const auto& [name, seconds] : timings_s) {
-    run.manifest().timings_s.emplace_back(fmt::format("{}: {}", stage, name), seconds);
-    run.detail(fmt::format("{}: {}: {:.3f} s", stage, name, seconds));
-  }
+  run.say("normals estimated{}, their sides chosen by {}",
+          options.normals == NormalSource::automatic ? ", since the cloud has none" : "", way);
+  run.add_results({{"normals_oriented_by", way}, {"normals_undefined", estimated.undefined}});
 }
 
 libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::PointCloud& cloud,
@@ -116,19 +81,17 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
   libmap::PoissonReconstructionResult made =
       libmap::reconstruct_surface(cloud, options.reconstruction, run.progress());
   if (made.dropped_points > 0)
-    run.warn(fmt::format("{} of {} points have no normal and are left out", made.dropped_points,
-                         cloud.size()));
-  Results results(run.manifest());
-  results.count("points", cloud.size());
-  results.count("dropped_points", made.dropped_points);
-  results.number("cell_size_m", made.cell_size_m);
-  results.number("spacing_m", made.spacing_m);
-  results.count("samples", made.samples);
-  results.count("octree_depth", static_cast<std::size_t>(made.octree_depth));
-  results.count("trimmed_triangles", made.trimmed_triangles);
-  add_timings("reconstruction", made.timings_s, run);
-  run.say(fmt::format("{} points, cells of {:.4g} m -> {} triangles", cloud.size(),
-                      made.cell_size_m, made.mesh.triangles.size()));
+    run.warn("{} of {} points have no normal and are left out", made.dropped_points, cloud.size());
+  run.add_results({{"points", cloud.size()},
+                   {"dropped_points", made.dropped_points},
+                   {"cell_size_m", made.cell_size_m},
+                   {"spacing_m", made.spacing_m},
+                   {"samples", made.samples},
+                   {"octree_depth", made.octree_depth},
+                   {"trimmed_triangles", made.trimmed_triangles}});
+  run.add_timings(made.timings_s, "reconstruction");
+  run.say("{} points, cells of {:.4g} m -> {} triangles", cloud.size(), made.cell_size_m,
+          made.mesh.triangles.size());
   if (!made.mesh.triangles.empty()) return std::move(made.mesh);
   if (made.trimmed_triangles == 0)
     throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
@@ -142,53 +105,51 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
 libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleMesh& mesh,
                              Run& run) {
   libmap::MeshCleaningResult made = libmap::clean_mesh(mesh, options.cleaning, run.progress());
-  Results results(run.manifest());
-  results.count("cut_edges", made.cut_edges);
-  results.count("split_vertices", made.split_vertices);
-  results.count("degenerate_triangles", made.degenerate_triangles);
-  results.count("islands", made.islands);
-  results.number("island_area_m2", made.island_area_m2);
-  results.count("intersecting_triangles", made.intersecting_triangles);
-  results.count("remaining_intersecting_triangles", made.remaining_intersecting_triangles);
-  results.count("filled_holes", made.filling.holes);
-  results.count("filled_triangles", made.filling.triangles);
-  results.number("filled_area_m2", made.filling.area_m2);
-  results.count("unfilled_holes", made.filling.unfilled);
-  results.count("decimated_triangles", made.decimation.removed_triangles);
-  results.count("vertices", made.mesh.vertices.size());
-  results.count("triangles", made.mesh.triangles.size());
-  results.number("area_m2", libmap::surface_area(made.mesh));
-  add_timings("cleaning", made.timings_s, run);
-  run.say(fmt::format("{} islands dropped, {} holes filled -> {} triangles", made.islands,
-                      made.filling.holes, made.mesh.triangles.size()));
+  run.add_results({{"cut_edges", made.cut_edges},
+                   {"split_vertices", made.split_vertices},
+                   {"degenerate_triangles", made.degenerate_triangles},
+                   {"islands", made.islands},
+                   {"island_area_m2", made.island_area_m2},
+                   {"intersecting_triangles", made.intersecting_triangles},
+                   {"remaining_intersecting_triangles", made.remaining_intersecting_triangles},
+                   {"filled_holes", made.filling.holes},
+                   {"filled_triangles", made.filling.triangles},
+                   {"filled_area_m2", made.filling.area_m2},
+                   {"unfilled_holes", made.filling.unfilled},
+                   {"decimated_triangles", made.decimation.removed_triangles},
+                   {"vertices", made.mesh.vertices.size()},
+                   {"triangles", made.mesh.triangles.size()},
+                   {"area_m2", libmap::surface_area(made.mesh)}});
+  run.add_timings(made.timings_s, "cleaning");
+  run.say("{} islands dropped, {} holes filled -> {} triangles", made.islands, made.filling.holes,
+          made.mesh.triangles.size());
   return std::move(made.mesh);
 }
 
-Json quality(const libmap::PointCloud& cloud, const libmap::TriangleMesh& mesh) {
+Results quality(const libmap::PointCloud& cloud, const libmap::TriangleMesh& mesh) {
   const libmap::MeshReport report = libmap::report_mesh(mesh);
   const auto distances =
       libmap::distance_statistics(libmap::distances_to_surface(cloud.positions, mesh));
   std::vector<double> boundaries;
   for (const libmap::MeshBoundary& boundary : report.boundaries)
     boundaries.push_back(boundary.length_m);
-  Json json = {{"watertight", report.is_watertight()},
-               {"manifold", report.is_manifold()},
-               {"oriented", report.is_oriented()},
-               {"components", report.components},
-               {"genus", report.genus},
-               {"boundaries", boundaries.size()},
-               {"boundary_lengths_m", boundaries},
-               {"area_m2", report.area_m2},
-               {"non_manifold_edges", report.non_manifold_edges},
-               {"non_manifold_vertices", report.non_manifold_vertices},
-               {"self_intersections", report.self_intersections},
-               {"median_edge_m", report.edge_lengths.median_m},
-               {"cloud_to_mesh_rmse_m", distances.rmse_m},
-               {"cloud_to_mesh_mean_m", distances.mean_m},
-               {"cloud_to_mesh_median_m", distances.median_m},
-               {"cloud_to_mesh_p95_m", distances.p95_m},
-               {"cloud_to_mesh_max_m", distances.max_m}};
-  return json;
+  return {{"watertight", report.is_watertight()},
+          {"manifold", report.is_manifold()},
+          {"oriented", report.is_oriented()},
+          {"components", report.components},
+          {"genus", report.genus},
+          {"boundaries", boundaries.size()},
+          {"boundary_lengths_m", boundaries},
+          {"area_m2", report.area_m2},
+          {"non_manifold_edges", report.non_manifold_edges},
+          {"non_manifold_vertices", report.non_manifold_vertices},
+          {"self_intersections", report.self_intersections},
+          {"median_edge_m", report.edge_lengths.median_m},
+          {"cloud_to_mesh_rmse_m", distances.rmse_m},
+          {"cloud_to_mesh_mean_m", distances.mean_m},
+          {"cloud_to_mesh_median_m", distances.median_m},
+          {"cloud_to_mesh_p95_m", distances.p95_m},
+          {"cloud_to_mesh_max_m", distances.max_m}};
 }
 
 void print_text(const Json& quality) {
@@ -208,24 +169,13 @@ void print_text(const Json& quality) {
 
 void report(const MeshOptions& options, const libmap::PointCloud& cloud,
             const libmap::TriangleMesh& mesh, Run& run) {
-  const Json found = run.timed("report", [&] { return quality(cloud, mesh); });
-  for (const auto& [key, value] : found.items()) {
-    libmap::ManifestValue kept;
-    if (value.is_boolean())
-      kept = value.get<bool>();
-    else if (value.is_array())
-      kept = value.get<std::vector<double>>();
-    else if (value.is_number_float())
-      kept = value.get<double>();
-    else
-      kept = value.get<std::int64_t>();
-    if (run.manifest().find_result(key) == nullptr)
-      run.manifest().results.emplace_back(key, std::move(kept));
-  }
+  const Results found = run.timed("report", [&] { return quality(cloud, mesh); });
+  for (const Result& one : found)
+    if (run.manifest().find_result(one.name) == nullptr) run.add_results({one});
   if (options.json)
-    std::cout << found.dump(2) << "\n";
+    print_json(to_json(found));
   else
-    print_text(found);
+    print_text(to_json(found));
 }
 
 void mesh(const MeshOptions& options, Run& run) {
@@ -233,18 +183,13 @@ void mesh(const MeshOptions& options, Run& run) {
   run.claim_output(options.output, {options.cloud});
   libmap::PointCloud cloud = run.timed("read", [&] { return read_points(options.cloud, run); });
   libmap::TriangleMesh surface;
-  try {
+  in_file(options.cloud, [&] {
     prepare_normals(options, cloud, run);
-    surface = reconstructed(options, cloud, run);
-    surface = cleaned(options, surface, run);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.cloud);
-  }
+    surface = cleaned(options, reconstructed(options, cloud, run), run);
+  });
   if (options.report || options.json) report(options, cloud, surface, run);
   run.add_input(options.cloud);
-  if (const auto source = libmap::read_manifest_of(options.cloud))
-    run.manifest().frame = source->frame;
-  graspmap_tools::carry_transforms(options.cloud, run);
+  carry_frame(options.cloud, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
@@ -253,7 +198,7 @@ void mesh(const MeshOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   MeshOptions options;
-  graspmap_tools::Command command("mesh");
+  Command command("mesh");
   command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv)");
   command.output(options.output, "mesh (.ply, .vtp, .obj, .stl, .off, .glb)");
   command.flag("--report", options.report,

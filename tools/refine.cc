@@ -1,27 +1,18 @@
 // graspmap refine: poses of a scan by loop closures, pose graph, bundle adjustment and depth.
-#include <fmt/format.h>
-
-#include <filesystem>
-#include <map>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/refine/refinement.h"
+#include "libmap/scan/colmap_builder.h"
+#include "libmap/scan/picture_file.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
-#include "tools/support/poses_output.h"
 #include "tools/support/refine_report.h"
-#include "tools/support/result_counts.h"
 #include "tools/support/scan_poses.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 
 struct RefineOptions {
   std::string scan;
@@ -53,43 +44,95 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
     text += fmt::format("; error {:.2f} mm, {:.3f} deg", 1e3 * stage.error->absolute.rmse_m,
                         stage.error->absolute.mean_rotation_deg);
   run.say(text);
-  run.detail(fmt::format("{}: {:.2f} s", stage.name, stage.seconds));
+  run.detail("{}: {:.2f} s", stage.name, stage.seconds);
   if (stage.rejected_error)
-    run.detail(fmt::format("  given up: {:.2f} mm, {:.3f} deg",
-                           1e3 * stage.rejected_error->absolute.rmse_m,
-                           stage.rejected_error->absolute.mean_rotation_deg));
-  for (const auto& [name, value] : stage.figures)
-    run.detail(fmt::format("  {} {:.6g}", name, value));
+    run.detail("  given up: {:.2f} mm, {:.3f} deg", 1e3 * stage.rejected_error->absolute.rmse_m,
+               stage.rejected_error->absolute.mean_rotation_deg);
+  for (const auto& [name, value] : stage.figures) run.detail("  {} {:.6g}", name, value);
   for (const auto& [name, group] : stage.groups)
     run.detail(
-        fmt::format("  {}: {} links, {} rejected, deviations x {:.3g} and x {:.3g}, rms "
-                    "{:.2f} mm {:.3f} deg",
-                    name, group.links, group.rejected, group.translation_scale,
-                    group.rotation_scale, 1e3 * group.translation_rms_m, group.rotation_rms_deg));
+        "  {}: {} links, {} rejected, deviations x {:.3g} and x {:.3g}, rms {:.2f} mm {:.3f} deg",
+        name, group.links, group.rejected, group.translation_scale, group.rotation_scale,
+        1e3 * group.translation_rms_m, group.rotation_rms_deg);
 }
 
-void add_results(const libmap::RefinementResult& result, libmap::Manifest& manifest) {
-  const graspmap_tools::ResultCounts count(manifest);
-  count("poses", result.poses.size());
-  count("links", result.links.size());
-  count("closures_found", result.closures.size());
-  count("parts", result.components.size());
-  count("nodes_without_pose", result.without_pose.size());
-  count("nodes_without_links", result.without_links.size());
-  count("frames_skipped", result.skipped.size());
-  count("features", result.features);
-  std::size_t rejected = 0;
-  for (const libmap::StageReport& stage : result.stages) rejected += stage.rejected ? 1 : 0;
-  count("stages_undone", rejected);
+void add_results(const libmap::RefinementResult& result, Run& run) {
+  run.add_results(
+      {{"poses", result.poses.size()},
+       {"links", result.links.size()},
+       {"closures_found", result.closures.size()},
+       {"parts", result.components.size()},
+       {"nodes_without_pose", result.without_pose.size()},
+       {"nodes_without_links", result.without_links.size()},
+       {"frames_skipped", result.skipped.size()},
+       {"features", result.features},
+       {"stages_undone", std::count_if(result.stages.begin(), result.stages.end(),
+                                       [](const auto& stage) { return stage.rejected; })}});
   for (const libmap::StageReport& stage : result.stages) {
-    manifest.timings_s.emplace_back(stage.name, stage.seconds);
-    manifest.timings_s.emplace_back(stage.name + ", processor", stage.processor_seconds);
+    run.manifest().timings_s.emplace_back(stage.name, stage.seconds);
+    run.manifest().timings_s.emplace_back(stage.name + ", processor", stage.processor_seconds);
   }
-  if (result.stages.back().error) {
-    manifest.results.emplace_back("trajectory_rmse_m", result.stages.back().error->absolute.rmse_m);
-    manifest.results.emplace_back("trajectory_rotation_error_deg",
-                                  result.stages.back().error->absolute.mean_rotation_deg);
+  if (const auto& error = result.stages.back().error)
+    run.add_results({{"trajectory_rmse_m", error->absolute.rmse_m},
+                     {"trajectory_rotation_error_deg", error->absolute.mean_rotation_deg}});
+}
+
+const std::vector<std::string> model_names = {"cameras.txt", "images.txt", "points3D.txt"};
+
+bool is_model(const std::string& path) { return fs::path(path).extension() == ".colmap"; }
+
+libmap::ColmapModel model_of(const libmap::Trajectory& poses, const libmap::ScanSource& scan,
+                             Run& run) {
+  libmap::ColmapBuilder builder;
+  for (const libmap::TrajectoryPose& pose : poses) {
+    try {
+      const std::vector<libmap::CameraView> views =
+          libmap::read_pictures(scan, pose.node, {.color = true, .depth = false});
+      for (std::size_t c = 0; c < views.size(); ++c)
+        builder.add_image(libmap::picture_file(scan, pose.node, views, c).name, views[c],
+                          pose.world_from_base * views[c].color_camera.base_from_camera);
+    } catch (const libmap::Error& error) {
+      run.warn(std::string(error.what()) + "; its pose is not in the model of COLMAP");
+    }
   }
+  return builder.model();
+}
+
+void warn_of_lost_nodes(const std::string& path, const libmap::Trajectory& poses,
+                        const libmap::PoseGraph& graph, Run& run) {
+  const std::size_t nodes = count_valid_nodes(graph);
+  if (fs::path(path).extension() != ".kitti" || poses.size() == nodes) return;
+  run.warn(
+      "{}: its lines name no nodes, and {} of {} nodes have a pose: only a file .tum, .g2o or "
+      ".toro can be bound to the scan again",
+      path, poses.size(), nodes);
+}
+
+// In the format that the name says: .tum, .kitti, .g2o, .toro, or NAME.colmap, a folder with a
+// model of COLMAP that has no points. Before the work.
+void claim_poses_output(const std::string& path, const std::vector<std::string>& inputs, Run& run) {
+  if (is_model(path)) return run.claim_output_tree(path, model_names, inputs);
+  if (!libmap::is_trajectory_path(path))
+    throw libmap::Error("unknown format of poses",
+                        {.file = path,
+                         .field = "extension",
+                         .value = fs::path(path).extension().string(),
+                         .bound = "one of .tum .kitti .g2o .toro .colmap"});
+  run.claim_output(path, inputs);
+}
+
+// A model of COLMAP has the scan's calibrations and names its images as `convert --colmap` does;
+// frames without a photograph or a calibration are left out with a warning.
+void write_poses_output(const std::string& path, const libmap::TrajectoryFile& poses,
+                        const libmap::ScanSource& scan, bool nodes, Run& run) {
+  if (is_model(path))
+    return run.write_output_tree(path, model_names, [&](const fs::path& folder) {
+      const libmap::ColmapModel model = model_of(poses.poses, scan, run);
+      if (!folder.empty()) libmap::write_colmap_model(folder, model);
+    });
+  warn_of_lost_nodes(path, poses.poses, scan.graph(), run);
+  run.write_output(
+      path, [&](const auto& temporary) { libmap::write_trajectory(temporary, poses, nodes); });
 }
 
 void write_outputs(const RefineOptions& options, const libmap::RefinementResult& result,
@@ -103,17 +146,14 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
       libmap::copy_with_optimized_poses(options.scan, temporary, poses, result.closures);
     });
   for (const std::string& report : options.reports)
-    run.write_output(report, [&](const auto& temporary) {
-      libmap::write_text(temporary, fs::path(report).extension() == ".txt"
-                                        ? graspmap_tools::refinement_text(options.scan, result)
-                                        : graspmap_tools::refinement_json(options.scan, result));
-    });
+    run.write_text(report, fs::path(report).extension() == ".txt"
+                               ? refinement_text(options.scan, result)
+                               : refinement_json(options.scan, result));
   if (!options.links.empty())
     run.write_output(options.links, [&](const auto& temporary) {
       libmap::write_trajectory(temporary, {result.poses, result.links});
     });
-  graspmap_tools::write_poses_output(options.output, {result.poses, result.links}, scan,
-                                     options.nodes, run);
+  write_poses_output(options.output, {result.poses, result.links}, scan, options.nodes, run);
 }
 
 // Beside the output, unless another folder or none is asked for.
@@ -124,19 +164,17 @@ libmap::FeatureCache feature_cache_of(const RefineOptions& options, const Run& r
 }
 
 void refine(const RefineOptions& options, Run& run) {
-  graspmap_tools::claim_poses_output(options.output, {options.scan}, run);
+  claim_poses_output(options.output, {options.scan}, run);
   if (!options.links.empty()) {
     if (fs::path(options.links).extension() != ".g2o")
-      throw libmap::Error(
-          "unknown format of links",
-          {.file = {}, .field = "--links", .value = options.links, .bound = "a file .g2o"});
+      throw libmap::Error("unknown format of links",
+                          {.field = "--links", .value = options.links, .bound = "a file .g2o"});
     run.claim_output(options.links, {options.scan});
   }
   if (!options.database.empty()) {
     if (fs::is_directory(options.scan))
       throw libmap::Error("a copy of a database, which the scan is not",
-                          {.file = {},
-                           .field = "--write-database",
+                          {.field = "--write-database",
                            .value = options.database,
                            .bound = "left out where SCAN is a folder"});
     run.claim_output(options.database, {options.scan});
@@ -144,28 +182,24 @@ void refine(const RefineOptions& options, Run& run) {
   for (const std::string& report : options.reports) {
     const fs::path extension = fs::path(report).extension();
     if (extension != ".json" && extension != ".txt")
-      throw libmap::Error(
-          "unknown format of reports",
-          {.file = {}, .field = "--report", .value = report, .bound = "a file .json or .txt"});
+      throw libmap::Error("unknown format of reports",
+                          {.field = "--report", .value = report, .bound = "a file .json or .txt"});
     run.claim_output(report, {options.scan});
   }
-  const auto scan = graspmap_tools::open_scan(options.scan, options.strict, run);
-  libmap::RefinementResult result;
-  try {
-    result = libmap::refine_poses(*scan, options.refinement, run.progress(),
-                                  feature_cache_of(options, run));
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.scan);
-  }
+  const auto scan = open_scan(options.scan, options.strict, run);
+  const libmap::RefinementResult result = in_file(options.scan, [&] {
+    return libmap::refine_poses(*scan, options.refinement, run.progress(),
+                                feature_cache_of(options, run));
+  });
   for (const auto& [node, fault] : result.skipped)
-    run.warn(fmt::format("no features: node {}: {}", node, fault.what()));
+    run.warn("no features: node {}: {}", node, fault.what());
   for (const std::string& warning : result.warnings) run.warn(options.scan + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
-  run.say(fmt::format("{} poses, {} links, of which {} were found", result.poses.size(),
-                      result.links.size(), result.closures.size()));
+  run.say("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
+          result.closures.size());
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   run.manifest().frame = "poses";
-  add_results(result, run.manifest());
+  add_results(result, run);
   write_outputs(options, result, *scan, run);
 }
 
@@ -173,7 +207,7 @@ void refine(const RefineOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   RefineOptions options;
-  graspmap_tools::Command command("refine");
+  Command command("refine");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
   command.option("--links", "LINKS.g2o", options.links, "poses and links as a pose graph");
@@ -189,7 +223,7 @@ int main(int argc, char** argv) {
                            "what the scan's file lacks is an error, not a warning");
   return command.run(argc, argv, [&](Run& run) {
     // Of a folder .colmap, beside which other files lie.
-    while (options.output.size() > 1 && options.output.ends_with('/')) options.output.pop_back();
+    options.output = without_trailing_slash(options.output);
     refine(options, run);
   });
 }

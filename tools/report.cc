@@ -1,28 +1,26 @@
 // graspmap report: one HTML file of a whole run.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <string>
 #include <system_error>
-#include <vector>
 
+#include "libgtd/evaluate/voxel_map.h"
+#include "libgtd/score/graspability_map.h"
+#include "libgtd/score/map_downsampling.h"
+#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/table.h"
 #include "libmap/report/found_outline.h"
 #include "libmap/report/outline_io.h"
 #include "libmap/report/report_page.h"
 #include "libmap/report/report_reader.h"
 #include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/report_map.h"
-#include "tools/support/result_counts.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 
 struct ReportCommandOptions {
   std::string folder;
@@ -61,8 +59,7 @@ std::size_t count_maps(const std::vector<libmap::OutlineSection>& sections) {
   return count;
 }
 
-std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::Outline& outline) {
-  const std::size_t maps = count_maps(outline.items) + count_maps(outline.sections);
+std::size_t cells_a_map(const ReportCommandOptions& options, std::size_t maps) {
   const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
   return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
@@ -86,8 +83,8 @@ libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_vi
     std::error_code code;
     if (!fs::is_regular_file(path, code))
       throw libmap::Error(
-          "no such file: install the Debian package libjs-three, or leave the 3-D "
-          "views out with --no-3d",
+          "no such file: install the Debian package libjs-three, or leave the 3-D views out with "
+          "--no-3d",
           {.file = path.string()});
     run.add_input(path);
     assets.libraries.push_back(libmap::read_whole_file(path));
@@ -109,6 +106,90 @@ libmap::Outline find_outline(const ReportCommandOptions& options, Run& run) {
   return outline;
 }
 
+struct DownsampledMap {
+  libmap::PointCloud points;  // in the terrain frame
+  std::uint64_t voxels = 0;   // of the whole map
+  libmap::MapViewOptions options;
+};
+
+std::optional<double> zero_plane_of(const libmap::Manifest& manifest) {
+  return libmap::number_of(manifest.find_parameter("zero_plane_m"));
+}
+
+// Of cubes, for a map of that many voxels if it is even ground.
+int first_width(std::uint64_t voxels, std::size_t max_cells) {
+  return std::max(
+      1, static_cast<int>(std::sqrt(static_cast<double>(voxels) / static_cast<double>(max_cells))));
+}
+
+DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
+  const auto manifest = libmap::read_manifest_of(path);
+  const libmap::PointCloud whole =
+      libmap::transform_cloud(libmap::read_cloud(path).cloud, terrain_from_map(manifest));
+  DownsampledMap map;
+  map.voxels = whole.size();
+  const auto lattice = manifest ? libgtd::facts_of(*manifest).lattice : std::nullopt;
+  if (lattice)
+    map.options.lattice = {lattice->voxel_size_m, lattice->origin_m};
+  else if (!whole.empty())
+    map.options.lattice = libmap::lattice_of(whole);
+  int& width = map.options.voxels_a_cell;
+  width = first_width(map.voxels, max_cells);
+  do {
+    map.points = width == 1 ? whole : libgtd::thin_map_in_cubes(whole, width);
+  } while (map.points.size() > max_cells && ++width > 0);
+  if (manifest) map.options.zero_plane_m = zero_plane_of(*manifest);
+  return map;
+}
+
+// The tiles' points that stay at that width.
+libmap::PointCloud thin_tiles(const MapTiles& tiles, int width) {
+  std::vector<libmap::PointCloud> parts(tiles.index().tiles.size());
+  libmap::parallel_each(parts.size(), [&](std::size_t n) {
+    parts[n] = libgtd::thin_map_in_cubes(tiles.load(n), width);
+  });
+  // Cubes that two tiles share have a point of each.
+  return libgtd::thin_map_in_cubes(libgtd::merge_map_clouds(parts), width);
+}
+
+// The same cells, but downsampled tile by tile: a store is never whole in memory.
+DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
+  const MapTiles tiles(path.string());
+  DownsampledMap map;
+  const auto& index = tiles.index();
+  map.voxels = index.voxels();
+  const std::optional<libmap::Manifest> manifest = index.manifest;
+  int& width = map.options.voxels_a_cell;
+  width = first_width(map.voxels, max_cells);
+  do {
+    map.points = thin_tiles(tiles, width);
+  } while (map.points.size() > max_cells && ++width > 0);
+  map.points = libmap::transform_cloud(map.points, terrain_from_map(manifest));
+  map.options.lattice = {index.lattice.voxel_size_m, index.lattice.origin_m};
+  map.options.zero_plane_m = zero_plane_of(index.manifest);
+  return map;
+}
+
+// A map or tile store, downsampled to at most `max_cells` cells, in its terrain frame. With
+// `lookup`, a CSV file as `lookup` writes it, the view has a marker for each of its rows.
+libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path>& lookup,
+                              std::size_t max_cells, Run& run) {
+  const bool store = is_tile_store(path.string());
+  const DownsampledMap map =
+      store ? read_store_map(path, max_cells) : read_cloud_map(path, max_cells);
+  libmap::MapView view = libmap::make_map_view(map.points, map.options);
+  view.voxels = map.voxels;
+  if (!lookup) return view;
+  const auto manifest = libmap::read_manifest_of(path);
+  const PointFrame frame =
+      frame_of_points(lookup->string(), PointFrame::automatic, path.string(), run);
+  const libmap::Pose terrain_from_points =
+      terrain_from_map(manifest) * map_from_points(path.string(), frame, run);
+  for (const Eigen::Vector3d& point : positions_of(libmap::read_csv(*lookup)))
+    view.markers.push_back({.label = {}, .point_in_terrain = terrain_from_points * point});
+  return view;
+}
+
 void make_report(ReportCommandOptions& options, Run& run) {
   std::error_code code;
   if (!fs::is_directory(options.folder, code))
@@ -120,43 +201,38 @@ void make_report(ReportCommandOptions& options, Run& run) {
     throw libmap::Error("reports are written as .html", {.file = options.output});
   run.claim_output(options.output);
   const libmap::Outline outline = find_outline(options, run);
-  const std::size_t max_cells = cells_a_map(options, outline);
-  const bool with_views = !options.no_views && max_cells > 0 &&
-                          count_maps(outline.items) + count_maps(outline.sections) > 0;
+  const std::size_t maps = count_maps(outline.items) + count_maps(outline.sections);
+  const std::size_t max_cells = cells_a_map(options, maps);
+  const bool with_views = !options.no_views && max_cells > 0 && maps > 0;
   const libmap::PageAssets assets = read_assets(options, with_views, run);
   const libmap::ReportReadResult read = run.timed("read", [&] {
-    return libmap::read_report_content(
-        outline, {.folder = options.folder, .left_out = options.output},
-        [&](const fs::path& map, const auto& lookup) {
-          return graspmap_tools::load_map_view(map, lookup, max_cells, run);
-        });
+    return libmap::read_report_content(outline,
+                                       {.folder = options.folder, .left_out = options.output},
+                                       [&](const fs::path& map, const auto& lookup) {
+                                         return load_map_view(map, lookup, max_cells, run);
+                                       });
   });
   const libmap::FittedPage page = run.timed("write page", [&] {
     return libmap::fit_report_page(read.content, assets,
                                    static_cast<std::size_t>(options.max_size_mb * 1e6));
   });
   for (const fs::path& file : read.files)
-    run.add_input(graspmap_tools::is_tile_store(file.string())
-                      ? graspmap_tools::store_index_path(file.string())
-                      : file);
-  const graspmap_tools::ResultCounts result(run.manifest());
-  result("files", read.files.size());
-  result("bytes", page.html.size());
-  result("pictures_made_smaller", page.changed_pictures);
-  run.say(fmt::format("{} files, {:.1f} MB{}", read.files.size(),
-                      static_cast<double>(page.html.size()) / 1e6,
-                      page.changed_pictures == 0
-                          ? ""
-                          : fmt::format(", {} pictures made smaller", page.changed_pictures)));
-  run.write_output(options.output,
-                   [&](const auto& temporary) { libmap::write_text(temporary, page.html); });
+    run.add_input(is_tile_store(file.string()) ? store_index_path(file.string()) : file);
+  run.add_results({{"files", read.files.size()},
+                   {"bytes", page.html.size()},
+                   {"pictures_made_smaller", page.changed_pictures}});
+  run.say("{} files, {:.1f} MB{}", read.files.size(), static_cast<double>(page.html.size()) / 1e6,
+          page.changed_pictures == 0
+              ? ""
+              : fmt::format(", {} pictures made smaller", page.changed_pictures));
+  run.write_text(options.output, page.html);
 }
 
 }  // namespace
 
 int main(int argc, char** argv) {
   ReportCommandOptions options;
-  graspmap_tools::Command command("report");
+  Command command("report");
   command.input("DIR", options.folder, "folder of the run");
   command.output(options.output, "report (.html); default: report.html in DIR", false);
   command.option("--outline", "OUTLINE", options.outline,

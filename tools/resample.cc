@@ -1,19 +1,13 @@
 // graspmap resample: Poisson-disk samples of a surface.
-#include <fmt/format.h>
-
-#include <cmath>
-#include <string>
-
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/poisson_disk.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 
-namespace {
+using namespace graspmap_tools;
 
-using graspmap_tools::Run;
+namespace {
 
 struct ResampleOptions {
   std::string mesh;
@@ -21,27 +15,20 @@ struct ResampleOptions {
   libmap::PoissonDiskOptions sampling;
 };
 
-void add_results(const libmap::PoissonDiskResult& result, libmap::Manifest& manifest) {
-  manifest.results.emplace_back("points", static_cast<std::int64_t>(result.cloud.size()));
-  manifest.results.emplace_back("area_m2", result.area_m2);
-  manifest.results.emplace_back("radius_m", result.radius_m);
-  manifest.results.emplace_back("smallest_distance_m", result.smallest_distance_m);
-  manifest.results.emplace_back("relative_radius", result.relative_radius);
-  manifest.results.emplace_back("radii_tried", static_cast<std::int64_t>(result.tries));
-  manifest.timings_s.insert(manifest.timings_s.end(), result.timings_s.begin(),
-                            result.timings_s.end());
-}
-
-void say_result(const libmap::PoissonDiskResult& result, std::uint64_t wanted, Run& run) {
-  for (const auto& [name, seconds] : result.timings_s)
-    run.detail(fmt::format("{}: {:.3f} s", name, seconds));
-  run.detail(fmt::format("radii tried: {}", result.tries));
-  run.say(fmt::format("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}",
-                      result.area_m2, result.cloud.size(), 1e3 * result.radius_m,
-                      result.relative_radius));
+void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted, Run& run) {
+  run.add_results({{"points", result.cloud.size()},
+                   {"area_m2", result.area_m2},
+                   {"radius_m", result.radius_m},
+                   {"smallest_distance_m", result.smallest_distance_m},
+                   {"relative_radius", result.relative_radius},
+                   {"radii_tried", result.tries}});
+  run.add_timings(result.timings_s);
+  run.detail("radii tried: {}", result.tries);
+  run.say("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,
+          result.cloud.size(), 1e3 * result.radius_m, result.relative_radius);
   if (!result.count_reached)
-    run.warn(fmt::format("no radius was found that yields {} points; {} are the nearest", wanted,
-                         result.cloud.size()));
+    run.warn("no radius was found that yields {} points; {} are the nearest", wanted,
+             result.cloud.size());
 }
 
 void resample(const ResampleOptions& options, Run& run) {
@@ -50,23 +37,15 @@ void resample(const ResampleOptions& options, Run& run) {
   const libmap::PoissonDiskOptions& sampling = options.sampling;
   if (sampling.count > 0 && sampling.radius_m != libmap::PoissonDiskOptions().radius_m)
     throw libmap::Error(
-        "the number of samples follows from their radius: one of --radius and "
-        "--count",
-        {.file = {}, .field = "count", .value = std::to_string(sampling.count), .bound = {}});
+        "the number of samples follows from their radius: one of --radius and --count",
+        {.field = "count", .value = std::to_string(sampling.count)});
   const libmap::TriangleMesh mesh =
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
   run.add_input(options.mesh);
-  libmap::PoissonDiskResult result;
-  try {
-    result = libmap::sample_poisson_disk(mesh, sampling, run.progress());
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.mesh);
-  }
-  if (const auto source = libmap::read_manifest_of(options.mesh))
-    run.manifest().frame = source->frame;
-  graspmap_tools::carry_transforms(options.mesh, run);
-  add_results(result, run.manifest());
-  say_result(result, sampling.count, run);
+  const libmap::PoissonDiskResult result = in_file(
+      options.mesh, [&] { return libmap::sample_poisson_disk(mesh, sampling, run.progress()); });
+  carry_frame(options.mesh, run);
+  tell_results(result, sampling.count, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, result.cloud); });
 }
@@ -75,7 +54,7 @@ void resample(const ResampleOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   ResampleOptions options;
-  graspmap_tools::Command command("resample");
+  Command command("resample");
   command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb)");
   command.output(options.output, "cloud with normals (.pcd, .ply, .vtp, .csv)");
   libmap::bind(command.parameters(), options.sampling);

@@ -1,5 +1,5 @@
 // graspmap simulate WHAT: terrains and recordings whose truth is known.
-#include "tools/support/simulate_commands.h"
+#include "tools/support/usages.h"
 
 #include <iostream>
 #include <string>

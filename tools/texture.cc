@@ -1,26 +1,17 @@
 // graspmap texture: a mesh and the photographs of a scan -> a textured mesh.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_model.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/result_counts.h"
 #include "tools/support/scan_poses.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 
 // Frame of the mesh: as its manifest says, that of the poses, or ground truth's.
 enum class MeshFrame { automatic, poses, ground_truth };
@@ -29,7 +20,7 @@ struct TextureCommandOptions {
   std::string mesh;
   std::string output;
   std::string scan;
-  graspmap_tools::PosesOption poses;
+  PosesOption poses;
   MeshFrame frame = MeshFrame::automatic;
   libmap::TextureOptions texture;
   libmap::TexturedMeshWriteOptions writing;
@@ -51,22 +42,21 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
 
 bool in_true_frame(const TextureCommandOptions& options) {
   if (options.frame != MeshFrame::automatic) return options.frame == MeshFrame::ground_truth;
-  return graspmap_tools::is_from_true_frame(options.mesh);
+  return is_from_true_frame(options.mesh);
 }
 
 // The poses in the frame of the mesh.
 libmap::Trajectory poses_of(TextureCommandOptions& options, const libmap::ScanSource& scan,
                             Run& run) {
-  libmap::Trajectory poses =
-      graspmap_tools::find_poses(scan, options.poses, options.texture.strict, run);
+  libmap::Trajectory poses = find_poses(scan, options.poses, options.texture.strict, run);
   libmap::Pose mesh_from_poses = libmap::Pose::Identity();
   const bool truth = in_true_frame(options);
-  if (truth) mesh_from_poses = graspmap_tools::truth_from_poses(scan, poses, options.poses, run);
+  if (truth) mesh_from_poses = truth_from_poses(scan, poses, options.poses, run);
   run.manifest().frame = truth ? "ground truth" : "poses";
-  if (const auto site_from_map = graspmap_tools::site_from_map_of(options.mesh)) {
+  if (const auto site_from_map = site_from_map_of(options.mesh)) {
     mesh_from_poses = *site_from_map * mesh_from_poses;
     run.manifest().frame = "site";
-    run.manifest().transforms.emplace_back(graspmap_tools::site_from_map_name, *site_from_map);
+    run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
     run.say("poses are carried into the site's frame");
   }
   for (libmap::TrajectoryPose& pose : poses)
@@ -78,69 +68,57 @@ libmap::TextureResult textured(const TextureCommandOptions& options, const libma
                                const libmap::Trajectory& poses, Run& run) {
   const libmap::TriangleMesh mesh =
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
-  try {
+  return in_file(options.mesh, [&] {
     return libmap::texture_mesh(mesh, scan, poses, options.texture, run.progress());
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.mesh);  // unless it names the scan
-  }
+  });
 }
 
-void add_results(const libmap::TextureResult& result, libmap::Manifest& manifest) {
-  const graspmap_tools::ResultCounts count(manifest);
-  const auto number = [&](const char* name, double value) {
-    manifest.results.emplace_back(name, value);
-  };
-  count("photographs", result.photos);
-  count("skipped_frames", result.skipped.size());
-  count("triangles", result.model.mesh.triangles.size());
-  count("triangles_by_cutting", result.cut_triangles);
-  count("seen_triangles", result.seen_triangles);
-  count("unseen_triangles", result.unseen_triangles);
-  number("seen_m2", result.seen_m2);
-  number("unseen_m2", result.unseen_m2);
-  count("charts", result.charts);
-  count("split_charts", result.split_charts);
-  count("shrunk_charts", result.shrunk_charts);
-  count("pages", result.model.pages.size());
-  number("texel_size_m", result.texel_size_m);
-  number("atlas_scale", result.atlas_scale);
-  number("seams_before_m", result.seams_before_m);
-  number("seams_m", result.seams_m);
-  number("color_spread_before", result.exposure.spread_before);
-  number("color_spread", result.exposure.spread);
+void add_results(const libmap::TextureResult& result, Run& run) {
   std::vector<double> gains;
   for (const Eigen::Vector3f& gain : result.exposure.gains)
     for (const float channel : gain) gains.push_back(static_cast<double>(channel));
-  manifest.results.emplace_back("exposure_gains", gains);
-  manifest.results.emplace_back(
-      "vignetting",
-      std::vector<double>(result.exposure.vignetting.begin(), result.exposure.vignetting.end()));
-  manifest.timings_s.insert(manifest.timings_s.end(), result.timings_s.begin(),
-                            result.timings_s.end());
+  run.add_results({{"photographs", result.photos},
+                   {"skipped_frames", result.skipped.size()},
+                   {"triangles", result.model.mesh.triangles.size()},
+                   {"triangles_by_cutting", result.cut_triangles},
+                   {"seen_triangles", result.seen_triangles},
+                   {"unseen_triangles", result.unseen_triangles},
+                   {"seen_m2", result.seen_m2},
+                   {"unseen_m2", result.unseen_m2},
+                   {"charts", result.charts},
+                   {"split_charts", result.split_charts},
+                   {"shrunk_charts", result.shrunk_charts},
+                   {"pages", result.model.pages.size()},
+                   {"texel_size_m", result.texel_size_m},
+                   {"atlas_scale", result.atlas_scale},
+                   {"seams_before_m", result.seams_before_m},
+                   {"seams_m", result.seams_m},
+                   {"color_spread_before", result.exposure.spread_before},
+                   {"color_spread", result.exposure.spread},
+                   {"exposure_gains", gains},
+                   {"vignetting", result.exposure.vignetting}});
 }
 
 void say_result(const libmap::TextureResult& result, Run& run) {
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
-  for (const auto& [name, seconds] : result.timings_s)
-    run.detail(fmt::format("{}: {:.3f} s", name, seconds));
-  run.say(fmt::format(
+  run.add_timings(result.timings_s);
+  run.say(
       "{} photographs, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) "
       "are seen by none and gray",
       result.photos, result.charts, result.model.pages.size(),
       result.model.pages.size() == 1 ? "" : "s", 1e3 * result.texel_size_m, result.unseen_triangles,
-      result.model.mesh.triangles.size(), result.unseen_m2));
+      result.model.mesh.triangles.size(), result.unseen_m2);
   // More than what lies behind the rocks: the poses are of another frame, or see another part.
   if (5 * result.unseen_triangles > result.model.mesh.triangles.size())
     run.warn("a fifth of the triangles or more is seen by no photograph: see --frame and --poses");
   if (result.split_charts > 0)
-    run.say(fmt::format("{} charts larger than a page were cut", result.split_charts));
+    run.say("{} charts larger than a page were cut", result.split_charts);
   if (result.shrunk_charts > 0)
-    run.warn(
-        fmt::format("{} triangles larger than a page have fewer texels", result.shrunk_charts));
+    run.warn("{} triangles larger than a page have fewer texels", result.shrunk_charts);
   if (result.atlas_scale < 1.0)
-    run.warn(fmt::format("texels are {:.2f} times as large as wanted, for the number of pages",
-                         1.0 / result.atlas_scale));
+    run.warn("texels are {:.2f} times as large as wanted, for the number of pages",
+             1.0 / result.atlas_scale);
 }
 
 // Pages of an earlier run that this one has not written anew.
@@ -160,11 +138,8 @@ std::vector<fs::path> pages_of_earlier_run(const fs::path& output) {
   std::vector<fs::path> pages;
   const auto manifest = libmap::read_manifest_of(output);
   if (!manifest || manifest->command != "texture" || !fs::exists(output)) return pages;
-  const auto* count = manifest->find_result("pages");
-  const auto* format = manifest->find_parameter("image_format");
-  if (count == nullptr || format == nullptr) return pages;
-  const auto* number = std::get_if<std::int64_t>(count);
-  const auto* name = std::get_if<std::string>(format);
+  const auto* number = std::get_if<std::int64_t>(manifest->find_result("pages"));
+  const auto* name = std::get_if<std::string>(manifest->find_parameter("image_format"));
   if (number == nullptr || name == nullptr || output.extension() == ".glb") return pages;
   const auto image_format = *name == "png" ? libmap::ImageFormat::png : libmap::ImageFormat::jpeg;
   for (std::int64_t page = 0; page < std::min<std::int64_t>(*number, 100000); ++page)
@@ -176,17 +151,17 @@ std::vector<fs::path> pages_of_earlier_run(const fs::path& output) {
 void texture(TextureCommandOptions options, Run& run) {
   libmap::require_textured_format(options.output);
   libmap::require_mesh_format(options.mesh);
-  std::vector<std::string> inputs = graspmap_tools::scan_inputs(options.scan, options.poses);
+  std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.mesh);
   run.claim_output(options.output, inputs);
   run.require_own_companions(options.output,
                              libmap::companions_of_model(options.output, options.writing));
-  const auto scan = graspmap_tools::open_scan(options.scan, options.texture.strict, run);
+  const auto scan = open_scan(options.scan, options.texture.strict, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
   run.add_input(options.mesh);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
-  add_results(result, run.manifest());
+  add_results(result, run);
   say_result(result, run);
   const std::vector<fs::path> old_pages = pages_of_earlier_run(options.output);
   const std::vector<libmap::ModelFile> files =
@@ -201,14 +176,14 @@ void texture(TextureCommandOptions options, Run& run) {
 
 int main(int argc, char** argv) {
   TextureCommandOptions options;
-  graspmap_tools::Command command("texture");
+  Command command("texture");
   command.input("MESH", options.mesh, "mesh in the frame of the poses (.ply, .obj, ...)");
   command.output(
       options.output,
       "textured mesh (.glb; .obj: with STEM.mtl and a picture per page, STEM_0.png ...)");
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
-  graspmap_tools::add_poses_option(command, options.poses);
+  add_poses_option(command, options.poses);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { texture(options, run); });
 }

@@ -126,8 +126,10 @@ class EquilibriumProgram {
   bool enter(Kind kind) {
     change_.noalias() = inverse_ * column_;
     Eigen::Index leaving = -1;
+    // Smaller changes are rounding errors; dividing by one would spoil the inverse.
+    const double smallest = 1e-9 * change_.cwiseAbs().maxCoeff();
     // Artificial variables are 0 and must stay so: they leave as soon as they would change.
-    double largest = 1e-9;
+    double largest = smallest;
     for (Eigen::Index row = 0; row < rows_; ++row)
       if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial &&
           std::abs(change_[row]) > largest) {
@@ -139,7 +141,7 @@ class EquilibriumProgram {
       perturb();
       step = std::numeric_limits<double>::infinity();
       for (Eigen::Index row = 0; row < rows_; ++row) {
-        if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial || change_[row] <= 1e-11)
+        if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial || change_[row] <= smallest)
           continue;
         const double bound = values_[row] / change_[row];
         if (bound >= step) continue;

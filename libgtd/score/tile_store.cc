@@ -31,10 +31,22 @@ const StoredTile* TileStoreIndex::find(const TileNumber& tile) const {
   return found != tiles.end() && found->number == tile ? &*found : nullptr;
 }
 
-std::uint64_t TileStoreIndex::voxels() const {
-  std::uint64_t count = 0;
-  for (const StoredTile& tile : tiles) count += tile.voxels;
-  return count;
+namespace {
+
+std::uint64_t sum_of(const std::vector<StoredTile>& tiles, const auto& count) {
+  std::uint64_t sum = 0;
+  for (const StoredTile& tile : tiles) sum += tile.*count;
+  return sum;
+}
+
+}  // namespace
+
+std::uint64_t TileStoreIndex::voxels() const { return sum_of(tiles, &StoredTile::voxels); }
+std::uint64_t TileStoreIndex::border_voxels() const {
+  return sum_of(tiles, &StoredTile::border_voxels);
+}
+std::uint64_t TileStoreIndex::graspable_voxels() const {
+  return sum_of(tiles, &StoredTile::graspable_voxels);
 }
 
 void restore_positions(const TileStoreIndex& index, libmap::PointCloud& tile) {

@@ -54,6 +54,8 @@ struct TileStoreIndex {
   // Nothing if there is no such tile.
   const StoredTile* find(const TileNumber& tile) const;
   std::uint64_t voxels() const;
+  std::uint64_t border_voxels() const;
+  std::uint64_t graspable_voxels() const;
 };
 
 // The positions of `tile`'s points from their fields i, j, k, in full precision: a tile's file has

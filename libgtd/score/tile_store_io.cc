@@ -81,21 +81,19 @@ fs::path tile_path(const fs::path& store, const StoredTile& tile) {
   libmap::require_readable_file(path);
   const std::uint64_t bytes = fs::file_size(path);
   if (bytes != tile.bytes)
-    throw libmap::Error(
-        "is not the tile that the index lists: `graspmap score` once more makes it again",
-        {.file = path.string(),
-         .field = "size",
-         .value = std::to_string(bytes) + " bytes",
-         .bound = std::to_string(tile.bytes)});
+    throw libmap::Error("is not the tile that the index lists: scoring once more makes it again",
+                        {.file = path.string(),
+                         .field = "size",
+                         .value = std::to_string(bytes) + " bytes",
+                         .bound = std::to_string(tile.bytes)});
   return path;
 }
 
 fs::path checked_tile_path(const fs::path& store, const StoredTile& tile) {
   fs::path path = tile_path(store, tile);
   if (libmap::sha256_of_file(path) != tile.sha256)
-    throw libmap::Error(
-        "is not the tile that the index lists: `graspmap score` once more makes it again",
-        {.file = path.string(), .field = "SHA-256"});
+    throw libmap::Error("is not the tile that the index lists: scoring once more makes it again",
+                        {.file = path.string(), .field = "SHA-256"});
   return path;
 }
 

@@ -82,7 +82,7 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
 std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare& share) {
   if (share.count < 1 || share.number < 1 || share.number > share.count)
     throw libmap::Error("no such share",
-                        {.field = "--tile",
+                        {.field = "tile",
                          .value = std::to_string(share.number) + "/" + std::to_string(share.count),
                          .bound = "K/N with 1 <= K <= N"});
   const auto number = static_cast<std::size_t>(share.number);

@@ -355,8 +355,7 @@ std::vector<std::pair<std::string, LensModel>> lens_model_names() {
 }
 
 void bind(ParameterTable& table, CameraCalibrationOptions& options) {
-  table.add("square_mm", options.board.square_mm, positive,
-            "side of the board's squares, also as --square-mm");
+  table.add("square_mm", options.board.square_mm, positive, "side of the board's squares");
   table.add("lens", options.lens, lens_model_names(),
             "distortion: none; plumb_bob: k1 k2 p1 p2 k3; rational: and k4 k5 k6; equidistant: a "
             "fisheye's k1 to k4");

@@ -16,6 +16,14 @@ namespace libmap {
 void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 
+// step(n) for each n of 0..count-1, in parallel one by one.
+template <typename Step>
+void parallel_each(std::size_t count, const Step& step) {
+  parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) step(n);
+  });
+}
+
 // chunk(begin, end) of each range, joined left to right with join(a, b).
 template <typename T, typename Chunk, typename Join>
 T parallel_reduce(std::size_t count, std::size_t grain, T identity, const Chunk& chunk,

@@ -38,8 +38,8 @@ std::string to_text(PoseSource source) {
   switch (source) {
     case PoseSource::odometry:
       return "odometry";
-    case PoseSource::stored:
-      return "stored";
+    case PoseSource::optimized:
+      return "optimized";
     case PoseSource::ground_truth:
       return "ground-truth";
   }
@@ -54,14 +54,13 @@ const GraphNode* PoseGraph::find_node(int id) const {
 }
 
 Trajectory trajectory_of(const PoseGraph& graph, PoseSource source) {
-  constexpr int invalid_weight = -9;
   Trajectory trajectory;
   for (const GraphNode& node : graph.nodes) {
-    if (node.weight == invalid_weight) continue;
+    if (node.weight == GraphNode::invalid_weight) continue;
     std::optional<Pose> pose;
     if (source == PoseSource::odometry) pose = node.odometry_from_base;
     if (source == PoseSource::ground_truth) pose = node.truth_from_base;
-    if (source == PoseSource::stored) {
+    if (source == PoseSource::optimized) {
       const auto place = graph.optimized_map_from_base.find(node.id);
       if (place != graph.optimized_map_from_base.end()) pose = place->second;
     }

@@ -88,9 +88,10 @@ struct TrajectoryPose {
 };
 using Trajectory = std::vector<TrajectoryPose>;
 
-// Which of a scan's own poses: by odometry, optimized as stored, or ground truth.
-enum class PoseSource { odometry, stored, ground_truth };
-std::string to_text(PoseSource source);  // "odometry", "stored", "ground-truth"
+// Which of a scan's own poses: by odometry, optimized by the program that recorded it, ground
+// truth.
+enum class PoseSource { odometry, optimized, ground_truth };
+std::string to_text(PoseSource source);  // "odometry", "optimized", "ground-truth"
 
 // The poses of that source, by ascending node; nodes that have none, and invalid nodes, are left
 // out.

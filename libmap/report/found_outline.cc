@@ -1,7 +1,6 @@
 #include "libmap/report/found_outline.h"
 
 #include <algorithm>
-#include <array>
 #include <map>
 #include <optional>
 #include <set>
@@ -19,16 +18,13 @@ namespace fs = std::filesystem;
 
 namespace {
 
-bool is_picture(const fs::path& file) {
-  constexpr std::array<const char*, 4> extensions = {".png", ".jpg", ".jpeg", ".svg"};
-  return std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end();
+bool has_extension(const fs::path& file, const std::set<fs::path>& extensions) {
+  return extensions.contains(file.extension());
 }
 
 // Maps are known by their manifests.
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
-  constexpr std::array<const char*, 4> extensions = {".pcd", ".ply", ".csv", ".tiles"};
-  return manifest &&
-         std::find(extensions.begin(), extensions.end(), file.extension()) != extensions.end() &&
+  return manifest && has_extension(file, {".pcd", ".ply", ".csv", ".tiles"}) &&
          (manifest->command == "score" ||
           (manifest->command == "convert" && manifest->find_result("scored_voxels") != nullptr));
 }
@@ -220,7 +216,9 @@ class Finder {
       return fs::exists(file.parent_path() / "evaluation" / drawing, code);
     };
     for (const fs::path& file : listing.files) {
-      if (!is_picture(file) || drawn(file) || drawn_below(file)) continue;
+      if (!has_extension(file, {".png", ".jpg", ".jpeg", ".svg"}) || drawn(file) ||
+          drawn_below(file))
+        continue;
       if (file.extension() == ".svg") {
         charts.push_back({.kind = ItemKind::picture,
                           .files = {file.filename().string()},

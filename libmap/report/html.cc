@@ -18,10 +18,6 @@ void replace_all(std::string& text, std::string_view what, std::string_view by) 
     text.replace(at, what.size(), by);
 }
 
-unsigned digit_value(char digit) {
-  return static_cast<unsigned>(digit <= '9' ? digit - '0' : digit - 'a' + 10);
-}
-
 }  // namespace
 
 std::string escape_html(std::string_view text) {
@@ -87,7 +83,7 @@ std::string csp_hash(std::string_view code) {
   const std::string digits = sha256_of(code);
   std::string bytes;
   for (std::size_t n = 0; n + 1 < digits.size(); n += 2)
-    bytes += static_cast<char>(digit_value(digits[n]) * 16 + digit_value(digits[n + 1]));
+    bytes += static_cast<char>(std::stoi(digits.substr(n, 2), nullptr, 16));
   return "'sha256-" + to_base64(bytes) + "'";
 }
 

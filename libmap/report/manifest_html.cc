@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <string>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -93,43 +92,25 @@ Values all_values(const Manifest& manifest) {
   return values;
 }
 
-// The values of several manifests, and their places by name.
-struct Columns {
-  std::vector<Values> values;
-  std::vector<std::unordered_map<std::string, std::size_t>> places;
-  std::vector<std::string> names;  // of all, in the order in which they first appear
-
-  explicit Columns(const ReportParameters& parameters) {
-    std::unordered_set<std::string> known;
-    for (const auto& [head, manifest] : parameters.outputs) {
-      Values own = all_values(manifest);
-      std::unordered_map<std::string, std::size_t> place_of;
-      for (std::size_t n = 0; n < own.size(); ++n) {
-        place_of.emplace(own[n].first, n);
-        if (known.insert(own[n].first).second) names.push_back(own[n].first);
-      }
-      values.push_back(std::move(own));
-      places.push_back(std::move(place_of));
-    }
-  }
-  const ManifestValue* find(std::size_t column, const std::string& name) const {
-    const auto found = places[column].find(name);
-    return found == places[column].end() ? nullptr : &values[column][found->second].second;
-  }
-};
-
 std::string side_by_side(const ReportParameters& parameters) {
-  const Columns columns(parameters);
+  // By name, in the order in which the names first appear: what each manifest says, if anything.
+  using Cells = std::vector<std::optional<ManifestValue>>;
+  std::vector<std::pair<std::string, Cells>> rows;
+  std::unordered_map<std::string, std::size_t> row_of;
+  for (std::size_t n = 0; n < parameters.outputs.size(); ++n)
+    for (auto& [name, value] : all_values(parameters.outputs[n].second)) {
+      const auto [row, is_new] = row_of.try_emplace(name, rows.size());
+      if (is_new) rows.emplace_back(name, Cells(parameters.outputs.size()));
+      std::optional<ManifestValue>& cell = rows[row->second].second[n];
+      if (!cell) cell = std::move(value);
+    }
   std::string differ;
   Values same;
-  for (const std::string& name : columns.names) {
+  for (const auto& [name, values] : rows) {
     std::vector<Value> cells;
-    for (std::size_t n = 0; n < columns.values.size(); ++n) {
-      const ManifestValue* value = columns.find(n, name);
-      cells.push_back(value == nullptr ? Value{} : to_value(*value));
-    }
+    for (const auto& value : values) cells.push_back(value ? to_value(*value) : Value{});
     if (std::all_of(cells.begin(), cells.end(), [&](const Value& c) { return c == cells[0]; })) {
-      same.emplace_back(name, *columns.find(0, name));
+      same.emplace_back(name, *values[0]);
       continue;
     }
     differ += "<tr><th scope=\"row\">" + escape_html(name) + "</th>";
@@ -140,8 +121,7 @@ std::string side_by_side(const ReportParameters& parameters) {
   for (const auto& [head, manifest] : parameters.outputs)
     html += "<th scope=\"col\" class=\"number\">" + breakable_html(head) + "</th>";
   html += "</tr></thead><tbody>\n" + differ + "</tbody></table>\n";
-  if (differ.empty()) html.clear();
-  html = html.empty() ? "" : scroll_box(html, "What differs");
+  html = differ.empty() ? "" : scroll_box(html, "What differs");
   return html + "<details class=\"more\"><summary>The same in all " +
          std::to_string(parameters.outputs.size()) + "</summary>\n" +
          scroll_box(pair_table("", same), "The same in all") + "</details>\n";

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "libmap/core/score_color.h"
-#include "libmap/core/text.h"
 #include "libmap/report/html.h"
 #include "libmap/report/table_html.h"
 #include "libmap/view/color_map.h"
@@ -140,12 +139,6 @@ std::string description(const MapView& view) {
   return text + ".";
 }
 
-bool has_verdicts(const MapView& view) {
-  for (const MapMarker& marker : view.markers)
-    if (marker.verdict) return true;
-  return false;
-}
-
 }  // namespace
 
 std::string map_html(const ReportMap& map, const std::string& still, bool with_view) {
@@ -158,7 +151,8 @@ std::string map_html(const ReportMap& map, const std::string& still, bool with_v
         "<canvas tabindex=\"0\" role=\"img\" hidden aria-label=\"Graspability map, 3-D view: "
         "arrow keys turn it, plus and minus zoom\"></canvas>";
   html += "</div>\n" + legend_html(map.view);
-  if (has_verdicts(map.view))
+  if (std::any_of(map.view.markers.begin(), map.view.markers.end(),
+                  [](const MapMarker& marker) { return marker.verdict.has_value(); }))
     html +=
         "<ul class=\"legend\" aria-label=\"Locations\"><li><span class=\"mark pass\"></span>"
         "listed as graspable</li><li><span class=\"mark fail\"></span>listed as not "

@@ -110,7 +110,7 @@ MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
   view.has_graspable = graspable != nullptr;
   view.has_obstacle = obstacle != nullptr;
   for (std::size_t n = 0; n < map.size(); ++n) {
-    const bool below = options.has_zero_plane && map.positions[n].z() < options.zero_plane_m;
+    const bool below = options.zero_plane_m && map.positions[n].z() < *options.zero_plane_m;
     unsigned value = class_of((*score)[n], below);
     if (is_set(convex, n)) value |= convex_flag;
     if (is_set(graspable, n)) value |= graspable_flag;

@@ -3,7 +3,6 @@
 
 #include <Eigen/Core>
 #include <array>
-#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
@@ -52,8 +51,7 @@ struct MapView {
 
 struct MapViewOptions {
   int voxels_a_cell = 1;
-  double zero_plane_m = 0.0;
-  bool has_zero_plane = false;
+  std::optional<double> zero_plane_m{};
   std::optional<MapLattice> lattice{};  // nothing: from the points
 };
 

@@ -1,7 +1,6 @@
 // What stands in a report, read and ready to be shown.
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>

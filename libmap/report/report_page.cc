@@ -19,21 +19,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
-std::string gap_html(const ReportGap& gap) {
-  const std::string file = "<code>" + escape_html(gap.file) + "</code>";
-  if (gap.reason.empty()) return "<p class=\"gap\">Not made in this run: " + file + "</p>\n";
-  return "<p class=\"gap\">" + file + " cannot be shown: " + escape_html(gap.reason) + "</p>\n";
-}
-
 // Files that are missing are mostly many: one line for all.
 std::string gaps_html(const std::vector<ReportGap>& gaps) {
   std::string html;
   std::string missing;
   for (const ReportGap& gap : gaps) {
-    if (!gap.reason.empty())
-      html += gap_html(gap);
+    const std::string file = "<code>" + escape_html(gap.file) + "</code>";
+    if (gap.reason.empty())
+      missing += (missing.empty() ? "" : ", ") + file;
     else
-      missing += (missing.empty() ? "<code>" : ", <code>") + escape_html(gap.file) + "</code>";
+      html +=
+          "<p class=\"gap\">" + file + " cannot be shown: " + escape_html(gap.reason) + "</p>\n";
   }
   if (!missing.empty()) html += "<p class=\"gap\">Not made in this run: " + missing + "</p>\n";
   return html;
@@ -52,7 +48,7 @@ class PageWriter {
   explicit PageWriter(const PageAssets& assets) : with_views_(!assets.libraries.empty()) {}
 
   std::string section(const ReportSection& section, int level) {
-    const std::string id = next_id();
+    const std::string id = "s" + std::to_string(++sections_);
     contents_ += "<li><a href=\"#" + id + "\">" + escape_html(section.heading) + "</a>";
     const int heading = std::min(level, 6);
     std::string html = fmt::format("<section aria-labeledby=\"{}\">\n<h{} id=\"{}\">{}</h{}>\n", id,
@@ -86,8 +82,6 @@ class PageWriter {
   bool has_views() const { return has_views_; }
 
  private:
-  std::string next_id() { return "s" + std::to_string(++sections_); }
-
   std::string figure(const std::string& kind, const std::string& number, const ReportItem& item,
                      const std::string& body, const std::string& otherwise) {
     std::string caption = "<figcaption>";
@@ -148,11 +142,9 @@ class PageWriter {
     const bool view = with_views_ && !map.view.cells.empty();
     has_views_ = has_views_ || view;
     const std::string caption = item.caption.empty() ? "Graspability map." : item.caption;
-    std::string still;
-    if (map.still)
-      still = "<div class=\"still\">" + image_html(*map.still, caption) + "</div>";
-    else
-      still = "<p class=\"still\">No picture of this map was made.</p>";
+    const std::string still =
+        map.still ? "<div class=\"still\">" + image_html(*map.still, caption) + "</div>"
+                  : "<p class=\"still\">No picture of this map was made.</p>";
     return figure("map", number, item, map_html(map, still, view), "Graspability map.");
   }
 
@@ -287,9 +279,8 @@ FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std:
   for (const ReportPicture* picture : pictures) originals.push_back(*picture);
   FittedPage page;
   for (page.picture_level = 0; page.picture_level <= max_picture_level; ++page.picture_level) {
-    parallel_for(pictures.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        *pictures[n] = fit_picture(originals[n], page.picture_level);
+    parallel_each(pictures.size(), [&](std::size_t n) {
+      *pictures[n] = fit_picture(originals[n], page.picture_level);
     });
     page.html = report_page(content, assets);
     if (page.html.size() <= max_bytes) {

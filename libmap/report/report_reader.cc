@@ -10,7 +10,6 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/json_input.h"
-#include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 #include "libmap/report/picture_fit.h"
 #include "libmap/report/run_folder.h"
@@ -138,8 +137,7 @@ class Reader {
         read_pictures(outline, folder, item);
         break;
       case ItemKind::table:
-        for (const std::string& file : outline.files)
-          read_table(outline, resolve(folder, file), item);
+        read_table(outline, resolve(folder, outline.files.front()), item);
         break;
       case ItemKind::map:
         read_map(outline, folder, item);
@@ -223,10 +221,6 @@ class Reader {
     return table;
   }
 
-  static std::optional<bool> verdict_of(const Table& all, std::size_t row, std::size_t column) {
-    return parse_bool(all.rows[row][column]);
-  }
-
   // By the first column of the file. Verdicts stand in the column asked for, or in `graspable`
   // where the points brought their own: the map's is then `map_graspable`.
   static void name_markers(const fs::path& path, const OutlineItem& outline, ReportMap& map) {
@@ -239,7 +233,7 @@ class Reader {
     std::vector<MapMarker>& markers = map.view.markers;
     for (std::size_t row = 0; row < std::min(markers.size(), all.rows.size()); ++row) {
       markers[row].label = all.rows[row].front();
-      if (verdict) markers[row].verdict = verdict_of(all, row, *verdict);
+      if (verdict) markers[row].verdict = parse_bool(all.rows[row][*verdict]);
     }
   }
 

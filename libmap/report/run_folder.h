@@ -1,7 +1,6 @@
 // What lies in the folder of a run.
 #pragma once
 
-#include <cstddef>
 #include <filesystem>
 #include <string>
 #include <string_view>

@@ -1,7 +1,6 @@
 // Tables as HTML.
 #pragma once
 
-#include <optional>
 #include <string>
 #include <vector>
 

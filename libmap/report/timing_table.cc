@@ -1,46 +1,11 @@
 #include "libmap/report/timing_table.h"
 
 #include <algorithm>
-#include <optional>
-#include <string>
-#include <unordered_map>
-#include <utility>
-#include <vector>
+#include <map>
 
 namespace libmap {
 
 namespace {
-
-// Rows as they come, those of a command together.
-class Rows {
- public:
-  explicit Rows(std::size_t cases) : cases_(cases) {}
-
-  TimingRow& row_of(const std::string& command, const std::string& step) {
-    const auto [group, is_new_command] = group_of_.try_emplace(command, groups_.size());
-    if (is_new_command) groups_.emplace_back();
-    Group& rows = groups_[group->second];
-    const auto [place, is_new] = rows.place_of.try_emplace(step, rows.rows.size());
-    if (is_new)
-      rows.rows.push_back({command, step, std::vector<std::optional<double>>(cases_), {}});
-    return rows.rows[place->second];
-  }
-  std::vector<TimingRow> take() {
-    std::vector<TimingRow> all;
-    for (Group& group : groups_)
-      for (TimingRow& row : group.rows) all.push_back(std::move(row));
-    return all;
-  }
-
- private:
-  struct Group {
-    std::vector<TimingRow> rows;
-    std::unordered_map<std::string, std::size_t> place_of;
-  };
-  std::size_t cases_;
-  std::vector<Group> groups_;
-  std::unordered_map<std::string, std::size_t> group_of_;
-};
 
 std::optional<std::string> name_for(const OutlinePublishedTimes& outline, const std::string& step) {
   for (const auto& [ours, theirs] : outline.rows)
@@ -54,7 +19,8 @@ std::optional<std::string> name_for(const OutlinePublishedTimes& outline, const 
 TimingTable timing_table(const std::vector<TimingCase>& cases) {
   TimingTable table;
   for (const TimingCase& one : cases) table.cases.push_back(one.name);
-  Rows rows(cases.size());
+  std::map<std::pair<std::string, std::string>, std::size_t> place_of;  // by command and step
+  std::map<std::string, std::size_t> rank_of;                           // of a command
   for (std::size_t n = 0; n < cases.size(); ++n) {
     table.manifests.push_back(cases[n].manifests.size());
     std::vector<unsigned>& threads = table.threads.emplace_back();
@@ -62,14 +28,23 @@ TimingTable timing_table(const std::vector<TimingCase>& cases) {
       if (std::find(threads.begin(), threads.end(), manifest.threads) == threads.end())
         threads.push_back(manifest.threads);
       for (const auto& [step, seconds] : manifest.timings_s) {
-        std::optional<double>& cell = rows.row_of(manifest.command, step).seconds[n];
+        const auto [place, is_new] =
+            place_of.try_emplace({manifest.command, step}, table.rows.size());
+        rank_of.try_emplace(manifest.command, rank_of.size());
+        if (is_new)
+          table.rows.push_back(
+              {manifest.command, step, std::vector<std::optional<double>>(cases.size()), {}});
+        std::optional<double>& cell = table.rows[place->second].seconds[n];
         table.sums = table.sums || cell.has_value();
         cell = cell.value_or(0.0) + seconds;
       }
     }
     std::sort(threads.begin(), threads.end());
   }
-  table.rows = rows.take();
+  // Those of a command together.
+  std::stable_sort(table.rows.begin(), table.rows.end(), [&](const auto& a, const auto& b) {
+    return rank_of.at(a.command) < rank_of.at(b.command);
+  });
   return table;
 }
 

@@ -25,7 +25,7 @@ std::string only_cloud_topic(const BagListing& listing) {
   throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
               {.field = "topics of " + ros_message::type_of<PointCloud2>(),
                .value = count == 0 ? "none" : names,
-               .bound = count == 0 ? "" : "named by --topic"});
+               .bound = count == 0 ? "" : "one of them named as the topic"});
 }
 
 BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,

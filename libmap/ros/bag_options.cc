@@ -21,7 +21,7 @@ void bind(ParameterTable& table, BagRigOptions& options) {
 }
 
 std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan) {
-  std::vector<std::string> names = {rig_file_name, rig_moments_file_name};
+  std::vector<std::string> names = {rig_file_name, synchronized_sets_file_name};
   for (const RigCamera& camera : plan.rig.cameras) names.push_back(camera.name);
   return names;
 }

@@ -222,27 +222,27 @@ void add_images(const SurveyedImages& images, std::size_t camera, bool calibrate
     plan.warnings.push_back(images.topic + ": images without a stamp: those of the recording");
 }
 
-// The moments that are wanted, and no images but theirs.
-void choose_moments(const BagRigOptions& options, const std::optional<double>& stamp_s,
-                    BagRigPlan& plan) {
+// The synchronized sets that are wanted, and no images but theirs.
+void choose_sets(const BagRigOptions& options, const std::optional<double>& stamp_s,
+                 BagRigPlan& plan) {
   std::vector<RigImage> stamps;
   for (const BagImage& image : plan.images)
     stamps.push_back({image.camera, ros_message::seconds_of(image.stamp_ns)});
-  std::vector<RigMoment> moments =
-      rig_moments(stamps, plan.rig.cameras.size(), options.tolerance_s);
-  plan.all_moments = moments.size();
+  std::vector<SynchronizedSet> sets =
+      synchronized_sets(stamps, plan.rig.cameras.size(), options.tolerance_s);
+  plan.all_sets = sets.size();
   if (stamp_s) {
     const auto nearest = std::min_element(
-        moments.begin(), moments.end(), [&](const RigMoment& a, const RigMoment& b) {
+        sets.begin(), sets.end(), [&](const SynchronizedSet& a, const SynchronizedSet& b) {
           return std::abs(a.stamp_s - *stamp_s) < std::abs(b.stamp_s - *stamp_s);
         });
-    moments = {*nearest};
+    sets = {*nearest};
   }
   std::vector<BagImage> kept;
-  for (std::size_t n = 0; n < moments.size(); n += static_cast<std::size_t>(options.every)) {
-    plan.moments.push_back(moments[n]);
-    for (RigMoment::Camera& camera : plan.moments.back().cameras) {
-      if (camera.state != RigMoment::Camera::State::seen) continue;
+  for (std::size_t n = 0; n < sets.size(); n += static_cast<std::size_t>(options.every)) {
+    plan.sets.push_back(sets[n]);
+    for (SynchronizedSet::Camera& camera : plan.sets.back().cameras) {
+      if (camera.state != SynchronizedSet::Camera::State::seen) continue;
       kept.push_back(plan.images[camera.image]);
     }
   }
@@ -300,7 +300,7 @@ BagRigPlan plan_of(const fs::path& bag, const BagRigOptions& options,
   set_limits(survey, options, plan);
   plan.rig.check();
   std::sort(plan.images.begin(), plan.images.end());
-  choose_moments(options, stamp_s, plan);
+  choose_sets(options, stamp_s, plan);
   return plan;
 }
 

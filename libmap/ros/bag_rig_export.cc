@@ -50,9 +50,9 @@ class ImageWriter {
     for (const auto& [camera, reason] : reasons_)
       result_.warnings.push_back(plan_.topics[camera] + ": " + std::to_string(reason.second) +
                                  " images cannot be used: " + reason.first);
-    result_.moments = plan_.moments;
+    result_.sets = plan_.sets;
     if (written_.size() < plan_.images.size() && !written_.empty())
-      result_.moments = rig_moments(written_, plan_.rig.cameras.size(), plan_.tolerance_s);
+      result_.sets = synchronized_sets(written_, plan_.rig.cameras.size(), plan_.tolerance_s);
     return std::move(result_);
   }
 
@@ -126,18 +126,18 @@ class ImageWriter {
   BagRigExport result_;
 };
 
-std::string moments_table(const std::vector<RigMoment>& moments) {
+std::string sets_table(const std::vector<SynchronizedSet>& sets) {
   Table table;
   table.columns = {"stamp_s", "cameras", "spread_s"};
-  for (const RigMoment& moment : moments) {
+  for (const SynchronizedSet& set : sets) {
     double first = 0.0;
     double last = 0.0;
-    for (const RigMoment::Camera& camera : moment.cameras) {
-      if (camera.state != RigMoment::Camera::State::seen) continue;
+    for (const SynchronizedSet::Camera& camera : set.cameras) {
+      if (camera.state != SynchronizedSet::Camera::State::seen) continue;
       first = std::min(first, camera.offset_s);
       last = std::max(last, camera.offset_s);
     }
-    table.rows.push_back({to_fixed_text(moment.stamp_s, 6), std::to_string(moment.seen()),
+    table.rows.push_back({to_fixed_text(set.stamp_s, 6), std::to_string(set.seen()),
                           to_fixed_text(last - first, 6)});
   }
   return to_csv(table);
@@ -157,7 +157,7 @@ BagRigExport export_bag_rig(const fs::path& bag, const BagRigPlan& plan, const f
                 {.file = bag.string()});
   if (!folder.empty()) {
     write_text(folder / rig_file_name, to_yaml(plan.rig));
-    write_text(folder / rig_moments_file_name, moments_table(result.moments));
+    write_text(folder / synchronized_sets_file_name, sets_table(result.sets));
   }
   return result;
 }

@@ -206,7 +206,7 @@ std::size_t FrameFolder::add_camera(const std::string& name) {
   std::error_code code;  // a list may hold names that no file can have
   if (!fs::exists(file, code))
     throw Error(
-        "no such file: the scan needs its camera's intrinsics, as `graspmap calibrate` "
+        "no such file: the scan needs its camera's intrinsics, as a calibration "
         "writes them; the key calibration of scan.yaml names another file",
         {.file = file.string()});
   cameras_.push_back(read_camera(file).camera);

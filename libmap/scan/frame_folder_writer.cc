@@ -162,7 +162,7 @@ std::size_t FrameFolderWriter::write_associations(const PoseGraph& graph) const 
 
 void FrameFolderWriter::write_poses(const PoseGraph& graph) const {
   const std::pair<PoseSource, const char*> sources[] = {{PoseSource::odometry, files::odometry},
-                                                        {PoseSource::stored, files::stored},
+                                                        {PoseSource::optimized, files::stored},
                                                         {PoseSource::ground_truth, files::truth}};
   for (const auto& [source, name] : sources) {
     const Trajectory trajectory = trajectory_of(graph, source);
@@ -170,7 +170,7 @@ void FrameFolderWriter::write_poses(const PoseGraph& graph) const {
     const bool with_nodes = !do_stamps_tell_nodes(graph, trajectory);
     write_text(folder_ / name, to_tum(trajectory, with_nodes));
   }
-  Trajectory vertices = trajectory_of(graph, PoseSource::stored);
+  Trajectory vertices = trajectory_of(graph, PoseSource::optimized);
   if (vertices.empty()) vertices = trajectory_of(graph, PoseSource::odometry);
   write_text(folder_ / files::links, to_g2o(vertices, graph.links));
 }

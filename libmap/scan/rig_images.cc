@@ -18,7 +18,7 @@ namespace libmap {
 namespace {
 
 namespace fs = std::filesystem;
-using State = RigMoment::Camera::State;
+using State = SynchronizedSet::Camera::State;
 
 // File names have whole microseconds.
 constexpr double stamp_rounding_s = 1e-6;
@@ -67,17 +67,17 @@ std::vector<RigImage> images_of_table(const fs::path& folder, const CameraRig& r
   return images;
 }
 
-double sum_of_offsets(const RigMoment& moment) {
+double sum_of_offsets(const SynchronizedSet& set) {
   double sum = 0.0;
-  for (const RigMoment::Camera& camera : moment.cameras)
+  for (const SynchronizedSet::Camera& camera : set.cameras)
     if (camera.state == State::seen) sum += std::abs(camera.offset_s);
   return sum;
 }
 
-bool is_fuller(const RigMoment& moment, const RigMoment& best) {
-  if (best.cameras.empty() || moment.seen() != best.seen())
-    return best.cameras.empty() || moment.seen() > best.seen();
-  return sum_of_offsets(moment) < sum_of_offsets(best);
+bool is_fuller(const SynchronizedSet& set, const SynchronizedSet& best) {
+  if (best.cameras.empty() || set.seen() != best.seen())
+    return best.cameras.empty() || set.seen() > best.seen();
+  return sum_of_offsets(set) < sum_of_offsets(best);
 }
 
 // Of each camera its images among `candidates`, which ascend in time.
@@ -114,17 +114,17 @@ std::optional<std::size_t> nearest_of(const std::vector<RigImage>& images,
 }
 
 // Of each camera the image nearest to `stamp_s` within the reach.
-RigMoment moment_of(const std::vector<RigImage>& images, const ImagesByCamera& candidates,
-                    double stamp_s, double reach_s) {
-  RigMoment moment;
-  moment.stamp_s = stamp_s;
-  moment.cameras.resize(candidates.size());
+SynchronizedSet set_of(const std::vector<RigImage>& images, const ImagesByCamera& candidates,
+                       double stamp_s, double reach_s) {
+  SynchronizedSet set;
+  set.stamp_s = stamp_s;
+  set.cameras.resize(candidates.size());
   for (std::size_t camera = 0; camera < candidates.size(); ++camera) {
     const std::optional<std::size_t> n = nearest_of(images, candidates[camera], stamp_s);
     if (!n || std::abs(images[*n].stamp_s - stamp_s) > reach_s) continue;
-    moment.cameras[camera] = {State::seen, *n, images[*n].stamp_s - stamp_s};
+    set.cameras[camera] = {State::seen, *n, images[*n].stamp_s - stamp_s};
   }
-  return moment;
+  return set;
 }
 
 }  // namespace
@@ -183,18 +183,18 @@ DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera) {
   return depth;
 }
 
-std::size_t RigMoment::seen() const {
+std::size_t SynchronizedSet::seen() const {
   return static_cast<std::size_t>(std::count_if(
       cameras.begin(), cameras.end(), [](const Camera& c) { return c.state == State::seen; }));
 }
 
-RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_count,
-                        double stamp_s, double tolerance_s) {
-  RigMoment moment;
-  moment.stamp_s = stamp_s;
-  moment.cameras.resize(camera_count);
+SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::size_t camera_count,
+                                    double stamp_s, double tolerance_s) {
+  SynchronizedSet set;
+  set.stamp_s = stamp_s;
+  set.cameras.resize(camera_count);
   for (std::size_t n = 0; n < images.size(); ++n) {
-    RigMoment::Camera& camera = moment.cameras.at(images[n].camera);
+    SynchronizedSet::Camera& camera = set.cameras.at(images[n].camera);
     const double offset = images[n].stamp_s - stamp_s;
     const bool nearer = std::abs(offset) < std::abs(camera.offset_s) ||
                         (std::abs(offset) == std::abs(camera.offset_s) && offset < camera.offset_s);
@@ -203,27 +203,27 @@ RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_
     camera.image = n;
     camera.offset_s = offset;
   }
-  return moment;
+  return set;
 }
 
-RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t camera_count,
-                             double tolerance_s) {
+SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
+                                         std::size_t camera_count, double tolerance_s) {
   if (images.empty()) throw Error("there are no images to choose a moment from");
   const std::vector<std::size_t> order = in_order_of_time(images);
   const ImagesByCamera all = by_camera(images, order, camera_count);
-  RigMoment best;
+  SynchronizedSet best;
   for (const std::size_t n : order) {
-    RigMoment moment = moment_of(images, all, images[n].stamp_s, tolerance_s + stamp_rounding_s);
-    if (is_fuller(moment, best)) best = std::move(moment);
+    SynchronizedSet set = set_of(images, all, images[n].stamp_s, tolerance_s + stamp_rounding_s);
+    if (is_fuller(set, best)) best = std::move(set);
   }
-  return rig_moment_at(images, camera_count, best.stamp_s, tolerance_s);
+  return synchronized_set_at(images, camera_count, best.stamp_s, tolerance_s);
 }
 
-std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::size_t camera_count,
-                                   double tolerance_s) {
+std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
+                                               std::size_t camera_count, double tolerance_s) {
   const std::vector<std::size_t> waiting = in_order_of_time(images);
   std::vector<bool> taken(images.size(), false);
-  std::vector<RigMoment> moments;
+  std::vector<SynchronizedSet> sets;
   for (std::size_t first = 0; first < waiting.size(); ++first) {
     if (taken[waiting[first]]) continue;
     const double start = images[waiting[first]].stamp_s;
@@ -233,21 +233,21 @@ std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::siz
       if (images[waiting[n]].stamp_s > start + 2 * reach) break;
       if (!taken[waiting[n]]) near.push_back(waiting[n]);
     }
-    // The first image belongs to the moment, whatever others its camera took.
+    // The first image belongs to the set, whatever others its camera took.
     ImagesByCamera candidates = by_camera(images, near, camera_count);
     candidates[images[near.front()].camera].resize(1);
-    RigMoment best;
+    SynchronizedSet best;
     for (const std::size_t middle : near) {
       const double stamp = images[middle].stamp_s;
       if (stamp > start + reach) break;
-      RigMoment moment = moment_of(images, candidates, stamp, reach);
-      if (is_fuller(moment, best)) best = std::move(moment);
+      SynchronizedSet set = set_of(images, candidates, stamp, reach);
+      if (is_fuller(set, best)) best = std::move(set);
     }
-    for (const RigMoment::Camera& camera : best.cameras)
+    for (const SynchronizedSet::Camera& camera : best.cameras)
       if (camera.state == State::seen) taken[camera.image] = true;
-    moments.push_back(std::move(best));
+    sets.push_back(std::move(best));
   }
-  return moments;
+  return sets;
 }
 
 }  // namespace libmap

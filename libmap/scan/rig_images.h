@@ -42,11 +42,11 @@ Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& came
 // saturated, are 0. Throws as read_rig_units.
 DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera);
 
-// What each camera saw at one moment.
-struct RigMoment {
+// What each camera saw at one time.
+struct SynchronizedSet {
   double stamp_s = 0.0;
   struct Camera {
-    enum class State { seen, late, missing };  // of its image at this moment
+    enum class State { seen, late, missing };  // of its image in this set
     State state = State::missing;  // late: the nearest image is outside the tolerance; missing: the
                                    // camera has no image at all
     std::size_t image = 0;         // index of its image nearest to stamp_s, unless missing
@@ -54,24 +54,25 @@ struct RigMoment {
   };
   std::vector<Camera> cameras{};  // one for each of the rig
 
-  std::size_t seen() const;  // how many cameras have an image of this moment
+  std::size_t seen() const;  // how many cameras have an image of this set
 };
 
 // What the cameras saw at `stamp_s`: of each camera the image nearest in time, the earlier of two
 // equally near ones, if it lies within `tolerance_s` >= 0.
-RigMoment rig_moment_at(const std::vector<RigImage>& images, std::size_t camera_count,
-                        double stamp_s, double tolerance_s);
+SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::size_t camera_count,
+                                    double stamp_s, double tolerance_s);
 
 // The image's stamp at which most cameras saw something; of several, the one with the smallest sum
 // of offsets, then the earliest. `images` may not be empty.
-RigMoment fullest_rig_moment(const std::vector<RigImage>& images, std::size_t camera_count,
-                             double tolerance_s);
+SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
+                                         std::size_t camera_count, double tolerance_s);
 
-// All moments of a recording, ascending; each image is in one of them. The earliest image that is
-// in none yet begins one; its stamp is that of an image at most `tolerance_s` later at which most
-// cameras saw something (of several the one with the smallest sum of offsets, then the earliest),
-// counting images that are in no moment yet. A camera without an image in a moment is `missing`.
-std::vector<RigMoment> rig_moments(const std::vector<RigImage>& images, std::size_t camera_count,
-                                   double tolerance_s);
+// All synchronized sets of a recording, ascending; each image is in one of them. The earliest image
+// that is in none yet begins one; its stamp is that of an image at most `tolerance_s` later at
+// which most cameras saw something (of several the one with the smallest sum of offsets, then the
+// earliest), counting images that are in no set yet. A camera without an image in a set is
+// `missing`.
+std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
+                                               std::size_t camera_count, double tolerance_s);
 
 }  // namespace libmap

@@ -159,7 +159,7 @@ std::map<int, Pose> own_poses(const PoseGraph& graph) {
   for (auto& [session, of_session] : sessions)
     if (of_session.size() > poses.size()) poses = std::move(of_session);
   if (!poses.empty()) return poses;
-  for (const TrajectoryPose& pose : trajectory_of(graph, PoseSource::stored))
+  for (const TrajectoryPose& pose : trajectory_of(graph, PoseSource::optimized))
     poses.emplace(pose.node, pose.world_from_base);
   return poses;
 }

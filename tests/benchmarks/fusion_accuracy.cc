@@ -175,7 +175,7 @@ void run(const std::filesystem::path& folder) {
     truth.seen.clear();
     find_seen(truth, *scan);
     for (const PoseSource source :
-         {PoseSource::ground_truth, PoseSource::stored, PoseSource::odometry}) {
+         {PoseSource::ground_truth, PoseSource::optimized, PoseSource::odometry}) {
       const libmap::Trajectory poses = trajectory_of(scan->graph(), source);
       // By the poses that a cloud was made with.
       const auto mesh_from = [&](const libmap::Trajectory& used) {

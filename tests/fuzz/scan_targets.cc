@@ -228,8 +228,8 @@ bool run_rig_images(std::string_view bytes) {
     rig.cameras[0].name = "front";
     rig.cameras[1].name = "rear";
     const auto images = libmap::list_rig_images(file.path().parent_path(), rig);
-    libmap::rig_moments(images, rig.cameras.size(), 0.02);
-    libmap::fullest_rig_moment(images, rig.cameras.size(), 0.02);
+    libmap::synchronized_sets(images, rig.cameras.size(), 0.02);
+    libmap::fullest_synchronized_set(images, rig.cameras.size(), 0.02);
   });
 }
 

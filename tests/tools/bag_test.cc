@@ -268,7 +268,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"none", "-o", "out.bag"}, {"none: no such file"});
   EXPECT_TRUE(wrong_usage(graspmap({"bag", "good.bag"}), {"--output", "is missing"}));
   says({"good.bag", "-o", "out"}, {"good.bag: topics of images is none"});
-  says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "--topic"});
+  says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "named as the topic"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
        {"did you mean '/graspability_map'"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspability_map", "--topic", "/curvature_map"},

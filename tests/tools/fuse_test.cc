@@ -44,6 +44,7 @@ TEST(Fuse, TrueAndStoredPosesLieNearTheTrueSurface) {
   EXPECT_LT(compared("stored.ply").at("rmse_m"), 0.0065);
   const nlohmann::json manifest = json_of("stored.ply.json");
   EXPECT_EQ(manifest.at("frame"), "ground truth");
+  EXPECT_EQ(manifest.at("parameters").at("poses"), "optimized") << "stored is another name of it";
   EXPECT_EQ(manifest.at("results").at("frames"), 40);
   // Of the corrected poses; those that are stored are off by 6.8 mm.
   EXPECT_LT(manifest.at("results").at("trajectory_rmse_m"), 0.001);
@@ -60,7 +61,7 @@ TEST(Fuse, ManifestCountsEveryPixel) {
     sum += results.at("rejected_" + std::string(reason)).get<std::int64_t>();
   EXPECT_EQ(sum, results.at("pixels"));
   EXPECT_EQ(results.at("frames"), 6);
-  EXPECT_EQ(manifest.at("parameters").at("poses"), "stored");
+  EXPECT_EQ(manifest.at("parameters").at("poses"), "optimized");
   EXPECT_EQ(manifest.at("parameters").at("voxel_size_m"), 0.01);
   const libmap::PointCloud cloud = libmap::read_cloud(scratch("cloud.ply")).cloud;
   EXPECT_EQ(static_cast<std::int64_t>(cloud.size()), results.at("points"));
@@ -175,8 +176,8 @@ TEST(Fuse, NodesWithoutAPoseAreCounted) {
 TEST(Fuse, PosesThatAreNotThere) {
   GRASPMAP_REQUIRE_DATA();
   const std::string killed = scan_file("site_killed.db");
-  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "stored", "-o", "cloud.ply"}),
-                        {"site_killed.db", "--poses", "stored", "odometry, ground-truth"}));
+  EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "optimized", "-o", "cloud.ply"}),
+                        {"site_killed.db", "--poses", "optimized", "odometry, ground-truth"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "odometri", "-o", "cloud.ply"}),
                         {"odometri", "did you mean 'odometry'?"}));
   EXPECT_TRUE(bad_input(graspmap({"fuse", killed, "--poses", "none.tum", "-o", "cloud.ply"}),

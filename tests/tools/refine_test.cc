@@ -66,7 +66,7 @@ TEST(Refine, KilledScanGetsEveryNode) {
   EXPECT_EQ(refined->graph().optimized_map_from_base.size(), 29U);
   EXPECT_GT(refined->graph().links.size(), 90U);
   const auto stored = libmap::absolute_trajectory_error(
-      libmap::trajectory_of(refined->graph(), libmap::PoseSource::stored),
+      libmap::trajectory_of(refined->graph(), libmap::PoseSource::optimized),
       libmap::trajectory_of(refined->graph(), libmap::PoseSource::ground_truth));
   EXPECT_NEAR(stored.rmse_m, error.rmse_m, 1e-6);
   // A fused cloud takes the poses from the file.

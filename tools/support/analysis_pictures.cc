@@ -48,19 +48,25 @@ libmap::PointCloud cloud_of(const libgtd::VoxelMap& map, const libgtd::MapSurfac
   return cloud;
 }
 
-// Entries of colors that the cloud has.
-libmap::Legend legend_of(const libmap::PointCloud& cloud, const std::string& title,
-                         const std::vector<libmap::LegendEntry>& known) {
-  libmap::Legend legend;
-  legend.title = title;
+// In its own colors; the legend has the known ones among them and those of the `rest` of the
+// ground.
+libmap::Coloring own_colors(const libmap::PointCloud& cloud, const std::string& title,
+                            const std::vector<libmap::LegendEntry>& known,
+                            const std::string& rest) {
+  libmap::Coloring coloring;
+  coloring.mode = libmap::ColorMode::own;
+  coloring.own_legend.title = title;
+  std::vector<libmap::LegendEntry>& entries = coloring.own_legend.entries;
   for (const libmap::LegendEntry& entry : known)
     if (std::find(cloud.colors.begin(), cloud.colors.end(), entry.color) != cloud.colors.end())
-      legend.entries.push_back(entry);
-  return legend;
+      entries.push_back(entry);
+  entries.push_back({ground_color(0.0F), rest + ", level"});
+  entries.push_back({ground_color(90.0F), rest + ", upright"});
+  return coloring;
 }
 
 libmap::ColorImage draw(libmap::PointCloud cloud, libmap::Coloring coloring,
-                        std::vector<libmap::Marker> markers, const std::string& title) {
+                        const std::string& title, std::vector<libmap::Marker> markers = {}) {
   libmap::Scene scene;
   libmap::SceneLayer& layer = scene.layers.emplace_back();
   layer.shape = std::move(cloud);
@@ -69,14 +75,6 @@ libmap::ColorImage draw(libmap::PointCloud cloud, libmap::Coloring coloring,
   libmap::SceneViewOptions view;
   view.title = title;
   return libmap::render_scene(scene, view);
-}
-
-libmap::ColorImage draw_own(libmap::PointCloud cloud, libmap::Legend legend,
-                            std::vector<libmap::Marker> markers, const std::string& title) {
-  libmap::Coloring coloring;
-  coloring.mode = libmap::ColorMode::own;
-  coloring.own_legend = std::move(legend);
-  return draw(std::move(cloud), std::move(coloring), std::move(markers), title);
 }
 
 Color change_color(ChangeClass change, const Color& ground) {
@@ -181,15 +179,14 @@ libmap::ColorImage draw_regions(const MapPicture& picture, const libgtd::MapRegi
       markers.push_back({.position = picture.map.center_in_terrain(regions.regions[r].best_voxel),
                          .label = std::to_string(r + 1)});
   }
-  libmap::Legend legend = legend_of(cloud, "graspable regions",
-                                    {{start_color, "start"},
-                                     {reachable_color, "reachable"},
-                                     {unreachable_color, "not reachable"},
-                                     {obstacle_color, "obstacle"},
-                                     {libmap::below_plane_color, "below zero plane"}});
-  legend.entries.push_back({ground_color(0.0F), "other ground, level"});
-  legend.entries.push_back({ground_color(90.0F), "other ground, upright"});
-  return draw_own(std::move(cloud), std::move(legend), std::move(markers), picture.title);
+  libmap::Coloring coloring = own_colors(cloud, "graspable regions",
+                                         {{start_color, "start"},
+                                          {reachable_color, "reachable"},
+                                          {unreachable_color, "not reachable"},
+                                          {obstacle_color, "obstacle"},
+                                          {libmap::below_plane_color, "below zero plane"}},
+                                         "other ground");
+  return draw(std::move(cloud), std::move(coloring), picture.title, std::move(markers));
 }
 
 libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChange& change,
@@ -209,15 +206,14 @@ libmap::ColorImage draw_change(const MapPicture& picture, const libgtd::MapChang
       cloud.colors.push_back(only_one_color);
     }
   }
-  libmap::Legend legend = legend_of(cloud, "graspable",
-                                    {{reachable_color, "in both maps"},
-                                     {gained_color, "in OTHER alone"},
-                                     {lost_color, "in MAP alone"},
-                                     {only_one_color, "ground of one map"},
-                                     {libmap::below_plane_color, "below zero plane"}});
-  legend.entries.push_back({ground_color(0.0F), "neither, level"});
-  legend.entries.push_back({ground_color(90.0F), "neither, upright"});
-  return draw_own(std::move(cloud), std::move(legend), {}, picture.title);
+  libmap::Coloring coloring = own_colors(cloud, "graspable",
+                                         {{reachable_color, "in both maps"},
+                                          {gained_color, "in OTHER alone"},
+                                          {lost_color, "in MAP alone"},
+                                          {only_one_color, "ground of one map"},
+                                          {libmap::below_plane_color, "below zero plane"}},
+                                         "neither");
+  return draw(std::move(cloud), std::move(coloring), picture.title);
 }
 
 libmap::ColorImage draw_score_change(const MapPicture& picture, const libgtd::MapChange& change,
@@ -237,7 +233,7 @@ libmap::ColorImage draw_score_change(const MapPicture& picture, const libgtd::Ma
   coloring.scale = libmap::ColorScale::diverging;
   coloring.range_min = -0.5;
   coloring.range_max = 0.5;
-  return draw(std::move(cloud), std::move(coloring), {}, picture.title);
+  return draw(std::move(cloud), std::move(coloring), picture.title);
 }
 
 }  // namespace graspmap_tools

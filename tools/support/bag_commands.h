@@ -1,10 +1,6 @@
 // The parts of `graspmap bag`.
 #pragma once
 
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "libmap/ros/bag_rig.h"
 #include "libmap/ros/bag_writer.h"
 #include "tools/support/run.h"

@@ -1,25 +1,17 @@
 // graspmap bag IN.bag: what a bag holds, its depth images as a rig's folder, one of its clouds.
-#include <fmt/format.h>
-
-#include <algorithm>
 #include <iostream>
-#include <nlohmann/json.hpp>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/core/text.h"
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
 #include "tools/support/bag_commands.h"
-#include "tools/support/bag_json.h"
-#include "tools/support/result_counts.h"
+#include "tools/support/info_json.h"
 
 namespace graspmap_tools {
 
 namespace {
 
 namespace fs = std::filesystem;
-using Json = nlohmann::ordered_json;
 
 void print_text(const libmap::BagListing& listing) {
   std::size_t name = 5;
@@ -45,30 +37,26 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
     run.warn(options.input + ": " + warning);
   }
   if (result.pixels_beyond > 0)
-    run.warn(
-        fmt::format("{}: {} pixels are deeper than 16 bits can represent and are left out "
-                    "(--depth-scale)",
-                    options.input, result.pixels_beyond));
+    run.warn("{}: {} pixels are deeper than 16 bits can represent and are left out (--depth-scale)",
+             options.input, result.pixels_beyond);
   std::size_t fullest = 0;
-  for (const libmap::RigMoment& moment : result.moments) fullest = std::max(fullest, moment.seen());
-  const ResultCounts count(run.manifest());
-  count("cameras", plan.rig.cameras.size());
-  count("images", result.images);
-  count("images_broken", result.broken);
-  count("moments", result.moments.size());
-  count("moments_in_bag", plan.all_moments);
-  count("cameras_of_fullest_moment", fullest);
-  count("pixels_beyond", result.pixels_beyond);
+  for (const libmap::SynchronizedSet& set : result.sets) fullest = std::max(fullest, set.seen());
+  run.add_results({{"cameras", plan.rig.cameras.size()},
+                   {"images", result.images},
+                   {"images_broken", result.broken},
+                   {"moments", result.sets.size()},
+                   {"moments_in_bag", plan.all_sets},
+                   {"cameras_of_fullest_moment", fullest},
+                   {"pixels_beyond", result.pixels_beyond}});
   for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
     const libmap::RigCamera& camera = plan.rig.cameras[n];
-    run.manifest().results.emplace_back(camera.name + ".topic", plan.topics[n]);
+    run.add_results({{camera.name + ".topic", plan.topics[n]}});
     run.manifest().transforms.emplace_back("robot_from_" + camera.name,
                                            camera.camera.base_from_camera);
     if (plan.topics[n].empty()) run.warn(camera.name + ": no topic of its images");
   }
-  run.say(fmt::format("{} images of {} cameras, {} of {} moments, {} cameras at the fullest",
-                      result.images, plan.rig.cameras.size(), result.moments.size(),
-                      plan.all_moments, fullest));
+  run.say("{} images of {} cameras, {} of {} moments, {} cameras at the fullest", result.images,
+          plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
 }
 
 }  // namespace
@@ -76,7 +64,7 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
 void list_bag_topics(const BagCommandOptions& options) {
   const libmap::BagListing listing = libmap::list_bag(options.input);
   if (options.json)
-    std::cout << bag_json(listing).dump(2, ' ', false, Json::error_handler_t::replace) << "\n";
+    print_json(bag_json(listing));
   else
     print_text(listing);
 }
@@ -99,7 +87,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
 
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   if (options.topics.size() > 1)
-    throw libmap::Error("a cloud comes from one topic", {.file = {}, .field = "--topic"});
+    throw libmap::Error("a cloud comes from one topic", {.field = "--topic"});
   run.claim_output(options.output, {options.input});
   const libmap::BagCloudResult result = run.timed("read", [&] {
     return libmap::read_bag_cloud(options.input,
@@ -108,16 +96,15 @@ void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
   });
   run.add_input(options.input);
   run.manifest().frame = result.frame;
-  run.manifest().results.emplace_back("topic", result.topic);
-  run.manifest().results.emplace_back("stamp_s", result.stamp_s);
-  const ResultCounts count(run.manifest());
-  count("messages", result.messages);
-  count("points", result.cloud.size());
-  count("dropped_points", result.dropped_points);
+  run.add_results({{"topic", result.topic},
+                   {"stamp_s", result.stamp_s},
+                   {"messages", result.messages},
+                   {"points", result.cloud.size()},
+                   {"dropped_points", result.dropped_points}});
   if (result.cloud.empty()) run.warn(options.input + ": " + result.topic + ": no finite points");
-  run.say(fmt::format("{} points of {} at {} s, one of {} messages; {} not finite",
-                      result.cloud.size(), result.topic, libmap::to_fixed_text(result.stamp_s, 6),
-                      result.messages, result.dropped_points));
+  run.say("{} points of {} at {} s, one of {} messages; {} not finite", result.cloud.size(),
+          result.topic, libmap::to_fixed_text(result.stamp_s, 6), result.messages,
+          result.dropped_points);
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_cloud(temporary, result.cloud);
   });

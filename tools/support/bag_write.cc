@@ -1,17 +1,10 @@
 // graspmap bag ... -o OUT.bag: a map and what belongs to it, or a rig's images, as a bag.
-#include <fmt/format.h>
-
-#include <optional>
-#include <string>
 #include <variant>
-#include <vector>
 
 #include "libgtd/shape/convexity.h"
 #include "libgtd/shape/curvature.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
 #include "libmap/core/score_color.h"
-#include "libmap/core/text.h"
 #include "libmap/view/color_map.h"
 #include "tools/support/bag_commands.h"
 #include "tools/support/map_frame.h"
@@ -47,11 +40,9 @@ std::string frame_id(const std::string& frame, const std::string& input) {
 }
 
 double radius_of(const std::optional<Manifest>& manifest) {
-  const libgtd::CurvatureOptions defaults;
-  if (!manifest) return defaults.radius_m;
-  const libmap::ManifestValue* value = manifest->find_parameter("curvature_radius_m");
-  const double* radius = value ? std::get_if<double>(value) : nullptr;
-  return radius && *radius > 0 ? *radius : defaults.radius_m;
+  const double* radius =
+      manifest ? std::get_if<double>(manifest->find_parameter("curvature_radius_m")) : nullptr;
+  return radius && *radius > 0 ? *radius : libgtd::CurvatureOptions{}.radius_m;
 }
 
 // The map with the curvatures at its voxels, colored by convexity as `render --color flags`.
@@ -111,9 +102,8 @@ libmap::BagPlaces places_of(const CloudFile& footholds, double arrow_m) {
 double stamp_of(const BagCommandOptions& options, const std::vector<const CloudFile*>& files) {
   if (const std::optional<double> stamp = bag_stamp(options)) return *stamp;
   for (const CloudFile* file : files) {
-    if (!file->manifest) continue;
-    const libmap::ManifestValue* value = file->manifest->find_result("stamp_s");
-    const double* stamp = value ? std::get_if<double>(value) : nullptr;
+    if (file == nullptr || !file->manifest) continue;
+    const double* stamp = std::get_if<double>(file->manifest->find_result("stamp_s"));
     if (stamp && *stamp >= 1e-9) return *stamp;
   }
   return libmap::BagContent{}.stamp_s;
@@ -123,31 +113,26 @@ double stamp_of(const BagCommandOptions& options, const std::vector<const CloudF
 void add_transform(const CloudFile& map, const std::string& map_frame,
                    const std::string& terrain_frame, libmap::BagContent& content, Run& run) {
   if (map_frame == terrain_frame) return;
-  const libmap::Pose* pose =
-      map.manifest ? map.manifest->find_transform("terrain_from_input") : nullptr;
+  const libmap::Pose* pose = terrain_from_input_of(map.manifest);
   if (pose && map.frame() == "terrain")
     content.transforms.push_back({map_frame, terrain_frame, *pose});
   else
-    run.warn(fmt::format("no transform from {} to {} is known", terrain_frame, map_frame));
+    run.warn("no transform from {} to {} is known", terrain_frame, map_frame);
 }
 
 void add_results(const libmap::BagContent& content, Run& run) {
   for (const libmap::BagCloud& cloud : content.clouds)
-    run.manifest().results.emplace_back(cloud.topic + ".points",
-                                        static_cast<std::int64_t>(cloud.cloud.size()));
+    run.add_results({{cloud.topic + ".points", cloud.cloud.size()}});
   for (const libmap::BagPlaces& places : content.places)
-    run.manifest().results.emplace_back("footholds",
-                                        static_cast<std::int64_t>(places.places.size()));
-  run.manifest().results.emplace_back("stamp_s", content.stamp_s);
+    run.add_results({{"footholds", places.places.size()}});
+  run.add_results({{"stamp_s", content.stamp_s}});
 }
 
 }  // namespace
 
 void write_map_bag(const BagCommandOptions& options, Run& run) {
-  std::vector<std::string> inputs = {options.input};
-  for (const std::string& path : {options.terrain, options.curvature, options.footholds})
-    if (!path.empty()) inputs.push_back(path);
-  run.claim_output(options.output, inputs);
+  run.claim_output(options.output,
+                   {options.input, options.terrain, options.curvature, options.footholds});
   const CloudFile map = read(options.input, run);
   if (!map.cloud.find_field("score"))
     throw libmap::Error("no such field: is this a map?", {.file = options.input, .field = "score"});
@@ -157,9 +142,7 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
   if (!options.footholds.empty()) footholds = read(options.footholds, run);
 
   libmap::BagContent content;
-  std::vector<const CloudFile*> stamped = {&map};
-  if (terrain) stamped.push_back(&*terrain);
-  content.stamp_s = stamp_of(options, stamped);
+  content.stamp_s = stamp_of(options, {&map, terrain ? &*terrain : nullptr});
   const std::string terrain_frame = terrain ? frame_id(terrain->frame(), "map") : "map";
   const std::string map_frame =
       options.frame == "auto" ? frame_id(map.frame(), terrain_frame) : options.frame;
@@ -181,9 +164,8 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_bag(temporary, content, options.compression);
   });
-  run.say(fmt::format("{} clouds and {} footholds at {} s", content.clouds.size(),
-                      footholds ? footholds->cloud.size() : 0,
-                      libmap::to_fixed_text(content.stamp_s, 6)));
+  run.say("{} clouds and {} footholds at {} s", content.clouds.size(),
+          footholds ? footholds->cloud.size() : 0, libmap::to_fixed_text(content.stamp_s, 6));
 }
 
 void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
@@ -199,12 +181,11 @@ void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
                                   .stamp_offset_s = options.stamp_offset_s,
                                   .compression = options.compression};
   run.manifest().frame = bag.base_frame;
-  run.manifest().results.emplace_back("cameras", static_cast<std::int64_t>(rig.cameras.size()));
-  run.manifest().results.emplace_back("images", static_cast<std::int64_t>(images.size()));
+  run.add_results({{"cameras", rig.cameras.size()}, {"images", images.size()}});
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_rig_bag(temporary, rig, images, bag);
   });
-  run.say(fmt::format("{} images of {} cameras", images.size(), rig.cameras.size()));
+  run.say("{} images of {} cameras", images.size(), rig.cameras.size());
 }
 
 }  // namespace graspmap_tools

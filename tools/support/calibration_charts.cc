@@ -25,16 +25,16 @@ std::string draw(const Chart& chart, int height_px) {
 }
 
 // The largest of 1, 2, 5, 10, ... that shows the mean residual no longer than 1/40 of the width.
-double magnification(const std::vector<PictureResiduals>& pictures, int width) {
+double magnification(const libmap::CameraCalibrationResult& result) {
   double sum = 0.0;
   std::size_t count = 0;
-  for (const PictureResiduals& picture : pictures)
+  for (const libmap::CalibratedPicture& picture : result.pictures)
     for (const Eigen::Vector2d& residual : picture.residuals_px) {
       sum += residual.norm();
       ++count;
     }
   if (!(sum > 0)) return 1.0;
-  const double wanted = width / 40.0 / (sum / static_cast<double>(count));
+  const double wanted = result.camera.width / 40.0 / (sum / static_cast<double>(count));
   const double power = std::pow(10.0, std::floor(std::log10(std::clamp(wanted, 1.0, 1e6))));
   double scale = power;
   for (const double multiple : {2.0, 5.0})
@@ -44,8 +44,10 @@ double magnification(const std::vector<PictureResiduals>& pictures, int width) {
 
 }  // namespace
 
-std::string draw_residuals(const std::vector<PictureResiduals>& pictures, int width, int height) {
-  const double scale = magnification(pictures, width);
+std::string draw_residuals(const libmap::CameraCalibrationResult& result) {
+  const int width = result.camera.width;
+  const int height = result.camera.height;
+  const double scale = magnification(result);
   Chart chart;
   chart.title = "Found minus projected corners, " + libmap::to_text(scale) + " times";
   chart.x_axis = {"column [px]", std::pair(0.0, static_cast<double>(width))};
@@ -56,7 +58,7 @@ std::string draw_residuals(const std::vector<PictureResiduals>& pictures, int wi
     curve.x.push_back(pixel.x());
     curve.y.push_back(height - 1 - pixel.y());
   };
-  for (const PictureResiduals& picture : pictures)
+  for (const libmap::CalibratedPicture& picture : result.pictures)
     for (std::size_t n = 0; n < picture.corners.size(); ++n) {
       ChartCurve dot;
       dot.color = corner_color;
@@ -76,16 +78,16 @@ std::string draw_residuals(const std::vector<PictureResiduals>& pictures, int wi
   return draw(chart, std::clamp(height_px, 400, 3000));
 }
 
-std::string draw_errors(const std::vector<PictureResiduals>& pictures, double bound_px) {
+std::string draw_errors(const libmap::CameraCalibrationResult& result, double bound_px) {
   Chart chart;
   chart.title = "Reprojection error of each picture";
-  const auto count = static_cast<double>(pictures.size());
+  const auto count = static_cast<double>(result.pictures.size());
   chart.x_axis = {"picture", std::pair(0.5, count + 0.5)};
   libmap::ChartHistogram bars;
   bars.name = "root mean square";
   bars.first_edge = 0.5;
   double largest = bound_px;
-  for (const PictureResiduals& picture : pictures) {
+  for (const libmap::CalibratedPicture& picture : result.pictures) {
     bars.heights.push_back(picture.rms_px);
     largest = std::max(largest, picture.rms_px);
   }

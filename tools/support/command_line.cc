@@ -4,15 +4,10 @@
 #include <spdlog/spdlog.h>
 
 #include <CLI/CLI.hpp>
-#include <algorithm>
 #include <iostream>
-#include <optional>
 #include <thread>
 
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/text.h"
 #include "tools/support/commands.h"
 #include "tools/support/end_signals.h"
 #include "tools/support/message_text.h"
@@ -58,7 +53,20 @@ std::string unit_of(const libmap::Parameter& parameter) {
   return parameter.type == libmap::ParameterType::integer ? "N" : "X";
 }
 
+// "draw maps" -> "Draw maps."
+std::string sentence(std::string_view summary) {
+  std::string text(summary);
+  if (!text.empty()) text[0] = static_cast<char>(std::toupper(text[0]));
+  return text + ".";
+}
+
 }  // namespace
+
+void refuse_given(const std::vector<std::pair<const char*, bool>>& flags,
+                  const std::string& reason) {
+  for (const auto& [flag, is_given] : flags)
+    if (is_given) throw libmap::Error(reason, {.field = flag});
+}
 
 struct Command::Parts {
   Parts(std::string command_name, const std::string& summary)
@@ -93,17 +101,6 @@ struct Command::Parts {
   int usage_error(const std::string& message) const;
 };
 
-namespace {
-
-// "draw maps" -> "Draw maps."
-std::string sentence(std::string_view summary) {
-  std::string text(summary);
-  if (!text.empty()) text[0] = static_cast<char>(std::toupper(text[0]));
-  return text + ".";
-}
-
-}  // namespace
-
 Command::Command(const std::string& name, const std::string& description)
     : parts_(std::make_unique<Parts>(
           name, description.empty() ? sentence(summary_of(name)) : description)) {}
@@ -111,11 +108,6 @@ Command::~Command() = default;
 
 void Command::input(const std::string& name, std::string& path, const std::string& description) {
   parts_->app.add_option(name, path, description)->required()->type_name("");
-}
-
-void Command::optional_input(const std::string& name, std::string& path,
-                             const std::string& description) {
-  parts_->app.add_option(name, path, description)->type_name("");
 }
 
 void Command::inputs(const std::string& name, std::vector<std::string>& paths,

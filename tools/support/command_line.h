@@ -11,14 +11,6 @@
 //   }
 #pragma once
 
-#include <filesystem>
-#include <functional>
-#include <memory>
-#include <string>
-#include <vector>
-
-#include "libmap/core/error.h"
-#include "libmap/core/parameters.h"
 #include "tools/support/run.h"
 
 namespace graspmap_tools {
@@ -28,6 +20,17 @@ class UsageError : public libmap::Error {
  public:
   using Error::Error;
 };
+
+// Throws Error with the flag of the first parameter of `bind` that is not as it is by default.
+template <typename Options>
+void refuse_set(const Options& options, void (*bind)(libmap::ParameterTable&, Options&),
+                const std::string& reason) {
+  if (const auto key = libmap::changed_key(options, bind))
+    throw libmap::Error(reason, {.field = libmap::flag_of(*key)});
+}
+// The same of options that are no parameters: flags, each with whether it was given.
+void refuse_given(const std::vector<std::pair<const char*, bool>>& flags,
+                  const std::string& reason);
 
 class Command {
  public:
@@ -39,7 +42,6 @@ class Command {
 
   // Positional arguments, in the order in which they are added.
   void input(const std::string& name, std::string& path, const std::string& description);
-  void optional_input(const std::string& name, std::string& path, const std::string& description);
   void inputs(const std::string& name, std::vector<std::string>& paths,
               const std::string& description);
   // -o, --output.

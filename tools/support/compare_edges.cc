@@ -1,22 +1,10 @@
-#include "tools/support/compare_edges.h"
-
-#include <fmt/format.h>
-
-#include <cmath>
+// graspmap compare SITE --edges: height errors along the four edges of a site.
 #include <iostream>
-#include <limits>
 #include <nlohmann/json.hpp>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/ground_plane.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
-#include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/spot_check.h"
@@ -24,10 +12,12 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
-using graspmap_tools::Run;
 using Json = nlohmann::ordered_json;
 
 // "Graspable Target Detection for Hexapod Robots" (2023), table B 2-2: mean of 28 places.
@@ -77,10 +67,6 @@ void bind(libmap::ParameterTable& table, SpotCheckCommandOptions& options) {
 struct EdgeData {
   std::optional<libmap::TriangleMesh> mesh{};
   libmap::PointCloud cloud{};
-
-  const std::vector<Eigen::Vector3d>& positions() const {
-    return mesh ? mesh->vertices : cloud.positions;
-  }
 };
 
 EdgeData read_edge_data(const std::string& file) {
@@ -103,7 +89,7 @@ struct Check {
 libmap::TriangleMesh read_truth(const SpotCheckCommandOptions& options) {
   libmap::TriangleMesh truth = libmap::read_mesh(options.truth).mesh;
   if (options.truth_frame == TruthFrame::site) return truth;
-  const auto site_from_map = graspmap_tools::site_from_map_of(options.file);
+  const auto site_from_map = site_from_map_of(options.file);
   if (!site_from_map)
     throw libmap::Error("the site was not cropped from a map",
                         {.file = options.file, .field = "--truth-frame", .value = "map"});
@@ -132,16 +118,15 @@ libmap::HeightFunction find_ground(const SpotCheckCommandOptions& options, EdgeD
     run.add_input(options.truth);
     return libmap::heights_of(truth);
   }
-  const bool zero =
-      options.ground == Ground::zero ||
-      (options.ground == Ground::automatic && graspmap_tools::site_from_map_of(options.file));
+  const bool zero = options.ground == Ground::zero ||
+                    (options.ground == Ground::automatic && site_from_map_of(options.file));
   check.ground = zero ? "z = 0" : "fitted plane";
   libmap::HeightFunction at_zero = [](const Eigen::Vector2d&) { return 0.0; };
   if (zero) return at_zero;
   check.plane = run.timed("ground", [&] { return fit_ground(shape, options.plane); });
   const libmap::Pose level_from_map = libmap::level_from_map(*check.plane);
-  run.say(fmt::format("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm",
-                      check.plane->tilt_deg, check.plane->inliers, 1e3 * check.plane->rmse_m));
+  run.say("ground: a plane tilted by {:.2f} deg, {} points, RMSE {:.1f} mm", check.plane->tilt_deg,
+          check.plane->inliers, 1e3 * check.plane->rmse_m);
   run.manifest().transforms.emplace_back("level_from_map", level_from_map);
   if (shape.mesh)
     shape.mesh = libmap::transform_mesh(*shape.mesh, level_from_map);
@@ -171,18 +156,17 @@ libmap::HeightFunction heights_in(const std::optional<libmap::Bounds3d>& box, Ed
 Check check_site(const SpotCheckCommandOptions& options, Run& run) {
   EdgeData shape = read_edge_data(options.file);
   Check check;
-  try {
+  in_file(options.file, [&] {
     const libmap::HeightFunction ground = find_ground(options, shape, check, run);
-    const auto box = graspmap_tools::parse_box(options.box);
+    const auto box = parse_box(options.box);
     check.site =
         box ? libmap::corners_of(box->min.head<2>(), box->max.head<2>())
-            : libmap::bounding_corners(shape.positions(), options.outline == SiteOutline::turned);
+            : libmap::bounding_corners(shape.mesh ? shape.mesh->vertices : shape.cloud.positions,
+                                       options.outline == SiteOutline::turned);
     const libmap::HeightFunction heights = heights_in(box, shape, options);
     check.result = run.timed(
         "check", [&] { return libmap::check_edges(check.site, heights, ground, options.check); });
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.file);
-  }
+  });
   return check;
 }
 
@@ -206,7 +190,13 @@ libmap::Table table_of(const libmap::SpotCheckResult& result) {
   return table;
 }
 
-Json number_or_null(const std::optional<double>& value) { return value ? Json(*value) : Json(); }
+Results results_of(const libmap::SpotCheckResult& result) {
+  return {{"measured", result.measured},
+          {"missing", result.missing},
+          {"mean_m", result.mean_abs_error_m},
+          {"mean_signed_m", result.mean_error_m},
+          {"max_m", result.max_abs_error_m}};
+}
 
 Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
   const libmap::SpotCheckResult& result = check.result;
@@ -214,37 +204,27 @@ Json check_json(const Check& check, const SpotCheckCommandOptions& options) {
   for (std::size_t e = 0; e < result.edges.size(); ++e) {
     Json places = Json::array();
     for (const libmap::SpotCheckPlace& place : result.edges[e])
-      places.push_back({{"x_m", place.position.x()},
-                        {"y_m", place.position.y()},
-                        {"z_m", number_or_null(place.height_m)},
-                        {"ground_m", number_or_null(place.ground_m)},
-                        {"error_m", number_or_null(place.error_m())}});
-    edges.push_back({{"edge", edge_names[e]},
-                     {"mean_m", number_or_null(result.mean_m[e])},
-                     {"places", places}});
+      places.push_back(to_json({{"x_m", place.position.x()},
+                                {"y_m", place.position.y()},
+                                {"z_m", place.height_m},
+                                {"ground_m", place.ground_m},
+                                {"error_m", place.error_m()}}));
+    edges.push_back(to_json({{"edge", edge_names[e]}, {"mean_m", result.mean_m[e]}}));
+    edges.back()["places"] = places;
   }
   Json corners = Json::array();
   for (const Eigen::Vector2d& corner : check.site.corners)
     corners.push_back({corner.x(), corner.y()});
-  return {{"file", options.file},
-          {"ground", check.ground},
-          {"corners_m", corners},
-          {"edges", edges},
-          {"measured", result.measured},
-          {"missing", result.missing},
-          {"mean_m", result.mean_abs_error_m},
-          {"mean_signed_m", result.mean_error_m},
-          {"max_m", result.max_abs_error_m},
-          {"published_mean_m", published_mean_m}};
+  Json json = {
+      {"file", options.file}, {"ground", check.ground}, {"corners_m", corners}, {"edges", edges}};
+  json.update(to_json(results_of(result)));
+  json["published_mean_m"] = published_mean_m;
+  return json;
 }
 
 void print_check(const Check& check, const SpotCheckCommandOptions& options) {
   const libmap::SpotCheckResult& result = check.result;
-  if (options.json) {
-    std::cout << check_json(check, options).dump(2, ' ', false, Json::error_handler_t::replace)
-              << "\n";
-    return;
-  }
+  if (options.json) return print_json(check_json(check, options));
   std::cout << fmt::format("height error in m along the edges (ground: {})\n{:<6}", check.ground,
                            "edge");
   for (std::size_t n = 1; n <= result.edges[0].size(); ++n)
@@ -271,7 +251,7 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
     run.claim_output(options.output, {options.file, options.truth});
   }
   if (!options.truth.empty() && options.ground != Ground::automatic)
-    throw libmap::Error("--truth gives the ground already", {.file = {}, .field = "--ground"});
+    throw libmap::Error("--truth gives the ground already", {.field = "--ground"});
   const Check check = check_site(options, run);
   print_check(check, options);
   if (options.output.empty()) return;
@@ -280,18 +260,9 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
   manifest.parameters.emplace_back("truth", options.truth);
   manifest.parameters.emplace_back("box", options.box);
   manifest.frame = check.plane ? "level" : "input";
-  const auto add = [&](const char* name, const libmap::ManifestValue& value) {
-    manifest.results.emplace_back(name, value);
-  };
-  add("ground", check.ground);
-  add("measured", static_cast<std::int64_t>(check.result.measured));
-  add("missing", static_cast<std::int64_t>(check.result.missing));
-  add("mean_m", check.result.mean_abs_error_m);
-  add("mean_signed_m", check.result.mean_error_m);
-  add("max_m", check.result.max_abs_error_m);
-  run.write_output(options.output, [&](const auto& temporary) {
-    libmap::write_text(temporary, libmap::to_csv(table_of(check.result)));
-  });
+  run.add_results({{"ground", check.ground}});
+  run.add_results(results_of(check.result));
+  run.write_text(options.output, libmap::to_csv(table_of(check.result)));
 }
 
 }  // namespace
@@ -299,10 +270,9 @@ void spot_check(const SpotCheckCommandOptions& options, Run& run) {
 int graspmap_tools::compare_edges(int argc, char** argv) {
   SpotCheckCommandOptions options;
   bool edges = true;
-  graspmap_tools::Command command(
-      "compare",
-      "With --edges: height errors at locations along the four edges of a site: a (y = min), then "
-      "counter-clockwise b (x = max), c (y = max), d (x = min).");
+  Command command("compare",
+                  "With --edges: height errors at locations along the four edges of a site: a (y = "
+                  "min), then counter-clockwise b (x = max), c (y = max), d (x = min).");
   command.flag("--edges", edges, "measure along the edges of one site");
   command.input("SITE", options.file, "cloud or mesh");
   command.output(options.output, "table: edge, e1_m, e2_m, ..., mean_m (.csv)", false);

@@ -1,16 +1,4 @@
-#include "tools/support/convert_scan.h"
-
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <cstdint>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "libmap/core/error.h"
+// graspmap convert SCAN -o FOLDER: a scan as plain files, for MeshLab (Bundler) or for COLMAP.
 #include "libmap/core/parallel.h"
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/image_codec.h"
@@ -21,20 +9,21 @@
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/result_counts.h"
 #include "tools/support/scan_pictures.h"
 #include "tools/support/scan_poses.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 
 struct ExtractOptions {
   std::string scan;
   std::string output;
   bool strict = false;
-  graspmap_tools::PictureOptions pictures;
+  PictureOptions pictures;
 };
 
 struct Counts {
@@ -105,9 +94,8 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
     // The first by itself: it tells how large they are.
     const std::size_t count = first == 0 ? 1 : libmap::frames_in_batch(max_pixels);
     batch = std::vector<NodeImages>(std::min(count, nodes.size() - first));
-    libmap::parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) batch[i] = read_images(scan, nodes[first + i].id);
-    });
+    libmap::parallel_each(
+        batch.size(), [&](std::size_t i) { batch[i] = read_images(scan, nodes[first + i].id); });
     for (const NodeImages& images : batch) {
       max_pixels = std::max(max_pixels, libmap::image_pixels(images.frame));
       if (images.error && options.strict) throw libmap::Error(*images.error);
@@ -126,26 +114,25 @@ Counts extract_frames(const libmap::ScanSource& scan, libmap::FrameFolderWriter*
   return counts;
 }
 
-void add_results(libmap::Manifest& manifest, const libmap::PoseGraph& graph, const Counts& counts,
-                 const libmap::FrameFolderCounts& written) {
-  const graspmap_tools::ResultCounts count(manifest);
-  manifest.frame = "base";
-  count("nodes", graph.nodes.size());
-  count("links", graph.links.size());
+void add_results(const libmap::PoseGraph& graph, const Counts& counts,
+                 const libmap::FrameFolderCounts& written, Run& run) {
+  run.manifest().frame = "base";
   const auto poses = [&](libmap::PoseSource source) {
     return libmap::trajectory_of(graph, source).size();
   };
-  count("odometry_poses", poses(libmap::PoseSource::odometry));
-  count("stored_poses", poses(libmap::PoseSource::stored));
-  count("ground_truth_poses", poses(libmap::PoseSource::ground_truth));
-  count("color_images", written.color_images);
-  count("depth_images", written.depth_images);
-  count("right_images", written.right_images);
-  count("calibrations", written.calibrations);
-  count("associations", written.associations);
-  count("broken_frames", counts.broken_frames);
-  count("depth_images_rounded", counts.rounded_depth_images);
-  manifest.results.emplace_back("depth_unit_m", 0.001);
+  run.add_results({{"nodes", graph.nodes.size()},
+                   {"links", graph.links.size()},
+                   {"odometry_poses", poses(libmap::PoseSource::odometry)},
+                   {"stored_poses", poses(libmap::PoseSource::optimized)},
+                   {"ground_truth_poses", poses(libmap::PoseSource::ground_truth)},
+                   {"color_images", written.color_images},
+                   {"depth_images", written.depth_images},
+                   {"right_images", written.right_images},
+                   {"calibrations", written.calibrations},
+                   {"associations", written.associations},
+                   {"broken_frames", counts.broken_frames},
+                   {"depth_images_rounded", counts.rounded_depth_images},
+                   {"depth_unit_m", 0.001}});
 }
 
 void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan, Run& run) {
@@ -155,49 +142,38 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
     const Counts counts = extract_frames(scan, writer ? &*writer : nullptr, options, run);
     if (!writer) return;
     const libmap::FrameFolderCounts written = writer->finish(scan.graph());
-    add_results(run.manifest(), scan.graph(), counts, written);
-    run.say(fmt::format("{} nodes: {} color, {} depth images, {} calibrations, {} links",
-                        scan.graph().nodes.size(), written.color_images, written.depth_images,
-                        written.calibrations, scan.graph().links.size()));
-    if (written.right_images > 0)
-      run.say(fmt::format("{} right images of stereo pairs", written.right_images));
+    add_results(scan.graph(), counts, written, run);
+    run.say("{} nodes: {} color, {} depth images, {} calibrations, {} links",
+            scan.graph().nodes.size(), written.color_images, written.depth_images,
+            written.calibrations, scan.graph().links.size());
+    if (written.right_images > 0) run.say("{} right images of stereo pairs", written.right_images);
     if (counts.rounded_depth_images > 0)
-      run.say(
-          fmt::format("{} depth images were rounded to millimeters", counts.rounded_depth_images));
+      run.say("{} depth images were rounded to millimeters", counts.rounded_depth_images);
     if (counts.lost_depth_pixels > 0)
-      run.warn(fmt::format("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels));
+      run.warn("{} depth pixels beyond 65.5 m are left out", counts.lost_depth_pixels);
   };
   run.write_output_tree(options.output, libmap::frame_folder_names(), work);
 }
 
-// What says how photographs are chosen and where they stand.
-void refuse_ignored(const ExtractOptions& options) {
-  if (options.pictures.wanted()) return;
-  const graspmap_tools::PictureOptions unset;
-  const std::pair<const char*, bool> given[] = {
-      {"--poses", options.pictures.poses.source != unset.poses.source},
-      {"--transform", options.pictures.transform != unset.transform},
-      {"--keep", options.pictures.keep != unset.keep}};
-  for (const auto& [name, is_given] : given)
-    if (is_given)
-      throw libmap::Error("is for --bundler and --colmap: a folder keeps the scan's own poses",
-                          {.file = {}, .field = name});
-}
-
 void extract(ExtractOptions& options, Run& run) {
-  refuse_ignored(options);
   const bool pictures = options.pictures.wanted();
+  const PictureOptions unset;
+  if (!pictures)
+    refuse_given({{"--poses", options.pictures.poses.source != unset.poses.source},
+                  {"--transform", options.pictures.transform != unset.transform},
+                  {"--keep", options.pictures.keep != unset.keep}},
+                 "is for --bundler and --colmap: a folder keeps the scan's own poses");
   if (options.output.empty() && !pictures)
-    throw graspmap_tools::UsageError("nothing to write: -o, --bundler or --colmap names a folder");
+    throw UsageError("nothing to write: -o, --bundler or --colmap names a folder");
   if (!options.output.empty())
     run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
-  if (pictures) graspmap_tools::claim_picture_folders(options.pictures, options.scan, run);
-  const auto scan = graspmap_tools::open_scan(options.scan, options.strict, run);
+  if (pictures) claim_picture_folders(options.pictures, options.scan, run);
+  const auto scan = open_scan(options.scan, options.strict, run);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   // Each folder's manifest holds what was done for it alone.
   const libmap::Manifest start = run.manifest();
   // First: whether there are poses for them shows before anything is written.
-  if (pictures) graspmap_tools::write_picture_folders(options.pictures, *scan, options.strict, run);
+  if (pictures) write_picture_folders(options.pictures, *scan, options.strict, run);
   run.manifest() = start;
   if (!options.output.empty()) write_folder(options, *scan, run);
 }
@@ -212,12 +188,12 @@ bool graspmap_tools::is_scan_path(const std::string& path) {
 
 int graspmap_tools::convert_scan(int argc, char** argv) {
   ExtractOptions options;
-  graspmap_tools::Command command(
+  Command command(
       "convert",
       "With a scan: the scan as plain files, for MeshLab (--bundler) or COLMAP (--colmap).");
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "folder of the whole scan, replaced as a whole", false);
   command.flag("--strict", options.strict, "end at a frame that is broken");
-  graspmap_tools::add_options(command, options.pictures);
+  add_options(command, options.pictures);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });
 }

@@ -1,28 +1,20 @@
-#include "tools/support/fuse_rig.h"
-
-#include <fmt/format.h>
-
-#include <cmath>
-#include <optional>
-#include <string>
-#include <vector>
-
+// graspmap fuse RIG_FOLDER: one cloud in the robot's frame.
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/panorama.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/text.h"
 #include "libmap/scan/rig_images.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/result_counts.h"
+#include "tools/support/option_values.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
-using libmap::RigMoment;
-using State = libmap::RigMoment::Camera::State;
+using libmap::SynchronizedSet;
+using State = libmap::SynchronizedSet::Camera::State;
 
 struct PanoramaCommandOptions {
   std::string folder;
@@ -44,80 +36,67 @@ void bind(libmap::ParameterTable& table, PanoramaCommandOptions& options) {
   bind(table, options.panorama);
 }
 
-std::optional<double> parse_stamp(const std::string& text) {
-  if (text == "fullest") return std::nullopt;
-  const std::optional<double> stamp = libmap::parse_double(text);
-  if (!stamp || !std::isfinite(*stamp))
-    throw libmap::Error("no such time", {.file = {},
-                                         .field = "--stamp",
-                                         .value = text,
-                                         .bound = "a number of seconds, or fullest"});
-  return stamp;
-}
-
 // One line on a camera that is left out.
-std::string absence(const std::string& name, const RigMoment::Camera& camera) {
+std::string absence(const std::string& name, const SynchronizedSet::Camera& camera) {
   if (camera.state == State::missing) return name + ": no image";
   return fmt::format("{}: its nearest image is {:.1f} ms {}", name, std::abs(camera.offset_s) * 1e3,
                      camera.offset_s > 0 ? "late" : "early");
 }
 
-void report_absent(const libmap::CameraRig& rig, const RigMoment& moment,
+void report_absent(const libmap::CameraRig& rig, const SynchronizedSet& set,
                    const PanoramaCommandOptions& options, Run& run) {
-  if (moment.seen() == 0)
+  if (set.seen() == 0)
     throw libmap::Error("no camera saw anything at that time",
                         {.file = options.folder,
                          .field = "--stamp",
-                         .value = libmap::to_text(moment.stamp_s),
+                         .value = libmap::to_text(set.stamp_s),
                          .bound = "within --tolerance of an image"});
   for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
-    if (moment.cameras[n].state == State::seen) continue;
-    const std::string line = absence(rig.cameras[n].name, moment.cameras[n]);
+    if (set.cameras[n].state == State::seen) continue;
+    const std::string line = absence(rig.cameras[n].name, set.cameras[n]);
     if (options.strict) throw libmap::Error(line, {.file = options.folder});
     run.warn(line);
   }
 }
 
-void add_rig_results(const libmap::CameraRig& rig, const RigMoment& moment,
+void add_rig_results(const libmap::CameraRig& rig, const SynchronizedSet& set,
                      const libmap::PanoramaResult& result,
-                     const std::vector<libmap::PanoramaView>& views, libmap::Manifest& manifest) {
-  manifest.frame = "robot";
-  const graspmap_tools::ResultCounts count(manifest);
-  manifest.results.emplace_back("stamp_s", moment.stamp_s);
-  count("cameras", rig.cameras.size());
-  count("cameras_seen", views.size());
-  count("points", result.cloud.size());
+                     const std::vector<libmap::PanoramaView>& views, Run& run) {
+  run.manifest().frame = "robot";
+  run.add_results({{"stamp_s", set.stamp_s},
+                   {"cameras", rig.cameras.size()},
+                   {"cameras_seen", views.size()},
+                   {"points", result.cloud.size()}});
   for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
-    const RigMoment::Camera& camera = moment.cameras[n];
+    const SynchronizedSet::Camera& camera = set.cameras[n];
     const std::string& name = rig.cameras[n].name;
     const char* state = camera.state == State::seen   ? "seen"
                         : camera.state == State::late ? "outside the tolerance"
                                                       : "missing";
-    manifest.results.emplace_back(name + ".state", std::string(state));
-    if (camera.state != State::missing)
-      manifest.results.emplace_back(name + ".offset_s", camera.offset_s);
+    run.add_results({{name + ".state", state}});
+    if (camera.state != State::missing) run.add_results({{name + ".offset_s", camera.offset_s}});
   }
   for (std::size_t n = 0; n < views.size(); ++n) {
     const libmap::PanoramaCounts& counts = result.views[n];
-    manifest.transforms.emplace_back("robot_from_" + views[n].name,
-                                     views[n].camera.base_from_camera);
-    count(views[n].name + ".points", counts.points);
-    count(views[n].name + ".unmeasured", counts.unmeasured);
-    count(views[n].name + ".too_near", counts.too_near);
-    count(views[n].name + ".too_far", counts.too_far);
-    count(views[n].name + ".flying", counts.flying);
-    count(views[n].name + ".without_ray", counts.without_ray);
+    const std::string& name = views[n].name;
+    run.manifest().transforms.emplace_back("robot_from_" + name, views[n].camera.base_from_camera);
+    run.add_results({{name + ".points", counts.points},
+                     {name + ".unmeasured", counts.unmeasured},
+                     {name + ".too_near", counts.too_near},
+                     {name + ".too_far", counts.too_far},
+                     {name + ".flying", counts.flying},
+                     {name + ".without_ray", counts.without_ray}});
   }
 }
 
 std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
                                              const std::vector<libmap::RigImage>& images,
-                                             const RigMoment& moment, bool strict, Run& run) {
+                                             const SynchronizedSet& set, bool strict, Run& run) {
   std::vector<libmap::PanoramaView> views;
   for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
-    if (moment.cameras[n].state != State::seen) continue;
+    if (set.cameras[n].state != State::seen) continue;
     const libmap::RigCamera& camera = rig.cameras[n];
-    const libmap::RigImage& image = images[moment.cameras[n].image];
+    const libmap::RigImage& image = images[set.cameras[n].image];
     libmap::DepthImage depth;
     try {
       depth = libmap::read_rig_depth(image, camera);
@@ -135,7 +114,8 @@ std::vector<libmap::PanoramaView> read_views(const libmap::CameraRig& rig,
 }
 
 void panorama(PanoramaCommandOptions& options, Run& run) {
-  const std::optional<double> stamp = parse_stamp(options.stamp);
+  const std::optional<double> stamp = parse_number_or("fullest", options.stamp, "no such time",
+                                                      "--stamp", "a number of seconds, or fullest");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const fs::path rig_file = options.rig.empty() ? fs::path(options.folder) / libmap::rig_file_name
@@ -148,21 +128,21 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
   run.add_input(rig_file);
   const std::vector<libmap::RigImage> images = libmap::list_rig_images(options.folder, rig);
   const std::size_t cameras = rig.cameras.size();
-  const RigMoment moment = stamp
-                               ? libmap::rig_moment_at(images, cameras, *stamp, options.tolerance_s)
-                               : libmap::fullest_rig_moment(images, cameras, options.tolerance_s);
-  report_absent(rig, moment, options, run);
+  const SynchronizedSet set =
+      stamp ? libmap::synchronized_set_at(images, cameras, *stamp, options.tolerance_s)
+            : libmap::fullest_synchronized_set(images, cameras, options.tolerance_s);
+  report_absent(rig, set, options, run);
   const std::vector<libmap::PanoramaView> views =
-      run.timed("read", [&] { return read_views(rig, images, moment, options.strict, run); });
+      run.timed("read", [&] { return read_views(rig, images, set, options.strict, run); });
   const libmap::PanoramaResult result =
       run.timed("project", [&] { return libmap::make_panorama(views, options.panorama); });
   if (views.empty())
     throw libmap::Error("no image of that time can be read", {.file = options.folder});
   if (result.cloud.empty()) run.warn("no camera measured anything within its limits");
-  add_rig_results(rig, moment, result, views, run.manifest());
-  graspmap_tools::carry_transforms(options.folder, run);
-  run.say(fmt::format("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(),
-                      cameras, libmap::to_text(moment.stamp_s)));
+  add_rig_results(rig, set, result, views, run);
+  carry_transforms(options.folder, run);
+  run.say("{} points from {} of {} cameras at {} s", result.cloud.size(), views.size(), cameras,
+          libmap::to_text(set.stamp_s));
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::write_cloud(temporary, result.cloud);
   });
@@ -172,10 +152,9 @@ void panorama(PanoramaCommandOptions& options, Run& run) {
 
 int graspmap_tools::fuse_rig(int argc, char** argv) {
   PanoramaCommandOptions options;
-  graspmap_tools::Command command(
-      "fuse",
-      "With the folder of a camera rig: one cloud in the robot's frame from the depth images that "
-      "its cameras took at one time.");
+  Command command("fuse",
+                  "With the folder of a camera rig: one cloud in the robot's frame from the depth "
+                  "images that its cameras took at one time.");
   command.input("RIG_FOLDER", options.folder,
                 "folder of rig.yaml and CAMERA/STAMP.png (or images.csv)");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");

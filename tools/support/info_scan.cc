@@ -11,6 +11,7 @@
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 #include "libmap/trajectory/trajectory_error.h"
+#include "tools/support/info_json.h"
 
 namespace graspmap_tools {
 
@@ -26,8 +27,6 @@ using libmap::Trajectory;
 
 // Phones give each image its own focal length.
 constexpr std::size_t max_listed_cameras = 8;
-
-// ------------------------------------------------------------------------------------------ graph
 
 Json sessions_json(const libmap::PoseGraph& graph) {
   struct Session {
@@ -84,11 +83,9 @@ Json poses_json(const libmap::PoseGraph& graph, const Trajectory& trajectory) {
   double length_m = 0.0;
   for (const auto& [session, part] : by_session(graph, trajectory))
     length_m += libmap::path_length(part);
-  const libmap::Bounds3d bounds = libmap::bounds_of(positions);
-  const auto numbers = [](const Eigen::Vector3d& v) { return Json::array({v.x(), v.y(), v.z()}); };
   return {{"poses", trajectory.size()},
           {"path_length_m", length_m},
-          {"bounds_m", {{"min", numbers(bounds.min)}, {"max", numbers(bounds.max)}}}};
+          {"bounds_m", bounds_json(positions)}};
 }
 
 Json error_json(const Trajectory& estimate, const Trajectory& truth) {
@@ -115,21 +112,21 @@ void add_error(Json& json, const std::string& name, const Trajectory& estimate,
 
 Json errors_json(const libmap::PoseGraph& graph) {
   const Trajectory truth = trajectory_of(graph, PoseSource::ground_truth);
-  Json json = Json::object();
   if (truth.empty()) return nullptr;
+  Json json = Json::object();
   // Odometry starts again with each session.
   const auto sessions = by_session(graph, trajectory_of(graph, PoseSource::odometry));
   for (const auto& [session, part] : sessions)
     add_error(json, sessions.size() == 1 ? "odometry" : fmt::format("odometry {}", session), part,
               truth);
-  add_error(json, "stored", trajectory_of(graph, PoseSource::stored), truth);
+  add_error(json, "optimized", trajectory_of(graph, PoseSource::optimized), truth);
   return json.empty() ? Json(nullptr) : json;
 }
 
 Json graph_json(const libmap::PoseGraph& graph) {
   Json poses = Json::object();
   for (const PoseSource source :
-       {PoseSource::odometry, PoseSource::stored, PoseSource::ground_truth})
+       {PoseSource::odometry, PoseSource::optimized, PoseSource::ground_truth})
     poses[to_text(source)] = poses_json(graph, trajectory_of(graph, source));
   std::size_t labels = 0;
   std::size_t velocities = 0;
@@ -149,8 +146,6 @@ Json graph_json(const libmap::PoseGraph& graph) {
           {"poses", poses},
           {"trajectory_error", errors_json(graph)}};
 }
-
-// ----------------------------------------------------------------------------------------- images
 
 std::string distortion_text(const Camera& camera) {
   if (!camera.is_distorted()) return "none";
@@ -173,12 +168,6 @@ Json camera_json(const Camera& camera) {
 
 // Counts of nodes for each text of what they hold, in the order of the texts.
 using Counts = std::map<std::string, std::size_t>;
-
-Json counts_json(const Counts& counts) {
-  Json json = Json::object();
-  for (const auto& [text, count] : counts) json[text] = count;
-  return json;
-}
 
 std::string image_text(const libmap::ImageInfo& info) {
   return fmt::format("{} {} x {}, {}{}", to_text(info.format), info.width, info.height,
@@ -221,10 +210,10 @@ class ContentSummary {
     return {
         {"cameras", cameras_},
         {"more_cameras", seen_.size() > max_listed_cameras ? seen_.size() - max_listed_cameras : 0},
-        {"calibrations", counts_json(calibrations_)},
-        {"images", counts_json(images_)},
+        {"calibrations", calibrations_},
+        {"images", images_},
         {"image_bytes", image_bytes_},
-        {"depth", counts_json(depths_)},
+        {"depth", depths_},
         {"depth_bytes", depth_bytes_},
         {"laser_scans", laser_scans_},
         {"user_data_bytes", user_data_bytes_}};
@@ -234,18 +223,20 @@ class ContentSummary {
 
  private:
   void add_cameras(const NodeContent& content) {
-    const int width = content.color   ? content.color->width
-                      : content.depth ? content.depth->width
-                                      : 0;
-    const int height = content.color   ? content.color->height
-                       : content.depth ? content.depth->height
-                                       : 0;
-    try {
+    const auto add_all = [&](int width, int height) {
       const auto stereo = stereo_cameras_of(content.calibration, width, height);
       for (const libmap::StereoCamera& pair : stereo) add_camera(pair.left, pair.baseline_m);
       if (stereo.empty())
         for (const Camera& camera : cameras_of(content.calibration, width, height))
           add_camera(camera, 0.0);
+    };
+    try {
+      if (content.color)
+        add_all(content.color->width, content.color->height);
+      else if (content.depth)
+        add_all(content.depth->width, content.depth->height);
+      else
+        add_all(0, 0);
     } catch (const libmap::Error& error) {
       faults_.push_back(fmt::format("node {}: calibration: {}", content.node, error.what()));
     }

@@ -1,24 +1,14 @@
 #include "tools/support/map_frame.h"
 
-#include <cmath>
-
-#include "libmap/core/error.h"
-#include "libmap/core/text.h"
-
 namespace graspmap_tools {
 
-const std::vector<std::pair<std::string, PointFrame>>& point_frame_names() {
-  static const std::vector<std::pair<std::string, PointFrame>> names = {
-      {"input", PointFrame::input}, {"terrain", PointFrame::terrain}, {"map", PointFrame::map}};
-  return names;
+PointFrameNames point_frame_names() {
+  return {{"input", PointFrame::input}, {"terrain", PointFrame::terrain}, {"map", PointFrame::map}};
 }
 
-const std::vector<std::pair<std::string, PointFrame>>& listed_point_frame_names() {
-  static const auto names = [] {
-    auto all = point_frame_names();
-    all.insert(all.begin(), {"auto", PointFrame::automatic});
-    return all;
-  }();
+PointFrameNames listed_point_frame_names() {
+  PointFrameNames names = point_frame_names();
+  names.insert(names.begin(), {"auto", PointFrame::automatic});
   return names;
 }
 
@@ -58,7 +48,7 @@ void require_same_terrain_frame(const libmap::Manifest& points, const std::strin
   const libmap::Pose* own = points.find_transform(terrain_from_input_name);
   if (own == nullptr) return;
   const auto of_map = manifest_of(map);
-  const libmap::Pose* others = of_map ? of_map->find_transform(terrain_from_input_name) : nullptr;
+  const libmap::Pose* others = terrain_from_input_of(of_map);
   if (others == nullptr || own->matrix() != others->matrix())
     throw libmap::Error("its places lie in the terrain frame of another map",
                         {.file = file,
@@ -74,6 +64,10 @@ void carry_transform(const std::string& file, const char* name, Run& run) {
 }
 
 }  // namespace
+
+const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest) {
+  return manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
+}
 
 PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
                            Run& run) {
@@ -120,6 +114,11 @@ void carry_transforms(const std::string& input, Run& run) {
   carry_truth_transform(input, run);
 }
 
+void carry_frame(const std::string& input, Run& run) {
+  if (const auto manifest = libmap::read_manifest_of(input)) run.manifest().frame = manifest->frame;
+  carry_transforms(input, run);
+}
+
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run) {
   const auto manifest = libmap::read_manifest_of(map);
   if (points_frame == PointFrame::map) {
@@ -144,34 +143,18 @@ libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Ru
   return map_in_terrain ? *terrain_from_input : terrain_from_input->inverse();
 }
 
-libmap::Pose input_from_map(const std::string& map) {
-  const auto manifest = libmap::read_manifest_of(map);
-  const libmap::Pose* terrain_from_input =
-      manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
-  if (terrain_from_input == nullptr || manifest->frame != "terrain")
-    return libmap::Pose::Identity();
-  return terrain_from_input->inverse();
+libmap::Pose map_from_input(const std::optional<libmap::Manifest>& manifest) {
+  const libmap::Pose* pose = terrain_from_input_of(manifest);
+  return pose != nullptr && manifest->frame == "terrain" ? *pose : libmap::Pose::Identity();
+}
+
+libmap::Pose terrain_from_map(const std::optional<libmap::Manifest>& manifest) {
+  const libmap::Pose* pose = terrain_from_input_of(manifest);
+  return pose != nullptr && manifest->frame != "terrain" ? *pose : libmap::Pose::Identity();
 }
 
 Eigen::Vector3d up_of_map(const std::optional<libmap::Manifest>& manifest) {
-  const libmap::Pose* terrain_from_input =
-      manifest ? manifest->find_transform(terrain_from_input_name) : nullptr;
-  if (!terrain_from_input || manifest->frame == "terrain") return Eigen::Vector3d::UnitZ();
-  return terrain_from_input->linear().transpose() * Eigen::Vector3d::UnitZ();
-}
-
-Eigen::Vector3d parse_vector(const std::string& text, const std::string& field) {
-  Eigen::Vector3d vector;
-  std::string_view rest = text;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) {
-    const std::size_t comma = rest.find(',');
-    const auto value = libmap::parse_double(rest.substr(0, comma));
-    if (!value || !std::isfinite(*value) || (comma == std::string_view::npos) != (axis == 2))
-      throw libmap::Error("not three numbers", {.field = field, .value = text, .bound = "X,Y,Z"});
-    vector[axis] = *value;
-    rest = comma == std::string_view::npos ? std::string_view() : rest.substr(comma + 1);
-  }
-  return vector;
+  return terrain_from_map(manifest).linear().transpose() * Eigen::Vector3d::UnitZ();
 }
 
 }  // namespace graspmap_tools

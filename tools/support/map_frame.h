@@ -2,10 +2,6 @@
 #pragma once
 
 #include <Eigen/Core>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
 
 #include "libmap/core/pose.h"
 #include "libmap/core/table.h"
@@ -17,9 +13,10 @@ namespace graspmap_tools {
 // of the map that `graspmap crop` made the site from or in which a simulated robot stood.
 enum class PointFrame { input, terrain, map, automatic };
 // Without `automatic`, for what comes from no file.
-const std::vector<std::pair<std::string, PointFrame>>& point_frame_names();
+using PointFrameNames = std::vector<std::pair<std::string, PointFrame>>;
+PointFrameNames point_frame_names();
 // With it: as the manifest beside the file of points says, else `input`.
-const std::vector<std::pair<std::string, PointFrame>>& listed_point_frame_names();
+PointFrameNames listed_point_frame_names();
 
 // The frame of the points in the file `points`: `asked`, unless that is automatic. The run's
 // parameter points_frame becomes what was found. Throws Error if the points lie in the terrain
@@ -30,8 +27,9 @@ PointFrame frame_of_points(const std::string& points, PointFrame asked, const st
 // The columns x, y, z, in meters. Throws Error naming the file, the row and the column.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
-// The name of the transform of what was scored.
+// The transform of what was scored; nullptr if the manifest has none.
 inline constexpr const char* terrain_from_input_name = "terrain_from_input";
+const libmap::Pose* terrain_from_input_of(const std::optional<libmap::Manifest>& manifest);
 
 // The name of the transform that `crop` and `simulate cameras` make and that others carry on. It
 // always leads from the map as it was before the first of them.
@@ -51,7 +49,9 @@ bool is_from_true_frame(const std::string& file);
 // For an output in the frame of `input`: its manifest gets the input's site_from_map and
 // ground_truth_from_poses, those that it has.
 void carry_transforms(const std::string& input, Run& run);
-// The latter alone.
+// The same and the frame's name.
+void carry_frame(const std::string& input, Run& run);
+// ground_truth_from_poses alone.
 void carry_truth_transform(const std::string& input, Run& run);
 
 // For an output in the terrain frame of `map`: its manifest gets the map's terrain_from_input.
@@ -62,15 +62,13 @@ void carry_terrain_transform(const std::string& map, Run& run);
 // was not cropped.
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run);
 
-// From the points in `map` to the cloud that was scored, as the map's manifest says; the identity
-// if it says nothing.
-libmap::Pose input_from_map(const std::string& map);
+// From the cloud that was scored to the points of a map, and from these to its terrain frame, as
+// the map's manifest says; the identity if it says nothing.
+libmap::Pose map_from_input(const std::optional<libmap::Manifest>& manifest);
+libmap::Pose terrain_from_map(const std::optional<libmap::Manifest>& manifest);
 
 // The outside of the regression plane in the frame of a map's points, as the map's manifest says;
 // the z axis if it says nothing.
 Eigen::Vector3d up_of_map(const std::optional<libmap::Manifest>& manifest);
-
-// "X,Y,Z". Throws Error naming `field`.
-Eigen::Vector3d parse_vector(const std::string& text, const std::string& field);
 
 }  // namespace graspmap_tools

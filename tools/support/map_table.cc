@@ -1,25 +1,12 @@
 #include "tools/support/map_table.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "libgtd/evaluate/map_summary.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
 #include "libmap/view/virtual_display.h"
 #include "tools/support/command_line.h"
-#include "tools/support/map_frame.h"
-#include "tools/support/text_list.h"
+#include "tools/support/option_values.h"
 
 namespace graspmap_tools {
 
@@ -40,11 +27,8 @@ void bind(libmap::ParameterTable& table, MapTableOptions& options) {
 namespace {
 
 double cutoff_of(const MapTableOptions& options, const libgtd::MapSummaryOptions& own) {
-  if (options.cutoff == "auto") return own.graspability_threshold;
-  const auto value = libmap::parse_double(options.cutoff);
-  if (value && std::isfinite(*value)) return *value;
-  throw libmap::Error("not a score",
-                      {.field = "--cutoff", .value = options.cutoff, .bound = "auto or a number"});
+  return parse_number_or("auto", options.cutoff, "not a score", "--cutoff", "auto or a number")
+      .value_or(own.graspability_threshold);
 }
 
 struct ReadMap {
@@ -83,13 +67,11 @@ std::vector<libgtd::MapPair> compare_all(const std::vector<libgtd::SummarizedMap
   std::vector<libgtd::MapPair> pairs;
   for (std::size_t first = 0; first < maps.size(); ++first) {
     for (std::size_t second = first + 1; second < maps.size(); ++second) {
-      try {
-        pairs.push_back(libgtd::compare_pair(
+      pairs.push_back(in_file(maps[first].name + " and " + maps[second].name, [&] {
+        return libgtd::compare_pair(
             voxels[first], voxels[second],
-            terrain_from_input(maps[first]) * terrain_from_input(maps[second]).inverse()));
-      } catch (const libmap::Error& error) {
-        throw error.in_file(maps[first].name + " and " + maps[second].name);
-      }
+            terrain_from_input(maps[first]) * terrain_from_input(maps[second]).inverse());
+      }));
       pairs.back().first = first;
       pairs.back().second = second;
     }
@@ -153,9 +135,7 @@ libmap::Chart chart_of(const libmap::Table& table, const std::string& x, const s
   return chart;
 }
 
-using Files = std::vector<std::pair<std::string, Run::Writer>>;
-
-void add_chart(Files& files, const std::string& name, const libmap::Chart& chart) {
+void add_chart(Run::Files& files, const std::string& name, const libmap::Chart& chart) {
   if (chart.curves.empty()) return;
   files.emplace_back(name + ".svg", [chart](const std::filesystem::path& temporary) {
     libmap::write_chart_svg(temporary, chart);
@@ -165,7 +145,7 @@ void add_chart(Files& files, const std::string& name, const libmap::Chart& chart
   });
 }
 
-void add_charts(Files& files, const libmap::Table& maps, const libmap::Table& histograms,
+void add_charts(Run::Files& files, const libmap::Table& maps, const libmap::Table& histograms,
                 const MapTableOptions& options) {
   libmap::Chart scores = chart_of(histograms, "score", "share", "map");
   scores.y_axis.title = "share of the evaluated voxels";
@@ -192,35 +172,26 @@ void tabulate_maps(const std::vector<std::string>& map_files, const std::string&
     expected = libgtd::parse_expected_map(libmap::read_csv(options.expected));
     run.add_input(options.expected);
   }
-  const std::vector<std::string> names = split_texts(options.names);
-  if (names.size() > map_files.size())
-    throw libmap::Error("more names than maps",
-                        {.field = "--names",
-                         .value = std::to_string(names.size()),
-                         .bound = "<= " + std::to_string(map_files.size())});
+  const std::vector<std::string> names =
+      split_texts(options.names, map_files.size(), "more names than maps", "--names");
   std::vector<libgtd::SummarizedMap> maps;
   std::vector<libgtd::VoxelMap> voxels;
   for (const std::string& file : map_files) {
-    try {
-      ReadMap read = summarize_one(file, options, expected ? &*expected : nullptr, run);
-      if (maps.size() < names.size() && !names[maps.size()].empty())
-        read.summarized.name = names[maps.size()];
-      maps.push_back(std::move(read.summarized));
-      voxels.push_back(std::move(read.voxels));
-    } catch (const libmap::Error& error) {
-      throw error.in_file(file);
-    }
+    ReadMap read = in_file(
+        file, [&] { return summarize_one(file, options, expected ? &*expected : nullptr, run); });
+    if (maps.size() < names.size() && !names[maps.size()].empty())
+      read.summarized.name = names[maps.size()];
+    maps.push_back(std::move(read.summarized));
+    voxels.push_back(std::move(read.voxels));
     run.add_input(file);
     say(maps.back(), run);
   }
   const auto table = [](const libmap::Table& content) {
-    return [text = libmap::to_csv(content)](const std::filesystem::path& temporary) {
-      libmap::write_text(temporary, text);
-    };
+    return Run::text_writer(libmap::to_csv(content));
   };
   const libmap::Table rows = libgtd::summary_table(maps);
   const libmap::Table histograms = libgtd::histogram_table(maps);
-  Files files = {{"maps.csv", table(rows)}, {"histograms.csv", table(histograms)}};
+  Run::Files files = {{"maps.csv", table(rows)}, {"histograms.csv", table(histograms)}};
   if (options.pairs)
     files.emplace_back("pairs.csv", table(libgtd::pair_table(maps, run.timed("pairs", [&] {
                          return compare_all(maps, voxels);

@@ -1,12 +1,8 @@
 // `graspmap analyze MAP MAP...`: several maps in one table, one row per map.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "libmap/core/parameters.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/run.h"
 
 namespace graspmap_tools {
 

@@ -1,11 +1,8 @@
 #include "tools/support/map_tiles.h"
 
-#include <algorithm>
-#include <utility>
-
 #include "libgtd/score/tile_store_io.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 
@@ -13,11 +10,6 @@ bool is_tile_store(const std::string& path) { return libgtd::is_tile_store_name(
 
 std::filesystem::path store_index_path(const std::string& store) {
   return std::filesystem::path(store) / "index.json";
-}
-
-std::string without_trailing_slash(std::string path) {
-  while (path.size() > 1 && path.back() == '/') path.pop_back();
-  return path;
 }
 
 MapTiles::MapTiles(const std::string& store)
@@ -56,11 +48,9 @@ libmap::PointCloud MapTiles::read(const std::filesystem::path& file,
                          .field = "points",
                          .value = std::to_string(cloud.size()),
                          .bound = std::to_string(tile.voxels)});
-  try {
+  in_file(file.string(), [&] {
     if (float64_positions_) libgtd::restore_positions(index_, cloud);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file.string());
-  }
+  });
   return cloud;
 }
 

@@ -17,9 +17,6 @@ bool is_tile_store(const std::string& path);
 
 std::filesystem::path store_index_path(const std::string& store);
 
-// A path without '/' at its end, so that manifests are found beside it.
-std::string without_trailing_slash(std::string path);
-
 class MapTiles {
  public:
   // Throws Error naming the store or its index: missing, incomplete, damaged, without a tile.

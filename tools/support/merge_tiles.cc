@@ -1,28 +1,17 @@
 #include "tools/support/merge_tiles.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <optional>
-#include <string>
-#include <vector>
-
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/tile_store.h"
 #include "libgtd/tile_detection.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/pcd_parts.h"
-#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/result_counts.h"
+
+using namespace graspmap_tools;
 
 namespace {
-
-using graspmap_tools::Run;
 
 libmap::Manifest manifest_of(const std::string& tile) {
   const auto manifest = libmap::read_manifest_of(tile);
@@ -65,10 +54,8 @@ void require_same_map(const libmap::Manifest& first, const libmap::Manifest& oth
 
 // "K/N"; empty if it is none.
 std::string share_of(const libmap::Manifest& manifest) {
-  const libmap::ManifestValue* value = manifest.find_parameter("tile");
-  return value != nullptr && std::holds_alternative<std::string>(*value)
-             ? std::get<std::string>(*value)
-             : std::string();
+  const auto* share = std::get_if<std::string>(manifest.find_parameter("tile"));
+  return share == nullptr ? std::string() : *share;
 }
 
 // One of several.
@@ -134,24 +121,20 @@ std::int64_t count_of(const libmap::PointCloud& map, const char* flag) {
   return field == nullptr ? 0 : std::count(field->values.begin(), field->values.end(), 1.0);
 }
 
-double number_of(const libmap::ManifestValue* value) {
-  if (value != nullptr && std::holds_alternative<double>(*value)) return std::get<double>(*value);
-  if (value != nullptr && std::holds_alternative<std::int64_t>(*value))
-    return static_cast<double>(std::get<std::int64_t>(*value));
-  return 0.0;
-}
-
 // A share has slopes alone: obstacles are evaluated by the whole map.
 void evaluate_obstacles(const libmap::Manifest& part, libmap::PointCloud& whole, Run& run) {
   if (whole.find_field("slope_deg") == nullptr) return;
-  const auto parameter = [&](const char* name) { return number_of(part.find_parameter(name)); };
+  const auto number = [](const libmap::ManifestValue* value) {
+    return libmap::number_of(value).value_or(0.0);
+  };
+  const auto parameter = [&](const char* name) { return number(part.find_parameter(name)); };
   const std::size_t count =
       libgtd::add_obstacles(whole, parameter("voxel_size_m"),
                             {.slope_deg = parameter("obstacle_slope_deg"),
                              .height_m = parameter("obstacle_height_m"),
-                             .normal_radius_m = number_of(part.find_result("normal_radius_m"))});
-  run.manifest().results.emplace_back("obstacle_voxels", static_cast<std::int64_t>(count));
-  run.say(fmt::format("{} voxels are obstacles", count));
+                             .normal_radius_m = number(part.find_result("normal_radius_m"))});
+  run.add_results({{"obstacle_voxels", count}});
+  run.say("{} voxels are obstacles", count);
 }
 
 // The tiles of a store that share their i, one after the other: consecutive in the map's order.
@@ -169,26 +152,19 @@ std::vector<TileRow> rows_of(const libgtd::TileStoreIndex& index) {
 }
 
 libmap::PointCloud joined(const std::vector<libmap::PointCloud>& parts, const std::string& name) {
-  try {
-    return libgtd::merge_map_clouds(parts);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(name);
-  }
+  return in_file(name, [&] { return libgtd::merge_map_clouds(parts); });
 }
 
-libmap::PointCloud load_row(const graspmap_tools::MapTiles& tiles, const std::string& store,
-                            const TileRow& row) {
+libmap::PointCloud load_row(const MapTiles& tiles, const std::string& store, const TileRow& row) {
   std::vector<libmap::PointCloud> parts(row.end - row.begin);
-  libmap::parallel_for(parts.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) parts[n] = tiles.load_checked(row.begin + n);
-  });
+  libmap::parallel_each(parts.size(),
+                        [&](std::size_t n) { parts[n] = tiles.load_checked(row.begin + n); });
   return joined(parts, store);
 }
 
 // A PCD row by row; other formats need the whole map in memory.
-void write_store(const graspmap_tools::MapTiles& tiles, const std::string& store,
-                 const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
-                 Run& run) {
+void write_store(const MapTiles& tiles, const std::string& store, const std::filesystem::path& file,
+                 const libmap::CloudWriteOptions& writing, Run& run) {
   const std::vector<TileRow> rows = rows_of(tiles.index());
   run.progress().begin("merge", rows.size());
   if (libmap::format_of(file) == ".pcd") {
@@ -210,24 +186,17 @@ void merge_store(const std::string& store, const std::string& output,
   if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
     throw libmap::Error("a tile store is written as binary .pcd",
                         {.file = output, .field = "--encoding"});
-  const graspmap_tools::MapTiles tiles(store);
+  const MapTiles tiles(store);
   const libgtd::TileStoreIndex& index = tiles.index();
-  std::uint64_t border = 0;
-  std::uint64_t graspable = 0;
-  for (const libgtd::StoredTile& tile : index.tiles) {
-    border += tile.border_voxels;
-    graspable += tile.graspable_voxels;
-  }
   copy_common_facts(index.manifest, run.manifest());
   run.manifest().inputs = index.manifest.inputs;
-  run.add_input(graspmap_tools::store_index_path(store));
-  const graspmap_tools::ResultCounts count(run.manifest());
-  count("scored_voxels", index.voxels());
-  count("border_voxels", border);
-  count("graspable_voxels", graspable);
+  run.add_input(store_index_path(store));
+  run.add_results({{"scored_voxels", index.voxels()},
+                   {"border_voxels", index.border_voxels()},
+                   {"graspable_voxels", index.graspable_voxels()}});
   run.write_output(
       output, [&](const auto& temporary) { write_store(tiles, store, temporary, writing, run); });
-  run.say(fmt::format("{} scored voxels from {} tiles", index.voxels(), index.tiles.size()));
+  run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
 }
 
 }  // namespace
@@ -242,7 +211,7 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
                                  const libmap::CloudWriteOptions& writing, Run& run) {
   libmap::require_cloud_format(output);
   run.claim_output(output, tiles);
-  const auto store = std::find_if(tiles.begin(), tiles.end(), graspmap_tools::is_tile_store);
+  const auto store = std::find_if(tiles.begin(), tiles.end(), is_tile_store);
   if (store != tiles.end()) {
     if (tiles.size() > 1) throw libmap::Error("a tile store is merged by itself", {.file = *store});
     return merge_store(*store, output, writing, run);
@@ -263,15 +232,12 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
   // The terrain and the gripper that the parts were made from, then the parts.
   run.manifest().inputs = manifests.front().inputs;
   for (const std::string& tile : tiles) run.add_input(tile);
-  run.manifest().results.emplace_back("scored_voxels", static_cast<std::int64_t>(whole.size()));
-  run.manifest().results.emplace_back("border_voxels", count_of(whole, "border"));
-  run.manifest().results.emplace_back("graspable_voxels", count_of(whole, "graspable"));
-  run.say(fmt::format("{} scored voxels from {} files", whole.size(), parts.size()));
-  try {
-    evaluate_obstacles(manifests.front(), whole, run);
-  } catch (const libmap::Error& error) {
-    throw error.in_file(libmap::manifest_path(tiles.front()).string());
-  }
+  run.add_results({{"scored_voxels", whole.size()},
+                   {"border_voxels", count_of(whole, "border")},
+                   {"graspable_voxels", count_of(whole, "graspable")}});
+  run.say("{} scored voxels from {} files", whole.size(), parts.size());
+  in_file(libmap::manifest_path(tiles.front()).string(),
+          [&] { evaluate_obstacles(manifests.front(), whole, run); });
   run.write_output(output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, whole, writing); });
 }

@@ -1,9 +1,6 @@
 // The shares of a map, or the tiles of a store, as one map.
 #pragma once
 
-#include <string>
-#include <vector>
-
 #include "libmap/cloud/cloud_io.h"
 #include "tools/support/run.h"
 

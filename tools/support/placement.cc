@@ -1,61 +1,35 @@
 #include "tools/support/placement.h"
 
-#include <cmath>
 #include <filesystem>
-#include <string_view>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
 #include "libmap/scan/text_lines.h"
+#include "tools/support/option_values.h"
 
 namespace graspmap_tools {
 
 namespace fs = std::filesystem;
-
-std::vector<double> parse_numbers(const std::string& text, std::size_t count,
-                                  const std::string& field, const std::string& bound) {
-  std::vector<double> numbers;
-  std::string_view rest = text;
-  while (true) {
-    const std::size_t comma = rest.find(',');
-    const auto number = libmap::parse_double(rest.substr(0, comma));
-    if (!number || !std::isfinite(*number)) break;
-    numbers.push_back(*number);
-    if (comma == std::string_view::npos) {
-      if (numbers.size() == count) return numbers;
-      break;
-    }
-    rest = rest.substr(comma + 1);
-  }
-  throw libmap::Error("not " + std::to_string(count) + " numbers",
-                      {.file = {}, .field = field, .value = text, .bound = bound});
-}
 
 namespace {
 
 libmap::Pose read_matrix(const fs::path& path) {
   const std::string file = path.string();
   const std::string text = libmap::read_whole_file(path, std::uint64_t{1} << 16U);
+  const auto refuse = [&](const std::string& field, const std::string& value) {
+    throw libmap::Error(
+        "no transform",
+        {.file = file, .field = field, .value = value, .bound = "four rows of four numbers"});
+  };
   Eigen::Matrix4d matrix;
   Eigen::Index row = 0;
   for (const libmap::TextLine& line : libmap::split_lines(text)) {
     if (libmap::is_comment(line)) continue;
-    if (row == 4 || line.words.size() != 4)
-      throw libmap::Error("no transform", {.file = file,
-                                           .field = libmap::name_of(line),
-                                           .value = {},
-                                           .bound = "four rows of four numbers"});
-    const std::vector<double> numbers = libmap::numbers_of(line, 0, 4, file);
-    for (Eigen::Index column = 0; column < 4; ++column)
-      matrix(row, column) = numbers[static_cast<std::size_t>(column)];
-    ++row;
+    if (row == 4 || line.words.size() != 4) refuse(libmap::name_of(line), {});
+    matrix.row(row++) = Eigen::RowVector4d(libmap::numbers_of(line, 0, 4, file).data());
   }
-  if (row != 4)
-    throw libmap::Error("no transform", {.file = file,
-                                         .field = "rows",
-                                         .value = std::to_string(row),
-                                         .bound = "four rows of four numbers"});
+  if (row != 4) refuse("rows", std::to_string(row));
   constexpr double tolerance = 1e-3;
   const Eigen::Matrix3d rotation = matrix.topLeftCorner<3, 3>();
   if (!(rotation.transpose() * rotation).isApprox(Eigen::Matrix3d::Identity(), tolerance) ||

@@ -3,17 +3,11 @@
 
 #include <optional>
 #include <string>
-#include <vector>
 
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
 
 namespace graspmap_tools {
-
-// `count` finite numbers with commas between them. Throws Error naming `field` and `bound`, the
-// form that it must have.
-std::vector<double> parse_numbers(const std::string& text, std::size_t count,
-                                  const std::string& field, const std::string& bound);
 
 // "X,Y,Z,ROLL,PITCH,YAW" in meters and degrees about the fixed axes, roll first; or the name of a
 // file of four rows of four numbers, as `crop` writes. Empty: the identity. Throws Error.

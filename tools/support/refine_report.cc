@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <cmath>
 #include <iterator>
 #include <map>
@@ -17,8 +16,6 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr double degrees = 180.0 / M_PI;
-
-Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
 // Why pairs of frames gave no link, by its name in both kinds of report.
 std::vector<std::pair<const char*, std::size_t>> rejections_of(
@@ -79,7 +76,7 @@ Json stage_json(const libmap::StageReport& stage) {
   if (stage.closures.candidates > 0) json["closures"] = rejections_json(stage.closures);
   if (stage.held_out.any()) json["held_out"] = held_out_json(stage.held_out);
   if (!stage.groups.empty()) json["links"] = groups_json(stage.groups);
-  for (const auto& [name, value] : stage.figures) json[name] = number(value);
+  for (const auto& [name, value] : stage.figures) json[name] = value;
   if (stage.error) {
     json["absolute_error"] = error_json(stage.error->absolute);
     json["relative_error"] = error_json(stage.error->relative);
@@ -87,18 +84,6 @@ Json stage_json(const libmap::StageReport& stage) {
   if (stage.rejected_error)
     json["absolute_error_given_up"] = error_json(stage.rejected_error->absolute);
   return json;
-}
-
-Json link_json(const libmap::PoseLink& link) {
-  return {{"from", link.from}, {"to", link.to}, {"type", to_text(link.type)}};
-}
-
-double deviation_m(const libmap::Matrix6d& covariance) {
-  return std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0);
-}
-
-double deviation_deg(const libmap::Matrix6d& covariance) {
-  return std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3.0) * degrees;
 }
 
 // Standard deviations of each node against its part's gauge node.
@@ -111,18 +96,17 @@ Json nodes_json(const libmap::RefinementResult& result) {
       for (int column = 0; column < 6; ++column) values.push_back(covariance(row, column));
       rows.push_back(values);
     }
-    json.push_back({{"node", node},
-                    {"deviation_m", deviation_m(covariance)},
-                    {"deviation_deg", deviation_deg(covariance)},
-                    {"covariance", rows}});
+    json.push_back(
+        {{"node", node},
+         {"deviation_m", std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0)},
+         {"deviation_deg", std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3.0) * degrees},
+         {"covariance", rows}});
   }
   return json;
 }
 
 std::string numbers_text(const std::vector<int>& numbers) {
-  std::string text;
-  for (const int number : numbers) text += fmt::format(" {}", number);
-  return text.empty() ? " none" : text;
+  return numbers.empty() ? " none" : fmt::format(" {}", fmt::join(numbers, " "));
 }
 
 void add_held_out(const libmap::StageReport& stage, std::string& text) {
@@ -143,8 +127,7 @@ void add_errors(const libmap::StageReport& stage, std::string& text) {
   const auto out = std::back_inserter(text);
   const auto line = [&](const char* what, const libmap::TrajectoryError& error) {
     fmt::format_to(out,
-                   "  {} error: rmse {:.3f} mm, median {:.3f}, max {:.3f}; "
-                   "rotation mean {:.4f} "
+                   "  {} error: rmse {:.3f} mm, median {:.3f}, max {:.3f}; rotation mean {:.4f} "
                    "deg, max {:.4f}\n",
                    what, 1e3 * error.rmse_m, 1e3 * error.median_m, 1e3 * error.max_m,
                    error.mean_rotation_deg, error.max_rotation_deg);
@@ -168,8 +151,7 @@ void add_stage(const libmap::StageReport& stage, std::string& text) {
   }
   for (const auto& [name, group] : stage.groups)
     fmt::format_to(out,
-                   "  links of {}: {}, {} rejected; residuals {:.2f} mm {:.3f} deg -> "
-                   "{:.2f} mm "
+                   "  links of {}: {}, {} rejected; residuals {:.2f} mm {:.3f} deg -> {:.2f} mm "
                    "{:.3f} deg; stated deviations x {:.3g} and x {:.3g}\n",
                    name, group.links, group.rejected, 1e3 * group.translation_rms_before_m,
                    group.rotation_rms_before_deg, 1e3 * group.translation_rms_m,
@@ -189,7 +171,8 @@ std::string refinement_json(const std::string& scan, const libmap::RefinementRes
   for (const libmap::GraphComponent& part : result.components)
     parts.push_back({{"nodes", part.nodes.size()}, {"gauge_node", part.gauge_node}});
   Json rejected = Json::array();
-  for (const libmap::PoseLink& link : result.rejected_links) rejected.push_back(link_json(link));
+  for (const libmap::PoseLink& link : result.rejected_links)
+    rejected.push_back({{"from", link.from}, {"to", link.to}, {"type", to_text(link.type)}});
   Json skipped = Json::array();
   for (const auto& [node, fault] : result.skipped)
     skipped.push_back({{"node", node}, {"reason", fault.what()}});
@@ -235,10 +218,10 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
     fmt::format_to(out, "stored link {} -> {} rejected: {}\n", link.from, link.to,
                    to_text(link.type));
   for (const std::string& warning : result.warnings) fmt::format_to(out, "warning: {}\n", warning);
-  fmt::format_to(out,
-                 "\nstandard deviations of each pose against its part's fixed node, "
-                 "in its own axes\n"
-                 "  node     x mm     y mm     z mm    x deg    y deg    z deg\n");
+  fmt::format_to(
+      out,
+      "\nstandard deviations of each pose against its part's fixed node, in its own axes\n"
+      "  node     x mm     y mm     z mm    x deg    y deg    z deg\n");
   for (const auto& [node, covariance] : result.covariance) {
     fmt::format_to(out, "{:6}", node);
     for (int n = 0; n < 6; ++n)

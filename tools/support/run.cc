@@ -1,15 +1,12 @@
 #include "tools/support/run.h"
 
-#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <optional>
+#include <iostream>
+#include <nlohmann/json.hpp>
 #include <sstream>
-#include <utility>
 
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/folder_output.h"
 #include "libmap/core/named_output.h"
 #include "libmap/core/unfinished_outputs.h"
@@ -20,11 +17,6 @@ namespace graspmap_tools {
 namespace fs = std::filesystem;
 
 namespace {
-
-// "maps/" and "maps" name the same folder.
-fs::path without_trailing_slash(const fs::path& folder) {
-  return folder.has_filename() ? folder : folder.parent_path();
-}
 
 std::optional<libmap::Manifest> own_manifest_of(const fs::path& output) {
   try {
@@ -50,8 +42,7 @@ void require_other_than_inputs(const fs::path& output, const std::vector<std::st
       throw libmap::Error("is the input: the output needs another name", {.file = output.string()});
 }
 
-void write_named(const libmap::OutputFile& output,
-                 const std::function<void(const fs::path&)>& writer) {
+void write_named(const libmap::OutputFile& output, const Run::Writer& writer) {
   libmap::write_named(output.temporary_path(), output.final_path(), writer);
 }
 
@@ -73,6 +64,31 @@ void make_folder(const fs::path& folder) {
 
 }  // namespace
 
+void add_results(const Results& results, libmap::Manifest& manifest) {
+  for (const Result& result : results)
+    if (result.value) manifest.results.emplace_back(result.name, *result.value);
+}
+
+std::string without_trailing_slash(std::string path) {
+  while (path.size() > 1 && path.back() == '/') path.pop_back();
+  return path;
+}
+
+nlohmann::ordered_json to_json(const libmap::ManifestValue& value) {
+  return std::visit([](const auto& held) { return nlohmann::ordered_json(held); }, value);
+}
+
+nlohmann::ordered_json to_json(const Results& results) {
+  nlohmann::ordered_json json = nlohmann::ordered_json::object();
+  for (const Result& result : results)
+    json[result.name] = result.value ? to_json(*result.value) : nlohmann::ordered_json();
+  return json;
+}
+
+void print_json(const nlohmann::ordered_json& json) {
+  std::cout << json.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace) << "\n";
+}
+
 Run::Run(std::string command, RunOptions options, libmap::Progress& progress)
     : command_(std::move(command)), options_(options), progress_(progress) {
   manifest_.command = command_;
@@ -93,10 +109,17 @@ void Run::say(const std::string& text) {
 void Run::warn(const std::string& text) { spdlog::warn("{}", message_text(text)); }
 void Run::detail(const std::string& text) { spdlog::debug("{}", message_text(text)); }
 
+void Run::add_timings(const std::vector<std::pair<std::string, double>>& timings_s,
+                      const std::string& stage) {
+  for (const auto& [step, seconds] : timings_s) {
+    manifest_.timings_s.emplace_back(stage.empty() ? step : stage + ": " + step, seconds);
+    detail(fmt::format("{}: {:.3f} s", manifest_.timings_s.back().first, seconds));
+  }
+}
+
 Run::Timing::~Timing() {
-  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
-  run_.manifest_.timings_s.emplace_back(name_, taken.count());
-  spdlog::debug("{}: {:.3f} s", name_, taken.count());
+  const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start;
+  run.add_timings({{name, taken.count()}});
 }
 
 void Run::claim_output(const fs::path& path, const std::vector<std::string>& inputs) {
@@ -122,21 +145,38 @@ void Run::claim_manifest(const fs::path& output) {
   }
 }
 
-Run::Writer Run::manifest_writer() const {
-  return [this](const fs::path& temporary) {
-    libmap::write_text(temporary, libmap::to_json(manifest_));
-  };
-}
-
 libmap::OutputFile Run::begin_manifest(const fs::path& output) {
   claim_manifest(output);
-  auto claimed = claimed_manifests_.extract(output.string());
-  libmap::OutputFile manifest = std::move(claimed.mapped());
-  return manifest;
+  return std::move(claimed_manifests_.extract(output.string()).mapped());
 }
 
-void Run::write_output(const fs::path& path, const std::function<void(const fs::path&)>& writer) {
+void Run::write_together(const fs::path& output, const Files& files, bool is_timed) {
+  // The manifest goes first: an output without one would not be recognized as ours, and `make`
+  // evaluates by the output, which is then still the old one.
+  std::vector<libmap::OutputFile> outputs;
+  outputs.push_back(begin_manifest(output));
+  const auto write = [&] {
+    for (const auto& [file, writer] : files) {
+      outputs.emplace_back(file);
+      write_named(outputs.back(), writer);
+    }
+  };
+  is_timed ? timed("write", write) : write();
+  write_named(outputs.front(), text_writer(libmap::to_json(manifest_)));
+  libmap::commit_together(outputs);
+}
+
+Run::Writer Run::text_writer(std::string text) {
+  return
+      [text = std::move(text)](const fs::path& temporary) { libmap::write_text(temporary, text); };
+}
+
+void Run::write_output(const fs::path& path, const Writer& writer) {
   write_outputs(path, {{path, writer}});
+}
+
+void Run::write_text(const fs::path& path, const std::string& text) {
+  write_output(path, text_writer(text));
 }
 
 void Run::require_own_companions(const fs::path& path, const std::vector<fs::path>& others) {
@@ -154,23 +194,12 @@ void Run::write_outputs(const fs::path& path, const Files& files) {
   std::vector<fs::path> paths;
   for (const auto& [file, writer] : files) paths.push_back(file);
   require_own_companions(path, paths);
-  // The manifest goes first: an output without one would not be recognized as ours, and `make`
-  // evaluates by the output, which is then still the old one.
-  std::vector<libmap::OutputFile> outputs;
-  outputs.push_back(begin_manifest(path));
-  timed("write", [&] {
-    for (const auto& [file, writer] : files) {
-      outputs.emplace_back(file);
-      write_named(outputs.back(), writer);
-    }
-  });
-  write_named(outputs.front(), manifest_writer());
-  libmap::commit_together(outputs);
+  write_together(path, files, true);
 }
 
 void Run::claim_output_folder(const fs::path& given) {
   require_own_folder(given, ": --force writes into it");
-  const fs::path folder = without_trailing_slash(given);
+  const fs::path folder = without_trailing_slash(given.string());
   const fs::path place = folder.has_parent_path() ? folder.parent_path() : ".";
   if (options_.dry_run && !fs::exists(place)) return;
   make_folder(place);
@@ -178,7 +207,7 @@ void Run::claim_output_folder(const fs::path& given) {
 }
 
 void Run::require_own_folder(const fs::path& given, const std::string& remedy) {
-  const fs::path folder = without_trailing_slash(given);
+  const fs::path folder = without_trailing_slash(given.string());
   if (fs::exists(folder) && !fs::is_directory(folder))
     throw libmap::Error("is a file, not a folder", {.file = folder.string()});
   if (fs::exists(folder) && holds_outputs(folder) && !options_.force) {
@@ -193,21 +222,15 @@ void Run::require_own_folder(const fs::path& given, const std::string& remedy) {
   if (!options_.force) require_no_foreign_manifest(folder);
 }
 
-void Run::write_output_folder(const fs::path& given,
-                              const std::vector<std::pair<std::string, Writer>>& files) {
+void Run::write_output_folder(const fs::path& given, const Files& files) {
   if (options_.dry_run) return;
-  const fs::path folder = without_trailing_slash(given);
+  const fs::path folder = without_trailing_slash(given.string());
   const bool is_new = !fs::exists(folder);
   make_folder(folder);
   try {
-    std::vector<libmap::OutputFile> outputs;
-    outputs.push_back(begin_manifest(folder));
-    for (const auto& [name, writer] : files) {
-      outputs.emplace_back(folder / name);
-      write_named(outputs.back(), writer);
-    }
-    write_named(outputs.front(), manifest_writer());
-    libmap::commit_together(outputs);
+    Files inside;
+    for (const auto& [name, writer] : files) inside.emplace_back(folder / name, writer);
+    write_together(folder, inside, false);
   } catch (...) {
     std::error_code ignored;
     if (is_new) fs::remove(folder, ignored);
@@ -221,17 +244,17 @@ void Run::claim_output_tree(const fs::path& given, const std::vector<std::string
   require_own_folder(given, "");
   // Made and dropped at once: what cannot be written or replaced is found before the work.
   const libmap::OutputFolder probe(given, names);
-  claim_manifest(without_trailing_slash(given));
+  claim_manifest(without_trailing_slash(given.string()));
 }
 
 void Run::write_output_tree(const fs::path& given, const std::vector<std::string>& names,
                             const Writer& writer) {
   if (options_.dry_run) return writer({});
-  const fs::path folder = without_trailing_slash(given);
+  const fs::path folder = without_trailing_slash(given.string());
   libmap::OutputFile manifest = begin_manifest(folder);
   libmap::OutputFolder output(folder, names);
   timed("write", [&] { libmap::write_named(output.temporary_path(), folder, writer); });
-  write_named(manifest, manifest_writer());
+  write_named(manifest, text_writer(libmap::to_json(manifest_)));
   const libmap::OutputsInStep step;
   manifest.commit();
   output.commit();

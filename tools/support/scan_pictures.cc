@@ -1,16 +1,5 @@
 #include "tools/support/scan_pictures.h"
-#include "tools/support/result_counts.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <filesystem>
-#include <optional>
-#include <utility>
-#include <vector>
-
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/parallel.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/image/image_sharpness.h"
@@ -28,15 +17,8 @@ namespace {
 // So many frames are in memory at a time.
 constexpr std::size_t batch_size = 8;
 
-const std::vector<std::string>& bundler_names() {
-  static const std::vector<std::string> names = {"bundle.out", "images", "list.txt"};
-  return names;
-}
-
-const std::vector<std::string>& colmap_names() {
-  static const std::vector<std::string> names = {"images", "sparse"};
-  return names;
-}
+const std::vector<std::string> bundler_names = {"bundle.out", "images", "list.txt"};
+const std::vector<std::string> colmap_names = {"images", "sparse"};
 
 // One camera of one frame.
 struct Picture {
@@ -80,9 +62,8 @@ std::vector<Picture> find_pictures(const libmap::ScanSource& scan, const libmap:
   run.progress().begin("pictures", poses.size());
   for (std::size_t first = 0; first < poses.size(); first += batch_size) {
     std::vector<FrameResult> batch(std::min(batch_size, poses.size() - first));
-    libmap::parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        batch[n] = find_pictures(scan, poses[first + n], world_from_map, options);
+    libmap::parallel_each(batch.size(), [&](std::size_t n) {
+      batch[n] = find_pictures(scan, poses[first + n], world_from_map, options);
     });
     for (const FrameResult& result : batch) {
       if (result.error && strict) throw libmap::Error(*result.error);
@@ -128,14 +109,13 @@ libmap::BundlerView write_picture(const libmap::ScanSource& scan, const Picture&
 void write_bundler(const PictureOptions& options, const std::vector<Picture>& all,
                    const libmap::ScanSource& scan, Run& run) {
   const std::vector<Picture> kept = selected(all, options);
-  run.say(fmt::format("{} of {} pictures kept", kept.size(), all.size()));
-  run.manifest().results.emplace_back("kept_pictures", static_cast<std::int64_t>(kept.size()));
-  run.write_output_tree(options.bundler, bundler_names(), [&](const fs::path& folder) {
+  run.say("{} of {} pictures kept", kept.size(), all.size());
+  run.add_results({{"kept_pictures", kept.size()}});
+  run.write_output_tree(options.bundler, bundler_names, [&](const fs::path& folder) {
     if (!folder.empty()) fs::create_directory(folder / "images");
     std::vector<libmap::BundlerView> views(kept.size());
-    libmap::parallel_for(kept.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) views[n] = write_picture(scan, kept[n], folder);
-    });
+    libmap::parallel_each(kept.size(),
+                          [&](std::size_t n) { views[n] = write_picture(scan, kept[n], folder); });
     if (folder.empty()) return;
     libmap::write_text(folder / "bundle.out", libmap::to_bundle_text(views));
     libmap::write_text(folder / "list.txt", libmap::to_bundler_list(views));
@@ -158,7 +138,7 @@ ColmapPicture copy_picture(const libmap::ScanSource& scan, const Picture& pictur
 
 void write_colmap(const PictureOptions& options, const std::vector<Picture>& pictures,
                   const libmap::ScanSource& scan, Run& run) {
-  run.write_output_tree(options.colmap, colmap_names(), [&](const fs::path& folder) {
+  run.write_output_tree(options.colmap, colmap_names, [&](const fs::path& folder) {
     if (!folder.empty()) {
       fs::create_directory(folder / "images");
       fs::create_directory(folder / "sparse");
@@ -166,9 +146,8 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
     libmap::ColmapBuilder builder(options.points);
     for (std::size_t first = 0; first < pictures.size(); first += batch_size) {
       std::vector<ColmapPicture> batch(std::min(batch_size, pictures.size() - first));
-      libmap::parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t n = begin; n < end; ++n)
-          batch[n] = copy_picture(scan, pictures[first + n], folder);
+      libmap::parallel_each(batch.size(), [&](std::size_t n) {
+        batch[n] = copy_picture(scan, pictures[first + n], folder);
       });
       for (std::size_t n = 0; n < batch.size(); ++n)
         builder.add_image(batch[n].name, batch[n].view, pictures[first + n].world_from_camera);
@@ -176,13 +155,11 @@ void write_colmap(const PictureOptions& options, const std::vector<Picture>& pic
     const libmap::ColmapModel& model = builder.model();
     std::size_t observations = 0;
     for (const auto& [id, image] : model.images) observations += image.observations.size();
-    run.say(fmt::format("{} pictures of {} cameras, {} points, {} times observed",
-                        model.images.size(), model.cameras.size(), model.points.size(),
-                        observations));
-    const graspmap_tools::ResultCounts count(run.manifest());
-    count("cameras", model.cameras.size());
-    count("points", model.points.size());
-    count("observations", observations);
+    run.say("{} pictures of {} cameras, {} points, {} times observed", model.images.size(),
+            model.cameras.size(), model.points.size(), observations);
+    run.add_results({{"cameras", model.cameras.size()},
+                     {"points", model.points.size()},
+                     {"observations", observations}});
     if (!folder.empty()) libmap::write_colmap_model(folder / "sparse", model);
   });
 }
@@ -212,8 +189,8 @@ void claim_picture_folders(const PictureOptions& options, const std::string& sca
   parse_transform(options.transform, "--transform");
   std::vector<std::string> inputs = scan_inputs(scan, options.poses);
   inputs.push_back(options.transform);
-  if (!options.bundler.empty()) run.claim_output_tree(options.bundler, bundler_names(), inputs);
-  if (!options.colmap.empty()) run.claim_output_tree(options.colmap, colmap_names(), inputs);
+  if (!options.bundler.empty()) run.claim_output_tree(options.bundler, bundler_names, inputs);
+  if (!options.colmap.empty()) run.claim_output_tree(options.colmap, colmap_names, inputs);
 }
 
 void write_picture_folders(PictureOptions& options, const libmap::ScanSource& scan, bool strict,
@@ -226,7 +203,7 @@ void write_picture_folders(PictureOptions& options, const libmap::ScanSource& sc
   manifest.parameters.emplace_back("transform", options.transform);
   manifest.frame = "poses";
   manifest.transforms.emplace_back("world_from_map", world_from_map);
-  manifest.results.emplace_back("pictures", static_cast<std::int64_t>(pictures.size()));
+  run.add_results({{"pictures", pictures.size()}});
   const libmap::Manifest start = manifest;
   // First: it needs the depth as well, so that what is broken shows before anything is written.
   if (!options.colmap.empty()) write_colmap(options, pictures, scan, run);

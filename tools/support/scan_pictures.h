@@ -2,13 +2,10 @@
 // MeshLab and for COLMAP.
 #pragma once
 
-#include <string>
-
 #include "libmap/scan/colmap_builder.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/scan/view_selection.h"
 #include "tools/support/command_line.h"
-#include "tools/support/run.h"
 #include "tools/support/scan_poses.h"
 
 namespace graspmap_tools {

@@ -1,16 +1,8 @@
 #include "tools/support/scan_poses.h"
 
-#include <fmt/format.h>
-
-#include <filesystem>
-#include <optional>
 #include <set>
-#include <utility>
 
-#include "libmap/core/error.h"
-#include "libmap/core/text.h"
 #include "libmap/scan/rtabmap_reader.h"
-#include "libmap/trajectory/pose_import.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/map_frame.h"
@@ -23,12 +15,13 @@ using libmap::PoseSource;
 namespace {
 
 // The best first: optimized, else by odometry, else ground truth.
-constexpr PoseSource sources[] = {PoseSource::stored, PoseSource::odometry,
+constexpr PoseSource sources[] = {PoseSource::optimized, PoseSource::odometry,
                                   PoseSource::ground_truth};
 
 std::optional<PoseSource> source_named(const std::string& name) {
   for (const PoseSource source : sources)
     if (to_text(source) == name) return source;
+  if (name == "stored") return PoseSource::optimized;  // the same by another name
   return std::nullopt;
 }
 
@@ -45,26 +38,21 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
   const std::string& file = poses.source;
   if (!fs::exists(file) && !libmap::is_trajectory_path(file))
     throw libmap::Error(
-        "no such poses" + libmap::did_you_mean(file, {"odometry", "stored", "ground-truth"}),
-        {.file = {},
-         .field = "--poses",
+        "no such poses" + libmap::did_you_mean(file, {"odometry", "optimized", "ground-truth"}),
+        {.field = "--poses",
          .value = file,
-         .bound = "auto, odometry, stored, ground-truth or a file"});
+         .bound = "auto, odometry, optimized, ground-truth or a file"});
   libmap::ImportedPoses imported = libmap::import_poses(file, scan, poses.file);
   run.add_input(libmap::file_of_trajectory(file));
-  for (const std::string& warning : imported.warnings)
-    run.warn(fmt::format("{}: {}", file, warning));
-  run.say(fmt::format("{} of {} poses belong to nodes of the scan",
-                      imported.poses_in_file - imported.trajectory.foreign,
-                      imported.poses_in_file));
-  if (imported.scale != 1.0) run.say(fmt::format("scaled by {:.9g}", imported.scale));
-  libmap::Manifest& manifest = run.manifest();
-  manifest.results.emplace_back("poses_in_file", static_cast<std::int64_t>(imported.poses_in_file));
-  manifest.results.emplace_back("poses_scale_taken", imported.scale);
+  for (const std::string& warning : imported.warnings) run.warn("{}: {}", file, warning);
+  run.say("{} of {} poses belong to nodes of the scan",
+          imported.poses_in_file - imported.trajectory.foreign, imported.poses_in_file);
+  if (imported.scale != 1.0) run.say("scaled by {:.9g}", imported.scale);
+  run.add_results(
+      {{"poses_in_file", imported.poses_in_file}, {"poses_scale_taken", imported.scale}});
   if (imported.largest_rig_deviation_m > 0.0) {
-    run.say(fmt::format("cameras of one node agree within {:.1f} mm",
-                        1e3 * imported.largest_rig_deviation_m));
-    manifest.results.emplace_back("largest_rig_deviation_m", imported.largest_rig_deviation_m);
+    run.say("cameras of one node agree within {:.1f} mm", 1e3 * imported.largest_rig_deviation_m);
+    run.add_results({{"largest_rig_deviation_m", imported.largest_rig_deviation_m}});
   }
   return std::move(imported.trajectory.poses);
 }
@@ -72,8 +60,7 @@ libmap::Trajectory poses_in_file(const PosesOption& poses, const libmap::ScanSou
 std::string best_poses(const libmap::PoseGraph& graph, const std::string& scan) {
   for (const PoseSource source : sources)
     if (!libmap::trajectory_of(graph, source).empty()) return to_text(source);
-  throw libmap::Error("the scan has no poses: give a file of poses with --poses",
-                      {.file = scan, .field = {}, .value = {}, .bound = {}});
+  throw libmap::Error("the scan has no poses: give a file of poses with --poses", {.file = scan});
 }
 
 libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOption& wanted,
@@ -92,14 +79,11 @@ libmap::Trajectory wanted_poses(const libmap::ScanSource& scan, const PosesOptio
 void report_nodes_without_pose(const std::string& scan, const std::string& wanted,
                                const libmap::PoseGraph& graph, const libmap::Trajectory& poses,
                                bool strict, Run& run) {
-  constexpr int invalid_weight = -9;
-  std::size_t nodes = 0;
-  for (const libmap::GraphNode& node : graph.nodes) nodes += node.weight != invalid_weight ? 1 : 0;
+  const std::size_t nodes = count_valid_nodes(graph);
   if (poses.size() >= nodes) return;
   const std::string text =
       fmt::format("{} of {} nodes have no pose there", nodes - poses.size(), nodes);
-  if (strict)
-    throw libmap::Error(text, {.file = scan, .field = "--poses", .value = wanted, .bound = {}});
+  if (strict) throw libmap::Error(text, {.file = scan, .field = "--poses", .value = wanted});
   run.warn(scan + ": " + text + ": their frames are left out");
 }
 
@@ -118,11 +102,18 @@ void report_sessions(const std::string& scan, const libmap::PoseGraph& graph,
 }  // namespace
 
 void add_poses_option(Command& command, PosesOption& poses) {
-  command.option("--poses", "auto|odometry|stored|ground-truth|FILE", poses.source,
-                 "where the frames were: by the scan, or a file of poses (TUM, KITTI, g2o, TORO; "
-                 "a folder: COLMAP); auto: the first of stored, odometry and ground-truth that the "
-                 "scan has");
+  command.option("--poses", "auto|odometry|optimized|ground-truth|FILE", poses.source,
+                 "where the frames were: by the scan, or a file of poses (TUM, KITTI, g2o, TORO; a "
+                 "folder: COLMAP); auto: the first of optimized, odometry and ground-truth that "
+                 "the scan has; optimized may be called stored");
   libmap::bind(command.parameters(), poses.file);
+}
+
+std::size_t count_valid_nodes(const libmap::PoseGraph& graph) {
+  return static_cast<std::size_t>(
+      std::count_if(graph.nodes.begin(), graph.nodes.end(), [](const libmap::GraphNode& node) {
+        return node.weight != libmap::GraphNode::invalid_weight;
+      }));
 }
 
 std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses) {
@@ -136,7 +127,7 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool stri
   for (const std::string& warning : scan->warnings()) {
     if (strict && !libmap::is_about_unknown_part(warning))
       throw libmap::Error(warning).in_file(path);
-    run.warn(fmt::format("{}: {}", path, warning));
+    run.warn("{}: {}", path, warning);
   }
   return scan;
 }
@@ -147,6 +138,8 @@ libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses
   if (poses.source == "auto") {
     poses.source = best_poses(scan.graph(), path);
     run.say("poses: " + poses.source);
+  } else if (const auto source = source_named(poses.source)) {
+    poses.source = to_text(*source);
   }
   libmap::Trajectory found = wanted_poses(scan, poses, run);
   report_nodes_without_pose(path, poses.source, scan.graph(), found, strict, run);
@@ -161,7 +154,7 @@ libmap::Trajectory require_truth(const libmap::ScanSource& scan) {
   if (truth.empty())
     throw libmap::Error(
         "the scan has no ground truth",
-        {.file = scan.path().string(), .field = "--frame", .value = "ground-truth", .bound = {}});
+        {.file = scan.path().string(), .field = "--frame", .value = "ground-truth"});
   return truth;
 }
 
@@ -173,15 +166,10 @@ libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Traj
     run.manifest().transforms.emplace_back(truth_from_poses_name, libmap::Pose::Identity());
     return libmap::Pose::Identity();
   }
-  libmap::AbsoluteTrajectoryError error;
-  try {
-    error = libmap::absolute_trajectory_error(poses, truth);
-  } catch (const libmap::Error& failure) {
-    throw failure.in_file(path);
-  }
-  run.say(
-      fmt::format("aligned with {} true poses: RMSE {:.1f} mm", error.poses, 1e3 * error.rmse_m));
-  run.manifest().results.emplace_back("trajectory_rmse_m", error.rmse_m);
+  const libmap::AbsoluteTrajectoryError error =
+      in_file(path, [&] { return libmap::absolute_trajectory_error(poses, truth); });
+  run.say("aligned with {} true poses: RMSE {:.1f} mm", error.poses, 1e3 * error.rmse_m);
+  run.add_results({{"trajectory_rmse_m", error.rmse_m}});
   run.manifest().transforms.emplace_back(truth_from_poses_name, error.truth_from_estimate);
   return error.truth_from_estimate;
 }

@@ -1,25 +1,23 @@
 // A scan and the poses at which its frames were, as commands take them: SCAN and `--poses`.
 #pragma once
 
-#include <memory>
-#include <string>
-#include <vector>
-
 #include "libmap/core/pose_graph.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/pose_import.h"
 #include "tools/support/command_line.h"
-#include "tools/support/run.h"
 
 namespace graspmap_tools {
 
-// --poses auto|odometry|stored|ground-truth|FILE. auto: the first of stored, odometry and
+// --poses auto|odometry|optimized|ground-truth|FILE. auto: the first of optimized, odometry and
 // ground-truth that the scan has; FILE: any that import_poses reads.
 struct PosesOption {
   std::string source = "auto";
   libmap::PoseImportOptions file;
 };
 void add_poses_option(Command& command, PosesOption& poses);
+
+// Without those that the recording itself declares invalid.
+std::size_t count_valid_nodes(const libmap::PoseGraph& graph);
 
 // The files among the two, for Run::claim_output.
 std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses);

@@ -1,18 +1,19 @@
 #include "tools/support/scene_file.h"
 
 #include <Eigen/Geometry>
-#include <cmath>
 #include <limits>
-#include <utility>
 #include <variant>
 
+#include "libgtd/score/graspability_map.h"
+#include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
+#include "tools/support/command_line.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/map_window.h"
+#include "tools/support/option_values.h"
 
 namespace graspmap_tools {
 namespace {
@@ -74,16 +75,87 @@ libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
   return pose;
 }
 
-// What says how places are marked, without any.
-void require_points(const SceneFileOptions& options) {
-  if (!options.points.empty()) return;
-  const std::pair<const char*, bool> given[] = {
-      {"--label", options.label != "auto"},
-      {"--verdict", !options.verdict.empty()},
-      {"--points-frame", options.points_frame != PointFrame::automatic}};
-  for (const auto& [name, is_given] : given)
-    if (is_given)
-      throw libmap::Error("is for --points, which is not given", {.file = {}, .field = name});
+// A tile that the window shows, and how much of its plan lies in it.
+struct SeenTile {
+  std::size_t tile = 0;
+  double share = 1.0;
+};
+
+std::vector<SeenTile> seen_tiles(const MapTiles& tiles,
+                                 const std::optional<Eigen::AlignedBox2d>& box) {
+  std::vector<SeenTile> seen;
+  for (std::size_t n = 0; n < tiles.index().tiles.size(); ++n) {
+    if (!box) {
+      seen.push_back({n, 1.0});
+      continue;
+    }
+    const double half = 0.5 * tiles.index().lattice.voxel_size_m;
+    const Eigen::AlignedBox3d around = tiles.box(n);
+    const Eigen::AlignedBox2d plan(around.min().head<2>().array() - half,
+                                   around.max().head<2>().array() + half);
+    const Eigen::AlignedBox2d common = plan.intersection(*box);
+    if (!common.isEmpty()) seen.push_back({n, common.volume() / plan.volume()});
+  }
+  return seen;
+}
+
+int columns_per_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
+                      std::uint64_t max_points) {
+  double points = 0.0;
+  for (const SeenTile& one : seen)
+    points += one.share * static_cast<double>(tiles.index().tiles[one.tile].voxels);
+  const double columns = std::ceil(std::sqrt(points / static_cast<double>(max_points)));
+  // The counts are the index's word; no map has more points than 2^40.
+  return columns >= 1.0 ? static_cast<int>(std::min(columns, 0x1p20)) : 1;
+}
+
+// "X0,Y0,X1,Y1" in meters, or nothing for an empty text. Throws Error naming --box.
+std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const auto n = split_numbers(text, 4);
+  if (n && (*n)[0] < (*n)[2] && (*n)[1] < (*n)[3])
+    return Eigen::AlignedBox2d(Eigen::Vector2d(n->data()), Eigen::Vector2d(n->data() + 2));
+  throw libmap::Error(
+      "not a rectangle",
+      {.field = "--box", .value = text, .bound = "X0,Y0,X1,Y1 with X0 < X1 and Y0 < Y1"});
+}
+
+// The points within the box, level, in the cloud's own frame.
+libmap::PointCloud points_in_box(const libmap::PointCloud& cloud, const Eigen::AlignedBox2d& box) {
+  std::vector<std::size_t> inside;
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (box.contains(cloud.positions[n].head<2>())) inside.push_back(n);
+  return libmap::select_points(cloud, inside);
+}
+
+struct MapWindow {
+  libmap::PointCloud cloud;
+  int columns_per_point = 1;  // width of the squares of columns that became one point
+};
+
+// Loads the tiles that the box touches, a few at a time. Where they hold more than about
+// `max_points`, squares of columns become one point each (downsample_map). Throws Error if nothing
+// is in the box.
+MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedBox2d>& box,
+                      std::uint64_t max_points) {
+  const std::vector<SeenTile> seen = seen_tiles(tiles, box);
+  MapWindow window;
+  window.columns_per_point = columns_per_point(tiles, seen, max_points);
+  std::vector<libmap::PointCloud> parts(seen.size());
+  libmap::parallel_each(seen.size(), [&](std::size_t n) {
+    parts[n] = tiles.load(seen[n].tile);
+    if (box) parts[n] = points_in_box(parts[n], *box);
+    if (window.columns_per_point > 1)
+      parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
+  });
+  if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
+  if (window.cloud.empty())
+    throw libmap::Error("nothing of the map lies in it", {.field = "--box"});
+  if (window.columns_per_point > 1) {
+    window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
+    libgtd::center_in_squares(tiles.index(), window.columns_per_point, window.cloud);
+  }
+  return window;
 }
 
 SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run& run) {
@@ -93,7 +165,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   const auto box = parse_rectangle(options.box);
   if (is_tile_store(file)) {
     MapWindow window = read_window(MapTiles(file), box, options.max_points);
-    read.columns_per_point = static_cast<std::int64_t>(window.columns_per_point);
+    read.columns_per_point = window.columns_per_point;
     layer.shape = std::move(window.cloud);
   } else if (libmap::is_textured_format(file)) {
     layer.shape = libmap::read_textured_mesh(file);
@@ -117,8 +189,7 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   layer.shading = options.shading;
   layer.point_size_m = options.point_size_m;
   scene.layers.push_back(std::move(layer));
-  const libmap::Pose* terrain_from_input =
-      manifest ? manifest->find_transform("terrain_from_input") : nullptr;
+  const libmap::Pose* terrain_from_input = terrain_from_input_of(manifest);
   if (terrain_from_input != nullptr) {
     if (manifest->frame == "input") scene.terrain_from_scene = *terrain_from_input;
     if (options.heading == MapHeading::input)
@@ -134,15 +205,18 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
   return read;
 }
 
-}  // namespace
-
-const std::vector<std::pair<std::string, MapHeading>>& map_heading_names() {
-  static const std::vector<std::pair<std::string, MapHeading>> names = {
-      {"auto", MapHeading::automatic},
-      {"terrain", MapHeading::terrain},
-      {"input", MapHeading::input}};
-  return names;
+// Of marked places alone.
+void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
+  table.add("label", options.label,
+            "column of the marked points' names; auto: the first column, unless it is x, y or z; "
+            "none: no names");
+  table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
+  table.add("points_frame", options.points_frame, listed_point_frame_names(),
+            "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
+            "before it was cropped; auto: as their manifest says, else input");
 }
+
+}  // namespace
 
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("color", options.coloring.mode, libmap::color_mode_names(), "what colors show");
@@ -165,19 +239,17 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
             "of a tile store: larger parts are downsampled to about so many points");
   table.add("shading", options.shading, libmap::shading_names(), "where light falls");
-  table.add("label", options.label,
-            "column of the marked points' names; auto: the first column, unless it is x, y or z; "
-            "none: no names");
-  table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
-  table.add("points_frame", options.points_frame, listed_point_frame_names(),
-            "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
-            "before it was cropped; auto: as their manifest says, else input");
-  table.add("heading", options.heading, map_heading_names(),
+  bind_points(table, options);
+  table.add("heading", options.heading,
+            {{"auto", MapHeading::automatic},
+             {"terrain", MapHeading::terrain},
+             {"input", MapHeading::input}},
             "which way a map lies: as in its terrain frame, or with the x and y of its input");
 }
 
 SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
-  require_points(options);
+  if (options.points.empty())
+    refuse_set(options, bind_points, "is for --points, which is not given");
   try {
     return scene_of(file, options, run);
   } catch (const libmap::Error& error) {

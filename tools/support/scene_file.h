@@ -1,16 +1,9 @@
 // What `render` shows of a file, as the user asks for it.
 #pragma once
 
-#include <cstdint>
-#include <filesystem>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "libmap/core/parameters.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/run.h"
 
 namespace graspmap_tools {
 
@@ -18,7 +11,6 @@ namespace graspmap_tools {
 // level, so that x and y are those of the cloud that was scored; heights stay the terrain's.
 // automatic: terrain for one file, input for several.
 enum class MapHeading { automatic, terrain, input };
-const std::vector<std::pair<std::string, MapHeading>>& map_heading_names();
 
 // One file as a scene, with listed places on it.
 struct SceneFileOptions {
@@ -41,8 +33,7 @@ void bind(libmap::ParameterTable& table, SceneFileOptions& options);
 
 struct SceneFile {
   libmap::Scene scene;
-  std::int64_t columns_per_point =
-      0;  // side of the downsampled columns of a tile store; 0: no store
+  int columns_per_point = 0;  // of a tile store: side of the squares that became one point; else 0
 };
 
 // A cloud, a mesh, a graspability map or a tile store. Throws Error naming the file.

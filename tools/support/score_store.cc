@@ -1,12 +1,5 @@
 #include "tools/support/score_store.h"
 
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <chrono>
-#include <utility>
-#include <vector>
-
 #include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
@@ -14,13 +7,10 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/cloud_pieces.h"
 #include "libmap/cloud/point_spool.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/named_output.h"
 #include "libmap/core/parallel.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/needed_tiles.h"
-#include "tools/support/plane_report.h"
 
 namespace graspmap_tools {
 
@@ -33,6 +23,16 @@ using libgtd::TerrainPiece;
 using libgtd::TileNumber;
 using libgtd::TilePlan;
 
+// Third standardized moment of the heights. Rocks and holds on their ground have +0.5 to +3, the
+// same upside down as much below 0; rolling ground has about 0.
+constexpr double upside_down_skewness = -1.0;
+
+std::string_view name_of(libgtd::UpSource source) {
+  if (source == libgtd::UpSource::frame_z) return "frame's z axis";
+  if (source == libgtd::UpSource::camera_origin) return "camera's origin";
+  return to_text(source);
+}
+
 std::int64_t modified_ns(const fs::path& path) {
   return std::chrono::duration_cast<std::chrono::nanoseconds>(
              fs::last_write_time(path).time_since_epoch())
@@ -44,26 +44,24 @@ std::int64_t modified_ns(const fs::path& path) {
 std::vector<TerrainPiece> survey(const std::vector<fs::path>& files,
                                  const std::vector<TerrainPiece>& known) {
   std::vector<TerrainPiece> pieces(files.size());
-  libmap::parallel_for(files.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      TerrainPiece& piece = pieces[n];
-      piece.input.path = files[n].string();
-      piece.input.bytes = fs::file_size(files[n]);
-      piece.modified_ns = modified_ns(files[n]);
-      const auto same = std::find_if(known.begin(), known.end(), [&](const TerrainPiece& one) {
-        return one.input.path == piece.input.path && one.input.bytes == piece.input.bytes &&
-               one.modified_ns == piece.modified_ns;
-      });
-      if (same != known.end()) {
-        piece = *same;
-        continue;
-      }
-      piece.input.sha256 = libmap::sha256_of_file(files[n]);
-      const libmap::PieceFacts facts = libmap::survey_piece(files[n]);
-      piece.points = facts.points;
-      piece.dropped_points = facts.dropped_points;
-      piece.box = facts.box;
+  libmap::parallel_each(files.size(), [&](std::size_t n) {
+    TerrainPiece& piece = pieces[n];
+    piece.input.path = files[n].string();
+    piece.input.bytes = fs::file_size(files[n]);
+    piece.modified_ns = modified_ns(files[n]);
+    const auto same = std::find_if(known.begin(), known.end(), [&](const TerrainPiece& one) {
+      return one.input.path == piece.input.path && one.input.bytes == piece.input.bytes &&
+             one.modified_ns == piece.modified_ns;
+    });
+    if (same != known.end()) {
+      piece = *same;
+      return;
     }
+    piece.input.sha256 = libmap::sha256_of_file(files[n]);
+    const libmap::PieceFacts facts = libmap::survey_piece(files[n]);
+    piece.points = facts.points;
+    piece.dropped_points = facts.dropped_points;
+    piece.box = facts.box;
   });
   return pieces;
 }
@@ -186,20 +184,11 @@ class StoreScoring {
       points += piece.points;
       dropped += piece.dropped_points;
     }
-    if (points == 0)
-      throw libmap::Error(dropped == 0
-                              ? "the cloud has no points"
-                              : fmt::format("none of its {} points has a position", dropped),
-                          {.file = options_.terrain});
-    if (dropped > 0)
-      run_.warn(
-          fmt::format("{}: {} points without a position were dropped", options_.terrain, dropped));
-    try {
+    require_points(points, dropped, options_.terrain, run_);
+    in_file(options_.terrain, [&] {
       frame_ = libgtd::frame_terrain(stream, options_.detection);
       libgtd::tiles_of(frame_, tile_voxels_);  // too many show before anything is kept
-    } catch (const libmap::Error& error) {
-      throw error.in_file(options_.terrain);
-    }
+    });
     plan.has_plane = frame_.plane.has_value();
     libgtd::TileStoreIndex& index = plan.index;
     index.lattice = frame_.lattice;
@@ -207,23 +196,19 @@ class StoreScoring {
     index.min = frame_.min;
     index.max = frame_.max;
     libmap::Manifest& manifest = index.manifest;
-    const Eigen::Vector3d& origin = frame_.lattice.origin_m;
     libmap::Pose terrain_from_input = libmap::Pose::Identity();
+    add_results({{"lattice_origin_m", frame_.lattice.origin_m}, {"input_points", points}},
+                manifest);
     if (frame_.plane) {
       plan.centroid = frame_.plane->centroid;
       terrain_from_input = frame_.plane->terrain_from_input;
-    }
-    manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
-    manifest.results.emplace_back("lattice_origin_m",
-                                  std::vector<double>{origin.x(), origin.y(), origin.z()});
-    manifest.results.emplace_back("input_points", static_cast<std::int64_t>(points));
-    if (frame_.plane) {
-      manifest.results.emplace_back("plane_rmse_m", frame_.plane->rmse_m);
-      manifest.results.emplace_back("up_source", std::string(to_text(frame_.plane->up_source)));
+      add_results(
+          {{"plane_rmse_m", frame_.plane->rmse_m}, {"up_source", to_text(frame_.plane->up_source)}},
+          manifest);
       report_plane(*frame_.plane, options_.terrain, run_);
     }
-    manifest.results.emplace_back("mask_side_voxels", std::int64_t{mask_.side});
-    manifest.results.emplace_back("mask_layers", std::int64_t{mask_.layers});
+    manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
+    add_results({{"mask_side_voxels", mask_.side}, {"mask_layers", mask_.layers}}, manifest);
   }
 
   void restore_frame() {
@@ -273,10 +258,9 @@ class StoreScoring {
     if (earlier.pieces.size() == plan.pieces.size())
       refuse("contains tiles of another gripper file: --force starts again");
     if (!options_.append)
-      refuse(
-          fmt::format("contains tiles of {} of these {} pieces: --append adds the others, --force "
-                      "starts again",
-                      earlier.pieces.size(), plan.pieces.size()));
+      refuse(fmt::format(
+          "contains tiles of {} of these {} pieces: --append adds the others, --force starts again",
+          earlier.pieces.size(), plan.pieces.size()));
     if (options_.detection.plane != libgtd::PlaneSource::none)
       refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
     if (scenario_.method != libgtd::Method::corrected)
@@ -400,9 +384,7 @@ class StoreScoring {
 
   std::vector<StoredTile> write(std::vector<libgtd::StreamedTile>& tiles) const {
     std::vector<StoredTile> stored(tiles.size());
-    libmap::parallel_for(tiles.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) stored[n] = write(tiles[n]);
-    });
+    libmap::parallel_each(tiles.size(), [&](std::size_t n) { stored[n] = write(tiles[n]); });
     return stored;
   }
 
@@ -444,8 +426,7 @@ class StoreScoring {
     const libmap::FileLock lock = progress_.lock();
     const libgtd::TileProgress::Completion completion = progress_.complete(plan_);
     if (!completion.index) {
-      run_.say(fmt::format("{} tiles scored; {} of {} are there", scored, completion.done,
-                           completion.tiles));
+      run_.say("{} tiles scored; {} of {} are there", scored, completion.done, completion.tiles);
       return;
     }
     const libgtd::TileStoreIndex& index = *completion.index;
@@ -455,10 +436,8 @@ class StoreScoring {
       manifest.threads = run_.manifest().threads;
       progress_.write_index(index, manifest);
     }
-    std::uint64_t graspable = 0;
-    for (const StoredTile& tile : index.tiles) graspable += tile.graspable_voxels;
-    run_.say(fmt::format("{} of {} tiles scored, all are there: {} voxels, {} graspable", scored,
-                         completion.tiles, index.voxels(), graspable));
+    run_.say("{} of {} tiles scored, all are there: {} voxels, {} graspable", scored,
+             completion.tiles, index.voxels(), index.graspable_voxels());
     if (index.voxels() == 0)
       run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
   }
@@ -476,6 +455,25 @@ class StoreScoring {
 };
 
 }  // namespace
+
+void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
+  if (plane.up_source == libgtd::UpSource::direction) return;
+  run.say("up from the {}", name_of(plane.up_source));
+  // Of the other sources, viewpoint and normals saw the outside, and the relief agrees with itself.
+  if (plane.up_source == libgtd::UpSource::frame_z && plane.relief_skewness < upside_down_skewness)
+    run.warn(
+        "{}: its relief hangs below the plane: if this is upside down, give --up (--up=0,0,-1 for "
+        "a cloud in a camera's frame)",
+        terrain);
+}
+
+void require_points(std::size_t points, std::size_t dropped, const std::string& terrain, Run& run) {
+  if (points == 0)
+    throw libmap::Error(dropped == 0 ? "the cloud has no points"
+                                     : fmt::format("none of its {} points has a position", dropped),
+                        {.file = terrain});
+  if (dropped > 0) run.warn("{}: {} points without a position were dropped", terrain, dropped);
+}
 
 void score_into_store(const ScoreStoreOptions& options, Run& run) {
   libgtd::require_streamable(options.detection);

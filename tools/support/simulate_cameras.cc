@@ -1,15 +1,5 @@
 // graspmap simulate cameras: what the depth cameras of a robot see from one place.
-#include <fmt/format.h>
-
-#include <cmath>
-#include <string>
-#include <utility>
-#include <vector>
-
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
-#include "libmap/core/text.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/rig_images.h"
@@ -17,12 +7,13 @@
 #include "libmap/simulate/robot_cameras.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/simulate_commands.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
-using graspmap_tools::Run;
 
 struct SimulateCamerasOptions {
   std::string mesh;
@@ -94,19 +85,13 @@ std::string images_table(const libmap::CameraRig& rig,
   return text;
 }
 
-std::vector<std::pair<std::string, Run::Writer>> files_of(
-    const libmap::CameraRig& rig, const std::vector<libmap::RobotCameraImage>& images) {
-  std::vector<std::pair<std::string, Run::Writer>> files;
-  files.emplace_back(libmap::rig_file_name, [&](const fs::path& temporary) {
-    libmap::write_text(temporary, libmap::to_yaml(rig));
-  });
-  files.emplace_back(libmap::rig_images_file_name, [&](const fs::path& temporary) {
-    libmap::write_text(temporary, images_table(rig, images));
-  });
+Run::Files files_of(const libmap::CameraRig& rig,
+                    const std::vector<libmap::RobotCameraImage>& images) {
+  Run::Files files = {{libmap::rig_file_name, Run::text_writer(libmap::to_yaml(rig))},
+                      {libmap::rig_images_file_name, Run::text_writer(images_table(rig, images))}};
   for (std::size_t i = 0; i < images.size(); ++i)
-    files.emplace_back(image_name(rig.cameras[i]), [&image = images[i]](const fs::path& temporary) {
-      libmap::write_text(temporary, libmap::encode_png(image.depth));
-    });
+    files.emplace_back(image_name(rig.cameras[i]),
+                       Run::text_writer(libmap::encode_png(images[i].depth)));
   return files;
 }
 
@@ -118,13 +103,11 @@ void add_results(const libmap::CameraRig& rig, const std::vector<libmap::RobotCa
     pixels += images[i].depth.pixels.size();
     measured += images[i].measurement.measured;
     if (images[i].measurement.measured == 0)
-      run.warn(fmt::format("{}: nothing within its range", rig.cameras[i].name));
+      run.warn("{}: nothing within its range", rig.cameras[i].name);
   }
-  run.manifest().results.emplace_back("cameras", static_cast<std::int64_t>(images.size()));
-  run.manifest().results.emplace_back("pixels", static_cast<std::int64_t>(pixels));
-  run.manifest().results.emplace_back("measured_pixels", static_cast<std::int64_t>(measured));
-  run.say(fmt::format("{} cameras, {:.0f} % of the pixels measured", images.size(),
-                      100.0 * static_cast<double>(measured) / static_cast<double>(pixels)));
+  run.add_results({{"cameras", images.size()}, {"pixels", pixels}, {"measured_pixels", measured}});
+  run.say("{} cameras, {:.0f} % of the pixels measured", images.size(),
+          100.0 * static_cast<double>(measured) / static_cast<double>(pixels));
 }
 
 void simulate(const SimulateCamerasOptions& options, Run& run) {
@@ -134,23 +117,21 @@ void simulate(const SimulateCamerasOptions& options, Run& run) {
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
   run.add_input(options.mesh);
   run.manifest().frame = "robot";
-  try {
+  in_file(options.mesh, [&] {
     const libmap::Pose mesh_from_robot = body_pose(mesh, options);
     run.manifest().transforms.emplace_back("mesh_from_robot", mesh_from_robot);
     // So that places listed in the mesh's frame, or in that of the map before it was cropped, are
     // found on maps of these images.
     const libmap::Pose mesh_from_map =
-        graspmap_tools::site_from_map_of(options.mesh).value_or(libmap::Pose::Identity());
-    run.manifest().transforms.emplace_back(graspmap_tools::site_from_map_name,
+        site_from_map_of(options.mesh).value_or(libmap::Pose::Identity());
+    run.manifest().transforms.emplace_back(site_from_map_name,
                                            mesh_from_robot.inverse() * mesh_from_map);
     const std::vector<libmap::RobotCameraImage> images = run.timed("cameras", [&] {
       return libmap::simulate_robot_cameras(mesh, rig, mesh_from_robot, options.cameras);
     });
     add_results(rig, images, run);
     run.write_output_folder(options.output, files_of(rig, images));
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.mesh);
-  }
+  });
 }
 
 }  // namespace

@@ -1,24 +1,16 @@
 // graspmap simulate scan: a scan of a mesh by a depth camera carried by hand.
-#include <fmt/format.h>
-
-#include <string>
-#include <utility>
-#include <vector>
-
-#include "libmap/core/error.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/simulate/scan_simulation.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "tools/support/command_line.h"
-#include "tools/support/map_frame.h"
-#include "tools/support/result_counts.h"
-#include "tools/support/simulate_commands.h"
+#include "tools/support/option_values.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
-
-using graspmap_tools::Run;
 
 struct SimulateScanOptions {
   std::string mesh;
@@ -54,33 +46,30 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {
-  libmap::Manifest& manifest = run.manifest();
-  const graspmap_tools::ResultCounts count(manifest);
-  count("frames", result.graph.nodes.size());
-  count("links", result.graph.links.size());
-  count("closures", result.graph.links.size() + 1 - result.graph.nodes.size());
-  count("pixels", result.pixels);
-  count("measured_pixels", result.measured_pixels);
-  count("edge_pixels", result.edge_pixels);
-  count("flying_pixels", result.flying_pixels);
-  count("empty_frames", result.empty_frames);
-  manifest.results.emplace_back("path_length_m", result.path_length_m);
+  const std::size_t closures = result.graph.links.size() + 1 - result.graph.nodes.size();
+  run.add_results({{"frames", result.graph.nodes.size()},
+                   {"links", result.graph.links.size()},
+                   {"closures", closures},
+                   {"pixels", result.pixels},
+                   {"measured_pixels", result.measured_pixels},
+                   {"edge_pixels", result.edge_pixels},
+                   {"flying_pixels", result.flying_pixels},
+                   {"empty_frames", result.empty_frames},
+                   {"path_length_m", result.path_length_m}});
   std::string drift;
   if (result.graph.nodes.size() >= 3) {
     const libmap::TrajectoryError error = libmap::absolute_trajectory_error(
         trajectory_of(result.graph, libmap::PoseSource::odometry),
         trajectory_of(result.graph, libmap::PoseSource::ground_truth));
-    manifest.results.emplace_back("odometry_rmse_m", error.rmse_m);
-    manifest.results.emplace_back("odometry_rotation_error_deg", error.mean_rotation_deg);
+    run.add_results({{"odometry_rmse_m", error.rmse_m},
+                     {"odometry_rotation_error_deg", error.mean_rotation_deg}});
     drift = fmt::format(", odometry {:.1f} mm off", 1e3 * error.rmse_m);
   }
-  run.say(fmt::format(
-      "{} frames along {:.1f} m, {:.0f} % of the pixels measured, {} closures{}",
-      result.graph.nodes.size(), result.path_length_m,
-      100.0 * static_cast<double>(result.measured_pixels) / static_cast<double>(result.pixels),
-      result.graph.links.size() + 1 - result.graph.nodes.size(), drift));
-  if (result.empty_frames > 0)
-    run.warn(fmt::format("{} frames see nothing within range", result.empty_frames));
+  run.say("{} frames along {:.1f} m, {:.0f} % of the pixels measured, {} closures{}",
+          result.graph.nodes.size(), result.path_length_m,
+          100.0 * static_cast<double>(result.measured_pixels) / static_cast<double>(result.pixels),
+          closures, drift);
+  if (result.empty_frames > 0) run.warn("{} frames see nothing within range", result.empty_frames);
 }
 
 void write_scan(const libmap::TriangleMesh& mesh, const SimulateScanOptions& options,
@@ -100,24 +89,22 @@ void write_scan(const libmap::TriangleMesh& mesh, const SimulateScanOptions& opt
 void simulate(SimulateScanOptions& options, Run& run) {
   libmap::ScanSimulationOptions& simulation = options.simulation;
   if (options.target != "auto")
-    simulation.trajectory.target = graspmap_tools::parse_vector(options.target, "--target");
+    simulation.trajectory.target = parse_vector(options.target, "--target");
   simulation.depth.check();
   run.claim_output(options.output, {options.mesh, options.camera});
   if (!options.output.ends_with(".db"))
     throw libmap::Error("a scan is written as a database",
-                        {.file = options.output, .field = {}, .value = {}, .bound = "a name.db"});
+                        {.file = options.output, .bound = "a name.db"});
   if (!options.camera.empty()) simulation.camera = libmap::read_camera(options.camera).camera;
   const libmap::TriangleMesh mesh =
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
   run.add_input(options.mesh);
   if (!options.camera.empty()) run.add_input(options.camera);
   run.manifest().frame = "mesh";
-  try {
+  in_file(options.mesh, [&] {
     run.write_output(options.output,
                      [&](const auto& temporary) { write_scan(mesh, options, temporary, run); });
-  } catch (const libmap::Error& error) {
-    throw error.in_file(options.mesh);
-  }
+  });
 }
 
 }  // namespace

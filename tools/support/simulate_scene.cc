@@ -1,21 +1,16 @@
 // graspmap simulate scene: scenes of primitive shapes with their closed-form truth.
-#include <fmt/format.h>
-
-#include <string>
-
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/simulate/primitive_scene_io.h"
 #include "libmap/simulate/scene_mesh.h"
 #include "libmap/simulate/scene_sampling.h"
 #include "tools/support/command_line.h"
-#include "tools/support/simulate_commands.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
-
-using graspmap_tools::Run;
 
 struct SimulateOptions {
   std::string output;
@@ -25,11 +20,10 @@ struct SimulateOptions {
   libmap::SceneMeshOptions meshing;
 };
 
-void bind(libmap::ParameterTable& table, SimulateOptions& options) {
-  using libmap::not_negative;
-  using libmap::positive;
-  table.add("scene", options.scene, "scene of the toolkit, or a scene file");
-  table.add("mesh", options.mesh, "the surface as a mesh, not as a cloud");
+using libmap::not_negative;
+using libmap::positive;
+
+void bind_cloud(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("spacing_m", options.sampling.spacing_m, positive, "mean distance of the samples, m");
   table.add("count", options.sampling.count, not_negative,
             "number of samples (2 %) in place of a spacing; 0: by spacing");
@@ -38,19 +32,28 @@ void bind(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("noise_m", options.sampling.noise_m, not_negative,
             "standard deviation of the noise along the normal, m");
   table.add("seed", options.sampling.seed, not_negative, "of jitter and noise");
+}
+
+void bind_mesh(libmap::ParameterTable& table, SimulateOptions& options) {
   table.add("edge_length_m", options.meshing.edge_length_m, positive,
             "longest edge of the mesh, m");
   table.add("chord_error_m", options.meshing.chord_error_m, positive,
             "largest distance of the mesh from a round shape, m");
 }
 
+void bind(libmap::ParameterTable& table, SimulateOptions& options) {
+  table.add("scene", options.scene, "scene of the toolkit, or a scene file");
+  table.add("mesh", options.mesh, "the surface as a mesh, not as a cloud");
+  bind_cloud(table, options);
+  bind_mesh(table, options);
+}
+
 void write_samples(const libmap::PrimitiveScene& scene, const SimulateOptions& options, Run& run) {
   const libmap::SceneSamples samples =
       run.timed("sampling", [&] { return libmap::sample_scene(scene, options.sampling); });
-  run.manifest().results.emplace_back("points", static_cast<std::int64_t>(samples.cloud.size()));
-  run.manifest().results.emplace_back("spacing_m", samples.spacing_m);
-  run.say(fmt::format("{} points, {} m apart", samples.cloud.size(),
-                      libmap::to_text(static_cast<float>(samples.spacing_m))));
+  run.add_results({{"points", samples.cloud.size()}, {"spacing_m", samples.spacing_m}});
+  run.say("{} points, {} m apart", samples.cloud.size(),
+          libmap::to_text(static_cast<float>(samples.spacing_m)));
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, samples.cloud); });
 }
@@ -58,38 +61,15 @@ void write_samples(const libmap::PrimitiveScene& scene, const SimulateOptions& o
 void write_surface(const libmap::PrimitiveScene& scene, const SimulateOptions& options, Run& run) {
   const libmap::TriangleMesh mesh =
       run.timed("meshing", [&] { return libmap::scene_mesh(scene, options.meshing); });
-  run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
-  run.manifest().results.emplace_back("triangles",
-                                      static_cast<std::int64_t>(mesh.triangles.size()));
-  run.say(fmt::format("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size()));
+  run.add_results({{"vertices", mesh.vertices.size()}, {"triangles", mesh.triangles.size()}});
+  run.say("{} vertices, {} triangles", mesh.vertices.size(), mesh.triangles.size());
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); });
 }
 
-// Options of the other output.
-void refuse_ignored(const SimulateOptions& options) {
-  const libmap::SceneSamplingOptions samples;
-  const libmap::SceneMeshOptions surface;
-  const auto refuse = [](bool given, const char* name, const char* reason) {
-    if (given) throw libmap::Error(reason, {.file = {}, .field = name});
-  };
-  const libmap::SceneSamplingOptions& sampling = options.sampling;
-  const char* of_clouds = "is for a cloud, not with --mesh";
-  refuse(options.mesh && sampling.spacing_m != samples.spacing_m, "--spacing", of_clouds);
-  refuse(options.mesh && sampling.count != samples.count, "--count", of_clouds);
-  refuse(options.mesh && sampling.jitter != samples.jitter, "--jitter", of_clouds);
-  refuse(options.mesh && sampling.noise_m != samples.noise_m, "--noise", of_clouds);
-  refuse(options.mesh && sampling.seed != samples.seed, "--seed", of_clouds);
-  const char* of_meshes = "is for --mesh";
-  const libmap::SceneMeshOptions& meshing = options.meshing;
-  refuse(!options.mesh && meshing.edge_length_m != surface.edge_length_m, "--edge-length",
-         of_meshes);
-  refuse(!options.mesh && meshing.chord_error_m != surface.chord_error_m, "--chord-error",
-         of_meshes);
-}
-
 void simulate(const SimulateOptions& options, Run& run) {
-  refuse_ignored(options);
+  refuse_set(options, options.mesh ? bind_cloud : bind_mesh,
+             options.mesh ? "is for a cloud, not with --mesh" : "is for --mesh");
   if (options.mesh)
     libmap::require_mesh_format(options.output);
   else

@@ -1,23 +1,15 @@
 // graspmap simulate site: test sites with their true mesh and places for a field test.
-#include <fmt/format.h>
-
-#include <filesystem>
-#include <optional>
-#include <string>
-
 #include "libmap/core/data_folder.h"
-#include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/simulate/field_points.h"
 #include "libmap/simulate/rock_site_io.h"
 #include "libmap/simulate/site_mesh.h"
 #include "tools/support/command_line.h"
-#include "tools/support/simulate_commands.h"
+#include "tools/support/usages.h"
+
+using namespace graspmap_tools;
 
 namespace {
-
-using graspmap_tools::Run;
 
 struct SimulateSiteOptions {
   std::string output;
@@ -63,19 +55,16 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
   run.manifest().frame = "site";
   libmap::TriangleMesh mesh;
   std::vector<libmap::FieldPoint> points;
-  try {
+  in_file(file.string(), [&] {
     mesh = run.timed("meshing", [&] { return libmap::site_mesh(site, options.meshing); });
     points = run.timed("field points", [&] { return libmap::choose_field_points(site, mesh); });
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file.string());
-  }
-  run.manifest().results.emplace_back("rocks", static_cast<std::int64_t>(site.rocks.size()));
-  run.manifest().results.emplace_back("vertices", static_cast<std::int64_t>(mesh.vertices.size()));
-  run.manifest().results.emplace_back("triangles",
-                                      static_cast<std::int64_t>(mesh.triangles.size()));
-  run.manifest().results.emplace_back("field_points", static_cast<std::int64_t>(points.size()));
-  run.say(fmt::format("{} rocks, {} triangles, {} field points", site.rocks.size(),
-                      mesh.triangles.size(), points.size()));
+  });
+  run.add_results({{"rocks", site.rocks.size()},
+                   {"vertices", mesh.vertices.size()},
+                   {"triangles", mesh.triangles.size()},
+                   {"field_points", points.size()}});
+  run.say("{} rocks, {} triangles, {} field points", site.rocks.size(), mesh.triangles.size(),
+          points.size());
   const std::string table =
       "# Places chosen by the form of the rocks alone: no field test was made at them.\n" +
       libmap::to_csv(libmap::field_point_table(site, points));
@@ -85,8 +74,8 @@ void simulate(const SimulateSiteOptions& options, Run& run) {
   run.write_output_folder(
       options.output,
       {{"mesh.ply", [&](const auto& temporary) { libmap::write_mesh(temporary, mesh); }},
-       {"field_points.csv", [&](const auto& temporary) { libmap::write_text(temporary, table); }},
-       {"site.yaml", [&](const auto& temporary) { libmap::write_text(temporary, yaml); }}});
+       {"field_points.csv", Run::text_writer(table)},
+       {"site.yaml", Run::text_writer(yaml)}});
 }
 
 }  // namespace

@@ -207,7 +207,7 @@ TEST(FrameRegistration, StoredPosesOfARealScanComeNearTheTruth) {
   GRASPMAP_REQUIRE_DATA();
   const auto scan = open_scan(graspmap_test::data_folder() / "scans/site_full.db");
   const Trajectory truth = trajectory_of(scan->graph(), PoseSource::ground_truth);
-  const Trajectory stored = trajectory_of(scan->graph(), PoseSource::stored);
+  const Trajectory stored = trajectory_of(scan->graph(), PoseSource::optimized);
   DepthFusionOptions options;
   options.color = false;
   const DepthFusionResult result = fuse_depth(*scan, stored, options);

@@ -44,9 +44,9 @@ TEST(PoseGraphTest, TrajectoriesLeaveOutWhatHasNoPoseAndInvalidNodes) {
     return nodes;
   };
   EXPECT_EQ(nodes_of(PoseSource::odometry), (std::vector<int>{2, 3, 7}));
-  EXPECT_EQ(nodes_of(PoseSource::stored), (std::vector<int>{3, 9}));
+  EXPECT_EQ(nodes_of(PoseSource::optimized), (std::vector<int>{3, 9}));
   EXPECT_EQ(nodes_of(PoseSource::ground_truth), (std::vector<int>{2}));
-  EXPECT_EQ(trajectory_of(graph, PoseSource::stored)[1].stamp_s, 5.0);
+  EXPECT_EQ(trajectory_of(graph, PoseSource::optimized)[1].stamp_s, 5.0);
   EXPECT_DOUBLE_EQ(libmap::path_length(trajectory_of(graph, PoseSource::odometry)), 5.0 + 2.0);
   EXPECT_EQ(libmap::path_length({}), 0.0);
 }

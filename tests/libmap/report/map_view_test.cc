@@ -81,7 +81,7 @@ TEST(MapView, ColorsAreTheClassesOfTheLegend) {
     EXPECT_EQ(color, libmap::score_color(all[n].score)) << all[n].score;
     EXPECT_EQ((view.cells[n].colors_and_flags & libmap::convex_flag) != 0, n % 2 == 0);
   }
-  const MapView above = libmap::make_map_view(map, {.zero_plane_m = 1.0, .has_zero_plane = true});
+  const MapView above = libmap::make_map_view(map, {.zero_plane_m = 1.0});
   EXPECT_EQ(above.cells[3].colors_and_flags & 15U, libmap::below_plane_class);
 }
 

@@ -221,26 +221,26 @@ TEST(BagRig, RectifiedImagesAreToldByTheirName) {
   }
 }
 
-TEST(BagRig, MomentsAreChosen) {
+TEST(BagRig, SetsAreChosen) {
   SampleBag bag(bag_path());
   bag.transform("base_link", "a_optical", Pose::Identity());
   bag.transform("base_link", "b_optical", Pose::Identity());
   bag.camera("/a", {5.0, 5.1, 5.2, 5.3, 5.4}).camera("/b", {5.012, 5.111, 5.3, 5.405}).close();
   const BagRigPlan all = plan();
-  ASSERT_EQ(all.moments.size(), 5U);
-  EXPECT_EQ(all.moments[0].seen(), 2U);
-  EXPECT_EQ(all.moments[2].seen(), 1U);  // b missed one
+  ASSERT_EQ(all.sets.size(), 5U);
+  EXPECT_EQ(all.sets[0].seen(), 2U);
+  EXPECT_EQ(all.sets[2].seen(), 1U);  // b missed one
   EXPECT_EQ(all.images.size(), 9U);
   const BagRigPlan second = plan({.every = 2});
   EXPECT_EQ(second.images.size(), 5U);
-  EXPECT_EQ(second.all_moments, 5U);
+  EXPECT_EQ(second.all_sets, 5U);
   EXPECT_EQ(images_of(second, "a").size(), 3U);
   EXPECT_THAT(graspmap_test::read_text(scratch_folder() / "rig" / "moments.csv"),
               HasSubstr("stamp_s,cameras,spread_s\n5.000000,2,0.012000\n5.200000,1,0.000000\n"));
   const BagRigPlan one = plan({}, 5.28);
-  ASSERT_EQ(one.moments.size(), 1U);
-  EXPECT_NEAR(one.moments[0].stamp_s, 5.3, 1e-9);
-  EXPECT_EQ(plan({.tolerance_s = 0.001}).moments.size(), 8U);
+  ASSERT_EQ(one.sets.size(), 1U);
+  EXPECT_NEAR(one.sets[0].stamp_s, 5.3, 1e-9);
+  EXPECT_EQ(plan({.tolerance_s = 0.001}).sets.size(), 8U);
 }
 
 TEST(BagRig, OddStampsAndCalibrationsAreLeftOut) {
@@ -285,9 +285,9 @@ TEST(BagRig, BrokenImagesAreCountedAndLeftOut) {
   ASSERT_EQ(result.warnings.size(), 1U);
   EXPECT_THAT(result.warnings[0], HasSubstr("/a/image_raw: 8 images"));
   EXPECT_THAT(result.warnings[0], HasSubstr("23 bytes"));
-  // A moment of which no image is left is none.
-  ASSERT_EQ(result.moments.size(), 1U);
-  EXPECT_EQ(result.moments[0].stamp_s, 5.0);
+  // A set of which no image is left is none.
+  ASSERT_EQ(result.sets.size(), 1U);
+  EXPECT_EQ(result.sets[0].stamp_s, 5.0);
 }
 
 TEST(BagRig, ABagWithoutAnImageThatCanBeUsedIsAnError) {

@@ -16,10 +16,10 @@ namespace fs = std::filesystem;
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
 using graspmap_test::write_text;
-using libmap::fullest_rig_moment;
+using libmap::fullest_synchronized_set;
 using libmap::RigImage;
-using libmap::RigMoment;
-using State = libmap::RigMoment::Camera::State;
+using libmap::SynchronizedSet;
+using State = libmap::SynchronizedSet::Camera::State;
 using testing::HasSubstr;
 
 libmap::CameraRig rig_of(const std::vector<std::string>& names) {
@@ -95,41 +95,41 @@ std::vector<RigImage> images_at(const std::vector<std::vector<double>>& stamps) 
   return images;
 }
 
-TEST(RigMoments, SeenLateAndMissing) {
+TEST(SynchronizedSets, SeenLateAndMissing) {
   const auto images = images_at({{1.0, 2.0}, {1.95, 2.04}, {2.0201}, {}, {0.5}});
-  const RigMoment moment = rig_moment_at(images, 5, 2.0, 0.02);
-  ASSERT_EQ(moment.cameras.size(), 5U);
-  EXPECT_EQ(moment.seen(), 1U);
-  EXPECT_EQ(moment.cameras[0].state, State::seen);
-  EXPECT_EQ(moment.cameras[0].image, 1U);
-  EXPECT_EQ(moment.cameras[1].state, State::late);
-  EXPECT_NEAR(moment.cameras[1].offset_s, 0.04, 1e-12);
-  EXPECT_EQ(moment.cameras[2].state, State::late);
-  EXPECT_EQ(moment.cameras[3].state, State::missing);
-  EXPECT_NEAR(moment.cameras[4].offset_s, -1.5, 1e-12);
-  EXPECT_EQ(rig_moment_at(images, 5, 2.0, 0.05).seen(), 3U);
+  const SynchronizedSet set = synchronized_set_at(images, 5, 2.0, 0.02);
+  ASSERT_EQ(set.cameras.size(), 5U);
+  EXPECT_EQ(set.seen(), 1U);
+  EXPECT_EQ(set.cameras[0].state, State::seen);
+  EXPECT_EQ(set.cameras[0].image, 1U);
+  EXPECT_EQ(set.cameras[1].state, State::late);
+  EXPECT_NEAR(set.cameras[1].offset_s, 0.04, 1e-12);
+  EXPECT_EQ(set.cameras[2].state, State::late);
+  EXPECT_EQ(set.cameras[3].state, State::missing);
+  EXPECT_NEAR(set.cameras[4].offset_s, -1.5, 1e-12);
+  EXPECT_EQ(synchronized_set_at(images, 5, 2.0, 0.05).seen(), 3U);
 }
 
-TEST(RigMoments, ToleranceHoldsItsBound) {
+TEST(SynchronizedSets, ToleranceHoldsItsBound) {
   // 0.1 + 0.02 - 0.1 is a little more than 0.02 in binary.
-  EXPECT_EQ(rig_moment_at(images_at({{0.12}}), 1, 0.1, 0.02).seen(), 1U);
-  EXPECT_EQ(rig_moment_at(images_at({{0.12001}}), 1, 0.1, 0.02).seen(), 0U);
+  EXPECT_EQ(synchronized_set_at(images_at({{0.12}}), 1, 0.1, 0.02).seen(), 1U);
+  EXPECT_EQ(synchronized_set_at(images_at({{0.12001}}), 1, 0.1, 0.02).seen(), 0U);
 }
 
-TEST(RigMoments, FullestThenTightestThenEarliest) {
+TEST(SynchronizedSets, FullestThenTightestThenEarliest) {
   // Three cameras at 2, three more closely at 3 and 4; two at 1.
   const auto images =
       images_at({{1.0, 2.00, 3.000, 4.000}, {1.0, 2.01, 3.001, 4.001}, {2.01, 3.001, 4.001}});
-  const RigMoment moment = fullest_rig_moment(images, 3, 0.02);
-  EXPECT_EQ(moment.seen(), 3U);
-  EXPECT_EQ(moment.stamp_s, 3.001);
+  const SynchronizedSet set = fullest_synchronized_set(images, 3, 0.02);
+  EXPECT_EQ(set.seen(), 3U);
+  EXPECT_EQ(set.stamp_s, 3.001);
   // An oracle: no stamp of an image does better.
   for (const RigImage& image : images)
-    EXPECT_LE(rig_moment_at(images, 3, image.stamp_s, 0.02).seen(), 3U);
-  EXPECT_THROW(fullest_rig_moment({}, 3, 0.02), libmap::Error);
+    EXPECT_LE(synchronized_set_at(images, 3, image.stamp_s, 0.02).seen(), 3U);
+  EXPECT_THROW(fullest_synchronized_set({}, 3, 0.02), libmap::Error);
 }
 
-TEST(RigMoments, FullestAgreesWithLookingAtEveryStamp) {
+TEST(SynchronizedSets, FullestAgreesWithLookingAtEveryStamp) {
   for (int round = 0; round < 200; ++round) {
     std::vector<RigImage> images;
     // Stamps that many images share, and ties to both sides.
@@ -139,19 +139,19 @@ TEST(RigMoments, FullestAgreesWithLookingAtEveryStamp) {
                         {}});
     std::set<double> stamps;
     for (const RigImage& image : images) stamps.insert(image.stamp_s);
-    RigMoment best;
+    SynchronizedSet best;
     double least = HUGE_VAL;
     for (const double stamp : stamps) {
-      const RigMoment moment = rig_moment_at(images, 4, stamp, 0.5);
+      const SynchronizedSet set = synchronized_set_at(images, 4, stamp, 0.5);
       double sum = 0.0;
-      for (const RigMoment::Camera& camera : moment.cameras)
+      for (const SynchronizedSet::Camera& camera : set.cameras)
         sum += camera.state == State::seen ? std::abs(camera.offset_s) : 0.0;
-      if (!best.cameras.empty() && moment.seen() < best.seen()) continue;
-      if (!best.cameras.empty() && moment.seen() == best.seen() && sum >= least) continue;
-      best = moment;
+      if (!best.cameras.empty() && set.seen() < best.seen()) continue;
+      if (!best.cameras.empty() && set.seen() == best.seen() && sum >= least) continue;
+      best = set;
       least = sum;
     }
-    const RigMoment found = fullest_rig_moment(images, 4, 0.5);
+    const SynchronizedSet found = fullest_synchronized_set(images, 4, 0.5);
     EXPECT_EQ(found.stamp_s, best.stamp_s);
     for (std::size_t camera = 0; camera < 4; ++camera) {
       EXPECT_EQ(found.cameras[camera].state, best.cameras[camera].state);
@@ -161,12 +161,12 @@ TEST(RigMoments, FullestAgreesWithLookingAtEveryStamp) {
 }
 
 // As many as a bag of 100 kB may hold, all within the tolerance: minutes in cubic time.
-TEST(RigMoments, OfVeryManyImagesOfOneMoment) {
+TEST(SynchronizedSets, OfVeryManyImagesOfOneMoment) {
   std::vector<RigImage> images;
   for (std::size_t n = 0; n < 3'000; ++n)
     images.push_back({n % 2, 1e-6 * static_cast<double>(n), {}});
-  EXPECT_EQ(libmap::rig_moments(images, 2, 0.02).size(), 1'500U);
-  EXPECT_EQ(fullest_rig_moment(images, 2, 0.02).seen(), 2U);
+  EXPECT_EQ(libmap::synchronized_sets(images, 2, 0.02).size(), 1'500U);
+  EXPECT_EQ(fullest_synchronized_set(images, 2, 0.02).seen(), 2U);
 }
 
 TEST(RigDepth, UnitsBecomeMeters) {
@@ -193,7 +193,7 @@ TEST(RigDepth, UnitsBecomeMeters) {
   EXPECT_THAT(error_of([&] { read_rig_depth({0, 1.0, file}, camera); }).what(), HasSubstr("1.png"));
 }
 
-TEST(RigMoments, EachImageIsInOneMoment) {
+TEST(SynchronizedSets, EachImageIsInOneMoment) {
   std::vector<RigImage> images;
   for (std::size_t camera = 0; camera < 4; ++camera)
     for (int n = 0; n < 60; ++n)
@@ -204,15 +204,15 @@ TEST(RigMoments, EachImageIsInOneMoment) {
   for (const double tolerance : {0.0, 0.02, 0.05, 1.0}) {
     std::vector<int> times(images.size(), 0);
     double last = -1.0;
-    for (const RigMoment& moment : libmap::rig_moments(images, 4, tolerance)) {
+    for (const SynchronizedSet& set : libmap::synchronized_sets(images, 4, tolerance)) {
       double first = 1e9;
       for (std::size_t camera = 0; camera < 4; ++camera) {
-        const RigMoment::Camera& one = moment.cameras[camera];
+        const SynchronizedSet::Camera& one = set.cameras[camera];
         if (one.state != State::seen) continue;
         const RigImage& image = images[one.image];
         EXPECT_EQ(image.camera, camera);
-        EXPECT_NEAR(image.stamp_s, moment.stamp_s, tolerance + 1e-5);
-        EXPECT_EQ(one.offset_s, image.stamp_s - moment.stamp_s);
+        EXPECT_NEAR(image.stamp_s, set.stamp_s, tolerance + 1e-5);
+        EXPECT_EQ(one.offset_s, image.stamp_s - set.stamp_s);
         first = std::min(first, image.stamp_s);
         ++times[one.image];
       }
@@ -221,8 +221,8 @@ TEST(RigMoments, EachImageIsInOneMoment) {
     }
     EXPECT_THAT(times, testing::Each(1));
   }
-  EXPECT_EQ(libmap::rig_moments(images, 4, 0.05).size(), 60U);
-  EXPECT_TRUE(libmap::rig_moments({}, 4, 0.05).empty());
+  EXPECT_EQ(libmap::synchronized_sets(images, 4, 0.05).size(), 60U);
+  EXPECT_TRUE(libmap::synchronized_sets({}, 4, 0.05).empty());
 }
 
 }  // namespace rig_images_test

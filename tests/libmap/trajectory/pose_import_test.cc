@@ -282,7 +282,8 @@ TEST(PoseImport, NamesTheFileThatIsOfNoUse) {
 TEST(PoseImport, RealScanThroughEveryFormat) {
   GRASPMAP_REQUIRE_DATA();
   const libmap::RtabmapDatabase scan(graspmap_test::data_folder() / "scans" / "site_full.db");
-  const libmap::Trajectory stored = libmap::trajectory_of(scan.graph(), libmap::PoseSource::stored);
+  const libmap::Trajectory stored =
+      libmap::trajectory_of(scan.graph(), libmap::PoseSource::optimized);
   for (const auto& [name, format] : libmap::trajectory_format_names()) {
     if (format == TrajectoryFormat::automatic || format == TrajectoryFormat::colmap) continue;
     SCOPED_TRACE(name);

@@ -215,9 +215,9 @@ TEST(AbsoluteTrajectoryError, AgreesWithTheTableOfTheRealScans) {
   GRASPMAP_REQUIRE_DATA();
   using libmap::PoseSource;
   const TabledError table[] = {{"site_full.db", PoseSource::odometry, 5.0, 11.0, 0.14},
-                               {"site_full.db", PoseSource::stored, 6.8, 11.2, 0.40},
+                               {"site_full.db", PoseSource::optimized, 6.8, 11.2, 0.40},
                                {"site_drift.db", PoseSource::odometry, 42.3, 73.5, 1.21},
-                               {"site_drift.db", PoseSource::stored, 17.3, 40.7, 0.59}};
+                               {"site_drift.db", PoseSource::optimized, 17.3, 40.7, 0.59}};
   for (const TabledError& expected : table) {
     SCOPED_TRACE(std::string(expected.scan) + " " + to_text(expected.source));
     const auto scan = libmap::open_scan(graspmap_test::data_folder() / "scans" / expected.scan);

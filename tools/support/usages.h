@@ -1,0 +1,22 @@
+// The usages of commands that have a file of their own; argv begins at the command.
+#pragma once
+
+#include <string>
+
+namespace graspmap_tools {
+
+int compare_edges(int argc, char** argv);  // compare SITE --edges
+int convert_scan(int argc, char** argv);   // convert SCAN
+int fuse_rig(int argc, char** argv);       // fuse RIG_FOLDER
+
+// simulate WHAT; argv begins at WHAT.
+int simulate_cameras(int argc, char** argv);
+int simulate_scan(int argc, char** argv);
+int simulate_scene(int argc, char** argv);
+int simulate_site(int argc, char** argv);
+int simulate_terrain(int argc, char** argv);
+
+// Whether convert_scan takes it: a database, or a folder of frames.
+bool is_scan_path(const std::string& path);
+
+}  // namespace graspmap_tools
