@@ -5,21 +5,21 @@
 # beside the simulated ones and his tables are evaluated.
 #
 #   make -f pipelines/study.mk OUT=folder [SCENARIOS="1 2 3 4"] [METHODS="thesis corrected"] \
-#        [STAGES="walls published thresholds masks report"] [INCLINATIONS="10 25"] [SEED=1] -j2
+#        [STAGES="walls published thresholds masks grasp report"] [INCLINATIONS="10 25"] [SEED=1] -j2
 #
 # A map is made by site.mk. Pre-scanned: Poisson-disk samples of the site's true mesh, COUNT of them.
 # In situ: the six depth images of the robot at one pose on the site, with the noise of a real sensor
 # (SENSOR), as one panorama. EDGE, SPACING and COUNT coarsen sites, scene and samples; CAMERAS and
 # PANORAMA hold further flags of `simulate cameras` and `fuse`, LOOKUP of `lookup` (but of the
 # wall a hold is looked up as the best within HOLD_RADIUS); SHARES is the number of processes that
-# score one map. A second run does nothing; other variables or changed files make again what depends
+# score one map; PLACES and TRIALS those of the virtual field test. A second run does nothing; other variables or changed files make again what depends
 # on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
 SCENARIOS ?= 1 2 3 4
 METHODS ?= thesis corrected
-STAGES ?= walls published thresholds masks report
+STAGES ?= walls published thresholds masks grasp report
 INCLINATIONS ?= 10 25
 OBSTACLE_HEIGHT ?= 0.3
 SEED ?= 1
@@ -33,6 +33,8 @@ PANORAMA ?= --flying-pixel-jump 0.03
 LOOKUP ?=
 HOLD_RADIUS ?= 0.05
 SHARES ?= 1
+PLACES ?= 1000
+TRIALS ?= --trials 16 --draws 8
 
 # make splits names at spaces; better an error than half a name.
 one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
@@ -45,7 +47,7 @@ known = $(foreach word,$($(1)),$(if $(filter $(word),$(2)),,\
   $(error $(1) holds '$(word)', which is none of: $(2))))
 $(call known,SCENARIOS,1 2 3 4)
 $(call known,METHODS,thesis envelope climblab corrected)
-$(call known,STAGES,walls published thresholds masks report)
+$(call known,STAGES,walls published thresholds masks grasp report)
 
 include $(here)one_run.mk
 ifdef is_alone
@@ -80,6 +82,7 @@ include $(here)study/scenarios.mk
 include $(here)study/places.mk
 include $(here)study/poses.mk
 include $(here)study/walls.mk
+include $(here)study/grasp.mk
 include $(here)study/stages.mk
 
 all: $(results)

@@ -14,6 +14,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/table.h"
+#include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
@@ -29,12 +30,17 @@ struct GraspCommandOptions {
   std::string gripper = "scar-e";
   std::vector<std::pair<std::string, std::string>> overrides;
   libgtd::GraspOptions grasp;
+  std::string more_loads;
+  std::string prefix;
 };
 
 void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
   table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
+  table.add("more_loads", options.more_loads,
+            "further loads with a verdict each, N, with commas between");
+  table.add("prefix", options.prefix, "before the name of each column of the results");
 }
 
 // Of all that the results depend on but mesh, locations and seed.
@@ -68,10 +74,16 @@ void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) 
       holding, results.size(), probability, 100.0 * unseen);
 }
 
-void grasp(const GraspCommandOptions& options, Run& run) {
+void grasp(GraspCommandOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
+  for (const std::string& text : libmap::split_list(options.more_loads)) {
+    const auto load = libmap::parse_double(text);
+    if (!load || !(*load > 0.0))
+      throw libmap::Error("is no load", {.field = "--more-loads", .value = text, .bound = "> 0"});
+    options.grasp.more_loads_n.push_back(*load);
+  }
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
   if (!gripper.fingers)
@@ -93,7 +105,8 @@ void grasp(const GraspCommandOptions& options, Run& run) {
     const bool of_location = error.context().field.starts_with("location");
     throw error.in_file(of_location ? options.points : options.mesh);
   }
-  for (const std::string& column : libgtd::grasp_columns()) {
+  for (const std::string& name : libgtd::grasp_columns(options.grasp.more_loads_n)) {
+    const std::string column = options.prefix + name;
     if (table.find_column(column))
       throw libmap::Error("the locations have this column already",
                           {.file = options.points, .field = column});

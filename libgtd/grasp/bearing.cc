@@ -36,7 +36,7 @@ void bind(libmap::ParameterTable& table, EngagementOptions& options) {
             "smallest lean of a facet against the drag");
   table.add("asperity_max_deg", options.asperity_max_deg, lean,
             "largest lean of a facet against the drag");
-  table.add("engagement_per_mm", options.engagement_per_mm, not_negative,
+  table.add("engagement_rate", options.engagement_rate, not_negative,
             "rate at which a dragged spine meets facets, 1/mm");
   table.add("drag_mm", options.drag_mm, not_negative, "distance that spines are dragged");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
@@ -80,7 +80,16 @@ BearingContact::BearingContact(const GripContact& contact, const EngagementOptio
   adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
 }
 
-// Of the eight edges of the friction pyramid on a facet, the best one for `local`.
+// The product of `local` with the best of the eight edges of the friction pyramid on a facet.
+double BearingContact::best_edge_product(double cosine, double sine,
+                                         const Eigen::Vector3d& local) const {
+  const double along = std::abs(sine * local.x() + cosine * local.y());
+  const double beside = std::abs(local.z());
+  const double slope = std::max({along, beside, (along + beside) * (std::numbers::sqrt2 / 2.0)});
+  return slant_ * (cosine * local.x() - sine * local.y() + friction_ * slope);
+}
+
+// The same, with the edge.
 BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
                                                const Eigen::Vector3d& local) const {
   const double axis = cosine * local.x() - sine * local.y();
@@ -114,15 +123,15 @@ double BearingContact::max_product(const Eigen::Vector3d& worth, SpineSharing sh
     for (const Eigen::Vector3d& edge : adhesion_) most = std::max(most, edge.dot(along));
     return limit_n_ * most;
   }
-  const double ground = std::max(0.0, best_edge(1.0, 0.0, along).product);
+  const double ground = std::max(0.0, best_edge_product(1.0, 0.0, along));
   double sum = static_cast<double>(cosines_.size()) * ground;
   if (sharing == SpineSharing::best)
     for (std::size_t n = 0; n < cosines_.size(); ++n)
-      sum += std::max(0.0, best_edge(cosines_[n], sines_[n], along).product);
+      sum += std::max(0.0, best_edge_product(cosines_[n], sines_[n], along));
   else
     for (std::size_t n = 0; n < cosines_.size(); ++n)
       sum = std::max(sum,
-                     static_cast<double>(n + 1) * best_edge(cosines_[n], sines_[n], along).product);
+                     static_cast<double>(n + 1) * best_edge_product(cosines_[n], sines_[n], along));
   return limit_n_ * sum;
 }
 
@@ -149,7 +158,7 @@ Eigen::Vector3d BearingContact::best_force(const Eigen::Vector3d& worth,
 
 double engagement_share(const EngagementOptions& options, const GripperFingers& fingers) {
   const double scale = usable_asperities(fingers.spine_tip_radius_um) / usable_asperities(25.0);
-  return -std::expm1(-scale * options.engagement_per_mm * options.drag_mm);
+  return -std::expm1(-scale * options.engagement_rate * options.drag_mm);
 }
 
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,

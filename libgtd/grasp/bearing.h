@@ -27,7 +27,7 @@ struct EngagementOptions {
   double friction = 0.39;         // Coulomb's mu, of spines and links
   double asperity_min_deg = 0.0;  // psi is uniform between the two
   double asperity_max_deg = 90.0;
-  double engagement_per_mm = 0.6;  // a spine meets a facet with 1 - exp(-rate * drag)
+  double engagement_rate = 0.6;  // a spine meets a facet with 1 - exp(-rate * drag)
   double drag_mm = 5.0;
   double adhesion_limit_n = 20.0;      // T of all fingers of the gripper
   double adhesion_lateral_deg = 45.0;  // lateral force: at most T tan of it
@@ -63,6 +63,7 @@ class BearingContact {
 
  private:
   struct Edge;
+  double best_edge_product(double cosine, double sine, const Eigen::Vector3d& local) const;
   Edge best_edge(double cosine, double sine, const Eigen::Vector3d& local) const;
   Eigen::Vector3d local(const Eigen::Vector3d& vector) const {
     return {normal_.dot(vector), drag_.dot(vector), lateral_.dot(vector)};

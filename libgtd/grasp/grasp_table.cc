@@ -20,7 +20,7 @@ std::string share_of(const LocationResult& result) {
 }
 
 constexpr Column columns[] = {
-    {"holds", [](const LocationResult& r) { return std::string(r.holds() ? "1" : "0"); }},
+    {"graspable", [](const LocationResult& r) { return std::string(r.holds() ? "1" : "0"); }},
     {"hold_probability", [](const LocationResult& r) { return number(r.hold_probability); }},
     {"hold_low", [](const LocationResult& r) { return number(r.hold_low); }},
     {"hold_high", [](const LocationResult& r) { return number(r.hold_high); }},
@@ -49,18 +49,22 @@ constexpr Column columns[] = {
 
 }  // namespace
 
-const std::vector<std::string>& grasp_columns() {
-  static const std::vector<std::string> names = [] {
-    std::vector<std::string> made;
-    for (const Column& column : columns) made.emplace_back(column.name);
-    return made;
-  }();
+std::vector<std::string> grasp_columns(const std::vector<double>& more_loads_n) {
+  std::vector<std::string> names;
+  for (const Column& column : columns) names.emplace_back(column.name);
+  for (const double load : more_loads_n)
+    for (const char* name : {"graspable_", "hold_probability_"})
+      names.push_back(name + libmap::to_text(load));
   return names;
 }
 
 std::vector<std::string> grasp_cells(const LocationResult& result) {
   std::vector<std::string> cells;
   for (const Column& column : columns) cells.push_back(column.cell(result));
+  for (const double probability : result.more_probabilities) {
+    cells.emplace_back(probability >= 0.5 ? "1" : "0");
+    cells.push_back(number(probability));
+  }
   return cells;
 }
 

@@ -157,6 +157,12 @@ LocationResult test_location(const Ground& ground, const Gripper& gripper,
       static_cast<double>(result.ends[0]) / static_cast<double>(result.trials);
   std::tie(result.hold_low, result.hold_high) =
       wilson_interval(result.hold_probability, options.poses);
+  for (const double load : options.more_loads_n)
+    result.more_probabilities.push_back(
+        static_cast<double>(
+            std::count_if(forces.begin(), forces.end(),
+                          [&](double force) { return force >= load * options.safety; })) /
+        static_cast<double>(result.trials));
   result.force_n = quantiles(forces);
   result.best_force_n = quantiles(best_forces);
   result.limiting_direction = static_cast<std::size_t>(
@@ -186,6 +192,11 @@ void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& lo
 
 void GraspOptions::check() const {
   libmap::check_parameters(*this);
+  for (const double load : more_loads_n)
+    if (!(load > 0.0))
+      throw libmap::Error(
+          "out of range",
+          {.field = "more_loads_n", .value = libmap::to_text(load), .bound = "> 0"});
   if (engagement.asperity_min_deg > engagement.asperity_max_deg)
     throw libmap::Error(
         "is beyond the largest lean",

@@ -23,6 +23,7 @@ enum class ApproachDirection { up, normal };
 struct GraspOptions {
   double load_n = 10.0;  // a trial holds if its force is at least load * safety in all directions
   double safety = 1.0;
+  std::vector<double> more_loads_n;  // whose probabilities are computed too
   ApproachDirection approach = ApproachDirection::up;
   int poses = 32;  // of a location
   int draws = 32;  // of asperities at each pose
@@ -62,9 +63,10 @@ struct LocationResult {
   // Wilson's interval of 95 %; trials of one pose depend on each other, so a pose counts once.
   double hold_low = 0.0;
   double hold_high = 0.0;
-  std::array<double, 3> force_n{};       // equal sharing: quantiles 0.1, 0.5, 0.9 of the trials
-  std::array<double, 3> best_force_n{};  // the same of the best sharing
-  std::size_t limiting_direction = 0;    // most often the weakest; of trials with any force
+  std::vector<double> more_probabilities;  // of more_loads_n
+  std::array<double, 3> force_n{};         // equal sharing: quantiles 0.1, 0.5, 0.9 of the trials
+  std::array<double, 3> best_force_n{};    // the same of the best sharing
+  std::size_t limiting_direction = 0;      // most often the weakest; of trials with any force
   // Means over the poses.
   double spine_fingers = 0.0;
   double link_fingers = 0.0;  // a link touches, no spine does

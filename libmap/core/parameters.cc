@@ -184,7 +184,7 @@ void ParameterTable::check() const {
 }
 
 std::string flag_of(std::string_view key) {
-  for (const std::string_view unit : {"_m", "_mm", "_deg", "_px", "_s"})
+  for (const std::string_view unit : {"_m", "_mm", "_deg", "_px", "_s", "_n"})
     if (key.ends_with(unit)) {
       key.remove_suffix(unit.size());
       break;

@@ -48,7 +48,7 @@ std::string unit_of(const libmap::Parameter& parameter) {
   }
   const std::string_view key = parameter.key;
   for (const auto& [suffix, name] :
-       {std::pair{"_mm", "MM"}, {"_m", "M"}, {"_deg", "DEG"}, {"_px", "PX"}, {"_s", "S"}})
+       {std::pair{"_mm", "MM"}, {"_m", "M"}, {"_deg", "DEG"}, {"_px", "PX"}, {"_s", "S"}, {"_n", "N"}})
     if (key.ends_with(suffix)) return name;
   return parameter.type == libmap::ParameterType::integer ? "N" : "X";
 }

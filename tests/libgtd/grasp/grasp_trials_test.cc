@@ -28,7 +28,7 @@ GraspOptions certain(double psi_deg) {
   options.offset_m = 0;
   options.tilt_deg = 0;
   options.engagement.asperity_min_deg = options.engagement.asperity_max_deg = psi_deg;
-  options.engagement.engagement_per_mm = 100;
+  options.engagement.engagement_rate = 100;
   return options;
 }
 
