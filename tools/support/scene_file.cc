@@ -6,6 +6,7 @@
 #include <utility>
 #include <variant>
 
+#include "libgtd/grasp/trial_scene.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/table.h"
@@ -112,6 +113,9 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
                         {.file = file});
   const auto manifest = libmap::read_manifest_of(file);
   layer.coloring = options.coloring;
+  if (const auto* mesh = std::get_if<libmap::TriangleMesh>(&layer.shape))
+    for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(*mesh))
+      layer.coloring.own_legend.entries.push_back({part.color, part.text});
   layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
   layer.point_shape = options.point_shape;
   layer.shading = options.shading;
