@@ -1,6 +1,7 @@
 // graspmap grasp: the virtual field test of a gripper at listed locations of a mesh.
 #include <fmt/format.h>
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,6 +18,7 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "tools/support/command_line.h"
+#include "tools/support/grasp_scenes.h"
 #include "tools/support/map_frame.h"
 
 namespace {
@@ -27,6 +29,7 @@ struct GraspCommandOptions {
   std::string mesh;
   std::string points;
   std::string output;
+  graspmap_tools::GraspScenesOptions scenes;
   std::string gripper = "scar-e";
   std::vector<std::pair<std::string, std::string>> overrides;
   libgtd::GraspOptions grasp;
@@ -84,6 +87,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
       throw libmap::Error("is no load", {.field = "--more-loads", .value = text, .bound = "> 0"});
     options.grasp.more_loads_n.push_back(*load);
   }
+  claim_scenes(options.scenes, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
   if (!gripper.fingers)
@@ -91,15 +95,17 @@ void grasp(GraspCommandOptions& options, Run& run) {
                         {.file = file.string(), .field = "fingers"});
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = graspmap_tools::positions_of(table);
+  const auto scenes = graspmap_tools::scenes_of(table, options.scenes);
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);
   run.add_input(options.points);
   run.add_input(file);
+  std::optional<libgtd::Ground> ground;
   std::vector<libgtd::LocationResult> results;
   try {
-    const libgtd::Ground ground(mesh);
+    ground.emplace(mesh);
     results = run.timed("grasp", [&] {
-      return libgtd::test_grasps(ground, gripper, locations, options.grasp, run.progress());
+      return libgtd::test_grasps(*ground, gripper, locations, options.grasp, run.progress());
     });
   } catch (const libmap::Error& error) {
     const bool of_location = error.context().field.starts_with("location");
@@ -117,6 +123,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
       table.rows[row].push_back(std::move(cell));
   run.add_results({{"parameters_sha256", parameters_hash(gripper, options.grasp)}});
   note_results(results, run);
+  write_scenes(options.scenes, scenes, {mesh, *ground, gripper, options.grasp, results}, run);
   run.write_text(options.output, libmap::to_csv(table));
 }
 
@@ -130,6 +137,11 @@ int main(int argc, char** argv) {
                  "CSV with the columns x, y, z in meters in the mesh's frame, and any others",
                  true);
   command.output(options.output, "CSV: the locations, each with the results of its trials");
+  command.option("--scenes", "FOLDER", options.scenes.folder,
+                 "pictures of one trial of each location, its force nearest to the median: "
+                 "FOLDER/PLACE.ply, after the column 'place' or the row");
+  command.option("--scene-of", "PLACES", options.scenes.places,
+                 "the locations to draw; default: all");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { grasp(options, run); });
 }

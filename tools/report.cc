@@ -15,6 +15,7 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
+#include "tools/support/report_scene.h"
 
 using namespace graspmap_tools;
 
@@ -43,23 +44,30 @@ void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
 
 // Bytes of a cell in the page: seven, in base64.
 constexpr double bytes_a_cell = 28.0 / 3.0;
-// The share of the page that maps may take.
+// The share of the page that maps may take, and that scenes may.
 constexpr double maps_share = 0.4;
+constexpr double scenes_share = 0.4;
 
-std::size_t count_maps(const std::vector<libmap::OutlineItem>& items) {
-  return static_cast<std::size_t>(std::count_if(
-      items.begin(), items.end(),
-      [](const libmap::OutlineItem& item) { return item.kind == libmap::ItemKind::map; }));
+std::size_t count_items(const std::vector<libmap::OutlineItem>& items, libmap::ItemKind kind) {
+  return static_cast<std::size_t>(
+      std::count_if(items.begin(), items.end(),
+                    [&](const libmap::OutlineItem& item) { return item.kind == kind; }));
 }
 
-std::size_t count_maps(const std::vector<libmap::OutlineSection>& sections) {
+std::size_t count_items(const std::vector<libmap::OutlineSection>& sections,
+                        libmap::ItemKind kind) {
   std::size_t count = 0;
   for (const libmap::OutlineSection& section : sections)
-    count += count_maps(section.items) + count_maps(section.sections);
+    count += count_items(section.items, kind) + count_items(section.sections, kind);
   return count;
 }
 
-std::size_t cells_a_map(const ReportCommandOptions& options, std::size_t maps) {
+std::size_t count_items(const libmap::Outline& outline, libmap::ItemKind kind) {
+  return count_items(outline.items, kind) + count_items(outline.sections, kind);
+}
+
+std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::Outline& outline) {
+  const std::size_t maps = count_items(outline, libmap::ItemKind::map);
   const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
   return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
@@ -75,7 +83,8 @@ libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_vi
   libmap::PageAssets assets;
   assets.version = run.manifest().version;
   assets.style = read_asset("report.css", run);
-  for (const char* name : {"map_cells.js", "map_marks.js", "map_view.js", "report.js"})
+  for (const char* name :
+       {"map_cells.js", "map_marks.js", "scene_mesh.js", "map_view.js", "report.js"})
     assets.scripts.push_back(read_asset(name, run));
   if (!with_views) return assets;
   for (const char* name : {"three.min.js", "examples/js/controls/OrbitControls.js"}) {
@@ -201,16 +210,19 @@ void make_report(ReportCommandOptions& options, Run& run) {
     throw libmap::Error("reports are written as .html", {.file = options.output});
   run.claim_output(options.output);
   const libmap::Outline outline = find_outline(options, run);
-  const std::size_t maps = count_maps(outline.items) + count_maps(outline.sections);
-  const std::size_t max_cells = cells_a_map(options, maps);
-  const bool with_views = !options.no_views && max_cells > 0 && maps > 0;
+  const std::size_t max_cells = cells_a_map(options, outline);
+  const bool has_views = (max_cells > 0 && count_items(outline, libmap::ItemKind::map) > 0) ||
+                         count_items(outline, libmap::ItemKind::scene) > 0;
+  const bool with_views = !options.no_views && has_views;
   const libmap::PageAssets assets = read_assets(options, with_views, run);
+  double bytes_left = scenes_share * options.max_size_mb * 1e6;
   const libmap::ReportReadResult read = run.timed("read", [&] {
-    return libmap::read_report_content(outline,
-                                       {.folder = options.folder, .left_out = options.output},
-                                       [&](const fs::path& map, const auto& lookup) {
-                                         return load_map_view(map, lookup, max_cells, run);
-                                       });
+    return libmap::read_report_content(
+        outline, {.folder = options.folder, .left_out = options.output},
+        [&](const fs::path& map, const auto& lookup) {
+          return load_map_view(map, lookup, max_cells, run);
+        },
+        [&](const fs::path& scene) { return load_report_scene(scene, bytes_left); });
   });
   const libmap::FittedPage page = run.timed("write page", [&] {
     return libmap::fit_report_page(read.content, assets,

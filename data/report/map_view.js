@@ -14,7 +14,7 @@ class MapView {
     this.labels = true;
     this.selected = -1;
     this.pending = false;
-    this.cells = new MapCells(this.data.cells);
+    this.cells = this.data.mesh ? new SceneMesh(this.data) : new MapCells(this.data.cells);
     this.marks = new MapMarks(this.canvas, this.data.markers, this.data.cell_size_m);
     this.size = this.cells.size;
     this.middle = this.size.clone().multiplyScalar(0.5);

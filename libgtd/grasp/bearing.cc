@@ -156,6 +156,20 @@ Eigen::Vector3d BearingContact::best_force(const Eigen::Vector3d& worth,
   return limit_n_ * (best.local.x() * normal_ + best.local.y() * drag_ + best.local.z() * lateral_);
 }
 
+std::vector<Eigen::Vector3d> BearingContact::cone() const {
+  std::vector<Eigen::Vector3d> edges = adhesion_;
+  constexpr int edges_of_facet = 8;
+  for (int n = 0; edges.size() < edges_of_facet && adhesion_.empty(); ++n) {
+    const double turn = n * 2.0 * std::numbers::pi / edges_of_facet;
+    const double out = friction_ * std::cos(turn);
+    edges.emplace_back(cosines_[0] - out * sines_[0], -sines_[0] - out * cosines_[0],
+                       friction_ * std::sin(turn));
+  }
+  for (Eigen::Vector3d& edge : edges)
+    edge = (edge.x() * normal_ + edge.y() * drag_ + edge.z() * lateral_).normalized();
+  return edges;
+}
+
 double engagement_share(const EngagementOptions& options, const GripperFingers& fingers) {
   const double scale = usable_asperities(fingers.spine_tip_radius_um) / usable_asperities(25.0);
   return -std::expm1(-scale * options.engagement_rate * options.drag_mm);

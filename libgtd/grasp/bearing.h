@@ -60,6 +60,9 @@ class BearingContact {
   // The largest product of a force of the set with `worth`, and a force that has it.
   double max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const;
   Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const;
+  // For pictures: the edges of the forces on the steepest facet (adhesion: of all forces), unit
+  // vectors in turn about it.
+  std::vector<Eigen::Vector3d> cone() const;
 
  private:
   struct Edge;

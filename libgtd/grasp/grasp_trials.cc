@@ -266,6 +266,7 @@ Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Ve
                    const GraspOptions& options, int pose, int draw) {
   const Site site = site_of(ground, gripper, location, options);
   Trial trial;
+  trial.mesh_from_patch = site.patch.mesh_from_patch;
   trial.gripper =
       close_gripper(site.patch, gripper, draw_pose(site, gripper, options, pose), options.closing);
   trial.bearing = draw_asperities(trial.gripper, site, gripper, options, pose, draw);

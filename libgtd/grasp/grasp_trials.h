@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
 #include <string>
@@ -48,6 +49,7 @@ enum class TrialEnd { holds, approach, contact, engagement, load, unseen };
 const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names();
 
 struct Trial {
+  Eigen::Isometry3d mesh_from_patch = Eigen::Isometry3d::Identity();
   ClosedGripper gripper;
   std::vector<BearingContact> bearing;
   TrialEnd end = TrialEnd::approach;

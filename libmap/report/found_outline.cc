@@ -50,6 +50,7 @@ class Finder {
     section.folder = folder.filename().string();
     const FolderListing listing = list_folder(folder);
     add_maps(listing, section);
+    add_scenes(folder, listing, section);
     add_pictures(listing, section);
     add_tables(listing, section);
     add_texts(listing, section);
@@ -149,6 +150,21 @@ class Finder {
       if (!item.lookup.empty()) item.columns = columns_of(file.parent_path() / item.lookup);
       item.picture = still_of(file, listing, candidates.size() == 1);
       section.items.push_back(std::move(item));
+    }
+  }
+
+  // Of the trials of `grasp`: the folder's manifest says of each what came out.
+  void add_scenes(const fs::path& folder, const FolderListing& listing, OutlineSection& section) {
+    const auto& manifest = manifest_of(folder);
+    if (!manifest || manifest->command != "grasp") return;
+    for (const fs::path& file : listing.files) {
+      const std::string name = file.filename().string();
+      const ManifestValue* result = manifest->find_result(name);
+      const auto* text = result == nullptr ? nullptr : std::get_if<std::string>(result);
+      if (text != nullptr)
+        section.items.push_back({.kind = ItemKind::scene,
+                                 .files = {name},
+                                 .caption = file.stem().string() + ": " + *text + "."});
     }
   }
 

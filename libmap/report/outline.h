@@ -10,7 +10,7 @@
 namespace libmap {
 
 // What an item of a report shows.
-enum class ItemKind { picture, table, map, parameters, values, timings, listing, note };
+enum class ItemKind { picture, table, map, scene, parameters, values, timings, listing, note };
 const std::vector<std::pair<std::string, ItemKind>>& item_kind_names();
 
 struct OutlineColumn {

@@ -253,10 +253,15 @@ OutlineSection parse_section(const YAML::Node& node, int depth) {
 
 const std::vector<std::pair<std::string, ItemKind>>& item_kind_names() {
   static const std::vector<std::pair<std::string, ItemKind>> names = {
-      {"map", ItemKind::map},         {"picture", ItemKind::picture},
-      {"chart", ItemKind::picture},   {"table", ItemKind::table},
-      {"values", ItemKind::values},   {"parameters", ItemKind::parameters},
-      {"timings", ItemKind::timings}, {"listing", ItemKind::listing},
+      {"map", ItemKind::map},
+      {"scene", ItemKind::scene},
+      {"picture", ItemKind::picture},
+      {"chart", ItemKind::picture},
+      {"table", ItemKind::table},
+      {"values", ItemKind::values},
+      {"parameters", ItemKind::parameters},
+      {"timings", ItemKind::timings},
+      {"listing", ItemKind::listing},
       {"note", ItemKind::note}};
   return names;
 }

@@ -11,6 +11,7 @@
 
 #include "libmap/core/manifest.h"
 #include "libmap/core/table.h"
+#include "libmap/core/triangle_mesh.h"
 #include "libmap/report/map_view.h"
 #include "libmap/report/outline.h"
 #include "libmap/report/timing_table.h"
@@ -39,6 +40,12 @@ struct ReportMap {
   MapView view{};
   std::optional<ReportTable> locations{};  // row n belongs to the marker n
   std::optional<ReportPicture> still{};
+};
+
+// A colored mesh, and what its colors mean.
+struct ReportScene {
+  TriangleMesh mesh{};
+  std::vector<std::pair<Color, std::string>> legend{};
 };
 
 struct ReportParameters {
@@ -70,8 +77,8 @@ struct ReportGap {
 using ReportPictures = std::vector<ReportPicture>;
 using ReportValues = std::vector<ReportValue>;
 using ReportBody =
-    std::variant<std::monostate, ReportPictures, ReportTable, ReportMap, ReportParameters,
-                 ReportValues, TimingTable, ReportListing, ReportNote>;
+    std::variant<std::monostate, ReportPictures, ReportTable, ReportMap, ReportScene,
+                 ReportParameters, ReportValues, TimingTable, ReportListing, ReportNote>;
 
 struct ReportItem {
   std::string caption{};

@@ -11,6 +11,7 @@
 #include "libmap/report/manifest_html.h"
 #include "libmap/report/map_html.h"
 #include "libmap/report/picture_fit.h"
+#include "libmap/report/scene_html.h"
 #include "libmap/report/table_html.h"
 
 namespace libmap {
@@ -146,6 +147,12 @@ class PageWriter {
         map.still ? "<div class=\"still\">" + image_html(*map.still, caption) + "</div>"
                   : "<p class=\"still\">No picture of this map was made.</p>";
     return figure("map", number, item, map_html(map, still, view), "Graspability map.");
+  }
+
+  std::string body_html(const ReportScene& scene, const ReportItem& item) {
+    const std::string number = figure_number();
+    has_views_ = has_views_ || with_views_;
+    return figure("map", number, item, scene_html(scene, with_views_), "Scene.");
   }
 
   std::string body_html(const ReportParameters& parameters, const ReportItem& item) {

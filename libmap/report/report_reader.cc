@@ -62,8 +62,8 @@ bool next_line(std::istream& stream, std::size_t most, std::string& line) {
 
 class Reader {
  public:
-  Reader(const ReportReadOptions& options, const MapLoader& load_map)
-      : options_(options), load_map_(load_map), root_(options.folder) {}
+  Reader(const ReportReadOptions& options, const MapLoader& load_map, const SceneLoader& load_scene)
+      : options_(options), load_map_(load_map), load_scene_(load_scene), root_(options.folder) {}
 
   ReportReadResult read(const Outline& outline) {
     ReportReadResult result;
@@ -142,6 +142,9 @@ class Reader {
       case ItemKind::map:
         read_map(outline, folder, item);
         break;
+      case ItemKind::scene:
+        read_scene(resolve(folder, outline.files.front()), item);
+        break;
       case ItemKind::parameters:
         read_parameters(outline, folder, item);
         break;
@@ -206,6 +209,13 @@ class Reader {
       if (!outline.picture.empty())
         map.still = read_picture(resolve(folder, outline.picture), item);
       item.body = std::move(map);
+    });
+  }
+
+  void read_scene(const fs::path& path, ReportItem& item) {
+    fill(item, path, [&] {
+      item.body = load_scene_(path);
+      use(path);
     });
   }
 
@@ -366,6 +376,7 @@ class Reader {
 
   const ReportReadOptions& options_;
   const MapLoader& load_map_;
+  const SceneLoader& load_scene_;
   fs::path root_;
   std::vector<fs::path> files_;
 };
@@ -373,12 +384,12 @@ class Reader {
 }  // namespace
 
 ReportReadResult read_report_content(const Outline& outline, const ReportReadOptions& options,
-                                     const MapLoader& load_map) {
+                                     const MapLoader& load_map, const SceneLoader& load_scene) {
   std::error_code code;
   if (!fs::is_directory(options.folder, code))
     throw Error(is_there(options.folder) ? "is no folder" : "no such folder",
                 {.file = options.folder.string()});
-  return Reader(options, load_map).read(outline);
+  return Reader(options, load_map, load_scene).read(outline);
 }
 
 }  // namespace libmap

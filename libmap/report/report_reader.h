@@ -24,6 +24,9 @@ struct ReportReadOptions {
 using MapLoader = std::function<MapView(const std::filesystem::path& map,
                                         const std::optional<std::filesystem::path>& lookup)>;
 
+// And the meshes of scenes. Throws Error if the scene cannot be shown.
+using SceneLoader = std::function<ReportScene(const std::filesystem::path& scene)>;
+
 struct ReportReadResult {
   ReportContent content;
   std::vector<std::filesystem::path> files;  // that were shown, in their order, each once
@@ -31,6 +34,6 @@ struct ReportReadResult {
 
 // What is missing or broken stands in the content as a gap. Throws Error: no such folder.
 ReportReadResult read_report_content(const Outline& outline, const ReportReadOptions& options,
-                                     const MapLoader& load_map);
+                                     const MapLoader& load_map, const SceneLoader& load_scene);
 
 }  // namespace libmap

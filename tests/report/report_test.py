@@ -1,5 +1,5 @@
-"""The report of a small run in a headless Chromium: it opens without errors, its views turn, places
-are chosen in table and view, it fits a telephone, and its text is there without JavaScript.
+"""The report of a small run in a headless Chromium: it opens without errors, its views of maps and
+scenes turn, places are chosen in table and view, it fits a telephone, and its text is there without JavaScript.
 
     report_test.py GRASPMAP SOURCE_FOLDER
 
@@ -17,6 +17,8 @@ from webdriver import Browser
 
 ATTACK = '<img src=x onerror=hacked()>'
 FIGURE = 'document.querySelector("figure.map")'
+SCENE = 'document.querySelectorAll("figure.map")[1]'
+FLOOR = 'OFF\n4 2 0\n-1 -1 0\n1 -1 0\n1 1 0\n-1 1 0\n3 0 1 2\n3 0 2 3\n'
 OUTLINE = f'''
 title: "A study {ATTACK}"
 text: The first words.
@@ -30,6 +32,10 @@ sections:
       - table: lookup.csv
       - parameters: map.pcd
       - timings: [{{name: one, folder: .}}]
+  - heading: Scene
+    items:
+      - scene: scenes/1.ply
+        caption: "A scene {ATTACK}"
   - heading: Wide
     items:
       - table: wide.csv
@@ -64,6 +70,10 @@ def make_run(graspmap, folder):
     call('score', folder / 'terrain.pcd', '--config', 'primitive_shapes_prescan', '--voxel-size',
          '0.02', '-o', run / 'map.pcd')
     call('lookup', run / 'map.pcd', folder / 'points.csv', '-o', run / 'lookup.csv')
+    (folder / 'floor.off').write_text(FLOOR)
+    (folder / 'places.csv').write_text('x,y,z\n0,0,0\n')
+    call('grasp', folder / 'floor.off', '--points', folder / 'places.csv', '--trials', '1',
+         '--draws', '1', '--scenes', run / 'scenes', '-o', folder / 'trials.csv')
     # Any picture will do.
     shutil.copy(pathlib.Path(sys.argv[2]) / 'pipelines/primitive_shapes.png', run / 'top.png')
     (folder / 'outline.yaml').write_text(OUTLINE)
@@ -77,21 +87,36 @@ class Page:
         self.browser = browser
         browser.open(report)
 
-    def show_view(self):
-        self.browser.run(f'{FIGURE}.scrollIntoView()')
-        wait_for('the view is drawn', lambda: self.drawn() > 0)
-        self.settle()
+    def show_view(self, figure=FIGURE):
+        self.browser.run(f'{figure}.scrollIntoView()')
+        wait_for('the view is drawn', lambda: self.drawn(figure) > 0)
+        self.settle(figure)
 
-    def drawn(self):
-        return int(self.browser.run(f'return {FIGURE}.dataset.drawn || "0"'))
+    def drawn(self, figure=FIGURE):
+        return int(self.browser.run(f'return {figure}.dataset.drawn || "0"'))
 
-    def settle(self):
+    def settle(self, figure=FIGURE):
         """Until all that was asked for is drawn."""
         wait_for('the view is at rest',
-                 lambda: self.browser.run(f'return {FIGURE}.dataset.busy === undefined'))
+                 lambda: self.browser.run(f'return {figure}.dataset.busy === undefined'))
 
-    def picture(self):
-        return self.browser.run('return document.querySelector("figure.map canvas").toDataURL()')
+    def picture(self, figure=FIGURE):
+        return self.browser.run(f'return {figure}.querySelector("canvas").toDataURL()')
+
+    def colors(self, figure):
+        """The share of the canvas's pixels of each kind."""
+        return self.browser.run(f'''
+            const canvas = {figure}.querySelector("canvas");
+            const data = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data;
+            const count = {{drawn: 0, green: 0, blue: 0}};
+            for (let n = 0; n < data.length; n += 4) {{
+              const [r, g, b, a] = data.subarray(n, n + 4);
+              if (a > 128) count.drawn++;
+              if (a > 128 && g > 1.5 * r && g > 1.5 * b) count.green++;
+              if (a > 128 && b > 1.5 * r) count.blue++;
+            }}
+            for (const kind in count) count[kind] /= data.length / 4;
+            return count;''')
 
     def middle(self):
         box = self.browser.run(
@@ -159,6 +184,17 @@ def on_a_desk(report):
                     'new KeyboardEvent("keydown", {key: "ArrowLeft"}))')
         page.settle()
         check(page.picture() != before, 'the arrow key did not turn the map')
+
+        # Floor, green spheres at the contacts, and the gripper in blue.
+        page.show_view(SCENE)
+        colors = page.colors(SCENE)
+        check(0.05 < colors['drawn'] < 0.95, f'the scene covers {colors}')
+        check(0.0005 < colors['green'] < 0.05, f'green in the scene: {colors}')
+        check(0.005 < colors['blue'] < 0.3, f'blue in the scene: {colors}')
+        oblique = page.picture(SCENE)
+        browser.run(f'{SCENE}.querySelector("[data-camera=top]").click()')
+        page.settle(SCENE)
+        check(page.picture(SCENE) != oblique, 'the scene is not seen from the top')
 
         browser.run('document.querySelector(".picture img").click()')
         check(browser.run('return document.querySelector("dialog").open'), 'no large picture')

@@ -4,6 +4,7 @@
 #include <limits>
 #include <variant>
 
+#include "libgtd/grasp/trial_scene.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
@@ -184,6 +185,9 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
                         {.file = file});
   const auto manifest = libmap::read_manifest_of(file);
   layer.coloring = options.coloring;
+  if (const auto* mesh = std::get_if<libmap::TriangleMesh>(&layer.shape))
+    for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(*mesh))
+      layer.coloring.own_legend.entries.push_back({part.color, part.text});
   layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
   layer.point_shape = options.point_shape;
   layer.shading = options.shading;

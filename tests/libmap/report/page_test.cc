@@ -61,6 +61,7 @@ TEST(ReportPage, NothingFromTheRunCanRun) {
        {libmap::ReportBody(table), libmap::ReportBody(parameters),
         libmap::ReportBody(libmap::ReportValues{{attack, attack, attack, attack}}),
         libmap::ReportBody(libmap::timing_table({{attack, {manifest}}})),
+        libmap::ReportBody(libmap::ReportScene{{}, {{libmap::Color{1, 2, 3}, attack}}}),
         libmap::ReportBody(libmap::ReportListing{attack, 3}),
         libmap::ReportBody(libmap::ReportNote{attack})}) {
     item.body = body;
@@ -95,6 +96,29 @@ TEST(ReportPage, LibrariesComeOnlyWithViews) {
   const std::string html = libmap::report_page(content, with_library);
   EXPECT_NE(html.find("<script>library();</script>"), std::string::npos);
   EXPECT_NE(html.find("whose it is"), std::string::npos);
+  EXPECT_EQ(libmap::report_page(content, assets).find("<canvas"), std::string::npos);
+}
+
+// Corners, places in steps from the lowest corner, colors.
+TEST(ReportPage, AScenesMesh) {
+  PageAssets with_library = assets;
+  with_library.libraries = {"library();"};
+  libmap::ReportScene scene;
+  scene.mesh.vertices = {{1.0, 5.0, 0.0}, {3.0, 5.0, 0.0}, {1.0, 6.0, 0.0}};
+  scene.mesh.triangles = {{0, 1, 2}};
+  scene.mesh.vertex_colors = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
+  scene.legend = {{{255, 16, 0}, "a & b"}};
+  ReportContent content;
+  content.title = "a";
+  content.items.push_back({.body = scene});
+  const std::string html = libmap::report_page(content, with_library);
+  const std::string bytes{0, 0, 1, 0,      2, 0,                              //
+                          0, 0, 0, 0,      0, 0, '\xff', '\xff', 0, 0, 0, 0,  //
+                          0, 0, 0, '\x80', 0, 0, 1,      2,      3, 4, 5, 6, 7, 8, 9};
+  EXPECT_NE(html.find("\"mesh\":\"" + libmap::to_base64(bytes) + "\",\"vertices\":3"),
+            std::string::npos);
+  EXPECT_NE(html.find("fill=\"#ff1000\"/></svg>a &amp; b</li>"), std::string::npos);
+  EXPECT_NE(html.find("<script>library();</script>"), std::string::npos);
   EXPECT_EQ(libmap::report_page(content, assets).find("<canvas"), std::string::npos);
 }
 

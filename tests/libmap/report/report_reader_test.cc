@@ -38,8 +38,17 @@ const libmap::MapLoader no_map = [](const fs::path&, const auto&) -> libmap::Map
   throw libmap::Error("not a map");
 };
 
+libmap::ReportScene triangle(const fs::path& path) {
+  if (path.filename() != "good.ply") throw libmap::Error("is no scene");
+  libmap::ReportScene scene;
+  scene.mesh.vertices = {{0.0, 0.0, 0.0}, {2.0, 0.0, 0.0}, {0.0, 1.0, 0.0}};
+  scene.mesh.triangles = {{0, 1, 2}};
+  return scene;
+}
+
 ReportContent read(const Outline& outline, const libmap::MapLoader& loader = no_map) {
-  return libmap::read_report_content(outline, {.folder = scratch_folder()}, loader).content;
+  return libmap::read_report_content(outline, {.folder = scratch_folder()}, loader, triangle)
+      .content;
 }
 
 ReportContent read(const std::string& items) {
@@ -229,6 +238,33 @@ TEST(FoundOutline, OfMapsTogether) {
   EXPECT_EQ(cases[2].files, std::vector<std::string>{"sub/c/deep.pcd"});
 }
 
+TEST(ReportReader, Scenes) {
+  put("good.ply", "");
+  put("bad.ply", "");
+  const ReportContent content =
+      read("  - scene: good.ply\n  - scene: bad.ply\n  - scene: none.ply\n");
+  EXPECT_EQ(std::get<libmap::ReportScene>(content.items[0].body).mesh.vertices.size(), 3U);
+  EXPECT_EQ(content.items[1].gaps.at(0).reason, "is no scene");
+  EXPECT_EQ(content.items[2].gaps.at(0).reason, "");
+}
+
+TEST(FoundOutline, ScenesOfGrasp) {
+  libmap::Manifest manifest;
+  manifest.command = "grasp";
+  manifest.version = "0";
+  manifest.results = {{"locations", std::int64_t{2}}, {"P10.ply", "holds"}, {"P2.ply", "fails"}};
+  put("scenes.json", libmap::to_json(manifest));
+  for (const char* name : {"P10.ply", "P2.ply", "other.ply", "locations"})
+    put(std::string("scenes/") + name, "");
+  const Outline outline = libmap::outline_of_folder(scratch_folder());
+  const auto& items = outline.sections.at(0).items;
+  ASSERT_EQ(items.size(), 2U);
+  EXPECT_EQ(items[0].kind, libmap::ItemKind::scene);
+  EXPECT_EQ(items[0].files, std::vector<std::string>{"P2.ply"});
+  EXPECT_EQ(items[0].caption, "P2: fails.");
+  EXPECT_EQ(items[1].caption, "P10: holds.");
+}
+
 TEST(FoundOutline, OfNothing) {
   EXPECT_NE(std::string(error_of([] { libmap::outline_of_folder(scratch_folder()); }).what())
                 .find("nothing that a report could show"),
@@ -238,8 +274,9 @@ TEST(FoundOutline, OfNothing) {
             std::string::npos);
   put("file", "");
   EXPECT_THROW(libmap::outline_of_folder(scratch_folder() / "file"), libmap::Error);
-  EXPECT_THROW(libmap::read_report_content({}, {.folder = scratch_folder() / "file"}, no_map),
-               libmap::Error);
+  EXPECT_THROW(
+      libmap::read_report_content({}, {.folder = scratch_folder() / "file"}, no_map, triangle),
+      libmap::Error);
 }
 
 }  // namespace report_reader_test
