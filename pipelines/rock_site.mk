@@ -16,6 +16,7 @@ CROP ?= --size 3x3
 SCENARIO ?= artificial_rocks_prescan
 METHOD ?= corrected
 SHARES ?= 4
+FIELD_TEST ?= --load 5
 
 include $(here)one_run.mk
 ifdef is_alone
@@ -38,15 +39,23 @@ $(OUT)/simulated_with: FORCE | $(OUT)
 $(OUT)/site/mesh.ply $(OUT)/site/field_points.csv $(OUT)/site/site.yaml &: $(OUT)/simulated_with
 	@exec $(GRASPMAP) simulate site $(site_flags) -o $(OUT)/site
 
+export tested_with := $(FIELD_TEST)
+$(OUT)/tested_with: FORCE | $(OUT)
+	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
+
 $(OUT)/site.png: $(OUT)/site/mesh.ply
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title 'simulated site' --quiet
 
 $(OUT)/scan.db: $(OUT)/site/mesh.ply
 	@exec $(GRASPMAP) simulate scan $< $(scan_flags) -o $@
 
-map: $(OUT)/scan.db $(OUT)/site/field_points.csv
+# The field test that nobody made: a gripper closed on the true mesh.
+$(OUT)/field_test.csv: $(OUT)/site/mesh.ply $(OUT)/site/field_points.csv $(OUT)/tested_with
+	@exec $(GRASPMAP) grasp $< --points $(word 2,$^) $(FIELD_TEST) -o $@
+
+map: $(OUT)/scan.db $(OUT)/field_test.csv
 	@exec $(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$< OUT=$(OUT)/scan POSES=$(POSES) \
 	  CROP="$(CROP)" \
-	  TRUTH=$(OUT)/site/mesh.ply POINTS=$(OUT)/site/field_points.csv SCENARIO=$(SCENARIO) \
+	  TRUTH=$(OUT)/site/mesh.ply POINTS=$(OUT)/field_test.csv SCENARIO=$(SCENARIO) \
 	  METHOD=$(METHOD) SHARES=$(SHARES) GRASPMAP=$(GRASPMAP) TITLE='simulated scan'
 endif

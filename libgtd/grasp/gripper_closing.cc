@@ -243,7 +243,10 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
     if (const auto needed = open_finger_height(finger, profiles.back()))
       height = std::max(height.value_or(*needed), *needed);
   }
-  if (!height) return closed;
+  if (!height) {
+    closed.unseen = 1.0;
+    return closed;
+  }
   closed.approach = ApproachEnd::on_ground;
   closed.palm_touches = palm && *palm >= *height;
   *height += clearance_m;

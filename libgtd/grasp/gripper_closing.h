@@ -42,12 +42,12 @@ struct GripContact {
 enum class ApproachEnd { on_ground, no_ground, blocked };
 
 struct ClosedGripper {
-  ApproachEnd approach = ApproachEnd::no_ground;  // unless on_ground, the rest is empty
+  ApproachEnd approach = ApproachEnd::no_ground;  // unless on_ground, there are no fingers
   bool palm_touches = false;                      // else an open finger is in the palm's way
   Eigen::Isometry3d patch_from_gripper = Eigen::Isometry3d::Identity();  // palm at z = 0, axis z
   std::vector<ClosedFinger> fingers;
   std::vector<GripContact> contacts;  // by finger, its link before its spines
-  double unseen = 0.0;                // mean of the fingers
+  double unseen = 0.0;                // mean of the fingers; 1 without ground
 };
 
 struct ClosingOptions {

@@ -113,13 +113,13 @@ void write_scenes(const GraspScenesOptions& options, const std::vector<GraspScen
                   const GraspScenesInput& input, Run& run) {
   if (options.folder.empty()) return;
   const double load_n = input.options.load_n * input.options.safety;
-  std::vector<std::pair<std::string, Run::Writer>> files;
+  Run::Files files;
   for (const GraspScene& scene : scenes) {
     const libgtd::LocationResult& result = input.results[scene.row];
     const libgtd::Trial trial =
         libgtd::repeat_trial(input.ground, input.gripper, result.location, input.options,
                              result.shown_pose, result.shown_draw);
-    run.manifest().results.emplace_back(scene.file, description(result, trial, load_n));
+    run.add_results({{scene.file, description(result, trial, load_n)}});
     files.emplace_back(scene.file, [=, &input](const std::filesystem::path& temporary) {
       libmap::write_mesh(temporary, libgtd::trial_scene(input.mesh, input.gripper, trial, load_n));
     });

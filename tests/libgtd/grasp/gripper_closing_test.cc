@@ -199,6 +199,7 @@ TEST(GripperClosing, NoGroundBelow) {
   auto mesh = height_mesh(0.3, 3, flat);
   for (Eigen::Vector3d& vertex : mesh.vertices) vertex.x() += 1;
   EXPECT_EQ(close_on(mesh).approach, ApproachEnd::no_ground);
+  EXPECT_EQ(close_on(mesh).unseen, 1);
 }
 
 TEST(GroundPatch, DistancesAgreeWithAllTriangles) {
