@@ -7,6 +7,7 @@
 #include <set>
 
 #include "libgtd/gripper/gripper_io.h"
+#include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"
 
 namespace trial_scene_test {
@@ -201,7 +202,7 @@ TEST(TrialScene, NoGroundIsALoneSphere) {
   libgtd::GraspOptions options = quiet_options();
   options.closing.start_height_m = 0.01;
   TriangleMesh mesh = floor(-1.0, 1.0);
-  mesh = libmap::join_meshes(mesh, floor(-0.1, 0.1, 0.05));
+  mesh = graspmap_test::join_meshes(mesh, floor(-0.1, 0.1, 0.05));
   const Shown shown = show(mesh, {0.0, 0.0, 0.0}, options);
   ASSERT_NE(shown.trial.gripper.approach, libgtd::ApproachEnd::on_ground);
   EXPECT_EQ(spheres(shown.scene, ScenePart::idle), 1U);
