@@ -16,7 +16,7 @@ CROP ?= --size 3x3
 SCENARIO ?= artificial_rocks_prescan
 METHOD ?= corrected
 SHARES ?= 4
-FIELD_TEST ?= --load 5
+FIELD_TEST ?= --load 2
 
 include $(here)one_run.mk
 ifdef is_alone

@@ -157,7 +157,7 @@ TEST(LinearProgram, AgreesWithAnExactSolver) {
     // another solution than the problem that they stand for.
     const bool is_regular = contacts.size() > 2 && contacts[0].contact.point.z() != 0.0;
     const double exact =
-        exact_force(contacts, direction, friction, limit_n, options, is_regular ? 0.0 : 1e-10);
+        exact_force(contacts, direction, friction, limit_n, options, is_regular ? 0.0 : 1e-12);
     EXPECT_NEAR(force, exact, (is_regular ? 1e-9 : 1e-6) * std::max(1.0, exact)) << seed;
     regular += is_regular ? 1 : 0;
     holding += exact > 1e-3 ? 1 : 0;
