@@ -2,10 +2,12 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <numbers>
 
+#include "libgtd/grasp/cloned_loops.h"
 #include "libmap/core/angle.h"
 
 namespace libgtd {
@@ -15,6 +17,38 @@ namespace {
 // Chen et al. 2024: share of a concrete's asperities that a spine tip can use.
 double usable_asperities(double tip_radius_um) {
   return std::max(0.0, 2.49 * std::pow(tip_radius_um + 39.44, -0.7116) - 0.01212);
+}
+
+constexpr std::size_t chunk = 12;  // facets at once
+
+// The friction pyramids that a force along `local` (normal, drag, lateral) is multiplied with.
+struct FacetLoop {
+  double x, y, z;
+  double friction;
+  double slant;
+};
+
+// Products with the best of the eight edges of the friction pyramids on the facets of a chunk.
+GRASPMAP_CLONED void best_edge_products(const double* cosines, const double* sines,
+                                        const FacetLoop& loop, double* products) {
+  constexpr double diagonal = std::numbers::sqrt2 / 2.0;
+  const auto [x, y, z, friction, slant] = loop;
+  const double beside = std::abs(z);
+  for (std::size_t n = 0; n < chunk; ++n) {
+    const double along = std::abs(sines[n] * x + cosines[n] * y);
+    const double both = (along + beside) * diagonal;
+    const double straight = along < beside ? beside : along;
+    const double slope = both < straight ? straight : both;
+    products[n] = slant * (cosines[n] * x - sines[n] * y + friction * slope);
+  }
+}
+
+// The same on the ground itself.
+double best_level_product(const FacetLoop& loop) {
+  const double along = std::abs(loop.y);
+  const double beside = std::abs(loop.z);
+  const double both = (along + beside) * (std::numbers::sqrt2 / 2.0);
+  return loop.slant * (loop.x + loop.friction * std::max({along, beside, both}));
 }
 
 }  // namespace
@@ -66,9 +100,13 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> l
       slant_(std::cos(std::atan(friction))),
       limit_n_(limit_n) {
   std::sort(leans_rad.begin(), leans_rad.end(), std::greater<>());
-  for (const double lean : leans_rad) {
-    cosines_.push_back(std::cos(lean));
-    sines_.push_back(std::sin(lean));
+  spines_ = leans_rad.size();
+  // Whole chunks.
+  cosines_.assign((spines_ + chunk - 1) / chunk * chunk, 0.0);
+  sines_ = cosines_;
+  for (std::size_t n = 0; n < spines_; ++n) {
+    cosines_[n] = std::cos(leans_rad[n]);
+    sines_[n] = std::sin(leans_rad[n]);
   }
 }
 
@@ -80,16 +118,7 @@ BearingContact::BearingContact(const GripContact& contact, const EngagementOptio
   adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
 }
 
-// The product of `local` with the best of the eight edges of the friction pyramid on a facet.
-double BearingContact::best_edge_product(double cosine, double sine,
-                                         const Eigen::Vector3d& local) const {
-  const double along = std::abs(sine * local.x() + cosine * local.y());
-  const double beside = std::abs(local.z());
-  const double slope = std::max({along, beside, (along + beside) * (std::numbers::sqrt2 / 2.0)});
-  return slant_ * (cosine * local.x() - sine * local.y() + friction_ * slope);
-}
-
-// The same, with the edge.
+// The best of the eight edges of the friction pyramid on a facet.
 BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
                                                const Eigen::Vector3d& local) const {
   const double axis = cosine * local.x() - sine * local.y();
@@ -123,35 +152,50 @@ double BearingContact::max_product(const Eigen::Vector3d& worth, SpineSharing sh
     for (const Eigen::Vector3d& edge : adhesion_) most = std::max(most, edge.dot(along));
     return limit_n_ * most;
   }
-  const double ground = std::max(0.0, best_edge_product(1.0, 0.0, along));
-  double sum = static_cast<double>(cosines_.size()) * ground;
-  if (sharing == SpineSharing::best)
-    for (std::size_t n = 0; n < cosines_.size(); ++n)
-      sum += std::max(0.0, best_edge_product(cosines_[n], sines_[n], along));
-  else
-    for (std::size_t n = 0; n < cosines_.size(); ++n)
-      sum = std::max(sum,
-                     static_cast<double>(n + 1) * best_edge_product(cosines_[n], sines_[n], along));
+  const FacetLoop loop{along.x(), along.y(), along.z(), friction_, slant_};
+  double sum = static_cast<double>(spines_) * std::max(0.0, best_level_product(loop));
+  std::array<double, chunk> products;
+  for (std::size_t begin = 0; begin < spines_; begin += chunk) {
+    const std::size_t count = std::min(chunk, spines_ - begin);
+    best_edge_products(&cosines_[begin], &sines_[begin], loop, products.data());
+    for (std::size_t n = 0; n < count; ++n)
+      sum = sharing == SpineSharing::best
+                ? sum + std::max(0.0, products[n])
+                : std::max(sum, static_cast<double>(begin + n + 1) * products[n]);
+  }
   return limit_n_ * sum;
 }
 
 Eigen::Vector3d BearingContact::best_force(const Eigen::Vector3d& worth,
                                            SpineSharing sharing) const {
   const Eigen::Vector3d along = local(worth);
-  const auto spines = static_cast<double>(cosines_.size());
+  const auto spines = static_cast<double>(spines_);
   Edge best;
   for (const Eigen::Vector3d& edge : adhesion_)
     if (edge.dot(along) > best.product) best = {edge.dot(along), edge};
   const Edge ground = best_edge(1.0, 0.0, along);
   if (adhesion_.empty() && ground.product > 0.0)
     best = {spines * ground.product, spines * ground.local};
-  for (std::size_t n = 0; n < cosines_.size(); ++n) {
-    const Edge edge = best_edge(cosines_[n], sines_[n], along);
-    const auto share = static_cast<double>(n + 1);
-    if (sharing == SpineSharing::best && edge.product > 0.0)
-      best = {best.product + edge.product, best.local + edge.local};
-    else if (sharing == SpineSharing::equally && share * edge.product > best.product)
-      best = {share * edge.product, share * edge.local};
+  if (sharing == SpineSharing::best) {
+    for (std::size_t n = 0; n < spines_; ++n)
+      if (const Edge edge = best_edge(cosines_[n], sines_[n], along); edge.product > 0.0)
+        best = {best.product + edge.product, best.local + edge.local};
+  } else if (adhesion_.empty()) {
+    const FacetLoop loop{along.x(), along.y(), along.z(), friction_, slant_};
+    std::array<double, chunk> products;
+    std::size_t steepest = spines_;  // no facet
+    for (std::size_t begin = 0; begin < spines_; begin += chunk) {
+      best_edge_products(&cosines_[begin], &sines_[begin], loop, products.data());
+      for (std::size_t n = begin; n < std::min(begin + chunk, spines_); ++n) {
+        const double product = static_cast<double>(n + 1) * products[n - begin];
+        if (product <= best.product) continue;
+        best.product = product;
+        steepest = n;
+      }
+    }
+    if (steepest < spines_)
+      best.local = static_cast<double>(steepest + 1) *
+                   best_edge(cosines_[steepest], sines_[steepest], along).local;
   }
   return limit_n_ * (best.local.x() * normal_ + best.local.y() * drag_ + best.local.z() * lateral_);
 }

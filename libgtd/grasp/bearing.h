@@ -55,7 +55,7 @@ class BearingContact {
   const Eigen::Vector3d& outward() const { return outward_; }  // away from the palm's axis
   std::size_t finger() const { return finger_; }
   bool is_link() const { return is_link_; }
-  std::size_t spines() const { return cosines_.size(); }
+  std::size_t spines() const { return spines_; }
 
   // The largest product of a force of the set with `worth`, and a force that has it.
   double max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const;
@@ -66,7 +66,6 @@ class BearingContact {
 
  private:
   struct Edge;
-  double best_edge_product(double cosine, double sine, const Eigen::Vector3d& local) const;
   Edge best_edge(double cosine, double sine, const Eigen::Vector3d& local) const;
   Eigen::Vector3d local(const Eigen::Vector3d& vector) const {
     return {normal_.dot(vector), drag_.dot(vector), lateral_.dot(vector)};
@@ -82,7 +81,8 @@ class BearingContact {
   double friction_ = 0.0;
   double slant_ = 1.0;  // cosine of the friction's angle
   double limit_n_ = 0.0;
-  std::vector<double> cosines_;  // of the leans, the largest lean first
+  std::size_t spines_ = 0;
+  std::vector<double> cosines_;  // of the leans, the largest lean first; padded with 0
   std::vector<double> sines_;
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; not empty: the law is adhesion
 };

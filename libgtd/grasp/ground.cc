@@ -58,13 +58,9 @@ std::optional<Eigen::Vector3d> GroundPatch::normal_at(const Eigen::Vector3d& poi
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   const double square_radius = radius_m * radius_m;
   for (std::size_t n = 0; n < triangles.size(); ++n) {
+    const double reach = radius_m + radii[n];
+    if ((point - centers[n]).squaredNorm() > reach * reach) continue;
     const Corners corners = corners_of(vertices, triangles[n]);
-    bool is_near = true;
-    for (int axis = 0; axis < 3 && is_near; ++axis) {
-      const auto [low, high] = std::minmax({corners[0][axis], corners[1][axis], corners[2][axis]});
-      is_near = low - radius_m <= point[axis] && point[axis] <= high + radius_m;
-    }
-    if (!is_near) continue;
     const double nearness = 1.0 - square_distance(point, corners) / square_radius;
     if (nearness > 0.0) sum += nearness * area_normals[n];
   }
@@ -177,6 +173,8 @@ GroundPatch Ground::patch(const Eigen::Vector3d& location, const Eigen::Vector3d
     }
     const Corners corners = corners_of(patch.vertices, triangle);
     patch.triangles.push_back(triangle);
+    patch.centers.push_back((corners[0] + corners[1] + corners[2]) / 3.0);
+    patch.radii.push_back(radius_about(patch.centers.back(), corners));
     patch.area_normals.push_back((corners[1] - corners[0]).cross(corners[2] - corners[0]));
   }
   return patch;

@@ -19,6 +19,8 @@ struct GroundPatch {
   std::vector<Eigen::Vector3d> vertices;
   std::vector<libmap::Triangle> triangles;
   std::vector<Eigen::Vector3d> area_normals;  // their lengths are twice the areas
+  std::vector<Eigen::Vector3d> centers;       // of spheres around the triangles
+  std::vector<double> radii;                  // of these
 
   // Mean of the triangles within `radius_m` of a point, weighted by their areas and, falling to 0
   // at the radius, by their nearness; unit length. Nothing if there is none.

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "libgtd/grasp/cloned_loops.h"
 #include "libmap/core/angle.h"
 #include "libmap/core/random_stream.h"
 
@@ -17,6 +18,30 @@ constexpr double wrench_length_m = 0.1;
 
 double small_value(Eigen::Index row) {
   return 1e-10 * (1.0 + libmap::unit_noise(static_cast<std::uint64_t>(row), 7));
+}
+
+// result = matrix * vector, of which many entries are 0
+GRASPMAP_CLONED void multiply(const double* matrix, const double* vector, double* result,
+                              std::ptrdiff_t size) {
+  for (std::ptrdiff_t row = 0; row < size; ++row) result[row] = 0.0;
+  for (std::ptrdiff_t n = 0; n < size; ++n) {
+    if (vector[n] == 0.0) continue;
+    for (std::ptrdiff_t row = 0; row < size; ++row)
+      result[row] += vector[n] * matrix[n * size + row];
+  }
+}
+
+// Of each column of a square matrix: its entry in the row `leaving` divided by the pivot, and
+// `change` times that subtracted from the other entries; change[leaving] is 0.
+GRASPMAP_CLONED void exchange(double* matrix, const double* change, double pivot,
+                              std::ptrdiff_t leaving, std::ptrdiff_t size) {
+  for (std::ptrdiff_t n = 0; n < size; ++n) {
+    double* column = matrix + n * size;
+    if (column[leaving] == 0.0) continue;
+    const double share = column[leaving] / pivot;
+    column[leaving] = share;
+    for (std::ptrdiff_t row = 0; row < size; ++row) column[row] -= share * change[row];
+  }
 }
 
 // The primal simplex method (Dantzig 1963) with the inverse of the basis. A contact's force is a
@@ -40,6 +65,8 @@ class EquilibriumProgram {
     values_.setZero(rows_);
     values_.tail(rows_ - 6).setOnes();
     column_.setZero(rows_);
+    change_.setZero(rows_);
+    prices_.setZero(rows_);
     kinds_.assign(static_cast<std::size_t>(rows_), Kind::slack);
     std::fill_n(kinds_.begin(), 6, Kind::artificial);
   }
@@ -57,7 +84,8 @@ class EquilibriumProgram {
       const Eigen::Index pull = pull_row();
       if (pull < 0) return 0.0;  // it has left at 0: nothing can balance it
       if (true_value(pull) >= enough) break;
-      const double gain = price(inverse_.row(pull));
+      prices_ = inverse_.row(pull);
+      const double gain = price();
       if (gain <= 1e-11 * (1.0 + std::abs(values_[pull])) || !enter(entering_)) break;
     }
     const Eigen::Index pull = pull_row();
@@ -83,9 +111,9 @@ class EquilibriumProgram {
   // Of a basic variable, without the perturbation.
   double true_value(Eigen::Index row) const { return inverse_.row(row).tail(rows_ - 6).sum(); }
 
-  // Makes the column with the largest gain, which it returns. `prices` of the rows: how much the
-  // pull grows with their right side.
-  double price(const Eigen::RowVectorXd& prices) {
+  // Makes the column with the largest gain, which it returns.
+  double price() {
+    const Eigen::RowVectorXd& prices = prices_;
     const Eigen::Vector3d force_price = prices.head<3>();
     const Eigen::Vector3d moment_price = prices.segment<3>(3) / wrench_length_m;
     const auto worth_of = [&](std::size_t n) -> Eigen::Vector3d {
@@ -124,7 +152,7 @@ class EquilibriumProgram {
 
   // Lets `column_` enter the basis; false if nothing bounds it.
   bool enter(Kind kind) {
-    change_.noalias() = inverse_ * column_;
+    multiply(inverse_.data(), column_.data(), change_.data(), rows_);
     Eigen::Index leaving = -1;
     // Smaller changes are rounding errors; dividing by one would spoil the inverse.
     const double smallest = 1e-9 * change_.cwiseAbs().maxCoeff();
@@ -152,10 +180,9 @@ class EquilibriumProgram {
     }
     values_ -= step * change_;
     values_[leaving] = step > 0.0 || !is_perturbed_ ? step : small_value(leaving);
-    inverse_.row(leaving) /= change_[leaving];
-    for (Eigen::Index row = 0; row < rows_; ++row)
-      if (row != leaving && change_[row] != 0.0)
-        inverse_.row(row) -= change_[row] * inverse_.row(leaving);
+    const double pivot = change_[leaving];
+    change_[leaving] = 0.0;
+    exchange(inverse_.data(), change_.data(), pivot, leaving, rows_);
     kinds_[static_cast<std::size_t>(leaving)] = kind;
     return true;
   }
@@ -175,10 +202,11 @@ class EquilibriumProgram {
   std::vector<Eigen::Vector3d> arms_;
   std::ptrdiff_t fingers_ = 0;  // with contacts
   Eigen::Index rows_ = 0;
-  Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, Eigen::RowMajor> inverse_;
+  Eigen::MatrixXd inverse_;
   Eigen::VectorXd values_;
   Eigen::VectorXd column_;  // that enters
   Eigen::VectorXd change_;  // of the values by it
+  Eigen::RowVectorXd prices_;  // of the rows: how much the pull grows with their right side
   std::vector<Kind> kinds_;
   Kind entering_ = Kind::slack;
   bool is_perturbed_ = false;

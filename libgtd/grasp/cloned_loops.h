@@ -1,0 +1,9 @@
+// Marks a loop that GCC compiles for AVX2 too and chooses when the program starts. The results are
+// the same: no operation is fused (-ffp-contract=off).
+#pragma once
+
+#if defined(GRASPMAP_X86_LOOPS)
+#define GRASPMAP_CLONED __attribute__((target_clones("avx2", "default"), optimize("O3")))
+#else
+#define GRASPMAP_CLONED
+#endif
