@@ -29,7 +29,7 @@ $(foreach n,2 3 4,$(eval grasp_mesh_$(n) := $(folder_$(n))/site.ply) \
 define grasp_lookup
 $(folder_$(1))/grasp/map_$(2).pcd: $(folder_$(1))/terrain.pcd
 	@mkdir -p $$(@D)
-	@exec $$(GRASPMAP) score $$< --scenario $(grasp_scenario_$(1)) --method $(2) -o $$@ --quiet
+	@exec $$(GRASPMAP) score $$< --config $(grasp_scenario_$(1)) --method $(2) -o $$@ --quiet
 $(folder_$(1))/grasp/with_$(2).csv: $(folder_$(1))/grasp/map_$(2).pcd $(3)
 	@exec $$(GRASPMAP) lookup $$^ --points-frame input -o $$@ --quiet \
 	  --column '$(2)_score=score,$(2)_convex=convex,$(2)_graspable=graspable'
