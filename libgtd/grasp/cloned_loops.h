@@ -2,7 +2,7 @@
 // the same: no operation is fused (-ffp-contract=off).
 #pragma once
 
-#if defined(GRASPMAP_X86_LOOPS)
+#if defined(GRASPMAP_X86_LOOPS) && !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
 #define GRASPMAP_CLONED __attribute__((target_clones("avx2", "default"), optimize("O3")))
 #else
 #define GRASPMAP_CLONED
