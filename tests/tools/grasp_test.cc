@@ -84,12 +84,13 @@ TEST(GraspCommand, BadInputIsOneLine) {
                           const std::vector<std::string>& parts) {
     return bad_input(graspmap(with(words)), parts);
   };
-  for (const auto& [flag, value] : {std::pair{"--friction", "-0.1"},
-                                    {"--trials", "0"},
-                                    {"--draws", "0"},
-                                    {"--load", "0"},
-                                    {"--more-loads", "x"}})
+  for (const auto& [flag, value] :
+       {std::pair{"--friction", "-0.1"}, {"--load", "0"}, {"--more-loads", "x"}})
     EXPECT_TRUE(refused({"-o", "t.csv", flag, value}, {flag, value}));
+  for (const char* flag : {"--trials", "--draws"})
+    EXPECT_TRUE(bad_input(
+        graspmap({"grasp", "ground.ply", "--points", "places.csv", "-o", "t.csv", flag, "0"}),
+        {flag, "0"}));
   EXPECT_TRUE(refused({"-o", "t.txt"}, {"t.txt", ".csv"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.count=0"}, {"fingers.count"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.cuont=3"}, {"fingers.cuont"}));
