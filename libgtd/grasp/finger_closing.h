@@ -24,6 +24,7 @@ struct FingerGeometry {
   double curl_rad = 0.0;
   double curl_limit_rad = 0.0;
 
+  // Places (r, z), m.
   Eigen::Vector2d joint() const { return {joint_radius_m, 0.0}; }
   Eigen::Vector2d knuckle(double proximal_rad) const;
   Eigen::Vector2d tip(double proximal_rad, double curl) const;

@@ -47,6 +47,7 @@ constexpr HalfEdge open_edge = 0xffffffff;          // no other triangle
 constexpr HalfEdge non_manifold_edge = 0xfffffffe;  // more than one other
 constexpr HalfEdge no_edge = 0xfffffffd;            // the triangle names a vertex twice
 inline bool is_joined(HalfEdge opposite) { return opposite < no_edge; }
+// One for each half-edge, in their order.
 std::vector<HalfEdge> opposites_of(const std::vector<Triangle>& triangles, const MeshEdges& edges);
 inline std::vector<HalfEdge> opposites_of(const TriangleMesh& mesh) {
   return opposites_of(mesh.triangles, edges_of(mesh.triangles, mesh.vertices.size()));

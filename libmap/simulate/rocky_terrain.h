@@ -30,6 +30,7 @@ void bind(ParameterTable& table, RockyTerrainOptions& options);
 // index of -2.65, that of Ryugu's boulders (Michikami et al. 2019).
 class RockyTerrain {
  public:
+  // Draws all rocks that reach into the rectangle.
   RockyTerrain(const RockyTerrainOptions& options, const Eigen::AlignedBox2d& rectangle_m);
 
   // At a place in the rectangle; the same in any rectangle that holds the place.
