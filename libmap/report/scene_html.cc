@@ -37,8 +37,8 @@ std::string mesh_bytes(const TriangleMesh& mesh, const Eigen::Vector3d& corner, 
       append(bytes, static_cast<std::uint32_t>(std::lround((vertex[axis] - corner[axis]) / step_m)),
              2);
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
-    constexpr Color grey{160, 160, 160};
-    for (const std::uint8_t part : mesh.vertex_colors.empty() ? grey : mesh.vertex_colors[n])
+    constexpr Color gray{160, 160, 160};
+    for (const std::uint8_t part : mesh.vertex_colors.empty() ? gray : mesh.vertex_colors[n])
       bytes += static_cast<char>(part);
   }
   return bytes;

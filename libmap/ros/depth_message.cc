@@ -71,7 +71,8 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
   const std::uint64_t width = message.width;
   const std::uint64_t height = message.height;
   const std::uint64_t row = width * (is_float ? 4 : 2);
-  const std::string size = size_text(width, height);
+  const std::string size =
+      size_text(static_cast<std::int64_t>(width), static_cast<std::int64_t>(height));
   if (width == 0 || height == 0 || width > max_pixels || width * height > max_pixels)
     throw Error("no image has this size",
                 {.field = "size", .value = size, .bound = "1 to 2^27 pixels"});
