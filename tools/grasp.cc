@@ -95,6 +95,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
                         {.file = file.string(), .field = "fingers"});
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = graspmap_tools::positions_of(table);
+  if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
   const auto scenes = graspmap_tools::scenes_of(table, options.scenes);
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);

@@ -153,7 +153,9 @@ double unseen_share(const std::vector<ProfileSegment>& profile, double tip_radiu
     seen += to * to - from * from;
     end = to;
   }
-  return std::max(0.0, 1.0 - seen / (tip_radius * tip_radius));
+  const double unseen = 1.0 - seen / (tip_radius * tip_radius);
+  constexpr double rounding = 1e-9;
+  return unseen > rounding ? unseen : 0.0;
 }
 
 Eigen::Isometry3d patch_from_palm(const ApproachPose& pose) {

@@ -71,29 +71,42 @@ class EquilibriumProgram {
     std::fill_n(kinds_.begin(), 6, Kind::artificial);
   }
 
+  // The basis of the direction before, if any, is the start: first the new pull takes the place of
+  // the former one, as part of the same program.
   double max_pull(const Eigen::Vector3d& direction, double enough) {
-    column_.head<3>() = direction;
-    if (options_.holds_when_closed)
-      for (const BearingContact& contact : contacts_) {
-        double& share = column_[drive_row(contact)];
-        share = std::min(share, -reaction_of(contact) / options_.closing_force_n);
-      }
+    if (const Eigen::Index former = row_of(Kind::pull); former >= 0)
+      kinds_[static_cast<std::size_t>(former)] = Kind::former_pull;
+    direction_ = direction;
+    make_pull();
     if (!enter(Kind::pull)) return 0.0;
+    // What the former pull costs, relative to the new one: a small cost leads to it on the way.
+    double cost = 0.1;
+    constexpr double max_cost = 1e9;
+    constexpr double negligible_n = 1e-9;
     constexpr int max_pivots = 2000;
-    for (int pivot = 0; pivot < max_pivots; ++pivot) {
-      const Eigen::Index pull = pull_row();
-      if (pull < 0) return 0.0;  // it has left at 0: nothing can balance it
-      if (true_value(pull) >= enough) break;
-      prices_ = inverse_.row(pull);
-      const double gain = price();
-      if (gain <= 1e-11 * (1.0 + std::abs(values_[pull])) || !enter(entering_)) break;
+    for (int pivot = 0; pivot < max_pivots && cost < max_cost; ++pivot) {
+      const Eigen::Index pull = row_of(Kind::pull);
+      const Eigen::Index former = row_of(Kind::former_pull);
+      const bool is_former_gone = former < 0 || true_value(former) <= negligible_n;
+      if (is_former_gone && pull >= 0 && values_[pull] >= enough && true_value(pull) >= enough) break;
+      prices_.setZero(rows_);
+      if (pull >= 0) prices_ += inverse_.row(pull);
+      if (former >= 0) prices_ -= cost * inverse_.row(former);
+      const double gain = price(pull < 0);
+      if (gain > 1e-11 * (1.0 + (pull < 0 ? 0.0 : std::abs(values_[pull])))) {
+        if (!enter(entering_)) break;
+      } else if (is_former_gone) {
+        break;
+      } else {
+        cost *= 100.0;
+      }
     }
-    const Eigen::Index pull = pull_row();
+    const Eigen::Index pull = row_of(Kind::pull);
     return pull < 0 ? 0.0 : std::max(0.0, true_value(pull));
   }
 
  private:
-  enum class Kind : std::uint8_t { slack, artificial, pull, contact };
+  enum class Kind : std::uint8_t { slack, artificial, pull, former_pull, contact };
 
   Eigen::Index drive_row(const BearingContact& contact) const {
     return 6 + static_cast<Eigen::Index>(contacts_.size() + contact.finger());
@@ -104,15 +117,24 @@ class EquilibriumProgram {
     const double cosine = contact.normal().dot(options_.axis);
     return std::max(0.0, sine * cosine) / (1.0 + sine * sine) / static_cast<double>(fingers_);
   }
-  Eigen::Index pull_row() const {
-    const auto pull = std::find(kinds_.begin(), kinds_.end(), Kind::pull);
-    return pull == kinds_.end() ? -1 : pull - kinds_.begin();
+  Eigen::Index row_of(Kind kind) const {
+    const auto found = std::find(kinds_.begin(), kinds_.end(), kind);
+    return found == kinds_.end() ? -1 : found - kinds_.begin();
+  }
+  void make_pull() {
+    column_.setZero();
+    column_.head<3>() = direction_;
+    if (!options_.holds_when_closed) return;
+    for (const BearingContact& contact : contacts_) {
+      double& share = column_[drive_row(contact)];
+      share = std::min(share, -reaction_of(contact) / options_.closing_force_n);
+    }
   }
   // Of a basic variable, without the perturbation.
   double true_value(Eigen::Index row) const { return inverse_.row(row).tail(rows_ - 6).sum(); }
 
   // Makes the column with the largest gain, which it returns.
-  double price() {
+  double price(bool with_pull) {
     const Eigen::RowVectorXd& prices = prices_;
     const Eigen::Vector3d force_price = prices.head<3>();
     const Eigen::Vector3d moment_price = prices.segment<3>(3) / wrench_length_m;
@@ -147,6 +169,15 @@ class EquilibriumProgram {
       column_[drive_row(contacts_[best])] =
           contacts_[best].outward().dot(force) / options_.closing_force_n;
     }
+    if (!with_pull) return most;
+    const Eigen::VectorXd other = column_;
+    make_pull();
+    const double gain = 1.0 - prices_.dot(column_);
+    if (gain > most) {
+      entering_ = Kind::pull;
+      return gain;
+    }
+    column_ = other;
     return most;
   }
 
@@ -204,7 +235,8 @@ class EquilibriumProgram {
   Eigen::Index rows_ = 0;
   Eigen::MatrixXd inverse_;
   Eigen::VectorXd values_;
-  Eigen::VectorXd column_;  // that enters
+  Eigen::Vector3d direction_;  // of the pull
+  Eigen::VectorXd column_;     // that enters
   Eigen::VectorXd change_;  // of the values by it
   Eigen::RowVectorXd prices_;  // of the rows: how much the pull grows with their right side
   std::vector<Kind> kinds_;
@@ -222,11 +254,14 @@ double holding_force(const std::vector<BearingContact>& contacts, const Eigen::V
 
 LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
                                const HoldingOptions& options, std::size_t first) {
+  if (contacts.size() < 2) return {0.0, first};
   const std::vector<PullDirection>& directions = pull_directions();
-  LeastForce least{holding_force(contacts, directions[first].vector, options), first};
+  EquilibriumProgram program(contacts, options);
+  constexpr double all = std::numeric_limits<double>::infinity();
+  LeastForce least{program.max_pull(directions[first].vector, all), first};
   for (std::size_t n = 0; n < directions.size() && least.force_n > 0.0; ++n) {
     if (n == first) continue;
-    const double force = holding_force(contacts, directions[n].vector, options, least.force_n);
+    const double force = program.max_pull(directions[n].vector, least.force_n);
     if (force < least.force_n) least = {force, n};
   }
   return least;

@@ -109,6 +109,8 @@ TEST(GraspCommand, BadInputIsOneLine) {
   EXPECT_TRUE(bad_input(on("ground.ply", "off.csv"), {"off.csv", "location 2", "0.05 m"}));
   write_text(scratch("nan.csv"), "x,y,z\n0,nan,0.05\n");
   EXPECT_TRUE(bad_input(on("ground.ply", "nan.csv"), {"nan.csv", "row 1"}));
+  write_text(scratch("none.csv"), "x,y,z\n");
+  EXPECT_TRUE(bad_input(on("ground.ply", "none.csv"), {"none.csv"}));
   write_text(scratch("taken.csv"), "x,y,z,graspable\n0,0,0.05,1\n");
   EXPECT_TRUE(bad_input(on("ground.ply", "taken.csv"), {"taken.csv", "graspable"}));
   write_text(scratch("points.ply"),

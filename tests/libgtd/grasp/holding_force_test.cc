@@ -211,9 +211,10 @@ TEST(HoldingForce, NothingHolds) {
 TEST(HoldingForce, TheLeastOfTheDirections) {
   ASSERT_EQ(libgtd::pull_directions().size(), 17u);
   EXPECT_EQ(libgtd::pull_directions()[3].name(), "45@90");
-  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+  for (std::uint64_t seed = 0; seed < 200; ++seed) {
     libmap::RandomStream random(seed, 5);
-    const auto contacts = random_contacts(random, 7, 0.6, 10, Eigen::Isometry3d::Identity());
+    const auto contacts = random_contacts(random, 2 + static_cast<int>(seed % 8), 0.6, 10,
+                                          Eigen::Isometry3d::Identity());
     double least = 1e9;
     for (const auto& direction : libgtd::pull_directions())
       least = std::min(least, libgtd::holding_force(contacts, direction.vector, limited()));
