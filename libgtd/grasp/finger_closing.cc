@@ -110,12 +110,6 @@ std::optional<LinkContact> first_contact(const TurningLink& link, double first, 
   return search.contact();
 }
 
-// The motion of a point per radian of closing, which turns about `pivot` from +r to -z.
-FingerTouch touch_at(const LinkContact& contact, const Eigen::Vector2d& pivot) {
-  const Eigen::Vector2d arm = contact.point - pivot;
-  return {contact.point, {arm.y(), -arm.x()}};
-}
-
 // Height of a chain of straight links above the profile, at its lowest.
 void rise_above(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const ProfileSegment& segment,
                 std::optional<double>& height) {
@@ -175,12 +169,12 @@ FingerClosing close_finger(const FingerGeometry& finger, std::span<const Profile
     closing.proximal_rad = on_distal->angle;
     const bool by_spines = on_distal->along >= outer_half;
     closing.end = by_spines ? FingerEnd::spines : FingerEnd::link;
-    (by_spines ? closing.spines : closing.link) = touch_at(*on_distal, distal.pivot);
+    (by_spines ? closing.spines : closing.link) = on_distal->point;
     return closing;
   }
   closing.end = FingerEnd::link;
   closing.proximal_rad = on_proximal->angle;
-  closing.link = touch_at(*on_proximal, proximal.pivot);
+  closing.link = on_proximal->point;
   const double first = closing.proximal_rad - finger.curl_rad;
   const double last = closing.proximal_rad - finger.curl_limit_rad;
   const TurningLink alone{finger.knuckle(closing.proximal_rad), 0.0, finger.distal_m, 0.0};
@@ -188,7 +182,7 @@ FingerClosing close_finger(const FingerGeometry& finger, std::span<const Profile
   closing.curl_rad = closing.proximal_rad - (contact ? contact->angle : last);
   if (contact && contact->along >= outer_half) {
     closing.end = FingerEnd::spines;
-    closing.spines = touch_at(*contact, alone.pivot);
+    closing.spines = contact->point;
   }
   return closing;
 }

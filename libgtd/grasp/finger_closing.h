@@ -41,11 +41,6 @@ struct ProfileSegment {
   bool faces_palm = true;  // the triangle's front faces the palm
 };
 
-struct FingerTouch {
-  Eigen::Vector2d point;   // of the profile
-  Eigen::Vector2d motion;  // of the link's point there, m per rad
-};
-
 // spines: the outer half of the distal link or its tip touches. link: only another part does.
 // end_stop: nothing does.
 enum class FingerEnd { spines, link, end_stop };
@@ -54,8 +49,9 @@ struct FingerClosing {
   FingerEnd end = FingerEnd::end_stop;
   double proximal_rad = 0.0;
   double curl_rad = 0.0;
-  std::optional<FingerTouch> spines;
-  std::optional<FingerTouch> link;  // on the proximal link or the inner half of the distal one
+  // Where the profile is touched.
+  std::optional<Eigen::Vector2d> spines;
+  std::optional<Eigen::Vector2d> link;  // on the proximal link or the inner half of the distal one
 };
 
 // From the open finger, which touches nothing. The proximal link turns inward with the distal one

@@ -184,19 +184,16 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
     GripContact contact;
     contact.finger = number;
     contact.by_spines = by_spines;
-    contact.point = gripper.patch_from_gripper * in_patch(touch->point);
+    contact.point = gripper.patch_from_gripper * in_patch(*touch);
     const auto normal = patch.normal_at(contact.point, options.normal_radius_m);
     if (!normal) continue;
     contact.normal = *normal;
     contact.outward = rotation * outward;
-    const auto tangential = [&](const Eigen::Vector3d& v) -> Eigen::Vector3d {
-      return v - v.dot(contact.normal) * contact.normal;
-    };
-    // A motion along the normal drags nowhere; what is left is toward the axis.
-    Eigen::Vector3d drag = tangential(rotation * in_patch(touch->motion).normalized());
-    if (drag.norm() < 1e-6) drag = tangential(-contact.outward);
-    if (drag.norm() < 1e-6) drag = tangential(-rotation.col(2));
-    contact.drag = drag.normalized();
+    // The normal in the finger's plane, a quarter turn inward; of ground that faces sideways, inward.
+    const Eigen::Vector3d axis = rotation.col(2);
+    const Eigen::Vector3d drag = contact.normal.dot(contact.outward) * axis -
+                                 contact.normal.dot(axis) * contact.outward;
+    contact.drag = drag.norm() < 1e-6 ? -contact.outward : drag.normalized();
     gripper.contacts.push_back(contact);
   }
 }

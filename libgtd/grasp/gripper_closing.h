@@ -26,8 +26,9 @@ struct ClosedFinger {
   double unseen = 0.0;
 };
 
-// In the patch's frame. A contact's normal is out of the ground; its drag is the motion of the
-// link's point in the tangent plane; `outward` is away from the palm's axis. Unit vectors.
+// In the patch's frame. A contact's normal is out of the ground; `outward` is away from the palm's
+// axis. The drag is the way along the ground, in the finger's plane, that drive and load pull a
+// spine: toward the axis where the ground is level, up where it falls outward. Unit vectors.
 struct GripContact {
   std::size_t finger = 0;
   bool by_spines = false;

@@ -4,7 +4,9 @@
 # looked up there, the verdicts of the virtual field test on the true mesh (table.csv), and how well
 # each column predicts them at three loads (evaluation_LOAD/). `again` is the field test with another
 # seed: nothing can predict better. `nz`, the normal's vertical part, is the slope alone.
-# OUT/grasp_sweep/: the same of scenario 4 with other parameters of the field test.
+# Of scenario 4 also `scanned`: the same field test on the surface of a simulated scan of the site.
+# OUT/grasp_real/: the same on the surfaces of the author's clouds, the bouldering holds by HubRobo.
+# OUT/grasp_sweep/: scenario 4 with other parameters of the field test.
 
 grasp_methods := thesis envelope climblab corrected
 grasp_score := $(foreach m,$(grasp_methods),$(m)_score)
@@ -16,7 +18,7 @@ commas = $(subst $(space),$(comma),$(strip $(1)))
 
 grasp_mesh_1 := $(folder_1)/scene.ply
 grasp_scenario_1 := primitive_shapes_prescan
-grasp_approach_1 := up
+$(foreach n,1 2 3 4,$(eval grasp_cloud_$(n) := $(folder_$(n))/terrain.pcd))
 # Away from the border, where the gripper would be over nothing.
 grasp_box_1 := -0.8,-0.8,0.8,0.8
 grasp_box_2 := -2.5,-1.9,2.5,1.9
@@ -25,11 +27,32 @@ grasp_box_4 := -1.3,-1.3,1.3,1.3
 $(foreach n,2 3 4,$(eval grasp_mesh_$(n) := $(folder_$(n))/site.ply) \
   $(eval grasp_scenario_$(n) := $(scenario_$(n))))
 
+# The author's clouds: 5 to 7.
+names_real := artificial_rocks primitive_shapes bouldering_holds
+$(foreach n,1 2 3,$(eval name_$(words 1 2 3 4 $(wordlist 1,$(n),1 2 3)) := thesis_$(word $(n),$(names_real))))
+$(foreach n,5 6 7,$(eval folder_$(n) := $(OUT)/grasp_real/$(name_$(n))) \
+  $(eval grasp_mesh_$(n) := $(folder_$(n))/mesh.ply))
+grasp_cloud_5 := $(clouds)/artificial_rocks.pcd
+grasp_cloud_6 := $(clouds)/scanned_cloud_primitive.pcd
+grasp_cloud_7 := $(folder_7)/terrain.pcd
+grasp_scenario_5 := artificial_rocks_prescan
+grasp_scenario_6 := primitive_shapes_prescan
+grasp_scenario_7 := bouldering_wall_prescan
+grasp_box_5 := -1.3,-1.3,1.3,1.3
+grasp_box_6 := -1.2,-1.2,1.2,1.2
+grasp_box_7 := -0.25,-0.32,0.25,0.32
+grasp_mesh_flags_6 := --normals estimate
+# As in masks.mk.
+grasp_flags_7 := --gripper hubrobo
+grasp_score_flags_7 := --gripper hubrobo --voxel-size 0.005 --solid-voxel-threshold 4 \
+  --curvature-radius 0.03 --set interpolation=yes
+
 # Scenario's number, method.
 define grasp_lookup
-$(folder_$(1))/grasp/map_$(2).pcd: $(folder_$(1))/terrain.pcd
+$(folder_$(1))/grasp/map_$(2).pcd: $(grasp_cloud_$(1))
 	@mkdir -p $$(@D)
-	@exec $$(GRASPMAP) score $$< --config $(grasp_scenario_$(1)) --method $(2) -o $$@ --quiet
+	@exec $$(GRASPMAP) score $$< --config $(grasp_scenario_$(1)) --method $(2) \
+	  $(grasp_score_flags_$(1)) -o $$@ --quiet
 $(folder_$(1))/grasp/with_$(2).csv: $(folder_$(1))/grasp/map_$(2).pcd $(3)
 	@exec $$(GRASPMAP) lookup $$^ --points-frame input -o $$@ --quiet \
 	  --column '$(2)_score=score,$(2)_convex=convex,$(2)_graspable=graspable'
@@ -47,11 +70,11 @@ $(call grasp_lookup,$(1),envelope,$(folder_$(1))/grasp/with_thesis.csv)
 $(call grasp_lookup,$(1),climblab,$(folder_$(1))/grasp/with_envelope.csv)
 $(call grasp_lookup,$(1),corrected,$(folder_$(1))/grasp/with_climblab.csv)
 $(folder_$(1))/grasp/again.csv: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/with_corrected.csv
-	@exec $$(GRASPMAP) grasp $$< --points $$(word 2,$$^) -o $$@ $$(TRIALS) --best-draws 0 --seed 2 \
+	@exec $$(GRASPMAP) grasp $$< --points $$(word 2,$$^) -o $$@ $$(TRIALS) $(grasp_flags_$(1)) --best-draws 0 --seed 2 \
 	  --prefix again_ --quiet
-$(folder_$(1))/grasp/table.csv: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/again.csv
-	@exec $$(GRASPMAP) grasp $$< --points $$(word 2,$$^) -o $$@ $$(TRIALS) --load 10 \
-	  --more-loads 5,30 --quiet
+$(folder_$(1))/grasp/table.csv: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/$(or $(grasp_last_$(1)),again).csv
+	@exec $$(GRASPMAP) grasp $$< --points $$(word 2,$$^) -o $$@ $$(TRIALS) $(grasp_flags_$(1)) \
+	  --load 10 --more-loads 5,30 --quiet
 $(call grasp_evaluation,$(1),10,graspable)
 $(call grasp_evaluation,$(1),5,graspable_5)
 $(call grasp_evaluation,$(1),30,graspable_30)
@@ -60,10 +83,43 @@ endef
 # Scenario's number, load, label.
 define grasp_evaluation
 $(folder_$(1))/grasp/evaluation_$(2)/accuracy.csv: $(folder_$(1))/grasp/table.csv
-	@exec $$(GRASPMAP) evaluate $$< -o $$(@D) --label $(3) --score $(call commas,$(grasp_columns)) \
+	@exec $$(GRASPMAP) evaluate $$< -o $$(@D) --label $(3) --score $(call commas,$(grasp_columns) $(grasp_more_$(1))) \
 	  --cutoff 0.8 --bootstrap 1000 --title 'virtual field test at $(2) N: $(subst _, ,$(name_$(1)))' --quiet
 results += $(folder_$(1))/grasp/evaluation_$(2)/accuracy.csv
 endef
+
+# What a scan's error costs: of a scan with noise and drift to a surface, in the truth's frame.
+grasp_last_4 := scanned
+grasp_more_4 := scanned_hold_probability scanned_graspable
+$(folder_4)/grasp/scan.db: $(folder_4)/site/mesh.ply
+	@mkdir -p $(@D)
+	@exec $(GRASPMAP) simulate scan $< --frames 60 --seed $(SEED) -o $@ --quiet
+$(folder_4)/grasp/poses.tum: $(folder_4)/grasp/scan.db
+	@exec $(GRASPMAP) refine $< -o $@ --quiet
+$(folder_4)/grasp/scan.ply: $(folder_4)/grasp/scan.db $(folder_4)/grasp/poses.tum
+	@exec $(GRASPMAP) fuse $< --poses $(word 2,$^) --frame ground-truth -o $@ --quiet
+$(folder_4)/grasp/scanned.ply: $(folder_4)/grasp/scan.ply
+	@exec $(GRASPMAP) mesh $< -o $@ --quiet
+$(folder_4)/grasp/scanned.csv: $(folder_4)/grasp/scanned.ply $(folder_4)/grasp/again.csv
+	@exec $(GRASPMAP) grasp $< --points $(word 2,$^) -o $@ $(TRIALS) --best-draws 0 \
+	  --prefix scanned_ --max-distance 0.5 --quiet
+
+# The surfaces of the author's clouds; the leaning board of holds is laid flat.
+define grasp_real_mesh
+$(folder_$(1))/mesh.ply: $(grasp_cloud_$(1))
+	@mkdir -p $$(@D)
+	@exec $$(GRASPMAP) mesh $$< -o $$@ $(grasp_mesh_flags_$(1)) --quiet
+endef
+ifneq ($(clouds),)
+$(foreach n,5 6,$(eval $(call grasp_real_mesh,$(n))))
+$(folder_7)/leaning.ply: $(clouds)/leaning_bouldering_holds.pcd
+	@mkdir -p $(@D)
+	@exec $(GRASPMAP) mesh $< -o $@ --quiet
+$(folder_7)/mesh.ply: $(folder_7)/leaning.ply
+	@exec $(GRASPMAP) crop $< -o $@ --center --quiet
+$(folder_7)/terrain.pcd: $(folder_7)/mesh.ply
+	@exec $(GRASPMAP) resample $< -o $@ --count 18401 --quiet
+endif
 
 # Name, flags of grasp: scenario 4 with other parameters.
 define grasp_sweep
@@ -77,7 +133,7 @@ results += $(OUT)/grasp_sweep/$(1)/accuracy.csv
 endef
 
 ifneq ($(filter grasp,$(STAGES)),)
-$(foreach n,$(SCENARIOS),$(eval $(call grasp_study,$(n))))
+$(foreach n,$(SCENARIOS) $(if $(clouds),5 6 7),$(eval $(call grasp_study,$(n))))
 ifneq ($(filter 4,$(SCENARIOS)),)
 $(eval $(call grasp_sweep,friction_0.25,--friction 0.25))
 $(eval $(call grasp_sweep,friction_0.6,--friction 0.6))

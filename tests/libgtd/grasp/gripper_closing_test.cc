@@ -72,7 +72,9 @@ TEST(GripperClosing, Spheres) {
     }
     // Wide ones need no ground: with it, the fingers would touch the ground.
     const auto mesh = revolved(profile, 128);
-    const ClosedGripper closed = close_on(mesh);
+    libgtd::ClosingOptions options;
+    options.max_unseen = 1;
+    const ClosedGripper closed = close_on(mesh, {}, gripper(), options);
     ASSERT_EQ(closed.approach, ApproachEnd::on_ground);
     const double palm = closed.patch_from_gripper.translation().z();
     if (radius > 0.1) {
@@ -101,14 +103,15 @@ TEST(GripperClosing, Spheres) {
       EXPECT_NEAR(one.closing.proximal_rad, std::max(angle, finger.closing_rad), 3e-3) << radius;
       EXPECT_EQ(one.closing.link.has_value() && !one.closing.spines, false) << radius;
     }
-    if (radius < 0.03) {
-      EXPECT_TRUE(closed.contacts.empty());
-    }
+    EXPECT_EQ(closed.contacts.empty(), radius < 0.06) << radius;
     for (const libgtd::GripContact& contact : closed.contacts) {
       const Eigen::Vector3d from_center = contact.point + Eigen::Vector3d(0, 0, radius);
       EXPECT_NEAR(from_center.norm(), radius, 3e-4);
       EXPECT_GT(contact.normal.dot(from_center.normalized()), 0.999);
       EXPECT_NEAR(contact.drag.dot(contact.normal), 0, 1e-9);
+      // Up the sphere, toward its top.
+      EXPECT_NEAR(contact.drag.dot(contact.outward), -contact.normal.z(), 1e-3);
+      EXPECT_GT(contact.drag.z(), 0);
     }
   }
 }
