@@ -4,6 +4,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "libgtd/score/closing_terms.h"
 #include "libgtd/score/scoring.h"
 #include "libgtd/score/surface_scoring.h"
 #include "libgtd/score/tilted_matching.h"
@@ -122,7 +123,9 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                                  const std::vector<SurfaceNormal>& surface,
                                  const std::vector<std::uint8_t>& convex,
                                  const VoxelLattice& lattice, const Scenario& scenario) {
-  const bool evaluate_convexity = scenario.curvature_radius_m > 0.0;
+  // A probability to hold needs no second opinion of the shape.
+  const bool needs_convexity =
+      scenario.curvature_radius_m > 0.0 && scenario.method != Method::calibrated;
   std::vector<MapVoxel> voxels;
   voxels.reserve(scored.size());
   for (std::size_t n = 0; n < scored.size(); ++n) {
@@ -131,7 +134,8 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .score = scored[n].score,
                    .convex = convex[n] != 0,
                    .graspable = false,
-                   .border = scored[n].border};
+                   .border = scored[n].border,
+                   .terms = scored[n].terms};
     if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
     if (scenario.orientation == Orientation::surface && surface[n].normal.allFinite())
       voxel.normal = surface[n].normal;
@@ -139,7 +143,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
     voxel.graspable =
         meets_threshold(voxel.counts, voxel.score, scenario.method, scenario.solid_voxel_threshold,
                         scenario.graspability_threshold) &&
-        height >= scenario.zero_plane_m && (voxel.convex || !evaluate_convexity);
+        height >= scenario.zero_plane_m && (voxel.convex || !needs_convexity);
     voxels.push_back(voxel);
   }
   return voxels;
@@ -193,6 +197,8 @@ int halo_voxels(const GripperMask& mask, const Scenario& scenario) {
   };
   require_moderate(convexity, "curvature_radius_m", scenario.curvature_radius_m);
   int halo = std::max(window + edges, static_cast<int>(std::ceil(convexity)));
+  if (mask.closing)
+    halo = std::max(halo, closing_reach_voxels(*mask.closing, scenario.voxel_size_m));
   if (!scenario.fits_normals()) return halo;
   const double radius_m = normal_radius_m(mask, scenario);
   const double normals = radius_m / scenario.voxel_size_m + 1.0;
@@ -208,7 +214,8 @@ double normal_radius_m(const GripperMask& mask, const Scenario& scenario) {
 
 MapContent content_of(const Scenario& scenario) {
   return {.normals = scenario.orientation == Orientation::surface,
-          .slopes = scenario.evaluates_obstacles()};
+          .slopes = scenario.evaluates_obstacles(),
+          .terms = scenario.method == Method::calibrated};
 }
 
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,

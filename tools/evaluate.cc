@@ -1,5 +1,9 @@
 // graspmap evaluate: ROC curve, areas under it and rates of the scores in a table, against the
 // labels in it.
+#include <algorithm>
+#include <utility>
+
+#include "libgtd/evaluate/hold_model_fit.h"
 #include "libgtd/evaluate/roc_tables.h"
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
@@ -15,11 +19,13 @@ using libgtd::ColumnEvaluation;
 using libgtd::TableEvaluation;
 
 struct EvaluateOptions {
-  std::string table;
+  std::vector<std::string> tables;
   std::string folder;
   std::string scores;  // names with commas between
   std::string title = "ROC";
   libgtd::TableEvaluationOptions evaluation;
+  std::string hold_model;  // file of the fitted section
+  double load_n = 10.0;
 };
 
 void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
@@ -34,6 +40,8 @@ void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
   parameters.add("bootstrap", roc.bootstrap_replicates, libmap::Range{0, 1e7},
                  "replicates for the interval of the area; 0: no interval");
   parameters.add("seed", roc.bootstrap_seed, libmap::not_negative, "of the bootstrap");
+  parameters.add("load_n", options.load_n, libmap::positive,
+                 "load of the verdicts, noted in the hold model, N");
   parameters.add("title", options.title, "title of the plot and of the summary");
 }
 
@@ -98,14 +106,43 @@ void write_results(const EvaluateOptions& options, const TableEvaluation& evalua
                            {"roc.png", text(libmap::to_png(picture))}});
 }
 
+// The rows of all tables, of the columns that all have.
+libmap::Table join_tables(std::vector<libmap::Table> tables) {
+  if (tables.size() == 1) return std::move(tables.front());
+  libmap::Table joined;
+  for (const std::string& name : tables.front().columns)
+    if (std::all_of(tables.begin(), tables.end(),
+                    [&](const libmap::Table& table) { return table.find_column(name); }))
+      joined.columns.push_back(name);
+  joined.file = tables.front().file;
+  for (const libmap::Table& table : tables)
+    for (const std::vector<std::string>& row : table.rows) {
+      std::vector<std::string>& cells = joined.rows.emplace_back();
+      for (const std::string& name : joined.columns) cells.push_back(row[table.column(name)]);
+    }
+  return joined;
+}
+
+void write_hold_model(const EvaluateOptions& options, const libmap::Table& table, Run& run) {
+  const libgtd::HoldModelFit fit = libgtd::fit_hold_model(table, options.evaluation.label_column, options.load_n);
+  run.say("hold model of {} places, {} left out", fit.places, fit.left_out);
+  run.write_text(options.hold_model, to_yaml_section(fit.model));
+}
+
 void evaluate(EvaluateOptions& options, Run& run) {
   run.claim_output_folder(options.folder);
+  if (!options.hold_model.empty()) run.claim_output(options.hold_model, options.tables);
   options.evaluation.score_columns = libmap::split_list(options.scores);
-  const libmap::Table table = libmap::read_csv(options.table);
-  run.add_input(options.table);
+  std::vector<libmap::Table> tables;
+  for (const std::string& file : options.tables) {
+    tables.push_back(libmap::read_csv(file));
+    run.add_input(file);
+  }
+  const libmap::Table table = join_tables(std::move(tables));
   const TableEvaluation evaluation =
       run.timed("evaluate", [&] { return libgtd::evaluate_table(table, options.evaluation); });
   note_results(evaluation, run);
+  if (!options.hold_model.empty()) write_hold_model(options, table, run);
   write_results(options, evaluation, run);
 }
 
@@ -114,10 +151,13 @@ void evaluate(EvaluateOptions& options, Run& run) {
 int main(int argc, char** argv) {
   EvaluateOptions options;
   Command command("evaluate");
-  command.input("TABLE.csv", options.table, "labels and scores, one row per location");
+  command.inputs("TABLE.csv", options.tables,
+                 "labels and scores, one row per location; of several the columns that all have");
   command.output(
       options.folder,
       "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");
+  command.option("--hold-model", "FILE.yaml", options.hold_model,
+                 "also fit the section hold_model of a gripper file to the labels");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { evaluate(options, run); });
 }

@@ -1,6 +1,7 @@
 #include "libgtd/evaluate/roc.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "libmap/core/error.h"
@@ -91,6 +92,32 @@ double trapezoid_area(const Sample& sample) {
   PairCount pairs;
   for (const ScoreGroup& group : sample.groups) pairs.add(group.positives, group.negatives);
   return pairs.area(sample.positives, sample.negatives);
+}
+
+double precision_at_half_recall(const Sample& sample) {
+  std::uint64_t positives = 0;
+  std::uint64_t negatives = 0;
+  for (auto group = sample.groups.rbegin(); 2 * positives < sample.positives; ++group) {
+    positives += group->positives;
+    negatives += group->negatives;
+  }
+  return static_cast<double>(positives) / static_cast<double>(positives + negatives);
+}
+
+std::optional<double> calibration_error(const Sample& sample) {
+  if (sample.groups.empty() || sample.groups.front().score < 0.0 ||
+      sample.groups.back().score > 1.0)
+    return std::nullopt;
+  constexpr std::size_t bins = 10;
+  std::array<double, bins> excess{};  // sum of label - score
+  for (const ScoreGroup& group : sample.groups) {
+    const auto bin = std::min(bins - 1, static_cast<std::size_t>(group.score * bins));
+    const auto count = static_cast<double>(group.positives + group.negatives);
+    excess[bin] += static_cast<double>(group.positives) - count * group.score;
+  }
+  double sum = 0.0;
+  for (const double value : excess) sum += std::abs(value);
+  return sum / static_cast<double>(sample.positives + sample.negatives);
 }
 
 void sum_upper(const std::vector<RocPoint>& points, AreaUnderCurve& area) {
@@ -236,6 +263,8 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
   for (const double cutoff : options.cutoffs) result.at_cutoffs.push_back(point_at(sample, cutoff));
   result.at_scores = points_at_scores(sample);
   result.at_rate_cutoff = point_at(sample, options.rate_cutoff);
+  result.calibration_error = calibration_error(sample);
+  if (sample.positives > 0) result.precision_at_half_recall = precision_at_half_recall(sample);
   if (sample.positives == 0 || sample.negatives == 0) {
     result.area_note = why_no_area(sample);
     return result;

@@ -95,6 +95,11 @@ struct RocResult {
   RocPoint at_rate_cutoff;
   std::optional<AreaUnderCurve> area;  // nothing unless both classes are there
   std::string area_note;               // why there is none
+  // Positives among the highest scores that reach half of all positives, ties counting in full.
+  std::optional<double> precision_at_half_recall;
+  // If all scores are in 0..1: the mean over the locations of |share of positives - mean score| of
+  // their tenth of that range (Naeini et al. 2015, expected calibration error).
+  std::optional<double> calibration_error;
   std::size_t left_out_unscored = 0;   // no score: not visible
   std::size_t left_out_unlabeled = 0;  // a score and no label
 };

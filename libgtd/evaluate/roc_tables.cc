@@ -111,6 +111,11 @@ Json json_of(const RocResult& result) {
     auc["note"] = result.area_note;
   }
   json["auc"] = std::move(auc);
+  const auto optional = [](const std::optional<double>& value) {
+    return value ? Json(*value) : Json(nullptr);
+  };
+  json["precision_at_half_recall"] = optional(result.precision_at_half_recall);
+  json["calibration_error"] = optional(result.calibration_error);
   Json rates;
   for (const NamedRate& named : named_rates(counts)) rates[named.name] = json_of(named.rate);
   json["rates"] = std::move(rates);
@@ -134,8 +139,9 @@ std::string interval_text(const std::optional<Interval>& interval, int decimals)
 
 std::string areas_markdown(const TableEvaluation& evaluation) {
   std::string text =
-      "| scores | locations | graspable | not visible | AUC, trapezoid | AUC, upper sum |\n"
-      "|---|---|---|---|---|---|\n";
+      "| scores | locations | graspable | not visible | AUC, trapezoid | AUC, upper sum | "
+      "precision at half of the recall | calibration error |\n"
+      "|---|---|---|---|---|---|---|---|\n";
   for (const ColumnEvaluation& column : evaluation.columns) {
     const RocResult& result = column.result;
     const Confusion& counts = result.at_rate_cutoff.counts;
@@ -146,10 +152,13 @@ std::string areas_markdown(const TableEvaluation& evaluation) {
       text += to_fixed_text(result.area->trapezoid, 3) +
               interval_text(result.area->trapezoid_bootstrap_95, 3) + " | " +
               to_fixed_text(result.area->upper_sum, 3) +
-              (result.area->upper_sum_width < 1.0 ? " (incomplete, see below) |\n" : " |\n");
+              (result.area->upper_sum_width < 1.0 ? " (incomplete, see below) |" : " |");
     } else {
-      text += "not defined | not defined |\n";
+      text += "not defined | not defined |";
     }
+    for (const auto& value : {result.precision_at_half_recall, result.calibration_error})
+      text += value ? " " + to_fixed_text(*value, 3) + " |" : " |";
+    text += '\n';
   }
   return text;
 }

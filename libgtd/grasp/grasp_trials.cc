@@ -98,14 +98,14 @@ TrialEnd end_of(const ClosedGripper& closed, std::size_t bearing, double force_n
 }
 
 // Of sorted values; the lower one of two.
-double quantile(const std::vector<double>& sorted, double share) {
+double sorted_quantile(const std::vector<double>& sorted, double share) {
   if (sorted.empty()) return 0.0;
   return sorted[static_cast<std::size_t>(share * static_cast<double>(sorted.size() - 1))];
 }
 
 std::array<double, 3> quantiles(std::vector<double> values) {
   std::sort(values.begin(), values.end());
-  return {quantile(values, 0.1), quantile(values, 0.5), quantile(values, 0.9)};
+  return {sorted_quantile(values, 0.1), sorted_quantile(values, 0.5), sorted_quantile(values, 0.9)};
 }
 
 // Adds the means of a pose.

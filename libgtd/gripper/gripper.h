@@ -5,6 +5,7 @@
 #include <string>
 
 #include "libgtd/gripper/gripper_fingers.h"
+#include "libgtd/gripper/hold_model.h"
 #include "libmap/core/parameters.h"
 
 namespace libgtd {
@@ -25,13 +26,14 @@ struct Gripper {
   double top_solid_margin_mm = 0.0;       // added to the palm's diameter on top of the mask
   double bottom_void_margin_mm = 0.0;     // taken off the radius of the void at the bottom
   std::optional<GripperFingers> fingers;  // none: there is no virtual field test of it
+  std::optional<HoldModel> hold_model;    // none: method `calibrated` is not for it
 
   // Throws Error naming the field, its value and the bound that it breaks, also between fields:
   // the closing angle lies below the opening angle.
   void check() const;
 };
 
-// The keys of a gripper file but those of `fingers`, bound to `gripper`.
+// The keys of a gripper file but those of its sections, bound to `gripper`.
 void bind(libmap::ParameterTable& table, Gripper& gripper);
 
 }  // namespace libgtd

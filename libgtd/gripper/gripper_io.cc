@@ -23,19 +23,26 @@ Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides) {
   Gripper gripper;
   GripperFingers fingers;
-  libmap::ParameterTable measures;
+  HoldModel hold_model;
   libmap::ParameterTable all;
-  bind(measures, gripper);
   bind(all, gripper);
   bind(all, fingers);
+  bind(all, hold_model);
   try {
-    const std::vector<std::string> given = libmap::set_from_yaml(all, yaml, file);
-    const bool has_fingers = std::any_of(given.begin(), given.end(), [](const std::string& key) {
-      return key.starts_with("fingers.");
-    });
-    require_all_keys(has_fingers ? all : measures, given);
-    for (const auto& [key, value] : overrides) (has_fingers ? all : measures).set(key, value);
-    if (has_fingers) gripper.fingers = fingers;
+    std::vector<std::string> given = libmap::set_from_yaml(all, yaml, file);
+    for (const auto& [key, value] : overrides) given.push_back(key);
+    const auto has = [&](const std::string& section) {
+      return std::any_of(given.begin(), given.end(),
+                         [&](const std::string& key) { return key.starts_with(section); });
+    };
+    libmap::ParameterTable present;
+    bind(present, gripper);
+    if (has("fingers.")) bind(present, fingers);
+    if (has("hold_model.")) bind(present, hold_model);
+    require_all_keys(present, given);
+    for (const auto& [key, value] : overrides) present.set(key, value);
+    if (has("fingers.")) gripper.fingers = fingers;
+    if (has("hold_model.")) gripper.hold_model = hold_model;
     gripper.check();
   } catch (const libmap::Error& error) {
     throw error.in_file(file);

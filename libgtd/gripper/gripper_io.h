@@ -1,4 +1,4 @@
-// Gripper files: a YAML map of measures and an optional section `fingers`, see data/grippers/README
+// Gripper files: a YAML map of measures and optional sections `fingers` and `hold_model`, see data/grippers/README
 // in data/README.md.
 #pragma once
 

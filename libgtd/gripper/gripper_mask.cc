@@ -210,7 +210,8 @@ const std::vector<std::pair<std::string, Method>>& method_names() {
       {"thesis", Method::thesis},
       {"envelope", Method::envelope},
       {"climblab", Method::climblab},
-      {"corrected", Method::corrected}};
+      {"corrected", Method::corrected},
+      {"calibrated", Method::calibrated}};
   return names;
 }
 
@@ -231,9 +232,14 @@ GripperMask make_mask(const Gripper& gripper, const GripperMaskOptions& options)
     case Method::climblab:
       return make_climblab(gripper, options);
     case Method::corrected:
+    case Method::calibrated:
       break;
   }
-  return make_corrected(gripper, options);
+  GripperMask mask = make_corrected(gripper, options);
+  mask.method = Method::corrected;
+  if (options.method == Method::calibrated)
+    mask.closing = make_closing_path(gripper, options.voxel_size_m);
+  return mask;
 }
 
 }  // namespace

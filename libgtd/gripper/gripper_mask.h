@@ -4,10 +4,12 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "libgtd/gripper/closing_path.h"
 #include "libgtd/gripper/gripper.h"
 #include "libmap/core/point_cloud.h"
 
@@ -15,8 +17,9 @@ namespace libgtd {
 
 // thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), in which
 // what the fingers cannot reach is not counted. climblab: the base of both. corrected: the idea of
-// `thesis` with an odd side, centered on the pivot's voxel, radii not rounded.
-enum class Method { thesis, envelope, climblab, corrected };
+// `thesis` with an odd side, centered on the pivot's voxel, radii not rounded. calibrated: the mask
+// of `corrected`, and a score that is the probability to hold (HoldModel).
+enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
 std::string name_of(Method method);  // its name, as flags and files have it
@@ -31,7 +34,8 @@ struct GripperMaskOptions {
 // z >= solid_layers are the extra void layers on top. The pivot stands at (pivot_xy, pivot_xy,
 // pivot_z) of the window.
 struct GripperMask {
-  Method method = Method::corrected;
+  Method method = Method::corrected;   // never calibrated
+  std::optional<ClosingPath> closing;  // of method calibrated
   double voxel_size_m = 0.01;
   double palm_diameter_m = 0.0;  // of the gripper
   int side = 0;

@@ -76,6 +76,12 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("i", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.i; });
   add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
+  if (map.content.terms) {
+    add("closing_contact", ScalarType::float32, [](const auto& one) { return one.terms.contact; });
+    add("closing_bearing", ScalarType::float32, [](const auto& one) { return one.terms.bearing; });
+    add("closing_rise", ScalarType::float32, [](const auto& one) { return one.terms.rise; });
+    add("closing_depth", ScalarType::float32, [](const auto& one) { return one.terms.depth; });
+  }
   if (map.content.slopes)
     add("slope_deg", ScalarType::float32, [](const MapVoxel& one) { return one.slope_deg; });
   if (map.content.obstacles)

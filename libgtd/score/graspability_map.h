@@ -18,6 +18,7 @@ struct MapVoxel {
   bool graspable = false;  // score, zero plane and, if it was evaluated, convexity say yes
   bool border = false;     // the mask's window leaves the scanned area
   Obstacle obstacle = Obstacle::none;
+  ClosingTerms terms{};                               // of method calibrated
   float slope_deg = 0.0F;                             // of the surface, as SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // in the terrain frame: the mask's axis
 };
@@ -26,6 +27,7 @@ struct MapVoxel {
 struct MapContent {
   bool normals = false;    // the mask was tilted
   bool slopes = false;     // obstacles are evaluated
+  bool terms = false;      // the method is calibrated
   bool obstacles = false;  // and the whole map is there to evaluate them
 };
 
@@ -42,9 +44,10 @@ enum class MapFrame { terrain, input };
 const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 
 // A point for each voxel, at its center, colored by score and white below the zero plane, with the
-// fields score, ssv, gsv, convex, graspable, edge and the voxel's i, j, k on the lattice. As the
+// fields score, ssv, gsv, convex, graspable, border and the voxel's i, j, k on the lattice. As the
 // content says: the mask's axis as the point's normal, from which the gripper comes; the fields
-// slope_deg and obstacle (the number of an Obstacle).
+// slope_deg and obstacle (the number of an Obstacle); the ClosingTerms closing_contact,
+// closing_bearing, closing_rise and closing_depth.
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
 
 // Evaluates the obstacles of a map that has slopes, once all of it is there: sets each point's

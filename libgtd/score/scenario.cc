@@ -14,7 +14,7 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
   using libmap::positive;
   table.add("method", scenario.method, method_names(),
-            "corrected, or one of the programs that it follows");
+            "corrected, one of the programs that it follows, or calibrated");
   table.add("gripper", scenario.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge of a voxel, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},
@@ -47,7 +47,7 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
 void Scenario::check() const {
   libmap::check_parameters(*this);
   if (orientation == Orientation::surface &&
-      (method == Method::thesis || method == Method::envelope))
+      (method == Method::thesis || method == Method::envelope || method == Method::calibrated))
     throw libmap::Error("not with method " + name_of(method) + ", which knows no tilted mask",
                         {.field = "orientation",
                          .value = "surface",

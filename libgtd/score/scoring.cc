@@ -25,6 +25,7 @@ double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_t
     case Method::climblab:
       return 100.0 * counts.gsv / counts.ssv;
     case Method::corrected:
+    case Method::calibrated:
       break;
   }
   return std::max(0.0, lowered(100.0 * counts.gsv / counts.ssv, counts.ssv, solid_voxel_threshold));

@@ -4,6 +4,7 @@
 #include <map>
 #include <utility>
 
+#include "libgtd/score/closing_terms.h"
 #include "libgtd/score/scanned_area.h"
 #include "libgtd/score/scoring.h"
 #include "libmap/core/error.h"
@@ -127,13 +128,20 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
     if (flags[at] != 0) pivots.push_back(at);
   const std::vector<VoxelCounts> counts =
       match_voxels(grid, mask, pivots, options.instructions, progress);
+  std::vector<ClosingTerms> terms;
+  if (mask.closing) terms = closing_terms(grid, *mask.closing, pivots);
   std::vector<ScoredVoxel> scored(pivots.size());
   libmap::parallel_for(pivots.size(), pivots_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       ScoredVoxel& one = scored[n];
       one.voxel = grid.voxels[pivots[n]];
       one.counts = counts[n];
-      one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0;
+      if (mask.closing) {
+        one.terms = terms[n];
+        one.score = mask.closing->model.probability(terms[n]);
+      } else {
+        one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0;
+      }
       one.border = (flags[pivots[n]] & is_border) != 0;
     }
   });

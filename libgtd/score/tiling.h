@@ -30,6 +30,7 @@ struct ScoredVoxel {
   VoxelCounts counts;
   double score = 0.0;   // score_percent / 100
   bool border = false;  // the mask's window leaves the scanned area
+  ClosingTerms terms{};  // of method calibrated
 };
 
 struct ScoringOptions {

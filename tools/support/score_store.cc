@@ -263,8 +263,9 @@ class StoreScoring {
           earlier.pieces.size(), plan.pieces.size()));
     if (options_.detection.plane != libgtd::PlaneSource::none)
       refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
-    if (scenario_.method != libgtd::Method::corrected)
-      refuse("--append needs --method corrected: others leave out the terrain's border");
+    if (scenario_.method != libgtd::Method::corrected &&
+        scenario_.method != libgtd::Method::calibrated)
+      refuse("--append needs --method corrected or calibrated: others leave out the terrain's border");
     require_same_tiles(earlier);
   }
 

@@ -1,0 +1,263 @@
+#include "libgtd/score/closing_terms.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <map>
+#include <numbers>
+#include <utility>
+
+#include "libgtd/score/scanned_area.h"
+#include "libmap/core/angle.h"
+#include "libmap/core/parallel.h"
+
+namespace libgtd {
+
+namespace {
+
+constexpr int azimuths = 16;
+constexpr int gap_columns = 3;
+constexpr int block_columns = 64;
+constexpr float unknown = -std::numeric_limits<float>::infinity();
+
+// Places around a pivot as columns, for one azimuth.
+struct Cell {
+  int i = 0;
+  int j = 0;
+  float depth = 0.0F;  // below the palm
+  bool has_spines = false;
+};
+
+struct Rays {
+  std::vector<Cell> palm;  // depth 0
+  std::vector<Cell> open;  // of all azimuths
+  std::array<std::vector<Cell>, azimuths> closing;
+  std::array<std::array<double, azimuths>, azimuths> weights{};  // side, azimuth; 1 in sum
+};
+
+// Whether a place in this column has not been as deep before: else it would have met the ground.
+bool is_new(const std::vector<Cell>& cells, const Cell& next) {
+  return std::none_of(cells.begin(), cells.end(), [&](const Cell& cell) {
+    return cell.i == next.i && cell.j == next.j && cell.depth >= next.depth;
+  });
+}
+
+Rays make_rays(const ClosingPath& path, double voxel_size_m) {
+  Rays rays;
+  const int palm = static_cast<int>(std::ceil(path.palm_radius_m / voxel_size_m));
+  for (int i = -palm; i <= palm; ++i)
+    for (int j = -palm; j <= palm; ++j)
+      if (std::hypot(i, j) * voxel_size_m <= path.palm_radius_m) rays.palm.push_back({i, j});
+  for (int a = 0; a < azimuths; ++a) {
+    const double angle = 2.0 * std::numbers::pi * a / azimuths;
+    const auto cell = [&](const ClosingPath::Place& place) {
+      return Cell{static_cast<int>(std::lround(place.radius_m * std::cos(angle) / voxel_size_m)),
+                  static_cast<int>(std::lround(place.radius_m * std::sin(angle) / voxel_size_m)),
+                  static_cast<float>(place.depth_m), place.has_spines};
+    };
+    for (const ClosingPath::Place& place : path.open) rays.open.push_back(cell(place));
+    for (const ClosingPath::Place& place : path.closing)
+      if (const Cell next = cell(place); is_new(rays.closing[static_cast<std::size_t>(a)], next))
+        rays.closing[static_cast<std::size_t>(a)].push_back(next);
+    double sum = 0.0;
+    auto& weights = rays.weights[static_cast<std::size_t>(a)];
+    for (int b = 0; b < azimuths; ++b) {
+      const double weight = std::max(0.0, std::cos(2.0 * std::numbers::pi * (b - a) / azimuths));
+      weights[static_cast<std::size_t>(b)] = weight;
+      sum += weight;
+    }
+    for (double& weight : weights) weight /= sum;
+  }
+  return rays;
+}
+
+// The heights of a rectangle of columns, and how they fall.
+class Heights {
+ public:
+  Heights(const VoxelGrid& grid, const TileBounds& bounds)
+      : bounds_(bounds), width_(bounds.j_end - bounds.j_begin) {
+    const auto size = static_cast<std::size_t>(bounds.i_end - bounds.i_begin) *
+                      static_cast<std::size_t>(width_);
+    heights_.assign(size, unknown);
+    // In voxels of the lattice, from its origin; ascending, so that the highest of a column is last.
+    visit_columns(grid, bounds, [&](std::size_t at) {
+      const Voxel& voxel = grid.voxels[at];
+      heights_[index(voxel.i, voxel.j)] =
+          static_cast<float>((voxel.k + 0.5) * grid.lattice.voxel_size_m);
+    });
+    for (int round = 0; round < gap_columns; ++round) fill_gaps();
+    find_falls(grid.lattice.voxel_size_m);
+  }
+
+  std::size_t index(int i, int j) const {
+    return static_cast<std::size_t>(i - bounds_.i_begin) * static_cast<std::size_t>(width_) +
+           static_cast<std::size_t>(j - bounds_.j_begin);
+  }
+  std::ptrdiff_t step(const Cell& cell) const {
+    return static_cast<std::ptrdiff_t>(cell.i) * width_ + cell.j;
+  }
+  float height(std::size_t at) const { return heights_[at]; }
+  // dz/dx and dz/dy
+  const std::array<float, 2>& rise(std::size_t at) const { return rises_[at]; }
+
+ private:
+  void fill_gaps() {
+    std::vector<float> filled = heights_;
+    const int rows = bounds_.i_end - bounds_.i_begin;
+    for (int i = 0; i < rows; ++i)
+      for (int j = 0; j < width_; ++j) {
+        const auto at = static_cast<std::size_t>(i) * static_cast<std::size_t>(width_) +
+                        static_cast<std::size_t>(j);
+        if (heights_[at] != unknown) continue;
+        float sum = 0.0F;
+        int count = 0;
+        for (int di = std::max(i - 1, 0); di <= std::min(i + 1, rows - 1); ++di)
+          for (int dj = std::max(j - 1, 0); dj <= std::min(j + 1, width_ - 1); ++dj) {
+            const float height = heights_[static_cast<std::size_t>(di) *
+                                              static_cast<std::size_t>(width_) +
+                                          static_cast<std::size_t>(dj)];
+            if (height == unknown) continue;
+            sum += height;
+            ++count;
+          }
+        if (count > 0) filled[at] = sum / static_cast<float>(count);
+      }
+    heights_ = std::move(filled);
+  }
+
+  void find_falls(double voxel_size_m) {
+    rises_.assign(heights_.size(), {0.0F, 0.0F});
+    const auto between = [&](std::size_t low, std::size_t high) {
+      if (heights_[low] == unknown || heights_[high] == unknown) return 0.0F;
+      return (heights_[high] - heights_[low]) / static_cast<float>(2.0 * voxel_size_m);
+    };
+    const auto width = static_cast<std::size_t>(width_);
+    for (std::size_t at = width + 1; at + width + 1 < heights_.size(); ++at)
+      rises_[at] = {between(at - width, at + width), between(at - 1, at + 1)};
+  }
+
+  TileBounds bounds_;
+  int width_ = 0;
+  std::vector<float> heights_;
+  std::vector<std::array<float, 2>> rises_;
+};
+
+// Follows the fingers at the pivots of one block.
+class BlockCloser {
+ public:
+  BlockCloser(const Heights& heights, const Rays& rays, const ClosingPath& path)
+      : heights_(heights), rays_(rays), path_(path) {
+    for (const Cell& cell : rays.palm) palm_.push_back(heights.step(cell));
+    for (const Cell& cell : rays.open) open_.push_back(heights.step(cell));
+    for (std::size_t a = 0; a < azimuths; ++a)
+      for (const Cell& cell : rays.closing[a]) closing_[a].push_back(heights.step(cell));
+  }
+
+  ClosingTerms terms(std::size_t pivot, float pivot_height) const {
+    const float palm = palm_height(pivot);
+    std::array<double, azimuths> contacts{};
+    std::array<double, azimuths> bearings{};
+    double depths = 0.0;
+    double touching = 0.0;
+    for (std::size_t a = 0; a < azimuths; ++a) {
+      const Cell* cell = nullptr;
+      const std::size_t at = first_contact(pivot, palm, a, cell);
+      if (cell == nullptr || !cell->has_spines) continue;
+      contacts[a] = 1.0;
+      depths += cell->depth;
+      touching += 1.0;
+      const double angle = 2.0 * std::numbers::pi * static_cast<double>(a) / azimuths;
+      const auto& [along_x, along_y] = heights_.rise(at);
+      const double fall_deg =
+          std::atan(-(along_x * std::cos(angle) + along_y * std::sin(angle))) /
+          libmap::radians_per_degree;
+      bearings[a] = path_.bearing[static_cast<std::size_t>(std::lround(fall_deg) + 90)];
+    }
+    return {.contact = weakest(contacts),
+            .bearing = weakest(bearings),
+            .rise = (palm - pivot_height) / path_.finger_length_m,
+            .depth = touching > 0.0 ? depths / touching / path_.finger_length_m : 0.0};
+  }
+
+ private:
+  float palm_height(std::size_t pivot) const {
+    float palm = unknown;
+    for (const std::ptrdiff_t step : palm_)
+      palm = std::max(palm, heights_.height(pivot + static_cast<std::size_t>(step)));
+    for (std::size_t n = 0; n < open_.size(); ++n)
+      palm = std::max(palm, heights_.height(pivot + static_cast<std::size_t>(open_[n])) +
+                                rays_.open[n].depth);
+    return palm;
+  }
+
+  std::size_t first_contact(std::size_t pivot, float palm, std::size_t azimuth,
+                            const Cell*& cell) const {
+    const std::vector<Cell>& cells = rays_.closing[azimuth];
+    for (std::size_t n = 0; n < cells.size(); ++n) {
+      const std::size_t at = pivot + static_cast<std::size_t>(closing_[azimuth][n]);
+      if (!(heights_.height(at) > palm - cells[n].depth)) continue;
+      cell = &cells[n];
+      return at;
+    }
+    return pivot;
+  }
+
+  double weakest(const std::array<double, azimuths>& values) const {
+    double least = std::numeric_limits<double>::infinity();
+    for (const auto& weights : rays_.weights) {
+      double sum = 0.0;
+      for (std::size_t a = 0; a < azimuths; ++a) sum += weights[a] * values[a];
+      least = std::min(least, sum);
+    }
+    return least;
+  }
+
+  const Heights& heights_;
+  const Rays& rays_;
+  const ClosingPath& path_;
+  std::vector<std::ptrdiff_t> palm_;
+  std::vector<std::ptrdiff_t> open_;
+  std::array<std::vector<std::ptrdiff_t>, azimuths> closing_;
+};
+
+}  // namespace
+
+int closing_reach_voxels(const ClosingPath& path, double voxel_size_m) {
+  // A place may be rounded half a column outward; its fall looks one farther, and gaps are filled.
+  return static_cast<int>(std::ceil(path.reach_m() / voxel_size_m + 0.5)) + 1 + gap_columns;
+}
+
+std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath& path,
+                                        const std::vector<std::size_t>& pivots) {
+  const double voxel_size_m = grid.lattice.voxel_size_m;
+  const Rays rays = make_rays(path, voxel_size_m);
+  const int reach = closing_reach_voxels(path, voxel_size_m);
+  std::map<std::pair<int, int>, std::vector<std::size_t>> blocks;
+  for (std::size_t n = 0; n < pivots.size(); ++n) {
+    const Voxel& voxel = grid.voxels[pivots[n]];
+    blocks[{floor_divide(voxel.i, block_columns), floor_divide(voxel.j, block_columns)}].push_back(
+        n);
+  }
+  std::vector<std::pair<std::pair<int, int>, std::vector<std::size_t>>> listed(blocks.begin(),
+                                                                               blocks.end());
+  std::vector<ClosingTerms> terms(pivots.size());
+  libmap::parallel_for(listed.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      const auto& [place, members] = listed[b];
+      const int i = place.first * block_columns;
+      const int j = place.second * block_columns;
+      const Heights heights(grid,
+                            grown({i, i + block_columns, j, j + block_columns}, reach, reach));
+      const BlockCloser closer(heights, rays, path);
+      for (const std::size_t n : members) {
+        const Voxel& voxel = grid.voxels[pivots[n]];
+        terms[n] = closer.terms(heights.index(voxel.i, voxel.j),
+                                static_cast<float>((voxel.k + 0.5) * voxel_size_m));
+      }
+    }
+  });
+  return terms;
+}
+
+}  // namespace libgtd

@@ -1,0 +1,26 @@
+// What a closing gripper would meet at a voxel, from the heights of the columns around it: the terms
+// of method `calibrated` (ClosingTerms in libgtd/gripper/hold_model.h).
+//
+// The palm comes down upright on the voxel's column until it or an open finger meets ground. Each
+// of 16 fingers then follows its closing path until one of its places is in the ground. Where that
+// is the outer half of the distal link, its spines bear as much as the ground's fall outward allows.
+// A side's share is the mean over the azimuths weighted with the cosine to the side, if positive.
+#pragma once
+
+#include <vector>
+
+#include "libgtd/gripper/closing_path.h"
+#include "libgtd/terrain/voxel_grid.h"
+
+namespace libgtd {
+
+// How many columns around a voxel its terms depend on.
+int closing_reach_voxels(const ClosingPath& path, double voxel_size_m);
+
+// Of each voxel of `pivots` (positions in grid.voxels, ascending). A column's height is that of its
+// highest voxel; up to three columns into a gap, the mean of the columns beside it. Terms depend on
+// the voxels within the reach alone, not on other pivots or the number of threads.
+std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath& path,
+                                        const std::vector<std::size_t>& pivots);
+
+}  // namespace libgtd
