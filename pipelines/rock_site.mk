@@ -14,9 +14,9 @@ EDGE ?= 0.008
 POSES ?= refined
 CROP ?= --size 3x3
 SCENARIO ?= artificial_rocks_prescan
-METHOD ?= corrected
+METHOD ?= calibrated
 SHARES ?= 4
-FIELD_TEST ?= --load 2
+FIELD_TEST ?=
 
 include $(here)one_run.mk
 ifdef is_alone

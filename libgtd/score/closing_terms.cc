@@ -19,6 +19,8 @@ namespace {
 constexpr int azimuths = 16;
 constexpr int gap_columns = 3;
 constexpr int block_columns = 64;
+// The open finger rests on the ground: only what rises more than rounding into its way is met.
+constexpr float clearance_m = 1e-5F;
 constexpr float unknown = -std::numeric_limits<float>::infinity();
 
 // Places around a pivot as columns, for one azimuth.
@@ -196,7 +198,7 @@ class BlockCloser {
     const std::vector<Cell>& cells = rays_.closing[azimuth];
     for (std::size_t n = 0; n < cells.size(); ++n) {
       const std::size_t at = pivot + static_cast<std::size_t>(closing_[azimuth][n]);
-      if (!(heights_.height(at) > palm - cells[n].depth)) continue;
+      if (!(heights_.height(at) > palm - cells[n].depth + clearance_m)) continue;
       cell = &cells[n];
       return at;
     }

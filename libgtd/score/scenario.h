@@ -16,7 +16,7 @@ enum class Orientation { plane, surface };
 const std::vector<std::pair<std::string, Orientation>>& orientation_names();
 
 struct Scenario {
-  Method method = Method::corrected;
+  Method method = Method::calibrated;
   std::string gripper = "scar-e";  // name of a gripper of the toolkit, or a file
   std::vector<std::pair<std::string, std::string>> gripper_overrides;  // "gripper.KEY: VALUE"
   double voxel_size_m = 0.01;

@@ -18,7 +18,8 @@ TEST(Footholds, OfAMapInEitherFrame) {
   for (const char* frame : {"terrain", "input"}) {
     const std::string map = std::string("map_") + frame + ".pcd";
     ASSERT_TRUE(succeeded(graspmap(
-        {"score", "terrain.pcd", "-o", map, "--frame", frame, "--solid-voxel-threshold", "1"})));
+        {"score", "terrain.pcd", "-o", map, "--frame", frame, "--method", "corrected",
+         "--solid-voxel-threshold", "1"})));
     ASSERT_TRUE(succeeded(graspmap(
         {"footholds", map, "-o", std::string(frame) + ".ply", "--no-graspable-only", "--border"})));
   }

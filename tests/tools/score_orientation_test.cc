@@ -1,6 +1,7 @@
 // The mask tilted to the surface, and obstacles, as a user asks for them.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "libmap/cloud/cloud_io.h"
@@ -38,6 +39,8 @@ std::string write_block() {
 
 graspmap_test::ProgramResult score(const std::string& output, Words more) {
   Words words = {"score", "terrain.pcd", "-o", output, "--plane", "none", "--tile-size", "0.15"};
+  if (std::find(more.begin(), more.end(), "--method") == more.end())
+    words.insert(words.end(), {"--method", "corrected"});
   words.insert(words.end(), more.begin(), more.end());
   return graspmap(words);
 }
@@ -102,7 +105,8 @@ TEST(ScoreOrientation, FootholdsComeAlongTheMasksAxis) {
   write_block();
   for (const char* frame : {"terrain", "input"}) {
     ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--frame", frame,
-                                    "--up", "0,0,1", "--orientation", "surface", "--force"})));
+                                    "--up", "0,0,1", "--orientation", "surface", "--method", "corrected",
+                                    "--force"})));
     ASSERT_TRUE(succeeded(graspmap(
         {"footholds", "map.pcd", "-o", "f.ply", "--no-graspable-only", "--border", "--force"})));
     const PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
@@ -126,7 +130,7 @@ TEST(ScoreOrientation, FootholdsComeAlongTheMasksAxis) {
 
 TEST(ScoreOrientation, WhatDoesNotGoTogetherIsRefused) {
   write_block();
-  for (const char* method : {"thesis", "envelope"})
+  for (const char* method : {"thesis", "envelope", "calibrated"})
     EXPECT_TRUE(bad_input(score("m.pcd", {"--orientation", "surface", "--method", method}),
                           {"orientation is surface", method, "corrected"}));
   EXPECT_TRUE(bad_input(score("m.tiles", {"--obstacle-height", "0.2"}),

@@ -119,7 +119,7 @@ TEST_F(Merge, KeepsWhatTheSharesHaveInCommon) {
   EXPECT_EQ(whole.at("command"), "convert");
   EXPECT_EQ(whole.at("frame"), part.at("frame"));
   EXPECT_EQ(whole.at("transforms"), part.at("transforms"));
-  EXPECT_EQ(whole.at("parameters").at("method"), "corrected");
+  EXPECT_EQ(whole.at("parameters").at("method"), "calibrated");
   EXPECT_FALSE(whole.at("parameters").contains("tile"));
   // The terrain and the gripper behind the parts, then the two parts.
   ASSERT_EQ(whole.at("inputs").size(), 4U);

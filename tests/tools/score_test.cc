@@ -38,7 +38,7 @@ double value(const PointCloud& map, const char* field, std::size_t point) {
 }
 
 TEST(Score, MapKeepsItsPromises) {
-  const PointCloud map = scored("map.pcd", {"--zero-plane", "-0.005"});
+  const PointCloud map = scored("map.pcd", {"--zero-plane", "-0.005", "--method", "corrected"});
   ASSERT_GT(map.size(), 4000U);
   ASSERT_TRUE(map.has_colors());
   const nlohmann::json manifest = graspmap_test::json_of("map.pcd.json");

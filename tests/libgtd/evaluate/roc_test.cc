@@ -420,4 +420,21 @@ TEST(Roc, WrongOptionsNameTheFieldAndTheBound) {
   EXPECT_EQ(error_of([] { evaluate_roc({true}, {}); }).context().field, "scores");
 }
 
+TEST(Roc, PrecisionAtHalfOfTheRecallAndCalibration) {
+  // Two of the three highest of four positives; ties count in full.
+  const Labels labels = {true, false, true, true, true, false};
+  const RocResult result =
+      evaluate_roc(labels, Scores{0.95, 0.85, 0.75, 0.35, 0.35, 0.05}, without_bootstrap());
+  ASSERT_TRUE(result.precision_at_half_recall);
+  EXPECT_DOUBLE_EQ(*result.precision_at_half_recall, 2.0 / 3.0);
+  // Tenths: |1 - 0.95|, |0 - 0.85|, |1 - 0.75|, |2 - 0.7|, |0 - 0.05| over six locations.
+  ASSERT_TRUE(result.calibration_error);
+  EXPECT_NEAR(*result.calibration_error, (0.05 + 0.85 + 0.25 + 1.3 + 0.05) / 6, 1e-12);
+  EXPECT_FALSE(evaluate_roc(labels, Scores{0.95, 1.5, 0.75, 0.35, 0.35, 0.05}, without_bootstrap())
+                   .calibration_error);
+  const RocResult tied = evaluate_roc(labels, Scores(6, 1.0), without_bootstrap());
+  EXPECT_DOUBLE_EQ(*tied.precision_at_half_recall, 4.0 / 6.0);
+  EXPECT_NEAR(*tied.calibration_error, 2.0 / 6.0, 1e-12);
+}
+
 }  // namespace roc_test

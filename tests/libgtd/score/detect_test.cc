@@ -26,7 +26,7 @@ class Detection : public testing::TestWithParam<Method> {};
 
 INSTANTIATE_TEST_SUITE_P(All, Detection,
                          testing::Values(Method::thesis, Method::envelope, Method::climblab,
-                                         Method::corrected),
+                                         Method::corrected, Method::calibrated),
                          [](const auto& given) { return name_of(given.param); });
 
 TEST_P(Detection, SharesYieldTheVoxelsOfTheWholeMap) {

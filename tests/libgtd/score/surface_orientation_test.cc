@@ -33,6 +33,7 @@ DetectionOptions options_for(Orientation orientation) {
   options.scenario.curvature_radius_m = 0.0;
   options.scenario.zero_plane_m = -10.0;
   options.scenario.orientation = orientation;
+  options.scenario.method = Method::corrected;
   return options;
 }
 

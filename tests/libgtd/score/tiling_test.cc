@@ -12,7 +12,8 @@
 namespace libgtd {
 
 bool operator==(const ScoredVoxel& a, const ScoredVoxel& b) {
-  return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.border == b.border;
+  return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.border == b.border &&
+         a.terms.rise == b.terms.rise && a.terms.depth == b.terms.depth;
 }
 
 namespace tiling_test {
@@ -26,7 +27,7 @@ class EachMethod : public testing::TestWithParam<Method> {};
 
 INSTANTIATE_TEST_SUITE_P(All, EachMethod,
                          testing::Values(Method::thesis, Method::envelope, Method::climblab,
-                                         Method::corrected),
+                                         Method::corrected, Method::calibrated),
                          [](const auto& given) { return name_of(given.param); });
 
 // The property on which distributed scoring rests, over random scenes off the origin.
