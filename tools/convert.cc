@@ -5,6 +5,7 @@
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/merge_tiles.h"
 #include "tools/support/usages.h"
@@ -46,25 +47,13 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
   return cloud;
 }
 
-template <typename Facts>
-void carry_facts(const Facts& source, Facts& facts) {
-  for (const auto& fact : source) {
-    const bool is_known = std::any_of(facts.begin(), facts.end(),
-                                      [&](const auto& known) { return known.first == fact.first; });
-    if (!is_known) facts.push_back(fact);
-  }
-}
-
 // The manifest of a converted map still says in which frame it is, and how it was made: its zero
 // plane, lattice and method. Once all is read: what cannot be read need not be hashed.
 void add_input(const ConvertOptions& options, Run& run) {
   run.add_input(options.input);
   const auto source = libmap::read_manifest_of(options.input);
   if (!source) return;
-  run.manifest().frame = source->frame;
-  run.manifest().transforms = source->transforms;
-  carry_facts(source->parameters, run.manifest().parameters);
-  carry_facts(source->results, run.manifest().results);
+  carry_facts(*source, run);
 }
 
 // Encodings that a format does not have.

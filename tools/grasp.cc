@@ -18,6 +18,7 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
 #include "tools/support/command_line.h"
+#include "tools/support/grasp_map.h"
 #include "tools/support/grasp_scenes.h"
 #include "tools/support/map_frame.h"
 
@@ -25,14 +26,19 @@ namespace {
 
 using graspmap_tools::Run;
 
+enum class SequentialTest { automatic, on, off };
+
 struct GraspCommandOptions {
   std::string mesh;
   std::string points;
+  std::string map;
   std::string output;
   graspmap_tools::GraspScenesOptions scenes;
   std::string gripper = "scar-e";
   std::vector<std::pair<std::string, std::string>> overrides;
   libgtd::GraspOptions grasp;
+  SequentialTest sequential = SequentialTest::automatic;
+  int map_draws = 8;
   std::string more_loads;
   std::string prefix;
 };
@@ -41,6 +47,13 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
   table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
+  table.add("sequential", options.sequential,
+            {{"auto", SequentialTest::automatic},
+             {"on", SequentialTest::on},
+             {"off", SequentialTest::off}},
+            "a location's test ends as soon as its verdict is clear; auto: with --map");
+  table.add("map_draws", options.map_draws, {1, 100000},
+            "with --map: the draws of each pose, instead of 'draws'");
   table.add("more_loads", options.more_loads,
             "further loads with a verdict each, N, with commas between");
   table.add("prefix", options.prefix, "before the name of each column of the results");
@@ -55,7 +68,7 @@ std::string parameters_hash(const libgtd::Gripper& gripper, libgtd::GraspOptions
   bind(table, measures);
   bind(table, fingers);
   bind(table, options);
-  return libmap::sha256_of(to_yaml(table));
+  return libmap::sha256_of(to_yaml(table) + (options.sequential ? "sequential" : ""));
 }
 
 void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) {
@@ -77,7 +90,39 @@ void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) 
       holding, results.size(), probability, 100.0 * unseen);
 }
 
-void grasp(GraspCommandOptions& options, Run& run) {
+libgtd::Gripper read_with_fingers(const std::filesystem::path& file,
+                                  const GraspCommandOptions& options) {
+  libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
+  if (!gripper.fingers)
+    throw libmap::Error("missing: a gripper is closed by its fingers",
+                        {.file = file.string(), .field = "fingers"});
+  return gripper;
+}
+
+void grasp_voxels(GraspCommandOptions& options, Run& run) {
+  graspmap_tools::refuse_given({{"--scenes", !options.scenes.folder.empty()},
+                                {"--scene-of", !options.scenes.places.empty()},
+                                {"--more-loads", !options.more_loads.empty()},
+                                {"--prefix", !options.prefix.empty()}},
+                               "is for --points");
+  libmap::require_cloud_format(options.output);
+  run.claim_output(options.output, {options.mesh, options.map});
+  const auto file = libmap::find_data_file("grippers", options.gripper);
+  const libgtd::Gripper gripper = read_with_fingers(file, options);
+  const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
+  run.add_input(options.mesh);
+  run.add_input(options.map);
+  run.add_input(file);
+  options.grasp.draws = options.map_draws;
+  options.grasp.best_draws = 0;
+  options.grasp.sequential = options.sequential != SequentialTest::off;
+  const std::string hash = parameters_hash(gripper, options.grasp);
+  run.add_results({{"parameters_sha256", hash}});
+  graspmap_tools::grasp_map({options.mesh, options.map, options.output, hash}, mesh, gripper,
+                            options.grasp, run);
+}
+
+void grasp_places(GraspCommandOptions& options, Run& run) {
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
@@ -88,11 +133,9 @@ void grasp(GraspCommandOptions& options, Run& run) {
     options.grasp.more_loads_n.push_back(*load);
   }
   claim_scenes(options.scenes, run);
+  options.grasp.sequential = options.sequential == SequentialTest::on;
   const auto file = libmap::find_data_file("grippers", options.gripper);
-  const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
-  if (!gripper.fingers)
-    throw libmap::Error("missing: a gripper is closed by its fingers",
-                        {.file = file.string(), .field = "fingers"});
+  const libgtd::Gripper gripper = read_with_fingers(file, options);
   libmap::Table table = libmap::read_csv(options.points);
   const std::vector<Eigen::Vector3d> locations = graspmap_tools::positions_of(table);
   if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
@@ -128,6 +171,14 @@ void grasp(GraspCommandOptions& options, Run& run) {
   run.write_text(options.output, libmap::to_csv(table));
 }
 
+void grasp(GraspCommandOptions& options, Run& run) {
+  if (options.points.empty() == options.map.empty())
+    throw graspmap_tools::UsageError(options.map.empty()
+                                         ? "--points LOCATIONS.csv or --map MAP.pcd is missing"
+                                         : "--points and --map exclude each other");
+  options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -135,9 +186,13 @@ int main(int argc, char** argv) {
   graspmap_tools::Command command("grasp");
   command.input("MESH", options.mesh, "mesh of the terrain, z up");
   command.option("--points", "LOCATIONS.csv", options.points,
-                 "CSV with the columns x, y, z in meters in the mesh's frame, and any others",
-                 true);
-  command.output(options.output, "CSV: the locations, each with the results of its trials");
+                 "CSV with the columns x, y, z in meters in the mesh's frame, and any others");
+  command.option(
+      "--map", "MAP", options.map,
+      "instead of it: a graspability map of the mesh, each of whose voxels is a location");
+  command.output(options.output,
+                 "with --points a CSV: the locations, each with the results of its trials; with "
+                 "--map the map with more fields (.pcd, .ply, .vtp, .csv)");
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "pictures of one trial of each location, its force nearest to the median: "
                  "FOLDER/PLACE.ply, after the column 'place' or the row");

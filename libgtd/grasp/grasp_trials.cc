@@ -125,38 +125,87 @@ void count_pose(const ClosedGripper& closed, double weight, LocationResult& resu
   result.clearance_m += weight * closed.patch_from_gripper.translation().z();
 }
 
-LocationResult test_location(const Ground& ground, const Gripper& gripper,
-                             const Eigen::Vector3d& location, const GraspOptions& options) {
-  const Site site = site_of(ground, gripper, location, options);
-  LocationResult result;
-  result.location = location;
+// Of one pose: the closed gripper and the trials that were made with it.
+struct PoseTrials {
+  ClosedGripper closed;
+  std::size_t guess = 0;  // of the direction that is the weakest in the next draw
   std::vector<double> forces;
-  std::vector<double> best_forces;
-  std::vector<std::size_t> limiting(pull_directions().size(), 0);
-  for (int pose = 0; pose < options.poses; ++pose) {
-    const ClosedGripper closed = close_gripper(
-        site.patch, gripper, draw_pose(site, gripper, options, pose), options.closing);
-    count_pose(closed, 1.0 / options.poses, result);
-    const HoldingOptions equally = holding_of(closed, gripper, SpineSharing::equally);
-    const HoldingOptions best = holding_of(closed, gripper, SpineSharing::best);
-    std::size_t guess = 0;
-    for (int draw = 0; draw < options.draws; ++draw) {
-      const auto bearing = draw_asperities(closed, site, gripper, options, pose, draw);
-      const LeastForce least = least_holding_force(bearing, equally, guess);
-      guess = least.direction;
-      forces.push_back(least.force_n);
-      if (draw < options.best_draws)
-        best_forces.push_back(least_holding_force(bearing, best, guess).force_n);
-      if (least.force_n > 0.0) ++limiting[least.direction];
-      ++result
-            .ends[static_cast<std::size_t>(end_of(closed, bearing.size(), least.force_n, options))];
+};
+
+// All trials of one location, made in rounds.
+class LocationTrials {
+ public:
+  LocationTrials(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
+                 const GraspOptions& options)
+      : site_(site_of(ground, gripper, location, options)), gripper_(gripper), options_(options) {
+    result_.location = location;
+  }
+
+  // Goes on to so many poses with so many draws each.
+  void go_on(const SequentialRound& round) {
+    for (int pose = 0; pose < round.poses; ++pose) {
+      if (static_cast<std::size_t>(pose) == poses_.size())
+        poses_.push_back(
+            {close_gripper(site_.patch, gripper_, draw_pose(site_, gripper_, options_, pose),
+                           options_.closing),
+             0,
+             {}});
+      draw(pose, round.draws);
     }
+  }
+
+  bool is_clear() const {
+    std::size_t trials = 0;
+    for (const PoseTrials& pose : poses_) trials += pose.forces.size();
+    constexpr double quantile_of_90_percent = 1.645;
+    const auto [low, high] =
+        wilson_interval(static_cast<double>(result_.ends[0]) / static_cast<double>(trials),
+                        static_cast<double>(poses_.size()), quantile_of_90_percent);
+    return low > 0.5 || high < 0.5;
+  }
+
+  LocationResult result() &&;
+
+ private:
+  void draw(int number, int draws) {
+    PoseTrials& pose = poses_[static_cast<std::size_t>(number)];
+    const HoldingOptions equally = holding_of(pose.closed, gripper_, SpineSharing::equally);
+    const HoldingOptions best = holding_of(pose.closed, gripper_, SpineSharing::best);
+    for (int n = static_cast<int>(pose.forces.size()); n < draws; ++n) {
+      const auto bearing = draw_asperities(pose.closed, site_, gripper_, options_, number, n);
+      const LeastForce least = least_holding_force(bearing, equally, pose.guess);
+      pose.guess = least.direction;
+      pose.forces.push_back(least.force_n);
+      if (n < options_.best_draws)
+        best_forces_.push_back(least_holding_force(bearing, best, pose.guess).force_n);
+      if (least.force_n > 0.0) ++limiting_[least.direction];
+      ++result_.ends[static_cast<std::size_t>(
+          end_of(pose.closed, bearing.size(), least.force_n, options_))];
+    }
+  }
+
+  const Site site_;
+  const Gripper& gripper_;
+  const GraspOptions& options_;
+  LocationResult result_;
+  std::vector<PoseTrials> poses_;
+  std::vector<double> best_forces_;
+  std::vector<std::size_t> limiting_ = std::vector<std::size_t>(pull_directions().size(), 0);
+};
+
+LocationResult LocationTrials::result() && {
+  LocationResult& result = result_;
+  const GraspOptions& options = options_;
+  std::vector<double> forces;
+  for (const PoseTrials& pose : poses_) {
+    count_pose(pose.closed, 1.0 / static_cast<double>(poses_.size()), result);
+    forces.insert(forces.end(), pose.forces.begin(), pose.forces.end());
   }
   result.trials = forces.size();
   result.hold_probability =
       static_cast<double>(result.ends[0]) / static_cast<double>(result.trials);
   std::tie(result.hold_low, result.hold_high) =
-      wilson_interval(result.hold_probability, options.poses);
+      wilson_interval(result.hold_probability, static_cast<double>(poses_.size()));
   for (const double load : options.more_loads_n)
     result.more_probabilities.push_back(
         static_cast<double>(
@@ -164,16 +213,28 @@ LocationResult test_location(const Ground& ground, const Gripper& gripper,
                           [&](double force) { return force >= load * options.safety; })) /
         static_cast<double>(result.trials));
   result.force_n = quantiles(forces);
-  result.best_force_n = quantiles(best_forces);
+  result.best_force_n = quantiles(best_forces_);
   result.limiting_direction = static_cast<std::size_t>(
-      std::max_element(limiting.begin(), limiting.end()) - limiting.begin());
+      std::max_element(limiting_.begin(), limiting_.end()) - limiting_.begin());
+  result.has_force = limiting_[result.limiting_direction] > 0;
   const auto nearest = std::min_element(forces.begin(), forces.end(), [&](double a, double b) {
     return std::abs(a - result.force_n[1]) < std::abs(b - result.force_n[1]);
   });
   const auto shown = static_cast<int>(nearest - forces.begin());
-  result.shown_pose = shown / options.draws;
-  result.shown_draw = shown % options.draws;
-  return result;
+  const auto draws = static_cast<int>(poses_.front().forces.size());
+  result.shown_pose = shown / draws;
+  result.shown_draw = shown % draws;
+  return std::move(result_);
+}
+
+LocationResult test_location(const Ground& ground, const Gripper& gripper,
+                             const Eigen::Vector3d& location, const GraspOptions& options) {
+  LocationTrials trials(ground, gripper, location, options);
+  for (const SequentialRound& round : sequential_rounds(options)) {
+    trials.go_on(round);
+    if (options.sequential && trials.is_clear()) break;
+  }
+  return std::move(trials).result();
 }
 
 void require_ground(const Ground& ground, const std::vector<Eigen::Vector3d>& locations,
@@ -234,13 +295,22 @@ const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names() {
   return names;
 }
 
-std::pair<double, double> wilson_interval(double share, double count) {
-  constexpr double z = 1.959963984540054;  // of 95 %
+std::pair<double, double> wilson_interval(double share, double count, double z) {
   const double middle = share + z * z / (2.0 * count);
   const double half = z * std::sqrt(share * (1.0 - share) / count + z * z / (4.0 * count * count));
   const double scale = 1.0 + z * z / count;
   return {std::clamp((middle - half) / scale, 0.0, share),
           std::clamp((middle + half) / scale, share, 1.0)};
+}
+
+std::vector<SequentialRound> sequential_rounds(const GraspOptions& options) {
+  std::vector<SequentialRound> rounds;
+  constexpr int first_poses = 4;
+  if (options.sequential)
+    for (int poses = first_poses; poses < options.poses; poses *= 2)
+      rounds.push_back({poses, (options.draws + 1) / 2});
+  rounds.push_back({options.poses, options.draws});
+  return rounds;
 }
 
 std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gripper,

@@ -30,6 +30,8 @@ struct GraspOptions {
   int draws = 32;  // of asperities at each pose
   // Draws of a pose for which the force with the best sharing (SpineSharing) is computed too.
   int best_draws = 2;
+  // Ends early where the verdict is clear: see sequential_rounds. Not bound to a key.
+  bool sequential = false;
   std::uint64_t seed = 1;
   double offset_m = 0.005;       // standard deviation of the palm's place, each of x and y
   double tilt_deg = 3.0;         // standard deviation of its tilt, about each of x and y
@@ -69,6 +71,7 @@ struct LocationResult {
   std::array<double, 3> force_n{};         // equal sharing: quantiles 0.1, 0.5, 0.9 of the trials
   std::array<double, 3> best_force_n{};    // the same of the best sharing
   std::size_t limiting_direction = 0;      // most often the weakest; of trials with any force
+  bool has_force = false;                  // some trial has one
   // Means over the poses.
   double spine_fingers = 0.0;
   double link_fingers = 0.0;  // a link touches, no spine does
@@ -83,6 +86,15 @@ struct LocationResult {
   bool holds() const { return hold_probability >= 0.5; }
 };
 
+// Of a sequential test: 4, 8, 16, ... poses with half of the draws each, at last all poses with all
+// draws. It ends after a round when Wilson's interval of 90 %, poses as the count, excludes 0.5. A
+// test that goes on to the last round has the same trials as one that is not sequential.
+struct SequentialRound {
+  int poses = 0;
+  int draws = 0;
+};
+std::vector<SequentialRound> sequential_rounds(const GraspOptions& options);
+
 // Tests all locations (m, in the mesh's frame). The result of a location depends on its coordinates
 // and the seed, not on the other locations, their order or the number of threads. Throws Error: a
 // bound of the options is broken, the gripper has no `fingers`, or a location is farther from the
@@ -95,7 +107,8 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw);
 
-// Wilson's score interval of a share at 95 % (Wilson 1927): {low, high}.
-std::pair<double, double> wilson_interval(double share, double count);
+// Wilson's score interval of a share (Wilson 1927): {low, high}; z is a
+// quantile of the normal distribution, by default that of 95 %.
+std::pair<double, double> wilson_interval(double share, double count, double z = 1.959963984540054);
 
 }  // namespace libgtd

@@ -1,7 +1,10 @@
 #include "libgtd/grasp/gripper_closing.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
+#include <cstdint>
 #include <numbers>
 #include <utility>
 
@@ -23,37 +26,57 @@ std::vector<Eigen::Vector3d> carried(const GroundPatch& patch,
   return vertices;
 }
 
-// The ground's cut with the half plane of a finger, beginning a little behind the palm's axis.
-std::vector<ProfileSegment> profile_of(const GroundPatch& patch,
-                                       const std::vector<Eigen::Vector3d>& vertices,
-                                       const Eigen::Vector3d& axis, double azimuth,
-                                       const FingerGeometry& finger) {
-  const Eigen::Vector2d along(std::cos(azimuth), std::sin(azimuth));
-  std::vector<double> side(vertices.size());
-  for (std::size_t n = 0; n < vertices.size(); ++n)
-    side[n] = along.x() * vertices[n].y() - along.y() * vertices[n].x();
-  const double farthest = finger.joint_radius_m + finger.proximal_m + finger.distal_m;
-  std::vector<ProfileSegment> profile;
-  for (std::uint32_t t = 0; t < patch.triangles.size(); ++t) {
-    const auto [a, b, c] = patch.triangles[t];
-    const bool above_a = side[a] >= 0.0;
-    const bool above_b = side[b] >= 0.0;
-    const bool above_c = side[c] >= 0.0;
-    if (above_a == above_b && above_b == above_c) continue;
-    // The vertex that is alone on its side, and the two others.
-    const auto [lone, first, second] = above_b == above_c   ? std::array{a, b, c}
-                                       : above_a == above_c ? std::array{b, c, a}
-                                                            : std::array{c, a, b};
-    const auto cut = [&, lone = lone](std::uint32_t other) {
-      const double share = side[lone] / (side[lone] - side[other]);
-      const Eigen::Vector3d point = vertices[lone] + share * (vertices[other] - vertices[lone]);
-      return Eigen::Vector2d(along.dot(point.head<2>()), point.z());
-    };
-    ProfileSegment segment{cut(first), cut(second), t, patch.area_normals[t].dot(axis) > 0.0};
-    const auto [low, high] = std::minmax(segment.a.x(), segment.b.x());
-    if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
+// On which side of the planes of all fingers, and beyond which side of the palm's square, each
+// vertex lies. Most triangles cross no plane and are not under the palm: a look at three numbers
+// says so for all fingers at once.
+struct VertexSides {
+  std::vector<std::vector<double>> side;  // by finger: distance from its plane
+  std::vector<std::uint64_t> above;       // bit n: side[n] >= 0
+  std::vector<std::uint8_t> beyond;       // of the palm's square, a bit for each side
+
+  VertexSides(const std::vector<Eigen::Vector3d>& vertices,
+              const std::vector<Eigen::Vector2d>& along, double palm_radius)
+      : side(along.size(), std::vector<double>(vertices.size())),
+        above(vertices.size(), 0),
+        beyond(vertices.size()) {
+    for (std::size_t n = 0; n < along.size(); ++n) {
+      const double x = along[n].x();
+      const double y = along[n].y();
+      for (std::size_t v = 0; v < vertices.size(); ++v)
+        side[n][v] = x * vertices[v].y() - y * vertices[v].x();
+      for (std::size_t v = 0; v < vertices.size(); ++v)
+        above[v] |= static_cast<std::uint64_t>(side[n][v] >= 0.0) << n;
+    }
+    for (std::size_t v = 0; v < vertices.size(); ++v)
+      beyond[v] = static_cast<std::uint8_t>(
+          (vertices[v].x() > palm_radius ? 1 : 0) | (vertices[v].x() < -palm_radius ? 2 : 0) |
+          (vertices[v].y() > palm_radius ? 4 : 0) | (vertices[v].y() < -palm_radius ? 8 : 0));
   }
-  return profile;
+};
+
+// Adds the cut of triangle t with the half plane of a finger, which begins a little behind the
+// palm's axis. The triangle has vertices on both sides of the plane.
+void add_cut(const GroundPatch& patch, const std::vector<Eigen::Vector3d>& vertices,
+             const std::vector<double>& side, const Eigen::Vector3d& axis,
+             const Eigen::Vector2d& along, const FingerGeometry& finger, std::uint32_t t,
+             std::vector<ProfileSegment>& profile) {
+  const double farthest = finger.joint_radius_m + finger.proximal_m + finger.distal_m;
+  const auto [a, b, c] = patch.triangles[t];
+  const bool above_a = side[a] >= 0.0;
+  const bool above_b = side[b] >= 0.0;
+  const bool above_c = side[c] >= 0.0;
+  // The vertex that is alone on its side, and the two others.
+  const auto [lone, first, second] = above_b == above_c   ? std::array{a, b, c}
+                                     : above_a == above_c ? std::array{b, c, a}
+                                                          : std::array{c, a, b};
+  const auto cut = [&, lone = lone](std::uint32_t other) {
+    const double share = side[lone] / (side[lone] - side[other]);
+    const Eigen::Vector3d point = vertices[lone] + share * (vertices[other] - vertices[lone]);
+    return Eigen::Vector2d(along.dot(point.head<2>()), point.z());
+  };
+  ProfileSegment segment{cut(first), cut(second), t, patch.area_normals[t].dot(axis) > 0.0};
+  const auto [low, high] = std::minmax(segment.a.x(), segment.b.x());
+  if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
 }
 
 // Height of the highest point of a triangle above the disc of this radius about the origin, if any.
@@ -94,22 +117,32 @@ std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& cor
   return height;
 }
 
-// Height at which the palm's disc meets the ground, from below `start_m`.
-std::optional<double> palm_height(const GroundPatch& patch,
-                                  const std::vector<Eigen::Vector3d>& vertices, double radius,
-                                  double start_m) {
-  std::optional<double> height;
-  for (const libmap::Triangle& triangle : patch.triangles) {
-    const std::array corners = {vertices[triangle[0]], vertices[triangle[1]],
-                                vertices[triangle[2]]};
-    const auto [low_x, high_x] = std::minmax({corners[0].x(), corners[1].x(), corners[2].x()});
-    const auto [low_y, high_y] = std::minmax({corners[0].y(), corners[1].y(), corners[2].y()});
-    if (low_x > radius || high_x < -radius || low_y > radius || high_y < -radius) continue;
+// What the palm and the fingers may meet of the ground.
+struct GroundCuts {
+  std::optional<double> palm_m;  // height at which the palm's disc meets it, from below the start
+  std::vector<std::vector<ProfileSegment>> profiles;  // of the fingers
+};
+
+GroundCuts cuts_of(const GroundPatch& patch, const std::vector<Eigen::Vector3d>& vertices,
+                   const Eigen::Vector3d& axis, const std::vector<Eigen::Vector2d>& along,
+                   const FingerGeometry& finger, double palm_radius, double start_m) {
+  const VertexSides sides(vertices, along, palm_radius);
+  GroundCuts cuts;
+  cuts.profiles.resize(along.size());
+  for (std::uint32_t t = 0; t < patch.triangles.size(); ++t) {
+    const auto [a, b, c] = patch.triangles[t];
+    std::uint64_t crossed = (sides.above[a] ^ sides.above[b]) | (sides.above[b] ^ sides.above[c]);
+    for (; crossed != 0; crossed &= crossed - 1) {
+      const auto n = static_cast<std::size_t>(std::countr_zero(crossed));
+      add_cut(patch, vertices, sides.side[n], axis, along[n], finger, t, cuts.profiles[n]);
+    }
+    if ((sides.beyond[a] & sides.beyond[b] & sides.beyond[c]) != 0) continue;
+    const std::array corners = {vertices[a], vertices[b], vertices[c]};
     if (std::min({corners[0].z(), corners[1].z(), corners[2].z()}) > start_m) continue;
-    if (const auto over = height_over_disc(corners, radius))
-      height = std::max(height.value_or(*over), *over);
+    if (const auto over = height_over_disc(corners, palm_radius))
+      cuts.palm_m = std::max(cuts.palm_m.value_or(*over), *over);
   }
-  return height;
+  return cuts;
 }
 
 // Whether ground that faces the palm is above `start_m` without a ceiling between: the finger would
@@ -189,10 +222,11 @@ void add_contacts(const GroundPatch& patch, std::size_t number, const ClosingOpt
     if (!normal) continue;
     contact.normal = *normal;
     contact.outward = rotation * outward;
-    // The normal in the finger's plane, a quarter turn inward; of ground that faces sideways, inward.
+    // The normal in the finger's plane, a quarter turn inward; of ground that faces sideways,
+    // inward.
     const Eigen::Vector3d axis = rotation.col(2);
-    const Eigen::Vector3d drag = contact.normal.dot(contact.outward) * axis -
-                                 contact.normal.dot(axis) * contact.outward;
+    const Eigen::Vector3d drag =
+        contact.normal.dot(contact.outward) * axis - contact.normal.dot(axis) * contact.outward;
     contact.drag = drag.norm() < 1e-6 ? -contact.outward : drag.normalized();
     gripper.contacts.push_back(contact);
   }
@@ -228,18 +262,20 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   closed.patch_from_gripper = patch_from_palm(pose);
   const std::vector<Eigen::Vector3d> vertices = carried(patch, closed.patch_from_gripper.inverse());
   const Eigen::Vector3d axis = closed.patch_from_gripper.linear().col(2);
-  std::vector<std::vector<ProfileSegment>> profiles;
-  const std::optional<double> palm =
-      palm_height(patch, vertices, 0.0005 * gripper.palm_diameter_mm, options.start_height_m);
-  std::optional<double> height = palm;
+  std::vector<Eigen::Vector2d> along;  // of the fingers' planes
   for (int n = 0; n < count; ++n) {
     const double azimuth = 2.0 * std::numbers::pi * n / count;
-    profiles.push_back(profile_of(patch, vertices, axis, azimuth, finger));
-    if (is_blocked(profiles.back(), finger, options.start_height_m)) {
+    along.emplace_back(std::cos(azimuth), std::sin(azimuth));
+  }
+  auto [palm, profiles] = cuts_of(patch, vertices, axis, along, finger,
+                                  0.0005 * gripper.palm_diameter_mm, options.start_height_m);
+  std::optional<double> height = palm;
+  for (std::vector<ProfileSegment>& profile : profiles) {
+    if (is_blocked(profile, finger, options.start_height_m)) {
       closed.approach = ApproachEnd::blocked;
       return closed;
     }
-    if (const auto needed = open_finger_height(finger, profiles.back()))
+    if (const auto needed = open_finger_height(finger, profile))
       height = std::max(height.value_or(*needed), *needed);
   }
   if (!height) {

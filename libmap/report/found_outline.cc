@@ -26,7 +26,8 @@ bool has_extension(const fs::path& file, const std::set<fs::path>& extensions) {
 bool is_map(const fs::path& file, const std::optional<Manifest>& manifest) {
   return manifest && has_extension(file, {".pcd", ".ply", ".csv", ".tiles"}) &&
          (manifest->command == "score" ||
-          (manifest->command == "convert" && manifest->find_result("scored_voxels") != nullptr));
+          ((manifest->command == "convert" || manifest->command == "grasp") &&
+           manifest->find_result("scored_voxels") != nullptr));
 }
 
 // "2_slopes_and_bumps" -> "2 Slopes and bumps".

@@ -119,6 +119,20 @@ void carry_frame(const std::string& input, Run& run) {
   carry_transforms(input, run);
 }
 
+void carry_facts(const libmap::Manifest& source, Run& run) {
+  const auto carry = [](const auto& facts, auto& own) {
+    for (const auto& fact : facts)
+      if (std::none_of(own.begin(), own.end(),
+                       [&](const auto& known) { return known.first == fact.first; }))
+        own.push_back(fact);
+  };
+  libmap::Manifest& manifest = run.manifest();
+  manifest.frame = source.frame;
+  manifest.transforms = source.transforms;
+  carry(source.parameters, manifest.parameters);
+  carry(source.results, manifest.results);
+}
+
 libmap::Pose map_from_points(const std::string& map, PointFrame points_frame, Run& run) {
   const auto manifest = libmap::read_manifest_of(map);
   if (points_frame == PointFrame::map) {

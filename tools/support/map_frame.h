@@ -51,6 +51,9 @@ bool is_from_true_frame(const std::string& file);
 void carry_transforms(const std::string& input, Run& run);
 // The same and the frame's name.
 void carry_frame(const std::string& input, Run& run);
+// For a map made of a map: frame, transforms, and the parameters and results that the run's
+// manifest does not have itself, such as its zero plane, lattice and method.
+void carry_facts(const libmap::Manifest& source, Run& run);
 // ground_truth_from_poses alone.
 void carry_truth_transform(const std::string& input, Run& run);
 

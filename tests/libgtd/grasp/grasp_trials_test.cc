@@ -261,6 +261,97 @@ TEST(GraspTrials, AlongTheGroundsNormal) {
   EXPECT_NEAR(steep.clearance_m, level.clearance_m, 8e-3);  // at another yaw
 }
 
+TEST(GraspTrials, SequentialVerdictsAreTheFullOnes) {
+  const auto mesh = bumps();
+  const auto places = places_on(mesh, 60);
+  GraspOptions options;
+  options.draws = 4;
+  options.best_draws = 0;
+  const auto full = test_on(mesh, places, options);
+  options.sequential = true;
+  const auto early = test_on(mesh, places, options);
+  std::size_t trials = 0;
+  int agree = 0;
+  int whole = 0;
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    trials += early[n].trials;
+    agree += early[n].holds() == full[n].holds() ? 1 : 0;
+    // 4, 8 and 16 poses with half of the draws, or all.
+    EXPECT_TRUE(early[n].trials == 8 || early[n].trials == 16 || early[n].trials == 32 ||
+                early[n].trials == 128)
+        << early[n].trials;
+    const double poses = static_cast<double>(early[n].trials) / (early[n].trials == 128 ? 4 : 2);
+    EXPECT_EQ(early[n].hold_high, libgtd::wilson_interval(early[n].hold_probability, poses).second);
+    EXPECT_LE(early[n].spine_fingers + early[n].link_fingers + early[n].free_fingers, 8.000001);
+    if (early[n].trials < 128) {
+      const auto [low, high] = libgtd::wilson_interval(early[n].hold_probability, poses, 1.645);
+      EXPECT_TRUE(low > 0.5 || high < 0.5);
+      EXPECT_LT(early[n].shown_pose, 16);
+      EXPECT_LT(early[n].shown_draw, 2);
+      continue;
+    }
+    ++whole;
+    EXPECT_EQ(text_of({early[n]}), text_of({full[n]}));
+  }
+  EXPECT_GE(agree, 59);
+  EXPECT_GT(whole, 0);
+  EXPECT_LT(trials, 60u * 70u);
+  // What a location's neighbors need does not matter.
+  EXPECT_EQ(text_of(test_on(mesh, {places[7]}, options)), text_of({early[7]}));
+}
+
+TEST(GraspTrials, SequentialRounds) {
+  GraspOptions options;
+  options.poses = 20;
+  options.draws = 5;
+  ASSERT_EQ(libgtd::sequential_rounds(options).size(), 1u);
+  options.sequential = true;
+  const auto rounds = libgtd::sequential_rounds(options);
+  ASSERT_EQ(rounds.size(), 4u);
+  EXPECT_EQ(rounds[0].poses, 4);
+  EXPECT_EQ(rounds[2].poses, 16);
+  EXPECT_EQ(rounds[2].draws, 3);
+  EXPECT_EQ(rounds[3].poses, 20);
+  EXPECT_EQ(rounds[3].draws, 5);
+  options.poses = 3;
+  EXPECT_EQ(libgtd::sequential_rounds(options).size(), 1u);
+}
+
+// A patch holds what comes into the cylinder, by comparison with all triangles, and small, large
+// and far ones are found alike.
+TEST(GraspTrials, PatchesHoldAllTriangles) {
+  auto mesh = bumps();
+  const auto large = height_mesh(1.5, 3, [](double, double) { return -0.2; });
+  const auto first = static_cast<std::uint32_t>(mesh.vertices.size());
+  mesh.vertices.insert(mesh.vertices.end(), large.vertices.begin(), large.vertices.end());
+  for (const auto& [a, b, c] : large.triangles)
+    mesh.triangles.push_back({a + first, b + first, c + first});
+  const libgtd::Ground ground(mesh);
+  for (const Eigen::Vector3d& away : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(0.6, 0.2, 0.7)})
+    for (const double radius : {0.01, 0.1}) {
+      const auto patch = ground.patch({0.1, -0.05, 0.0}, away, radius, 0.2);
+      const Eigen::Isometry3d patch_from_mesh = patch.mesh_from_patch.inverse();
+      std::vector<Eigen::Vector3d> centers;
+      for (const auto& triangle : mesh.triangles) {
+        Eigen::Vector3d center = Eigen::Vector3d::Zero();
+        bool is_in = false;
+        for (const std::uint32_t vertex : triangle) {
+          const Eigen::Vector3d corner = patch_from_mesh * mesh.vertices[vertex];
+          center += corner / 3.0;
+          is_in |= corner.head<2>().norm() <= radius && corner.z() <= 0.2;
+        }
+        if (is_in) centers.push_back(center);
+      }
+      ASSERT_GT(centers.size(), 3u);
+      // In the mesh's order, among others outside.
+      std::size_t next = 0;
+      for (const Eigen::Vector3d& center : patch.centers)
+        if (next < centers.size() && (center - centers[next]).norm() < 1e-9) ++next;
+      EXPECT_EQ(next, centers.size());
+      EXPECT_LT(patch.triangles.size(), 4 * centers.size() + 80);
+    }
+}
+
 TEST(GraspTrials, WilsonsInterval) {
   const auto [low, high] = libgtd::wilson_interval(0.5, 10);
   EXPECT_NEAR(low, 0.2366, 1e-4);
