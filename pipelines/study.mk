@@ -46,7 +46,7 @@ endif
 known = $(foreach word,$($(1)),$(if $(filter $(word),$(2)),,\
   $(error $(1) holds '$(word)', which is none of: $(2))))
 $(call known,SCENARIOS,1 2 3 4)
-$(call known,METHODS,thesis envelope climblab corrected)
+$(call known,METHODS,thesis envelope climblab corrected calibrated)
 $(call known,STAGES,walls published thresholds masks grasp report)
 
 include $(here)one_run.mk

@@ -1,6 +1,6 @@
 # The virtual field test of the scenarios, and what predicts it; included by study.mk.
 #
-# OUT/N_name/grasp/: PLACES places spread evenly over the terrain, the maps of all four methods
+# OUT/N_name/grasp/: PLACES places spread evenly over the terrain, the maps of all methods
 # looked up there, the verdicts of the virtual field test on the true mesh (table.csv), and how well
 # each column predicts them at three loads (evaluation_LOAD/). `again` is the field test with another
 # seed: nothing can predict better. `nz`, the normal's vertical part, is the slope alone.
@@ -8,7 +8,7 @@
 # OUT/grasp_real/: the same on the surfaces of the author's clouds, the bouldering holds by HubRobo.
 # OUT/grasp_sweep/: scenario 4 with other parameters of the field test.
 
-grasp_methods := thesis envelope climblab corrected
+grasp_methods := thesis envelope climblab corrected calibrated
 grasp_score := $(foreach m,$(grasp_methods),$(m)_score)
 grasp_columns := $(grasp_score) $(foreach m,$(grasp_methods),$(m)_convex $(m)_graspable) nz again_hold_probability
 empty :=
@@ -69,7 +69,8 @@ $(call grasp_lookup,$(1),thesis,$(folder_$(1))/grasp/places.csv)
 $(call grasp_lookup,$(1),envelope,$(folder_$(1))/grasp/with_thesis.csv)
 $(call grasp_lookup,$(1),climblab,$(folder_$(1))/grasp/with_envelope.csv)
 $(call grasp_lookup,$(1),corrected,$(folder_$(1))/grasp/with_climblab.csv)
-$(folder_$(1))/grasp/again.csv: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/with_corrected.csv
+$(call grasp_lookup,$(1),calibrated,$(folder_$(1))/grasp/with_corrected.csv)
+$(folder_$(1))/grasp/again.csv: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/with_calibrated.csv
 	@exec $$(GRASPMAP) grasp $$< --points $$(word 2,$$^) -o $$@ $$(TRIALS) $(grasp_flags_$(1)) --best-draws 0 --seed 2 \
 	  --prefix again_ --quiet
 $(folder_$(1))/grasp/table.csv: $(grasp_mesh_$(1)) $(folder_$(1))/grasp/$(or $(grasp_last_$(1)),again).csv
