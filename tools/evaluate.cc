@@ -124,7 +124,8 @@ libmap::Table join_tables(std::vector<libmap::Table> tables) {
 }
 
 void write_hold_model(const EvaluateOptions& options, const libmap::Table& table, Run& run) {
-  const libgtd::HoldModelFit fit = libgtd::fit_hold_model(table, options.evaluation.label_column, options.load_n);
+  const libgtd::HoldModelFit fit =
+      libgtd::fit_hold_model(table, options.evaluation.label_column, options.load_n);
   run.say("hold model of {} places, {} left out", fit.places, fit.left_out);
   run.write_text(options.hold_model, to_yaml_section(fit.model));
 }

@@ -19,7 +19,7 @@ constexpr double ridge = 1e-6;
 
 struct Sample {
   std::vector<Eigen::Matrix<double, weights, 1>> terms;  // signs as in HoldModel
-  std::vector<double> labels;  // 0 or 1
+  std::vector<double> labels;                            // 0 or 1
 };
 
 using Weights = Eigen::Matrix<double, weights, 1>;
@@ -72,7 +72,8 @@ HoldModelFit fit_hold_model(const libmap::Table& table, const std::string& label
     const std::string& cell = table.rows[row][target];
     const std::optional<bool> label = parse_label(cell);
     if (!label && !cell.empty())
-      throw libmap::Error("is no label", {.file = table.file, .field = label_column, .value = cell});
+      throw libmap::Error("is no label",
+                          {.file = table.file, .field = label_column, .value = cell});
     Weights terms = Weights::Ones();
     bool is_whole = label.has_value();
     for (std::size_t n = 0; n < columns.size(); ++n) {
@@ -91,9 +92,9 @@ HoldModelFit fit_hold_model(const libmap::Table& table, const std::string& label
   result.places = sample.terms.size();
   constexpr std::size_t min_places = 10;
   if (result.places < min_places)
-    throw libmap::Error("too few places for a fit", {.file = table.file,
-                                                     .value = std::to_string(result.places),
-                                                     .bound = ">= 10"});
+    throw libmap::Error(
+        "too few places for a fit",
+        {.file = table.file, .value = std::to_string(result.places), .bound = ">= 10"});
   std::array<bool, weights> free{true, true, true, true, true};
   Weights found = fit(sample, free);
   for (bool changed = true; changed;) {
@@ -116,10 +117,12 @@ HoldModelFit fit_hold_model(const libmap::Table& table, const std::string& label
 
 std::string to_yaml_section(const HoldModel& model) {
   std::string text = "hold_model:\n";
-  for (const auto& [key, value] :
-       {std::pair{"load_n", model.load_n}, {"intercept", model.intercept},
-        {"contact", model.contact}, {"bearing", model.bearing}, {"rise", model.rise},
-        {"depth", model.depth}})
+  for (const auto& [key, value] : {std::pair{"load_n", model.load_n},
+                                   {"intercept", model.intercept},
+                                   {"contact", model.contact},
+                                   {"bearing", model.bearing},
+                                   {"rise", model.rise},
+                                   {"depth", model.depth}})
     text += std::string("  ") + key + ": " + libmap::to_text(value) + "\n";
   return text;
 }

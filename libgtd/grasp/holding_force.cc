@@ -88,7 +88,8 @@ class EquilibriumProgram {
       const Eigen::Index pull = row_of(Kind::pull);
       const Eigen::Index former = row_of(Kind::former_pull);
       const bool is_former_gone = former < 0 || true_value(former) <= negligible_n;
-      if (is_former_gone && pull >= 0 && values_[pull] >= enough && true_value(pull) >= enough) break;
+      if (is_former_gone && pull >= 0 && values_[pull] >= enough && true_value(pull) >= enough)
+        break;
       prices_.setZero(rows_);
       if (pull >= 0) prices_ += inverse_.row(pull);
       if (former >= 0) prices_ -= cost * inverse_.row(former);
@@ -237,7 +238,7 @@ class EquilibriumProgram {
   Eigen::VectorXd values_;
   Eigen::Vector3d direction_;  // of the pull
   Eigen::VectorXd column_;     // that enters
-  Eigen::VectorXd change_;  // of the values by it
+  Eigen::VectorXd change_;     // of the values by it
   Eigen::RowVectorXd prices_;  // of the rows: how much the pull grows with their right side
   std::vector<Kind> kinds_;
   Kind entering_ = Kind::slack;

@@ -23,8 +23,9 @@ double mean_pull_n(double fall_deg, const GripperFingers& fingers) {
   for (int psi = 0; psi < leans; ++psi) {
     const double angle = (fall_deg + psi - 90.0) * degree + phi;
     if (angle <= 0.0) continue;
-    sum += angle < std::numbers::pi / 2.0 ? std::min(most, fingers.closing_force_n * std::tan(angle))
-                                          : most;
+    sum += angle < std::numbers::pi / 2.0
+               ? std::min(most, fingers.closing_force_n * std::tan(angle))
+               : most;
   }
   return sum / leans;
 }
@@ -39,10 +40,11 @@ double ClosingPath::reach_m() const {
 }
 
 ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
-  for (const auto& [section, is_there] :
-       {std::pair{"fingers", gripper.fingers.has_value()}, {"hold_model", gripper.hold_model.has_value()}})
+  for (const auto& [section, is_there] : {std::pair{"fingers", gripper.fingers.has_value()},
+                                          {"hold_model", gripper.hold_model.has_value()}})
     if (!is_there)
-      throw libmap::Error("missing: method calibrated needs it, corrected does not", {.field = section});
+      throw libmap::Error("missing: method calibrated needs it, corrected does not",
+                          {.field = section});
   ClosingPath path;
   path.model = *gripper.hold_model;
   path.palm_radius_m = 0.0005 * gripper.palm_diameter_mm;
@@ -59,8 +61,9 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
   };
   const double opening = gripper.opening_angle_deg * degree;
   const double closing = gripper.closing_angle_deg * degree;
-  const int steps = std::max(
-      1, static_cast<int>(std::ceil((opening - closing) * path.finger_length_m / (0.5 * voxel_size_m))));
+  const int steps =
+      std::max(1, static_cast<int>(std::ceil((opening - closing) * path.finger_length_m /
+                                             (0.5 * voxel_size_m))));
   for (int n = 0; n <= steps; ++n) {
     const double angle = opening + (closing - opening) * n / steps;
     for (const double share : {1.0, 0.5, 0.0})
@@ -70,8 +73,7 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
       std::max(1, static_cast<int>(std::ceil(path.finger_length_m / (0.5 * voxel_size_m))));
   for (int n = 0; n <= parts; ++n) {
     const double along = path.finger_length_m * n / parts;
-    path.open.push_back(
-        place(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
+    path.open.push_back(place(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
   }
   for (std::size_t n = 0; n < path.bearing.size(); ++n)
     path.bearing[n] = std::log1p(mean_pull_n(static_cast<double>(n) - 90.0, *gripper.fingers) /

@@ -1,5 +1,5 @@
-// Gripper files: a YAML map of measures and optional sections `fingers` and `hold_model`, see data/grippers/README
-// in data/README.md.
+// Gripper files: a YAML map of measures and optional sections `fingers` and `hold_model`, see
+// data/grippers/README in data/README.md.
 #pragma once
 
 #include <filesystem>

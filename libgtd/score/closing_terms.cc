@@ -79,10 +79,11 @@ class Heights {
  public:
   Heights(const VoxelGrid& grid, const TileBounds& bounds)
       : bounds_(bounds), width_(bounds.j_end - bounds.j_begin) {
-    const auto size = static_cast<std::size_t>(bounds.i_end - bounds.i_begin) *
-                      static_cast<std::size_t>(width_);
+    const auto size =
+        static_cast<std::size_t>(bounds.i_end - bounds.i_begin) * static_cast<std::size_t>(width_);
     heights_.assign(size, unknown);
-    // In voxels of the lattice, from its origin; ascending, so that the highest of a column is last.
+    // In voxels of the lattice, from its origin; ascending, so that the highest of a column is
+    // last.
     visit_columns(grid, bounds, [&](std::size_t at) {
       const Voxel& voxel = grid.voxels[at];
       heights_[index(voxel.i, voxel.j)] =
@@ -116,9 +117,9 @@ class Heights {
         int count = 0;
         for (int di = std::max(i - 1, 0); di <= std::min(i + 1, rows - 1); ++di)
           for (int dj = std::max(j - 1, 0); dj <= std::min(j + 1, width_ - 1); ++dj) {
-            const float height = heights_[static_cast<std::size_t>(di) *
-                                              static_cast<std::size_t>(width_) +
-                                          static_cast<std::size_t>(dj)];
+            const float height =
+                heights_[static_cast<std::size_t>(di) * static_cast<std::size_t>(width_) +
+                         static_cast<std::size_t>(dj)];
             if (height == unknown) continue;
             sum += height;
             ++count;
@@ -171,9 +172,8 @@ class BlockCloser {
       touching += 1.0;
       const double angle = 2.0 * std::numbers::pi * static_cast<double>(a) / azimuths;
       const auto& [along_x, along_y] = heights_.rise(at);
-      const double fall_deg =
-          std::atan(-(along_x * std::cos(angle) + along_y * std::sin(angle))) /
-          libmap::radians_per_degree;
+      const double fall_deg = std::atan(-(along_x * std::cos(angle) + along_y * std::sin(angle))) /
+                              libmap::radians_per_degree;
       bearings[a] = path_.bearing[static_cast<std::size_t>(std::lround(fall_deg) + 90)];
     }
     return {.contact = weakest(contacts),
@@ -188,8 +188,8 @@ class BlockCloser {
     for (const std::ptrdiff_t step : palm_)
       palm = std::max(palm, heights_.height(pivot + static_cast<std::size_t>(step)));
     for (std::size_t n = 0; n < open_.size(); ++n)
-      palm = std::max(palm, heights_.height(pivot + static_cast<std::size_t>(open_[n])) +
-                                rays_.open[n].depth);
+      palm = std::max(
+          palm, heights_.height(pivot + static_cast<std::size_t>(open_[n])) + rays_.open[n].depth);
     return palm;
   }
 

@@ -13,8 +13,9 @@ const std::vector<std::pair<std::string, Orientation>>& orientation_names() {
 void bind(libmap::ParameterTable& table, Scenario& scenario) {
   using libmap::not_negative;
   using libmap::positive;
-  table.add("method", scenario.method, method_names(),
-            "calibrated: the probability to hold; corrected: the shape alone; or a program before it");
+  table.add(
+      "method", scenario.method, method_names(),
+      "calibrated: the probability to hold; corrected: the shape alone; or a program before it");
   table.add("gripper", scenario.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add("voxel_size_m", scenario.voxel_size_m, positive, "edge of a voxel, m");
   table.add("extra_void_layers", scenario.extra_void_layers, {0, 10000},

@@ -28,8 +28,8 @@ std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare&
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;
-  double score = 0.0;   // score_percent / 100
-  bool border = false;  // the mask's window leaves the scanned area
+  double score = 0.0;    // score_percent / 100
+  bool border = false;   // the mask's window leaves the scanned area
   ClosingTerms terms{};  // of method calibrated
 };
 

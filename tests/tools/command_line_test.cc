@@ -42,8 +42,7 @@ TEST(CommandLine, HelpShowsUnitsAndDefaults) {
   const std::string help = graspmap({"score", "--help"}).standard_output;
   for (const char* part :
        {"--voxel-size M", "[0.01]", "--method thesis|envelope|climblab|corrected|calibrated",
-        "[calibrated]",
-        "--solid-voxel-threshold N", "[120]"})
+        "[calibrated]", "--solid-voxel-threshold N", "[120]"})
     EXPECT_NE(help.find(part), std::string::npos) << part << "\n" << help;
 }
 

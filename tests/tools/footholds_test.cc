@@ -17,9 +17,8 @@ TEST(Footholds, OfAMapInEitherFrame) {
   write_terrain();
   for (const char* frame : {"terrain", "input"}) {
     const std::string map = std::string("map_") + frame + ".pcd";
-    ASSERT_TRUE(succeeded(graspmap(
-        {"score", "terrain.pcd", "-o", map, "--frame", frame, "--method", "corrected",
-         "--solid-voxel-threshold", "1"})));
+    ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", map, "--frame", frame, "--method",
+                                    "corrected", "--solid-voxel-threshold", "1"})));
     ASSERT_TRUE(succeeded(graspmap(
         {"footholds", map, "-o", std::string(frame) + ".ply", "--no-graspable-only", "--border"})));
   }

@@ -104,9 +104,9 @@ TEST(ScoreOrientation, DefaultsLeaveTheMapAsItWas) {
 TEST(ScoreOrientation, FootholdsComeAlongTheMasksAxis) {
   write_block();
   for (const char* frame : {"terrain", "input"}) {
-    ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--frame", frame,
-                                    "--up", "0,0,1", "--orientation", "surface", "--method", "corrected",
-                                    "--force"})));
+    ASSERT_TRUE(succeeded(
+        graspmap({"score", "terrain.pcd", "-o", "map.pcd", "--frame", frame, "--up", "0,0,1",
+                  "--orientation", "surface", "--method", "corrected", "--force"})));
     ASSERT_TRUE(succeeded(graspmap(
         {"footholds", "map.pcd", "-o", "f.ply", "--no-graspable-only", "--border", "--force"})));
     const PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;

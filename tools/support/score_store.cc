@@ -265,7 +265,8 @@ class StoreScoring {
       refuse("--append needs --plane none: with a fitted plane every new point moves all tiles");
     if (scenario_.method != libgtd::Method::corrected &&
         scenario_.method != libgtd::Method::calibrated)
-      refuse("--append needs --method corrected or calibrated: others leave out the terrain's border");
+      refuse(
+          "--append needs --method corrected or calibrated: others leave out the terrain's border");
     require_same_tiles(earlier);
   }
 

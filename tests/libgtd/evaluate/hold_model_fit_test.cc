@@ -21,8 +21,8 @@ libmap::Table places_of(const HoldModel& model, int count) {
   table.columns = {"closing_contact", "closing_bearing", "closing_rise", "closing_depth", "holds"};
   libmap::RandomStream random(3, 1);
   for (int n = 0; n < count; ++n) {
-    const libgtd::ClosingTerms terms{random.uniform(), random.uniform(0, 0.3),
-                                     random.uniform(0, 2), random.uniform()};
+    const libgtd::ClosingTerms terms{random.uniform(), random.uniform(0, 0.3), random.uniform(0, 2),
+                                     random.uniform()};
     const bool holds = random.uniform() < model.probability(terms);
     table.rows.push_back({libmap::to_text(terms.contact), libmap::to_text(terms.bearing),
                           libmap::to_text(terms.rise), libmap::to_text(terms.depth),
@@ -71,13 +71,15 @@ TEST(HoldModelFit, EmptyCellsAreLeftOutAndSeparableClassesStayFinite) {
 TEST(HoldModelFit, TheSectionIsReadBack) {
   const HoldModel model{
       .load_n = 10, .intercept = -0.25, .contact = 3, .bearing = 8.5, .rise = 0, .depth = 2};
-  std::string text = graspmap_test::read_text(graspmap_test::source_folder() /
-                                              "data/grippers/scar-e.yaml");
+  std::string text =
+      graspmap_test::read_text(graspmap_test::source_folder() / "data/grippers/scar-e.yaml");
   text = text.substr(0, text.find("hold_model:")) + to_yaml_section(model);
   const auto read = libgtd::parse_gripper(text, "g.yaml").hold_model;
   ASSERT_TRUE(read);
   EXPECT_EQ(to_yaml_section(*read), to_yaml_section(model));
-  EXPECT_EQ(error_of([&] { libgtd::parse_gripper(text, "g.yaml", {{"hold_model.rise", "-1"}}); })
+  EXPECT_EQ(error_of([&] {
+              libgtd::parse_gripper(text, "g.yaml", {{"hold_model.rise", "-1"}});
+            })
                 .context()
                 .field,
             "hold_model.rise");

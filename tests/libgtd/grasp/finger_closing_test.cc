@@ -103,8 +103,8 @@ TEST(FingerClosing, TipOnAPlane) {
     ASSERT_TRUE(closing.spines);
     EXPECT_EQ(closing.end, FingerEnd::spines);
     EXPECT_NEAR(closing.spines->y(), -depth, 1e-12);
-    EXPECT_NEAR((*closing.spines - finger.tip(closing.proximal_rad, finger.curl_rad)).norm(),
-                0, 1e-12);
+    EXPECT_NEAR((*closing.spines - finger.tip(closing.proximal_rad, finger.curl_rad)).norm(), 0,
+                1e-12);
   }
 }
 

@@ -25,7 +25,8 @@ using libgtd::VoxelGrid;
 // Any weights: they do not change the terms.
 libgtd::Gripper with_model(const std::string& name) {
   libgtd::Gripper gripper = gripper_named(name);
-  gripper.hold_model = libgtd::HoldModel{.load_n = 10, .contact = 2, .bearing = 3, .rise = 1, .depth = 1};
+  gripper.hold_model =
+      libgtd::HoldModel{.load_n = 10, .contact = 2, .bearing = 3, .rise = 1, .depth = 1};
   return gripper;
 }
 
@@ -57,8 +58,11 @@ TEST(ClosingTerms, LevelGround) {
   // The open finger is the lowest part: its depth is the palm's height and that of the contacts.
   double depth = 0.0;
   for (const ClosingPath::Place& place : path.open) depth = std::max(depth, place.depth_m);
-  EXPECT_NEAR(depth, (40 * std::cos(85 * std::numbers::pi / 180) +
-                      41 * std::cos(65 * std::numbers::pi / 180)) / 1000, 1e-12);
+  EXPECT_NEAR(
+      depth,
+      (40 * std::cos(85 * std::numbers::pi / 180) + 41 * std::cos(65 * std::numbers::pi / 180)) /
+          1000,
+      1e-12);
   EXPECT_NEAR(terms.contact, 1, 1e-12);
   EXPECT_NEAR(terms.rise, depth / 0.081, 1e-6);
   EXPECT_GE(terms.depth, depth / 0.081 - 1e-6);
@@ -91,8 +95,8 @@ TEST(ClosingTerms, ShapesInOrder) {
   const auto cliff = terms_at_origin(ground([](int i, int) { return i <= 1 ? 0 : -40; }));
   EXPECT_LT(cliff.contact, 0.3);
   // A narrow pit: the open fingers rest on its rim, the palm is far above the voxel.
-  const auto pit = terms_at_origin(
-      ground([](int i, int j) { return std::hypot(i, j) < 4 ? -12 : 0; }));
+  const auto pit =
+      terms_at_origin(ground([](int i, int j) { return std::hypot(i, j) < 4 ? -12 : 0; }));
   EXPECT_GT(pit.rise, flat.rise + 1.2);
 }
 
@@ -242,7 +246,9 @@ TEST(Calibrated, GrippersWithoutTheSectionsAreNamed) {
   const auto field_of = [](libgtd::Gripper gripper) {
     return error_of([&] {
              libgtd::make_gripper_mask(gripper, {libgtd::Method::calibrated, 0.01, 1});
-           }).context().field;
+           })
+        .context()
+        .field;
   };
   libgtd::Gripper gripper = with_model("scar-e");
   gripper.hold_model.reset();
@@ -252,9 +258,9 @@ TEST(Calibrated, GrippersWithoutTheSectionsAreNamed) {
   libgtd::DetectionOptions options;
   options.scenario.method = libgtd::Method::calibrated;
   options.scenario.orientation = libgtd::Orientation::surface;
-  EXPECT_EQ(error_of([&] {
-              libgtd::detect(graspmap_test::bumpy_cloud(0.4, 0.01), options);
-            }).context().field,
+  EXPECT_EQ(error_of([&] { libgtd::detect(graspmap_test::bumpy_cloud(0.4, 0.01), options); })
+                .context()
+                .field,
             "orientation");
 }
 
