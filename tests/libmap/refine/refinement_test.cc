@@ -195,7 +195,9 @@ TEST(IcpRefinement, WantsABlockOfThePriorForEachPose) {
   const libmap::Error error = graspmap_test::error_of([] {
     libmap::align_surfaces({}, {{1, Pose::Identity()}}, libmap::BlockSystem(3), {}, {});
   });
-  EXPECT_STREQ(error.what(), "blocks of the prior is 3: surfaces cannot be aligned so (must be 1)");
+  EXPECT_EQ(error.context().field, "blocks of the prior");
+  EXPECT_EQ(error.context().value, "3");
+  EXPECT_EQ(error.context().bound, "1");
 }
 
 TEST(Features, OptionsOutOfTheirRangesAreNamed) {
