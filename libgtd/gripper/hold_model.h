@@ -25,6 +25,7 @@ struct HoldModel {
   double rise = 0.0;
   double depth = 0.0;
 
+  // In 0 .. 1, that the load is held.
   double probability(const ClosingTerms& terms) const;
 };
 
