@@ -201,28 +201,39 @@ double surrounding_ground_height(const TriangleMesh& mesh) {
   return median(std::move(heights));
 }
 
-Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
-                        std::uint64_t seed) {
+CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
+                           std::uint64_t seed) {
   const Way way = way_of(mesh, options);
-  const std::vector<double> loops = paced_loops(way, options);
-  // A hand sways with the steps of a walk; a look wanders in some ten seconds.
-  const Wander3 sway = wander3(seed, 0, 0.4, 2.0);
-  const Wander3 turn = wander3(seed, 3, 0.4, 2.0);
-  const Wander3 gaze = wander3(seed, 6, 0.04, 0.15);
   const double gaze_m = way.radius * std::tan(options.gaze_deg * pi / 180.0);
-  Trajectory trajectory;
-  for (std::size_t n = 0; n < loops.size(); ++n) {
-    const double time_s = static_cast<double>(n) * options.frame_interval_s;
+  // A hand sways with the steps of a walk; a look wanders in some ten seconds.
+  return [=, loops = paced_loops(way, options), sway = wander3(seed, 0, 0.4, 2.0),
+          turn = wander3(seed, 3, 0.4, 2.0),
+          gaze = wander3(seed, 6, 0.04, 0.15)](std::size_t frame, double after_s) {
+    const std::size_t last = std::max<std::size_t>(loops.size(), 2) - 2;
+    const std::size_t step = std::min(frame, last);
+    const double pace = loops.size() > 1 ? loops[step + 1] - loops[step] : 0.0;
+    const double loop = loops[frame] + after_s / options.frame_interval_s * pace;
+    const double time_s = static_cast<double>(frame) * options.frame_interval_s + after_s;
     const Eigen::Vector3d position =
-        position_on(way, options, loops[n]) + options.sway_m * at(sway, time_s);
+        position_on(way, options, loop) + options.sway_m * at(sway, time_s);
     // The look wanders over the ground more than up and down.
     const Eigen::Vector3d target =
         way.target + gaze_m * Eigen::Vector3d(1.0, 1.0, 0.3).cwiseProduct(at(gaze, time_s));
     Pose pose = make_pose_from_rpy(position, Eigen::Vector3d::Zero());
     pose.linear() = look_at(position, target) *
                     make_pose_from_rpy({0, 0, 0}, options.tremor_deg * at(turn, time_s)).linear();
-    trajectory.push_back({static_cast<int>(n) + 1, first_stamp_s + time_s, pose});
-  }
+    return pose;
+  };
+}
+
+Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
+                        std::uint64_t seed) {
+  const CameraMotion motion = camera_motion(mesh, options, seed);
+  Trajectory trajectory;
+  for (std::size_t n = 0; n < static_cast<std::size_t>(options.frames); ++n)
+    trajectory.push_back({static_cast<int>(n) + 1,
+                          first_stamp_s + static_cast<double>(n) * options.frame_interval_s,
+                          motion(n, 0.0)});
   return trajectory;
 }
 

@@ -2,7 +2,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <optional>
 
 #include "libmap/core/parameters.h"
@@ -39,7 +41,13 @@ void bind(ParameterTable& table, CameraTrajectoryOptions& options);
 // mesh's length and width.
 double surrounding_ground_height(const TriangleMesh& mesh);
 
-// Poses of the camera's body (x forward, y left, z up) in the mesh's frame; nodes from 1. Stamps
+// Pose of the camera's body (x forward, y left, z up) in the mesh's frame, a time after that of the
+// frame, which counts from 0. Throws Error for a mesh without vertices.
+using CameraMotion = std::function<Pose(std::size_t frame, double after_s)>;
+CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
+                           std::uint64_t seed);
+
+// Its poses at the frames; nodes from 1. Stamps
 // begin at 1,700,000,000 s. The hand's motions are smooth in time; the same seed gives the same.
 // Throws Error for a mesh without vertices.
 Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,

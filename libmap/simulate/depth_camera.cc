@@ -153,6 +153,12 @@ VisibleSurface& VisibleSurface::operator=(VisibleSurface&&) noexcept = default;
 
 SurfaceView VisibleSurface::view(const PixelRays& rays, const Pose& world_from_camera,
                                  bool with_color) const {
+  return view(
+      rays, [&](double) { return world_from_camera; }, with_color);
+}
+
+SurfaceView VisibleSurface::view(const PixelRays& rays, const PoseOfRow& world_from_camera,
+                                 bool with_color) const {
   const int w = rays.width;
   const int h = rays.height;
   SurfaceView view{DepthImage(w, h), DepthImage(w + 1, h + 1), Image<float>(w, h), {}};
@@ -165,26 +171,26 @@ SurfaceView VisibleSurface::view(const PixelRays& rays, const Pose& world_from_c
     const auto count = static_cast<std::size_t>(width);
     return std::span<const Eigen::Vector2d>(all).subspan(row * count, count);
   };
-  parallel_for(static_cast<std::size_t>(h) + 1, rows_a_task,
-               [&](std::size_t begin, std::size_t end) {
-                 for (std::size_t y = begin; y < end; ++y) {
-                   const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
-                   parts_->view_row(row_of(rays.corners, y, w + 1), world_from_camera, with_color,
-                                    [&](std::size_t x, const Parts::Seen& seen) {
-                                      view.corner_depth.pixels[corner_start + x] = seen.depth;
-                                      if (with_color)
-                                        corner_color.pixels[corner_start + x] = seen.color;
-                                    });
-                   if (y == static_cast<std::size_t>(h)) continue;
-                   const std::size_t start = y * static_cast<std::size_t>(w);
-                   parts_->view_row(row_of(rays.centers, y, w), world_from_camera, with_color,
-                                    [&](std::size_t x, const Parts::Seen& seen) {
-                                      view.depth.pixels[start + x] = seen.depth;
-                                      view.incidence_cos.pixels[start + x] = seen.incidence_cos;
-                                      if (with_color) view.color.pixels[start + x] = seen.color;
-                                    });
-                 }
-               });
+  parallel_for(
+      static_cast<std::size_t>(h) + 1, rows_a_task, [&](std::size_t begin, std::size_t end) {
+        for (std::size_t y = begin; y < end; ++y) {
+          const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
+          parts_->view_row(row_of(rays.corners, y, w + 1),
+                           world_from_camera(static_cast<double>(y) - 0.5), with_color,
+                           [&](std::size_t x, const Parts::Seen& seen) {
+                             view.corner_depth.pixels[corner_start + x] = seen.depth;
+                             if (with_color) corner_color.pixels[corner_start + x] = seen.color;
+                           });
+          if (y == static_cast<std::size_t>(h)) continue;
+          const std::size_t start = y * static_cast<std::size_t>(w);
+          parts_->view_row(row_of(rays.centers, y, w), world_from_camera(static_cast<double>(y)),
+                           with_color, [&](std::size_t x, const Parts::Seen& seen) {
+                             view.depth.pixels[start + x] = seen.depth;
+                             view.incidence_cos.pixels[start + x] = seen.incidence_cos;
+                             if (with_color) view.color.pixels[start + x] = seen.color;
+                           });
+        }
+      });
   for (int y = 0; with_color && y < h; ++y)
     for (int x = 0; x < w; ++x)
       view.color.at(x, y) = 0.5F * view.color.at(x, y) +

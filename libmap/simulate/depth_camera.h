@@ -7,6 +7,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <string>
 #include <utility>
@@ -56,6 +57,11 @@ class VisibleSurface {
   // Rows in parallel. May be called from several threads at once. Without `with_color` the view's
   // color is empty.
   SurfaceView view(const PixelRays& rays, const Pose& world_from_camera,
+                   bool with_color = true) const;
+  // The same of a camera that moves while it reads its rows one after the other; row -0.5 is the
+  // upper border of the first.
+  using PoseOfRow = std::function<Pose(double row)>;
+  SurfaceView view(const PixelRays& rays, const PoseOfRow& world_from_camera,
                    bool with_color = true) const;
 
  private:

@@ -14,6 +14,7 @@ namespace {
 
 constexpr std::uint64_t stamp_key = 1;
 constexpr std::uint64_t camera_key = 1000;
+constexpr std::uint64_t hole_key = 2000;
 
 Image<std::uint16_t> to_units(const DepthImage& depth, double depth_scale_m) {
   Image<std::uint16_t> units(depth.width, depth.height);
@@ -29,6 +30,7 @@ Image<std::uint16_t> to_units(const DepthImage& depth, double depth_scale_m) {
 
 void bind(ParameterTable& table, RobotCamerasOptions& options) {
   bind_noise(table, options.sensor);
+  bind(table, options.faults);
   table.add("stamp_s", options.stamp_s, not_negative, "time of the images, s");
   table.add("stamp_spread_s", options.stamp_spread_s, not_negative,
             "how far apart the cameras' stamps lie at most, s");
@@ -48,10 +50,12 @@ std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, c
     sensor.near_m = camera.near_m;
     sensor.far_m = camera.far_m;
     const PixelRays rays = make_pixel_rays(camera.camera);
-    const SurfaceView view =
-        surface.view(rays, world_from_robot * camera.camera.base_from_camera, false);
+    SurfaceView view = surface.view(rays, world_from_robot * camera.camera.base_from_camera, false);
+    distort_depth(view, options.faults);
     RobotCameraImage image;
     image.measurement = measure_depth(view, rays, sensor, mix_bits(options.seed, camera_key + i));
+    image.measurement.measured -=
+        punch_holes(image.measurement.depth, options.faults, mix_bits(options.seed, hole_key + i));
     image.depth = to_units(image.measurement.depth, camera.depth_scale_m);
     image.stamp_s = options.stamp_s + options.stamp_spread_s * stamps.uniform();
     images.push_back(std::move(image));

@@ -11,12 +11,14 @@
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/simulate/depth_camera.h"
+#include "libmap/simulate/sensor_faults.h"
 
 namespace libmap {
 
 struct RobotCamerasOptions {
   // Its limits and its step are not used: they are the rig's.
   DepthSensorOptions sensor = ideal_depth_sensor(0.0, 1.0);
+  DepthFaults faults{};
   double stamp_s = 0.0;
   double stamp_spread_s = 0.004;  // cameras that are not triggered together: each stamp lies this
                                   // much around stamp_s, in all

@@ -23,6 +23,7 @@ constexpr std::size_t batch = 8;
 constexpr std::uint64_t trajectory_key = 1;
 constexpr std::uint64_t odometry_key = 2;
 constexpr std::uint64_t closure_key = 3;
+constexpr std::uint64_t fault_key = 4;
 constexpr std::uint64_t frame_key = 1000;
 
 double turn_of(const Pose& motion) { return Eigen::AngleAxisd(motion.linear()).angle(); }
@@ -72,6 +73,75 @@ void add_closures(PoseGraph& graph, const Trajectory& truth, const LoopClosureOp
                      truth[first].world_from_base.inverse() * truth[last].world_from_base,
                      options.shift_error_m, options.turn_error_deg,
                      RandomStream(mix_bits(seed, closure_key), first * truth.size() + last)));
+}
+
+// Takes the frames of a scan.
+class ScanCamera {
+ public:
+  ScanCamera(const TriangleMesh& mesh, const ScanSimulationOptions& options)
+      : options_(options),
+        faults_(options.faults.calibration),
+        rays_(make_pixel_rays(options.camera)),
+        surface_(mesh, options.texture, options.seed),
+        motion_(camera_motion(mesh, options.trajectory, mix_bits(options.seed, trajectory_key))),
+        color_from_depth_(color_from_depth(faults_, mix_bits(options.seed, fault_key))) {}
+
+  DepthMeasurement take(std::size_t n, RgbdFrame& frame) const;
+
+ private:
+  Pose world_from_camera(std::size_t n, double after_s) const {
+    return motion_(n, after_s) * options_.camera.base_from_camera;
+  }
+  bool is_depth_apart() const {
+    return faults_.depth_shift_mm != 0.0 || faults_.depth_turn_deg != 0.0 ||
+           faults_.depth_delay_s != 0.0 || faults_.rolling_shutter_s != 0.0;
+  }
+  SurfaceView picture_view(std::size_t n) const;
+  ColorImage photo_of(SurfaceView& view, std::size_t n, std::uint64_t key) const;
+
+  const ScanSimulationOptions& options_;
+  const CalibrationFaults& faults_;
+  PixelRays rays_;
+  VisibleSurface surface_;
+  CameraMotion motion_;
+  Pose color_from_depth_;
+};
+
+SurfaceView ScanCamera::picture_view(std::size_t n) const {
+  if (faults_.rolling_shutter_s == 0.0) return surface_.view(rays_, world_from_camera(n, 0.0));
+  const double row_s = faults_.rolling_shutter_s / std::max(1, rays_.height - 1);
+  return surface_.view(rays_, [&](double row) {
+    return world_from_camera(n, row_s * (row - 0.5 * (rays_.height - 1)));
+  });
+}
+
+ColorImage ScanCamera::photo_of(SurfaceView& view, std::size_t n, std::uint64_t key) const {
+  const PhotoFaults& faults = options_.faults.photo;
+  if (is_blurred(faults, mix_bits(options_.seed, key + 3)))
+    blur_by_motion(
+        view, options_.camera,
+        [&](double time_s) {
+          return world_from_camera(n, 0.0).inverse() * world_from_camera(n, time_s);
+        },
+        faults.exposure_s);
+  change_exposure(view, faults, mix_bits(options_.seed, fault_key), n);
+  return compress_photo(take_photo(view, options_.photo, mix_bits(options_.seed, key + 1)), faults);
+}
+
+DepthMeasurement ScanCamera::take(std::size_t n, RgbdFrame& frame) const {
+  const auto key = frame_key + 4 * static_cast<std::uint64_t>(n);
+  SurfaceView view = picture_view(n);
+  frame.cameras = {stored_camera(options_.camera, faults_)};
+  frame.color = photo_of(view, n, key);
+  if (is_depth_apart())
+    view = surface_.view(rays_, world_from_camera(n, faults_.depth_delay_s) * color_from_depth_,
+                         false);
+  distort_depth(view, options_.faults.depth);
+  DepthMeasurement measured =
+      measure_depth(view, rays_, options_.depth, mix_bits(options_.seed, key));
+  measured.measured -=
+      punch_holes(measured.depth, options_.faults.depth, mix_bits(options_.seed, key + 2));
+  return measured;
 }
 
 }  // namespace
@@ -132,8 +202,7 @@ Camera kinect_v2_camera() {
 
 ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress) {
-  const PixelRays rays = make_pixel_rays(options.camera);
-  const VisibleSurface surface(mesh, options.texture, options.seed);
+  const ScanCamera camera(mesh, options);
   const Trajectory truth =
       carry_camera(mesh, options.trajectory, mix_bits(options.seed, trajectory_key));
   ScanSimulationResult result;
@@ -146,15 +215,9 @@ ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulatio
     std::array<DepthMeasurement, batch> measured;
     parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
-        const TrajectoryPose& pose = truth[first + i];
-        const auto key = frame_key + 4 * static_cast<std::uint64_t>(first + i);
-        const SurfaceView view =
-            surface.view(rays, pose.world_from_base * options.camera.base_from_camera);
-        measured[i] = measure_depth(view, rays, options.depth, mix_bits(options.seed, key));
-        frames[i].node = pose.node;
-        frames[i].stamp_s = pose.stamp_s;
-        frames[i].cameras = {options.camera};
-        frames[i].color = take_photo(view, options.photo, mix_bits(options.seed, key + 1));
+        frames[i].node = truth[first + i].node;
+        frames[i].stamp_s = truth[first + i].stamp_s;
+        measured[i] = camera.take(first + i, frames[i]);
         frames[i].depth = std::move(measured[i].depth);
       }
     });

@@ -15,6 +15,7 @@
 #include "libmap/scan/rgbd_frame.h"
 #include "libmap/simulate/camera_trajectory.h"
 #include "libmap/simulate/depth_camera.h"
+#include "libmap/simulate/sensor_faults.h"
 
 namespace libmap {
 
@@ -56,6 +57,7 @@ struct ScanSimulationOptions {
   CameraTrajectoryOptions trajectory{};
   DepthSensorOptions depth{};
   PhotoOptions photo{};
+  SensorFaults faults{};
   OdometryOptions odometry{};
   LoopClosureOptions closures{};
   std::uint64_t seed = 1;
@@ -72,7 +74,8 @@ struct ScanSimulationResult {
 };
 
 // Frames go to `sink` one by one in the order of their nodes; a few are in memory at a time. Ground
-// truth poses are those of the camera's body in the mesh's frame. Throws Error where the mesh has
+// truth poses are those of the camera's body in the mesh's frame when the middle row of the picture
+// is taken. Throws Error where the mesh has
 // no triangle, or where no frame has any depth.
 using FrameSink = std::function<void(const GraphNode& node, const RgbdFrame& frame)>;
 ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,

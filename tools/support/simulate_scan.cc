@@ -32,6 +32,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
   table.add("texture", simulation.texture, libmap::texture_source_names(),
             "the mesh's own colors, or rock; auto: rock where the mesh has but one color");
   bind(table, simulation.photo);
+  bind(table, simulation.faults);
   bind(table, simulation.odometry);
   bind(table, simulation.closures);
   table.add("depth_format", options.writer.depth,

@@ -1,0 +1,218 @@
+#include "libmap/simulate/sensor_faults.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
+#include "libmap/image/depth_correction.h"
+#include "libmap/image/image_codec.h"
+
+namespace libmap {
+
+namespace {
+
+using std::numbers::pi;
+
+constexpr int hole_spacing_px = 24;
+constexpr double hole_radius_px = 8.0;
+constexpr int max_blur_steps = 64;
+// Of the slow waves by which exposure and white balance wander, in frames.
+constexpr double exposure_period = 9.0;
+constexpr double balance_period = 23.0;
+
+Eigen::Vector3d random_direction(RandomStream& random) {
+  Eigen::Vector3d direction;
+  do {
+    for (Eigen::Index axis = 0; axis < 3; ++axis) direction[axis] = random.normal();
+  } while (!(direction.norm() > 1e-6));
+  return direction.normalized();
+}
+
+// Between pixels; the nearest of the border outside.
+Eigen::Vector3f color_between(const Image<Eigen::Vector3f>& image, const Eigen::Vector2d& at) {
+  const double x = std::clamp(at.x(), 0.0, image.width - 1.0);
+  const double y = std::clamp(at.y(), 0.0, image.height - 1.0);
+  const int left = std::min(static_cast<int>(x), std::max(image.width - 2, 0));
+  const int top = std::min(static_cast<int>(y), std::max(image.height - 2, 0));
+  const int right = std::min(left + 1, image.width - 1);
+  const int bottom = std::min(top + 1, image.height - 1);
+  const auto u = static_cast<float>(x - left);
+  const auto v = static_cast<float>(y - top);
+  return (1.0F - v) * ((1.0F - u) * image.at(left, top) + u * image.at(right, top)) +
+         v * ((1.0F - u) * image.at(left, bottom) + u * image.at(right, bottom));
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, DepthFaults& faults) {
+  table.add("depth_scale_percent", faults.scale_percent, {-50.0, 50.0},
+            "fault: added to depth, percent of it");
+  table.add("depth_wiggle_m", faults.wiggle_m, any_number,
+            "fault: amplitude of a wave over depth (time of flight: Lindner and Kolb 2006), m");
+  table.add("depth_wiggle_period_m", faults.wiggle_period_m, positive, "its period, m");
+  table.add("depth_corner_m", faults.corner_m, any_number,
+            "fault: added to depth in the image's corners, growing with the squared radius "
+            "(Teichman et al. 2013), m");
+  table.add("depth_holes", faults.holes, zero_to_one,
+            "fault: share of the image in discs without depth");
+}
+
+void bind(ParameterTable& table, PhotoFaults& faults) {
+  table.add("exposure_drift", faults.exposure_drift, zero_to_one,
+            "fault: brightness wanders between 1 - and 1 + this");
+  table.add("white_balance_drift", faults.white_balance_drift, zero_to_one,
+            "fault: red against blue wanders between 1 - and 1 + this");
+  table.add("exposure_s", faults.exposure_s, not_negative,
+            "fault: pictures blur along the true motion of this time, s");
+  table.add("blurred_frames", faults.blurred_frames, zero_to_one, "share of the frames that blur");
+  table.add("jpeg_quality", faults.jpeg_quality, {0, 100},
+            "fault: quality of the pictures' first compression; 0: none");
+}
+
+void bind(ParameterTable& table, CalibrationFaults& faults) {
+  table.add("stored_focal_percent", faults.focal_percent, {-50.0, 50.0},
+            "fault: by how much the stored focal lengths are too large, percent");
+  table.add("stored_cx_px", faults.cx_px, any_number,
+            "fault: by how much the stored principal point is too far right, px");
+  table.add("stored_cy_px", faults.cy_px, any_number, "fault: and too far down, px");
+  table.add("registration_shift_mm", faults.depth_shift_mm, not_negative,
+            "fault: length of the error of depth registered to color, mm");
+  table.add("registration_turn_deg", faults.depth_turn_deg, {0.0, 45.0},
+            "fault: its angle, degrees; directions are drawn from the seed");
+  table.add("depth_delay_s", faults.depth_delay_s, any_number,
+            "fault: depth is taken this much after color, s");
+  table.add("rolling_shutter_s", faults.rolling_shutter_s, not_negative,
+            "fault: time from the first to the last row of a picture (RealSense D435: about 20 ms; "
+            "its depth is global), s");
+}
+
+void bind(ParameterTable& table, SensorFaults& faults) {
+  bind(table, faults.depth);
+  bind(table, faults.photo);
+  bind(table, faults.calibration);
+}
+
+double DepthFaults::measured(double depth_m, double radius2) const {
+  return depth_m * (1.0 + 0.01 * scale_percent) +
+         wiggle_m * std::sin(2.0 * pi * depth_m / wiggle_period_m) + corner_m * radius2;
+}
+
+Camera stored_camera(Camera camera, const CalibrationFaults& faults) {
+  camera.fx *= 1.0 + 0.01 * faults.focal_percent;
+  camera.fy *= 1.0 + 0.01 * faults.focal_percent;
+  camera.cx += faults.cx_px;
+  camera.cy += faults.cy_px;
+  return camera;
+}
+
+Pose color_from_depth(const CalibrationFaults& faults, std::uint64_t seed) {
+  Pose pose = Pose::Identity();
+  RandomStream random(seed, 1);
+  const Eigen::Vector3d shift = random_direction(random);
+  const Eigen::Vector3d axis = random_direction(random);
+  pose.translation() = 1e-3 * faults.depth_shift_mm * shift;
+  pose.linear() = Eigen::AngleAxisd(faults.depth_turn_deg * pi / 180.0, axis).toRotationMatrix();
+  return pose;
+}
+
+void distort_depth(SurfaceView& view, const DepthFaults& faults) {
+  if (!faults.changes_depth()) return;
+  const int w = view.depth.width;
+  const int h = view.depth.height;
+  // Corners lie half a pixel before the pixels.
+  const auto distort = [&](DepthImage& depth, double shift) {
+    for (int y = 0; y < depth.height; ++y)
+      for (int x = 0; x < depth.width; ++x)
+        if (float& z = depth.at(x, y); z > 0.0F)
+          z = static_cast<float>(
+              std::max(faults.measured(static_cast<double>(z),
+                                       squared_image_radius(w, h, x + shift, y + shift)),
+                       0.0));
+  };
+  distort(view.depth, 0.0);
+  distort(view.corner_depth, -0.5);
+}
+
+std::size_t punch_holes(DepthImage& depth, const DepthFaults& faults, std::uint64_t seed) {
+  if (!(faults.holes > 0.0)) return 0;
+  // A disc for each square of a lattice, with the probability that gives the wanted share.
+  const double share_of_disc =
+      pi * hole_radius_px * hole_radius_px / (hole_spacing_px * hole_spacing_px);
+  const double probability = faults.holes / share_of_disc;
+  std::size_t lost = 0;
+  std::uint64_t square = 0;
+  for (int top = 0; top < depth.height; top += hole_spacing_px)
+    for (int left = 0; left < depth.width; left += hole_spacing_px) {
+      RandomStream random(seed, square++);
+      if (!(random.uniform() < probability)) continue;
+      const double x = left + hole_spacing_px * random.uniform();
+      const double y = top + hole_spacing_px * random.uniform();
+      const double radius = hole_radius_px * std::max(1.0, std::sqrt(probability));
+      for (int row = std::max(0, static_cast<int>(y - radius));
+           row <= std::min(depth.height - 1, static_cast<int>(y + radius)); ++row)
+        for (int column = std::max(0, static_cast<int>(x - radius));
+             column <= std::min(depth.width - 1, static_cast<int>(x + radius)); ++column) {
+          float& z = depth.at(column, row);
+          if (z <= 0.0F || std::hypot(column - x, row - y) > radius) continue;
+          z = 0.0F;
+          ++lost;
+        }
+    }
+  return lost;
+}
+
+void blur_by_motion(SurfaceView& view, const Camera& camera,
+                    const std::function<Pose(double time_s)>& now_from_later, double exposure_s) {
+  const Image<Eigen::Vector3f> sharp = view.color;
+  // The picture moves evenly over so short a time: where a point is at the two ends tells the rest.
+  const Pose first_from_now = now_from_later(-0.5 * exposure_s).inverse();
+  const Pose last_from_now = now_from_later(0.5 * exposure_s).inverse();
+  const double far_away = 1e3;
+  parallel_for(static_cast<std::size_t>(sharp.height), 8, [&](std::size_t begin, std::size_t end) {
+    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
+      for (int x = 0; x < sharp.width; ++x) {
+        const auto ray = pixel_to_ray(camera, Eigen::Vector2d(x, y));
+        if (!ray) continue;
+        const auto z = static_cast<double>(view.depth.at(x, y));
+        const Eigen::Vector3d point = (z > 0.0 ? z : far_away) * ray->homogeneous();
+        const auto first = project_point(camera, first_from_now * point);
+        const auto last = project_point(camera, last_from_now * point);
+        if (!first || !last) continue;
+        const Eigen::Vector2d way = *last - *first;
+        const int steps =
+            std::clamp(static_cast<int>(std::ceil(way.norm())) + 1, 1, max_blur_steps);
+        Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+        // What passes this pixel lies as far before it as the point goes on.
+        for (int n = 0; n < steps; ++n)
+          sum += color_between(sharp, Eigen::Vector2d(x, y) + ((n + 0.5) / steps - 0.5) * way);
+        view.color.at(x, y) = sum / static_cast<float>(steps);
+      }
+  });
+}
+
+bool is_blurred(const PhotoFaults& faults, std::uint64_t seed) {
+  return faults.exposure_s > 0.0 && RandomStream(seed, 0).uniform() < faults.blurred_frames;
+}
+
+void change_exposure(SurfaceView& view, const PhotoFaults& faults, std::uint64_t seed,
+                     std::uint64_t frame) {
+  if (faults.exposure_drift == 0.0 && faults.white_balance_drift == 0.0) return;
+  const auto wave = [&](std::uint64_t key, double period) {
+    return std::sin(2.0 * pi * (static_cast<double>(frame) / period + unit_noise(seed, key)));
+  };
+  const double brightness = 1.0 + faults.exposure_drift * wave(1, exposure_period);
+  const double balance = faults.white_balance_drift * wave(2, balance_period);
+  const Eigen::Vector3f gains(static_cast<float>(brightness * (1.0 + balance)),
+                              static_cast<float>(brightness),
+                              static_cast<float>(brightness * (1.0 - balance)));
+  for (Eigen::Vector3f& color : view.color.pixels) color = color.cwiseProduct(gains);
+}
+
+ColorImage compress_photo(const ColorImage& photo, const PhotoFaults& faults) {
+  return faults.jpeg_quality > 0 ? decode_color(encode_jpeg(photo, faults.jpeg_quality)) : photo;
+}
+
+}  // namespace libmap
