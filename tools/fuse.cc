@@ -21,6 +21,7 @@ struct FuseOptions {
   std::string scan;
   std::string output;
   PosesOption poses;
+  std::string calibration;
   std::string corrected_poses;
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
@@ -71,7 +72,8 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
 
 void fuse(FuseOptions options, Run& run) {
   libmap::require_cloud_format(options.output);
-  const auto inputs = scan_inputs(options.scan, options.poses);
+  auto inputs = scan_inputs(options.scan, options.poses);
+  inputs.push_back(options.calibration);
   run.claim_output(options.output, inputs);
   if (!options.corrected_poses.empty()) {
     if (!libmap::is_trajectory_path(options.corrected_poses))
@@ -81,7 +83,7 @@ void fuse(FuseOptions options, Run& run) {
     run.claim_output(options.corrected_poses, inputs);
   }
   const bool strict = options.fusion.strict;
-  const auto scan = open_scan(options.scan, strict, run);
+  const auto scan = open_scan(options.scan, strict, run, options.calibration);
   const libmap::Trajectory poses = find_poses(*scan, options.poses, strict, run);
   const bool in_true_frame = options.frame == CloudFrame::ground_truth;
   if (in_true_frame) require_truth(*scan);
@@ -122,6 +124,7 @@ int fuse_scan(int argc, char** argv) {
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "cloud (.pcd, .ply, .vtp, .csv)");
   add_poses_option(command, options.poses);
+  add_calibration_option(command, options.calibration);
   command.option("--corrected-poses", "FILE", options.corrected_poses,
                  "also write the poses that the frames were fused by (.tum, .kitti, .g2o, .toro), "
                  "in the frame of --poses");

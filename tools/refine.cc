@@ -21,6 +21,8 @@ struct RefineOptions {
   std::string database;
   std::vector<std::string> reports;
   std::string feature_cache;
+  std::string calibration;
+  std::string new_calibration;
   bool nodes = false;
   bool strict = false;
   libmap::RefinementOptions refinement;
@@ -135,6 +137,25 @@ void write_poses_output(const std::string& path, const libmap::TrajectoryFile& p
       path, [&](const auto& temporary) { libmap::write_trajectory(temporary, poses, nodes); });
 }
 
+// The camera of the scan as the refinement knows it now.
+libmap::CameraFile camera_of(const libmap::RefinementResult& result,
+                             const libmap::ScanSource& scan) {
+  for (const libmap::TrajectoryPose& pose : result.poses) {
+    const std::vector<libmap::Camera> cameras =
+        scan.read_frame(pose.node, {.color = false, .depth = false}).cameras;
+    if (cameras.empty()) continue;
+    if (cameras.size() > 1)
+      throw libmap::Error("a calibration is of one camera",
+                          {.file = scan.path().string(),
+                           .field = "cameras",
+                           .value = std::to_string(cameras.size()),
+                           .bound = "1"});
+    return libmap::calibrated_camera(cameras.front(), result.cameras.front(), result.calibration,
+                                     0);
+  }
+  throw libmap::Error("the scan has no calibration", {.file = scan.path().string()});
+}
+
 void write_outputs(const RefineOptions& options, const libmap::RefinementResult& result,
                    const libmap::ScanSource& scan, Run& run) {
   // First: a database whose rest is broken cannot be copied.
@@ -143,8 +164,12 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
       std::map<int, libmap::Pose> poses;
       for (const libmap::TrajectoryPose& pose : result.poses)
         poses.emplace(pose.node, pose.world_from_base);
-      libmap::copy_with_optimized_poses(options.scan, temporary, poses, result.closures);
+      std::optional<libmap::CameraFile> camera;
+      if (!result.calibration.empty()) camera = camera_of(result, scan);
+      libmap::copy_with_optimized_poses(options.scan, temporary, poses, result.closures, camera);
     });
+  if (!options.new_calibration.empty())
+    run.write_text(options.new_calibration, libmap::to_yaml(camera_of(result, scan)));
   for (const std::string& report : options.reports)
     run.write_text(report, fs::path(report).extension() == ".txt"
                                ? refinement_text(options.scan, result)
@@ -171,6 +196,12 @@ void refine(const RefineOptions& options, Run& run) {
                           {.field = "--links", .value = options.links, .bound = "a file .g2o"});
     run.claim_output(options.links, {options.scan});
   }
+  if (!options.new_calibration.empty())
+    run.claim_output(options.new_calibration, {options.scan, options.calibration});
+  if (!options.calibration.empty())
+    refuse_given({{"--write-calibration", !options.new_calibration.empty()},
+                  {"--write-database", !options.database.empty()}},
+                 "starts from the stored camera, not from --calibration");
   if (!options.database.empty()) {
     if (fs::is_directory(options.scan))
       throw libmap::Error("a copy of a database, which the scan is not",
@@ -186,7 +217,7 @@ void refine(const RefineOptions& options, Run& run) {
                           {.field = "--report", .value = report, .bound = "a file .json or .txt"});
     run.claim_output(report, {options.scan});
   }
-  const auto scan = open_scan(options.scan, options.strict, run);
+  const auto scan = open_scan(options.scan, options.strict, run, options.calibration);
   const libmap::RefinementResult result = in_file(options.scan, [&] {
     return libmap::refine_poses(*scan, options.refinement, run.progress(),
                                 feature_cache_of(options, run));
@@ -195,6 +226,7 @@ void refine(const RefineOptions& options, Run& run) {
     run.warn("no features: node {}: {}", node, fault.what());
   for (const std::string& warning : result.warnings) run.warn(options.scan + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
+  for (const std::string& finding : result.findings) run.say(finding);
   run.say("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
           result.closures.size());
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
@@ -211,8 +243,13 @@ int main(int argc, char** argv) {
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
   command.option("--links", "LINKS.g2o", options.links, "poses and links as a pose graph");
-  command.option("--write-database", "OUT.db", options.database,
-                 "a copy of the database with the refined poses and the links that were found");
+  command.option(
+      "--write-database", "OUT.db", options.database,
+      "a copy of the database with the refined poses, the links that were found, and the camera "
+      "and depth as they were corrected");
+  add_calibration_option(command, options.calibration);
+  command.option("--write-calibration", "OUT.yaml", options.new_calibration,
+                 "the camera as it was estimated, for --calibration of other commands and scans");
   command.option("--report", "FILE.json|FILE.txt", options.reports,
                  "what each stage did, and how certain the poses are");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,

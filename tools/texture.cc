@@ -21,6 +21,7 @@ struct TextureCommandOptions {
   std::string output;
   std::string scan;
   PosesOption poses;
+  std::string calibration;
   MeshFrame frame = MeshFrame::automatic;
   libmap::TextureOptions texture;
   libmap::TexturedMeshWriteOptions writing;
@@ -153,10 +154,11 @@ void texture(TextureCommandOptions options, Run& run) {
   libmap::require_mesh_format(options.mesh);
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.mesh);
+  inputs.push_back(options.calibration);
   run.claim_output(options.output, inputs);
   run.require_own_companions(options.output,
                              libmap::companions_of_model(options.output, options.writing));
-  const auto scan = open_scan(options.scan, options.texture.strict, run);
+  const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
   run.add_input(options.mesh);
@@ -184,6 +186,7 @@ int main(int argc, char** argv) {
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
   add_poses_option(command, options.poses);
+  add_calibration_option(command, options.calibration);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { texture(options, run); });
 }

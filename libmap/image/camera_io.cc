@@ -125,6 +125,27 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
   camera.distortion = terms;
 }
 
+DepthCorrection depth_correction_of(const YAML::Node& root) {
+  DepthCorrection depth;
+  if (!root["depth_correction"]) return depth;
+  const auto read = [&](const std::string& field, std::size_t size) {
+    if (!root[field]) throw Error("is missing", {.field = field});
+    std::vector<double> numbers = matrix_of(root[field], field);
+    if (numbers.size() != size)
+      refuse(field, std::to_string(numbers.size()) + " numbers", "wrong size",
+             std::to_string(size) + " numbers");
+    return numbers;
+  };
+  depth.spline_m = matrix_of(root["depth_correction"], "depth_correction");
+  const std::vector<double> range = read("depth_correction_range", 2);
+  depth.first_m = range[0];
+  depth.step_m = range[1];
+  const std::vector<double> radial = read("depth_correction_radial", depth.radial.size());
+  std::copy(radial.begin(), radial.end(), depth.radial.begin());
+  depth.check();
+  return depth;
+}
+
 // As cv::FileStorage, which does not take a flow map after a tag.
 std::string matrix_text(const std::string& key, int rows, int cols,
                         const std::vector<double>& numbers) {
@@ -133,6 +154,13 @@ std::string matrix_text(const std::string& key, int rows, int cols,
   for (std::size_t n = 0; n < numbers.size(); ++n)
     text += (n == 0 ? "" : ", ") + to_text(numbers[n]);
   return text + "]\n";
+}
+
+std::string pose_text(const std::string& key, const Pose& pose) {
+  std::vector<double> numbers;
+  for (int row = 0; row < 3; ++row)
+    for (int column = 0; column < 4; ++column) numbers.push_back(pose.matrix()(row, column));
+  return matrix_text(key, 3, 4, numbers);
 }
 
 std::string model_name(const Camera& camera) {
@@ -185,6 +213,9 @@ CameraFile camera_from_yaml(const YAML::Node& root) {
   if (root["local_transform"])
     file.camera.base_from_camera = pose_from_yaml(root["local_transform"], "local_transform");
   file.camera.check();
+  file.depth = depth_correction_of(root);
+  if (root["depth_registration"])
+    file.color_from_depth = pose_from_yaml(root["depth_registration"], "depth_registration");
   return file;
 }
 
@@ -212,11 +243,16 @@ std::string to_yaml(const CameraFile& file, const std::string& comment) {
   std::vector<double> terms = camera.distortion;
   if (camera.distortion_model == DistortionModel::none) terms.assign(5, 0.0);
   text += matrix_text("distortion_coefficients", 1, static_cast<int>(terms.size()), terms);
-  std::vector<double> transform;
-  for (int row = 0; row < 3; ++row)
-    for (int column = 0; column < 4; ++column)
-      transform.push_back(camera.base_from_camera.matrix()(row, column));
-  return text + matrix_text("local_transform", 3, 4, transform);
+  text += pose_text("local_transform", camera.base_from_camera);
+  if (!file.color_from_depth.matrix().isIdentity(0.0))
+    text += pose_text("depth_registration", file.color_from_depth);
+  const DepthCorrection& depth = file.depth;
+  if (depth.empty()) return text;
+  return text +
+         matrix_text("depth_correction", 1, static_cast<int>(depth.spline_m.size()),
+                     depth.spline_m) +
+         matrix_text("depth_correction_range", 1, 2, {depth.first_m, depth.step_m}) +
+         matrix_text("depth_correction_radial", 1, 3, {depth.radial.begin(), depth.radial.end()});
 }
 
 }  // namespace libmap

@@ -15,6 +15,12 @@
 //     {rows: 1, cols: 5, dt: d, data: [...]}
 //   local_transform: !!opencv-matrix          # base_from_camera, 3 x 4; may be missing
 //     {rows: 3, cols: 4, dt: d, data: [...]}
+//   depth_correction: !!opencv-matrix         # DepthCorrection: spline_m; may be missing
+//     {rows: 1, cols: 14, dt: d, data: [...]}
+//   depth_correction_range: !!opencv-matrix   # first_m, step_m
+//     {rows: 1, cols: 2, dt: d, data: [0.6, 0.2]}
+//   depth_correction_radial: !!opencv-matrix  # radial
+//     {rows: 1, cols: 3, dt: d, data: [...]}
 //
 // distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
 // order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without it the number
@@ -27,6 +33,7 @@
 #include <string>
 
 #include "libmap/core/camera.h"
+#include "libmap/image/depth_correction.h"
 
 namespace YAML {
 class Node;
@@ -37,6 +44,14 @@ namespace libmap {
 struct CameraFile {
   std::string name{};  // may be empty
   Camera camera{};
+  // Of depth that is registered to the camera's pictures: where it was taken from, if not from the
+  // camera's own place (depth_registration, 3 x 4; may be missing), and what is added to it.
+  Pose color_from_depth = Pose::Identity();
+  DepthCorrection depth{};
+
+  bool changes_depth() const {
+    return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0);
+  }
 };
 
 // Throws Error naming `file`, the key, its value and its bound: no YAML, a key that is missing, a

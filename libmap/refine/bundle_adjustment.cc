@@ -4,10 +4,14 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <utility>
 
+#include "libmap/refine/bundle_residuals.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/pose_residuals.h"
+#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 
@@ -15,111 +19,13 @@ namespace {
 
 constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
 constexpr int point_steps = 3;
+constexpr double registration_prior_m = 0.02;
+constexpr double registration_prior_rad = 0.03;
 
-// x, y in the picture and depth, in standard deviations. The intrinsics are steps away from those
-// by which the feature's ray was made: of fx and fy in parts, of cx and cy in pixels.
-class ObservationResidual {
- public:
-  ObservationResidual(const Feature& feature, const Camera& camera)
-      : camera_from_base_(Eigen::Quaterniond(camera.base_from_camera.linear()).conjugate()),
-        origin_(camera.base_from_camera.inverse().translation()),
-        ray_(feature.ray.cast<double>()),
-        depth_(static_cast<double>(feature.depth_m)),
-        fx_(camera.fx),
-        fy_(camera.fy),
-        pixel_noise_(static_cast<double>(feature.pixel_noise_px)),
-        depth_noise_(static_cast<double>(feature.depth_noise_m)) {}
-
-  template <typename T>
-  bool operator()(const T* pose, const T* point, T* residual) const {
-    const std::array<T, 4> none = {T(0), T(0), T(0), T(0)};
-    return (*this)(pose, point, none.data(), residual);
-  }
-
-  template <typename T>
-  bool operator()(const T* pose, const T* point, const T* intrinsics, T* residual) const {
-    const PoseView<T> base(pose);
-    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> in_map(point);
-    const Eigen::Matrix<T, 3, 1> in_base =
-        base.rotation.conjugate() * Eigen::Matrix<T, 3, 1>(in_map - base.translation);
-    const Eigen::Matrix<T, 3, 1> in_camera =
-        camera_from_base_.cast<T>() * in_base + origin_.template cast<T>();
-    if (in_camera.z() < T(1e-3)) return false;
-    const T x = in_camera.x() / in_camera.z();
-    const T y = in_camera.y() / in_camera.z();
-    residual[0] =
-        (T(fx_) * ((T(1) + intrinsics[0]) * x - T(ray_.x())) + intrinsics[2]) / T(pixel_noise_);
-    residual[1] =
-        (T(fy_) * ((T(1) + intrinsics[1]) * y - T(ray_.y())) + intrinsics[3]) / T(pixel_noise_);
-    residual[2] = (in_camera.z() - T(depth_)) / T(depth_noise_);
-    return true;
-  }
-
- private:
-  Eigen::Quaterniond camera_from_base_;
-  Eigen::Vector3d origin_;
-  Eigen::Vector2d ray_;
-  double depth_;
-  double fx_;
-  double fy_;
-  double pixel_noise_;
-  double depth_noise_;
-};
-
-class IntrinsicsPrior {
- public:
-  IntrinsicsPrior(double focal, double center_px) : focal_(focal), center_(center_px) {}
-  template <typename T>
-  bool operator()(const T* intrinsics, T* residual) const {
-    residual[0] = intrinsics[0] / T(focal_);
-    residual[1] = intrinsics[1] / T(focal_);
-    residual[2] = intrinsics[2] / T(center_);
-    residual[3] = intrinsics[3] / T(center_);
-    return true;
-  }
-
- private:
-  double focal_;
-  double center_;
-};
-
-// Residual of an observation with its derivatives by a step of the pose and by the point.
-struct Linearized {
-  Eigen::Vector3d residual;
-  Eigen::Matrix<double, 3, 6> by_pose;
-  Eigen::Matrix3d by_point;
-};
-
-Linearized linearize(const Feature& feature, const Camera& camera, const Pose& map_from_base,
-                     const Eigen::Vector3d& point) {
-  const Pose camera_from_base = camera.base_from_camera.inverse();
-  const Eigen::Vector3d in_base = map_from_base.inverse() * point;
-  const Eigen::Vector3d p = camera_from_base * in_base;
-  Eigen::Matrix3d projection;
-  projection << camera.fx / p.z(), 0.0, -camera.fx * p.x() / (p.z() * p.z()), 0.0,
-      camera.fy / p.z(), -camera.fy * p.y() / (p.z() * p.z()), 0.0, 0.0, 1.0;
-  const double pixel = 1.0 / static_cast<double>(feature.pixel_noise_px);
-  const double depth = 1.0 / static_cast<double>(feature.depth_noise_m);
-  const Eigen::Vector3d weight(pixel, pixel, depth);
-  const Eigen::Matrix3d by_base = weight.asDiagonal() * projection * camera_from_base.linear();
-  Linearized result;
-  result.residual = weight.cwiseProduct(
-      Eigen::Vector3d(camera.fx * (p.x() / p.z() - static_cast<double>(feature.ray.x())),
-                      camera.fy * (p.y() / p.z() - static_cast<double>(feature.ray.y())),
-                      p.z() - static_cast<double>(feature.depth_m)));
-  // A step of the pose moves the point against it: d in_base = -t + [in_base]x r.
-  result.by_pose.leftCols<3>() = -by_base;
-  result.by_pose.rightCols<3>() = by_base * cross_matrix(in_base);
-  result.by_point = by_base * map_from_base.linear().transpose();
-  return result;
-}
-
-Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
-                          const IntrinsicsStep& step) {
-  const Eigen::Vector2d ray = feature.ray.cast<double>();
-  return Eigen::Vector2d((camera.fx * ray.x() - step.cx_px) / (camera.fx * (1.0 + step.fx_share)),
-                         (camera.fy * ray.y() - step.cy_px) / (camera.fy * (1.0 + step.fy_share)))
-      .cast<float>();
+std::size_t count_numbers(const std::vector<DepthCorrection>& corrections) {
+  std::size_t count = 0;
+  for (const DepthCorrection& correction : corrections) count += 3 + correction.spline_m.size();
+  return count;
 }
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
@@ -135,8 +41,11 @@ class Adjustment {
       : frames_(frames),
         tracks_(tracks),
         options_(options),
-        cameras_(options.refine_intrinsics ? max_cameras(frames) : 0),
-        blocks_(poses, 4 * cameras_) {
+        cameras_(options.refine_intrinsics || options.refine_depth || options.refine_registration
+                     ? max_cameras(frames)
+                     : 0),
+        corrections_(corrections_for(frames, refines_more() ? cameras_ : 0, options.depth_knot_m)),
+        blocks_(poses, 10 * cameras_ + count_numbers(corrections_)) {
     result_.map_from_base = poses;
     for (const FeatureTrack& track : tracks_) {
       const Eigen::Vector3d point = place_of(track);
@@ -156,13 +65,29 @@ class Adjustment {
     return blocks_.contains(frames_[seen.frame].node);
   }
   double* intrinsics(std::size_t camera) const { return blocks_.rest() + 4 * camera; }
+  double* registration(std::size_t camera) const {
+    return blocks_.rest() + 4 * cameras_ + 6 * camera;
+  }
   Eigen::Vector3d place_of(const FeatureTrack& track) const;
   // The observation as the refined intrinsics have it.
   Linearized linearized(const Observation& seen, const Eigen::Vector3d& point) const;
   double weight_of(const Linearized& l) const {
     return 1.0 / (1.0 + l.residual.squaredNorm() / (options_.robust_scale * options_.robust_scale));
   }
+  double* depth_numbers(std::size_t camera) const {
+    double* numbers = blocks_.rest() + 10 * cameras_;
+    for (std::size_t n = 0; n < camera; ++n) numbers += 3 + corrections_[n].spline_m.size();
+    return numbers;
+  }
+  bool refines_more() const { return options_.refine_depth || options_.refine_registration; }
+  bool refines_more(std::size_t camera) const {
+    return refines_more() && !corrections_[camera].empty();
+  }
+  void add_observation(ceres::Problem& problem, const Observation& seen, double* point);
   void add_observations(ceres::Problem& problem);
+  void add_intrinsics_priors(ceres::Problem& problem);
+  void add_depth_priors(ceres::Problem& problem, std::size_t camera);
+  void add_registration_prior(ceres::Problem& problem, std::size_t camera);
   void add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links);
   void solve(ceres::Problem& problem);
   void add_to_system(const FeatureTrack& track, const Eigen::Vector3d& point,
@@ -175,8 +100,11 @@ class Adjustment {
   const std::vector<FeatureTrack>& tracks_;
   const BundleAdjustmentOptions& options_;
   BundleAdjustmentResult result_;
-  std::size_t cameras_ = 0;  // with intrinsics to refine
-  PoseBlocks blocks_;        // then a step of four numbers a camera
+  std::size_t cameras_ = 0;                   // with something to refine
+  std::vector<DepthCorrection> corrections_;  // of 0: their knots
+  // Then, of each camera: a step of the intrinsics (4), of the registration (6), and a correction
+  // of depth, its radial numbers first. In one place, since Ceres orders blocks by address.
+  PoseBlocks blocks_;
   std::vector<std::array<double, 3>> points_;
 };
 
@@ -193,6 +121,35 @@ Eigen::Vector3d Adjustment::place_of(const FeatureTrack& track) const {
   return count > 0.0 ? Eigen::Vector3d(sum / count) : sum;
 }
 
+void Adjustment::add_observation(ceres::Problem& problem, const Observation& seen, double* point) {
+  const Feature& its = feature(seen);
+  const Camera& camera = frames_[seen.frame].cameras[its.camera];
+  auto* residual = new ObservationResidual(its, camera);
+  auto* loss = new ceres::CauchyLoss(options_.robust_scale);
+  double* pose = blocks_.at(frames_[seen.frame].node);
+  if (cameras_ == 0) {
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3>(residual), loss, pose, point);
+  } else if (!refines_more(its.camera)) {
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3, 4>(residual), loss, pose,
+        point, intrinsics(its.camera));
+  } else {
+    const DepthCorrection& depth = corrections_[its.camera];
+    const DepthCorrection::Terms terms =
+        depth.terms(static_cast<double>(its.depth_m), squared_radius_of(its, camera));
+    residual->set_terms(terms);
+    if (options_.refine_registration)
+      residual->set_registration(depth_by_registration(frames_[seen.frame], its));
+    double* spline = depth_numbers(its.camera) + 3 + terms.first;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3, 4, 1, 1, 1, 1, 3, 6>(
+            residual),
+        loss, pose, point, intrinsics(its.camera), spline, spline + 1, spline + 2, spline + 3,
+        depth_numbers(its.camera), registration(its.camera));
+  }
+}
+
 void Adjustment::add_observations(ceres::Problem& problem) {
   for (std::size_t t = 0; t < tracks_.size(); ++t) {
     std::size_t views = 0;
@@ -202,26 +159,79 @@ void Adjustment::add_observations(ceres::Problem& problem) {
     for (const Observation& seen : tracks_[t].observations) {
       if (!has_pose(seen)) continue;
       ++result_.observations;
-      const Feature& its = feature(seen);
-      auto* residual = new ObservationResidual(its, frames_[seen.frame].cameras[its.camera]);
-      auto* loss = new ceres::CauchyLoss(options_.robust_scale);
-      double* pose = blocks_.at(frames_[seen.frame].node);
-      if (options_.refine_intrinsics)
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3, 4>(residual), loss, pose,
-            points_[t].data(), intrinsics(its.camera));
-      else
-        problem.AddResidualBlock(
-            new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3>(residual), loss, pose,
-            points_[t].data());
+      add_observation(problem, seen, points_[t].data());
     }
   }
-  for (std::size_t n = 0; n < cameras_; ++n)
-    if (problem.HasParameterBlock(intrinsics(n)))
-      problem.AddResidualBlock(
-          new ceres::AutoDiffCostFunction<IntrinsicsPrior, 4, 4>(
-              new IntrinsicsPrior(options_.focal_prior, options_.center_prior_px)),
-          nullptr, intrinsics(n));
+  add_intrinsics_priors(problem);
+  for (std::size_t n = 0; n < corrections_.size(); ++n)
+    if (refines_more(n)) {
+      add_depth_priors(problem, n);
+      add_registration_prior(problem, n);
+    }
+}
+
+void Adjustment::add_intrinsics_priors(ceres::Problem& problem) {
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    if (!problem.HasParameterBlock(intrinsics(n))) continue;
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<IntrinsicsPrior, 4, 4>(
+            new IntrinsicsPrior(options_.focal_prior, options_.center_prior_px)),
+        nullptr, intrinsics(n));
+    if (!options_.refine_intrinsics) problem.SetParameterBlockConstant(intrinsics(n));
+  }
+}
+
+void Adjustment::add_registration_prior(ceres::Problem& problem, std::size_t camera) {
+  double* const block = registration(camera);
+  if (!problem.HasParameterBlock(block)) return;
+  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SmallResidual, 6, 6>(
+                               new SmallResidual(registration_prior_m, registration_prior_rad)),
+                           nullptr, block);
+  if (!options_.refine_registration) problem.SetParameterBlockConstant(block);
+}
+
+// Each number is small, the spline bends little, and depths keep their mean (depth_gauge).
+void Adjustment::add_depth_priors(ceres::Problem& problem, std::size_t camera) {
+  const DepthCorrection& depth = corrections_[camera];
+  double* const radial = depth_numbers(camera);
+  const auto add = [&](std::size_t first, const std::vector<double>& factors,
+                       const std::array<double, 3>& of_radial) {
+    std::vector<double*> blocks;
+    for (std::size_t n = 0; n < factors.size(); ++n) blocks.push_back(radial + 3 + first + n);
+    blocks.push_back(radial);
+    problem.AddResidualBlock(new LinearResidual(factors, of_radial), nullptr, blocks);
+  };
+  const double small = 1.0 / options_.depth_prior_m;
+  const double bend = 1.0 / options_.depth_bend_m;
+  for (std::size_t n = 0; n < depth.spline_m.size(); ++n) {
+    add(n, {small}, {});
+    if (n + 2 < depth.spline_m.size()) add(n, {bend, -2.0 * bend, bend}, {});
+  }
+  for (std::size_t n = 0; n < 3; ++n) {
+    std::array<double, 3> one{};
+    one[n] = small;
+    add(0, {}, one);
+  }
+  std::vector<double> spline(depth.spline_m.size(), 0.0);
+  std::array<double, 3> radii{};
+  double count = 0.0;
+  for (const FrameFeatures& frame : frames_)
+    for (const Feature& its : frame.features) {
+      if (its.camera != camera) continue;
+      const auto z = static_cast<double>(its.depth_m);
+      const DepthCorrection::Terms terms =
+          depth.terms(z, squared_radius_of(its, frame.cameras[camera]));
+      for (std::size_t n = 0; n < 4; ++n) spline[terms.first + n] += terms.spline[n] / z;
+      for (std::size_t n = 0; n < 3; ++n) radii[n] += terms.radial[n] / z;
+      count += 1.0;
+    }
+  for (double& factor : spline) factor /= count * depth_gauge;
+  for (double& factor : radii) factor /= count * depth_gauge;
+  add(0, spline, radii);
+  if (options_.refine_depth) return;
+  for (std::size_t n = 0; n < depth.spline_m.size(); ++n)
+    problem.SetParameterBlockConstant(radial + 3 + n);
+  problem.SetParameterBlockConstant(radial);
 }
 
 void Adjustment::add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links) {
@@ -255,6 +265,15 @@ void Adjustment::solve(ceres::Problem& problem) {
     if (problem.HasParameterBlock(block)) ordering->AddElementToGroup(block, 1);
   for (std::size_t n = 0; n < cameras_; ++n)
     if (problem.HasParameterBlock(intrinsics(n))) ordering->AddElementToGroup(intrinsics(n), 1);
+  for (std::size_t n = 0; n < corrections_.size(); ++n) {
+    double* const numbers = depth_numbers(n);
+    if (problem.HasParameterBlock(numbers)) ordering->AddElementToGroup(numbers, 1);
+    for (std::size_t k = 0; k < corrections_[n].spline_m.size(); ++k)
+      if (problem.HasParameterBlock(numbers + 3 + k))
+        ordering->AddElementToGroup(numbers + 3 + k, 1);
+  }
+  for (std::size_t n = 0; n < cameras_; ++n)
+    if (problem.HasParameterBlock(registration(n))) ordering->AddElementToGroup(registration(n), 1);
   settings.linear_solver_ordering = ordering;
   ceres::Solver::Summary summary;
   ceres::Solve(settings, &problem, &summary);
@@ -267,6 +286,17 @@ void Adjustment::solve(ceres::Problem& problem) {
 Linearized Adjustment::linearized(const Observation& seen, const Eigen::Vector3d& point) const {
   Feature its = feature(seen);
   Camera camera = frames_[seen.frame].cameras[its.camera];
+  if (!result_.color_from_depth.empty()) {
+    const std::array<double, 6> derivatives = depth_by_registration(frames_[seen.frame], its);
+    double added = 0.0;
+    for (std::size_t n = 0; n < 6; ++n) added += derivatives[n] * registration(its.camera)[n];
+    its.depth_m += static_cast<float>(added);
+  }
+  if (!result_.depth.empty()) {
+    const auto z = static_cast<double>(its.depth_m);
+    its.depth_m =
+        static_cast<float>(z + result_.depth[its.camera].at(z, squared_radius_of(its, camera)));
+  }
   if (!result_.intrinsics.empty()) {
     its.ray = moved_ray(its, camera, result_.intrinsics[its.camera]);
     camera = moved(camera, result_.intrinsics[its.camera]);
@@ -362,6 +392,15 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
   for (std::size_t n = 0; n < cameras_; ++n) {
     const double* step = intrinsics(n);
     result_.intrinsics.push_back({step[0], step[1], step[2], step[3]});
+    if (options_.refine_registration)
+      result_.color_from_depth.push_back(
+          moved(Pose::Identity(), Eigen::Map<const Vector6d>(registration(n))));
+  }
+  for (std::size_t n = 0; options_.refine_depth && n < cameras_; ++n) {
+    const double* numbers = depth_numbers(n);
+    result_.depth.push_back(corrections_[n]);
+    std::copy_n(numbers, 3, result_.depth[n].radial.begin());
+    std::copy_n(numbers + 3, corrections_[n].spline_m.size(), result_.depth[n].spline_m.begin());
   }
   eliminate_points(links, system_tracks);
   return std::move(result_);
@@ -378,21 +417,11 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
             "standard deviation of the focal length, of itself");
   table.add("center_prior_px", options.center_prior_px, positive,
             "standard deviation of the principal point");
-}
-
-Camera moved(Camera camera, const IntrinsicsStep& step) {
-  camera.fx *= 1.0 + step.fx_share;
-  camera.fy *= 1.0 + step.fy_share;
-  camera.cx += step.cx_px;
-  camera.cy += step.cy_px;
-  return camera;
-}
-
-void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps) {
-  for (Feature& feature : frame.features)
-    feature.ray = moved_ray(feature, frame.cameras[feature.camera], steps[feature.camera]);
-  for (std::size_t n = 0; n < frame.cameras.size(); ++n)
-    frame.cameras[n] = moved(frame.cameras[n], steps[n]);
+  table.add("depth_prior_m", options.depth_prior_m, positive,
+            "standard deviation of a correction of depth");
+  table.add("depth_bend_m", options.depth_bend_m, positive,
+            "standard deviation of its second difference from knot to knot");
+  table.add("depth_knot_m", options.depth_knot_m, {0.02}, "between its knots");
 }
 
 BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,

@@ -1,5 +1,6 @@
-// Poses, points and, if wanted, intrinsics that agree best with all observations of the points, in
-// the pictures and in depth (Triggs et al. 2000), by Ceres with the points eliminated.
+// Poses, points and, if wanted, intrinsics and a correction of depth that agree best with all
+// observations of the points, in the pictures and in depth (Triggs et al. 2000), by Ceres with the
+// points eliminated.
 #pragma once
 
 #include <cstddef>
@@ -9,35 +10,37 @@
 #include "libmap/core/parameters.h"
 #include "libmap/refine/block_system.h"
 #include "libmap/refine/feature_tracks.h"
+#include "libmap/refine/frame_calibration.h"
 #include "libmap/refine/pose_graph_optimization.h"
 
 namespace libmap {
 
 struct BundleAdjustmentOptions {
-  double robust_scale = 3.0;       // > 0: of Cauchy's loss, standard deviations of an observation
-  int max_iterations = 30;         // >= 1
-  bool refine_intrinsics = false;  // of each camera of the rig, the same in all frames; their
-                                   // distortion stays
-  double focal_prior = 0.005;      // > 0: standard deviation of the focal length, of itself
-  double center_prior_px = 2.0;    // > 0: ... and of the principal point
+  double robust_scale = 3.0;         // > 0: of Cauchy's loss, standard deviations of an observation
+  int max_iterations = 30;           // >= 1
+  bool refine_intrinsics = false;    // of each camera of the rig, the same in all frames; their
+                                     // distortion stays
+  bool refine_depth = false;         // a DepthCorrection of each camera
+  bool refine_registration = false;  // where depth lies to color, of each camera
+  double focal_prior = 0.02;         // > 0: standard deviation of the focal length, of itself
+  double center_prior_px = 8.0;      // > 0: ... and of the principal point
+  double depth_prior_m = 0.03;       // > 0: ... and of a correction of depth
+  double depth_bend_m = 0.005;       // > 0: ... and of its second difference from knot to knot
+  double depth_knot_m = 0.2;         // >= 0.02: between the knots of its spline
 };
 void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 
-// Steps away from a camera's own.
-struct IntrinsicsStep {
-  double fx_share = 0.0;  // of fx
-  double fy_share = 0.0;
-  double cx_px = 0.0;
-  double cy_px = 0.0;
-};
-// The camera with the step, and the rays of the features whose pixels it made.
-Camera moved(Camera camera, const IntrinsicsStep& step);
-void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps);
+// The mean share of the depths of its features by which a camera's depth may be corrected: pictures
+// and depth alone cannot tell a scale of depth from a larger scene, so the scale stays that of the
+// depth camera.
+inline constexpr double depth_gauge = 1e-6;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
   std::vector<Eigen::Vector3d> points;     // in the map, one a track
   std::vector<IntrinsicsStep> intrinsics;  // of a frame's cameras; empty if not asked
+  std::vector<DepthCorrection> depth;      // the same
+  std::vector<Pose> color_from_depth;      // the same
   // Of steps of the poses (rigid_motion.h), in the order of map_from_base, the points eliminated
   // (Schur complement), at the end: the links among them.
   BlockSystem information{0};
@@ -54,7 +57,8 @@ struct BundleAdjustmentResult {
   bool converged = false;
 };
 
-// Poses that the intrinsics were refined with fit features that move_intrinsics has moved. `links`
+// Poses that the intrinsics and depths were refined with fit frames that move_intrinsics and
+// correct_depth have changed. `links`
 // are those of the graph at its optimum (odometry, closures of other sources, priors); the
 // gauge nodes of the components stay where they are. The information is that of `system_tracks`
 // where there are any: of TrackFrames::linked it is a little less, and sparse.

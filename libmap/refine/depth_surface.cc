@@ -1,6 +1,7 @@
 #include "libmap/refine/depth_surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <string>
@@ -14,6 +15,11 @@ namespace {
 
 constexpr double normal_scale = 32767.0;
 constexpr double noise_unit_m = 1e-6;
+
+void set_normal(DepthSurface::Cell& cell, double x, double y) {
+  cell.normal_x = static_cast<std::int16_t>(std::lround(x * normal_scale));
+  cell.normal_y = static_cast<std::int16_t>(std::lround(y * normal_scale));
+}
 
 }  // namespace
 
@@ -29,8 +35,7 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
       planes.support.empty() ? 0 : *std::max_element(planes.support.begin(), planes.support.end());
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column) {
-      const auto cell = static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                        static_cast<std::size_t>(column);
+      const std::size_t cell = index(column, row);
       const auto pixel =
           static_cast<std::size_t>(row * step_px) * static_cast<std::size_t>(planes.width) +
           static_cast<std::size_t>(column * step_px);
@@ -43,10 +48,8 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
           std::hypot(axial, surface_noise_m) * static_cast<double>(planes.cos_incidence[pixel]);
       Cell& kept = cells_[cell];
       kept.depth_m = planes.depth_m[pixel];
-      kept.normal_x = static_cast<std::int16_t>(
-          std::lround(static_cast<double>(planes.normals[pixel].x()) * normal_scale));
-      kept.normal_y = static_cast<std::int16_t>(
-          std::lround(static_cast<double>(planes.normals[pixel].y()) * normal_scale));
+      set_normal(kept, static_cast<double>(planes.normals[pixel].x()),
+                 static_cast<double>(planes.normals[pixel].y()));
       kept.noise =
           static_cast<std::uint16_t>(std::clamp(along_normal / noise_unit_m, 1.0, 65535.0));
     }
@@ -67,8 +70,78 @@ DepthSurface::DepthSurface(const Camera& depth_camera, int step_px, std::vector<
   find_rays();
 }
 
+// The inverse depth of a plane, n r / h on the ray r, keeps its value and its slopes by the pixel.
+void DepthSurface::set_camera(const Camera& depth_camera) {
+  const auto intrinsics = [](const Camera& camera) {
+    return std::array{camera.fx, camera.fy, camera.cx, camera.cy};
+  };
+  if (intrinsics(camera_) == intrinsics(depth_camera)) {
+    camera_.base_from_camera = depth_camera.base_from_camera;
+    return;
+  }
+  const DepthSurface before = *this;
+  camera_ = depth_camera;
+  find_rays();
+  for (int row = 0; row < rows_; ++row)
+    for (int column = 0; column < columns_; ++column) {
+      SurfaceElement element;
+      if (!before.at(column, row, element)) continue;
+      const Eigen::Vector2d ray = ray_at(column, row);
+      Cell& cell = cells_[index(column, row)];
+      if (!ray.allFinite()) {
+        cell = {};
+        continue;
+      }
+      const double x = element.normal.x() * camera_.fx / before.camera_.fx;
+      const double y = element.normal.y() * camera_.fy / before.camera_.fy;
+      const double facing = element.normal.dot(before.ray_at(column, row).homogeneous());
+      const Eigen::Vector3d normal =
+          Eigen::Vector3d(x, y, facing - x * ray.x() - y * ray.y()).normalized();
+      set_normal(cell, normal.x(), normal.y());
+    }
+}
+
+// z(u, v) + c(z, r): its slopes by the pixel are z' (1 + dc/dz) + dc/du.
+void DepthSurface::correct(const DepthCorrection& correction) {
+  if (correction.empty()) return;
+  constexpr double step_m = 1e-3;
+  constexpr double step_px = 0.5;
+  const auto added = [&](double depth_m, double x_px, double y_px) {
+    return correction.at(depth_m, squared_image_radius(camera_.width, camera_.height, x_px, y_px));
+  };
+  for (int row = 0; row < rows_; ++row)
+    for (int column = 0; column < columns_; ++column) {
+      SurfaceElement element;
+      if (!at(column, row, element)) continue;
+      const double x_px = column * step_px_;
+      const double y_px = row * step_px_;
+      const double z = element.point.z();
+      const double slope =
+          (added(z + step_m, x_px, y_px) - added(z - step_m, x_px, y_px)) / (2.0 * step_m);
+      const Eigen::Vector2d by_pixel(
+          (added(z, x_px + step_px, y_px) - added(z, x_px - step_px, y_px)) / (2.0 * step_px),
+          (added(z, x_px, y_px + step_px) - added(z, x_px, y_px - step_px)) / (2.0 * step_px));
+      // By the ray: of the plane n r z = h, z' = -z n / (n r).
+      const Eigen::Vector2d ray = element.point.head<2>() / z;
+      const double facing = element.normal.dot(ray.homogeneous());
+      Cell& cell = cells_[index(column, row)];
+      const double corrected = z + added(z, x_px, y_px);
+      if (!(corrected > 0.0 && facing < 0.0)) {
+        cell = {};
+        continue;
+      }
+      const Eigen::Vector2d by_ray = (1.0 + slope) * -z / facing * element.normal.head<2>() +
+                                     by_pixel.cwiseProduct(Eigen::Vector2d(camera_.fx, camera_.fy));
+      const Eigen::Vector3d normal =
+          Eigen::Vector3d(by_ray.x(), by_ray.y(), -corrected - ray.dot(by_ray)).normalized();
+      cell.depth_m = static_cast<float>(corrected);
+      set_normal(cell, normal.x(), normal.y());
+    }
+}
+
 // NaN where no ray belongs to the pixel.
 void DepthSurface::find_rays() {
+  rays_.clear();
   if (!camera_.is_distorted()) return;
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column) {
@@ -79,17 +152,13 @@ void DepthSurface::find_rays() {
 }
 
 Eigen::Vector2d DepthSurface::ray_at(int column, int row) const {
-  if (!rays_.empty())
-    return rays_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                 static_cast<std::size_t>(column)]
-        .cast<double>();
+  if (!rays_.empty()) return rays_[index(column, row)].cast<double>();
   return {(column * step_px_ - camera_.cx) / camera_.fx,
           (row * step_px_ - camera_.cy) / camera_.fy};
 }
 
 bool DepthSurface::at(int column, int row, SurfaceElement& element) const {
-  const Cell& cell = cells_[static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
-                            static_cast<std::size_t>(column)];
+  const Cell& cell = cells_[index(column, row)];
   if (cell.depth_m <= 0.0F) return false;
   element.point = static_cast<double>(cell.depth_m) * ray_at(column, row).homogeneous();
   const double x = cell.normal_x / normal_scale;

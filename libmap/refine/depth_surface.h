@@ -2,11 +2,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
 #include "libmap/cloud/depth_planes.h"
 #include "libmap/core/camera.h"
+#include "libmap/image/depth_correction.h"
 
 namespace libmap {
 
@@ -36,6 +38,11 @@ class DepthSurface {
   DepthSurface(const Camera& depth_camera, int step_px, std::vector<Cell> cells);
 
   const Camera& camera() const { return camera_; }
+  // The same measurements seen through another camera of the same size and distortion: depths stay
+  // at their pixels, normals turn with the rays.
+  void set_camera(const Camera& depth_camera);
+  // The same with other depths, normals as they turn by them.
+  void correct(const DepthCorrection& correction);
   int step_px() const { return step_px_; }
   const std::vector<Cell>& cells() const { return cells_; }
   int columns() const { return columns_; }
@@ -55,6 +62,10 @@ class DepthSurface {
 
   void find_rays();
   Eigen::Vector2d ray_at(int column, int row) const;
+  std::size_t index(int column, int row) const {
+    return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
+           static_cast<std::size_t>(column);
+  }
 };
 
 }  // namespace libmap

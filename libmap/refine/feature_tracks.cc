@@ -1,10 +1,11 @@
 #include "libmap/refine/feature_tracks.h"
 
 #include <algorithm>
-#include <numeric>
 #include <set>
 #include <tuple>
 #include <utility>
+
+#include "libmap/core/disjoint_sets.h"
 
 namespace libmap {
 
@@ -14,27 +15,20 @@ namespace {
 class FeatureSets {
  public:
   explicit FeatureSets(const std::vector<FrameFeatures>& frames) {
-    std::size_t count = 0;
-    for (const FrameFeatures& frame : frames) {
-      begin_.push_back(count);
-      count += frame.features.size();
+    for (std::size_t f = 0; f < frames.size(); ++f) {
+      begin_.push_back(members_.size());
+      for (std::size_t n = 0; n < frames[f].features.size(); ++n) members_.push_back({{f, n}});
     }
-    parent_.resize(count);
-    std::iota(parent_.begin(), parent_.end(), std::size_t{0});
-    members_.resize(count);
-    for (std::size_t f = 0; f < frames.size(); ++f)
-      for (std::size_t n = 0; n < frames[f].features.size(); ++n)
-        members_[begin_[f] + n] = {{f, n}};
+    sets_ = DisjointSets<std::size_t>(members_.size());
   }
 
   enum class Join { joined, conflict, unlinked };
 
   // A conflict if the two sets hold different features of one frame.
   Join join(const Observation& a, const Observation& b, const std::set<FramePair>* linked) {
-    std::size_t one = root(begin_[a.frame] + a.feature);
-    std::size_t other = root(begin_[b.frame] + b.feature);
+    const std::size_t one = sets_.find(begin_[a.frame] + a.feature);
+    const std::size_t other = sets_.find(begin_[b.frame] + b.feature);
     if (one == other) return Join::joined;
-    if (members_[one].size() < members_[other].size()) std::swap(one, other);
     Join result = Join::joined;
     for (const Observation& member : members_[other])
       for (const Observation& its : members_[one]) {
@@ -43,9 +37,11 @@ class FeatureSets {
           result = Join::unlinked;
       }
     if (result != Join::joined) return result;
-    parent_[other] = one;
-    members_[one].insert(members_[one].end(), members_[other].begin(), members_[other].end());
-    members_[other].clear();
+    sets_.join(one, other);
+    const std::size_t root = sets_.find(one);
+    std::vector<Observation>& joined = members_[root == one ? other : one];
+    members_[root].insert(members_[root].end(), joined.begin(), joined.end());
+    joined.clear();
     return Join::joined;
   }
 
@@ -67,13 +63,8 @@ class FeatureSets {
   }
 
  private:
-  std::size_t root(std::size_t n) {
-    while (parent_[n] != n) n = parent_[n] = parent_[parent_[n]];
-    return n;
-  }
-
   std::vector<std::size_t> begin_;
-  std::vector<std::size_t> parent_;
+  DisjointSets<std::size_t> sets_{0};
   std::vector<std::vector<Observation>> members_;  // at the root of each set
 };
 

@@ -1,14 +1,13 @@
 #include "libmap/refine/refinement.h"
 
 #include <algorithm>
-#include <chrono>
 #include <ctime>
 #include <set>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/refine/graph_covariance.h"
-#include "libmap/refine/intrinsics_refinement.h"
+#include "libmap/refine/refinement_work.h"
 
 namespace libmap {
 
@@ -29,65 +28,7 @@ std::string join_numbers(const std::vector<int>& numbers) {
   return text;
 }
 
-class Refinement {
- public:
-  Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress,
-             const FeatureCache& cache)
-      : scan_(scan),
-        options_(options),
-        progress_(progress),
-        cache_(cache),
-        truth_(trajectory_of(scan.graph(), PoseSource::ground_truth)) {}
-  RefinementResult run();
-
- private:
-  using Clock = std::chrono::steady_clock;
-
-  void start();
-  void find_frames();
-  bool may_be_visual() const {
-    return options_.start == StartPoses::visual || options_.start == StartPoses::automatic;
-  }
-  bool is_all_tracked() const {
-    return std::all_of(poses_.begin(), poses_.end(), [&](const auto& pose) {
-      return pose.first < 0 || tracked_.contains(pose.first);
-    });
-  }
-  void odometry();
-  void leave_out_unjoined();
-  bool round(int number);
-  std::vector<FramePair> candidates(int number);
-  std::vector<GraphLink> with_features(const std::vector<FeatureLink>& links) const;
-  void join_new(const std::vector<FeatureLink>& links);
-  void bundle();
-  void free_intrinsics();
-  void icp();
-  void finish();
-  Trajectory trajectory(const std::map<int, Pose>& poses) const;
-  void close(StageReport stage);
-  // Compares poses with those before; true if they are worse.
-  bool evaluate(StageReport& stage, const std::map<int, Pose>& before,
-                const std::map<int, Pose>& after) const;
-  std::optional<StageError> error_of(const std::map<int, Pose>& poses) const;
-
-  const ScanSource& scan_;
-  const RefinementOptions& options_;
-  Progress& progress_;
-  const FeatureCache& cache_;
-  Trajectory truth_;
-  Clock::time_point stage_begin_ = Clock::now();
-  std::clock_t processor_begin_ = std::clock();
-  RefinementResult result_;
-  std::map<int, Pose> poses_;
-  std::vector<std::vector<int>> parts_;
-  std::vector<FrameFeatures> frames_;
-  std::vector<GraphLink> stored_;
-  std::set<int> tracked_;  // nodes whose poses are by visual odometry
-  std::vector<FeatureLink> links_;
-  std::set<FramePair> tried_;
-  PoseGraphResult graph_;
-  BlockSystem information_{0};
-};
+}  // namespace
 
 Trajectory Refinement::trajectory(const std::map<int, Pose>& poses) const {
   Trajectory trajectory;
@@ -136,6 +77,7 @@ void Refinement::start() {
                 {.field = "gauge_node", .value = std::to_string(gauge)});
   InitialPoses initial = initial_poses(scan_.graph(), options_.start);
   poses_ = std::move(initial.map_from_base);
+  start_ = poses_;
   parts_ = std::move(initial.parts);
   result_.without_pose = std::move(initial.without_pose);
   stored_ = stored_links(scan_.graph());
@@ -169,6 +111,7 @@ void Refinement::find_frames() {
     result_.features += frame.features.size();
     without_depth += frame.without_depth;
   }
+  if (!frames_.empty()) result_.cameras = frames_.front().cameras;
   StageReport stage;
   stage.name = "features";
   stage.figures = {{"frames", static_cast<double>(frames_.size())},
@@ -315,11 +258,6 @@ bool Refinement::round(int number) {
   return static_cast<double>(verified.links.size()) > settled_share * static_cast<double>(before);
 }
 
-std::vector<GraphLinkResult> without_features(const std::vector<GraphLinkResult>& links,
-                                              std::size_t stored) {
-  return {links.begin(), links.begin() + static_cast<std::ptrdiff_t>(stored)};
-}
-
 void Refinement::bundle() {
   StageReport stage;
   stage.name = "bundle adjustment";
@@ -340,51 +278,6 @@ void Refinement::bundle() {
   if (!stage.rejected) {
     poses_ = std::move(adjusted.map_from_base);
     information_ = std::move(adjusted.information);
-  }
-  close(std::move(stage));
-}
-
-// The same with the intrinsics free. What the camera's file says is kept unless what was held out
-// speaks against it: the pictures of RTAB-Map's own downsampling, for one, are a fraction of a
-// pixel off.
-void Refinement::free_intrinsics() {
-  StageReport stage;
-  stage.name = "intrinsics";
-  const std::vector<GraphLinkResult> others = without_features(graph_.links, stored_.size());
-  IntrinsicsEstimate estimate = estimate_intrinsics(frames_, links_, poses_, others,
-                                                    graph_.components, options_.bundle_adjustment);
-  BundleAdjustmentResult& adjusted = estimate.adjustment;
-  const std::vector<IntrinsicsStep> steps = adjusted.intrinsics;
-  stage.held_out = estimate.held_out;
-  stage.figures.emplace_back("frames", static_cast<double>(estimate.frames));
-  for (std::size_t n = 0; n < steps.size(); ++n) {
-    const std::string camera = "camera_" + std::to_string(n) + "_";
-    stage.figures.emplace_back(camera + "fx_share", steps[n].fx_share);
-    stage.figures.emplace_back(camera + "fy_share", steps[n].fy_share);
-    stage.figures.emplace_back(camera + "cx_px", steps[n].cx_px);
-    stage.figures.emplace_back(camera + "cy_px", steps[n].cy_px);
-  }
-  stage.rejected = !adjusted.converged || (options_.intrinsics == IntrinsicsMode::automatic
-                                               ? !stage.held_out.is_clearly_better()
-                                               : stage.held_out.is_worse());
-  if (!stage.rejected) {
-    const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
-    for (FrameFeatures& frame : frames_) move_intrinsics(frame, steps);
-    if (estimate.frames < frames_.size())
-      adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components,
-                               options_.bundle_adjustment);
-    stage.held_out =
-        evaluate_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
-    stage.rejected = stage.held_out.is_worse();
-    if (stage.rejected)
-      for (FrameFeatures& frame : frames_) move_intrinsics(frame, reversed(steps));
-  }
-  if (!stage.rejected) {
-    poses_ = std::move(adjusted.map_from_base);
-    information_ = std::move(adjusted.information);
-    result_.intrinsics = steps;
-  } else {
-    stage.rejected_error = error_of(adjusted.map_from_base);
   }
   close(std::move(stage));
 }
@@ -422,6 +315,7 @@ void Refinement::finish() {
     result_.links.push_back(link.link);
     if (n >= stored_.size()) result_.closures.push_back(link.link);
   }
+  result_.findings = findings(result_.calibration, result_.cameras);
   result_.components = graph_.components;
   result_.without_links = graph_.without_links;
   const GraphCovariance covariance(poses_, information_, graph_.components);
@@ -446,7 +340,6 @@ RefinementResult Refinement::run() {
   for (int number = 0; number <= options_.rounds; ++number)
     if (!round(number) && number > 0) break;
   information_ = link_system(poses_, graph_.links);
-  for (FrameFeatures& frame : frames_) frame.descriptors = {};
   if (links_.empty()) {
     if (is_all_tracked())
       throw Error("its pictures give no poses: no two of them could be matched",
@@ -455,15 +348,16 @@ RefinementResult Refinement::run() {
         "no two frames could be matched by features: the poses rest on the stored links alone");
   } else {
     if (options_.bundle) bundle();
-    if (options_.bundle && options_.intrinsics != IntrinsicsMode::fixed) free_intrinsics();
+    if (options_.bundle && (options_.intrinsics != IntrinsicsMode::fixed || options_.correct_depth))
+      calibrate_sensor();
+    for (FrameFeatures& frame : frames_) frame.descriptors = {};
     if (options_.icp.mode != IcpMode::off) icp();
+    keep_start_if_better();
   }
   finish();
   leave_out_unjoined();
   return std::move(result_);
 }
-
-}  // namespace
 
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options,
                               Progress& progress, const FeatureCache& cache) {

@@ -22,12 +22,13 @@
 #include "libmap/refine/initial_poses.h"
 #include "libmap/refine/loop_closure.h"
 #include "libmap/refine/pose_graph_optimization.h"
+#include "libmap/refine/sensor_calibration.h"
 #include "libmap/refine/visual_odometry.h"
 #include "libmap/trajectory/trajectory_error.h"
 
 namespace libmap {
 
-// Whether the bundle adjustment estimates focal lengths and principal points of the pictures too.
+// Whether the bundle adjustment estimates focal lengths and principal points too.
 // automatic: if what was held out fits better then, by more than chance explains.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
@@ -36,6 +37,7 @@ struct RefinementOptions {
   int rounds = 5;  // >= 0: of loop closures, each on the poses of the last
   bool bundle = true;
   IntrinsicsMode intrinsics = IntrinsicsMode::automatic;
+  bool correct_depth = true;  // estimate a correction of depth, if what was held out asks for it
   FeatureOptions features{};
   VisualOdometryOptions odometry{};
   LoopClosureDetectionOptions closures{};
@@ -78,7 +80,9 @@ struct RefinementResult {
   std::vector<int> without_links;
   std::vector<PoseLink> rejected_links;  // stored ones
   std::size_t features = 0;
-  std::vector<IntrinsicsStep> intrinsics;  // as refined, of each camera of the rig; else empty
+  SensorCalibration calibration;      // as estimated
+  std::vector<Camera> cameras;        // of the pictures, as stored
+  std::vector<std::string> findings;  // about the sensor, a sentence each
   std::vector<std::string> warnings;
 };
 

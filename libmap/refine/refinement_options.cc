@@ -23,6 +23,9 @@ void bind(ParameterTable& table, RefinementOptions& options) {
              {"auto", IntrinsicsMode::automatic}},
             "focal length and principal point: as stored, or estimated; auto: estimated where the "
             "held-out matches fit better then");
+  table.add("correct_depth", options.correct_depth,
+            "estimate a correction of depth by range and radius, if what was held out fits better "
+            "then");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "of all that is random");

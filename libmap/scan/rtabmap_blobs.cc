@@ -32,7 +32,7 @@ std::string null_pose_blob() { return to_bytes(PoseFloats{}); }
 std::string to_blob(const Matrix6d& information) {
   std::array<double, 36> numbers{};
   using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-  Eigen::Map<RowMajor>(numbers.data()) = information;
+  Eigen::Map<RowMajor>(numbers.data()) = 0.5 * (information + information.transpose());
   return to_bytes(numbers);
 }
 

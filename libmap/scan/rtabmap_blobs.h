@@ -18,7 +18,7 @@ inline bool is_absent(std::string_view blob) { return blob.size() <= absent_blob
 // 12 float32, the rows of [R|t].
 std::string to_blob(const Pose& pose);
 std::string null_pose_blob();
-// 36 float64, row by row.
+// 36 float64, row by row: the symmetric part. g2o rejects a whole graph for one asymmetric bit.
 std::string to_blob(const Matrix6d& information);
 // 6 float32.
 std::string to_blob(const std::array<double, 6>& velocity);

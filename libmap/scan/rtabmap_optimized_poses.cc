@@ -10,6 +10,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/image/matrix_codec.h"
+#include "libmap/scan/calibrated_scan.h"
+#include "libmap/scan/calibration_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/rtabmap_reader.h"
@@ -142,11 +144,37 @@ void add_links(SQLite::Database& database, const std::vector<PoseLink>& links) {
     if (known.insert(std::minmax(link.from, link.to)).second) insert_link(insert, link);
 }
 
+void write_calibration(SQLite::Database& database, const RtabmapDatabase& scan,
+                       const CameraFile& calibration) {
+  if (!scan.columns().has("Data", "calibration"))
+    throw Error("has no place for calibrations", {.file = scan.path().string()});
+  SQLite::Statement update(database, "UPDATE Data SET depth = ?, calibration = ? WHERE id = ?");
+  for (const GraphNode& node : scan.graph().nodes) {
+    const FrameBlobs blobs = scan.read_blobs(node.id);
+    RgbdFrame frame = scan.read_frame(node.id, {.color = false, .depth = true});
+    try {
+      apply_calibration(frame, calibration);
+    } catch (const Error& error) {
+      throw error.in_field("node " + std::to_string(node.id)).in_file(scan.path().string());
+    }
+    if (frame.cameras.empty()) continue;
+    std::string depth = blobs.depth;
+    if (!frame.depth.empty() && calibration.changes_depth())
+      depth = encode_depth(frame.depth, read_depth_info(blobs.depth).value().format);
+    const std::string record = encode_calibration({.cameras = {record_of(frame.cameras.front())}});
+    bind_blob(update, 1, depth);
+    bind_blob(update, 2, record);
+    update.bind(3, node.id);
+    run_once(update);
+  }
+}
+
 }  // namespace
 
 void copy_with_optimized_poses(const fs::path& source, const fs::path& target,
                                const std::map<int, Pose>& map_from_base,
-                               const std::vector<PoseLink>& links) {
+                               const std::vector<PoseLink>& links,
+                               const std::optional<CameraFile>& calibration) {
   const RtabmapDatabase scan(source);
   require_columns(scan, !links.empty());
   scan.file().copy_to(target);
@@ -159,6 +187,7 @@ void copy_with_optimized_poses(const fs::path& source, const fs::path& target,
                  with_landmarks(stored, scan.graph().links, map_from_base));
     clear_stored_map(copy, scan.columns());
     add_links(copy, links);
+    if (calibration) write_calibration(copy, scan, *calibration);
     transaction.commit();
   } catch (const SQLite::Exception& error) {
     throw copy_error(source, target, error);

@@ -61,6 +61,19 @@ constexpr const char* stamp_as_date = "COALESCE(DATETIME(?, 'unixepoch'), '1970-
 
 }  // namespace
 
+std::string encode_depth(const DepthImage& depth, DepthFormat format) {
+  if (depth.empty()) return {};
+  switch (format) {
+    case DepthFormat::rvl:
+      return encode_rvl(to_millimeters(depth));
+    case DepthFormat::png16:
+      return encode_png(to_millimeters(depth));
+    case DepthFormat::float_png:
+      return encode_float_png(depth);
+  }
+  return {};
+}
+
 struct RtabmapWriter::Parts {
   fs::path path;
   RtabmapWriterOptions options;
@@ -131,16 +144,7 @@ std::string RtabmapWriter::Parts::encode(const auto& image) const {
 
 std::string RtabmapWriter::Parts::encode_right_or_depth(const RgbdFrame& frame) const {
   if (!frame.right.empty()) return encode(frame.right);
-  if (frame.depth.empty()) return {};
-  switch (options.depth) {
-    case DepthFormat::rvl:
-      return encode_rvl(to_millimeters(frame.depth));
-    case DepthFormat::png16:
-      return encode_png(to_millimeters(frame.depth));
-    case DepthFormat::float_png:
-      return encode_float_png(frame.depth);
-  }
-  return {};
+  return encode_depth(frame.depth, options.depth);
 }
 
 void RtabmapWriter::Parts::write_data(const RgbdFrame& frame) {

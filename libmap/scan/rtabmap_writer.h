@@ -4,10 +4,12 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/rgbd_frame.h"
@@ -18,6 +20,9 @@ struct RtabmapWriterOptions {
   DepthFormat depth = DepthFormat::rvl;   // rvl and png16: whole millimeters up to 65.534 m
   ImageFormat color = ImageFormat::jpeg;  // of the right image of a stereo pair too
 };
+
+// The depth image as RTAB-Map stores it; empty for an empty one.
+std::string encode_depth(const DepthImage& depth, DepthFormat format);
 
 // The same calls in the same order give the same bytes: where RTAB-Map writes the present time, the
 // stamps of the nodes stand.
@@ -50,11 +55,14 @@ class RtabmapWriter {
 // stood at an optimized pose it moves with its node, else it is dropped; landmarks among the
 // optimized poses move with the first node that sees them. A grid, cloud or mesh that RTAB-Map
 // stored with the earlier poses goes: it makes them anew. `links` between its nodes are added, in
-// both directions, where the two have no link yet. `source` may be open elsewhere. Throws Error: no
-// database of RTAB-Map 0.13 or later.
+// both directions, where the two have no link yet. With a calibration the camera and the depth
+// images of all nodes become what apply_calibration makes of them, depth in the format that it has.
+// `source` may be open elsewhere. Throws Error: no database of RTAB-Map 0.13 or later, or a node
+// whose camera is another.
 void copy_with_optimized_poses(const std::filesystem::path& source,
                                const std::filesystem::path& target,
                                const std::map<int, Pose>& map_from_base,
-                               const std::vector<PoseLink>& links = {});
+                               const std::vector<PoseLink>& links = {},
+                               const std::optional<CameraFile>& calibration = std::nullopt);
 
 }  // namespace libmap

@@ -6,7 +6,9 @@
 #include <utility>
 
 #include "libmap/core/file_output.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/image/image_codec.h"
+#include "libmap/scan/calibrated_scan.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"
@@ -223,6 +225,47 @@ TEST(Refine, ReportsInJsonAndInText) {
        {"absolute error: rmse", "relative error: rmse", "held-out matches", "held-out surfaces",
         "links of neighbor", "standard deviations"})
     EXPECT_NE(text.find(words), std::string::npos) << words;
+}
+
+// A camera that the scan stores wrongly is found, written, and applied by what reads the scan.
+TEST(RefineCalibration, IsWrittenAndApplied) {
+  libmap::Camera camera{
+      .width = 320, .height = 264, .fx = 228, .fy = 228, .cx = 159.5, .cy = 131.5};
+  libmap::write_text(scratch("camera.yaml"), libmap::to_yaml({.camera = camera}));
+  ASSERT_TRUE(succeeded(graspmap({"simulate", "site", "--edge-length", "0.03", "-o", "site"})));
+  ASSERT_TRUE(
+      succeeded(graspmap({"simulate", "scan", "site/mesh.ply", "-o", "scan.db", "--camera",
+                          "camera.yaml", "--frames", "20", "--loops", "1", "--stored-focal-percent",
+                          "1.5", "--stored-cx", "3", "--depth-corner", "0.012"})));
+  ASSERT_TRUE(
+      succeeded(graspmap({"refine", "scan.db", "-o", "poses.tum", "--write-calibration",
+                          "found.yaml", "--write-database", "found.db", "--report", "r.json"})));
+  const libmap::CameraFile found = libmap::read_camera(scratch("found.yaml"));
+  EXPECT_NEAR(found.camera.fx, 228.0, 1.0) << "of 3.4 px";
+  EXPECT_NEAR(found.camera.cx, 159.5, 0.5);
+  ASSERT_FALSE(found.depth.empty());
+  EXPECT_NEAR(found.depth.at(1.8, 1.0) - found.depth.at(1.8, 0.0), -0.012, 0.004);
+  EXPECT_EQ(json_of("r.json").at("sensor").size(), 2U);
+  EXPECT_LT(error_of_file("poses.tum", scratch("scan.db")).mean_rotation_deg, 0.1);
+  // The copy is the scan as the calibration has it.
+  const auto copy = libmap::open_scan(scratch("found.db"));
+  const auto known = libmap::with_calibration(libmap::open_scan(scratch("scan.db")), found);
+  const libmap::RgbdFrame a = copy->read_frame(7);
+  const libmap::RgbdFrame b = known->read_frame(7);
+  EXPECT_EQ(a.cameras.at(0).fx, found.camera.fx);
+  EXPECT_EQ(b.cameras.at(0).fx, found.camera.fx);
+  for (std::size_t n = 0; n < a.depth.pixels.size(); ++n)
+    ASSERT_NEAR(a.depth.pixels[n], b.depth.pixels[n], 5.1e-4) << "whole millimeters";
+  ASSERT_TRUE(succeeded(graspmap({"fuse", "scan.db", "--poses", "poses.tum", "--calibration",
+                                  "found.yaml", "--voxel-size", "0.05", "-o", "cloud.ply"})));
+  EXPECT_TRUE(
+      bad_input(graspmap({"fuse", "scan.db", "--calibration", "camera.yaml2", "-o", "c.ply"}),
+                {"camera.yaml2"}));
+  camera.width = 321;
+  libmap::write_text(scratch("other.yaml"), libmap::to_yaml({.camera = camera}));
+  EXPECT_TRUE(bad_input(
+      graspmap({"fuse", "scan.db", "--calibration", "other.yaml", "-o", "c.ply", "--quiet"}),
+      {"camera is 320 x 264: the calibration is of another size (must be 321 x 264)"}));
 }
 
 // One link that cannot be used does not end it, nor does a node without a calibration.

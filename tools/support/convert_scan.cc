@@ -22,6 +22,7 @@ namespace fs = std::filesystem;
 struct ExtractOptions {
   std::string scan;
   std::string output;
+  std::string calibration;
   bool strict = false;
   PictureOptions pictures;
 };
@@ -166,9 +167,10 @@ void extract(ExtractOptions& options, Run& run) {
   if (options.output.empty() && !pictures)
     throw UsageError("nothing to write: -o, --bundler or --colmap names a folder");
   if (!options.output.empty())
-    run.claim_output_tree(options.output, libmap::frame_folder_names(), {options.scan});
+    run.claim_output_tree(options.output, libmap::frame_folder_names(),
+                          {options.scan, options.calibration});
   if (pictures) claim_picture_folders(options.pictures, options.scan, run);
-  const auto scan = open_scan(options.scan, options.strict, run);
+  const auto scan = open_scan(options.scan, options.strict, run, options.calibration);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   // Each folder's manifest holds what was done for it alone.
   const libmap::Manifest start = run.manifest();
@@ -194,6 +196,7 @@ int graspmap_tools::convert_scan(int argc, char** argv) {
   command.input("SCAN", options.scan, "RTAB-Map database, or a folder of frames");
   command.output(options.output, "folder of the whole scan, replaced as a whole", false);
   command.flag("--strict", options.strict, "end at a frame that is broken");
+  add_calibration_option(command, options.calibration);
   add_options(command, options.pictures);
   return command.run(argc, argv, [&](Run& run) { extract(options, run); });
 }

@@ -194,6 +194,7 @@ std::string refinement_json(const std::string& scan, const libmap::RefinementRes
                      {"nodes_lost_by_odometry", losses},
                      {"frames_skipped", skipped},
                      {"stored_links_rejected", rejected},
+                     {"sensor", result.findings},
                      {"warnings", result.warnings},
                      {"nodes", nodes_json(result)}};
   return json.dump(2) + "\n";
@@ -217,6 +218,7 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
   for (const libmap::PoseLink& link : result.rejected_links)
     fmt::format_to(out, "stored link {} -> {} rejected: {}\n", link.from, link.to,
                    to_text(link.type));
+  for (const std::string& finding : result.findings) fmt::format_to(out, "sensor: {}\n", finding);
   for (const std::string& warning : result.warnings) fmt::format_to(out, "warning: {}\n", warning);
   fmt::format_to(
       out,

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "libmap/scan/calibrated_scan.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"
@@ -122,14 +123,25 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
   return inputs;
 }
 
-std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool strict, Run& run) {
+void add_calibration_option(Command& command, std::string& calibration) {
+  command.option("--calibration", "FILE.yaml", calibration,
+                 "the camera as refine --write-calibration found it, instead of the stored one");
+}
+
+std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool strict, Run& run,
+                                              const std::string& calibration) {
   auto scan = run.timed("open", [&] { return libmap::open_scan(path); });
   for (const std::string& warning : scan->warnings()) {
     if (strict && !libmap::is_about_unknown_part(warning))
       throw libmap::Error(warning).in_file(path);
     run.warn("{}: {}", path, warning);
   }
-  return scan;
+  if (calibration.empty()) return scan;
+  const libmap::CameraFile camera = libmap::read_camera(calibration);
+  run.add_input(calibration);
+  run.say("camera of {}: {}", calibration,
+          camera.depth.empty() ? "intrinsics" : "intrinsics and depth correction");
+  return libmap::with_calibration(std::move(scan), camera);
 }
 
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,

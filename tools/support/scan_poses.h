@@ -22,8 +22,13 @@ std::size_t count_valid_nodes(const libmap::PoseGraph& graph);
 // The files among the two, for Run::claim_output.
 std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses);
 
-// Opens a scan; what it had to leave out is a warning, an Error if `strict`.
-std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run);
+// --calibration FILE: the scan's camera as it is known now, its depth correction included.
+void add_calibration_option(Command& command, std::string& calibration);
+
+// Opens a scan; what it had to leave out is a warning, an Error if `strict`. Its frames are those
+// of the calibration, if there is one.
+std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
+                                              const std::string& calibration = {});
 
 // The poses that `poses` names, by ascending node; "auto" becomes the source that was taken. Says
 // so, and keeps it in the manifest. Nodes without a pose are a warning, an Error if `strict`.

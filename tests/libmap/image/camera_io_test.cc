@@ -58,6 +58,44 @@ constexpr Lens lenses[] = {{DistortionModel::none, 0},
                            {DistortionModel::radial_tangential, 12},
                            {DistortionModel::equidistant, 4}};
 
+TEST(CameraIo, DepthCorrectionsComeBackBitForBit) {
+  CameraFile file{.name = "a", .camera = random_camera(DistortionModel::none, 0)};
+  file.depth = {0.61, 0.2, {0.001, -0.002, 1e-7, 0.25, -0.125}, {0.1, -0.003, 1.0 / 3.0}};
+  const CameraFile read = parse_camera(to_yaml(file), "a.yaml");
+  EXPECT_EQ(read.depth, file.depth);
+  expect_equal(read.camera, file.camera);
+  EXPECT_TRUE(parse_camera(to_yaml({.camera = file.camera}), "a.yaml").depth.empty());
+  file.depth.spline_m.resize(3);
+  EXPECT_THAT(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }).what(),
+              HasSubstr("depth_correction is 3: wrong number of coefficients"));
+  file.depth.spline_m = {0, 0, 0, 2};
+  EXPECT_THAT(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }).what(),
+              HasSubstr("-1 to 1 m"));
+  file.depth.spline_m = {0, 0, 0, 0};
+  file.depth.step_m = 0.0;
+  EXPECT_THAT(error_of([&] { parse_camera(to_yaml(file), "a.yaml"); }).what(),
+              HasSubstr("depth_correction_range"));
+}
+
+// A spline of equal coefficients is a constant; of coefficients on a line that line; depths beyond
+// the knots take what the last of them take.
+TEST(DepthCorrection, IsTheSplineAndTheRadialTerms) {
+  libmap::DepthCorrection correction{1.0, 0.5, {0, 0, 0, 0, 0, 0}, {0.01, 0.02, 0.03}};
+  EXPECT_NEAR(correction.at(1.7, 0.25), 0.01 * 0.25 + 0.02 * 0.0625 + 0.03 * 1.7 * 0.25, 1e-15);
+  correction.radial = {};
+  for (std::size_t n = 0; n < 6; ++n) correction.spline_m[n] = 0.1 * (static_cast<double>(n) - 1.0);
+  EXPECT_DOUBLE_EQ(correction.last_m(), 2.5);
+  for (const double z : {1.0, 1.2, 1.5, 2.0, 2.49, 2.5})
+    EXPECT_NEAR(correction.at(z, 0.0), 0.2 * (z - 1.0), 1e-12) << z;
+  EXPECT_NEAR(correction.at(0.2, 0.0), 0.0, 1e-12);
+  EXPECT_NEAR(correction.at(9.0, 0.0), 0.3, 1e-12);
+  libmap::DepthImage image(3, 1, 2.0F);
+  image.at(1, 0) = 0.0F;
+  libmap::correct_depth(image, correction);
+  EXPECT_FLOAT_EQ(image.at(0, 0), 2.2F);
+  EXPECT_EQ(image.at(1, 0), 0.0F) << "what was not measured stays so";
+}
+
 TEST(CameraIo, EveryLensReadsBackBitForBit) {
   for (const Lens& lens : lenses) {
     for (int round = 0; round < 20; ++round) {

@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <limits>
+#include <vector>
 
 #include "libmap/refine/icp_refinement.h"
+#include "libmap/refine/sensor_calibration.h"
 #include "libmap/refine/surface_samples.h"
 #include "tests/libmap/refine/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
@@ -105,6 +107,66 @@ TEST(HeldOut, SurfacesTellWrongPosesFromTrueOnes) {
                                                libmap::held_out_costs(found.frames, links, wrong));
   EXPECT_LT(fewer.surfaces.count, evaluated.surfaces.count);
   EXPECT_GT(fewer.surfaces.count, 0U);
+}
+
+// The share of the elements that both have and that differ by more than a millimeter or 0.1
+// degrees: at edges one or the other takes another neighbor's plane.
+double share_of_other_elements(const std::vector<libmap::FrameFeatures>& one,
+                               const std::vector<libmap::FrameFeatures>& other) {
+  double elements = 0.0;
+  double others = 0.0;
+  for (std::size_t n = 0; n < one.size(); ++n)
+    for (int row = 0; row < one[n].surfaces[0].rows(); ++row)
+      for (int column = 0; column < one[n].surfaces[0].columns(); ++column) {
+        libmap::SurfaceElement a;
+        libmap::SurfaceElement b;
+        if (!one[n].surfaces[0].at(column, row, a) || !other[n].surfaces[0].at(column, row, b))
+          continue;
+        elements += 1.0;
+        const bool same = (a.normal - b.normal).norm() < 2e-3 && (a.point - b.point).norm() < 1e-3;
+        others += same ? 0.0 : 1.0;
+      }
+  return others / elements;
+}
+
+// The depth of frames read with a wrong camera fits at the true poses once the camera is put right:
+// as well as had it been right from the start.
+TEST(HeldOut, SurfacesAreSeenThroughTheCameraThatIsRefined) {
+  TexturedScan scan = bare_ground(3);
+  std::map<int, Pose> truth;
+  for (int n = 0; n < 3; ++n) truth[n + 1] = around(10.0 * n);
+  std::vector<libmap::FeatureLink> links(2);
+  links[0].frames = {0, 1};
+  links[1].frames = {1, 2};
+  const auto right = libmap::find_features(scan, {1, 2, 3});
+  const libmap::IntrinsicsStep wrong_by{0.02, 0.015, 4.0, -3.0};
+  const libmap::IntrinsicsStep step{1.0 / 1.02 - 1.0, 1.0 / 1.015 - 1.0, -4.0, 3.0};
+  for (auto& [node, frame] : scan.frames)
+    frame.cameras = {libmap::moved(frame.cameras[0], wrong_by)};
+  auto found = libmap::find_features(scan, {1, 2, 3});
+  const auto wrong = libmap::surface_costs(found.frames, links, truth);
+  for (libmap::FrameFeatures& frame : found.frames) libmap::move_intrinsics(frame, {step});
+  const auto put_right = libmap::surface_costs(found.frames, links, truth);
+  const auto from_start = libmap::surface_costs(right.frames, links, truth);
+  EXPECT_GT(libmap::compare_held_out(wrong, put_right).count, 50U);
+  const auto gain = libmap::compare_held_out(wrong, put_right);
+  EXPECT_LT(gain.after, 0.5 * gain.before);
+  const auto same = libmap::compare_held_out(from_start, put_right);
+  EXPECT_NEAR(same.after, same.before, 0.02 * same.before);
+  EXPECT_LT(share_of_other_elements(found.frames, right.frames), 0.02);
+}
+
+// Corrected surfaces are those of the corrected images.
+TEST(HeldOut, SurfacesTurnWithTheCorrectionOfDepth) {
+  TexturedScan scan = bare_ground(2);
+  libmap::DepthCorrection correction{0.5, 0.25, {}, {0.01, -0.004, 0.006}};
+  for (int n = 0; n < 14; ++n) correction.spline_m.push_back(0.01 * std::sin(0.8 * n));
+  auto found = libmap::find_features(scan, {1, 2});
+  for (auto& [node, frame] : scan.frames) libmap::correct_depth(frame.depth, correction);
+  const auto wanted = libmap::find_features(scan, {1, 2});
+  EXPECT_GT(share_of_other_elements(found.frames, wanted.frames), 0.5);
+  for (libmap::FrameFeatures& frame : found.frames) libmap::correct_depth(frame, {correction});
+  EXPECT_LT(share_of_other_elements(found.frames, wanted.frames), 0.05);
 }
 
 }  // namespace held_out_test

@@ -1,0 +1,84 @@
+#include "libmap/image/depth_correction.h"
+
+#include <algorithm>
+#include <cmath>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t max_coefficients = 1000;
+constexpr double max_correction_m = 1.0;
+
+}  // namespace
+
+DepthCorrection::Terms DepthCorrection::terms(double depth_m, double radius2) const {
+  Terms terms;
+  terms.radial = {radius2, radius2 * radius2, depth_m * radius2};
+  const double pieces = static_cast<double>(spline_m.size()) - 3.0;
+  const double place = std::clamp((depth_m - first_m) / step_m, 0.0, pieces);
+  const double piece = std::min(std::floor(place), pieces - 1.0);
+  const double t = place - piece;
+  const double s = 1.0 - t;
+  terms.first = static_cast<std::size_t>(piece);
+  terms.spline = {s * s * s / 6.0, (3.0 * t * t * t - 6.0 * t * t + 4.0) / 6.0,
+                  (3.0 * s * s * s - 6.0 * s * s + 4.0) / 6.0, t * t * t / 6.0};
+  return terms;
+}
+
+double DepthCorrection::at(double depth_m, double radius2) const {
+  if (empty()) return 0.0;
+  const Terms of = terms(depth_m, radius2);
+  double sum = 0.0;
+  for (std::size_t n = 0; n < 4; ++n) sum += of.spline[n] * spline_m[of.first + n];
+  for (std::size_t n = 0; n < 3; ++n) sum += of.radial[n] * radial[n];
+  return sum;
+}
+
+void DepthCorrection::check() const {
+  if (empty()) return;
+  if (spline_m.size() < 4 || spline_m.size() > max_coefficients)
+    throw Error("wrong number of coefficients", {.field = "depth_correction",
+                                                 .value = std::to_string(spline_m.size()),
+                                                 .bound = "4 to 1000"});
+  if (!(step_m > 0.0 && std::isfinite(step_m) && std::isfinite(first_m)))
+    throw Error("out of range", {.field = "depth_correction_range",
+                                 .value = to_text(first_m) + ", " + to_text(step_m),
+                                 .bound = "first depth and step > 0"});
+  const auto is_small = [](double number) { return std::abs(number) <= max_correction_m; };
+  for (const double number : spline_m)
+    if (!is_small(number))
+      throw Error("out of range",
+                  {.field = "depth_correction", .value = to_text(number), .bound = "-1 to 1 m"});
+  for (const double number : radial)
+    if (!is_small(number))
+      throw Error(
+          "out of range",
+          {.field = "depth_correction_radial", .value = to_text(number), .bound = "-1 to 1"});
+}
+
+double squared_image_radius(int width, int height, double x_px, double y_px) {
+  const double half_x = 0.5 * (width - 1);
+  const double half_y = 0.5 * (height - 1);
+  const double largest = std::max(half_x * half_x + half_y * half_y, 1e-9);
+  return ((x_px - half_x) * (x_px - half_x) + (y_px - half_y) * (y_px - half_y)) / largest;
+}
+
+void correct_depth(DepthImage& depth, const DepthCorrection& correction) {
+  if (correction.empty()) return;
+  for (int y = 0; y < depth.height; ++y)
+    for (int x = 0; x < depth.width; ++x) {
+      float& z = depth.at(x, y);
+      if (!(z > 0.0F)) continue;
+      const auto measured = static_cast<double>(z);
+      const double corrected =
+          measured + correction.at(measured, squared_image_radius(depth.width, depth.height, x, y));
+      z = static_cast<float>(std::max(corrected, 0.0));
+    }
+}
+
+}  // namespace libmap

@@ -1,0 +1,47 @@
+// A smooth correction of a camera's depth: what is added to it as a function of depth (a uniform
+// cubic B-spline) and of the radius in the image. Linear in its numbers, so that they are estimated
+// by least squares. A model for each range and place was proposed by Teichman et al. (2013); a
+// scan holds too little for a map of every pixel.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <vector>
+
+#include "libmap/core/camera.h"
+#include "libmap/core/image.h"
+
+namespace libmap {
+
+struct DepthCorrection {
+  double first_m = 0.0;            // depths before it are corrected as it is
+  double step_m = 0.0;             // between the spline's knots
+  std::vector<double> spline_m{};  // its coefficients, 4 or more; empty: no correction at all
+  std::array<double, 3> radial{};  // of r^2 and r^4 (m), of depth r^2 (m a m); r is 1 in corners
+
+  // What a depth takes from the spline (the coefficients from `first` on) and from the radial
+  // terms.
+  struct Terms {
+    std::size_t first = 0;
+    std::array<double, 4> spline{};
+    std::array<double, 3> radial{};
+  };
+
+  bool empty() const { return spline_m.empty(); }
+  double last_m() const { return first_m + step_m * (static_cast<double>(spline_m.size()) - 3.0); }
+  // At a depth, and a squared radius as of `at`.
+  Terms terms(double depth_m, double radius2) const;
+  // What is added to `depth_m`.
+  double at(double depth_m, double radius2) const;
+  // Throws Error naming the field: a step > 0, no or 4 to 1000 coefficients of less than 1 m each.
+  void check() const;
+  bool operator==(const DepthCorrection&) const = default;
+};
+
+// From the middle of the image, squared, of that of its corners' pixels.
+double squared_image_radius(int width, int height, double x_px, double y_px);
+
+// Pixels without a depth stay so.
+void correct_depth(DepthImage& depth, const DepthCorrection& correction);
+
+}  // namespace libmap

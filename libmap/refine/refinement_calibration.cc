@@ -1,0 +1,136 @@
+#include <map>
+#include <utility>
+
+#include "libmap/refine/refinement_work.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr int max_calibrations = 3;
+constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
+
+void add_figures(const CalibrationEstimate& estimate, StageReport& stage) {
+  stage.figures.emplace_back("frames", static_cast<double>(estimate.frames));
+  for (const auto& [name, change] : estimate.tried) {
+    stage.figures.emplace_back(name + "_matches", change.matches.after);
+    stage.figures.emplace_back(name + "_surfaces", change.surfaces.after);
+  }
+  for (std::size_t n = 0; n < estimate.calibration.intrinsics.size(); ++n) {
+    const IntrinsicsStep& step = estimate.calibration.intrinsics[n];
+    const std::string camera = "camera_" + std::to_string(n) + "_";
+    stage.figures.emplace_back(camera + "fx_share", step.fx_share);
+    stage.figures.emplace_back(camera + "fy_share", step.fy_share);
+    stage.figures.emplace_back(camera + "cx_px", step.cx_px);
+    stage.figures.emplace_back(camera + "cy_px", step.cy_px);
+  }
+}
+
+}  // namespace
+
+// The same with intrinsics, depth and its registration free. What the camera's file says is kept
+// unless what was held out speaks against it: the pictures of RTAB-Map's own downsampling, for one,
+// are a fraction of a pixel off.
+bool Refinement::calibrate_sensor(const std::string& name) {
+  StageReport stage;
+  stage.name = name;
+  const std::vector<GraphLinkResult> others = without_features(graph_.links, stored_.size());
+  CalibrationChoice choice;
+  choice.intrinsics = options_.intrinsics != IntrinsicsMode::fixed;
+  choice.depth = choice.registration = options_.correct_depth;
+  choice.only_if_better = options_.intrinsics != IntrinsicsMode::refined;
+  if (const SensorCalibration& known = result_.calibration; !known.empty()) {
+    choice.intrinsics = !known.intrinsics.empty();
+    choice.depth = !known.depth.empty();
+    choice.registration = !known.color_from_depth.empty();
+    choice.leave_out = false;
+    choice.color_from_depth = known.color_from_depth;
+  }
+  CalibrationEstimate estimate = estimate_calibration(
+      frames_, links_, poses_, others, graph_.components, options_.bundle_adjustment, choice);
+  stage.held_out = estimate.held_out;
+  add_figures(estimate, stage);
+  stage.rejected = estimate.calibration.empty();
+  BundleAdjustmentResult& adjusted = estimate.adjustment;
+  if (!stage.rejected) {
+    const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
+    std::vector<FrameFeatures> as_stored = frames_;
+    for (FrameFeatures& frame : frames_) calibrate(frame, estimate.calibration);
+    if (estimate.frames < frames_.size())
+      adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components,
+                               options_.bundle_adjustment);
+    stage.held_out =
+        evaluate_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
+    stage.rejected = stage.held_out.is_worse();
+    if (stage.rejected)
+      frames_ = std::move(as_stored);
+    else
+      stored_frames_ = std::move(as_stored);
+  }
+  const bool accepted = !stage.rejected;
+  if (accepted) {
+    poses_ = std::move(adjusted.map_from_base);
+    information_ = std::move(adjusted.information);
+    result_.calibration = std::move(estimate.calibration);
+  } else {
+    stage.rejected_error = error_of(adjusted.map_from_base);
+  }
+  close(std::move(stage));
+  return accepted;
+}
+
+// Matches that a wrong camera hid come back with the right one, and those that it let pass go.
+void Refinement::match_again() {
+  std::vector<FramePair> pairs;
+  std::map<FramePair, LinkType> types;
+  for (const FeatureLink& link : links_)
+    if (types.emplace(link.frames, link.link.type).second) pairs.push_back(link.frames);
+  PairVerification verified =
+      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_);
+  if (verified.links.size() < static_cast<std::size_t>(0.9 * static_cast<double>(pairs.size())))
+    return;
+  for (FeatureLink& link : verified.links) link.link.type = types.at(link.frames);
+  links_ = std::move(verified.links);
+}
+
+// Again with matches by what has been found: those of the first time are what the stored camera let
+// pass. A wrong registration hides most of them.
+void Refinement::calibrate_sensor() {
+  std::vector<FrameFeatures> calibrated;
+  for (int pass = 1; pass <= max_calibrations; ++pass) {
+    if (!calibrate_sensor(pass == 1 ? "calibration" : "calibration " + std::to_string(pass))) {
+      if (pass == 1) return;
+      stored_frames_ = std::move(frames_);
+      frames_ = std::move(calibrated);
+      break;
+    }
+    if (pass == max_calibrations || (pass > 1 && result_.calibration.color_from_depth.empty()))
+      break;
+    match_again();
+    calibrated = std::move(frames_);
+    frames_ = std::exchange(stored_frames_, {});
+  }
+  for (FrameFeatures& frame : stored_frames_) frame.descriptors = {};
+}
+
+// The whole, by what no stage was estimated from. A part that had no poses has nothing to fall back
+// to.
+void Refinement::keep_start_if_better() {
+  if (!tracked_.empty() || start_.size() != poses_.size()) return;
+  const HeldOutEvaluation whole = evaluate_held_out(
+      held_out_costs(stored_frames_.empty() ? frames_ : stored_frames_, links_, start_),
+      held_out_costs(frames_, links_, poses_));
+  if (whole.change() > 2.0 * whole.deviation()) {
+    poses_ = start_;
+    result_.calibration = {};
+    result_.warnings.push_back(
+        "what was held out fits the poses of the start better: they are kept, and the camera as "
+        "it is stored");
+  } else if (whole.matches.after > explained_cost) {
+    result_.warnings.push_back(
+        "held-out matches fit worse than noise explains: the sensor has faults that the "
+        "calibration does not cover, such as a delay or a rolling shutter");
+  }
+}
+
+}  // namespace libmap

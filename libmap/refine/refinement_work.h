@@ -1,0 +1,89 @@
+// The state of one refinement, stage by stage. Inner part of libmap/refine.
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <ctime>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "libmap/refine/refinement.h"
+
+namespace libmap {
+
+class Refinement {
+ public:
+  Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress,
+             const FeatureCache& cache)
+      : scan_(scan),
+        options_(options),
+        progress_(progress),
+        cache_(cache),
+        truth_(trajectory_of(scan.graph(), PoseSource::ground_truth)) {}
+  // All stages; see refine_poses in refinement.h.
+  RefinementResult run();
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void start();
+  void find_frames();
+  bool may_be_visual() const {
+    return options_.start == StartPoses::visual || options_.start == StartPoses::automatic;
+  }
+  bool is_all_tracked() const {
+    return std::all_of(poses_.begin(), poses_.end(), [&](const auto& pose) {
+      return pose.first < 0 || tracked_.contains(pose.first);
+    });
+  }
+  void odometry();
+  void leave_out_unjoined();
+  bool round(int number);
+  std::vector<FramePair> candidates(int number);
+  std::vector<GraphLink> with_features(const std::vector<FeatureLink>& links) const;
+  void join_new(const std::vector<FeatureLink>& links);
+  void bundle();
+  bool calibrate_sensor(const std::string& name);
+  void match_again();
+  void calibrate_sensor();
+  void icp();
+  void keep_start_if_better();
+  void finish();
+  Trajectory trajectory(const std::map<int, Pose>& poses) const;
+  void close(StageReport stage);
+  // Compares poses with those before; true if they are worse.
+  bool evaluate(StageReport& stage, const std::map<int, Pose>& before,
+                const std::map<int, Pose>& after) const;
+  std::optional<StageError> error_of(const std::map<int, Pose>& poses) const;
+
+  const ScanSource& scan_;
+  const RefinementOptions& options_;
+  Progress& progress_;
+  const FeatureCache& cache_;
+  Trajectory truth_;
+  Clock::time_point stage_begin_ = Clock::now();
+  std::clock_t processor_begin_ = std::clock();
+  RefinementResult result_;
+  std::map<int, Pose> poses_;
+  std::map<int, Pose> start_;  // poses of the start
+  std::vector<std::vector<int>> parts_;
+  std::vector<FrameFeatures> frames_;
+  std::vector<FrameFeatures> stored_frames_;  // before an accepted calibration
+  std::vector<GraphLink> stored_;
+  std::set<int> tracked_;  // nodes whose poses are by visual odometry
+  std::vector<FeatureLink> links_;
+  std::set<FramePair> tried_;
+  PoseGraphResult graph_;
+  BlockSystem information_{0};
+};
+
+// Of the graph's links, those that are not of features.
+inline std::vector<GraphLinkResult> without_features(const std::vector<GraphLinkResult>& links,
+                                                     std::size_t stored) {
+  return {links.begin(), links.begin() + static_cast<std::ptrdiff_t>(stored)};
+}
+
+}  // namespace libmap
