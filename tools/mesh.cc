@@ -8,7 +8,7 @@
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
-#include "libmap/surface/poisson_reconstruction.h"
+#include "libmap/surface/surface_reconstruction.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 
@@ -28,7 +28,7 @@ struct MeshOptions {
   bool report = false;
   bool json = false;
   libmap::NormalEstimationOptions estimation;
-  libmap::PoissonReconstructionOptions reconstruction;
+  libmap::SurfaceReconstructionOptions reconstruction;
   libmap::MeshCleaningOptions cleaning;
 };
 
@@ -78,7 +78,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
 
 libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::PointCloud& cloud,
                                    Run& run) {
-  libmap::PoissonReconstructionResult made =
+  libmap::SurfaceReconstructionResult made =
       libmap::reconstruct_surface(cloud, options.reconstruction, run.progress());
   if (made.dropped_points > 0)
     run.warn("{} of {} points have no normal and are left out", made.dropped_points, cloud.size());

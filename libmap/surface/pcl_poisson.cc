@@ -53,10 +53,10 @@ class Silence {
   std::array<int, 2> kept_{};
 };
 
-pcl::PointCloud<pcl::PointNormal>::Ptr to_pcl(const std::vector<PoissonSample>& samples) {
+pcl::PointCloud<pcl::PointNormal>::Ptr to_pcl(const std::vector<SurfaceSample>& samples) {
   pcl::PointCloud<pcl::PointNormal>::Ptr cloud(new pcl::PointCloud<pcl::PointNormal>);
   cloud->reserve(samples.size());
-  for (const PoissonSample& sample : samples) {
+  for (const SurfaceSample& sample : samples) {
     pcl::PointNormal point;
     point.getVector3fMap() = sample.position;
     // Its length is the confidence.
@@ -66,10 +66,10 @@ pcl::PointCloud<pcl::PointNormal>::Ptr to_pcl(const std::vector<PoissonSample>& 
   return cloud;
 }
 
-float extent_of(const std::vector<PoissonSample>& samples) {
+float extent_of(const std::vector<SurfaceSample>& samples) {
   Eigen::Array3f low = samples.front().position;
   Eigen::Array3f high = low;
-  for (const PoissonSample& sample : samples) {
+  for (const SurfaceSample& sample : samples) {
     low = low.min(sample.position.array());
     high = high.max(sample.position.array());
   }
@@ -78,7 +78,7 @@ float extent_of(const std::vector<PoissonSample>& samples) {
 
 }  // namespace
 
-TriangleMesh solve_poisson(const std::vector<PoissonSample>& samples,
+TriangleMesh solve_poisson(const std::vector<SurfaceSample>& samples,
                            const PoissonProblem& problem) {
   // PCL's octrees share one allocator.
   static std::mutex in_use;

@@ -1,19 +1,13 @@
 // PCL's Poisson reconstruction, made to give the same bytes in every run. Inner part of
-// poisson_reconstruction.
+// surface_reconstruction.
 #pragma once
 
-#include <Eigen/Core>
 #include <vector>
 
 #include "libmap/core/triangle_mesh.h"
+#include "libmap/surface/surface_sample.h"
 
 namespace libmap {
-
-struct PoissonSample {
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // m, about the samples' middle
-  Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // unit, outwards
-  float weight = 1.0F;                                 // > 0
-};
 
 struct PoissonProblem {
   int depth = 0;        // of the octree
@@ -23,7 +17,7 @@ struct PoissonProblem {
 };
 
 // The whole surface, positions alone. Throws Error of ErrorKind::failed if PCL gives up.
-TriangleMesh solve_poisson(const std::vector<PoissonSample>& samples,
+TriangleMesh solve_poisson(const std::vector<SurfaceSample>& samples,
                            const PoissonProblem& problem);
 
 }  // namespace libmap

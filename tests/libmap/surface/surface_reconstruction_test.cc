@@ -1,4 +1,4 @@
-#include "libmap/surface/poisson_reconstruction.h"
+#include "libmap/surface/surface_reconstruction.h"
 
 #include <gmock/gmock.h>
 
@@ -12,13 +12,14 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/surface/implicit_surface.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
 #include "libmap/surface/pcl_poisson.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace poisson_reconstruction_test {
+namespace surface_reconstruction_test {
 
 using graspmap_test::error_of;
 using graspmap_test::random_engine;
@@ -62,11 +63,25 @@ PointCloud joined(PointCloud one, const PointCloud& two) {
   return one;
 }
 
-PoissonReconstructionOptions cells_of(double cell_size_m) {
-  PoissonReconstructionOptions options;
+SurfaceReconstructionOptions cells_of(double cell_size_m) {
+  SurfaceReconstructionOptions options;
   options.cell_size_m = cell_size_m;
   return options;
 }
+
+class Reconstruction : public testing::TestWithParam<SurfaceMethod> {
+ protected:
+  static SurfaceReconstructionResult reconstruct(const PointCloud& cloud,
+                                                 SurfaceReconstructionOptions options = {}) {
+    options.method = GetParam();
+    return reconstruct_surface(cloud, options);
+  }
+};
+INSTANTIATE_TEST_SUITE_P(Method, Reconstruction,
+                         testing::Values(SurfaceMethod::implicit, SurfaceMethod::poisson),
+                         [](const auto& one) {
+                           return one.param == SurfaceMethod::poisson ? "Poisson" : "Implicit";
+                         });
 
 MeshReport cleaned_report(const TriangleMesh& mesh) {
   MeshCleaningOptions options;
@@ -81,9 +96,9 @@ double rms_off_sphere(const TriangleMesh& mesh, double radius) {
   return std::sqrt(squares / static_cast<double>(mesh.vertices.size()));
 }
 
-TEST(PoissonReconstruction, Sphere) {
+TEST_P(Reconstruction, Sphere) {
   constexpr double radius = 0.25;
-  const PoissonReconstructionResult result = reconstruct_surface(ball(radius, 0.01));
+  const SurfaceReconstructionResult result = reconstruct(ball(radius, 0.01));
   EXPECT_NEAR(result.cell_size_m, 0.01, 0.002);
   EXPECT_EQ(result.cell_size_m, result.spacing_m);
   EXPECT_LT(rms_off_sphere(result.mesh, radius), 0.0005);
@@ -98,11 +113,11 @@ TEST(PoissonReconstruction, Sphere) {
   EXPECT_NEAR(report.volume_m3, 4 * pi / 3 * std::pow(radius, 3), 0.01 * std::pow(radius, 3));
 }
 
-TEST(PoissonReconstruction, CellsHaveTheWantedSize) {
+TEST_P(Reconstruction, CellsHaveTheWantedSize) {
   const PointCloud cloud = ball(0.25, 0.005);
   double last = 0.0;
   for (const double cell : {0.01, 0.013, 0.02, 0.04}) {
-    const PoissonReconstructionResult result = reconstruct_surface(cloud, cells_of(cell));
+    const SurfaceReconstructionResult result = reconstruct(cloud, cells_of(cell));
     EXPECT_EQ(result.cell_size_m, cell);
     // Marching cubes makes edges a little shorter than its cells.
     const double edge = report_mesh(result.mesh).edge_lengths.median_m;
@@ -113,10 +128,56 @@ TEST(PoissonReconstruction, CellsHaveTheWantedSize) {
   }
 }
 
-TEST(PoissonReconstruction, PlaneIsFlatAndEndsWithThePoints) {
+// A half of the samples gives the same surface as all of them, but near where it ends.
+TEST(ImplicitSurface, DependsOnNearSamplesOnly) {
+  std::vector<SurfaceSample> all;
+  for (const Eigen::Vector3d& position : ball(0.25, 0.01).positions) {
+    const double off = 1.0 + uniform(-0.01, 0.01);
+    all.push_back({(off * position).cast<float>(), position.normalized().cast<float>(),
+                   static_cast<float>(uniform(0.2, 1.0)), 0.01F});
+  }
+  std::vector<SurfaceSample> half;
+  for (const SurfaceSample& sample : all)
+    if (sample.position.x() > -0.05F) half.push_back(sample);
+  const TriangleMesh whole = implicit_surface(all, 0.01, 2.5);
+  const TriangleMesh part = implicit_surface(half, 0.01, 2.5);
+  const auto corners_of = [](const TriangleMesh& mesh) {
+    std::vector<std::array<double, 9>> corners;
+    for (const Triangle& triangle : mesh.triangles) {
+      std::array<double, 9> one{};
+      for (std::size_t c = 0; c < 3; ++c)
+        for (int axis = 0; axis < 3; ++axis)
+          one[3 * c + static_cast<std::size_t>(axis)] = mesh.vertices[triangle[c]][axis];
+      if (std::min({one[0], one[3], one[6]}) > 0.0) corners.push_back(one);
+    }
+    std::sort(corners.begin(), corners.end());
+    return corners;
+  };
+  const auto expected = corners_of(whole);
+  EXPECT_GT(expected.size(), 5000U);
+  EXPECT_EQ(corners_of(part), expected);
+}
+
+// Algebraic spheres fit balls exactly, however uneven the samples are; along an edge of the grid
+// the function is taken as straight, which is off by cell^2 / 8 radius at most.
+TEST(ImplicitSurface, SpheresAreExact) {
+  constexpr double cell_m = 0.01;
+  for (const double radius : {0.04, 0.1, 0.5}) {
+    std::vector<SurfaceSample> samples;
+    for (const Eigen::Vector3d& position : ball(radius, 0.006).positions)
+      if (uniform(0, 1) < 0.7)
+        samples.push_back({position.cast<float>(), position.normalized().cast<float>(),
+                           static_cast<float>(uniform(0.1, 1.0)), 0.01F});
+    const TriangleMesh mesh = implicit_surface(samples, cell_m, 2.5);
+    ASSERT_GT(mesh.vertices.size(), 100U);
+    for (const Eigen::Vector3d& vertex : mesh.vertices)
+      EXPECT_NEAR(vertex.norm(), radius, 1.1 * cell_m * cell_m / (8 * radius) + 0.01 * cell_m);
+  }
+}
+
+TEST_P(Reconstruction, PlaneIsFlatAndEndsWithThePoints) {
   for (const double slope : {0.0, 0.4}) {
-    const PoissonReconstructionResult result =
-        reconstruct_surface(plane(0.6, 0.01, slope), cells_of(0.01));
+    const SurfaceReconstructionResult result = reconstruct(plane(0.6, 0.01, slope), cells_of(0.01));
     ASSERT_FALSE(result.mesh.triangles.empty());
     double reach = 0.0;
     for (const Eigen::Vector3d& vertex : result.mesh.vertices) {
@@ -126,22 +187,22 @@ TEST(PoissonReconstruction, PlaneIsFlatAndEndsWithThePoints) {
     }
     EXPECT_GT(reach, 0.3 - 0.01);
     EXPECT_LT(reach, 0.3 + 0.025);
-    EXPECT_GT(result.trimmed_triangles, 0U);
+    EXPECT_EQ(result.trimmed_triangles > 0, GetParam() == SurfaceMethod::poisson);
     const MeshReport report = cleaned_report(result.mesh);
     EXPECT_EQ(report.components, 1U);
     EXPECT_EQ(report.boundaries.size(), 1U);
   }
 }
 
-TEST(PoissonReconstruction, TwoBallsStayApart) {
+TEST_P(Reconstruction, TwoBallsStayApart) {
   const PointCloud cloud = joined(ball(0.1, 0.008, {-0.2, 0, 0}), ball(0.1, 0.008, {0.2, 0, 0}));
-  const MeshReport report = cleaned_report(reconstruct_surface(cloud).mesh);
+  const MeshReport report = cleaned_report(reconstruct(cloud).mesh);
   EXPECT_EQ(report.components, 2U);
   EXPECT_TRUE(report.is_watertight());
   EXPECT_NEAR(report.area_m2, 8 * pi * 0.01, 0.005);
 }
 
-TEST(PoissonReconstruction, OpenHalfBallGetsNoLidAndNoBalloon) {
+TEST_P(Reconstruction, OpenHalfBallGetsNoLidAndNoBalloon) {
   const PointCloud whole = ball(0.25, 0.01);
   PointCloud half;
   for (std::size_t n = 0; n < whole.size(); ++n)
@@ -149,7 +210,7 @@ TEST(PoissonReconstruction, OpenHalfBallGetsNoLidAndNoBalloon) {
       half.positions.push_back(whole.positions[n]);
       half.normals.push_back(whole.normals[n]);
     }
-  const TriangleMesh mesh = reconstruct_surface(half, cells_of(0.01)).mesh;
+  const TriangleMesh mesh = reconstruct(half, cells_of(0.01)).mesh;
   for (const Eigen::Vector3d& vertex : mesh.vertices) {
     EXPECT_GT(vertex.z(), -0.03);
     EXPECT_NEAR(vertex.norm(), 0.25, 0.006);
@@ -158,7 +219,7 @@ TEST(PoissonReconstruction, OpenHalfBallGetsNoLidAndNoBalloon) {
   EXPECT_EQ(report_mesh(mesh).boundaries.size(), 1U);
 }
 
-TEST(PoissonReconstruction, GapsAreLeftOpen) {
+TEST_P(Reconstruction, GapsAreLeftOpen) {
   PointCloud cloud;
   const PointCloud full = plane(0.6, 0.01);
   for (std::size_t n = 0; n < full.size(); ++n)
@@ -166,13 +227,25 @@ TEST(PoissonReconstruction, GapsAreLeftOpen) {
       cloud.positions.push_back(full.positions[n]);
       cloud.normals.push_back(full.normals[n]);
     }
-  const TriangleMesh mesh = reconstruct_surface(cloud, cells_of(0.01)).mesh;
+  const TriangleMesh mesh = reconstruct(cloud, cells_of(0.01)).mesh;
   EXPECT_EQ(cleaned_report(mesh).boundaries.size(), 2U);  // the gap is wider than holes are filled
   for (const Eigen::Vector3d& vertex : mesh.vertices)
     EXPECT_GT(vertex.head<2>().norm(), 0.1 - 0.025);
 }
 
-TEST(PoissonReconstruction, NoiseIsAveraged) {
+// A lone point far from the others costs no time and makes no surface.
+TEST(ImplicitSurface, LonePointsMakeNoSurface) {
+  PointCloud cloud = plane(0.4, 0.01);
+  for (int n = 0; n < 20; ++n) {
+    cloud.positions.emplace_back(uniform(-9, 9), uniform(-9, 9), 3 + n);
+    cloud.normals.emplace_back(0, 0, 1);
+  }
+  for (const Eigen::Vector3d& vertex :
+       clean_mesh(reconstruct_surface(cloud, cells_of(0.01)).mesh, {}).mesh.vertices)
+    EXPECT_LT(vertex.z(), 0.1);
+}
+
+TEST_P(Reconstruction, NoiseIsAveraged) {
   PointCloud cloud = ball(0.25, 0.005);
   std::normal_distribution<double> noise(0.0, 0.003);
   double squares = 0.0;
@@ -182,11 +255,11 @@ TEST(PoissonReconstruction, NoiseIsAveraged) {
     squares += off * off;
   }
   const double of_points = std::sqrt(squares / static_cast<double>(cloud.size()));
-  const TriangleMesh mesh = reconstruct_surface(cloud, cells_of(0.015)).mesh;
+  const TriangleMesh mesh = reconstruct(cloud, cells_of(0.015)).mesh;
   EXPECT_LT(rms_off_sphere(mesh, 0.25), 0.6 * of_points);
 }
 
-TEST(PoissonReconstruction, UncertainPointsCountForLess) {
+TEST_P(Reconstruction, UncertainPointsCountForLess) {
   // Every other point 8 mm too far out, and known to be bad.
   PointCloud cloud = ball(0.25, 0.006);
   ScalarField& errors = cloud.add_field("expected_error", ScalarType::float32);
@@ -195,14 +268,14 @@ TEST(PoissonReconstruction, UncertainPointsCountForLess) {
     if (is_bad) cloud.positions[n] *= 1 + 0.008 / 0.25;
     errors.values[n] = is_bad ? 0.01 : 0.001;
   }
-  PoissonReconstructionOptions options = cells_of(0.012);
-  const double weighted = rms_off_sphere(reconstruct_surface(cloud, options).mesh, 0.25);
+  SurfaceReconstructionOptions options = cells_of(0.012);
+  const double weighted = rms_off_sphere(reconstruct(cloud, options).mesh, 0.25);
   options.weigh_by_error = false;
-  const double equal = rms_off_sphere(reconstruct_surface(cloud, options).mesh, 0.25);
+  const double equal = rms_off_sphere(reconstruct(cloud, options).mesh, 0.25);
   EXPECT_LT(weighted, 0.6 * equal);
 }
 
-TEST(PoissonReconstruction, SameBytesForThreadsAndOrder) {
+TEST_P(Reconstruction, SameBytesForThreadsAndOrder) {
   PointCloud cloud = ball(0.2, 0.008);
   cloud.add_field("expected_error", ScalarType::float32);
   cloud.colors.resize(cloud.size());
@@ -213,7 +286,7 @@ TEST(PoissonReconstruction, SameBytesForThreadsAndOrder) {
   }
   const TriangleMesh first = [&] {
     const ThreadLimit limit(1);
-    return reconstruct_surface(cloud).mesh;
+    return reconstruct(cloud).mesh;
   }();
   std::vector<std::size_t> order(cloud.size());
   std::iota(order.begin(), order.end(), 0U);
@@ -222,7 +295,7 @@ TEST(PoissonReconstruction, SameBytesForThreadsAndOrder) {
   for (PointCloud* other : {&cloud, &shuffled})
     for (const unsigned threads : {2U, 4U}) {
       const ThreadLimit limit(threads);
-      const TriangleMesh mesh = reconstruct_surface(*other).mesh;
+      const TriangleMesh mesh = reconstruct(*other).mesh;
       EXPECT_EQ(mesh.vertices, first.vertices);
       EXPECT_EQ(mesh.triangles, first.triangles);
       EXPECT_EQ(mesh.vertex_normals, first.vertex_normals);
@@ -231,21 +304,20 @@ TEST(PoissonReconstruction, SameBytesForThreadsAndOrder) {
     }
 }
 
-TEST(PoissonReconstruction, CallsFromSeveralThreadsDoNotDisturbEachOther) {
+TEST_P(Reconstruction, CallsFromSeveralThreadsDoNotDisturbEachOther) {
   const PointCloud cloud = ball(0.1, 0.01);
-  const TriangleMesh alone = reconstruct_surface(cloud).mesh;
+  const TriangleMesh alone = reconstruct(cloud).mesh;
   std::array<TriangleMesh, 3> meshes;
   std::vector<std::thread> threads;
-  for (TriangleMesh& mesh : meshes)
-    threads.emplace_back([&] { mesh = reconstruct_surface(cloud).mesh; });
+  for (TriangleMesh& mesh : meshes) threads.emplace_back([&] { mesh = reconstruct(cloud).mesh; });
   for (std::thread& thread : threads) thread.join();
   for (const TriangleMesh& mesh : meshes) EXPECT_EQ(mesh.vertices, alone.vertices);
 }
 
-TEST(PoissonReconstruction, FarAway) {
+TEST_P(Reconstruction, FarAway) {
   const Eigen::Vector3d far(5e5, 4.1e6, 120);
-  const TriangleMesh near_mesh = reconstruct_surface(ball(0.2, 0.01), cells_of(0.01)).mesh;
-  const TriangleMesh far_mesh = reconstruct_surface(ball(0.2, 0.01, far), cells_of(0.01)).mesh;
+  const TriangleMesh near_mesh = reconstruct(ball(0.2, 0.01), cells_of(0.01)).mesh;
+  const TriangleMesh far_mesh = reconstruct(ball(0.2, 0.01, far), cells_of(0.01)).mesh;
   EXPECT_NEAR(static_cast<double>(far_mesh.vertices.size()),
               static_cast<double>(near_mesh.vertices.size()),
               0.02 * static_cast<double>(near_mesh.vertices.size()));
@@ -253,7 +325,7 @@ TEST(PoissonReconstruction, FarAway) {
     EXPECT_NEAR((vertex - far).norm(), 0.2, 0.001);
 }
 
-TEST(PoissonReconstruction, ColorsAndFieldsAreCarriedOver) {
+TEST_P(Reconstruction, ColorsAndFieldsAreCarriedOver) {
   PointCloud cloud = plane(0.4, 0.01);
   cloud.colors.resize(cloud.size());
   cloud.add_field("ramp", ScalarType::float32);
@@ -264,7 +336,7 @@ TEST(PoissonReconstruction, ColorsAndFieldsAreCarriedOver) {
     cloud.find_field("ramp")->values[n] = cloud.positions[n].y();
     cloud.find_field("views")->values[n] = right ? 7 : 3;
   }
-  const TriangleMesh mesh = reconstruct_surface(cloud, cells_of(0.01)).mesh;
+  const TriangleMesh mesh = reconstruct(cloud, cells_of(0.01)).mesh;
   mesh.check();
   ASSERT_EQ(mesh.vertex_fields.size(), 2U);
   EXPECT_EQ(mesh.vertex_fields[0].name, "ramp");
@@ -279,35 +351,35 @@ TEST(PoissonReconstruction, ColorsAndFieldsAreCarriedOver) {
   }
 }
 
-TEST(PoissonReconstruction, PointsWithoutANormalAreLeftOutAndCounted) {
+TEST_P(Reconstruction, PointsWithoutANormalAreLeftOutAndCounted) {
   PointCloud cloud = ball(0.2, 0.01);
   for (std::size_t n = 0; n < cloud.size(); n += 10) cloud.normals[n].setZero();
   cloud.normals[1].setConstant(std::numeric_limits<float>::quiet_NaN());
-  const PoissonReconstructionResult result = reconstruct_surface(cloud, cells_of(0.01));
+  const SurfaceReconstructionResult result = reconstruct(cloud, cells_of(0.01));
   EXPECT_EQ(result.dropped_points, (cloud.size() + 9) / 10 + 1);
   EXPECT_LT(rms_off_sphere(result.mesh, 0.2), 0.001);
 }
 
-TEST(PoissonReconstruction, RepeatedPointsChangeNothing) {
+TEST_P(Reconstruction, RepeatedPointsChangeNothing) {
   const PointCloud once = ball(0.2, 0.01);
   PointCloud thrice = joined(once, joined(once, once));
-  const PoissonReconstructionResult one = reconstruct_surface(once);
-  const PoissonReconstructionResult three = reconstruct_surface(thrice);
+  const SurfaceReconstructionResult one = reconstruct(once);
+  const SurfaceReconstructionResult three = reconstruct(thrice);
   EXPECT_EQ(three.samples, one.samples);
   EXPECT_EQ(three.spacing_m, one.spacing_m);
   EXPECT_NEAR(surface_area(three.mesh), surface_area(one.mesh), 1e-4);
 }
 
-TEST(PoissonReconstruction, LengthsOfNormalsDoNotCount) {
+TEST_P(Reconstruction, LengthsOfNormalsDoNotCount) {
   PointCloud cloud = ball(0.2, 0.01);
-  const TriangleMesh unit = reconstruct_surface(cloud).mesh;
+  const TriangleMesh unit = reconstruct(cloud).mesh;
   for (Eigen::Vector3f& normal : cloud.normals) normal *= 0.5F;
-  EXPECT_EQ(reconstruct_surface(cloud).mesh.vertices, unit.vertices);
+  EXPECT_EQ(reconstruct(cloud).mesh.vertices, unit.vertices);
 }
 
-TEST(PoissonReconstruction, CloudsThatAreTooThin) {
-  const auto refusal = [](const PointCloud& cloud) {
-    return std::string(error_of([&] { reconstruct_surface(cloud); }).what());
+TEST_P(Reconstruction, CloudsThatAreTooThin) {
+  const auto refusal = [&](const PointCloud& cloud) {
+    return std::string(error_of([&] { reconstruct(cloud); }).what());
   };
   EXPECT_THAT(refusal({}), HasSubstr("no normals"));
   PointCloud cloud = plane(0.1, 0.01);
@@ -325,50 +397,51 @@ TEST(PoissonReconstruction, CloudsThatAreTooThin) {
   EXPECT_THAT(refusal(line), HasSubstr("on a line"));
 }
 
-TEST(PoissonReconstruction, AFewPointsDoNoHarm) {
+TEST_P(Reconstruction, AFewPointsDoNoHarm) {
   for (const int count : {3, 4, 10}) {
     PointCloud cloud;
     for (int n = 0; n < count; ++n)
       cloud.positions.emplace_back(uniform(0, 1), uniform(0, 1), uniform(0, 1));
     cloud.normals.assign(cloud.size(), Eigen::Vector3f::UnitZ());
-    EXPECT_NO_THROW(reconstruct_surface(cloud).mesh.check());
+    EXPECT_NO_THROW(reconstruct(cloud).mesh.check());
   }
 }
 
-TEST(PoissonReconstruction, OptionsOutOfTheirRangesAreNamed) {
+TEST_P(Reconstruction, OptionsOutOfTheirRangesAreNamed) {
   const PointCloud cloud = plane(0.2, 0.01);
   const auto refusal = [&](const auto& change) {
-    PoissonReconstructionOptions options;
+    SurfaceReconstructionOptions options;
     change(options);
-    return std::string(error_of([&] { reconstruct_surface(cloud, options); }).what());
+    return std::string(error_of([&] { reconstruct(cloud, options); }).what());
   };
   EXPECT_THAT(refusal([](auto& o) { o.cell_size_m = -1; }), HasSubstr("cell_size_m is -1"));
   EXPECT_THAT(refusal([](auto& o) { o.screening = -1; }), HasSubstr("screening is -1"));
   EXPECT_THAT(refusal([](auto& o) { o.samples_per_cell = 0; }), HasSubstr("samples_per_cell is 0"));
   EXPECT_THAT(refusal([](auto& o) { o.trim_distance_cells = 0; }),
               HasSubstr("trim_distance_cells is 0"));
-  // 0.2 m and a margin of a tenth in 4096 cells.
+  // 0.2 m and a margin of a tenth in 4096 cells; a quarter of the spacing.
+  const bool is_poisson = GetParam() == SurfaceMethod::poisson;
   EXPECT_THAT(refusal([](auto& o) { o.cell_size_m = 1e-5; }),
-              ::testing::AllOf(HasSubstr("cell_size_m is 1e-05"), HasSubstr(">= 5.37"),
-                               HasSubstr("deeper than 12")));
+              ::testing::AllOf(HasSubstr("cell_size_m is 1e-05"),
+                               HasSubstr(is_poisson ? ">= 5.37" : ">= 0.0025 m")));
 }
 
-TEST(PoissonReconstruction, CellsLargerThanTheCloudAreRefused) {
+TEST_P(Reconstruction, CellsLargerThanTheCloudAreRefused) {
   PointCloud cloud;
   for (int x = 0; x <= 20; ++x)
     for (int y = 0; y <= 10; ++y) {
       cloud.positions.emplace_back(0.05 * x, 0.05 * y, 3.0);
       cloud.normals.emplace_back(0, 0, 1);
     }
-  const Error error = graspmap_test::error_of([&] { reconstruct_surface(cloud, cells_of(1.01)); });
+  const Error error = graspmap_test::error_of([&] { reconstruct(cloud, cells_of(1.01)); });
   EXPECT_EQ(error.context().field, "cell_size_m");
   EXPECT_EQ(error.context().bound, "<= 1 m");
-  EXPECT_LT(surface_area(reconstruct_surface(cloud, cells_of(0.1)).mesh), 1.1);
+  EXPECT_LT(surface_area(reconstruct(cloud, cells_of(0.1)).mesh), 1.1);
 }
 
 // Deeper than reconstruct_surface lets it go, PCL's tables have no size.
-TEST(PoissonReconstruction, WhatPclThrowsIsSaid) {
-  std::vector<PoissonSample> samples;
+TEST(PclPoisson, WhatPclThrowsIsSaid) {
+  std::vector<SurfaceSample> samples;
   for (int x = -2; x <= 2; ++x)
     for (int y = -2; y <= 2; ++y) {
       const Eigen::Vector2f place = 0.1F * Eigen::Vector2i(x, y).cast<float>();
@@ -379,7 +452,7 @@ TEST(PoissonReconstruction, WhatPclThrowsIsSaid) {
   EXPECT_THAT(error.what(), HasSubstr("Poisson reconstruction failed: std::bad_array_new_length"));
 }
 
-TEST(PoissonReconstruction, StandardOutputStaysClean) {
+TEST(PclPoisson, StandardOutputStaysClean) {
   testing::internal::CaptureStdout();
   testing::internal::CaptureStderr();
   // A tangle in which PCL drops faces and says so.
@@ -397,7 +470,7 @@ TEST(PoissonReconstruction, StandardOutputStaysClean) {
       cloud.positions.push_back(0.2 * out + 0.04 * arrow());
       cloud.normals.push_back((out + 0.7 * arrow()).normalized().cast<float>());
     }
-    PoissonReconstructionOptions options = cells_of(0.012);
+    SurfaceReconstructionOptions options = cells_of(0.012);
     options.samples_per_cell = 1.0;
     reconstruct_surface(cloud, options);
   }
@@ -406,5 +479,5 @@ TEST(PoissonReconstruction, StandardOutputStaysClean) {
   EXPECT_EQ(testing::internal::GetCapturedStderr(), "");
 }
 
-}  // namespace poisson_reconstruction_test
+}  // namespace surface_reconstruction_test
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libmap/surface/poisson_reconstruction.h"
+#include "libmap/surface/surface_reconstruction.h"
 
 #include <algorithm>
 #include <cmath>
@@ -12,6 +12,7 @@
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_parts.h"
+#include "libmap/surface/implicit_surface.h"
 #include "libmap/surface/pcl_poisson.h"
 
 namespace libmap {
@@ -25,6 +26,8 @@ constexpr double min_weight = 1.0 / 16;
 // The octree's cube against the samples' box, at least.
 constexpr double cube_margin = 1.1;
 constexpr int min_depth = 3;
+// Of a packed cell, 21 bits an axis.
+constexpr double max_grid_cells = 1 << 20;
 // Smallest second standard deviation of a cloud's positions, against its first, of a surface.
 constexpr double min_width = 1e-4;
 
@@ -85,11 +88,11 @@ struct UsedPoint {
 
 class Reconstruction {
  public:
-  Reconstruction(const PointCloud& cloud, const PoissonReconstructionOptions& options,
+  Reconstruction(const PointCloud& cloud, const SurfaceReconstructionOptions& options,
                  Progress& progress)
       : cloud_(cloud), options_(options), progress_(progress) {}
 
-  PoissonReconstructionResult run() {
+  SurfaceReconstructionResult run() {
     timed("samples", [&] {
       choose_points();
       choose_cell_size();
@@ -97,9 +100,12 @@ class Reconstruction {
       find_spacings();
     });
     TriangleMesh surface;
-    timed("poisson", [&] {
-      progress_.begin("Poisson reconstruction", 0);
-      surface = solve_poisson(samples_, problem_);
+    const bool is_poisson = options_.method == SurfaceMethod::poisson;
+    timed(is_poisson ? "poisson" : "implicit", [&] {
+      progress_.begin("reconstruction", 0);
+      surface = is_poisson
+                    ? solve_poisson(samples_, problem_)
+                    : implicit_surface(samples_, result_.cell_size_m, options_.support_cells);
     });
     timed("trimming", [&] { trim(surface); });
     timed("values", [&] {
@@ -129,17 +135,17 @@ class Reconstruction {
   bool is_near(const TriangleMesh& mesh, const Triangle& triangle, const PointTree& tree) const;
 
   const PointCloud& cloud_;
-  const PoissonReconstructionOptions& options_;
+  const SurfaceReconstructionOptions& options_;
   Progress& progress_;
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
   const ScalarField* errors_ = nullptr;
   PoissonProblem problem_;
-  std::vector<PoissonSample> samples_;   // about the origin
+  std::vector<SurfaceSample> samples_;   // about the origin
   std::vector<Eigen::Vector3d> places_;  // of the samples, so too
   std::vector<double> spacings_m_;       // around the samples
-  PoissonReconstructionResult result_;
+  SurfaceReconstructionResult result_;
 };
 
 void Reconstruction::choose_points() {
@@ -195,14 +201,19 @@ void Reconstruction::choose_cell_size() {
                 {.field = "cell_size_m",
                  .value = to_text(static_cast<float>(result_.cell_size_m)),
                  .bound = "<= " + to_text(static_cast<float>(extent)) + " m"});
+  const bool is_poisson = options_.method == SurfaceMethod::poisson;
   const double cells = cube_margin * extent / result_.cell_size_m;
-  const double most = std::exp2(max_octree_depth);
-  if (!(cells <= most))
-    throw Error(
-        "the octree would be deeper than " + std::to_string(max_octree_depth) + " levels",
-        {.field = "cell_size_m",
-         .value = to_text(static_cast<float>(result_.cell_size_m)),
-         .bound = ">= " + to_text(static_cast<float>(result_.cell_size_m * cells / most)) + " m"});
+  const double min_cell_m =
+      is_poisson ? cube_margin * extent / std::exp2(max_octree_depth)
+                 : std::max(extent / max_grid_cells, result_.spacing_m / max_spacing_cells);
+  if (!(result_.cell_size_m >= min_cell_m))
+    throw Error(is_poisson ? "the octree would be deeper than " + std::to_string(max_octree_depth) +
+                                 " levels"
+                           : "too small for the distance between the points",
+                {.field = "cell_size_m",
+                 .value = to_text(static_cast<float>(result_.cell_size_m)),
+                 .bound = ">= " + to_text(static_cast<float>(min_cell_m)) + " m"});
+  if (!is_poisson) return;
   problem_.depth = std::max(min_depth, static_cast<int>(std::ceil(std::log2(cells))));
   problem_.cube_m = result_.cell_size_m * std::exp2(problem_.depth);
   problem_.screening = options_.screening;
@@ -273,7 +284,7 @@ void Reconstruction::add_cell(const UsedPoint* begin, const UsedPoint* end) {
       normal += static_cast<float>(weight) * own;
     }
     if (count == 0) continue;
-    PoissonSample sample;
+    SurfaceSample sample;
     sample.position = (position / weights * result_.cell_size_m).cast<float>();
     sample.normal = normal.normalized();
     sample.weight = static_cast<float>(weights / static_cast<double>(count));
@@ -283,7 +294,7 @@ void Reconstruction::add_cell(const UsedPoint* begin, const UsedPoint* end) {
 
 void Reconstruction::find_spacings() {
   places_.reserve(samples_.size());
-  for (const PoissonSample& sample : samples_) places_.push_back(sample.position.cast<double>());
+  for (const SurfaceSample& sample : samples_) places_.push_back(sample.position.cast<double>());
   spacings_m_.resize(samples_.size());
   const PointTree tree(places_);
   parallel_for(samples_.size(), 1024, [&](std::size_t begin, std::size_t end) {
@@ -292,6 +303,8 @@ void Reconstruction::find_spacings() {
       // The disc that reaches the last of them holds so many.
       const double count = static_cast<double>(neighbors.size()) - 0.5;
       spacings_m_[n] = std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count);
+      samples_[n].spacing_m =
+          static_cast<float>(std::min(spacings_m_[n], max_spacing_cells * result_.cell_size_m));
     }
   });
 }
@@ -325,7 +338,12 @@ void Reconstruction::trim(TriangleMesh& surface) {
 
 }  // namespace
 
-void bind(ParameterTable& table, PoissonReconstructionOptions& options) {
+void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
+  table.add("method", options.method,
+            {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
+            "implicit: algebraic point set surface; poisson: screened Poisson reconstruction");
+  table.add("support_cells", options.support_cells, {1.5, 10.0},
+            "of a point with method implicit, in cells or in the points' spacing");
   table.add("cell_size_m", options.cell_size_m, not_negative,
             "of the finest cells, and edges; 0: the distance between the cloud's points");
   table.add("screening", options.screening, not_negative,
@@ -338,8 +356,8 @@ void bind(ParameterTable& table, PoissonReconstructionOptions& options) {
             "no surface farther than this from all points, in cells or in the points' spacing");
 }
 
-PoissonReconstructionResult reconstruct_surface(const PointCloud& cloud,
-                                                const PoissonReconstructionOptions& options,
+SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
+                                                const SurfaceReconstructionOptions& options,
                                                 Progress& progress) {
   check_parameters(options);
   return Reconstruction(cloud, options, progress).run();
