@@ -35,7 +35,7 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& opti
                            DetectionResult& result) {
   if (options.plane == PlaneSource::none) {
     // No use is made of it, but points in one place or on a line are no terrain in any frame.
-    fit_regression_plane(input);
+    fit_regression_plane(input, {.method = PlaneMethod::corrected});
     return input;
   }
   const bool thesis = follows_thesis(options.scenario.method);
@@ -45,7 +45,7 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& opti
                           [&] { return downsampled(input, options.scenario.voxel_size_m); });
     result.downsampled_points = cloud.size();
   }
-  const PlaneMethod method = thesis ? PlaneMethod::thesis : PlaneMethod::corrected;
+  const PlaneMethod method = plane_method(options.scenario.method);
   return libmap::timed(result.timings_s, "regression plane", [&] {
     result.plane = fit_regression_plane(cloud, {.method = method, .up = options.up});
     result.map.terrain_from_input = result.plane->terrain_from_input;

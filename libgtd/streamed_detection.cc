@@ -183,7 +183,8 @@ void require_streamable(const DetectionOptions& options) {
 TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options) {
   TerrainFrame frame;
   if (options.plane == PlaneSource::fit)
-    frame.plane = fit_regression_plane(points, {.up = options.up});
+    frame.plane = fit_regression_plane(
+        points, {.method = plane_method(options.scenario.method), .up = options.up});
   std::optional<libmap::Bounds3d> box;
   const auto positions = libmap::PointStream::Need::positions;
   points.for_each_block(positions, [&](const PointCloud& block) {

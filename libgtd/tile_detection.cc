@@ -84,6 +84,12 @@ std::vector<std::size_t> points_within(const PointCloud& cloud, const VoxelLatti
   return within;
 }
 
+// A dense part of a scan has no more weight in the curvature than a sparse one.
+bool uses_voxel_means(Method method) { return plane_method(method) == PlaneMethod::robust; }
+
+// A voxel that the reach of a tile cuts has another mean: it is farther away than the reach.
+constexpr double mean_margin_voxels = 2.0;
+
 // The convex ones of the points `queries`.
 std::vector<Eigen::Vector3d> convex_among(const PointCloud& cloud,
                                           const std::optional<std::vector<std::size_t>>& queries,
@@ -110,11 +116,17 @@ std::vector<Eigen::Vector3d> find_convex_points(const PointCloud& terrain,
                                                 const std::vector<TileBounds>& tiles,
                                                 CurvatureAt curvature_at, const Scenario& scenario,
                                                 TileDetectionResult& result) {
+  const bool of_means = uses_voxel_means(scenario.method);
+  const double voxel_size_m = scenario.voxel_size_m;
   if (curvature_at == CurvatureAt::all_points)
-    return convex_among(terrain, std::nullopt, scenario, result);
+    return convex_among(of_means ? voxel_means(terrain, voxel_size_m) : terrain, std::nullopt,
+                        scenario, result);
   const double margin_m = scenario.intersection_distance_m;
-  const PointCloud nearby = libmap::select_points(
-      terrain, points_within(terrain, lattice, tiles, margin_m + curvature_reach_m(scenario)));
+  const double reach_m =
+      margin_m + curvature_reach_m(scenario) + (of_means ? mean_margin_voxels * voxel_size_m : 0.0);
+  PointCloud nearby =
+      libmap::select_points(terrain, points_within(terrain, lattice, tiles, reach_m));
+  if (of_means) nearby = voxel_means(nearby, voxel_size_m);
   return convex_among(nearby, points_within(nearby, lattice, tiles, margin_m), scenario, result);
 }
 
@@ -174,6 +186,11 @@ bool follows_thesis(Method method) {
   return method == Method::thesis || method == Method::envelope;
 }
 
+PlaneMethod plane_method(Method method) {
+  if (follows_thesis(method)) return PlaneMethod::thesis;
+  return method == Method::climblab ? PlaneMethod::corrected : PlaneMethod::robust;
+}
+
 int tile_voxels(const Scenario& scenario) {
   const double voxels = std::round(scenario.tile_size_m / scenario.voxel_size_m);
   if (voxels >= 1.0 && voxels <= 0x1p20) return static_cast<int>(voxels);
@@ -189,7 +206,7 @@ int halo_voxels(const GripperMask& mask, const Scenario& scenario) {
   if (scenario.curvature_radius_m > 0.0)
     convexity =
         (scenario.intersection_distance_m + curvature_reach_m(scenario)) / scenario.voxel_size_m +
-        1.0;
+        1.0 + (uses_voxel_means(scenario.method) ? mean_margin_voxels : 0.0);
   const auto require_moderate = [](double voxels, const char* field, double value) {
     if (voxels > 0x1p28)
       throw libmap::Error("too large for voxels of this size",

@@ -10,6 +10,7 @@
 
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/scenario.h"
+#include "libgtd/terrain/regression_plane.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/stage_timer.h"
@@ -18,6 +19,9 @@ namespace libgtd {
 
 // Whether a method prepares the cloud as the author's program does (`thesis`, `envelope`).
 bool follows_thesis(Method method);
+
+// `climblab` has the least-squares plane of its source, the others of ours the robust one.
+PlaneMethod plane_method(Method method);
 
 // Width of a tile. Throws Error naming tile_size_m.
 int tile_voxels(const Scenario& scenario);

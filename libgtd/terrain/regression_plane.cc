@@ -4,6 +4,7 @@
 #include <cmath>
 #include <string>
 
+#include "libgtd/terrain/ground_normal.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/symmetric_eigen.h"
@@ -255,6 +256,9 @@ RegressionPlane fit_regression_plane(const PointStream& points,
   check_spread(variances, plane.centroid, plane.points);
 
   Fit fit{.centroid = plane.centroid, .normal = axes.col(0)};
+  if (options.method == PlaneMethod::robust)
+    fit.normal = ground_normal(
+        points, {.centroid = plane.centroid, .axes = axes, .extent_m = std::sqrt(variances[2])});
   const Moments moments = height_moments(points, fit.centroid, fit.normal);
   const double count = static_cast<double>(plane.points);
   fit.rmse = std::sqrt(moments.second / count);

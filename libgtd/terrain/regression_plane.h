@@ -15,8 +15,9 @@ namespace libgtd {
 
 // thesis: the heading is y = (c x n) / |c x n|, which turns with the distance to the input's
 // origin. corrected: x is the input frame's x axis laid into the plane, or, where that axis stands
-// on the plane, y is the input frame's y axis laid into it.
-enum class PlaneMethod { thesis, corrected };
+// on the plane, y is the input frame's y axis laid into it. robust: the same with the normal of the
+// ground, to which rocks do not tilt it (ground_normal.h).
+enum class PlaneMethod { thesis, corrected, robust };
 
 // What decided which side of the plane is up, in the order in which they are asked.
 enum class UpSource {
@@ -30,7 +31,7 @@ enum class UpSource {
 };
 
 struct RegressionPlaneOptions {
-  PlaneMethod method = PlaneMethod::corrected;
+  PlaneMethod method = PlaneMethod::robust;
   std::optional<Eigen::Vector3d> up =
       std::nullopt;  // a direction of any length in the cloud's frame
 };
@@ -45,7 +46,8 @@ struct RegressionPlane {
   std::size_t skipped = 0;     // points with NaN or infinite coordinates
 };
 
-// Fits by the smallest eigenvector of the points' covariance (eq. 2-13..2-15). Points that are not
+// Fits by the smallest eigenvector of the points' covariance (eq. 2-13..2-15). The origin is the
+// points' centroid with each method. Points that are not
 // finite are skipped. Throws Error for fewer than 3 points, for points that all lie in one place or
 // on one line, for an `up` of no length or within the plane, and with `thesis` where c is parallel
 // to n.

@@ -131,6 +131,37 @@ VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double
   return grid;
 }
 
+libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m) {
+  libmap::PointCloud means;
+  means.viewpoint = terrain.viewpoint;
+  if (terrain.empty()) return means;
+  require_voxel_size(voxel_size_m);
+  const auto [low, high] = bounds_of(terrain.positions);
+  require_room(Eigen::Vector3d(low / voxel_size_m), voxel_size_m);
+  require_room(Eigen::Vector3d(high / voxel_size_m), voxel_size_m);
+  const VoxelLattice lattice{.voxel_size_m = voxel_size_m};
+  std::vector<Cell> cells;
+  cells.reserve(terrain.size());
+  for (const Eigen::Vector3d& position : terrain.positions) {
+    const Voxel voxel = lattice.voxel_of(position);
+    cells.push_back({voxel.i, voxel.j, voxel.k});
+  }
+  const SortedCells sorted = sort_by_cell(cells);
+  for (std::size_t c = 0; c + 1 < sorted.begins.size(); ++c) {
+    const std::size_t first = sorted.begins[c];
+    const std::size_t last = sorted.begins[c + 1];
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    for (std::size_t n = first; n < last; ++n) {
+      sum += terrain.positions[sorted.order[n]];
+      if (terrain.has_normals()) normal += terrain.normals[sorted.order[n]];
+    }
+    means.positions.emplace_back(sum / static_cast<double>(last - first));
+    if (terrain.has_normals()) means.normals.push_back(normal);
+  }
+  return means;
+}
+
 std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
                                                double leaf_m) {
   require_voxel_size(leaf_m);

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "libgtd/terrain/voxel_lattice.h"
+#include "libmap/core/point_cloud.h"
 
 namespace libgtd {
 
@@ -69,6 +70,11 @@ void visit_columns(const VoxelGrid& grid, const TileBounds& columns, const Visit
 // point lies in the same voxel whatever else is in the cloud. Throws Error naming voxel_size_m if
 // an index would leave +-2^29 (it says how much memory a bit per voxel would take).
 VoxelGrid voxelize(const std::vector<Eigen::Vector3d>& points_in_terrain, double voxel_size_m);
+
+// The mean of the points in each voxel of the same lattice, voxels ascending, with the sum of their
+// normals if they have normals: where a scan is denser, its points have no more weight. Throws as
+// `voxelize`.
+libmap::PointCloud voxel_means(const libmap::PointCloud& terrain, double voxel_size_m);
 
 // `thesis` (listing A.4), in single precision: the centroid of each cell of one lattice, put into
 // the cells of a second one that begins at the smallest coordinates of the points.

@@ -103,6 +103,44 @@ TEST(Voxelize, SortsVoxelsOfAnyBox) {
   }
 }
 
+TEST(VoxelMeans, DensityHasNoWeight) {
+  libmap::PointCloud cloud;
+  for (int n = 0; n < 100; ++n) cloud.positions.emplace_back(0.031, -0.001, 0.002);
+  cloud.positions.emplace_back(0.039, -0.003, 0.006);
+  cloud.positions.emplace_back(-0.005, 0.5, 0.005);
+  cloud.normals.assign(cloud.size(), {0, 0, 1});
+  cloud.normals.back() = {0, 1, 0};
+  const libmap::PointCloud means = libgtd::voxel_means(cloud, 0.01);
+  ASSERT_EQ(means.size(), 2U);
+  EXPECT_EQ(means.positions[0], Eigen::Vector3d(-0.005, 0.5, 0.005));
+  EXPECT_NEAR(means.positions[1].x(), 0.031 + 0.008 / 101, 1e-12);
+  EXPECT_NEAR(means.positions[1].z(), 0.002 + 0.004 / 101, 1e-12);
+  EXPECT_EQ(means.normals[0], Eigen::Vector3f(0, 1, 0));
+  EXPECT_EQ(means.normals[1], Eigen::Vector3f(0, 0, 101));
+  EXPECT_TRUE(libgtd::voxel_means({}, 0.01).empty());
+  EXPECT_EQ(graspmap_test::error_of([&] { libgtd::voxel_means(cloud, 1e-11); }).context().field,
+            "voxel_size_m");
+}
+
+// Against the slow way: the points of each voxel by a map.
+TEST(VoxelMeans, AsAveragedByHand) {
+  libmap::PointCloud cloud;
+  std::map<Voxel, std::vector<Eigen::Vector3d>> voxels;
+  for (int n = 0; n < 3000; ++n) {
+    cloud.positions.emplace_back(uniform(-0.1, 0.1), uniform(-0.1, 0.1), uniform(-0.1, 0.1));
+    voxels[VoxelLattice().voxel_of(cloud.positions.back())].push_back(cloud.positions.back());
+  }
+  const libmap::PointCloud means = libgtd::voxel_means(cloud, 0.01);
+  ASSERT_EQ(means.size(), voxels.size());
+  EXPECT_TRUE(means.normals.empty());
+  auto mean = means.positions.begin();
+  for (const auto& [voxel, members] : voxels) {
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Eigen::Vector3d& member : members) sum += member;
+    EXPECT_EQ(*mean++, (sum / static_cast<double>(members.size())).eval());
+  }
+}
+
 TEST(Downsampling, CellsOfAnyBoxInOrder) {
   for (const float extent_m : {0.2F, 4e6F}) {
     std::vector<Eigen::Vector3f> points;

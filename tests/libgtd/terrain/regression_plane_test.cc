@@ -61,13 +61,14 @@ Matrix3d axes_of(const RegressionPlane& plane) {
   return plane.terrain_from_input.linear().transpose();
 }
 
-RegressionPlaneOptions upwards(const Vector3d& up, PlaneMethod method = PlaneMethod::corrected) {
+RegressionPlaneOptions upwards(const Vector3d& up, PlaneMethod method = PlaneMethod::robust) {
   return {.method = method, .up = up};
 }
 
 TEST(RegressionPlane, AgreesWithSingularValueDecomposition) {
   const PointCloud cloud = moved(bumpy_ground(20000), rotation_about({1, 2, 0.5}, 35), {3, -1, 2});
-  const RegressionPlane plane = fit_regression_plane(cloud, upwards({0, 0, 1}));
+  const RegressionPlane plane =
+      fit_regression_plane(cloud, upwards({0, 0, 1}, PlaneMethod::corrected));
 
   Eigen::MatrixXd points(3, cloud.size());
   for (std::size_t i = 0; i < cloud.size(); ++i)
@@ -82,7 +83,8 @@ TEST(RegressionPlane, AgreesWithSingularValueDecomposition) {
 
 TEST(RegressionPlane, FrameIsARotationWithTheCentroidAtItsOrigin) {
   const PointCloud cloud = moved(bumpy_ground(500), rotation_about({1, 1, 0}, 50), {1, 2, 3});
-  for (const PlaneMethod method : {PlaneMethod::thesis, PlaneMethod::corrected}) {
+  for (const PlaneMethod method :
+       {PlaneMethod::thesis, PlaneMethod::corrected, PlaneMethod::robust}) {
     const RegressionPlane plane = fit_regression_plane(cloud, upwards({0, 0, 1}, method));
     const Matrix3d axes = axes_of(plane);
     EXPECT_LT((axes.transpose() * axes - Matrix3d::Identity()).norm(), 1e-12);
@@ -139,8 +141,9 @@ TEST(RegressionPlane, TurningTheCloudTurnsItsImageInTheCorrectedFrame) {
   }
   const Matrix3d turn = rotation_about({0, 0, 1}, 90);
   const PointCloud turned = moved(level, turn, Vector3d::Zero());
-  const RegressionPlane a = fit_regression_plane(level);
-  const RegressionPlane b = fit_regression_plane(turned);
+  const RegressionPlaneOptions corrected{.method = PlaneMethod::corrected};
+  const RegressionPlane a = fit_regression_plane(level, corrected);
+  const RegressionPlane b = fit_regression_plane(turned, corrected);
   EXPECT_LT((axes_of(a) - axes_of(b)).norm(), 1e-12);
   const Vector3d before = a.terrain_from_input * level.positions[7];
   EXPECT_LT((turn * before - b.terrain_from_input * turned.positions[7]).norm(), 1e-12);
@@ -305,6 +308,62 @@ TEST(RegressionPlane, PointsThatAreNotFiniteAreSkipped) {
   const RegressionPlane plane = fit_regression_plane(cloud);
   EXPECT_EQ(plane.skipped, 2u);
   EXPECT_LT((plane.terrain_from_input.matrix() - clean.terrain_from_input.matrix()).norm(), 1e-12);
+}
+
+// A site of 3 x 3 m whose ground rises by a tenth along x. Rocks of up to 0.4 m cover 40 % of it,
+// all on one side; `is_dense` adds a hundred points near a corner for each that is there.
+PointCloud ground_with_rocks(bool is_dense) {
+  PointCloud cloud;
+  for (int i = 0; i < 20000; ++i) {
+    const double x = uniform(-1.5, 1.5), y = uniform(-1.5, 1.5);
+    const bool is_rock = x > 0.3;
+    const double height =
+        is_rock ? 0.1 + 0.3 * std::abs(std::sin(7 * x) * std::sin(5 * y)) : uniform(-0.005, 0.005);
+    cloud.positions.emplace_back(x, y, 0.1 * x + height);
+  }
+  for (int i = 0; is_dense && i < 50000; ++i) {
+    const double x = uniform(1.2, 1.5), y = uniform(1.2, 1.5);
+    cloud.positions.emplace_back(x, y, 0.1 * x + 0.3);
+  }
+  return cloud;
+}
+
+double degrees_off(const RegressionPlane& plane, const Vector3d& normal) {
+  return std::acos(std::min(1.0, axes_of(plane).col(2).dot(normal.normalized()))) * 180.0 /
+         std::numbers::pi;
+}
+
+TEST(RobustPlane, RocksAndDensePartsDoNotTiltIt) {
+  const Vector3d truth(-0.1, 0, 1);
+  for (const bool is_dense : {false, true}) {
+    const PointCloud cloud = ground_with_rocks(is_dense);
+    const RegressionPlane squares =
+        fit_regression_plane(cloud, upwards({0, 0, 1}, PlaneMethod::corrected));
+    const RegressionPlane robust =
+        fit_regression_plane(cloud, upwards({0, 0, 1}, PlaneMethod::robust));
+    EXPECT_GT(degrees_off(squares, truth), 4.0);
+    EXPECT_LT(degrees_off(robust, truth), 0.1);
+    EXPECT_EQ(robust.centroid, squares.centroid);
+  }
+}
+
+TEST(RobustPlane, IsTheLeastSquaresPlaneOfAPlane) {
+  PointCloud cloud;
+  for (int i = 0; i < 3000; ++i) {
+    const double x = uniform(-1, 1), y = uniform(-2, 2);
+    cloud.positions.emplace_back(x + 7, y - 3, 0.3 * x - 0.2 * y);
+  }
+  EXPECT_LT(degrees_off(fit_regression_plane(cloud, upwards({0, 0, 1}, PlaneMethod::robust)),
+                        Vector3d(-0.3, 0.2, 1)),
+            1e-6);
+}
+
+TEST(RobustPlane, TurnsWithTheCloud) {
+  const PointCloud cloud = ground_with_rocks(false);
+  const Matrix3d turn = rotation_about({1, 2, 3}, 20);
+  const Vector3d normal = axes_of(fit_regression_plane(cloud, upwards({0, 0, 1}))).col(2);
+  const PointCloud turned = moved(cloud, turn, {4, 5, 6});
+  EXPECT_LT(degrees_off(fit_regression_plane(turned, upwards({0, 0, 1})), turn * normal), 0.01);
 }
 
 class InBlocks : public libmap::PointStream {
