@@ -160,14 +160,59 @@ void measure_completeness(const Shape& a, const Shape& b, const CompareOptions& 
                               static_cast<double>(comparison.samples);
 }
 
+// A turned by so many quarter turns about B's z axis, and from there aligned.
+libmap::SurfaceAlignmentResult align_turned(const Shape& a, const libmap::ReferenceSurface& surface,
+                                            const CompareOptions& options,
+                                            const std::optional<libmap::Bounds3d>& box,
+                                            const libmap::Pose& b_from_a, int quarter_turns) {
+  const libmap::Pose turn =
+      libmap::make_pose_from_rpy(Eigen::Vector3d::Zero(), {0.0, 0.0, 90.0 * quarter_turns});
+  const libmap::PointCloud start =
+      part_in_box(libmap::transform_cloud(a.points, turn * b_from_a), box, options.a);
+  require_nearness(surface, start, options);
+  libmap::SurfaceAlignmentResult found = in_file(
+      surface.is_oriented() ? options.a : options.b,
+      [&] { return libmap::align_to_surface(start.positions, surface, options.alignment); });
+  found.surface_from_points = found.surface_from_points * turn;
+  return found;
+}
+
+// True poses may be those of a world whose x axis is another one.
+std::optional<libmap::SurfaceAlignmentResult> align_other_turns(
+    const Shape& a, const libmap::ReferenceSurface& surface, const CompareOptions& options,
+    const std::optional<libmap::Bounds3d>& box, const libmap::Pose& b_from_a, Run& run) {
+  std::optional<libmap::SurfaceAlignmentResult> best;
+  int turns_of_best = 0;
+  for (int turns = 1; turns < 4; ++turns) {
+    try {
+      const auto found = align_turned(a, surface, options, box, b_from_a, turns);
+      if (!found.converged || (best && best->inliers >= found.inliers)) continue;
+      best = found;
+      turns_of_best = turns;
+    } catch (const libmap::Error&) {
+      // Too little of it lies over B.
+    }
+  }
+  if (best)
+    run.warn("ICP has converged only after a turn of {} degrees about the z axis",
+             90 * turns_of_best);
+  return best;
+}
+
 void align(const Shape& a, const libmap::ReferenceSurface& surface, const CompareOptions& options,
            const std::optional<libmap::Bounds3d>& box, Comparison& comparison, Run& run) {
-  const libmap::PointCloud start =
-      part_in_box(libmap::transform_cloud(a.points, comparison.b_from_a), box, options.a);
-  require_nearness(surface, start, options);
-  comparison.alignment = in_file(surface.is_oriented() ? options.a : options.b, [&] {
-    return libmap::align_to_surface(start.positions, surface, options.alignment);
-  });
+  std::exception_ptr failure;
+  try {
+    comparison.alignment = align_turned(a, surface, options, box, comparison.b_from_a, 0);
+  } catch (const libmap::Error&) {
+    failure = std::current_exception();
+  }
+  if (failure || !comparison.alignment->converged) {
+    if (const auto turned = align_other_turns(a, surface, options, box, comparison.b_from_a, run))
+      comparison.alignment = turned;
+    else if (failure)
+      std::rethrow_exception(failure);
+  }
   const libmap::SurfaceAlignmentResult& found = *comparison.alignment;
   comparison.b_from_a = found.surface_from_points * comparison.b_from_a;
   if (!found.converged) run.warn("ICP has not converged in {} iterations", found.iterations);

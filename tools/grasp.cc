@@ -8,6 +8,7 @@
 
 #include "libgtd/grasp/grasp_table.h"
 #include "libgtd/grasp/grasp_trials.h"
+#include "libgtd/grasp/surface_error.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
@@ -21,6 +22,8 @@
 #include "tools/support/grasp_map.h"
 #include "tools/support/grasp_scenes.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/store_filling.h"
 
 namespace {
 
@@ -41,12 +44,17 @@ struct GraspCommandOptions {
   int map_draws = 8;
   std::string more_loads;
   std::string prefix;
+  std::string surface_error = "none";
+  std::string tile = "1/1";
 };
 
 void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
   table.add("gripper", options.gripper, "scar-e, hubrobo, limbero, or a gripper file");
   table.add_overrides("gripper", options.overrides);
   bind(table, options.grasp);
+  table.add("surface_error", options.surface_error,
+            "of the mesh: none; mesh, the field expected_error of its vertices; or a standard "
+            "deviation, m");
   table.add("sequential", options.sequential,
             {{"auto", SequentialTest::automatic},
              {"on", SequentialTest::on},
@@ -60,7 +68,8 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
 }
 
 // Of all that the results depend on but mesh, locations and seed.
-std::string parameters_hash(const libgtd::Gripper& gripper, libgtd::GraspOptions options) {
+std::string parameters_hash(const libgtd::Gripper& gripper, const GraspCommandOptions& command) {
+  libgtd::GraspOptions options = command.grasp;
   libgtd::Gripper measures = gripper;
   libgtd::GripperFingers fingers = *gripper.fingers;
   options.seed = 0;
@@ -68,7 +77,8 @@ std::string parameters_hash(const libgtd::Gripper& gripper, libgtd::GraspOptions
   bind(table, measures);
   bind(table, fingers);
   bind(table, options);
-  return libmap::sha256_of(to_yaml(table) + (options.sequential ? "sequential" : ""));
+  return libmap::sha256_of(to_yaml(table) + (options.sequential ? "sequential" : "") +
+                           command.surface_error);
 }
 
 void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) {
@@ -99,30 +109,54 @@ libgtd::Gripper read_with_fingers(const std::filesystem::path& file,
   return gripper;
 }
 
+libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOptions& options) {
+  const libgtd::SurfaceErrorOptions& bounds = options.grasp.surface;
+  return graspmap_tools::in_file(options.mesh, [&] {
+    if (options.surface_error == "none") return libgtd::Ground(mesh);
+    if (options.surface_error == "mesh")
+      return libgtd::Ground(mesh, libgtd::errors_of(mesh, bounds));
+    const auto error_m = libmap::parse_double(options.surface_error);
+    if (!error_m || !(*error_m >= 0.0 && *error_m <= bounds.max_error_m))
+      throw libmap::Error("no error of a surface",
+                          {.field = "--surface-error",
+                           .value = options.surface_error,
+                           .bound = "none, mesh, or 0 to --max-surface-error, m"});
+    return libgtd::Ground(mesh, libgtd::constant_error(mesh, *error_m, bounds));
+  });
+}
+
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
   graspmap_tools::refuse_given({{"--scenes", !options.scenes.folder.empty()},
                                 {"--scene-of", !options.scenes.places.empty()},
                                 {"--more-loads", !options.more_loads.empty()},
                                 {"--prefix", !options.prefix.empty()}},
                                "is for --points");
-  libmap::require_cloud_format(options.output);
-  run.claim_output(options.output, {options.mesh, options.map});
+  graspmap_tools::GraspMapInput input{.mesh_file = options.mesh,
+                                      .map_file = options.map,
+                                      .output = options.output,
+                                      .share = graspmap_tools::parse_share(options.tile),
+                                      .parameters_hash = {}};
+  require_map_output(input, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);
-  run.add_input(options.map);
+  run.add_input(graspmap_tools::is_tile_store(options.map)
+                    ? graspmap_tools::store_index_path(options.map).string()
+                    : options.map);
   run.add_input(file);
   options.grasp.draws = options.map_draws;
   options.grasp.best_draws = 0;
   options.grasp.sequential = options.sequential != SequentialTest::off;
-  const std::string hash = parameters_hash(gripper, options.grasp);
-  run.add_results({{"parameters_sha256", hash}});
-  graspmap_tools::grasp_map({options.mesh, options.map, options.output, hash}, mesh, gripper,
-                            options.grasp, run);
+  input.parameters_hash = parameters_hash(gripper, options);
+  run.add_results({{"parameters_sha256", input.parameters_hash}});
+  options.grasp.check();
+  grasp_map(input, mesh, ground_of(mesh, options), gripper, options.grasp, run);
 }
 
 void grasp_places(GraspCommandOptions& options, Run& run) {
+  graspmap_tools::refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}},
+                               "is for --map");
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
@@ -144,16 +178,15 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   run.add_input(options.mesh);
   run.add_input(options.points);
   run.add_input(file);
-  std::optional<libgtd::Ground> ground;
+  options.grasp.check();
+  const libgtd::Ground ground = ground_of(mesh, options);
   std::vector<libgtd::LocationResult> results;
   try {
-    ground.emplace(mesh);
     results = run.timed("grasp", [&] {
-      return libgtd::test_grasps(*ground, gripper, locations, options.grasp, run.progress());
+      return libgtd::test_grasps(ground, gripper, locations, options.grasp, run.progress());
     });
   } catch (const libmap::Error& error) {
-    const bool of_location = error.context().field.starts_with("location");
-    throw error.in_file(of_location ? options.points : options.mesh);
+    throw error.in_file(options.points);
   }
   for (const std::string& name : libgtd::grasp_columns(options.grasp.more_loads_n)) {
     const std::string column = options.prefix + name;
@@ -165,16 +198,16 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   for (std::size_t row = 0; row < results.size(); ++row)
     for (std::string& cell : libgtd::grasp_cells(results[row]))
       table.rows[row].push_back(std::move(cell));
-  run.add_results({{"parameters_sha256", parameters_hash(gripper, options.grasp)}});
+  run.add_results({{"parameters_sha256", parameters_hash(gripper, options)}});
   note_results(results, run);
-  write_scenes(options.scenes, scenes, {mesh, *ground, gripper, options.grasp, results}, run);
+  write_scenes(options.scenes, scenes, {mesh, ground, gripper, options.grasp, results}, run);
   run.write_text(options.output, libmap::to_csv(table));
 }
 
 void grasp(GraspCommandOptions& options, Run& run) {
   if (options.points.empty() == options.map.empty())
     throw graspmap_tools::UsageError(options.map.empty()
-                                         ? "--points LOCATIONS.csv or --map MAP.pcd is missing"
+                                         ? "--points LOCATIONS.csv or --map MAP is missing"
                                          : "--points and --map exclude each other");
   options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);
 }
@@ -189,10 +222,14 @@ int main(int argc, char** argv) {
                  "CSV with the columns x, y, z in meters in the mesh's frame, and any others");
   command.option(
       "--map", "MAP", options.map,
-      "instead of it: a graspability map of the mesh, each of whose voxels is a location");
-  command.output(options.output,
-                 "with --points a CSV: the locations, each with the results of its trials; with "
-                 "--map the map with more fields (.pcd, .ply, .vtp, .csv)");
+      "instead of it: a graspability map of the mesh (.pcd, .ply, .csv, .tiles), each of whose "
+      "voxels is a location");
+  command.output(
+      options.output,
+      "with --points a CSV: the locations, each with the results of its trials; with "
+      "--map the map with more fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles)");
+  command.option("--tile", "K/N", options.tile,
+                 "with --map: test only share K of N of the tiles, into a tile store");
   command.option("--scenes", "FOLDER", options.scenes.folder,
                  "pictures of one trial of each location, its force nearest to the median: "
                  "FOLDER/PLACE.ply, after the column 'place' or the row");

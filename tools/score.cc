@@ -1,5 +1,6 @@
 // graspmap score: graspability map of a terrain, tile by tile.
 #include "libgtd/detect.h"
+#include "libgtd/gripper/closing_path.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/tile_detection.h"
@@ -10,6 +11,7 @@
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"
 #include "tools/support/score_store.h"
+#include "tools/support/store_filling.h"
 
 using namespace graspmap_tools;
 
@@ -33,17 +35,6 @@ void bind(libmap::ParameterTable& table, ScoreOptions& options) {
   table.add("up", options.up,
             "which side of the plane is outside: auto, or a direction X,Y,Z in the cloud's frame");
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
-}
-
-libgtd::TileShare parse_share(const std::string& text) {
-  const std::size_t slash = text.find('/');
-  const auto number = libmap::parse_integer(text.substr(0, slash));
-  const auto count =
-      slash == std::string::npos ? std::nullopt : libmap::parse_integer(text.substr(slash + 1));
-  if (!number || !count || *count < 1 || *number < 1 || *number > *count || *count > 1000000)
-    throw libmap::Error("no such share of the tiles",
-                        {.field = "--tile", .value = text, .bound = "K/N with 1 <= K <= N"});
-  return {static_cast<int>(*number), static_cast<int>(*count)};
 }
 
 std::size_t parse_points_at_once(const std::string& text) {
@@ -119,7 +110,10 @@ void score(ScoreOptions& options, Run& run) {
                         {.field = "--up", .value = options.up});
   const auto gripper_file = libmap::find_data_file("grippers", scenario.gripper);
   // Before any work: a voxel size that does not suit the gripper shows here.
-  libgtd::make_gripper_mask(libgtd::gripper_of(options.detection),
+  const libgtd::Gripper gripper = libgtd::gripper_of(options.detection);
+  if (scenario.method == libgtd::Method::calibrated)
+    in_file(gripper_file.string(), [&] { libgtd::require_hold_model(gripper); });
+  libgtd::make_gripper_mask(gripper,
                             {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
   if (libgtd::is_tile_store_name(options.output)) {
     score_into_store({.terrain = options.terrain,

@@ -43,6 +43,35 @@ GRASPMAP_CLONED void best_edge_products(const double* cosines, const double* sin
   }
 }
 
+// The largest of these products, each times the spines that share the force; 0 if none is positive.
+GRASPMAP_CLONED double max_shared_product(const double* cosines, const double* sines,
+                                          const double* counts, std::size_t padded,
+                                          const FacetLoop& loop) {
+  constexpr double diagonal = std::numbers::sqrt2 / 2.0;
+  const auto [x, y, z, friction, slant] = loop;
+  const double beside = std::abs(z);
+  double most[chunk] = {};
+  for (std::size_t begin = 0; begin < padded; begin += chunk)
+    for (std::size_t n = 0; n < chunk; ++n) {
+      const double cosine = cosines[begin + n];
+      const double sine = sines[begin + n];
+      const double along = std::abs(sine * x + cosine * y);
+      const double both = (along + beside) * diagonal;
+      const double straight = along < beside ? beside : along;
+      const double slope = both < straight ? straight : both;
+      const double product =
+          counts[begin + n] * (slant * (cosine * x - sine * y + friction * slope));
+      most[n] = most[n] < product ? product : most[n];
+    }
+  // Halves, so that the loops are of several numbers at once.
+  for (std::size_t n = 0; n < 4; ++n) {
+    most[n] = most[n] < most[n + 4] ? most[n + 4] : most[n];
+    most[n] = most[n] < most[n + 8] ? most[n + 8] : most[n];
+  }
+  return std::max(std::max(most[0], most[1]), std::max(most[2], most[3]));
+}
+static_assert(chunk == 12);
+
 // The same on the ground itself.
 double best_level_product(const FacetLoop& loop) {
   const double along = std::abs(loop.y);
@@ -103,10 +132,11 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> l
   spines_ = leans_rad.size();
   // Whole chunks.
   cosines_.assign((spines_ + chunk - 1) / chunk * chunk, 0.0);
-  sines_ = cosines_;
+  counts_ = sines_ = cosines_;
   for (std::size_t n = 0; n < spines_; ++n) {
     cosines_[n] = std::cos(leans_rad[n]);
     sines_[n] = std::sin(leans_rad[n]);
+    counts_[n] = static_cast<double>(n + 1);
   }
 }
 
@@ -145,30 +175,28 @@ BearingContact::Edge BearingContact::best_edge(double cosine, double sine,
   return edge;
 }
 
-double BearingContact::max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const {
-  const Eigen::Vector3d along = local(worth);
+double BearingContact::max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const {
   if (!adhesion_.empty()) {
     double most = 0.0;
-    for (const Eigen::Vector3d& edge : adhesion_) most = std::max(most, edge.dot(along));
+    for (const Eigen::Vector3d& edge : adhesion_) most = std::max(most, edge.dot(local));
     return limit_n_ * most;
   }
-  const FacetLoop loop{along.x(), along.y(), along.z(), friction_, slant_};
+  const FacetLoop loop{local.x(), local.y(), local.z(), friction_, slant_};
   double sum = static_cast<double>(spines_) * std::max(0.0, best_level_product(loop));
+  if (sharing == SpineSharing::equally)
+    return limit_n_ * std::max(sum, max_shared_product(cosines_.data(), sines_.data(),
+                                                       counts_.data(), cosines_.size(), loop));
   std::array<double, chunk> products;
   for (std::size_t begin = 0; begin < spines_; begin += chunk) {
-    const std::size_t count = std::min(chunk, spines_ - begin);
     best_edge_products(&cosines_[begin], &sines_[begin], loop, products.data());
-    for (std::size_t n = 0; n < count; ++n)
-      sum = sharing == SpineSharing::best
-                ? sum + std::max(0.0, products[n])
-                : std::max(sum, static_cast<double>(begin + n + 1) * products[n]);
+    for (std::size_t n = 0; n < std::min(chunk, spines_ - begin); ++n)
+      sum += std::max(0.0, products[n]);
   }
   return limit_n_ * sum;
 }
 
-Eigen::Vector3d BearingContact::best_force(const Eigen::Vector3d& worth,
-                                           SpineSharing sharing) const {
-  const Eigen::Vector3d along = local(worth);
+Eigen::Vector3d BearingContact::best_local_force(const Eigen::Vector3d& along,
+                                                 SpineSharing sharing) const {
   const auto spines = static_cast<double>(spines_);
   Edge best;
   for (const Eigen::Vector3d& edge : adhesion_)

@@ -58,8 +58,21 @@ class BearingContact {
   std::size_t spines() const { return spines_; }
 
   // The largest product of a force of the set with `worth`, and a force that has it.
-  double max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const;
-  Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const;
+  double max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const {
+    return max_local_product(frame().transpose() * worth, sharing);
+  }
+  Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const {
+    return best_local_force(frame().transpose() * worth, sharing);
+  }
+  // The columns are normal, drag and lateral.
+  Eigen::Matrix3d frame() const {
+    Eigen::Matrix3d frame;
+    frame << normal_, drag_, lateral_;
+    return frame;
+  }
+  // As max_product and best_force, of a worth's products with the columns of `frame`.
+  double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
+  Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
   // For pictures: the edges of the forces on the steepest facet (adhesion: of all forces), unit
   // vectors in turn about it.
   std::vector<Eigen::Vector3d> cone() const;
@@ -67,9 +80,6 @@ class BearingContact {
  private:
   struct Edge;
   Edge best_edge(double cosine, double sine, const Eigen::Vector3d& local) const;
-  Eigen::Vector3d local(const Eigen::Vector3d& vector) const {
-    return {normal_.dot(vector), drag_.dot(vector), lateral_.dot(vector)};
-  }
 
   Eigen::Vector3d point_;
   Eigen::Vector3d normal_;
@@ -84,6 +94,7 @@ class BearingContact {
   std::size_t spines_ = 0;
   std::vector<double> cosines_;  // of the leans, the largest lean first; padded with 0
   std::vector<double> sines_;
+  std::vector<double> counts_;             // of the leans up to each; padded with 0
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; not empty: the law is adhesion
 };
 

@@ -49,7 +49,8 @@ Site site_of(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d
              const GraspOptions& options) {
   const Eigen::Vector3d away = away_from(ground, gripper, location, options.approach);
   // Four standard deviations; draws are cut off there.
-  return {patch_around(ground, location, away, gripper, 4.0 * options.offset_m,
+  const double offset_m = 4.0 * (options.offset_m + ground.largest_error_m());
+  return {patch_around(ground, location, away, gripper, offset_m,
                        4.0 * options.tilt_deg * libmap::radians_per_degree, options.closing),
           key_of(location)};
 }
@@ -65,6 +66,18 @@ ApproachPose draw_pose(const Site& site, const Gripper& gripper, const GraspOpti
   for (double& tilt : pose.tilt_rad)
     tilt = options.tilt_deg * libmap::radians_per_degree * normal();
   return pose;
+}
+
+ClosedGripper close_at(const Site& site, const Gripper& gripper, const GraspOptions& options,
+                       int number) {
+  const ApproachPose pose = draw_pose(site, gripper, options, number);
+  if (site.patch.vertex_errors_m.empty())
+    return close_gripper(site.patch, gripper, pose, options.closing);
+  constexpr std::uint64_t of_surface = 0x73757266616365;
+  const std::uint64_t key =
+      libmap::mix_bits(libmap::mix_bits(site.key, of_surface), static_cast<std::uint64_t>(number));
+  return close_gripper(displaced(site.patch, options.surface.correlation_m, options.seed, key),
+                       gripper, pose, options.closing);
 }
 
 HoldingOptions holding_of(const ClosedGripper& closed, const Gripper& gripper,
@@ -145,11 +158,7 @@ class LocationTrials {
   void go_on(const SequentialRound& round) {
     for (int pose = 0; pose < round.poses; ++pose) {
       if (static_cast<std::size_t>(pose) == poses_.size())
-        poses_.push_back(
-            {close_gripper(site_.patch, gripper_, draw_pose(site_, gripper_, options_, pose),
-                           options_.closing),
-             0,
-             {}});
+        poses_.push_back({close_at(site_, gripper_, options_, pose), 0, {}});
       draw(pose, round.draws);
     }
   }
@@ -178,10 +187,16 @@ class LocationTrials {
       pose.forces.push_back(least.force_n);
       if (n < options_.best_draws)
         best_forces_.push_back(least_holding_force(bearing, best, pose.guess).force_n);
+      if (options_.pull_limits) add_pulls(bearing, equally);
       if (least.force_n > 0.0) ++limiting_[least.direction];
       ++result_.ends[static_cast<std::size_t>(
           end_of(pose.closed, bearing.size(), least.force_n, options_))];
     }
+  }
+
+  void add_pulls(const std::vector<BearingContact>& bearing, const HoldingOptions& holding) {
+    for (std::size_t n = 0; n < pulls_.size(); ++n)
+      pulls_[n].push_back(holding_force(bearing, pull_directions()[n].vector, holding));
   }
 
   const Site site_;
@@ -191,6 +206,7 @@ class LocationTrials {
   std::vector<PoseTrials> poses_;
   std::vector<double> best_forces_;
   std::vector<std::size_t> limiting_ = std::vector<std::size_t>(pull_directions().size(), 0);
+  std::vector<std::vector<double>> pulls_{pull_directions().size()};  // of all trials
 };
 
 LocationResult LocationTrials::result() && {
@@ -217,6 +233,9 @@ LocationResult LocationTrials::result() && {
   result.limiting_direction = static_cast<std::size_t>(
       std::max_element(limiting_.begin(), limiting_.end()) - limiting_.begin());
   result.has_force = limiting_[result.limiting_direction] > 0;
+  if (options.pull_limits)
+    for (const std::vector<double>& pulls : pulls_)
+      result.pull_limits_n.push_back(quantiles(pulls)[0]);
   const auto nearest = std::min_element(forces.begin(), forces.end(), [&](double a, double b) {
     return std::abs(a - result.force_n[1]) < std::abs(b - result.force_n[1]);
   });
@@ -285,6 +304,7 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
             "largest distance of a location from the mesh, m");
   bind(table, options.closing);
   bind(table, options.engagement);
+  bind(table, options.surface);
 }
 
 const std::vector<std::pair<std::string, TrialEnd>>& trial_end_names() {
@@ -306,9 +326,12 @@ std::pair<double, double> wilson_interval(double share, double count, double z) 
 std::vector<SequentialRound> sequential_rounds(const GraspOptions& options) {
   std::vector<SequentialRound> rounds;
   constexpr int first_poses = 4;
-  if (options.sequential)
+  const int few_draws = (options.draws + 3) / 4;
+  if (options.sequential) {
     for (int poses = first_poses; poses < options.poses; poses *= 2)
-      rounds.push_back({poses, (options.draws + 1) / 2});
+      rounds.push_back({poses, few_draws});
+    if (few_draws < options.draws) rounds.push_back({options.poses, few_draws});
+  }
   rounds.push_back({options.poses, options.draws});
   return rounds;
 }
@@ -337,8 +360,7 @@ Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Ve
   const Site site = site_of(ground, gripper, location, options);
   Trial trial;
   trial.mesh_from_patch = site.patch.mesh_from_patch;
-  trial.gripper =
-      close_gripper(site.patch, gripper, draw_pose(site, gripper, options, pose), options.closing);
+  trial.gripper = close_at(site, gripper, options, pose);
   trial.bearing = draw_asperities(trial.gripper, site, gripper, options, pose, draw);
   const LeastForce least =
       least_holding_force(trial.bearing, holding_of(trial.gripper, gripper, SpineSharing::equally));

@@ -13,6 +13,7 @@
 #include "libgtd/grasp/bearing.h"
 #include "libgtd/grasp/gripper_closing.h"
 #include "libgtd/grasp/holding_force.h"
+#include "libgtd/grasp/surface_error.h"
 #include "libmap/core/progress.h"
 
 namespace libgtd {
@@ -30,6 +31,8 @@ struct GraspOptions {
   int draws = 32;  // of asperities at each pose
   // Draws of a pose for which the force with the best sharing (SpineSharing) is computed too.
   int best_draws = 2;
+  // Whether LocationResult::pull_limits_n is computed. Not bound to a key.
+  bool pull_limits = false;
   // Ends early where the verdict is clear: see sequential_rounds. Not bound to a key.
   bool sequential = false;
   std::uint64_t seed = 1;
@@ -38,6 +41,7 @@ struct GraspOptions {
   double max_distance_m = 0.05;  // of a location from the ground
   ClosingOptions closing;
   EngagementOptions engagement;
+  SurfaceErrorOptions surface;  // of a ground with errors: each pose is on a surface drawn anew
 
   // Throws Error naming the field, its value and the bound that it breaks.
   void check() const;
@@ -72,12 +76,14 @@ struct LocationResult {
   std::array<double, 3> best_force_n{};    // the same of the best sharing
   std::size_t limiting_direction = 0;      // most often the weakest; of trials with any force
   bool has_force = false;                  // some trial has one
+  // Of each of pull_directions(): the pull that nine of ten trials hold (equal sharing), N.
+  std::vector<double> pull_limits_n;
   // Means over the poses.
   double spine_fingers = 0.0;
   double link_fingers = 0.0;  // a link touches, no spine does
   double free_fingers = 0.0;
   double palm_share = 0.0;   // of poses in which the palm touches the ground
-  double unseen = 0.0;       // share of the fingers' strips
+  double unseen = 0.0;       // share of the fingers' strips, as ClosedFinger
   double clearance_m = 0.0;  // of the palm above the location
   // The trial whose force is nearest to the median.
   int shown_pose = 0;
@@ -86,9 +92,10 @@ struct LocationResult {
   bool holds() const { return hold_probability >= 0.5; }
 };
 
-// Of a sequential test: 4, 8, 16, ... poses with half of the draws each, at last all poses with all
-// draws. It ends after a round when Wilson's interval of 90 %, poses as the count, excludes 0.5. A
-// test that goes on to the last round has the same trials as one that is not sequential.
+// Of a sequential test: 4, 8, 16, ... and all poses with a quarter of the draws each, at last all
+// poses with all draws: those of one pose say little more than a few of them. It ends after a round
+// when Wilson's interval of 90 %, poses as the count, excludes 0.5. A test that goes on to the last
+// round has the same trials as one that is not sequential.
 struct SequentialRound {
   int poses = 0;
   int draws = 0;

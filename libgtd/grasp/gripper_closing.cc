@@ -171,10 +171,12 @@ bool is_blocked(std::vector<ProfileSegment>& profile, const FingerGeometry& fing
 }
 
 // ClosedFinger::unseen: by the union of what the profile covers.
-double unseen_share(const std::vector<ProfileSegment>& profile, double tip_radius) {
+double unseen_share(const GroundPatch& patch, const std::vector<ProfileSegment>& profile,
+                    double tip_radius) {
   std::vector<std::pair<double, double>> spans;
   for (const ProfileSegment& segment : profile)
-    if (segment.faces_palm && std::min(segment.a.y(), segment.b.y()) < 0.0)
+    if (segment.faces_palm && std::min(segment.a.y(), segment.b.y()) < 0.0 &&
+        (patch.is_unsure.empty() || patch.is_unsure[segment.triangle] == 0))
       spans.push_back(std::minmax(segment.a.x(), segment.b.x()));
   std::sort(spans.begin(), spans.end());
   double seen = 0.0;
@@ -295,7 +297,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
     }
     ClosedFinger one;
     one.azimuth_rad = 2.0 * std::numbers::pi * n / count;
-    one.unseen = unseen_share(profile, tip);
+    one.unseen = unseen_share(patch, profile, tip);
     one.closing = close_finger(finger, profile);
     closed.unseen += one.unseen / count;
     closed.fingers.push_back(one);

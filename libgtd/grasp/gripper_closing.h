@@ -22,7 +22,7 @@ struct ClosedFinger {
   FingerClosing closing;
   double azimuth_rad = 0.0;  // in the gripper's frame
   // The share of the finger's strip, from the palm's axis to the open tip and weighted as a sector
-  // of the disc, without ground below it: a hole of the scan or its border.
+  // of the disc, without sure ground below it: a hole of the scan, its border, or a large error.
   double unseen = 0.0;
 };
 

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <limits>
+#include <utility>
 
 #include "libmap/core/error.h"
 
@@ -68,6 +69,18 @@ std::optional<Eigen::Vector3d> GroundPatch::normal_at(const Eigen::Vector3d& poi
   return sum / length;
 }
 
+void GroundPatch::measure_triangles() {
+  centers.resize(triangles.size());
+  radii.resize(triangles.size());
+  area_normals.resize(triangles.size());
+  for (std::size_t n = 0; n < triangles.size(); ++n) {
+    const Corners corners = corners_of(vertices, triangles[n]);
+    centers[n] = (corners[0] + corners[1] + corners[2]) / 3.0;
+    radii[n] = radius_about(centers[n], corners);
+    area_normals[n] = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+  }
+}
+
 Eigen::Isometry3d patch_frame(const Eigen::Vector3d& location, const Eigen::Vector3d& away) {
   const Eigen::Vector3d z = away.normalized();
   Eigen::Vector3d x = Eigen::Vector3d::UnitX() - z.x() * z;
@@ -94,9 +107,11 @@ struct Ground::Index {
     double radius;
   };
 
-  explicit Index(const libmap::TriangleMesh& of) : mesh(of) {}
+  Index(const libmap::TriangleMesh& of, GroundErrors known) : mesh(of), errors(std::move(known)) {}
 
   const libmap::TriangleMesh& mesh;
+  GroundErrors errors;
+  std::vector<Eigen::Vector3d> vertex_normals;  // with errors
   Eigen::AlignedBox3d box;
   std::array<Eigen::Index, 2> axes{0, 1};
   double cell_m = 1.0;
@@ -113,6 +128,17 @@ struct Ground::Index {
   std::size_t cell_of(const Eigen::Vector3d& point) const {
     return static_cast<std::size_t>(cell_along(0, point[axes[0]]) * cells[1] +
                                     cell_along(1, point[axes[1]]));
+  }
+
+  // Means of the triangles around, weighted by their areas.
+  void find_vertex_normals() {
+    vertex_normals.assign(mesh.vertices.size(), Eigen::Vector3d::Zero());
+    for (const libmap::Triangle& triangle : mesh.triangles) {
+      const Corners corners = corners_of(mesh.vertices, triangle);
+      const Eigen::Vector3d normal = (corners[1] - corners[0]).cross(corners[2] - corners[0]);
+      for (const std::uint32_t corner : triangle) vertex_normals[corner] += normal;
+    }
+    for (Eigen::Vector3d& normal : vertex_normals) normal = normal.stableNormalized();
   }
 
   void fill() {
@@ -238,7 +264,8 @@ class PatchVertices {
 
 }  // namespace
 
-Ground::Ground(const libmap::TriangleMesh& mesh) : index_(std::make_unique<Index>(mesh)) {
+Ground::Ground(const libmap::TriangleMesh& mesh, GroundErrors errors)
+    : index_(std::make_unique<Index>(mesh, std::move(errors))) {
   mesh.check();
   if (mesh.triangles.empty()) throw libmap::Error("the mesh has no triangles");
   for (const Eigen::Vector3d& vertex : mesh.vertices)
@@ -247,6 +274,11 @@ Ground::Ground(const libmap::TriangleMesh& mesh) : index_(std::make_unique<Index
     else
       throw libmap::Error("a vertex of the mesh is not finite");
   index_->fill();
+  if (index_->errors.vertex_errors_m.empty()) return;
+  if (index_->errors.vertex_errors_m.size() != mesh.vertices.size() ||
+      index_->errors.is_unsure.size() != mesh.triangles.size())
+    throw libmap::Error("the errors are not of this mesh");
+  index_->find_vertex_normals();
 }
 
 Ground::~Ground() = default;
@@ -282,6 +314,7 @@ GroundPatch Ground::patch(const Eigen::Vector3d& location, const Eigen::Vector3d
   const auto carry = [&](std::uint32_t vertex) -> Eigen::Vector3d {
     return patch_from_mesh * mesh.vertices[vertex];
   };
+  const bool has_errors = !index_->errors.vertex_errors_m.empty();
   for (const std::uint32_t n : triangles) {
     std::array<PatchVertices::Slot*, 3> slots{};
     Eigen::AlignedBox3d box;
@@ -297,16 +330,25 @@ GroundPatch Ground::patch(const Eigen::Vector3d& location, const Eigen::Vector3d
       if (slot.number == PatchVertices::none) {
         slot.number = static_cast<std::uint32_t>(patch.vertices.size());
         patch.vertices.push_back(slot.position);
+        if (has_errors) {
+          const std::uint32_t vertex = mesh.triangles[n][corner];
+          patch.vertex_errors_m.push_back(index_->errors.vertex_errors_m[vertex]);
+          patch.vertex_normals.emplace_back(patch_from_mesh.linear() *
+                                            index_->vertex_normals[vertex]);
+        }
       }
       triangle[corner] = slot.number;
     }
-    const Corners corners = {slots[0]->position, slots[1]->position, slots[2]->position};
     patch.triangles.push_back(triangle);
-    patch.centers.push_back((corners[0] + corners[1] + corners[2]) / 3.0);
-    patch.radii.push_back(radius_about(patch.centers.back(), corners));
-    patch.area_normals.push_back((corners[1] - corners[0]).cross(corners[2] - corners[0]));
+    if (has_errors) patch.is_unsure.push_back(index_->errors.is_unsure[n]);
   }
+  patch.measure_triangles();
   return patch;
+}
+
+double Ground::largest_error_m() const {
+  const std::vector<double>& errors = index_->errors.vertex_errors_m;
+  return errors.empty() ? 0.0 : *std::max_element(errors.begin(), errors.end());
 }
 
 std::optional<double> Ground::distance(const Eigen::Vector3d& point, double radius_m) const {

@@ -21,10 +21,23 @@ struct GroundPatch {
   std::vector<Eigen::Vector3d> area_normals;  // their lengths are twice the areas
   std::vector<Eigen::Vector3d> centers;       // of spheres around the triangles
   std::vector<double> radii;                  // of these
+  // As GroundErrors; empty without.
+  std::vector<double> vertex_errors_m;
+  std::vector<Eigen::Vector3d> vertex_normals;
+  std::vector<std::uint8_t> is_unsure;
+
+  // Normals, centers and radii by the vertices.
+  void measure_triangles();
 
   // Mean of the triangles within `radius_m` of a point, weighted by their areas and, falling to 0
   // at the radius, by their nearness; unit length. Nothing if there is none.
   std::optional<Eigen::Vector3d> normal_at(const Eigen::Vector3d& point, double radius_m) const;
+};
+
+// How well the ground of a mesh is known. Empty: exactly.
+struct GroundErrors {
+  std::vector<double> vertex_errors_m;  // standard deviations along the vertices' normals
+  std::vector<std::uint8_t> is_unsure;  // of triangles: 1 where the scan says too little
 };
 
 // The frame of a patch.
@@ -32,9 +45,9 @@ Eigen::Isometry3d patch_frame(const Eigen::Vector3d& location, const Eigen::Vect
 
 class Ground {
  public:
-  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
-  // The mesh must stay while this lives.
-  explicit Ground(const libmap::TriangleMesh& mesh);
+  // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite,
+  // or the errors are not of the mesh. The mesh must stay while this lives.
+  explicit Ground(const libmap::TriangleMesh& mesh, GroundErrors errors = {});
   ~Ground();
   Ground(Ground&&) noexcept;
   Ground& operator=(Ground&&) noexcept;
@@ -47,6 +60,9 @@ class Ground {
 
   // Distance from a point to the nearest triangle within `radius_m`, m; nothing if there is none.
   std::optional<double> distance(const Eigen::Vector3d& point, double radius_m) const;
+
+  // Of the vertices; 0 without errors.
+  double largest_error_m() const;
 
  private:
   struct Index;

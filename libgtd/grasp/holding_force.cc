@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <utility>
 
 #include "libgtd/grasp/cloned_loops.h"
 #include "libmap/core/angle.h"
@@ -20,28 +21,46 @@ double small_value(Eigen::Index row) {
   return 1e-10 * (1.0 + libmap::unit_noise(static_cast<std::uint64_t>(row), 7));
 }
 
+// Columns are padded to whole groups of this many rows, which a loop handles at once.
+constexpr std::ptrdiff_t group = 4;
+
 // result = matrix * vector, of which many entries are 0
 GRASPMAP_CLONED void multiply(const double* matrix, const double* vector, double* result,
-                              std::ptrdiff_t size) {
-  for (std::ptrdiff_t row = 0; row < size; ++row) result[row] = 0.0;
+                              std::ptrdiff_t size, std::ptrdiff_t stride) {
+  for (std::ptrdiff_t row = 0; row < stride; ++row) result[row] = 0.0;
   for (std::ptrdiff_t n = 0; n < size; ++n) {
     if (vector[n] == 0.0) continue;
-    for (std::ptrdiff_t row = 0; row < size; ++row)
-      result[row] += vector[n] * matrix[n * size + row];
+    const double* column = matrix + n * stride;
+    for (std::ptrdiff_t row = 0; row < stride; row += group)
+      for (std::ptrdiff_t lane = 0; lane < group; ++lane)
+        result[row + lane] += vector[n] * column[row + lane];
   }
 }
 
 // Of each column of a square matrix: its entry in the row `leaving` divided by the pivot, and
 // `change` times that subtracted from the other entries; change[leaving] is 0.
 GRASPMAP_CLONED void exchange(double* matrix, const double* change, double pivot,
-                              std::ptrdiff_t leaving, std::ptrdiff_t size) {
+                              std::ptrdiff_t leaving, std::ptrdiff_t size, std::ptrdiff_t stride) {
   for (std::ptrdiff_t n = 0; n < size; ++n) {
-    double* column = matrix + n * size;
+    double* column = matrix + n * stride;
     if (column[leaving] == 0.0) continue;
     const double share = column[leaving] / pivot;
     column[leaving] = share;
-    for (std::ptrdiff_t row = 0; row < size; ++row) column[row] -= share * change[row];
+    for (std::ptrdiff_t row = 0; row < stride; row += group)
+      for (std::ptrdiff_t lane = 0; lane < group; ++lane)
+        column[row + lane] -= share * change[row + lane];
   }
+}
+
+// How far each value may go before it is 0: infinitely far where it does not fall.
+GRASPMAP_CLONED void find_bounds(const double* values, const double* change, const double* smallest,
+                                 double* bounds, std::ptrdiff_t stride) {
+  for (std::ptrdiff_t row = 0; row < stride; row += group)
+    for (std::ptrdiff_t lane = row; lane < row + group; ++lane) {
+      const double bound = values[lane] / change[lane];
+      bounds[lane] =
+          change[lane] > smallest[lane] ? bound : std::numeric_limits<double>::infinity();
+    }
 }
 
 // The primal simplex method (Dantzig 1963) with the inverse of the basis. A contact's force is a
@@ -52,20 +71,25 @@ class EquilibriumProgram {
  public:
   EquilibriumProgram(const std::vector<BearingContact>& contacts, const HoldingOptions& options)
       : contacts_(contacts), options_(options) {
-    std::size_t fingers = 0;
+    number_drives();
     for (const BearingContact& contact : contacts) {
-      arms_.push_back(contact.point() - options.load_point);
-      fingers = std::max(fingers, contact.finger() + 1);
+      const Eigen::Matrix3d frame = contact.frame();
+      const Eigen::Vector3d arm = contact.point() - options.load_point;
+      ContactPrices& prices = prices_of_.emplace_back();
+      prices.by_force = -frame.transpose();
+      for (Eigen::Index axis = 0; axis < 3; ++axis)
+        prices.by_moment.row(axis) = -arm.cross(frame.col(axis)) / wrench_length_m;
+      prices.by_drive = -frame.transpose() * contact.outward() / options.closing_force_n;
+      arms_.push_back(arm);
     }
-    std::vector<bool> has_contact(fingers, false);
-    for (const BearingContact& contact : contacts) has_contact[contact.finger()] = true;
-    fingers_ = std::count(has_contact.begin(), has_contact.end(), true);
-    rows_ = static_cast<Eigen::Index>(6 + contacts.size() + fingers);
-    inverse_.setIdentity(rows_, rows_);
-    values_.setZero(rows_);
-    values_.tail(rows_ - 6).setOnes();
-    column_.setZero(rows_);
-    change_.setZero(rows_);
+    stride_ = (rows_ + group - 1) / group * group;
+    inverse_.setIdentity(stride_, rows_);
+    values_.setZero(stride_);
+    values_.segment(6, rows_ - 6).setOnes();
+    column_.setZero(stride_);
+    change_.setZero(stride_);
+    smallest_.setZero(stride_);
+    bounds_.setZero(stride_);
     prices_.setZero(rows_);
     kinds_.assign(static_cast<std::size_t>(rows_), Kind::slack);
     std::fill_n(kinds_.begin(), 6, Kind::artificial);
@@ -74,43 +98,57 @@ class EquilibriumProgram {
   // The basis of the direction before, if any, is the start: first the new pull takes the place of
   // the former one, as part of the same program.
   double max_pull(const Eigen::Vector3d& direction, double enough) {
-    if (const Eigen::Index former = row_of(Kind::pull); former >= 0)
-      kinds_[static_cast<std::size_t>(former)] = Kind::former_pull;
+    if (pull_ >= 0) formers_.push_back(std::exchange(pull_, -1));
     direction_ = direction;
     make_pull();
     if (!enter(Kind::pull)) return 0.0;
     // What the former pull costs, relative to the new one: a small cost leads to it on the way.
     double cost = 0.1;
     constexpr double max_cost = 1e9;
-    constexpr double negligible_n = 1e-9;
     constexpr int max_pivots = 2000;
     for (int pivot = 0; pivot < max_pivots && cost < max_cost; ++pivot) {
-      const Eigen::Index pull = row_of(Kind::pull);
-      const Eigen::Index former = row_of(Kind::former_pull);
-      const bool is_former_gone = former < 0 || true_value(former) <= negligible_n;
-      if (is_former_gone && pull >= 0 && values_[pull] >= enough && true_value(pull) >= enough)
+      if (pull_ >= 0 && values_[pull_] >= enough && are_formers_gone() &&
+          true_value(pull_) >= enough)
         break;
-      prices_.setZero(rows_);
-      if (pull >= 0) prices_ += inverse_.row(pull);
-      if (former >= 0) prices_ -= cost * inverse_.row(former);
-      const double gain = price(pull < 0);
-      if (gain > 1e-11 * (1.0 + (pull < 0 ? 0.0 : std::abs(values_[pull])))) {
+      prices_.setZero();
+      if (pull_ >= 0) prices_ += inverse_.row(pull_);
+      for (const Eigen::Index former : formers_) prices_ -= cost * inverse_.row(former);
+      const double gain = price(pull_ < 0);
+      if (gain > 1e-11 * (1.0 + (pull_ < 0 ? 0.0 : std::abs(values_[pull_])))) {
         if (!enter(entering_)) break;
-      } else if (is_former_gone) {
+      } else if (are_formers_gone()) {
         break;
       } else {
         cost *= 100.0;
       }
     }
-    const Eigen::Index pull = row_of(Kind::pull);
-    return pull < 0 ? 0.0 : std::max(0.0, true_value(pull));
+    return pull_ < 0 ? 0.0 : std::max(0.0, true_value(pull_));
   }
 
  private:
-  enum class Kind : std::uint8_t { slack, artificial, pull, former_pull, contact };
+  enum class Kind : std::uint8_t { slack, artificial, pull, contact };
 
-  Eigen::Index drive_row(const BearingContact& contact) const {
-    return 6 + static_cast<Eigen::Index>(contacts_.size() + contact.finger());
+  // What a force of a contact is worth along its normal, drag and lateral, by the prices of the
+  // equilibrium's rows and of its drive's row.
+  struct ContactPrices {
+    Eigen::Matrix3d by_force;
+    Eigen::Matrix3d by_moment;
+    Eigen::Vector3d by_drive;
+  };
+
+  // Of the fingers with contacts alone.
+  void number_drives() {
+    std::vector<Eigen::Index> row_of_finger;
+    rows_ = static_cast<Eigen::Index>(6 + contacts_.size());
+    for (const BearingContact& contact : contacts_) {
+      if (contact.finger() >= row_of_finger.size()) row_of_finger.resize(contact.finger() + 1, -1);
+      Eigen::Index& row = row_of_finger[contact.finger()];
+      if (row < 0) {
+        row = rows_++;
+        ++fingers_;
+      }
+      drive_rows_.push_back(row);
+    }
   }
   // Of a rigid finger: c_k / m.
   double reaction_of(const BearingContact& contact) const {
@@ -118,44 +156,47 @@ class EquilibriumProgram {
     const double cosine = contact.normal().dot(options_.axis);
     return std::max(0.0, sine * cosine) / (1.0 + sine * sine) / static_cast<double>(fingers_);
   }
-  Eigen::Index row_of(Kind kind) const {
-    const auto found = std::find(kinds_.begin(), kinds_.end(), kind);
-    return found == kinds_.end() ? -1 : found - kinds_.begin();
-  }
   void make_pull() {
     column_.setZero();
     column_.head<3>() = direction_;
     if (!options_.holds_when_closed) return;
-    for (const BearingContact& contact : contacts_) {
-      double& share = column_[drive_row(contact)];
-      share = std::min(share, -reaction_of(contact) / options_.closing_force_n);
+    for (std::size_t n = 0; n < contacts_.size(); ++n) {
+      double& share = column_[drive_rows_[n]];
+      share = std::min(share, -reaction_of(contacts_[n]) / options_.closing_force_n);
     }
   }
   // Of a basic variable, without the perturbation.
-  double true_value(Eigen::Index row) const { return inverse_.row(row).tail(rows_ - 6).sum(); }
+  double true_value(Eigen::Index row) const {
+    return inverse_.row(row).segment(6, rows_ - 6).sum();
+  }
+  bool are_formers_gone() const {
+    constexpr double negligible_n = 1e-9;
+    return std::all_of(formers_.begin(), formers_.end(),
+                       [&](Eigen::Index row) { return true_value(row) <= negligible_n; });
+  }
 
   // Makes the column with the largest gain, which it returns.
   double price(bool with_pull) {
-    const Eigen::RowVectorXd& prices = prices_;
-    const Eigen::Vector3d force_price = prices.head<3>();
-    const Eigen::Vector3d moment_price = prices.segment<3>(3) / wrench_length_m;
+    const Eigen::Vector3d force_price = prices_.head<3>();
+    const Eigen::Vector3d moment_price = prices_.segment<3>(3);
     const auto worth_of = [&](std::size_t n) -> Eigen::Vector3d {
-      return -force_price - moment_price.cross(arms_[n]) -
-             prices[drive_row(contacts_[n])] / options_.closing_force_n * contacts_[n].outward();
+      const ContactPrices& by = prices_of_[n];
+      return by.by_force * force_price + by.by_moment * moment_price +
+             by.by_drive * prices_[drive_rows_[n]];
     };
     double most = 0.0;
     std::size_t best = contacts_.size();
     for (std::size_t n = 0; n < contacts_.size(); ++n) {
-      const double gain = contacts_[n].max_product(worth_of(n), options_.sharing) -
-                          prices[6 + static_cast<Eigen::Index>(n)];
+      const double gain = contacts_[n].max_local_product(worth_of(n), options_.sharing) -
+                          prices_[6 + static_cast<Eigen::Index>(n)];
       if (gain <= most) continue;
       most = gain;
       best = n;
     }
     Eigen::Index slack = -1;
     for (Eigen::Index row = 6; row < rows_; ++row) {
-      if (-prices[row] <= most) continue;
-      most = -prices[row];
+      if (-prices_[row] <= most) continue;
+      most = -prices_[row];
       slack = row;
     }
     column_.setZero();
@@ -163,17 +204,17 @@ class EquilibriumProgram {
     if (slack >= 0) {
       column_[slack] = 1.0;
     } else if (best < contacts_.size()) {
-      const Eigen::Vector3d force = contacts_[best].best_force(worth_of(best), options_.sharing);
+      const Eigen::Vector3d force =
+          contacts_[best].best_local_force(worth_of(best), options_.sharing);
       column_.head<3>() = force;
       column_.segment<3>(3) = arms_[best].cross(force) / wrench_length_m;
       column_[6 + static_cast<Eigen::Index>(best)] = 1.0;
-      column_[drive_row(contacts_[best])] =
-          contacts_[best].outward().dot(force) / options_.closing_force_n;
+      column_[drive_rows_[best]] = contacts_[best].outward().dot(force) / options_.closing_force_n;
     }
     if (!with_pull) return most;
     const Eigen::VectorXd other = column_;
     make_pull();
-    const double gain = 1.0 - prices_.dot(column_);
+    const double gain = 1.0 - prices_.dot(column_.head(rows_));
     if (gain > most) {
       entering_ = Kind::pull;
       return gain;
@@ -184,39 +225,57 @@ class EquilibriumProgram {
 
   // Lets `column_` enter the basis; false if nothing bounds it.
   bool enter(Kind kind) {
-    multiply(inverse_.data(), column_.data(), change_.data(), rows_);
-    Eigen::Index leaving = -1;
+    multiply(inverse_.data(), column_.data(), change_.data(), rows_, stride_);
     // Smaller changes are rounding errors; dividing by one would spoil the inverse.
     const double smallest = 1e-9 * change_.cwiseAbs().maxCoeff();
-    // Artificial variables are 0 and must stay so: they leave as soon as they would change.
-    double largest = smallest;
-    for (Eigen::Index row = 0; row < rows_; ++row)
-      if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial &&
-          std::abs(change_[row]) > largest) {
-        largest = std::abs(change_[row]);
-        leaving = row;
-      }
+    Eigen::Index leaving = changing_artificial(smallest);
     double step = 0.0;
     if (leaving < 0) {
       perturb();
-      step = std::numeric_limits<double>::infinity();
-      for (Eigen::Index row = 0; row < rows_; ++row) {
-        if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial || change_[row] <= smallest)
-          continue;
-        const double bound = values_[row] / change_[row];
-        if (bound >= step) continue;
-        step = bound;
-        leaving = row;
-      }
+      leaving = first_at_zero(smallest, step);
       if (leaving < 0) return false;
     }
     values_ -= step * change_;
     values_[leaving] = step > 0.0 || !is_perturbed_ ? step : small_value(leaving);
     const double pivot = change_[leaving];
     change_[leaving] = 0.0;
-    exchange(inverse_.data(), change_.data(), pivot, leaving, rows_);
+    exchange(inverse_.data(), change_.data(), pivot, leaving, rows_, stride_);
+    if (kinds_[static_cast<std::size_t>(leaving)] == Kind::artificial) --artificials_;
+    std::erase(formers_, leaving);
+    if (leaving == pull_) pull_ = -1;
+    if (kind == Kind::pull) pull_ = leaving;
     kinds_[static_cast<std::size_t>(leaving)] = kind;
     return true;
+  }
+
+  // Artificial variables are 0 and must stay so: they leave as soon as they would change.
+  Eigen::Index changing_artificial(double smallest) const {
+    Eigen::Index found = -1;
+    double largest = smallest;
+    for (Eigen::Index row = 0; artificials_ > 0 && row < rows_; ++row)
+      if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial &&
+          std::abs(change_[row]) > largest) {
+        largest = std::abs(change_[row]);
+        found = row;
+      }
+    return found;
+  }
+
+  // The value that is 0 first as the column enters, after `step`.
+  Eigen::Index first_at_zero(double smallest, double& step) {
+    smallest_.setConstant(smallest);
+    for (Eigen::Index row = 0; artificials_ > 0 && row < rows_; ++row)
+      if (kinds_[static_cast<std::size_t>(row)] == Kind::artificial)
+        smallest_[row] = std::numeric_limits<double>::infinity();
+    find_bounds(values_.data(), change_.data(), smallest_.data(), bounds_.data(), stride_);
+    Eigen::Index first = -1;
+    step = std::numeric_limits<double>::infinity();
+    for (Eigen::Index row = 0; row < rows_; ++row) {
+      if (bounds_[row] >= step) continue;
+      step = bounds_[row];
+      first = row;
+    }
+    return first;
   }
 
   // Many basic variables are 0 at first. Small different values instead keep the method from going
@@ -231,16 +290,24 @@ class EquilibriumProgram {
 
   const std::vector<BearingContact>& contacts_;
   const HoldingOptions& options_;
+  std::vector<ContactPrices> prices_of_;
   std::vector<Eigen::Vector3d> arms_;
-  std::ptrdiff_t fingers_ = 0;  // with contacts
+  std::vector<Eigen::Index> drive_rows_;  // of the contacts
+  std::ptrdiff_t fingers_ = 0;            // with contacts
   Eigen::Index rows_ = 0;
+  Eigen::Index stride_ = 0;  // of the columns
   Eigen::MatrixXd inverse_;
   Eigen::VectorXd values_;
   Eigen::Vector3d direction_;  // of the pull
   Eigen::VectorXd column_;     // that enters
   Eigen::VectorXd change_;     // of the values by it
+  Eigen::VectorXd smallest_;
+  Eigen::VectorXd bounds_;
   Eigen::RowVectorXd prices_;  // of the rows: how much the pull grows with their right side
   std::vector<Kind> kinds_;
+  Eigen::Index pull_ = -1;  // its row; -1: not in the basis
+  std::vector<Eigen::Index> formers_;
+  int artificials_ = 6;
   Kind entering_ = Kind::slack;
   bool is_perturbed_ = false;
 };
@@ -260,8 +327,11 @@ LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
   EquilibriumProgram program(contacts, options);
   constexpr double all = std::numeric_limits<double>::infinity();
   LeastForce least{program.max_pull(directions[first].vector, all), first};
-  for (std::size_t n = 0; n < directions.size() && least.force_n > 0.0; ++n) {
+  // Each beside the one before: few contacts change their forces.
+  constexpr std::size_t ways[] = {0, 1, 9, 10, 2, 3, 11, 12, 4, 5, 13, 14, 6, 7, 15, 16, 8};
+  for (const std::size_t n : ways) {
     if (n == first) continue;
+    if (!(least.force_n > 0.0)) break;
     const double force = program.max_pull(directions[n].vector, least.force_n);
     if (force < least.force_n) least = {force, n};
   }

@@ -48,11 +48,11 @@ const std::vector<PullDirection>& pull_directions();
 // The least holding force of these directions.
 struct LeastForce {
   double force_n = 0.0;
-  std::size_t direction = 0;  // in pull_directions(); the first of equal ones
+  std::size_t direction = 0;  // in pull_directions(); one of equal ones
 };
 
 // `first` is tried first: a good guess saves time and changes nothing but the choice among equal
-// ones at 0 N.
+// ones.
 LeastForce least_holding_force(const std::vector<BearingContact>& contacts,
                                const HoldingOptions& options, std::size_t first = 0);
 

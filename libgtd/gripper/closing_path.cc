@@ -39,12 +39,16 @@ double ClosingPath::reach_m() const {
   return reach;
 }
 
-ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
+void require_hold_model(const Gripper& gripper) {
   for (const auto& [section, is_there] : {std::pair{"fingers", gripper.fingers.has_value()},
                                           {"hold_model", gripper.hold_model.has_value()}})
     if (!is_there)
       throw libmap::Error("missing: method calibrated needs it, corrected does not",
                           {.field = section});
+}
+
+ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
+  require_hold_model(gripper);
   ClosingPath path;
   path.model = *gripper.hold_model;
   path.palm_radius_m = 0.0005 * gripper.palm_diameter_mm;

@@ -32,6 +32,9 @@ struct ClosingPath {
 };
 
 // Throws Error naming the section that the gripper does not have: `fingers` or `hold_model`.
+void require_hold_model(const Gripper& gripper);
+
+// Throws as require_hold_model.
 ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m);
 
 }  // namespace libgtd

@@ -20,14 +20,14 @@ constexpr int azimuths = 16;
 constexpr int gap_columns = 3;
 constexpr int block_columns = 64;
 // The open finger rests on the ground: only what rises more than rounding into its way is met.
-constexpr float clearance_m = 1e-5F;
-constexpr float unknown = -std::numeric_limits<float>::infinity();
+constexpr double clearance_m = 1e-5;
+constexpr double unknown = -std::numeric_limits<double>::infinity();
 
 // Places around a pivot as columns, for one azimuth.
 struct Cell {
   int i = 0;
   int j = 0;
-  float depth = 0.0F;  // below the palm
+  double depth = 0.0;  // below the palm
   bool has_spines = false;
 };
 
@@ -56,7 +56,7 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
     const auto cell = [&](const ClosingPath::Place& place) {
       return Cell{static_cast<int>(std::lround(place.radius_m * std::cos(angle) / voxel_size_m)),
                   static_cast<int>(std::lround(place.radius_m * std::sin(angle) / voxel_size_m)),
-                  static_cast<float>(place.depth_m), place.has_spines};
+                  place.depth_m, place.has_spines};
     };
     for (const ClosingPath::Place& place : path.open) rays.open.push_back(cell(place));
     for (const ClosingPath::Place& place : path.closing)
@@ -86,8 +86,7 @@ class Heights {
     // last.
     visit_columns(grid, bounds, [&](std::size_t at) {
       const Voxel& voxel = grid.voxels[at];
-      heights_[index(voxel.i, voxel.j)] =
-          static_cast<float>((voxel.k + 0.5) * grid.lattice.voxel_size_m);
+      heights_[index(voxel.i, voxel.j)] = (voxel.k + 0.5) * grid.lattice.voxel_size_m;
     });
     for (int round = 0; round < gap_columns; ++round) fill_gaps();
     find_falls(grid.lattice.voxel_size_m);
@@ -100,40 +99,40 @@ class Heights {
   std::ptrdiff_t step(const Cell& cell) const {
     return static_cast<std::ptrdiff_t>(cell.i) * width_ + cell.j;
   }
-  float height(std::size_t at) const { return heights_[at]; }
+  double height(std::size_t at) const { return heights_[at]; }
   // dz/dx and dz/dy
-  const std::array<float, 2>& rise(std::size_t at) const { return rises_[at]; }
+  const std::array<double, 2>& rise(std::size_t at) const { return rises_[at]; }
 
  private:
   void fill_gaps() {
-    std::vector<float> filled = heights_;
+    std::vector<double> filled = heights_;
     const int rows = bounds_.i_end - bounds_.i_begin;
     for (int i = 0; i < rows; ++i)
       for (int j = 0; j < width_; ++j) {
         const auto at = static_cast<std::size_t>(i) * static_cast<std::size_t>(width_) +
                         static_cast<std::size_t>(j);
         if (heights_[at] != unknown) continue;
-        float sum = 0.0F;
+        double sum = 0.0;
         int count = 0;
         for (int di = std::max(i - 1, 0); di <= std::min(i + 1, rows - 1); ++di)
           for (int dj = std::max(j - 1, 0); dj <= std::min(j + 1, width_ - 1); ++dj) {
-            const float height =
+            const double height =
                 heights_[static_cast<std::size_t>(di) * static_cast<std::size_t>(width_) +
                          static_cast<std::size_t>(dj)];
             if (height == unknown) continue;
             sum += height;
             ++count;
           }
-        if (count > 0) filled[at] = sum / static_cast<float>(count);
+        if (count > 0) filled[at] = sum / count;
       }
     heights_ = std::move(filled);
   }
 
   void find_falls(double voxel_size_m) {
-    rises_.assign(heights_.size(), {0.0F, 0.0F});
+    rises_.assign(heights_.size(), {0.0, 0.0});
     const auto between = [&](std::size_t low, std::size_t high) {
-      if (heights_[low] == unknown || heights_[high] == unknown) return 0.0F;
-      return (heights_[high] - heights_[low]) / static_cast<float>(2.0 * voxel_size_m);
+      if (heights_[low] == unknown || heights_[high] == unknown) return 0.0;
+      return (heights_[high] - heights_[low]) / (2.0 * voxel_size_m);
     };
     const auto width = static_cast<std::size_t>(width_);
     for (std::size_t at = width + 1; at + width + 1 < heights_.size(); ++at)
@@ -142,8 +141,8 @@ class Heights {
 
   TileBounds bounds_;
   int width_ = 0;
-  std::vector<float> heights_;
-  std::vector<std::array<float, 2>> rises_;
+  std::vector<double> heights_;
+  std::vector<std::array<double, 2>> rises_;
 };
 
 // Follows the fingers at the pivots of one block.
@@ -157,8 +156,8 @@ class BlockCloser {
       for (const Cell& cell : rays.closing[a]) closing_[a].push_back(heights.step(cell));
   }
 
-  ClosingTerms terms(std::size_t pivot, float pivot_height) const {
-    const float palm = palm_height(pivot);
+  ClosingTerms terms(std::size_t pivot, double pivot_height) const {
+    const double palm = palm_height(pivot);
     std::array<double, azimuths> contacts{};
     std::array<double, azimuths> bearings{};
     double depths = 0.0;
@@ -183,8 +182,8 @@ class BlockCloser {
   }
 
  private:
-  float palm_height(std::size_t pivot) const {
-    float palm = unknown;
+  double palm_height(std::size_t pivot) const {
+    double palm = unknown;
     for (const std::ptrdiff_t step : palm_)
       palm = std::max(palm, heights_.height(pivot + static_cast<std::size_t>(step)));
     for (std::size_t n = 0; n < open_.size(); ++n)
@@ -193,7 +192,7 @@ class BlockCloser {
     return palm;
   }
 
-  std::size_t first_contact(std::size_t pivot, float palm, std::size_t azimuth,
+  std::size_t first_contact(std::size_t pivot, double palm, std::size_t azimuth,
                             const Cell*& cell) const {
     const std::vector<Cell>& cells = rays_.closing[azimuth];
     for (std::size_t n = 0; n < cells.size(); ++n) {
@@ -254,8 +253,7 @@ std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath
       const BlockCloser closer(heights, rays, path);
       for (const std::size_t n : members) {
         const Voxel& voxel = grid.voxels[pivots[n]];
-        terms[n] = closer.terms(heights.index(voxel.i, voxel.j),
-                                static_cast<float>((voxel.k + 0.5) * voxel_size_m));
+        terms[n] = closer.terms(heights.index(voxel.i, voxel.j), (voxel.k + 0.5) * voxel_size_m);
       }
     }
   });

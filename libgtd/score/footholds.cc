@@ -47,7 +47,7 @@ class FootholdSearch {
       : map_(map),
         options_(options),
         up_(frame.up.normalized()),
-        scores_(values_of(map, "score")),
+        scores_(values_of(map, is_tested(map) ? "hold_probability" : "score")),
         grid_(map.positions, options.separation_m) {}
 
   FootholdResult run() {
@@ -56,6 +56,7 @@ class FootholdSearch {
     result.candidates = candidates.size();
     std::sort(candidates.begin(), candidates.end(), [](const Foothold& a, const Foothold& b) {
       if (a.score != b.score) return a.score > b.score;
+      if (a.force_n != b.force_n) return a.force_n > b.force_n;
       if (a.mean_score != b.mean_score) return a.mean_score > b.mean_score;
       return a.map_point < b.map_point;
     });
@@ -76,11 +77,24 @@ class FootholdSearch {
   }
 
  private:
+  static bool is_tested(const PointCloud& map) {
+    return map.find_field("hold_probability") != nullptr;
+  }
+
+  // For each point, 1 or 0; empty if the map does not say and the options do not ask.
+  std::vector<double> graspable_points() const {
+    if (is_tested(map_)) {
+      std::vector<double> graspable;
+      for (const double probability : scores_) graspable.push_back(probability >= 0.5 ? 1.0 : 0.0);
+      return graspable;
+    }
+    if (map_.find_field("graspable") == nullptr && !options_.graspable_only) return {};
+    return values_of(map_, "graspable");
+  }
+
   std::vector<Foothold> find_candidates(std::size_t& at_border) const {
-    const std::vector<double>* graspable =
-        map_.find_field("graspable") != nullptr || options_.graspable_only
-            ? &values_of(map_, "graspable")
-            : nullptr;
+    const std::vector<double> graspable = graspable_points();
+    const ScalarField* force = is_tested(map_) ? map_.find_field("holding_force_n") : nullptr;
     // Maps of earlier versions call it edge.
     const char* name = map_.find_field("edge") != nullptr ? "edge" : "border";
     const std::vector<double>* border = options_.border ? nullptr : &values_of(map_, name);
@@ -89,7 +103,7 @@ class FootholdSearch {
       if (!map_.positions[n].allFinite() || !std::isfinite(scores_[n]) ||
           !(scores_[n] >= options_.min_score))
         continue;
-      if (options_.graspable_only && (*graspable)[n] == 0.0) continue;
+      if (options_.graspable_only && graspable[n] == 0.0) continue;
       if (border != nullptr && (*border)[n] != 0.0) {
         ++at_border;
         continue;
@@ -97,6 +111,7 @@ class FootholdSearch {
       Foothold& candidate = candidates.emplace_back();
       candidate.map_point = n;
       candidate.score = scores_[n];
+      candidate.force_n = force != nullptr ? force->values[n] : 0.0;
       candidate.approach = approach_at(n);
     }
     // Those in one place follow each other and have the same surroundings, however many they are.
@@ -134,7 +149,7 @@ class FootholdSearch {
     return zero - (axis.allFinite() && axis.norm() > 0.0 ? axis.normalized() : up_);
   }
 
-  void look_around(Foothold& foothold, const std::vector<double>* graspable,
+  void look_around(Foothold& foothold, const std::vector<double>& graspable,
                    std::vector<PointGrid::Range>& runs) const {
     const double radius_m = 0.5 * options_.separation_m;
     const Eigen::Vector3d& place = map_.positions[foothold.map_point];
@@ -145,7 +160,7 @@ class FootholdSearch {
       const double share = (map_.positions[point] - place).squaredNorm() / (radius_m * radius_m);
       sum += (1.0 - share) * scores_[point];
       weights += 1.0 - share;
-      if (graspable != nullptr && (*graspable)[point] != 0.0) ++foothold.graspable_points;
+      if (!graspable.empty() && graspable[point] != 0.0) ++foothold.graspable_points;
     });
     // A separation whose square is nothing weighs no point.
     foothold.mean_score = weights > 0.0 ? sum / weights : foothold.score;
@@ -187,7 +202,7 @@ void bind(libmap::ParameterTable& table, FootholdOptions& options) {
             "no two footholds lie nearer to each other, m");
   table.add("min_score", options.min_score, libmap::zero_to_one, "least score of a foothold");
   table.add("graspable_only", options.graspable_only,
-            "only where the map's threshold, zero plane and convexity are known");
+            "only voxels that are graspable, or whose hold_probability is at least one half");
   table.add("border", options.border, "also where the mask's window leaves the scanned area");
   table.add("surface_radius_m", options.surface_radius_m, libmap::positive,
             "radius in which the surface's normal and curvatures are fitted, m");

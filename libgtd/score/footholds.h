@@ -11,9 +11,10 @@
 namespace libgtd {
 
 struct FootholdOptions {
-  double separation_m = 0.1;       // > 0: no two footholds lie nearer to each other
-  double min_score = 0.0;          // of a foothold
-  bool graspable_only = true;      // the map's own threshold, zero plane and convexity hold there
+  double separation_m = 0.1;  // > 0: no two footholds lie nearer to each other
+  double min_score = 0.0;     // of a foothold
+  // Where the map has hold_probability: at least one half. Else where it is `graspable`.
+  bool graspable_only = true;
   bool border = false;             // also where the mask's window leaves the scanned area
   double surface_radius_m = 0.05;  // > 0: the surface's normal and curvatures are fitted within
   int max_count = 0;               // the best ones alone; 0: all
@@ -27,10 +28,11 @@ struct FootholdFrame {
 
 struct Foothold {
   std::size_t map_point = 0;
-  double score = 0.0;
+  double score = 0.0;    // the map's hold_probability if it has this field, else its score
+  double force_n = 0.0;  // the map's holding_force_n, else 0: orders equal scores
   // Mean score of the map points within half of the separation, weighted by Epanechnikov's kernel:
-  // of equal scores the one with the larger mean comes first, the middle of a plateau rather than
-  // its border.
+  // of equal scores and forces the one with the larger mean comes first, the middle of a plateau
+  // rather than its border.
   double mean_score = 0.0;
   std::size_t graspable_points = 0;  // within half of the separation
   // Of the surface: unit normal outward (where the map's normals face, else up), principal

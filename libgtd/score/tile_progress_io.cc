@@ -128,7 +128,7 @@ std::size_t count_tiles(const TileStoreIndex& index) {
          static_cast<std::size_t>(1 + last.j - first.j);
 }
 
-// Of all tiles, those without a scored voxel too.
+// Of all tiles, those without a scored voxel too. What is known of the whole map stays.
 void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& index) {
   std::uint64_t occupied = 0, border = 0, graspable = 0;
   for (const auto& [number, tile] : tiles) {
@@ -138,7 +138,8 @@ void add_totals(const std::map<TileNumber, StoredTile>& tiles, TileStoreIndex& i
   }
   auto& results = index.manifest.results;
   const auto add = [&](const char* name, std::uint64_t count) {
-    results.emplace_back(name, static_cast<std::int64_t>(count));
+    if (index.manifest.find_result(name) == nullptr)
+      results.emplace_back(name, static_cast<std::int64_t>(count));
   };
   add("occupied_voxels", occupied);
   add("scored_voxels", index.voxels());

@@ -1,25 +1,30 @@
-# A large terrain's map by a Slurm cluster: an array of tasks scores shares of its tiles into one
-# store, then the tiles are merged.
+# A large terrain's map by a Slurm cluster: an array of tasks makes shares of its tiles in one store,
+# then the tiles are merged.
 #
 #   make -f pipelines/slurm/tiles.mk TERRAIN=terrain OUT=folder SHARES=100 [SCENARIO=NAME|FILE]
 #        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
+#   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... MESH=mesh.ply [GRASP="..."] held [held_map]
 #
 # TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
-# render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. TERRAIN, OUT and graspmap
-# itself must be reached by the same path on all nodes. SBATCH holds further flags of sbatch, among
-# them --cpus-per-task and --array=1-100%10 to run ten at a time. A second run does nothing; after a
-# run that failed, the next scores what is missing. Logs: $(OUT)/logs.
+# render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. `held` tests the gripper
+# at every voxel of the map on MESH, in the frame of TERRAIN: $(OUT)/held.tiles, merged by `held_map`
+# to $(OUT)/held.pcd. TERRAIN, MESH, OUT and graspmap itself must be reached by the same path on all
+# nodes. SBATCH holds further flags of sbatch, among them --cpus-per-task and --array=1-100%10 to run
+# ten at a time. A second run does nothing; after a run that failed, the next makes what is missing.
+# Logs: $(OUT)/logs, $(OUT)/held_logs.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../../build/release/graspmap) graspmap)
 SCENARIO ?= artificial_rocks_prescan
 SHARES ?= 16
 SCORE ?=
+MESH ?=
+GRASP ?=
 SBATCH ?=
 TRIES ?= 3
 
 one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
-$(foreach name,TERRAIN OUT SCENARIO SHARES,$(call one_word,$(name)))
+$(foreach name,TERRAIN OUT SCENARIO SHARES MESH,$(call one_word,$(name)))
 ifeq ($(wildcard $(TERRAIN)),)
   $(error TERRAIN is '$(TERRAIN)': it must be a cloud or a folder of clouds)
 endif
@@ -36,15 +41,20 @@ ifdef is_alone
 # Tasks run in the folder of their submission; paths are made whole all the same.
 program := $(shell command -v $(GRASPMAP))
 terrain := $(abspath $(TERRAIN))
+mesh := $(abspath $(MESH))
 store := $(abspath $(OUT))/map.tiles
+held := $(abspath $(OUT))/held.tiles
 logs := $(abspath $(OUT))/logs
+held_logs := $(abspath $(OUT))/held_logs
 score_flags := --config $(SCENARIO) $(SCORE)
 
-.PHONY: tiles map FORCE
+.PHONY: tiles map held held_map FORCE
 tiles: $(store)/index.json
 map: $(OUT)/map.pcd
+held: $(held)/index.json
+held_map: $(OUT)/held.pcd
 
-$(OUT) $(logs):
+$(OUT) $(logs) $(held_logs):
 	@mkdir -p $@
 
 # A stamp of what the tiles depend on: written anew only if it changes, and then tiles of another
@@ -54,17 +64,31 @@ $(OUT)/scored_with: FORCE | $(OUT)
 	@printf '%s\n' "$$scored_with" | cmp -s - $@ || \
 	  { rm -rf $(store) $(store).json && printf '%s\n' "$$scored_with" > $@; }
 
-# sbatch --wait ends when the last task has, with the largest of their exit codes. A task that has
-# been put back into the queue is not at its end.
+export grasped_with := $(scored_with) $(MESH) $(GRASP)
+$(OUT)/grasped_with: FORCE | $(OUT)
+	@printf '%s\n' "$$grasped_with" | cmp -s - $@ || \
+	  { rm -rf $(held) $(held).json && printf '%s\n' "$$grasped_with" > $@; }
+
+# $(call in_shares,LOGS,STORE,COMMAND WORDS). sbatch --wait ends when the last task has, with the
+# largest of their exit codes. A task that has been put back into the queue is not at its end.
+define in_shares
+@GRASPMAP=$(program) TRIES=$(TRIES) sbatch --wait --export=ALL --array=1-$(SHARES) \
+  --output=$(1)/%a.log $(SBATCH) $(here)tile_share.sbatch $(SHARES) $(2) $(3) --quiet || \
+  { echo "tiles.mk: tasks failed; $(1) says why, and make again makes what is missing" >&2; exit 1; }
+@test -e $@ || $(program) info $(2) >$(1)/info.log
+@touch -c $@
+endef
+
 $(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
-	@GRASPMAP=$(program) TRIES=$(TRIES) sbatch --wait --export=ALL --array=1-$(SHARES) \
-	  --output=$(logs)/%a.log $(SBATCH) \
-	  $(here)score_tiles.sbatch $(SHARES) $(terrain) $(store) $(score_flags) --quiet || \
-	  { echo "tiles.mk: tasks failed; $(logs) says why, and make again scores what is missing" >&2; \
-	    exit 1; }
-	@test -e $@ || $(program) info $(store) >$(logs)/info.log
-	@touch -c $@
+	$(call in_shares,$(logs),$(store),score $(terrain) $(score_flags))
+
+$(held)/index.json: $(MESH) $(store)/index.json $(OUT)/grasped_with | $(held_logs)
+	$(if $(MESH),,$(error MESH is not set: the mesh on which the gripper is tested))
+	$(call in_shares,$(held_logs),$(held),grasp $(mesh) --map $(store) $(GRASP))
 
 $(OUT)/map.pcd: $(store)/index.json
 	@exec $(program) convert $(store) -o $@
+
+$(OUT)/held.pcd: $(held)/index.json
+	@exec $(program) convert $(held) -o $@
 endif

@@ -74,7 +74,20 @@ for node in node1 node2; do
   grep -q "on $node\$" "$out"/logs/*.log || fail "$node did nothing"
 done
 
+# A gripper on a mesh at each voxel: again the map of a single process.
+"$graspmap" simulate site --edge-length 0.05 -o "$scratch/site" --quiet
+"$graspmap" resample "$scratch/site/mesh.ply" --radius 0.03 -o "$scratch/site.pcd" --quiet
+held() {
+  run "$@" TERRAIN="$scratch/site.pcd" OUT="$scratch/held" SHARES=3 MESH="$scratch/site/mesh.ply" \
+    SCORE="--voxel-size 0.06 --tile-size 1" GRASP="--trials 2 --map-draws 1"
+}
+held held_map
+"$graspmap" grasp "$scratch/site/mesh.ply" --map "$scratch/held/map.tiles" --trials 2 --map-draws 1 \
+  -o "$scratch/held.pcd" --quiet
+cmp "$scratch/held.pcd" "$scratch/held/held.pcd" || fail "the test by Slurm differs from the local one"
+
 jobs=$(scontrol --oneliner show jobs | wc -l)
+held held_map
 before=$(listing "$out")
 run map TERRAIN="$site" SHARES=4
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"

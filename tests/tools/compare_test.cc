@@ -220,6 +220,24 @@ TEST(Compare, IcpFindsTheMotion) {
             1e-6);
 }
 
+TEST(Compare, IcpTriesQuarterTurns) {
+  const libmap::TriangleMesh mesh = hills();
+  libmap::write_mesh(scratch("hills.ply"), mesh);
+  libmap::PointCloud cloud;
+  const libmap::Pose motion = libmap::make_pose_from_rpy({0.01, -0.01, 0.02}, {1, -1, 91});
+  for (const Eigen::Vector3d& vertex : mesh.vertices)
+    if (vertex.x() > 0.1 && vertex.x() < 0.9 && vertex.y() > 0.1 && vertex.y() < 0.9)
+      cloud.positions.push_back(motion * vertex);
+  libmap::write_cloud(scratch("turned.csv"), cloud);
+  const auto result = graspmap({"compare", "turned.csv", "hills.ply", "--icp", "-o", "out.ply"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("270 degrees"), std::string::npos);
+  const auto found = json_of("out.ply.json").at("transforms").at("b_from_a");
+  const Eigen::Matrix4d truth = motion.inverse().matrix();
+  for (int n = 0; n < 12; ++n)
+    EXPECT_NEAR(found.at(static_cast<std::size_t>(n)).get<double>(), truth(n / 4, n % 4), 1e-6);
+}
+
 TEST(Compare, IcpSaysWhatItCannotDo) {
   write_square_and_points();
   const auto flat = graspmap({"compare", "points.ply", "square.ply", "--icp"});

@@ -331,8 +331,9 @@ TEST(ExtractBundler, BadInput) {
   write_example();
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--angle", "181"}),
                         {"--angle is 181"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--poses", "optimised"}),
-                        {"--poses is optimised", "did you mean 'optimized'"}));
+  EXPECT_TRUE(
+      bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--poses", "optimised"}),
+                {"--poses is optimised", "did you mean 'optimized'"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "scan.db", "--bundler", "out", "--transform", "1,2"}),
                         {"--transform is 1,2"}));
   EXPECT_TRUE(succeeded(graspmap({"convert", "scan.db", "--bundler", "out", "--dry-run"})));

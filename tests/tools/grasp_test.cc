@@ -151,6 +151,15 @@ std::vector<std::string> map_words(const std::string& output,
   return words;
 }
 
+// With two trials for each voxel.
+std::vector<std::string> quick_words(const std::string& output,
+                                     const std::vector<std::string>& more = {}) {
+  std::vector<std::string> words = map_words(output, more);
+  words[7] = "2";
+  words[9] = "1";
+  return words;
+}
+
 TEST(GraspCommand, EveryVoxelOfAMap) {
   const libmap::PointCloud map = write_map();
   ASSERT_GT(map.size(), 300u);
@@ -226,24 +235,19 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
                                   "hold_probability", "-o", "held.png"})));
 }
 
-TEST(GraspCommand, MapsAreTheSameForThreadsAndAfterAKill) {
-  write_map();
-  ASSERT_TRUE(succeeded(graspmap(map_words("one.pcd", {"--threads", "1"}))));
-  ASSERT_TRUE(succeeded(graspmap(map_words("two.pcd", {"--threads", "4"}))));
-  EXPECT_EQ(content("one.pcd"), content("two.pcd"));
-  const auto progress = scratch("killed.pcd.progress");
-  const auto tiles = [&] {
-    std::size_t count = 0;
-    if (std::filesystem::exists(progress))
-      for (const auto& entry : std::filesystem::directory_iterator(progress))
-        count +=
-            entry.path().extension() == ".txt" && !entry.path().filename().string().starts_with(".")
-                ? 1
-                : 0;
-    return count;
-  };
+// The finished tiles of a store.
+std::vector<std::filesystem::path> tiles_in(const std::string& store) {
+  std::vector<std::filesystem::path> files;
+  if (std::filesystem::exists(scratch(store) / "tiles"))
+    for (const auto& entry : std::filesystem::directory_iterator(scratch(store) / "tiles"))
+      if (!entry.path().filename().string().starts_with(".")) files.push_back(entry.path());
+  std::sort(files.begin(), files.end());
+  return files;
+}
+
+// Kills `graspmap WORDS...` once two tiles are in the store.
+void kill_after_two_tiles(std::vector<std::string> words, const std::string& store) {
   const std::string program = (graspmap_test::build_folder() / "graspmap").string();
-  std::vector<std::string> words = map_words("killed.pcd", {"--quiet"});
   const std::string folder = graspmap_test::scratch_folder().string();  // it has this process's id
   const pid_t child = fork();
   if (child == 0) {
@@ -256,43 +260,141 @@ TEST(GraspCommand, MapsAreTheSameForThreadsAndAfterAKill) {
     _exit(1);
   }
   setpgid(child, child);
-  while (tiles() < 2) {
+  while (tiles_in(store).size() < 2) {
     ASSERT_EQ(waitpid(child, nullptr, WNOHANG), 0);
     std::this_thread::sleep_for(std::chrono::milliseconds(1));
   }
   kill(-child, SIGKILL);
   waitpid(child, nullptr, 0);
+}
+
+TEST(GraspCommand, MapsAreTheSameForThreadsAndAfterAKill) {
+  write_map();
+  ASSERT_TRUE(succeeded(graspmap(map_words("one.pcd", {"--threads", "1"}))));
+  ASSERT_TRUE(succeeded(graspmap(map_words("two.pcd", {"--threads", "4"}))));
+  EXPECT_EQ(content("one.pcd"), content("two.pcd"));
+  std::vector<std::string> words = map_words("killed.pcd", {"--quiet"});
+  const std::string progress = "killed.pcd.progress";
+  kill_after_two_tiles(words, progress);
   EXPECT_FALSE(std::filesystem::exists(scratch("killed.pcd")));
-  ASSERT_GE(tiles(), 2u);
-  // A tile that is not whole, and one that says something else: it is read, not made again.
-  const auto kept = [&](const std::string& name) {
-    return graspmap_test::read_text(progress / name);
-  };
-  std::vector<std::string> names;
-  for (const auto& entry : std::filesystem::directory_iterator(progress))
-    names.push_back(entry.path().filename().string());
-  std::sort(names.begin(), names.end());
-  const std::string whole = kept(names[0]);
-  write_text(progress / names[0], whole.substr(0, whole.size() / 2));
+  auto tiles = tiles_in(progress);
+  ASSERT_GE(tiles.size(), 2u);
+  // A tile that is not whole is made again, another is not.
+  const std::string whole = graspmap_test::read_text(tiles[0]);
+  write_text(tiles[0], whole.substr(0, whole.size() / 2));
   ASSERT_TRUE(succeeded(graspmap(words)));
   EXPECT_EQ(content("killed.pcd"), content("one.pcd"));
-  EXPECT_FALSE(std::filesystem::exists(progress));
-  std::filesystem::create_directory(progress);
-  const std::size_t line = whole.find('\n') + 1;
-  std::string other = whole;  // another probability of its first voxel
-  other[line] = other[line] == '1' ? '0' : '1';
-  write_text(progress / names[0], other);
-  words.emplace_back("--force");
+  EXPECT_FALSE(std::filesystem::exists(scratch(progress)));
+  // Tiles of another seed are not taken.
+  words.insert(words.end(), {"--force", "--seed", "2"});
+  kill_after_two_tiles(words, progress);
+  words.back() = "3";
   ASSERT_TRUE(succeeded(graspmap(words)));
-  EXPECT_NE(content("killed.pcd"), content("one.pcd"));
-  // Of another seed: made again.
-  std::filesystem::create_directory(progress);
-  write_text(progress / names[0], other);
-  words.insert(words.end(), {"--seed", "2"});
-  ASSERT_TRUE(succeeded(graspmap(words)));
-  ASSERT_TRUE(succeeded(graspmap(map_words("seed.pcd", {"--seed", "2"}))));
+  ASSERT_TRUE(succeeded(graspmap(map_words("seed.pcd", {"--seed", "3"}))));
   EXPECT_EQ(content("killed.pcd"), content("seed.pcd"));
   EXPECT_NE(content("killed.pcd"), content("one.pcd"));
+}
+
+TEST(GraspCommand, SharesOfAMapAreTheMap) {
+  write_map();
+  ASSERT_TRUE(succeeded(graspmap(map_words("whole.pcd"))));
+  ASSERT_TRUE(succeeded(graspmap(map_words("held.tiles", {"--tile", "2/3"}))));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "held.tiles", "-o", "t.pcd"}), {"held.tiles"}));
+  // A share that was killed, and that has lost a tile since.
+  kill_after_two_tiles(map_words("held.tiles", {"--tile", "1/3", "--quiet"}), "held.tiles");
+  std::filesystem::remove(tiles_in("held.tiles").front());
+  ASSERT_TRUE(succeeded(graspmap(map_words("held.tiles", {"--tile", "2/3"}))));
+  ASSERT_TRUE(succeeded(graspmap(map_words("held.tiles", {"--tile", "3/3"}))));
+  ASSERT_TRUE(succeeded(graspmap(map_words("held.tiles", {"--tile", "1/3"}))));
+  ASSERT_TRUE(succeeded(graspmap({"info", "--verify", "held.tiles"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "held.tiles", "-o", "merged.pcd"})));
+  EXPECT_EQ(content("merged.pcd"), content("whole.pcd"));
+  // The store is a map for other commands.
+  ASSERT_TRUE(
+      succeeded(graspmap({"lookup", "held.tiles", "places.csv", "--column", "p=hold_probability",
+                          "-o", "looked.csv", "--max-distance", "0.05"})));
+  // And the map may be a store itself.
+  ASSERT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "--voxel-size", "0.04", "--up", "0,0,1",
+                                  "--tile-size", "0.3", "-o", "map.tiles"})));
+  auto words = map_words("of_tiles.pcd");
+  words[3] = "map.tiles";
+  ASSERT_TRUE(succeeded(graspmap(words)));
+  EXPECT_EQ(content("of_tiles.pcd"), content("whole.pcd"));
+  // Another seed is another map.
+  EXPECT_TRUE(
+      bad_input(graspmap(map_words("held.tiles", {"--seed", "2"})), {"held.tiles", "--force"}));
+  EXPECT_TRUE(
+      bad_input(graspmap(map_words("held.tiles", {"--force", "--tile", "1/3"})), {"--force"}));
+  ASSERT_TRUE(succeeded(graspmap(map_words("held.tiles", {"--seed", "2", "--force"}))));
+  ASSERT_TRUE(succeeded(graspmap(map_words("seed.pcd", {"--seed", "2"}))));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "held.tiles", "-o", "merged.pcd", "--force"})));
+  EXPECT_EQ(content("merged.pcd"), content("seed.pcd"));
+}
+
+TEST(GraspCommand, MapsInAllFormats) {
+  write_map();
+  ASSERT_TRUE(succeeded(graspmap(quick_words("held.pcd"))));
+  for (const char* format : {".ply", ".csv", ".vtp"}) {
+    ASSERT_TRUE(succeeded(graspmap(quick_words(std::string("held") + format))));
+    ASSERT_TRUE(
+        succeeded(graspmap({"convert", "held.pcd", "-o", std::string("converted") + format})));
+    EXPECT_EQ(content(std::string("held") + format), content(std::string("converted") + format));
+  }
+  for (const char* name : {"t.obj", "t.txt", "t"})
+    EXPECT_TRUE(bad_input(graspmap(quick_words(name)), {name, ".pcd, .ply, .csv or .vtp"}));
+}
+
+// The error of a mesh, as fuse and mesh leave it, and a constant one: by shares as in one run.
+TEST(GraspCommand, SurfaceError) {
+  write_map();
+  libmap::TriangleMesh mesh = libmap::read_mesh(scratch("ground.ply")).mesh;
+  const auto with_errors = [&](double error_m, double beyond_m) {
+    std::vector<double> errors;
+    for (const Eigen::Vector3d& vertex : mesh.vertices)
+      errors.push_back(vertex.x() > 0.2 ? beyond_m : error_m);
+    mesh.vertex_fields = {{"expected_error", libmap::ScalarType::float32, errors}};
+    libmap::write_mesh(scratch("ground.ply"), mesh);
+  };
+  const auto run_to = [](const std::string& output, const std::vector<std::string>& more) {
+    return graspmap(quick_words(output, more));
+  };
+  const auto refused = [&](const std::string& error, const std::vector<std::string>& parts) {
+    return bad_input(run_to("t.pcd", {"--surface-error", error}), parts);
+  };
+  EXPECT_TRUE(refused("mesh", {"ground.ply", "expected_error"}));
+  with_errors(0.0, 0.0);
+  ASSERT_TRUE(succeeded(run_to("without.pcd", {})));
+  for (const char* none : {"mesh", "0"}) {
+    ASSERT_TRUE(succeeded(run_to("zero.pcd", {"--force", "--surface-error", none})));
+    EXPECT_EQ(content("zero.pcd"), content("without.pcd")) << none;
+  }
+  with_errors(0.002, 0.02);
+  ASSERT_TRUE(succeeded(run_to("with.pcd", {"--surface-error", "mesh"})));
+  for (const char* share : {"2/2", "1/2"})
+    ASSERT_TRUE(succeeded(run_to("with.tiles", {"--surface-error", "mesh", "--tile", share})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "with.tiles", "-o", "merged.pcd"})));
+  EXPECT_EQ(content("merged.pcd"), content("with.pcd"));
+  EXPECT_TRUE(bad_input(run_to("with.tiles", {"--surface-error", "0.002"}), {"--force"}));
+  // Ground with a large error is marked.
+  const auto without = libmap::read_cloud(scratch("without.pcd")).cloud;
+  const auto with = libmap::read_cloud(scratch("with.pcd")).cloud;
+  const auto mesh_from_map = libmap::read_manifest_of(scratch("with.pcd"))
+                                 ->find_transform("terrain_from_input")
+                                 ->inverse();
+  int marked = 0;
+  for (std::size_t n = 0; n < with.size(); ++n) {
+    const auto value = [&](const libmap::PointCloud& map, const char* name) {
+      return map.find_field(name)->values[n];
+    };
+    const double x = (mesh_from_map * with.positions[n]).x();
+    if (value(with, "grasp_trials") == 0 || x < 0.35) continue;
+    ++marked;
+    EXPECT_GT(value(with, "grasp_unseen"), 0.4);
+    EXPECT_GE(value(with, "grasp_unseen"), value(without, "grasp_unseen") - 1e-6);
+  }
+  EXPECT_GT(marked, 20);
+  for (const char* error : {"x", "0.006", "-0.001", "nan"})
+    EXPECT_TRUE(refused(error, {"--surface-error", error, "--max-surface-error"}));
 }
 
 TEST(GraspCommand, BadMaps) {
@@ -304,7 +406,9 @@ TEST(GraspCommand, BadMaps) {
   for (const auto& [flag, value] :
        {std::pair{"--scenes", "s"}, {"--more-loads", "5"}, {"--prefix", "p"}})
     EXPECT_TRUE(bad_input(graspmap(map_words("t.pcd", {flag, value})), {flag}));
-  EXPECT_TRUE(bad_input(graspmap(map_words("t.txt")), {"t.txt"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("t.pcd", {"--tile", "1/2"})), {"t.pcd", "--tile"}));
+  EXPECT_TRUE(bad_input(graspmap(map_words("t.tiles", {"--tile", "3/2"})), {"--tile", "3/2"}));
+  EXPECT_TRUE(bad_input(graspmap(with({"-o", "t.csv", "--tile", "1/2"})), {"--tile", "--map"}));
   EXPECT_TRUE(bad_input(graspmap(map_words("map.pcd")), {"map.pcd"}));
   auto map = libmap::read_cloud(scratch("map.pcd")).cloud;
   map.add_field("holding_force_n", libmap::ScalarType::float32);
@@ -313,15 +417,19 @@ TEST(GraspCommand, BadMaps) {
   words[3] = "taken.pcd";
   EXPECT_TRUE(bad_input(graspmap(words), {"taken.pcd", "holding_force_n"}));
   for (Eigen::Vector3d& position : map.positions) position.x() += 7;
-  map.fields.clear();
+  map.fields.pop_back();
   libmap::write_cloud(scratch("far.pcd"), map);
   words[3] = "far.pcd";
   EXPECT_TRUE(bad_input(graspmap(words), {"far.pcd", "mesh", "0.05 m"}));
   libmap::write_cloud(scratch("none.pcd"), {});
   words[3] = "none.pcd";
   EXPECT_TRUE(bad_input(graspmap(words), {"none.pcd"}));
-  EXPECT_FALSE(std::filesystem::exists(scratch("t.pcd")));
-  EXPECT_FALSE(std::filesystem::exists(scratch("t.pcd.progress")));
+  map.fields.clear();
+  libmap::write_cloud(scratch("bare.pcd"), map);
+  words[3] = "bare.pcd";
+  EXPECT_TRUE(bad_input(graspmap(words), {"bare.pcd", "no such field"}));
+  for (const char* left : {"t.pcd", "t.pcd.progress", "t.tiles"})
+    EXPECT_FALSE(std::filesystem::exists(scratch(left))) << left;
 }
 
 }  // namespace grasp_test

@@ -162,6 +162,15 @@ TEST_F(ScoreBadInput, VoxelSizes) {
   }
 }
 
+TEST_F(ScoreBadInput, GripperWithoutHoldModel) {
+  graspmap_test::write_terrain();
+  const std::string gripper = gripper_with("hold_model:", "ignored:");
+  std::string text = read_text(scratch(gripper));
+  text.erase(text.find("ignored:"));
+  write_text(scratch(gripper), text);
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", gripper}), {gripper, "hold_model"}));
+}
+
 TEST_F(ScoreBadInput, CloudTooWideForTheVoxelSize) {
   // Three patches 1e8 m apart.
   std::vector<Eigen::Vector3d> positions;

@@ -47,8 +47,12 @@ std::string unit_of(const libmap::Parameter& parameter) {
     return names.empty() ? "TEXT" : names;
   }
   const std::string_view key = parameter.key;
-  for (const auto& [suffix, name] :
-       {std::pair{"_mm", "MM"}, {"_m", "M"}, {"_deg", "DEG"}, {"_px", "PX"}, {"_s", "S"}, {"_n", "N"}})
+  for (const auto& [suffix, name] : {std::pair{"_mm", "MM"},
+                                     {"_m", "M"},
+                                     {"_deg", "DEG"},
+                                     {"_px", "PX"},
+                                     {"_s", "S"},
+                                     {"_n", "N"}})
     if (key.ends_with(suffix)) return name;
   return parameter.type == libmap::ParameterType::integer ? "N" : "X";
 }

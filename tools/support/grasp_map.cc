@@ -2,13 +2,20 @@
 
 #include <array>
 #include <cstddef>
-#include <sstream>
-#include <system_error>
+#include <map>
 
+#include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/grasp/grip_candidates.h"
+#include "libgtd/score/tile_progress_io.h"
+#include "libgtd/score/tile_store_io.h"
+#include "libgtd/streamed_detection.h"
+#include "libgtd/terrain/voxel_fields.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/map_tiles.h"
+#include "tools/support/merge_tiles.h"
+#include "tools/support/store_filling.h"
 
 namespace graspmap_tools {
 
@@ -16,17 +23,17 @@ namespace fs = std::filesystem;
 
 namespace {
 
+using libgtd::StoredTile;
+using libgtd::TileNumber;
+
 constexpr std::size_t field_count = 5;
 using Values = std::array<double, field_count>;  // of one voxel, as grasp_fields
 constexpr Values no_candidate = {0.0, 0.0, -1.0, 0.0, 0.0};
 
-// As they are written: what is read again from a tile is the same.
 Values values_of(const libgtd::LocationResult& result) {
-  Values values = {result.hold_probability, result.force_n[1],
-                   result.has_force ? static_cast<double>(result.limiting_direction) : -1.0,
-                   result.unseen, static_cast<double>(result.trials)};
-  for (double& value : values) value = static_cast<float>(value);
-  return values;
+  return {result.hold_probability, result.force_n[1],
+          result.has_force ? static_cast<double>(result.limiting_direction) : -1.0, result.unseen,
+          static_cast<double>(result.trials)};
 }
 
 // Each location of a tile is a step of the whole map.
@@ -41,127 +48,286 @@ class StepsOfTile : public libmap::Progress {
   libmap::Progress& whole_;
 };
 
-using TileNumber = std::pair<std::int64_t, std::int64_t>;
-using Tiles = std::map<TileNumber, std::vector<std::size_t>>;  // voxels of each
-
-// The finished tiles of a run, a file each. One of another key, or not whole, does not count.
-class FinishedTiles {
+// A map by its tiles: those of a store, or of one file that is cut.
+class TiledMap {
  public:
-  FinishedTiles(fs::path folder, std::string key)
-      : folder_(std::move(folder)), key_(std::move(key)) {
-    std::error_code error;
-    fs::create_directory(folder_, error);
-    if (!fs::is_directory(folder_))
-      throw libmap::Error("is no folder for finished tiles", {.file = folder_.string()});
-  }
-
-  std::optional<std::vector<Values>> find(const TileNumber& tile, std::size_t voxels) const {
-    if (!fs::exists(file_of(tile))) return std::nullopt;
-    std::istringstream text(libmap::read_whole_file(file_of(tile)));
-    std::string line;
-    if (!std::getline(text, line) || line != key_) return std::nullopt;
-    std::vector<Values> found;
-    while (std::getline(text, line)) {
-      const std::vector<std::string> words = libmap::split_list(line);
-      if (words.size() != field_count) return std::nullopt;
-      Values& values = found.emplace_back();
-      for (std::size_t n = 0; n < field_count; ++n) {
-        const auto value = libmap::parse_double(words[n]);
-        if (!value) return std::nullopt;
-        values[n] = *value;
-      }
+  explicit TiledMap(const std::string& file) {
+    if (is_tile_store(file)) {
+      store_.emplace(file);
+      index_ = store_->index();
+    } else {
+      in_file(file, [&] { cut(file); });
     }
-    if (found.size() != voxels) return std::nullopt;
-    return found;
   }
 
-  void add(const TileNumber& tile, const std::vector<Values>& values) const {
-    std::string text = key_ + "\n";
-    for (const Values& voxel : values) {
-      for (std::size_t n = 0; n < field_count; ++n)
-        text += (n == 0 ? "" : ",") + libmap::to_text(voxel[n]);
-      text += "\n";
-    }
-    libmap::write_whole_file(file_of(tile), text);
-  }
+  const libgtd::TileStoreIndex& index() const { return index_; }
+  bool has_manifest() const { return has_manifest_; }
 
-  // What others put into the folder stays.
-  void remove(const Tiles& tiles) const {
-    std::error_code error;
-    for (const auto& [tile, voxels] : tiles) fs::remove(file_of(tile), error);
-    fs::remove(folder_, error);
+  // Of index().tiles.
+  libmap::PointCloud load(std::size_t tile) const {
+    return store_ ? store_->load_checked(tile)
+                  : libmap::select_points(cloud_, points_.at(index_.tiles[tile].number));
   }
 
  private:
-  fs::path file_of(const TileNumber& tile) const {
-    return folder_ / fmt::format("{}_{}.txt", tile.first, tile.second);
+  void cut(const std::string& file) {
+    cloud_ = libmap::read_cloud(file).cloud;
+    if (cloud_.empty()) throw libmap::Error("the map has no points");
+    const auto manifest = libmap::read_manifest_of(file);
+    has_manifest_ = manifest.has_value();
+    const libmap::Manifest known = manifest.value_or(libmap::Manifest{});
+    if (const auto index = index_of(known))
+      index_ = *index;
+    else
+      index_.lattice = libgtd::voxel_map_of(cloud_, libgtd::facts_of(known)).lattice;
+    index_.manifest = known;
+    constexpr double tile_m = 0.5;
+    index_.tile_voxels = std::max(1, static_cast<int>(tile_m / index_.lattice.voxel_size_m));
+    const std::vector<libgtd::Voxel> voxels = libgtd::VoxelFields(cloud_).all();
+    index_.min = index_.max = voxels.front();
+    for (std::size_t n = 0; n < voxels.size(); ++n) {
+      points_[libgtd::tile_of(voxels[n], index_.tile_voxels)].push_back(n);
+      extend(voxels[n], index_.min, index_.max);
+    }
+    for (const auto& [number, points] : points_) {
+      StoredTile& tile = index_.tiles.emplace_back();
+      tile.number = number;
+      tile.voxels = tile.occupied_voxels = points.size();
+      tile.min = tile.max = voxels[points.front()];
+      for (const std::size_t n : points) {
+        extend(voxels[n], tile.min, tile.max);
+        tile.border_voxels += is_set("border", n) ? 1 : 0;
+        tile.graspable_voxels += is_set("graspable", n) ? 1 : 0;
+      }
+    }
   }
 
-  fs::path folder_;
-  std::string key_;
+  static void extend(const libgtd::Voxel& voxel, libgtd::Voxel& min, libgtd::Voxel& max) {
+    min = {std::min(min.i, voxel.i), std::min(min.j, voxel.j), std::min(min.k, voxel.k)};
+    max = {std::max(max.i, voxel.i), std::max(max.j, voxel.j), std::max(max.k, voxel.k)};
+  }
+  bool is_set(const char* flag, std::size_t n) const {
+    const libmap::ScalarField* field = cloud_.find_field(flag);
+    return field != nullptr && field->values[n] == 1.0;
+  }
+
+  libgtd::TileStoreIndex index_;
+  bool has_manifest_ = true;
+  std::optional<MapTiles> store_;
+  libmap::PointCloud cloud_;
+  std::map<TileNumber, std::vector<std::size_t>> points_;  // of cloud_
 };
 
-Tiles tiles_of(const std::vector<Eigen::Vector3d>& positions) {
-  constexpr double tile_m = 1.0;
-  Tiles tiles;
-  for (std::size_t n = 0; n < positions.size(); ++n) {
-    const Eigen::Vector3d tile = (positions[n] / tile_m).array().floor();
-    if (!(tile.head<2>().cwiseAbs().maxCoeff() < 1e9))
-      throw libmap::Error("a voxel's place is out of bounds",
-                          {.field = "point " + std::to_string(n + 1)});
-    tiles[{static_cast<std::int64_t>(tile.x()), static_cast<std::int64_t>(tile.y())}].push_back(n);
+class MapGrasping {
+ public:
+  MapGrasping(const GraspMapInput& input, const libmap::TriangleMesh& mesh,
+              const libgtd::Ground& ground, const libgtd::Gripper& gripper,
+              const libgtd::GraspOptions& options, Run& run)
+      : input_(input),
+        gripper_(gripper),
+        options_(options),
+        run_(run),
+        map_(input.map_file),
+        ground_(ground),
+        from_above_(mesh, gripper, {.start_height_m = options.closing.start_height_m}),
+        mesh_from_map_(map_from_input(map_.index().manifest).inverse()),
+        progress_(is_store() ? input.output : input.output + ".progress") {
+    carry_facts(map_.index().manifest, run);
+    in_file(input.map_file, [&] { require_usable(); });
+    if (!map_.has_manifest())
+      run.warn(input.map_file + ": no manifest beside it: it is taken in the mesh's frame");
   }
-  return tiles;
-}
 
-// The places in the mesh's frame where the gripper is closed; nothing at the others.
-std::vector<std::optional<Eigen::Vector3d>> candidates_of(
-    const std::vector<Eigen::Vector3d>& positions, const libmap::Pose& map_from_mesh,
-    const libmap::TriangleMesh& mesh, const libgtd::Ground& ground, const libgtd::Gripper& gripper,
-    const libgtd::GraspOptions& options) {
-  const libgtd::GripCandidates from_above(mesh, gripper,
-                                          {.start_height_m = options.closing.start_height_m});
-  const libmap::Pose mesh_from_map = map_from_mesh.inverse();
-  std::vector<std::optional<Eigen::Vector3d>> candidates(positions.size());
-  bool is_on_mesh = false;
-  for (const Eigen::Vector3d& position : positions)
-    is_on_mesh =
-        is_on_mesh || ground.distance(mesh_from_map * position, options.max_distance_m).has_value();
-  if (!is_on_mesh)
-    throw libmap::Error("none of its voxels is on the mesh",
-                        {.bound = "within " + libmap::to_text(options.max_distance_m) + " m"});
-  constexpr std::size_t grain = 256;
-  libmap::parallel_for(positions.size(), grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const Eigen::Vector3d place = mesh_from_map * positions[n];
-      // Along a normal the gripper comes from anywhere.
-      if (options.approach == libgtd::ApproachDirection::up && !from_above.may_hold(place))
-        continue;
-      if (ground.distance(place, options.max_distance_m)) candidates[n] = place;
+  void grasp() {
+    if (run_.options().dry_run) return;
+    const bool is_new = !fs::exists(progress_.store());
+    progress_.open();
+    std::optional<libgtd::TileJournal> journal;
+    try {
+      const libmap::FileLock lock = progress_.lock();
+      agree_on_plan();
+      journal.emplace(progress_.store(), input_.share, plan_.key);
+    } catch (...) {
+      if (is_new) progress_.remove_if_bare();
+      throw;
     }
-  });
-  return candidates;
-}
-
-void note_results(const libmap::PointCloud& map, Run& run) {
-  const std::vector<double>& probability = map.find_field("hold_probability")->values;
-  std::int64_t candidates = 0;
-  std::int64_t holding = 0;
-  double trials = 0.0;
-  for (std::size_t n = 0; n < map.size(); ++n) {
-    const double made = map.find_field("grasp_trials")->values[n];
-    candidates += made > 0.0 ? 1 : 0;
-    holding += probability[n] >= 0.5 ? 1 : 0;
-    trials += made;
+    const std::vector<TileNumber> missing = missing_tiles(
+        progress_, plan_,
+        libgtd::tiles_of(
+            {.plane = {}, .lattice = {}, .min = plan_.index.min, .max = plan_.index.max},
+            plan_.index.tile_voxels, input_.share));
+    run_.timed("grasp", [&] { test(missing, *journal); });
+    journal.reset();
+    finish(missing.size());
   }
-  run.add_results(
-      {{"grasp_voxels", map.size()},
-       {"grasp_candidates", candidates},
-       {"grasp_holding", holding},
-       {"grasp_mean_trials", candidates == 0 ? 0.0 : trials / static_cast<double>(candidates)}});
-  run.say("{} of {} voxels hold; {} were tested, with {:.1f} trials each", holding, map.size(),
-          candidates, candidates == 0 ? 0.0 : trials / static_cast<double>(candidates));
-}
+
+ private:
+  bool is_store() const { return libgtd::is_tile_store_name(input_.output); }
+
+  void require_usable() const {
+    const std::vector<StoredTile>& tiles = map_.index().tiles;
+    bool is_on_mesh = false;
+    for (std::size_t n = 0; n < tiles.size() && !is_on_mesh; ++n) {
+      const libmap::PointCloud points = map_.load(n);
+      for (const std::string& name : grasp_fields())
+        if (points.find_field(name) != nullptr)
+          throw libmap::Error("the map has this field already", {.field = name});
+      for (std::size_t p = 0; p < points.size() && !is_on_mesh; ++p)
+        is_on_mesh = ground_.distance(mesh_from_map_ * points.positions[p], options_.max_distance_m)
+                         .has_value();
+    }
+    if (!is_on_mesh)
+      throw libmap::Error("none of its voxels is on the mesh",
+                          {.bound = "within " + libmap::to_text(options_.max_distance_m) + " m"});
+  }
+
+  // The plan that is there, if it is of the same mesh, map and parameters; else a new one. The
+  // caller holds the lock.
+  void agree_on_plan() {
+    const bool is_forced = run_.options().force && is_store();
+    const auto earlier = is_forced ? std::nullopt : progress_.plan();
+    plan_.index = map_.index();
+    plan_.index.tiles.clear();
+    plan_.index.manifest = run_.manifest();
+    plan_.index.manifest.timings_s.clear();
+    plan_.index.manifest.threads = 0;
+    // A map's frame is in its manifest alone.
+    plan_.key = libmap::sha256_of(libgtd::key_of(run_.manifest()) + input_.parameters_hash +
+                                  libmap::to_text(mesh_from_map_.matrix().sum()));
+    if (earlier && earlier->key == plan_.key) return;
+    if (earlier && is_store())
+      throw libmap::Error(
+          "contains tiles of another mesh, map, gripper or of other parameters: --force starts "
+          "again",
+          {.file = input_.output});
+    if (!earlier && !is_forced && fs::exists(progress_.store() / "index.json"))
+      throw libmap::Error(
+          "is complete, but its folder `progress` is not there: --force starts again",
+          {.file = input_.output});
+    progress_.require_idle();
+    progress_.clear();
+    progress_.set_plan(plan_);
+  }
+
+  void test(const std::vector<TileNumber>& missing, libgtd::TileJournal& journal) {
+    const std::vector<StoredTile>& tiles = map_.index().tiles;
+    const auto find = [&](const TileNumber& number) { return map_.index().find(number); };
+    std::size_t voxels = 0;
+    for (const TileNumber& number : missing)
+      if (const StoredTile* tile = find(number)) voxels += tile->voxels;
+    run_.progress().begin("grasp", voxels);
+    StepsOfTile steps(run_.progress());
+    for (const TileNumber& number : missing) {
+      StoredTile stored;
+      stored.number = number;
+      if (const StoredTile* tile = find(number)) {
+        stored = *tile;
+        write_tile(progress_,
+                   tested(map_.load(static_cast<std::size_t>(tile - tiles.data())), steps), stored);
+      }
+      journal.add({stored});
+    }
+    run_.progress().end();
+  }
+
+  // The places in the mesh's frame where the gripper is closed; nothing at the others.
+  std::vector<std::optional<Eigen::Vector3d>> candidates_of(
+      const std::vector<Eigen::Vector3d>& positions) const {
+    std::vector<std::optional<Eigen::Vector3d>> candidates(positions.size());
+    constexpr std::size_t grain = 256;
+    libmap::parallel_for(positions.size(), grain, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) {
+        const Eigen::Vector3d place = mesh_from_map_ * positions[n];
+        // Along a normal the gripper comes from anywhere.
+        if (options_.approach == libgtd::ApproachDirection::up && !from_above_.may_hold(place))
+          continue;
+        if (ground_.distance(place, options_.max_distance_m)) candidates[n] = place;
+      }
+    });
+    return candidates;
+  }
+
+  libmap::PointCloud tested(libmap::PointCloud points, libmap::Progress& steps) const {
+    const auto candidates = candidates_of(points.positions);
+    std::vector<Eigen::Vector3d> places;
+    for (const auto& candidate : candidates)
+      if (candidate) places.push_back(*candidate);
+    steps.advance(points.size() - places.size());
+    const auto results = libgtd::test_grasps(ground_, gripper_, places, options_, steps);
+    std::array<std::vector<double>*, field_count> fields{};
+    points.fields.reserve(points.fields.size() + field_count);
+    for (std::size_t field = 0; field < field_count; ++field)
+      fields[field] = &points.add_field(grasp_fields()[field], libmap::ScalarType::float32).values;
+    auto next = results.begin();
+    for (std::size_t n = 0; n < points.size(); ++n) {
+      const Values values = candidates[n] ? values_of(*next++) : no_candidate;
+      for (std::size_t field = 0; field < field_count; ++field) (*fields[field])[n] = values[field];
+    }
+    return points;
+  }
+
+  // Whoever comes last writes the index, or the map in one file.
+  void finish(std::size_t tested) {
+    std::optional<libmap::FileLock> lock = progress_.lock();
+    const libgtd::TileProgress::Completion completion = progress_.complete(plan_);
+    if (!completion.index) {
+      run_.say("{} tiles tested; {} of {} are there", tested, completion.done, completion.tiles);
+      return;
+    }
+    if (is_store()) {
+      if (!fs::exists(progress_.store() / "index.json")) {
+        libmap::Manifest manifest = completion.index->manifest;
+        manifest.timings_s = run_.manifest().timings_s;
+        manifest.threads = run_.manifest().threads;
+        progress_.write_index(*completion.index, manifest);
+      }
+      run_.say("{} of {} tiles tested, all are there", tested, completion.tiles);
+      return;
+    }
+    const MapTiles tiles(progress_.store(), *completion.index);
+    note_results(tiles);
+    run_.write_output(input_.output, [&](const fs::path& temporary) {
+      write_merged(tiles, input_.output, temporary, {}, run_);
+    });
+    progress_.clear();
+    lock.reset();
+    progress_.remove_if_bare();
+  }
+
+  void note_results(const MapTiles& tiles) {
+    std::int64_t candidates = 0;
+    std::int64_t holding = 0;
+    double trials = 0.0;
+    for (std::size_t tile = 0; tile < tiles.index().tiles.size(); ++tile) {
+      const libmap::PointCloud points = tiles.load(tile);
+      const std::vector<double>& probability = libgtd::values_of(points, "hold_probability");
+      const std::vector<double>& made = libgtd::values_of(points, "grasp_trials");
+      for (std::size_t n = 0; n < points.size(); ++n) {
+        candidates += made[n] > 0.0 ? 1 : 0;
+        holding += probability[n] >= 0.5 ? 1 : 0;
+        trials += made[n];
+      }
+    }
+    const double mean = candidates == 0 ? 0.0 : trials / static_cast<double>(candidates);
+    run_.add_results({{"grasp_voxels", tiles.index().voxels()},
+                      {"grasp_candidates", candidates},
+                      {"grasp_holding", holding},
+                      {"grasp_mean_trials", mean}});
+    run_.say("{} of {} voxels hold; {} were tested, with {:.1f} trials each", holding,
+             tiles.index().voxels(), candidates, mean);
+  }
+
+  const GraspMapInput& input_;
+  const libgtd::Gripper& gripper_;
+  const libgtd::GraspOptions& options_;
+  Run& run_;
+  TiledMap map_;
+  const libgtd::Ground& ground_;
+  libgtd::GripCandidates from_above_;
+  libmap::Pose mesh_from_map_;
+  libgtd::TileProgress progress_;
+  libgtd::TilePlan plan_;
+};
 
 }  // namespace
 
@@ -171,63 +337,27 @@ const std::vector<std::string>& grasp_fields() {
   return names;
 }
 
+void require_map_output(const GraspMapInput& input, Run& run) {
+  if (!libgtd::is_tile_store_name(input.output)) {
+    if (input.share.count > 1)
+      throw libmap::Error("fills a tile store, MAP.tiles",
+                          {.file = input.output, .field = "--tile"});
+    libmap::require_cloud_format(input.output);
+    run.claim_output(input.output, {input.mesh_file, input.map_file});
+    return;
+  }
+  if (fs::exists(input.output) && fs::exists(input.map_file) &&
+      fs::equivalent(input.output, input.map_file))
+    throw libmap::Error("is the input: the output needs another name", {.file = input.output});
+  if (run.options().force && input.share.count > 1)
+    throw libmap::Error("removes the tiles of all shares: use it without --tile",
+                        {.field = "--force"});
+}
+
 void grasp_map(const GraspMapInput& input, const libmap::TriangleMesh& mesh,
-               const libgtd::Gripper& gripper, const libgtd::GraspOptions& options, Run& run) {
-  libmap::PointCloud map = libmap::read_cloud(input.map_file).cloud;
-  if (map.empty()) throw libmap::Error("the map has no points", {.file = input.map_file});
-  for (const std::string& name : grasp_fields())
-    if (map.find_field(name) != nullptr)
-      throw libmap::Error("the map has this field already",
-                          {.file = input.map_file, .field = name});
-  const std::optional<libmap::Manifest> manifest = libmap::read_manifest_of(input.map_file);
-  if (manifest) carry_facts(*manifest, run);
-  const auto ground = in_file(input.mesh_file, [&] { return libgtd::Ground(mesh); });
-  const Tiles tiles = in_file(input.map_file, [&] { return tiles_of(map.positions); });
-  const auto candidates = in_file(input.map_file, [&] {
-    return run.timed("candidates", [&] {
-      return candidates_of(map.positions, map_from_input(manifest), mesh, ground, gripper, options);
-    });
-  });
-  if (!manifest)
-    run.warn(input.map_file + ": no manifest beside it: it is taken in the mesh's frame");
-  if (run.options().dry_run) return;
-  std::string key = run.manifest().version + input.parameters_hash + std::to_string(options.seed);
-  for (const std::string& file : {input.mesh_file, input.map_file})
-    key += libmap::sha256_of_file(file);
-  if (manifest) key += libmap::to_text(map_from_input(manifest).matrix().sum());
-  const FinishedTiles finished(input.output + ".progress", libmap::sha256_of(key));
-  std::vector<libmap::ScalarField> fields;
-  for (const std::string& name : grasp_fields())
-    fields.push_back({name, libmap::ScalarType::float32, std::vector<double>(map.size())});
-  run.timed("grasp", [&] {
-    run.progress().begin("grasp", map.size());
-    StepsOfTile steps(run.progress());
-    for (const auto& [tile, voxels] : tiles) {
-      std::optional<std::vector<Values>> values = finished.find(tile, voxels.size());
-      if (values) {
-        steps.advance(voxels.size());
-      } else {
-        std::vector<Eigen::Vector3d> places;
-        for (const std::size_t n : voxels)
-          if (candidates[n]) places.push_back(*candidates[n]);
-        steps.advance(voxels.size() - places.size());
-        const auto results = libgtd::test_grasps(ground, gripper, places, options, steps);
-        values.emplace();
-        auto next = results.begin();
-        for (const std::size_t n : voxels)
-          values->push_back(candidates[n] ? values_of(*next++) : no_candidate);
-        finished.add(tile, *values);
-      }
-      for (std::size_t v = 0; v < voxels.size(); ++v)
-        for (std::size_t n = 0; n < field_count; ++n) fields[n].values[voxels[v]] = (*values)[v][n];
-    }
-    run.progress().end();
-  });
-  for (libmap::ScalarField& field : fields) map.fields.push_back(std::move(field));
-  note_results(map, run);
-  run.write_output(input.output,
-                   [&](const fs::path& temporary) { libmap::write_cloud(temporary, map); });
-  finished.remove(tiles);
+               const libgtd::Ground& ground, const libgtd::Gripper& gripper,
+               const libgtd::GraspOptions& options, Run& run) {
+  MapGrasping(input, mesh, ground, gripper, options, run).grasp();
 }
 
 }  // namespace graspmap_tools

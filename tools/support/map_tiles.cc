@@ -1,6 +1,8 @@
 #include "tools/support/map_tiles.h"
 
+#include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/tile_store_io.h"
+#include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
 #include "tools/support/run.h"
 
@@ -12,9 +14,29 @@ std::filesystem::path store_index_path(const std::string& store) {
   return std::filesystem::path(store) / "index.json";
 }
 
+std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest) {
+  const auto lattice = libgtd::facts_of(manifest).lattice;
+  if (!lattice) return std::nullopt;
+  libgtd::TileStoreIndex index;
+  index.lattice = *lattice;
+  // The thesis's program counts in single precision, its voxels' size included.
+  const libmap::ManifestValue* value = manifest.find_parameter("method");
+  for (const auto& [known, method] : libgtd::method_names())
+    if (value != nullptr && *value == libmap::ManifestValue(known) &&
+        libgtd::follows_thesis(method))
+      index.lattice.voxel_size_m = static_cast<float>(index.lattice.voxel_size_m);
+  index.frame = manifest.frame == "input" ? libgtd::MapFrame::input : libgtd::MapFrame::terrain;
+  index.manifest = manifest;
+  return index;
+}
+
 MapTiles::MapTiles(const std::string& store)
-    : store_(without_trailing_slash(store)), index_(libgtd::finish_tile_store(store_)) {
-  if (index_.tiles.empty()) throw libmap::Error("the map has no points", {.file = store});
+    : MapTiles(without_trailing_slash(store),
+               libgtd::finish_tile_store(without_trailing_slash(store))) {}
+
+MapTiles::MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index)
+    : store_(std::move(store)), index_(std::move(index)) {
+  if (index_.tiles.empty()) throw libmap::Error("the map has no points", {.file = store_.string()});
   float64_positions_ = need_float64();
 }
 

@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <cstddef>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,16 @@ bool is_tile_store(const std::string& path);
 
 std::filesystem::path store_index_path(const std::string& store);
 
+// What the manifest of a map in one file says of it, as the index of a store: lattice, frame,
+// transforms, no tiles. Nothing if it knows no lattice.
+std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest);
+
 class MapTiles {
  public:
   // Throws Error naming the store or its index: missing, incomplete, damaged, without a tile.
   explicit MapTiles(const std::string& store);
+  // Of a store whose index is not written.
+  MapTiles(std::filesystem::path store, libgtd::TileStoreIndex index);
 
   const libgtd::TileStoreIndex& index() const { return index_; }
 

@@ -1,13 +1,10 @@
 #include "tools/support/merge_tiles.h"
 
-#include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/tile_store.h"
-#include "libgtd/tile_detection.h"
 #include "libmap/cloud/pcd_parts.h"
 #include "libmap/core/parallel.h"
 #include "tools/support/command_line.h"
-#include "tools/support/map_tiles.h"
 
 using namespace graspmap_tools;
 
@@ -100,19 +97,7 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
 
 // Single precision in some shares' files and double in others would meet in the whole.
 void restore_full_precision(const libmap::Manifest& part, libmap::PointCloud& whole) {
-  libgtd::TileStoreIndex index;
-  const auto lattice = libgtd::facts_of(part).lattice;
-  if (!lattice) return;
-  index.lattice = *lattice;
-  // The thesis's program counts in single precision, its voxels' size included.
-  const libmap::ManifestValue* value = part.find_parameter("method");
-  for (const auto& [known, method] : libgtd::method_names())
-    if (value != nullptr && *value == libmap::ManifestValue(known) &&
-        libgtd::follows_thesis(method))
-      index.lattice.voxel_size_m = static_cast<float>(index.lattice.voxel_size_m);
-  index.frame = part.frame == "input" ? libgtd::MapFrame::input : libgtd::MapFrame::terrain;
-  index.manifest.transforms = part.transforms;
-  libgtd::restore_positions(index, whole);
+  if (const auto index = index_of(part)) libgtd::restore_positions(*index, whole);
 }
 
 // Points whose flag is set.
@@ -162,9 +147,29 @@ libmap::PointCloud load_row(const MapTiles& tiles, const std::string& store, con
   return joined(parts, store);
 }
 
-// A PCD row by row; other formats need the whole map in memory.
-void write_store(const MapTiles& tiles, const std::string& store, const std::filesystem::path& file,
+void merge_store(const std::string& store, const std::string& output,
                  const libmap::CloudWriteOptions& writing, Run& run) {
+  if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
+    throw libmap::Error("a tile store is written as binary .pcd",
+                        {.file = output, .field = "--encoding"});
+  const MapTiles tiles(store);
+  const libgtd::TileStoreIndex& index = tiles.index();
+  copy_common_facts(index.manifest, run.manifest());
+  run.manifest().inputs = index.manifest.inputs;
+  run.add_input(store_index_path(store));
+  run.add_results({{"scored_voxels", index.voxels()},
+                   {"border_voxels", index.border_voxels()},
+                   {"graspable_voxels", index.graspable_voxels()}});
+  run.write_output(
+      output, [&](const auto& temporary) { write_merged(tiles, store, temporary, writing, run); });
+  run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
+}
+
+}  // namespace
+
+void graspmap_tools::write_merged(const MapTiles& tiles, const std::string& store,
+                                  const std::filesystem::path& file,
+                                  const libmap::CloudWriteOptions& writing, Run& run) {
   const std::vector<TileRow> rows = rows_of(tiles.index());
   run.progress().begin("merge", rows.size());
   if (libmap::format_of(file) == ".pcd") {
@@ -180,26 +185,6 @@ void write_store(const MapTiles& tiles, const std::string& store, const std::fil
   }
   run.progress().end();
 }
-
-void merge_store(const std::string& store, const std::string& output,
-                 const libmap::CloudWriteOptions& writing, Run& run) {
-  if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
-    throw libmap::Error("a tile store is written as binary .pcd",
-                        {.file = output, .field = "--encoding"});
-  const MapTiles tiles(store);
-  const libgtd::TileStoreIndex& index = tiles.index();
-  copy_common_facts(index.manifest, run.manifest());
-  run.manifest().inputs = index.manifest.inputs;
-  run.add_input(store_index_path(store));
-  run.add_results({{"scored_voxels", index.voxels()},
-                   {"border_voxels", index.border_voxels()},
-                   {"graspable_voxels", index.graspable_voxels()}});
-  run.write_output(
-      output, [&](const auto& temporary) { write_store(tiles, store, temporary, writing, run); });
-  run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
-}
-
-}  // namespace
 
 bool graspmap_tools::is_part_of_map(const std::string& file) {
   if (is_tile_store(file)) return true;
@@ -225,6 +210,7 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
   }
   require_all_shares(manifests, tiles);
   std::vector<libmap::PointCloud> parts;
+  parts.reserve(tiles.size());
   for (const std::string& tile : tiles) parts.push_back(libmap::read_cloud(tile).cloud);
   libmap::PointCloud whole = joined(parts, tiles.front());
   restore_full_precision(manifests.front(), whole);

@@ -4,13 +4,12 @@
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
 #include "libgtd/tile_detection.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/cloud_pieces.h"
 #include "libmap/cloud/point_spool.h"
-#include "libmap/core/named_output.h"
 #include "libmap/core/parallel.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/needed_tiles.h"
+#include "tools/support/store_filling.h"
 
 namespace graspmap_tools {
 
@@ -116,7 +115,10 @@ class StoreScoring {
       if (is_new) progress_.remove_if_bare();
       throw;
     }
-    const std::vector<TileNumber> wanted = run_.timed("check", [&] { return missing_tiles(); });
+    const std::vector<TileNumber> wanted = run_.timed("check", [&] {
+      return missing_tiles(progress_, plan_,
+                           libgtd::tiles_of(frame_, tile_voxels_, options_.detection.share));
+    });
     if (!wanted.empty()) {
       libmap::PointSpool spool(progress_.store() / "progress",
                                {.square_m = square_m(), .has_normals = stream.has_normals()});
@@ -301,30 +303,6 @@ class StoreScoring {
     progress_.remove_index();
   }
 
-  // Of the share, those without a file that is as it was written.
-  std::vector<TileNumber> missing_tiles() const {
-    const auto done = progress_.done(plan_);
-    const std::vector<TileNumber> share =
-        libgtd::tiles_of(frame_, tile_voxels_, options_.detection.share);
-    std::vector<std::uint8_t> is_there(share.size(), 0);
-    libmap::parallel_for(share.size(), 16, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) {
-        const auto found = done.find(share[n]);
-        if (found == done.end()) continue;
-        try {
-          if (found->second.voxels > 0) libgtd::checked_tile_path(progress_.store(), found->second);
-          is_there[n] = 1;
-        } catch (const libmap::Error&) {
-          continue;
-        }
-      }
-    });
-    std::vector<TileNumber> missing;
-    for (std::size_t n = 0; n < share.size(); ++n)
-      if (is_there[n] == 0) missing.push_back(share[n]);
-    return missing;
-  }
-
   // Small against the tiles that are worked on at once, not small against their halo.
   double square_m() const {
     return std::max(1.0 + halo_, std::min<double>(tile_voxels_, 4.0 * halo_)) *
@@ -412,14 +390,7 @@ class StoreScoring {
     map.zero_plane_m = scenario_.zero_plane_m;
     map.content = libgtd::content_of(scenario_);
     map.voxels = std::move(tile.voxels);
-    stored.file = libgtd::tile_file_of(tile.number);
-    libmap::OutputFile file(progress_.store() / stored.file);
-    libmap::write_named(file.temporary_path(), file.final_path(), [&](const auto& temporary) {
-      libmap::write_cloud(temporary, libgtd::to_cloud(map, options_.frame));
-    });
-    stored.bytes = fs::file_size(file.temporary_path());
-    stored.sha256 = libmap::sha256_of_file(file.temporary_path());
-    file.commit();
+    write_tile(progress_, libgtd::to_cloud(map, options_.frame), stored);
     return stored;
   }
 

@@ -471,8 +471,8 @@ ClosedGripper closed_by_libgtd(const Shape& shape, const Gripper& gripper,
   return libgtd::close_gripper(patch, gripper, pose, options);
 }
 
-// Two of 20,000 fingers on shapes that are drawn like these differ: one contact grazes, one is named
-// for the other half of the distal link at the same angle.
+// Two of 20,000 fingers on shapes that are drawn like these differ: one contact grazes, one is
+// named for the other half of the distal link at the same angle.
 TEST(BulletGripper, ClosesAlike) {
   std::map<FingerEnd, int> ends;
   int went_on_alone = 0;

@@ -78,6 +78,18 @@ TEST(ClosingTerms, LevelGround) {
   EXPECT_TRUE(std::is_sorted(path.bearing.begin(), path.bearing.end()));
 }
 
+TEST(ClosingTerms, DoNotDependOnTheOrigin) {
+  const auto bumps = [](int base) {
+    return ground([base](int i, int j) { return base + (i * i + 3 * j) % 7; });
+  };
+  const ClosingTerms low = terms_at_origin(bumps(0));
+  const ClosingTerms high = terms_at_origin(bumps(1000000));  // 10 km
+  EXPECT_NEAR(high.contact, low.contact, 1e-12);
+  EXPECT_NEAR(high.bearing, low.bearing, 1e-9);
+  EXPECT_NEAR(high.rise, low.rise, 1e-9);
+  EXPECT_NEAR(high.depth, low.depth, 1e-9);
+}
+
 TEST(ClosingTerms, ShapesInOrder) {
   const auto flat = terms_at_origin(ground([](int, int) { return 0; }));
   // A cone: the ground falls outward, so that spines bear more.

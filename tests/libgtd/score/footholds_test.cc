@@ -62,6 +62,26 @@ TEST(Footholds, TheMiddleOfAPlateauComesFirst) {
   EXPECT_TRUE(second);
 }
 
+TEST(Footholds, OfATestedMapByProbabilityAndForce) {
+  PointCloud map = map_of([](double, double) { return 1.0; });
+  std::vector<double> probability(map.size(), 0.3);
+  std::vector<double> force(map.size(), 0.0);
+  probability[1234] = 0.9;
+  probability[5678] = 0.9;
+  probability[9012] = 1.0;
+  force[1234] = 12.0;
+  force[5678] = 34.0;
+  map.add_field("hold_probability", ScalarType::float32).values = probability;
+  map.add_field("holding_force_n", ScalarType::float32).values = force;
+  const FootholdResult result = libgtd::find_footholds(map);
+  ASSERT_EQ(result.footholds.size(), 3U);
+  EXPECT_EQ(result.candidates, 3U);
+  EXPECT_EQ(result.footholds[0].map_point, 9012U);
+  EXPECT_EQ(result.footholds[1].map_point, 5678U);
+  EXPECT_EQ(result.footholds[2].map_point, 1234U);
+  EXPECT_EQ(result.footholds[1].force_n, 34.0);
+}
+
 // The definition, point by point.
 std::vector<std::size_t> slow_footholds(const PointCloud& map, double separation_m) {
   const std::vector<double>& scores = map.find_field("score")->values;
