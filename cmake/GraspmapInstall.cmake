@@ -18,7 +18,8 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN instruction_set_loops.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
   PATTERN named_cells.h EXCLUDE
-  PATTERN pose_residuals.h EXCLUDE
+  PATTERN *_residuals.h EXCLUDE
+  PATTERN refinement_work.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
   PATTERN rtabmap_rows.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)

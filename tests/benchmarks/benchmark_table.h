@@ -16,18 +16,13 @@
 
 namespace graspmap_bench {
 
-// Seconds on the clock, and the least processor time of all threads and finished children: what the
-// code costs where the machine has other work too.
+// Seconds on the clock, and the minimum processor time of all threads and finished children: what
+// the code costs where the machine has other work too.
 struct Times {
   std::vector<double> seconds;
   double processor_s = std::numeric_limits<double>::infinity();
 
-  double least() const { return *std::min_element(seconds.begin(), seconds.end()); }
-  double median() const {
-    std::vector<double> sorted = seconds;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[sorted.size() / 2];
-  }
+  double min() const { return *std::min_element(seconds.begin(), seconds.end()); }
 };
 
 inline double processor_seconds() {
@@ -52,26 +47,19 @@ void time_once(const Work& work, Times& times) {
   times.processor_s = std::min(times.processor_s, processor_seconds() - processor_start);
 }
 
-// Runs the benchmark's iterations and leaves the counters min_ms, median_ms and processor_ms.
+// Runs the benchmark's iterations and leaves the counters min_ms and processor_ms.
 template <typename Work>
 Times time_iterations(benchmark::State& state, const Work& work) {
   Times times;
   for (auto _ : state) time_once(work, times);
-  state.counters["min_ms"] = 1e3 * times.least();
-  state.counters["median_ms"] = 1e3 * times.median();
+  state.counters["min_ms"] = 1e3 * times.min();
   state.counters["processor_ms"] = 1e3 * times.processor_s;
   return times;
 }
 
-// What is aimed at on the clock with two processors, and what the author's program takes of one.
-struct Marks {
-  double wanted_ms = 0.0;  // 0: nothing
-  double author_ms = 0.0;
-};
-
-inline void set_marks(benchmark::State& state, const Marks& marks) {
-  if (marks.wanted_ms > 0.0) state.counters["wanted_ms"] = marks.wanted_ms;
-  if (marks.author_ms > 0.0) state.counters["author_ms"] = marks.author_ms;
+// What the author's program takes of one processor, if it was measured.
+inline void set_author_ms(benchmark::State& state, double author_ms) {
+  if (author_ms > 0.0) state.counters["author_ms"] = author_ms;
 }
 
 inline std::string threads_text(unsigned threads) {

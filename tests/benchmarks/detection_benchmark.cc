@@ -31,7 +31,7 @@ void convexity(benchmark::State& state, libgtd::CurvatureMethod method, const ch
     const auto curvature = libgtd::estimate_curvature(cloud, {.method = method, .radius_m = 0.09});
     benchmark::DoNotOptimize(libgtd::find_convex(curvature, cloud.positions));
   });
-  graspmap_bench::set_marks(state, {150, 1720});
+  graspmap_bench::set_author_ms(state, 1720);
   state.SetLabel(std::string(label) + ", " + graspmap_bench::threads_text(threads));
 }
 
@@ -59,7 +59,7 @@ void interpolation(benchmark::State& state, bool thesis) {
   const auto threads = static_cast<unsigned>(state.range(0));
   const libmap::ThreadLimit limit(threads);
   time_iterations(state, [&] { benchmark::DoNotOptimize(libgtd::interpolate(terrain, options)); });
-  graspmap_bench::set_marks(state, {30, 240});
+  graspmap_bench::set_author_ms(state, 240);
   state.SetLabel((thesis ? "thesis, " : "corrected, ") + graspmap_bench::threads_text(threads));
 }
 
@@ -87,7 +87,7 @@ void command(benchmark::State& state, const std::string& method) {
   std::filesystem::remove(output);
   std::filesystem::remove(output.string() + ".json");
   if (status != 0) state.SkipWithError("the command failed");
-  graspmap_bench::set_marks(state, {300, 4100});
+  graspmap_bench::set_author_ms(state, 4100);
   state.SetLabel(method + ", with convexity, " + graspmap_bench::threads_text(threads));
 }
 

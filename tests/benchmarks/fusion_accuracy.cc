@@ -21,7 +21,7 @@
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/surface/mesh_cleaning.h"
-#include "libmap/surface/poisson_reconstruction.h"
+#include "libmap/surface/surface_reconstruction.h"
 #include "libmap/trajectory/trajectory_error.h"
 
 namespace {
@@ -92,7 +92,7 @@ Pose mesh_from_truth() { return libmap::make_pose_from_rpy({0, 0, 0}, {0, 0, -90
 
 // Of the cleaned surface with cells as wide as the voxels, evenly spread.
 Points surface_of(const libmap::PointCloud& cloud) {
-  libmap::PoissonReconstructionOptions options;
+  libmap::SurfaceReconstructionOptions options;
   options.cell_size_m = voxel_size_m;
   const libmap::TriangleMesh mesh =
       libmap::clean_mesh(libmap::reconstruct_surface(cloud, options).mesh).mesh;

@@ -4,7 +4,7 @@
 usage: scale.py BUILD_FOLDER [--sides 3,10,30,100] [--repeat N] [--folder FOLDER] [--page README.md]
 
 Simulates square rocky terrains at 1 cm, scores each out of core as a process of its own, and looks a
-million places up in the largest map's store. Prints a Markdown table; with --page, puts it between
+million locations up in the largest map's store. Prints a Markdown table; with --page, puts it between
 the marks of that page and the chart scale.png beside it. All files lie in a temporary folder in
 FOLDER (TMPDIR), about 9 GB for 100 x 100 m, and are removed.
 """
@@ -81,14 +81,15 @@ def look_up(graspmap, folder, side):
     wall, processor, peak = measure([graspmap, "lookup", folder / f"map_{side}.tiles", points,
                                      "--points-frame", "input", "--max-distance", "0.5",
                                      "-o", folder / "answers.csv", "--quiet"])
-    return (f"A million places looked up in the {side} x {side} m store: {wall:.1f} s, "
-            f"{processor:.1f} s of processor time, {peak:.0f} MiB.")
+    return (f"Looking up a million random locations in the {side} x {side} m store takes "
+            f"{wall:.1f} s ({processor:.1f} s of processor time, {peak:.0f} MiB).")
 
 
 def table_of(rows):
-    lines = ["| side m | points | pivots | graspable % | s | processor s | us a pivot | "
-             "of the least side's | peak MiB | terrain MB | map MB |",
+    lines = ["| side m | points | pivots | graspable % | wall s | CPU s | us per pivot | "
+             "relative to {0} m | peak MiB | terrain MB | map MB |",
              "|---|---|---|---|---|---|---|---|---|---|---|"]
+    lines[0] = lines[0].format(rows[0]["side_m"])
     for row in rows:
         lines.append("| {side_m} | {points} | {pivots} | {share:.2f} | {wall_s:.2f} | "
                      "{processor_s:.2f} | {us_per_pivot:.2f} | {ratio:.0f} % | {peak_mib:.0f} | "
@@ -111,7 +112,7 @@ def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=pathlib.Path)
     parser.add_argument("--sides", default="3,10,30,100")
-    parser.add_argument("--repeat", type=int, default=1, help="runs of each; the least counts")
+    parser.add_argument("--repeat", type=int, default=1, help="runs of each; the minimum counts")
     parser.add_argument("--folder", help="where the temporary folder goes")
     parser.add_argument("--page", type=pathlib.Path)
     options = parser.parse_args()

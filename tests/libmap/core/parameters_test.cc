@@ -90,8 +90,9 @@ TEST(Parameters, SectionsOfAFile) {
   EXPECT_EQ(field("part: 1"), "part");
   EXPECT_EQ(field("part.angle: 1\npart: {angle: 1}"), "part.angle");
   EXPECT_EQ(field("other: {angle: 1}"), "other");
-  EXPECT_EQ(error_of([&] { libmap::set_from_yaml(table, "part: {angle: -1}", "f"); }).context().file,
-            "f");
+  EXPECT_EQ(
+      error_of([&] { libmap::set_from_yaml(table, "part: {angle: -1}", "f"); }).context().file,
+      "f");
   EXPECT_EQ(count, 3);
 }
 
