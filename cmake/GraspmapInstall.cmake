@@ -1,6 +1,8 @@
 # cmake --install: the program, its commands, libraries, headers, data and the CMake package, so that
 # find_package(graspmap) gives graspmap::map and graspmap::gtd.
 include(CMakePackageConfigHelpers)
+# Of all that names no other; the Python module has its own, in tools/python.
+set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME graspmap)
 
 get_property(graspmap_libraries GLOBAL PROPERTY graspmap_libraries)
 get_property(graspmap_commands GLOBAL PROPERTY graspmap_commands)
@@ -10,20 +12,31 @@ install(TARGETS ${graspmap_commands}
   RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/graspmap)
 install(TARGETS ${graspmap_libraries} EXPORT graspmap_targets
   LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+# Loaded when they are needed; nothing links them.
+get_property(graspmap_modules GLOBAL PROPERTY graspmap_modules)
+if(graspmap_modules)
+  install(TARGETS ${graspmap_modules} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+endif()
 # But for inner headers: of the .cc files beside them alone, and not whole or not free of other
 # libraries by themselves.
 install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   FILES_MATCHING PATTERN "*.h"
   PATTERN *_body.h EXCLUDE
   PATTERN instruction_set_loops.h EXCLUDE
+  PATTERN bag_storage.h EXCLUDE
+  PATTERN chunk_compression.h EXCLUDE
+  PATTERN mcap_records.h EXCLUDE
+  PATTERN message_codec.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
   PATTERN named_cells.h EXCLUDE
   PATTERN *_residuals.h EXCLUDE
+  PATTERN raster_module.h EXCLUDE
   PATTERN refinement_work.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
+  PATTERN rosbag2_metadata.h EXCLUDE
   PATTERN rtabmap_rows.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
-install(DIRECTORY data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sites data/field_test
+install(DIRECTORY data/cameras data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(FILES tools/completion/graspmap.bash

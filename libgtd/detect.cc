@@ -116,6 +116,12 @@ const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names() {
   return names;
 }
 
+void bind(libmap::ParameterTable& table, DetectionOptions& options) {
+  bind(table, options.scenario);
+  table.add("plane", options.plane, plane_source_names(),
+            "fit: regression plane; none: the cloud is already in the terrain frame");
+}
+
 Gripper gripper_of(const DetectionOptions& options) {
   const Scenario& scenario = options.scenario;
   return options.gripper ? *options.gripper

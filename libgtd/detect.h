@@ -29,6 +29,8 @@ struct DetectionOptions {
   std::optional<Eigen::Vector3d> up;  // in the cloud's frame: which side of the plane is outside
   TileShare share;                    // score only these tiles
 };
+// The keys of the scenario, and `plane`.
+void bind(libmap::ParameterTable& table, DetectionOptions& options);
 
 struct DetectionResult {
   GraspabilityMap map;

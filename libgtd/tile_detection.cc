@@ -147,7 +147,8 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .convex = convex[n] != 0,
                    .graspable = false,
                    .border = scored[n].border,
-                   .terms = scored[n].terms};
+                   .terms = scored[n].terms,
+                   .falling_share = scored[n].falling_share};
     if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
     if (scenario.orientation == Orientation::surface && surface[n].normal.allFinite())
       voxel.normal = surface[n].normal;
@@ -232,7 +233,9 @@ double normal_radius_m(const GripperMask& mask, const Scenario& scenario) {
 MapContent content_of(const Scenario& scenario) {
   return {.normals = scenario.orientation == Orientation::surface,
           .slopes = scenario.evaluates_obstacles(),
-          .terms = scenario.method == Method::calibrated};
+          .terms = scenario.method == Method::calibrated,
+          .falling_shares =
+              scenario.method == Method::corrected && scenario.orientation != Orientation::surface};
 }
 
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,

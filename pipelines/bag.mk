@@ -1,5 +1,8 @@
-# A robot's bag (ROS 1) to maps: its depth images, and of each moment a panorama, a graspability map,
+# A robot's bag to maps: its depth images, and of each moment a panorama, a graspability map,
 # footholds, a picture, and a bag that RViz shows.
+#
+# BAG is a bag of ROS 1 (.bag) or ROS 2 (.mcap, or a folder of .db3); the bags written are of its kind:
+# map.bag, map.mcap, or a folder map_bag.
 #
 #   make -f pipelines/bag.mk BAG=robot.bag SCENARIO=artificial_rocks_realtime OUT=folder \
 #        [EVERY=10] [BAG_FLAGS="--near 0.28 --far 1.5"] [METHOD=corrected] [SCORE="..."] -j2
@@ -45,13 +48,16 @@ $(OUT)/read_with $(OUT)/scored_with: FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
 # The folder's manifest stands for the folder.
-$(OUT)/images.json: $(BAG) $(OUT)/read_with
+$(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 	@rm -rf $(OUT)/images
 	@exec $(GRASPMAP) bag $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
 
+# The bag of a map; its manifest stands for a folder.
+map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.mcap,map_bag.json))
+
 # Known once the images are there.
 stamps := $(shell test -f $(OUT)/images/moments.csv && tail -n +2 $(OUT)/images/moments.csv | cut -d, -f1)
-moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/map.bag $(OUT)/$(stamp)/top.png)
+moments: $(foreach stamp,$(stamps),$(OUT)/$(stamp)/$(map_bag) $(OUT)/$(stamp)/top.png)
 
 $(OUT)/%/panorama.pcd: $(OUT)/images.json
 	@mkdir -p $(@D)
@@ -63,8 +69,8 @@ $(OUT)/%/map.pcd: $(OUT)/%/panorama.pcd $(OUT)/scored_with
 $(OUT)/%/footholds.csv: $(OUT)/%/map.pcd
 	@exec $(GRASPMAP) footholds $< -o $@ $(FOOTHOLDS)
 
-$(OUT)/%/map.bag: $(OUT)/%/map.pcd $(OUT)/%/footholds.csv
-	@exec $(GRASPMAP) bag $< -o $@ --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
+$(OUT)/%/$(map_bag): $(OUT)/%/map.pcd $(OUT)/%/footholds.csv
+	@exec $(GRASPMAP) bag $< -o $(@:.json=) --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
 
 $(OUT)/%/top.png: $(OUT)/%/map.pcd
 	@exec $(GRASPMAP) render $< -o $@ --view top --color score --title "$* s" --quiet

@@ -5,13 +5,15 @@
 #
 #   make -f pipelines/scan.mk SCAN=scan.db OUT=folder [POSES=odometry] [TRUTH=mesh.ply] \
 #        [CROP="--size 3x3"] [RESAMPLE="--count 73000"] [POINTS=points.csv] \
-#        [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] -j2
+#        [SCENARIO=artificial_rocks_prescan] [METHOD=thesis] [TILES=5] -j2
 #
 # SCAN is an RTAB-Map database or a folder of images. POSES is refined (by graspmap refine), odometry,
 # optimized, ground-truth or a file of poses (optimized). With TRUTH, a mesh in the frame of the
 # scan's true poses, the cloud is carried into that frame. POINTS lie in the cloud's frame. FUSE, MESH, CROP, RESAMPLE and SCORE hold
 # further flags of their commands; without CROP the map is levelled and kept whole. TEXTURE= leaves
-# the texture out. A second run does nothing; other variables or changed files make again what
+# the texture out. With TILES, the side of a square in meters, cloud, mesh, site and terrain are
+# folders of pieces and the map is a tile store, so that memory does not depend on the area; then
+# there is no texture, and CROP cannot be --size or --border of a site too large for memory. A second run does nothing; other variables or changed files make again what
 # depends on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
@@ -26,13 +28,14 @@ FUSE ?=
 MESH ?= --cell-size 0.01
 CROP ?=
 RESAMPLE ?=
-TEXTURE ?= model.glb
+TILES ?=
+TEXTURE ?= $(if $(TILES),,model.glb)
 SCORE ?=
 export TITLE ?= $(basename $(notdir $(SCAN)))
 
 # make splits names at spaces; better an error than half a name.
 one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
-$(foreach name,SCAN OUT POSES TRUTH POINTS SCENARIO TEXTURE,$(call one_word,$(name)))
+$(foreach name,SCAN OUT POSES TRUTH POINTS SCENARIO TEXTURE TILES,$(call one_word,$(name)))
 ifeq ($(SCAN),)
   $(error SCAN is not set: the scan, e.g. SCAN=scan.db)
 endif
@@ -47,9 +50,15 @@ refined := $(if $(filter refined,$(POSES)),$(OUT)/poses.tum)
 poses := $(or $(refined),$(POSES))
 true_frame := $(if $(TRUTH),--frame ground-truth)
 poses_flags := --poses $(poses) $(true_frame)
+cloud := $(OUT)/cloud$(if $(TILES),,.ply)
+mesh := $(OUT)/mesh$(if $(TILES),,.ply)
+site := $(OUT)/site$(if $(TILES),,.ply)
+terrain := $(OUT)/terrain$(if $(TILES),,.pcd)
+tile_flag := $(if $(TILES),--tile-size $(TILES))
 # A site that is not cropped has no straight edges to check.
-results := $(OUT)/scan.txt $(OUT)/cloud.png $(OUT)/site.png $(if $(CROP),$(OUT)/spot_check.txt) \
-  $(if $(TRUTH),$(OUT)/accuracy.txt) $(if $(TEXTURE),$(OUT)/texture.png)
+pictures := $(OUT)/cloud.png $(OUT)/site.png $(if $(CROP),$(OUT)/spot_check.txt) \
+  $(if $(TEXTURE),$(OUT)/texture.png)
+results := $(OUT)/scan.txt $(if $(TILES),,$(pictures)) $(if $(TRUTH),$(OUT)/accuracy.txt)
 
 .DELETE_ON_ERROR:
 .PHONY: all map FORCE
@@ -59,14 +68,16 @@ $(OUT):
 	@mkdir -p $@
 
 # Stamps of the variables that a result depends on: written anew only if they change.
-export fused_with := $(SCAN) $(poses_flags) $(FUSE)
+export fused_with := $(SCAN) $(poses_flags) $(tile_flag) $(FUSE)
 export refined_with := $(SCAN)
 export checked_with := $(TRUTH)
-export meshed_with := $(MESH)
+export meshed_with := $(tile_flag) $(MESH)
 export cropped_with := $(CROP)
 export resampled_with := $(RESAMPLE)
+score_flags := --config $(SCENARIO) $(if $(METHOD),--method $(METHOD)) $(SCORE)
+export scored_with := $(score_flags)
 stamps := $(addprefix $(OUT)/,refined_with fused_with meshed_with cropped_with resampled_with \
-  checked_with)
+  scored_with checked_with)
 $(stamps): FORCE | $(OUT)
 	@printf '%s\n' "$${$(@F)}" | cmp -s - $@ || printf '%s\n' "$${$(@F)}" > $@
 
@@ -78,51 +89,70 @@ $(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) $(OUT)/refined_with
 	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json
 
 # fuse corrects the poses; photographs match its cloud by the corrected ones alone.
-$(OUT)/cloud.ply $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \
+$(cloud) $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \
     $(OUT)/fused_with
-	@exec $(GRASPMAP) fuse $(SCAN) -o $(OUT)/cloud.ply --corrected-poses $(OUT)/fused_poses.tum \
-	  $(poses_flags) $(FUSE)
+	@exec $(GRASPMAP) fuse $(SCAN) -o $(cloud) --corrected-poses $(OUT)/fused_poses.tum \
+	  $(poses_flags) $(tile_flag) $(FUSE)
 
-$(OUT)/mesh.ply $(OUT)/mesh.txt &: $(OUT)/cloud.ply $(OUT)/meshed_with
-	@exec $(GRASPMAP) mesh $< -o $(OUT)/mesh.ply --report $(MESH) > $(OUT)/mesh.txt.partial
+ifdef TILES
+$(mesh): $(cloud) $(OUT)/meshed_with
+	@exec $(GRASPMAP) mesh $< -o $@ $(tile_flag) $(MESH)
+else
+$(mesh) $(OUT)/mesh.txt &: $(cloud) $(OUT)/meshed_with
+	@exec $(GRASPMAP) mesh $< -o $(mesh) --report $(MESH) > $(OUT)/mesh.txt.partial
 	@mv $(OUT)/mesh.txt.partial $(OUT)/mesh.txt
+endif
 
-$(OUT)/site.ply: $(OUT)/mesh.ply $(OUT)/cropped_with
+$(site): $(mesh) $(OUT)/cropped_with
 	@exec $(GRASPMAP) crop $< -o $@ $(CROP)
 
-$(OUT)/terrain.pcd: $(OUT)/site.ply $(OUT)/resampled_with
+$(terrain): $(site) $(OUT)/resampled_with
 	@exec $(GRASPMAP) resample $< -o $@ $(RESAMPLE)
 
-$(OUT)/$(TEXTURE): $(OUT)/site.ply $(SCAN) $(OUT)/fused_poses.tum
+$(OUT)/$(TEXTURE): $(site) $(SCAN) $(OUT)/fused_poses.tum
 	@exec $(GRASPMAP) texture $< --scan $(SCAN) --poses $(OUT)/fused_poses.tum $(true_frame) -o $@
 
-$(OUT)/cloud.png: $(OUT)/cloud.ply
+$(OUT)/cloud.png: $(cloud)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: cloud" --quiet
 
-$(OUT)/site.png: $(OUT)/site.ply
+$(OUT)/site.png: $(site)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --color own --title "$$TITLE: site" --quiet
 
 $(OUT)/texture.png: $(OUT)/$(TEXTURE)
 	@exec $(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE: textured" --quiet
 
 # Without a true mesh the ground is the plane that was found.
-$(OUT)/spot_check.txt: $(OUT)/site.ply $(TRUTH) $(OUT)/checked_with
+$(OUT)/spot_check.txt: $(site) $(TRUTH) $(OUT)/checked_with
 	@exec $(GRASPMAP) compare $< --edges -o $(OUT)/spot_check.csv $(if $(TRUTH),--truth $(TRUTH) \
 	  --truth-frame map) > $@.partial
 	@mv $@.partial $@
 
-$(OUT)/accuracy.txt: $(OUT)/cloud.ply $(OUT)/site.ply $(TRUTH) $(OUT)/checked_with
+$(OUT)/accuracy.txt: $(cloud) $(site) $(TRUTH) $(OUT)/checked_with
 	@echo 'cloud:' > $@.partial
-	@exec $(GRASPMAP) compare $(OUT)/cloud.ply $(TRUTH) >> $@.partial
+	@exec $(GRASPMAP) compare $(cloud) $(TRUTH) >> $@.partial
 	@echo 'surface of the site:' >> $@.partial
-	@exec $(GRASPMAP) compare $(OUT)/site.ply $(TRUTH) --transform crop > $@.site
+	@exec $(GRASPMAP) compare $(site) $(TRUTH) --transform crop > $@.site
 	@sed '/^surface within/d' $@.site >> $@.partial
 	@cat $@.partial
 	@rm $@.site
 	@mv $@.partial $@
 
-map: $(OUT)/terrain.pcd
+ifdef TILES
+# A store is resumed, but begun anew for another terrain or other variables.
+$(OUT)/map.begun: $(terrain) $(OUT)/scored_with
+	@rm -rf $(OUT)/map.tiles && touch $@
+
+$(OUT)/map.tiles/index.json: $(OUT)/map.begun
+	@exec $(GRASPMAP) score $(terrain) -o $(OUT)/map.tiles $(score_flags)
+
+$(OUT)/map.png: $(OUT)/map.tiles/index.json
+	@exec $(GRASPMAP) render $(OUT)/map.tiles -o $@ --view top --color score --title "$$TITLE" --quiet
+
+map: $(OUT)/map.png
+else
+map: $(terrain)
 	@exec $(MAKE) --no-print-directory -f $(here)site.mk SITE=$< POINTS=$(POINTS) POINTS_FRAME=map \
 	  SCENARIO=$(SCENARIO) METHOD=$(METHOD) OUT=$(OUT)/map SHARES=$(SHARES) SCORE="$(SCORE)" \
 	  GRASPMAP=$(GRASPMAP)
+endif
 endif

@@ -1,4 +1,4 @@
-// graspmap bag: ROS 1 bags in and out, offline.
+// graspmap bag: bags of ROS 1 and ROS 2 in and out, offline.
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/ros/bag_reader.h"
@@ -24,11 +24,11 @@ void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
   table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
             "added to the stamps of a rig's images, s");
   table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
+  table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
+            "cells of the map's grids in a bag of ROS 2, m (0: the map's voxel size)");
   table.add("compression", options.compression, libmap::bag_compression_names(),
-            "of the bag written");
+            "of the bag written: bz2 or lz4 in .bag, lz4 or zstd in .mcap");
 }
-
-bool is_bag(const std::string& path) { return libmap::format_of(path) == ".bag"; }
 
 void refuse_map_options(const BagCommandOptions& options, const std::string& reason) {
   refuse_given({{"--terrain", !options.terrain.empty()},
@@ -38,9 +38,6 @@ void refuse_map_options(const BagCommandOptions& options, const std::string& rea
 }
 
 void write_bag(const BagCommandOptions& options, Run& run) {
-  if (is_bag(options.input))
-    throw libmap::Error("one of the two must be something else than a bag",
-                        {.file = options.input});
   const bool rig = fs::is_directory(options.input);
   refuse_given({{"--topic", !options.topics.empty()}},
                rig ? "is not for a rig's folder" : "is not for a map");
@@ -52,6 +49,7 @@ void write_bag(const BagCommandOptions& options, Run& run) {
     refuse_given({{"--rig", !options.rig.empty()}}, "is not for a map");
     libmap::require_readable_file(options.input);
   }
+  libmap::bag_format_of(options.output);  // throws Error
   try {
     return rig ? write_rig_folder_bag(options, run) : write_map_bag(options, run);
   } catch (const libmap::Error& error) {
@@ -60,10 +58,13 @@ void write_bag(const BagCommandOptions& options, Run& run) {
 }
 
 void run_bag(const BagCommandOptions& options, Run& run) {
-  libmap::require_ros();
   if (options.list) return list_bag_topics(options);
   if (options.output.empty()) throw UsageError("is missing (or --list)", {.field = "--output"});
-  if (is_bag(options.output)) return write_bag(options, run);
+  if (!libmap::is_bag_path(options.input)) return write_bag(options, run);
+  const std::string extension = libmap::format_of(options.output);
+  if (extension == ".bag" || extension == ".mcap")
+    throw libmap::Error("one of the two must be something else than a bag",
+                        {.file = options.input});
   refuse_map_options(options, "is for a bag that is written");
   if (fs::path(options.output).has_extension()) {
     libmap::require_cloud_format(options.output);
@@ -90,13 +91,16 @@ libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& r
 int main(int argc, char** argv) {
   BagCommandOptions options;
   Command command("bag");
-  command.input("IN", options.input,
-                "out of a bag: IN.bag; into one: a map (.pcd, .ply, .vtp, .csv), or a rig's folder "
-                "as `fuse` reads it");
-  command.output(options.output,
-                 "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
-                 "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag",
-                 false);
+  command.input(
+      "IN", options.input,
+      "out of a bag: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); into one: a map (.pcd, "
+      ".ply, .vtp, .csv), or a rig's folder as `fuse` reads it");
+  command.output(
+      options.output,
+      "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
+      "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
+      "extension) of .db3 (ROS 2)",
+      false);
   command.flag("--list", options.list, "print what the bag contains and do nothing else");
   command.flag("--json", options.json, "print it as JSON");
   command.option("--topic", "[NAME=]TOPIC", options.topics,

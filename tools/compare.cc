@@ -1,4 +1,5 @@
 // graspmap compare: how far one cloud or mesh lies from another.
+#include <array>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <numbers>
@@ -127,12 +128,29 @@ struct Comparison {
   std::optional<double> bias_m;
   double precision = 0.0;     // share of A near B
   double completeness = 0.0;  // share of B near A
-  std::size_t samples = 0;    // of B, in the box
+  // Shares of A within one and two of the deviations that it states (field expected_error).
+  std::optional<std::array<double, 2>> within_deviations;
+  std::size_t samples = 0;  // of B, in the box
 };
 
 auto count_within(const std::vector<double>& distances, double bound_m) {
   return std::count_if(distances.begin(), distances.end(),
                        [&](double distance) { return distance <= bound_m; });
+}
+
+// 0.68 and 0.95 where stated deviations are right and errors normally distributed.
+std::optional<std::array<double, 2>> share_within_deviations(const Comparison& comparison) {
+  const libmap::ScalarField* stated = comparison.points.find_field("expected_error");
+  if (stated == nullptr || stated->values.empty()) return std::nullopt;
+  std::array<double, 2> within{};
+  for (std::size_t n = 0; n < stated->values.size(); ++n)
+    for (std::size_t k = 0; k < within.size(); ++k)
+      within[k] +=
+          comparison.distances.distance_m[n] <= static_cast<double>(k + 1) * stated->values[n]
+              ? 1.0
+              : 0.0;
+  for (double& share : within) share /= static_cast<double>(stated->values.size());
+  return within;
 }
 
 // Which points of B, in the box, A comes near to. All of A counts: what lies just outside covers
@@ -240,6 +258,7 @@ Comparison compare_shapes(const Shape& a, const Shape& b, const CompareOptions& 
   const auto count = static_cast<double>(distances.size());
   comparison.precision = static_cast<double>(count_within(distances, options.within_m)) / count;
   if (surface.is_oriented()) comparison.bias_m = sum / count;
+  comparison.within_deviations = share_within_deviations(comparison);
   run.timed("completeness", [&] { measure_completeness(a, b, options, box, comparison); });
   return comparison;
 }
@@ -264,7 +283,13 @@ Results distance_results(const Comparison& comparison) {
 }
 
 Results share_results(const Comparison& comparison) {
-  return {{"precision", comparison.precision}, {"completeness", comparison.completeness}};
+  Results results = {{"precision", comparison.precision},
+                     {"completeness", comparison.completeness}};
+  if (const auto& within = comparison.within_deviations) {
+    results.emplace_back("within_one_deviation", within->at(0));
+    results.emplace_back("within_two_deviations", within->at(1));
+  }
+  return results;
 }
 
 Json json_of(const Comparison& comparison, const Shape& a, const Shape& b,
@@ -319,6 +344,11 @@ void print(const Comparison& comparison, const Shape& a, const Shape& b,
       statistics.count, 1e3 * statistics.rmse_m, 1e3 * statistics.mean_m, 1e3 * statistics.median_m,
       1e3 * statistics.p95_m, 1e3 * statistics.max_m);
   if (comparison.bias_m) std::cout << fmt::format("bias: {:+.2f} mm\n", 1e3 * *comparison.bias_m);
+  if (const auto& within = comparison.within_deviations)
+    std::cout << fmt::format(
+        "points within one and two stated deviations: {:.1f} % and {:.1f} % (normal: 68.3 and "
+        "95.4)\n",
+        1e2 * within->at(0), 1e2 * within->at(1));
   const char* of_b = b.mesh ? "surface" : "cloud";
   std::cout << fmt::format("points within {:g} mm of the {}: {:.2f} %\n", 1e3 * options.within_m,
                            of_b, 1e2 * comparison.precision)

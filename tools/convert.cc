@@ -2,12 +2,14 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/single_precision.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/raster/dem_reader.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/merge_tiles.h"
+#include "tools/support/raster_output.h"
 #include "tools/support/usages.h"
 
 using namespace graspmap_tools;
@@ -23,6 +25,7 @@ struct ConvertOptions {
   std::string output;
   FileEncoding encoding = FileEncoding::binary;
   bool big_endian = false;
+  double pixel_size_m = 0.0;
   TrajectoryFormat poses_format = TrajectoryFormat::automatic;
   TrajectoryFormat output_poses_format = TrajectoryFormat::automatic;
 };
@@ -51,9 +54,8 @@ libmap::PointCloud vertices_of(const libmap::TriangleMesh& mesh) {
 // plane, lattice and method. Once all is read: what cannot be read need not be hashed.
 void add_input(const ConvertOptions& options, Run& run) {
   run.add_input(options.input);
-  const auto source = libmap::read_manifest_of(options.input);
-  if (!source) return;
-  carry_facts(*source, run);
+  if (const auto source = libmap::read_manifest_of(options.input)) carry_facts(*source, run);
+  carry_georeference(options.input, run);
 }
 
 // Encodings that a format does not have.
@@ -63,6 +65,8 @@ void refuse_ignored(const ConvertOptions& options) {
     throw libmap::Error(
         "is an encoding of .pcd",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
+  if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
+    throw libmap::Error("is for .tif", {.file = options.output, .field = "--pixel-size"});
   if (options.big_endian && format != ".ply")
     throw libmap::Error("is for .ply", {.file = options.output, .field = "--big-endian"});
 }
@@ -101,6 +105,14 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
                         {.file = options.output});
   run.add_results({{"points", read.cloud.size()}});
   add_input(options, run);
+  if (libmap::is_dem_path(options.output)) {
+    const auto visit_cloud = [&](const auto& visit) { visit(read.cloud); };
+    return write_raster(
+        options.output,
+        in_file(options.input,
+                [&] { return raster_of(visit_cloud, run.manifest(), options.pixel_size_m); }),
+        run);
+  }
   run.write_output(options.output, [&](const auto& temporary) {
     libmap::write_cloud(temporary, read.cloud, {options.encoding, options.big_endian});
   });
@@ -139,6 +151,10 @@ bool convert_textured(const ConvertOptions& options, Run& run) {
 }
 
 void convert_mesh(const ConvertOptions& options, Run& run) {
+  if (libmap::is_dem_path(options.output))
+    throw libmap::Error(
+        "a mesh is no raster: graspmap resample makes a cloud of it, gdal_translate copies a DEM",
+        {.file = options.input});
   if (convert_textured(options, run)) return;
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   const std::string format = libmap::format_of(options.output);
@@ -180,18 +196,25 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   });
 }
 
+// Points without the triangles between them.
+bool is_dem_as_cloud(const ConvertOptions& options) {
+  const std::string format = libmap::format_of(options.output);
+  return libmap::is_dem_path(options.input) && (format == ".pcd" || format == ".csv");
+}
+
 void convert(ConvertOptions& options, Run& run) {
   options.input = options.inputs.front();
   if (options.inputs.size() > 1 || is_part_of_map(options.input)) {
     refuse_ignored(options);
-    return merge_tiles(options.inputs, options.output, {options.encoding, options.big_endian}, run);
+    return merge_tiles(options.inputs, options.output,
+                       {{options.encoding, options.big_endian}, options.pixel_size_m}, run);
   }
   const bool poses = holds_poses(options);
   if (!poses) refuse_ignored(options);
   run.claim_output(options.output, {options.input});
   if (poses)
     convert_poses(options, run);
-  else if (libmap::file_kind(options.input) == libmap::FileKind::mesh)
+  else if (libmap::file_kind(options.input) == libmap::FileKind::mesh && !is_dem_as_cloud(options))
     convert_mesh(options, run);
   else
     convert_cloud(options, run);
@@ -218,17 +241,21 @@ int convert_file(int argc, char** argv) {
   ConvertOptions options;
   Command command("convert");
   command.inputs("IN", options.inputs,
-                 "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), poses (.tum .kitti .g2o .toro "
+                 "cloud (.pcd .ply .csv), mesh (.ply .obj .stl ...), DEM (.tif), poses (.tum "
+                 ".kitti .g2o .toro "
                  "...), tile store (.tiles), or all shares of a map");
-  command.output(options.output,
-                 "the same in the format of this extension, or .vtp for ParaView; of tiles and "
-                 "shares the whole map, the same bytes as in one run");
+  command.output(
+      options.output,
+      "the same in the format of this extension, .vtp for ParaView, or .tif (GeoTIFF) for "
+      "GIS; of tiles and shares the whole map, the same bytes as in one run");
   command.parameters().add("encoding", options.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
                             {"binary_compressed", FileEncoding::binary_compressed}},
                            "how numbers are written, where the format has a choice");
   command.parameters().add("big_endian", options.big_endian, "binary PLY with the high byte first");
+  command.parameters().add("pixel_size_m", options.pixel_size_m, libmap::not_negative,
+                           "of .tif, m; 0: the map's voxel size");
   command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),
                            "of poses in IN; auto: by its extension, else by its content");
   command.parameters().add(

@@ -10,6 +10,7 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"
+#include "tools/support/piece_folder.h"
 
 using namespace graspmap_tools;
 
@@ -136,9 +137,7 @@ void tell_ground(const libmap::CropReport& report, bool up_by_normals, Run& run)
              tilt);
 }
 
-void tell_site(const libmap::CropReport& report, const std::vector<Eigen::Vector3d>& positions,
-               Run& run) {
-  const libmap::Bounds3d bounds = libmap::bounds_of(positions);
+void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds, Run& run) {
   const Eigen::Vector3d size = bounds.max - bounds.min;
   run.add_results({{"size_m", size}});
   if (report.rectangle) {
@@ -163,16 +162,17 @@ void tell_site(const libmap::CropReport& report, const std::vector<Eigen::Vector
 }
 
 void tell(const CropCommandOptions& options, const libmap::CropReport& report,
-          const std::vector<Eigen::Vector3d>& positions, Run& run) {
+          const libmap::Bounds3d& bounds, Run& run) {
   run.add_input(options.input);
   if (!options.polygon.empty()) run.add_input(options.polygon);
   // The input's own site_from_map, if it was cropped before, stands behind the new one.
   const libmap::Pose before = site_from_map_of(options.input).value_or(libmap::Pose::Identity());
   run.manifest().transforms.emplace_back(site_from_map_name, report.site_from_map * before);
   carry_truth_transform(options.input, run);
+  carry_georeference(options.input, run);
   run.manifest().frame = "site";
   tell_ground(report, !options.crop.up, run);
-  tell_site(report, positions, run);
+  tell_site(report, bounds, run);
 }
 
 void write_site(const CropCommandOptions& options, Run& run, const Run::Writer& write) {
@@ -187,7 +187,7 @@ void crop_cloud(const CropCommandOptions& options, Run& run) {
     run.warn("{} points without a position were dropped", read.dropped_points);
   const libmap::CropCloudResult result =
       run.timed("crop", [&] { return libmap::crop_cloud(read.cloud, options.crop); });
-  tell(options, result.report, result.cloud.positions, run);
+  tell(options, result.report, libmap::bounds_of(result.cloud.positions), run);
   run.add_results({{"points", result.cloud.size()}});
   run.say("{} of {} points", result.cloud.size(), read.cloud.size());
   write_site(options, run, [&](const fs::path& to) { libmap::write_cloud(to, result.cloud); });
@@ -197,7 +197,7 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.input).mesh;
   const libmap::CropMeshResult result =
       run.timed("crop", [&] { return libmap::crop_mesh(mesh, options.crop); });
-  tell(options, result.report, result.mesh.vertices, run);
+  tell(options, result.report, libmap::bounds_of(result.mesh.vertices), run);
   const double area = libmap::surface_area(result.mesh);
   run.add_results({{"surface_area_m2", area},
                    {"vertices", result.mesh.vertices.size()},
@@ -207,8 +207,50 @@ void crop_mesh(const CropCommandOptions& options, Run& run) {
   write_site(options, run, [&](const fs::path& to) { libmap::write_mesh(to, result.mesh); });
 }
 
-void crop(CropCommandOptions& options, Run& run) {
-  read_region(options);
+// Each piece is read, cut, written and forgotten.
+void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>& pieces,
+                 const fs::path& folder, Run& run) {
+  std::size_t next = 0;
+  std::size_t written = 0, triangles = 0;
+  double area_m2 = 0.0;
+  Eigen::AlignedBox3d box;
+  const auto each = [&](const libmap::UseMesh& use) {
+    for (const fs::path& piece : pieces) use(libmap::read_mesh(piece).mesh);
+  };
+  const auto write = [&](const libmap::TriangleMesh& mesh) {
+    const fs::path& piece = pieces[next++];
+    if (mesh.triangles.empty()) return;
+    ++written;
+    triangles += mesh.triangles.size();
+    area_m2 += libmap::surface_area(mesh);
+    for (const Eigen::Vector3d& vertex : mesh.vertices) box.extend(vertex);
+    libmap::write_mesh(folder / (piece.stem().string() + ".ply"), mesh);
+  };
+  const libmap::CropReport report =
+      run.timed("crop", [&] { return libmap::crop_mesh_pieces(each, options.crop, write); });
+  tell(options, report, {box.min(), box.max()}, run);
+  run.add_results({{"pieces", written}, {"surface_area_m2", area_m2}, {"triangles", triangles}});
+  run.say("{} triangles in {} of {} pieces, {:.3f} m2 of surface", triangles, written,
+          pieces.size(), area_m2);
+}
+
+void crop_folder(const CropCommandOptions& options, Run& run) {
+  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.input);
+  const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".ply");
+  run.claim_output_tree(options.output, names, {options.input, options.polygon});
+  run.write_output_tree(options.output, names, [&](const fs::path& folder) {
+    if (!folder.empty()) crop_pieces(options, pieces, folder, run);
+  });
+}
+
+void note_region(const CropCommandOptions& options, Run& run) {
+  run.manifest().parameters.emplace_back("box", options.box);
+  run.manifest().parameters.emplace_back("polygon", options.polygon);
+  run.manifest().parameters.emplace_back("size", options.size);
+  run.manifest().parameters.emplace_back("border", options.border);
+}
+
+void crop_file(const CropCommandOptions& options, Run& run) {
   const bool is_mesh = libmap::file_kind(options.input) == libmap::FileKind::mesh;
   if (is_mesh)
     libmap::require_mesh_format(options.output);
@@ -216,12 +258,14 @@ void crop(CropCommandOptions& options, Run& run) {
     libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.input, options.polygon});
   run.require_own_companions(options.output, {transform_path(options.output)});
-  run.manifest().parameters.emplace_back("box", options.box);
-  run.manifest().parameters.emplace_back("polygon", options.polygon);
-  run.manifest().parameters.emplace_back("size", options.size);
-  run.manifest().parameters.emplace_back("border", options.border);
+  is_mesh ? crop_mesh(options, run) : crop_cloud(options, run);
+}
+
+void crop(CropCommandOptions& options, Run& run) {
+  read_region(options);
+  note_region(options, run);
   try {
-    is_mesh ? crop_mesh(options, run) : crop_cloud(options, run);
+    is_piece_folder(options.output) ? crop_folder(options, run) : crop_file(options, run);
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
   }
@@ -232,7 +276,9 @@ void crop(CropCommandOptions& options, Run& run) {
 int main(int argc, char** argv) {
   CropCommandOptions options;
   Command command("crop");
-  command.input("MAP", options.input, "mesh (.ply .obj .stl ...) or cloud (.pcd .ply .csv)");
+  command.input(
+      "MAP", options.input,
+      "mesh (.ply .obj .stl .tif ...), a folder of its pieces, or cloud (.pcd .ply .csv)");
   command.output(options.output,
                  "the site, of the same kind; OUTPUT's stem + .site_from_map.txt is the transform");
   command.option("--box", "XMIN,YMIN[,ZMIN],XMAX,YMAX[,ZMAX]", options.box, "keep what is in it");

@@ -29,17 +29,10 @@ struct EvaluateOptions {
 };
 
 void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
-  libgtd::RocOptions& roc = options.evaluation.roc;
-  parameters.add("label", options.evaluation.label_column,
-                 "column of the truth: 1/0, true/false, yes/no, graspable/not graspable");
+  bind(parameters, options.evaluation);
   parameters.add("score", options.scores,
                  "columns of scores, with commas between; none: every numeric column that is no "
                  "identity, position or length");
-  parameters.add("cutoff", roc.rate_cutoff, libmap::any_number,
-                 "a place whose score reaches it is predicted graspable: for the rates");
-  parameters.add("bootstrap", roc.bootstrap_replicates, libmap::Range{0, 1e7},
-                 "replicates for the interval of the area; 0: no interval");
-  parameters.add("seed", roc.bootstrap_seed, libmap::not_negative, "of the bootstrap");
   parameters.add("load_n", options.load_n, libmap::positive,
                  "load of the verdicts, noted in the hold model, N");
   parameters.add("title", options.title, "title of the plot and of the summary");

@@ -144,7 +144,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   run.add_input(graspmap_tools::is_tile_store(options.map)
                     ? graspmap_tools::store_index_path(options.map).string()
                     : options.map);
-  run.add_input(file);
+  for (const auto& used : libgtd::gripper_files(file)) run.add_input(used);
   options.grasp.draws = options.map_draws;
   options.grasp.best_draws = 0;
   options.grasp.sequential = options.sequential != SequentialTest::off;
@@ -177,7 +177,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);
   run.add_input(options.points);
-  run.add_input(file);
+  for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
   options.grasp.check();
   const libgtd::Ground ground = ground_of(mesh, options);
   std::vector<libgtd::LocationResult> results;
@@ -217,7 +217,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
 int main(int argc, char** argv) {
   GraspCommandOptions options;
   graspmap_tools::Command command("grasp");
-  command.input("MESH", options.mesh, "mesh of the terrain, z up");
+  command.input("MESH", options.mesh, "mesh or DEM (.tif) of the terrain, z up");
   command.option("--points", "LOCATIONS.csv", options.points,
                  "CSV with the columns x, y, z in meters in the mesh's frame, and any others");
   command.option(

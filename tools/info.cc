@@ -246,7 +246,8 @@ Json tiles_json(const InfoOptions& options, Run& run, Faults& faults) {
 
 Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
   if (is_tile_store(options.file)) return tiles_json(options, run, faults);
-  if (may_be_scan(options.file)) {
+  const bool is_bag = libmap::is_bag_path(options.file);
+  if (!is_bag && may_be_scan(options.file)) {
     ScanInfo scan = scan_info(options.file, options.verify, run.progress());
     faults.scan = std::move(scan.faults);
     return std::move(scan.json);
@@ -254,9 +255,10 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
   if (options.verify)
     throw libmap::Error("only scans and tile stores are verified",
                         {.file = options.file, .field = "--verify"});
-  if (libmap::format_of(options.file) == ".bag") {
-    Json json = {{"kind", "bag of ROS 1"}};
-    json.update(bag_json(libmap::list_bag(options.file)));
+  if (is_bag) {
+    const libmap::BagListing listing = libmap::list_bag(options.file);
+    Json json = {{"kind", listing.storage}};
+    json.update(bag_json(listing));
     return json;
   }
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
@@ -305,7 +307,7 @@ void info(InfoOptions& options, Run& run) {
 int main(int argc, char** argv) {
   InfoOptions options;
   Command command("info");
-  command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or ROS 1 bag");
+  command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or bag of ROS");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify,
                "read all that a scan or a tile store contains and list what is broken");

@@ -242,7 +242,7 @@ void mask(const MaskOptions& options, Run& run) {
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
   const GripperMask made = libgtd::make_gripper_mask(gripper, options.mask);
-  run.add_input(file);
+  for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
   run.manifest().frame = "mask";
   run.add_results({{"side_voxels", made.side}, {"layers", made.layers}});
   run.write_output(options.output, [&](const auto& temporary) {

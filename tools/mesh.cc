@@ -4,18 +4,23 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/normals.h"
+#include "libmap/cloud/piece_index.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
 #include "libmap/surface/surface_reconstruction.h"
+#include "libmap/surface/surface_tiles.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/piece_folder.h"
 
 using namespace graspmap_tools;
 
 namespace {
 
+namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
 // Whose normals the surface is made from.
@@ -28,8 +33,7 @@ struct MeshOptions {
   bool report = false;
   bool json = false;
   libmap::NormalEstimationOptions estimation;
-  libmap::SurfaceReconstructionOptions reconstruction;
-  libmap::MeshCleaningOptions cleaning;
+  libmap::SurfaceTileOptions surface;
 };
 
 void bind(libmap::ParameterTable& table, MeshOptions& options) {
@@ -40,15 +44,20 @@ void bind(libmap::ParameterTable& table, MeshOptions& options) {
             "auto: the cloud's, estimated if it has none; cloud: an error if it has none; "
             "estimate: always estimated");
   libmap::bind(table, options.estimation);
-  libmap::bind(table, options.reconstruction);
-  libmap::bind(table, options.cleaning);
+  libmap::bind(table, options.surface.reconstruction);
+  libmap::bind(table, options.surface.cleaning);
+  table.add("tile_size_m", options.surface.tile_m, libmap::positive,
+            "side of a piece, m, where the output is a folder");
 }
 
-libmap::PointCloud read_points(const std::string& file, Run& run) {
-  libmap::CloudReadResult read = libmap::read_cloud(file);
-  if (read.dropped_points > 0)
-    run.warn("{}: {} points without a finite position are left out", file, read.dropped_points);
-  if (read.cloud.empty()) throw libmap::Error("the cloud has no points", {.file = file});
+void check_points(const std::string& input, std::size_t points, std::size_t dropped, Run& run) {
+  if (dropped > 0) run.warn("{}: {} points without a finite position are left out", input, dropped);
+  if (points == 0) throw libmap::Error("the cloud has no points", {.file = input});
+}
+
+libmap::PointCloud read_points(const std::string& input, Run& run) {
+  libmap::CloudReadResult read = libmap::read_cloud(input);
+  check_points(input, read.cloud.size(), read.dropped_points, run);
   return std::move(read.cloud);
 }
 
@@ -79,7 +88,7 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
 libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::PointCloud& cloud,
                                    Run& run) {
   libmap::SurfaceReconstructionResult made =
-      libmap::reconstruct_surface(cloud, options.reconstruction, run.progress());
+      libmap::reconstruct_surface(cloud, options.surface.reconstruction, run.progress());
   if (made.dropped_points > 0)
     run.warn("{} of {} points have no normal and are left out", made.dropped_points, cloud.size());
   run.add_results({{"points", cloud.size()},
@@ -96,15 +105,17 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
   if (made.trimmed_triangles == 0)
     throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
                         {.file = options.cloud});
-  throw libmap::Error("no surface is so near the points",
-                      {.file = options.cloud,
-                       .field = "trim_distance_cells",
-                       .value = libmap::to_text(options.reconstruction.trim_distance_cells)});
+  throw libmap::Error(
+      "no surface is so near the points",
+      {.file = options.cloud,
+       .field = "trim_distance_cells",
+       .value = libmap::to_text(options.surface.reconstruction.trim_distance_cells)});
 }
 
 libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleMesh& mesh,
                              Run& run) {
-  libmap::MeshCleaningResult made = libmap::clean_mesh(mesh, options.cleaning, run.progress());
+  libmap::MeshCleaningResult made =
+      libmap::clean_mesh(mesh, options.surface.cleaning, run.progress());
   run.add_results({{"cut_edges", made.cut_edges},
                    {"split_vertices", made.split_vertices},
                    {"degenerate_triangles", made.degenerate_triangles},
@@ -194,16 +205,114 @@ void mesh(const MeshOptions& options, Run& run) {
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
 
+// Of the pieces that are written.
+struct Totals {
+  std::int64_t pieces = 0;
+  std::int64_t vertices = 0;
+  std::int64_t triangles = 0;
+  double area_m2 = 0.0;
+
+  // -1: it is not written after all.
+  void add(const libmap::TriangleMesh& mesh, int sign) {
+    pieces += mesh.triangles.empty() ? 0 : sign;
+    vertices += sign * static_cast<std::int64_t>(mesh.vertices.size());
+    triangles += sign * static_cast<std::int64_t>(mesh.triangles.size());
+    area_m2 += sign * libmap::surface_area(mesh);
+  }
+};
+
+// Each tile is made, written and forgotten.
+void write_tiles(const MeshOptions& options, libmap::PieceIndex& index,
+                 const libmap::SurfaceSurvey& survey,
+                 const std::map<libmap::PlanTile, std::size_t>& tiles, const fs::path& folder,
+                 Run& run) {
+  const auto file_of = [&](const libmap::PlanTile& tile) {
+    return folder / libmap::piece_file_name(tile, ".ply");
+  };
+  libmap::SurfaceIslands islands;
+  Totals totals;
+  run.progress().begin("tiles", tiles.size());
+  for (const auto& [tile, points] : tiles) {
+    const libmap::PlanBox box =
+        libmap::plan_box_of(tile, options.surface.tile_m, options.surface.margin_m());
+    const libmap::SurfaceTile made = libmap::make_surface_tile(
+        index.points_in(box.min(), box.max()), survey, tile, options.surface);
+    run.progress().advance(1);
+    islands.add(tile, made);
+    totals.add(made.mesh, 1);
+    if (!made.mesh.triangles.empty()) libmap::write_mesh(file_of(tile), made.mesh);
+  }
+  run.progress().end();
+  for (const auto& [tile, dropped] : islands.dropped(options.surface.cleaning)) {
+    const libmap::TriangleMesh mesh = libmap::read_mesh(file_of(tile)).mesh;
+    const libmap::TriangleMesh kept = libmap::without_components(mesh, dropped);
+    totals.add(mesh, -1);
+    totals.add(kept, 1);
+    if (kept.triangles.empty())
+      fs::remove(file_of(tile));
+    else
+      libmap::write_mesh(file_of(tile), kept);
+  }
+  if (totals.triangles == 0)
+    throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
+                        {.file = options.cloud});
+  run.add_results({{"points", index.points()},
+                   {"dropped_points", survey.dropped_points()},
+                   {"cell_size_m", options.surface.reconstruction.cell_size_m},
+                   {"pieces", totals.pieces},
+                   {"islands_across_tiles", islands.islands()},
+                   {"vertices", totals.vertices},
+                   {"triangles", totals.triangles},
+                   {"area_m2", totals.area_m2}});
+  run.say("{} points -> {} triangles in {} pieces", index.points(), totals.triangles,
+          totals.pieces);
+}
+
+void mesh_in_tiles(const MeshOptions& options, Run& run) {
+  if (options.report || options.json)
+    throw libmap::Error("is for one mesh, not for a folder of pieces",
+                        {.field = options.json ? "--json" : "--report"});
+  if (options.normals == NormalSource::estimate)
+    throw libmap::Error("sides are chosen over the whole cloud: not in pieces",
+                        {.field = "--normals", .value = "estimate", .bound = "auto or cloud"});
+  options.surface.check();
+  const std::vector<std::string> names = piece_folder_names(options.output);
+  run.claim_output_tree(options.output, names, {options.cloud});
+  libmap::SurfaceSurvey survey;
+  std::map<libmap::PlanTile, std::size_t> tiles;
+  in_file(options.cloud, [&] {
+    libmap::PieceIndex index = run.timed("survey", [&] {
+      return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
+                                [&](const libmap::PointCloud& piece) {
+                                  survey.add(piece, options.surface.reconstruction.weigh_by_error);
+                                  libmap::add_surface_tiles(piece, options.surface, tiles);
+                                });
+    });
+    check_points(options.cloud, index.points(), index.dropped_points(), run);
+    if (survey.dropped_points() > 0)
+      run.warn("{} of {} points have no normal and are left out", survey.dropped_points(),
+               index.points());
+    run.add_input(options.cloud);
+    carry_frame(options.cloud, run);
+    run.write_output_tree(options.output, names, [&](const fs::path& folder) {
+      if (!folder.empty()) write_tiles(options, index, survey, tiles, folder, run);
+    });
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   MeshOptions options;
   Command command("mesh");
-  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv)");
-  command.output(options.output, "mesh (.ply, .vtp, .obj, .stl, .off, .glb)");
+  command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv), or a folder of pieces");
+  command.output(options.output,
+                 std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_piece_folder);
   command.flag("--report", options.report,
                "print what the mesh is as a surface, and how far the points lie from it");
   command.flag("--json", options.json, "that report as JSON");
   bind(command.parameters(), options);
-  return command.run(argc, argv, [&](Run& run) { mesh(options, run); });
+  return command.run(argc, argv, [&](Run& run) {
+    is_piece_folder(options.output) ? mesh_in_tiles(options, run) : mesh(options, run);
+  });
 }

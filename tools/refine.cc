@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 struct RefineOptions {
-  std::string scan;
+  std::vector<std::string> scans;
   std::string output;
   std::string links;
   std::string database;
@@ -23,6 +23,7 @@ struct RefineOptions {
   std::string feature_cache;
   std::string calibration;
   std::string new_calibration;
+  std::vector<std::string> known_lengths;
   bool nodes = false;
   bool strict = false;
   libmap::RefinementOptions refinement;
@@ -150,8 +151,8 @@ libmap::CameraFile camera_of(const libmap::RefinementResult& result,
                            .field = "cameras",
                            .value = std::to_string(cameras.size()),
                            .bound = "1"});
-    return libmap::calibrated_camera(cameras.front(), result.cameras.front(), result.calibration,
-                                     0);
+    return libmap::calibrated_camera(cameras.front(), result.cameras.front(), result.calibration, 0,
+                                     scan.graph());
   }
   throw libmap::Error("the scan has no calibration", {.file = scan.path().string()});
 }
@@ -166,14 +167,15 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
         poses.emplace(pose.node, pose.world_from_base);
       std::optional<libmap::CameraFile> camera;
       if (!result.calibration.empty()) camera = camera_of(result, scan);
-      libmap::copy_with_optimized_poses(options.scan, temporary, poses, result.closures, camera);
+      libmap::copy_with_optimized_poses(options.scans.front(), temporary, poses, result.closures,
+                                        camera);
     });
   if (!options.new_calibration.empty())
     run.write_text(options.new_calibration, libmap::to_yaml(camera_of(result, scan)));
   for (const std::string& report : options.reports)
     run.write_text(report, fs::path(report).extension() == ".txt"
-                               ? refinement_text(options.scan, result)
-                               : refinement_json(options.scan, result));
+                               ? refinement_text(options.scans.front(), result)
+                               : refinement_json(options.scans.front(), result));
   if (!options.links.empty())
     run.write_output(options.links, [&](const auto& temporary) {
       libmap::write_trajectory(temporary, {result.poses, result.links});
@@ -188,48 +190,89 @@ libmap::FeatureCache feature_cache_of(const RefineOptions& options, const Run& r
                                                             : options.feature_cache);
 }
 
-void refine(const RefineOptions& options, Run& run) {
-  claim_poses_output(options.output, {options.scan}, run);
+struct ScanCounts {
+  std::size_t nodes = 0;
+  std::size_t poses = 0;
+};
+std::map<fs::path, ScanCounts> count_by_scan(const libmap::Trajectory& poses,
+                                             const libmap::ScanSource& scan) {
+  std::map<fs::path, ScanCounts> counts;
+  for (const libmap::GraphNode& node : scan.graph().nodes)
+    if (node.weight != libmap::GraphNode::invalid_weight)
+      ++counts[scan.source_of(node.id).path].nodes;
+  for (const libmap::TrajectoryPose& pose : poses) ++counts[scan.source_of(pose.node).path].poses;
+  return counts;
+}
+
+// Of several scans.
+void say_scans(const libmap::RefinementResult& result, const libmap::ScanSource& scan, Run& run) {
+  const auto counts = count_by_scan(result.poses, scan);
+  if (counts.size() < 2) return;
+  for (const auto& [path, count] : counts) {
+    if (count.poses == 0)
+      run.warn("{}: nothing joins it to the others: it gets no poses", path.string());
+    else
+      run.say("{}: {} of {} nodes have a pose", path.string(), count.poses, count.nodes);
+  }
+}
+
+void refine(RefineOptions& options, Run& run) {
+  const std::string& first = options.scans.front();
+  const bool is_file = options.scans.size() == 1 && fs::is_regular_file(first);
+  claim_poses_output(options.output, options.scans, run);
   if (!options.links.empty()) {
     if (fs::path(options.links).extension() != ".g2o")
       throw libmap::Error("unknown format of links",
                           {.field = "--links", .value = options.links, .bound = "a file .g2o"});
-    run.claim_output(options.links, {options.scan});
+    run.claim_output(options.links, options.scans);
   }
-  if (!options.new_calibration.empty())
-    run.claim_output(options.new_calibration, {options.scan, options.calibration});
+  if (!options.new_calibration.empty()) {
+    std::vector<std::string> inputs = options.scans;
+    inputs.push_back(options.calibration);
+    run.claim_output(options.new_calibration, inputs);
+  }
   if (!options.calibration.empty())
     refuse_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
                  "starts from the stored camera, not from --calibration");
   if (!options.database.empty()) {
-    if (fs::is_directory(options.scan))
+    if (!is_file && fs::exists(first))
       throw libmap::Error("a copy of a database, which the scan is not",
                           {.field = "--write-database",
                            .value = options.database,
-                           .bound = "left out where SCAN is a folder"});
-    run.claim_output(options.database, {options.scan});
+                           .bound = "left out where SCAN is a folder or several"});
+    run.claim_output(options.database, options.scans);
   }
   for (const std::string& report : options.reports) {
     const fs::path extension = fs::path(report).extension();
     if (extension != ".json" && extension != ".txt")
       throw libmap::Error("unknown format of reports",
                           {.field = "--report", .value = report, .bound = "a file .json or .txt"});
-    run.claim_output(report, {options.scan});
+    run.claim_output(report, options.scans);
   }
-  const auto scan = open_scan(options.scan, options.strict, run, options.calibration);
-  const libmap::RefinementResult result = in_file(options.scan, [&] {
+  const auto scan = open_scan(options.scans, options.strict, run, options.calibration);
+  // Nodes of several scans may have the same stamps.
+  if (count_by_scan({}, *scan).size() > 1) options.refinement.one_map = options.nodes = true;
+  const libmap::RefinementResult result = in_file(first, [&] {
     return libmap::refine_poses(*scan, options.refinement, run.progress(),
                                 feature_cache_of(options, run));
   });
   for (const auto& [node, fault] : result.skipped)
     run.warn("no features: node {}: {}", node, fault.what());
-  for (const std::string& warning : result.warnings) run.warn(options.scan + ": " + warning);
+  for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
+  const bool is_depth_scale = options.refinement.known_lengths.empty() &&
+                              options.refinement.scale_from == libmap::ScaleSource::depth;
+  if (is_depth_scale && result.findings.empty())
+    run.detail("{}", result.scale);
+  else
+    run.say(result.scale);
   run.say("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
           result.closures.size());
-  if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
+  say_scans(result, *scan, run);
+  for (const std::string& path : options.scans)
+    if (fs::is_regular_file(path)) run.add_input(path);
   run.manifest().frame = "poses";
   add_results(result, run);
   write_outputs(options, result, *scan, run);
@@ -240,7 +283,9 @@ void refine(const RefineOptions& options, Run& run) {
 int main(int argc, char** argv) {
   RefineOptions options;
   Command command("refine");
-  command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
+  command.inputs("SCAN", options.scans,
+                 "scan: a database of RTAB-Map, or a folder of images; several, or a folder of "
+                 "databases: scans of overlapping ground, which are joined");
   command.output(options.output, "poses (.tum, .kitti, .g2o, .toro, or a folder .colmap)");
   command.option("--links", "LINKS.g2o", options.links, "poses and links as a pose graph");
   command.option(
@@ -250,6 +295,9 @@ int main(int argc, char** argv) {
   add_calibration_option(command, options.calibration);
   command.option("--write-calibration", "OUT.yaml", options.new_calibration,
                  "the camera as it was estimated, for --calibration of other commands and scans");
+  command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
+                 "measured distance between what two pixels of pictures show; repeatable; "
+                 "determines the scale");
   command.option("--report", "FILE.json|FILE.txt", options.reports,
                  "what each stage did, and how certain the poses are");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,
@@ -259,6 +307,8 @@ int main(int argc, char** argv) {
   command.parameters().add("strict", options.strict,
                            "what the scan's file lacks is an error, not a warning");
   return command.run(argc, argv, [&](Run& run) {
+    for (const std::string& text : options.known_lengths)
+      options.refinement.known_lengths.push_back(libmap::parse_known_length(text));
     // Of a folder .colmap, beside which other files lie.
     options.output = without_trailing_slash(options.output);
     refine(options, run);

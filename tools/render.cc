@@ -28,11 +28,7 @@ struct RenderOptions {
 
 // Of a picture of one file.
 void bind_one(libmap::ParameterTable& table, RenderOptions& options) {
-  constexpr libmap::Range pixels{1.0, 16384.0};
-  table.add("width_px", options.view.width, pixels, "width of the picture, pixels");
-  table.add("height_px", options.view.height, pixels, "height of the picture, pixels");
-  table.add("legend", options.view.legend, "show the legend");
-  table.add("axes", options.view.axes, "show the axes");
+  libmap::bind_single(table, options.view);
   table.add("camera_position", options.camera_position, "X,Y,Z with view: camera");
   table.add("camera_target", options.camera_target, "X,Y,Z with view: camera");
 }
@@ -57,11 +53,8 @@ void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
 }
 
 void bind(libmap::ParameterTable& table, RenderOptions& options) {
-  table.add("view", options.view.view, libmap::viewpoint_names(), "from where");
-  table.add("title", options.view.title, "above the scene");
+  bind(table, options.view);
   bind(table, options.scene);
-  table.add("scale_bar", options.view.scale_bar, "show the scale bar");
-  table.add("background", options.view.background, "#rrggbb or a name");
   bind_one(table, options);
   bind_page(table, options);
 }

@@ -1,13 +1,18 @@
 // graspmap resample: Poisson-disk samples of a surface.
+#include <limits>
+
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/poisson_disk.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/piece_folder.h"
 
 using namespace graspmap_tools;
 
 namespace {
+
+namespace fs = std::filesystem;
 
 struct ResampleOptions {
   std::string mesh;
@@ -31,14 +36,18 @@ void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted,
              result.cloud.size());
 }
 
-void resample(const ResampleOptions& options, Run& run) {
-  libmap::require_cloud_format(options.output);
-  run.claim_output(options.output, {options.mesh});
-  const libmap::PoissonDiskOptions& sampling = options.sampling;
+void require_one_of_radius_and_count(const libmap::PoissonDiskOptions& sampling) {
   if (sampling.count > 0 && sampling.radius_m != libmap::PoissonDiskOptions().radius_m)
     throw libmap::Error(
         "the number of samples follows from their radius: one of --radius and --count",
         {.field = "count", .value = std::to_string(sampling.count)});
+}
+
+void resample(const ResampleOptions& options, Run& run) {
+  libmap::require_cloud_format(options.output);
+  run.claim_output(options.output, {options.mesh});
+  const libmap::PoissonDiskOptions& sampling = options.sampling;
+  require_one_of_radius_and_count(sampling);
   const libmap::TriangleMesh mesh =
       run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
   run.add_input(options.mesh);
@@ -50,13 +59,58 @@ void resample(const ResampleOptions& options, Run& run) {
                    [&](const auto& temporary) { libmap::write_cloud(temporary, result.cloud); });
 }
 
+// Piece by piece of the mesh.
+void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sampler,
+                  const fs::path& folder, Run& run) {
+  std::size_t points = 0;
+  double area_m2 = 0.0;
+  double smallest_m = std::numeric_limits<double>::infinity();
+  run.progress().begin("pieces", pieces.size());
+  for (std::size_t n = 0; n < pieces.size(); ++n) {
+    const libmap::PoissonDiskResult result = in_file(
+        pieces[n].string(), [&] { return sampler.sample(libmap::read_mesh(pieces[n]).mesh, n); });
+    run.progress().advance(1);
+    points += result.cloud.size();
+    area_m2 += result.area_m2;
+    if (result.smallest_distance_m > 0.0)
+      smallest_m = std::min(smallest_m, result.smallest_distance_m);
+    if (!result.cloud.empty())
+      libmap::write_cloud(folder / (pieces[n].stem().string() + ".pcd"), result.cloud);
+  }
+  run.add_results({{"pieces", pieces.size()},
+                   {"points", points},
+                   {"area_m2", area_m2},
+                   {"smallest_distance_m", smallest_m}});
+  run.say("{:.2f} m2 in {} pieces -> {} points", area_m2, pieces.size(), points);
+}
+
+void resample_pieces(const ResampleOptions& options, Run& run) {
+  require_one_of_radius_and_count(options.sampling);
+  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".pcd");
+  run.claim_output_tree(options.output, names, {options.mesh});
+  std::vector<libmap::Bounds3d> boxes;
+  for (const fs::path& piece : pieces)
+    boxes.push_back(libmap::bounds_of(libmap::read_mesh(piece).mesh.vertices));
+  run.add_input(options.mesh);
+  libmap::PieceSampler sampler(std::move(boxes), options.sampling);
+  carry_frame(options.mesh, run);
+  run.write_output_tree(options.output, names, [&](const fs::path& folder) {
+    if (!folder.empty()) write_pieces(pieces, sampler, folder, run);
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   ResampleOptions options;
   Command command("resample");
-  command.input("MESH", options.mesh, "surface (.ply, .obj, .stl, .off, .glb)");
-  command.output(options.output, "cloud with normals (.pcd, .ply, .vtp, .csv)");
+  command.input("MESH", options.mesh,
+                "surface (.ply, .obj, .stl, .off, .glb), or a folder of pieces");
+  command.output(options.output,
+                 std::string("cloud with normals (.pcd, .ply, .vtp, .csv)") + or_piece_folder);
   libmap::bind(command.parameters(), options.sampling);
-  return command.run(argc, argv, [&](Run& run) { resample(options, run); });
+  return command.run(argc, argv, [&](Run& run) {
+    is_piece_folder(options.output) ? resample_pieces(options, run) : resample(options, run);
+  });
 }

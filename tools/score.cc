@@ -29,9 +29,7 @@ struct ScoreOptions {
 };
 
 void bind(libmap::ParameterTable& table, ScoreOptions& options) {
-  bind(table, options.detection.scenario);
-  table.add("plane", options.detection.plane, libgtd::plane_source_names(),
-            "fit: regression plane; none: the cloud is already in the terrain frame");
+  bind(table, options.detection);
   table.add("up", options.up,
             "which side of the plane is outside: auto, or a direction X,Y,Z in the cloud's frame");
   table.add("frame", options.frame, libgtd::map_frame_names(), "frame of the map's points");
@@ -144,7 +142,7 @@ void score(ScoreOptions& options, Run& run) {
   });
   run.manifest().parameters.emplace_back("tile", options.tile);
   for (const auto& piece : libmap::cloud_pieces(options.terrain)) run.add_input(piece);
-  run.add_input(gripper_file);
+  for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
   add_results(result, options, run);
   carry_transforms(options.terrain, run);
   say_result(result, options, run);
@@ -159,7 +157,7 @@ int main(int argc, char** argv) {
   ScoreOptions options;
   Command command("score");
   command.input("TERRAIN", options.terrain,
-                "cloud of the terrain (.pcd, .ply, .csv), or a folder of its pieces");
+                "cloud of the terrain (.pcd, .ply, .csv) or DEM (.tif), or a folder of its pieces");
   command.output(options.output,
                  "graspability map (.pcd, .ply, .vtp, .csv), or tile store (.tiles)");
   command.option("--tile", "K/N", options.tile,

@@ -236,6 +236,16 @@ std::vector<std::string> default_score_columns(const Table& table, std::string_v
   return names;
 }
 
+void bind(libmap::ParameterTable& table, TableEvaluationOptions& options) {
+  table.add("label", options.label_column,
+            "column of the truth: 1/0, true/false, yes/no, graspable/not graspable");
+  table.add("cutoff", options.roc.rate_cutoff, libmap::any_number,
+            "a place whose score reaches it is predicted graspable: for the rates");
+  table.add("bootstrap", options.roc.bootstrap_replicates, libmap::Range{0, 1e7},
+            "replicates for the interval of the area; 0: no interval");
+  table.add("seed", options.roc.bootstrap_seed, libmap::not_negative, "of the bootstrap");
+}
+
 TableEvaluation evaluate_table(const Table& table, const TableEvaluationOptions& options) {
   options.roc.check();
   TableEvaluation evaluation;

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "libgtd/evaluate/roc.h"
+#include "libmap/core/parameters.h"
 #include "libmap/core/table.h"
 
 namespace libgtd {
@@ -17,6 +18,8 @@ struct TableEvaluationOptions {
   std::vector<std::string> score_columns;
   RocOptions roc;
 };
+// All but the columns of scores, which are a list.
+void bind(libmap::ParameterTable& table, TableEvaluationOptions& options);
 
 struct ColumnEvaluation {
   std::string name;

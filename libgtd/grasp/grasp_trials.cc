@@ -26,12 +26,6 @@ std::uint64_t key_of(const Eigen::Vector3d& location) {
   return key;
 }
 
-// What all trials of one location share.
-struct Site {
-  GroundPatch patch;
-  std::uint64_t key = 0;
-};
-
 Eigen::Vector3d away_from(const Ground& ground, const Gripper& gripper,
                           const Eigen::Vector3d& location, ApproachDirection approach) {
   const Eigen::Vector3d up = Eigen::Vector3d::UnitZ();
@@ -45,20 +39,9 @@ Eigen::Vector3d away_from(const Ground& ground, const Gripper& gripper,
   return up;
 }
 
-Site site_of(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
-             const GraspOptions& options) {
-  const Eigen::Vector3d away = away_from(ground, gripper, location, options.approach);
-  // Four standard deviations; draws are cut off there.
-  const double offset_m = 4.0 * (options.offset_m + ground.largest_error_m());
-  return {patch_around(ground, location, away, gripper, offset_m,
-                       4.0 * options.tilt_deg * libmap::radians_per_degree, options.closing),
-          key_of(location)};
-}
-
-ApproachPose draw_pose(const Site& site, const Gripper& gripper, const GraspOptions& options,
-                       int number) {
-  libmap::RandomStream random(options.seed,
-                              libmap::mix_bits(site.key, static_cast<std::uint64_t>(number)));
+ApproachPose draw_pose(std::uint64_t key, const Gripper& gripper, const GraspOptions& options,
+                       std::size_t number) {
+  libmap::RandomStream random(options.seed, libmap::mix_bits(key, number));
   const auto normal = [&] { return std::clamp(random.normal(), -4.0, 4.0); };
   ApproachPose pose;
   pose.yaw_rad = random.uniform(0.0, 2.0 * std::numbers::pi / gripper.fingers->count);
@@ -68,17 +51,59 @@ ApproachPose draw_pose(const Site& site, const Gripper& gripper, const GraspOpti
   return pose;
 }
 
-ClosedGripper close_at(const Site& site, const Gripper& gripper, const GraspOptions& options,
-                       int number) {
-  const ApproachPose pose = draw_pose(site, gripper, options, number);
-  if (site.patch.vertex_errors_m.empty())
-    return close_gripper(site.patch, gripper, pose, options.closing);
-  constexpr std::uint64_t of_surface = 0x73757266616365;
-  const std::uint64_t key =
-      libmap::mix_bits(libmap::mix_bits(site.key, of_surface), static_cast<std::uint64_t>(number));
-  return close_gripper(displaced(site.patch, options.surface.correlation_m, options.seed, key),
-                       gripper, pose, options.closing);
-}
+// What all trials of one location share: poses, and the ground around it that these may meet.
+class Site {
+ public:
+  Site(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
+       const GraspOptions& options)
+      : ground_(ground),
+        gripper_(gripper),
+        location_(location),
+        options_(options),
+        key_(key_of(location)),
+        away_(away_from(ground, gripper, location, options.approach)) {}
+
+  std::uint64_t key() const { return key_; }
+  const GroundPatch& patch() const { return patch_; }
+
+  void draw_poses(std::size_t count) {
+    const bool is_first = poses_.empty();
+    const double offset_m = offset_m_;
+    const double tilt_rad = tilt_rad_;
+    while (poses_.size() < count) {
+      const ApproachPose pose = draw_pose(key_, gripper_, options_, poses_.size());
+      offset_m_ = std::max(offset_m_, pose.offset_m.norm());
+      tilt_rad_ = std::max(tilt_rad_, pose.tilt_rad.norm());
+      poses_.push_back(pose);
+    }
+    if (is_first || offset_m_ > offset_m || tilt_rad_ > tilt_rad)
+      patch_ =
+          patch_around(ground_, location_, away_, gripper_,
+                       offset_m_ + 4.0 * ground_.largest_error_m(), tilt_rad_, options_.closing);
+  }
+
+  // Of a drawn pose.
+  ClosedGripper close(std::size_t pose) const {
+    if (patch_.vertex_errors_m.empty())
+      return close_gripper(patch_, gripper_, poses_[pose], options_.closing);
+    constexpr std::uint64_t of_surface = 0x73757266616365;
+    const std::uint64_t key = libmap::mix_bits(libmap::mix_bits(key_, of_surface), pose);
+    return close_gripper(displaced(patch_, options_.surface.correlation_m, options_.seed, key),
+                         gripper_, poses_[pose], options_.closing);
+  }
+
+ private:
+  const Ground& ground_;
+  const Gripper& gripper_;
+  const Eigen::Vector3d location_;
+  const GraspOptions& options_;
+  const std::uint64_t key_;
+  const Eigen::Vector3d away_;
+  std::vector<ApproachPose> poses_;
+  double offset_m_ = 0.0;  // largest ones of the poses
+  double tilt_rad_ = 0.0;
+  GroundPatch patch_;
+};
 
 HoldingOptions holding_of(const ClosedGripper& closed, const Gripper& gripper,
                           SpineSharing sharing) {
@@ -96,7 +121,7 @@ std::vector<BearingContact> draw_asperities(const ClosedGripper& closed, const S
                                             int pose, int draw) {
   const std::uint64_t number =
       (static_cast<std::uint64_t>(pose) << 32U) | (static_cast<std::uint64_t>(draw) + 1);
-  libmap::RandomStream random(options.seed, libmap::mix_bits(~site.key, number));
+  libmap::RandomStream random(options.seed, libmap::mix_bits(~site.key(), number));
   return draw_bearing(closed.contacts, *gripper.fingers, options.engagement, random);
 }
 
@@ -150,32 +175,55 @@ class LocationTrials {
  public:
   LocationTrials(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                  const GraspOptions& options)
-      : site_(site_of(ground, gripper, location, options)), gripper_(gripper), options_(options) {
+      : site_(ground, gripper, location, options), gripper_(gripper), options_(options) {
     result_.location = location;
   }
 
   // Goes on to so many poses with so many draws each.
   void go_on(const SequentialRound& round) {
-    for (int pose = 0; pose < round.poses; ++pose) {
-      if (static_cast<std::size_t>(pose) == poses_.size())
-        poses_.push_back({close_at(site_, gripper_, options_, pose), 0, {}});
-      draw(pose, round.draws);
-    }
+    const auto poses = static_cast<std::size_t>(round.poses);
+    site_.draw_poses(poses);
+    while (poses_.size() < poses) poses_.push_back({site_.close(poses_.size()), 0, {}});
+    for (int pose = 0; pose < round.poses; ++pose) draw(pose, round.draws);
   }
 
   bool is_clear() const {
-    std::size_t trials = 0;
-    for (const PoseTrials& pose : poses_) trials += pose.forces.size();
+    const auto poses = static_cast<double>(poses_.size());
+    double trials = 0.0;
+    double variance = 0.0;  // of the sum over the poses of their shares after all draws
+    for (const PoseTrials& pose : poses_) {
+      trials += static_cast<double>(pose.forces.size());
+      variance += variance_to_come(pose);
+    }
+    const double share = static_cast<double>(result_.ends[0]) / trials;
     constexpr double quantile_of_90_percent = 1.645;
-    const auto [low, high] =
-        wilson_interval(static_cast<double>(result_.ends[0]) / static_cast<double>(trials),
-                        static_cast<double>(poses_.size()), quantile_of_90_percent);
-    return low > 0.5 || high < 0.5;
+    const auto [low, high] = wilson_interval(share, poses, quantile_of_90_percent);
+    if (low > 0.5 || high < 0.5) return true;
+    return poses_.size() == static_cast<std::size_t>(options_.poses) &&
+           std::abs(share - 0.5) > quantile_of_90_percent * std::sqrt(variance) / poses;
   }
 
   LocationResult result() &&;
 
  private:
+  // Of the share of a pose's draws that hold, once all are made: k of n hold so far, and Jeffreys'
+  // prior of the probability of the others makes it beta distributed.
+  double variance_to_come(const PoseTrials& pose) const {
+    const auto made = static_cast<double>(pose.forces.size());
+    const double to_come = options_.draws - made;
+    if (to_come <= 0.0) return 0.0;
+    const double holding = static_cast<double>(std::count_if(
+        pose.forces.begin(), pose.forces.end(), [&](double force) { return is_held(force); }));
+    const double a = holding + 0.5;
+    const double b = made - holding + 0.5;
+    const double mean = a / (a + b);
+    const double variance = mean * (1.0 - mean) / (a + b + 1.0);
+    const double of_draws = (mean * (1.0 - mean) - variance) / to_come;
+    const double part = to_come / options_.draws;
+    return part * part * (variance + of_draws);
+  }
+  bool is_held(double force_n) const { return force_n >= options_.load_n * options_.safety; }
+
   void draw(int number, int draws) {
     PoseTrials& pose = poses_[static_cast<std::size_t>(number)];
     const HoldingOptions equally = holding_of(pose.closed, gripper_, SpineSharing::equally);
@@ -199,7 +247,7 @@ class LocationTrials {
       pulls_[n].push_back(holding_force(bearing, pull_directions()[n].vector, holding));
   }
 
-  const Site site_;
+  Site site_;
   const Gripper& gripper_;
   const GraspOptions& options_;
   LocationResult result_;
@@ -330,7 +378,8 @@ std::vector<SequentialRound> sequential_rounds(const GraspOptions& options) {
   if (options.sequential) {
     for (int poses = first_poses; poses < options.poses; poses *= 2)
       rounds.push_back({poses, few_draws});
-    if (few_draws < options.draws) rounds.push_back({options.poses, few_draws});
+    for (int draws = few_draws; draws < options.draws; draws *= 2)
+      rounds.push_back({options.poses, draws});
   }
   rounds.push_back({options.poses, options.draws});
   return rounds;
@@ -357,10 +406,11 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
 
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw) {
-  const Site site = site_of(ground, gripper, location, options);
+  Site site(ground, gripper, location, options);
+  site.draw_poses(static_cast<std::size_t>(pose) + 1);
   Trial trial;
-  trial.mesh_from_patch = site.patch.mesh_from_patch;
-  trial.gripper = close_at(site, gripper, options, pose);
+  trial.mesh_from_patch = site.patch().mesh_from_patch;
+  trial.gripper = site.close(static_cast<std::size_t>(pose));
   trial.bearing = draw_asperities(trial.gripper, site, gripper, options, pose, draw);
   const LeastForce least =
       least_holding_force(trial.bearing, holding_of(trial.gripper, gripper, SpineSharing::equally));

@@ -92,10 +92,12 @@ struct LocationResult {
   bool holds() const { return hold_probability >= 0.5; }
 };
 
-// Of a sequential test: 4, 8, 16, ... and all poses with a quarter of the draws each, at last all
-// poses with all draws: those of one pose say little more than a few of them. It ends after a round
-// when Wilson's interval of 90 %, poses as the count, excludes 0.5. A test that goes on to the last
-// round has the same trials as one that is not sequential.
+// Of a sequential test: 4, 8, 16, ... and all poses with a quarter of the draws each, then all with
+// twice as many, ..., at last with all: draws of one pose say little more than a few of them. It
+// ends after a round when Wilson's interval of 90 %, poses as the count, excludes 0.5, or when all
+// poses are made and the share is farther from 0.5 than 1.645 standard deviations of what the draws
+// to come may change (beta distributed, Jeffreys' prior). A test that goes on to the last round has
+// the same trials as one that is not sequential.
 struct SequentialRound {
   int poses = 0;
   int draws = 0;

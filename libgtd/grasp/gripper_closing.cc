@@ -8,6 +8,8 @@
 #include <numbers>
 #include <utility>
 
+#include "libgtd/grasp/cloned_loops.h"
+
 namespace libgtd {
 
 namespace {
@@ -16,65 +18,67 @@ namespace {
 // ground from outside.
 constexpr double clearance_m = 1e-5;
 
-// The patch's vertices in a gripper's frame.
-std::vector<Eigen::Vector3d> carried(const GroundPatch& patch,
-                                     const Eigen::Isometry3d& gripper_from_patch) {
-  std::vector<Eigen::Vector3d> vertices;
-  vertices.reserve(patch.vertices.size());
-  for (const Eigen::Vector3d& vertex : patch.vertices)
-    vertices.push_back(gripper_from_patch * vertex);
-  return vertices;
+// Sets bit `finger` of each vertex that is not on the right of a finger's plane.
+GRASPMAP_CLONED_CHOICE void mark_left(const double* xs, const double* ys,
+                                      const Eigen::Vector2d& along, std::size_t finger,
+                                      std::uint64_t* is_left, std::size_t size) {
+  const double x = along.x();
+  const double y = along.y();
+  for (std::size_t v = 0; v < size; ++v)
+    is_left[v] |= static_cast<std::uint64_t>(x * ys[v] - y * xs[v] >= 0.0) << finger;
 }
 
-// On which side of the planes of all fingers, and beyond which side of the palm's square, each
-// vertex lies. Most triangles cross no plane and are not under the palm: a look at three numbers
-// says so for all fingers at once.
-struct VertexSides {
-  std::vector<std::vector<double>> side;  // by finger: distance from its plane
-  std::vector<std::uint64_t> above;       // bit n: side[n] >= 0
-  std::vector<std::uint8_t> beyond;       // of the palm's square, a bit for each side
+// The patch's vertices in a gripper's frame, on which side of the planes of all fingers they are,
+// and beyond which side of the palm's square. Most triangles cross no plane and are not under the
+// palm: a look at three numbers says so for all fingers at once.
+struct CarriedVertices {
+  std::vector<double> x, y, z;
+  std::vector<std::uint64_t> is_left;  // a bit for each finger
+  std::vector<std::uint8_t> beyond;    // a bit for each side
 
-  VertexSides(const std::vector<Eigen::Vector3d>& vertices,
-              const std::vector<Eigen::Vector2d>& along, double palm_radius)
-      : side(along.size(), std::vector<double>(vertices.size())),
-        above(vertices.size(), 0),
-        beyond(vertices.size()) {
-    for (std::size_t n = 0; n < along.size(); ++n) {
-      const double x = along[n].x();
-      const double y = along[n].y();
-      for (std::size_t v = 0; v < vertices.size(); ++v)
-        side[n][v] = x * vertices[v].y() - y * vertices[v].x();
-      for (std::size_t v = 0; v < vertices.size(); ++v)
-        above[v] |= static_cast<std::uint64_t>(side[n][v] >= 0.0) << n;
+  CarriedVertices(const GroundPatch& patch, const Eigen::Isometry3d& gripper_from_patch,
+                  const std::vector<Eigen::Vector2d>& along, double palm_radius)
+      : is_left(patch.vertices.size(), 0) {
+    for (std::vector<double>* axis : {&x, &y, &z}) axis->reserve(patch.vertices.size());
+    beyond.reserve(patch.vertices.size());
+    for (const Eigen::Vector3d& vertex : patch.vertices) {
+      const Eigen::Vector3d here = gripper_from_patch * vertex;
+      x.push_back(here.x());
+      y.push_back(here.y());
+      z.push_back(here.z());
+      beyond.push_back(static_cast<std::uint8_t>(
+          (here.x() > palm_radius ? 1 : 0) | (here.x() < -palm_radius ? 2 : 0) |
+          (here.y() > palm_radius ? 4 : 0) | (here.y() < -palm_radius ? 8 : 0)));
     }
-    for (std::size_t v = 0; v < vertices.size(); ++v)
-      beyond[v] = static_cast<std::uint8_t>(
-          (vertices[v].x() > palm_radius ? 1 : 0) | (vertices[v].x() < -palm_radius ? 2 : 0) |
-          (vertices[v].y() > palm_radius ? 4 : 0) | (vertices[v].y() < -palm_radius ? 8 : 0));
+    for (std::size_t n = 0; n < along.size(); ++n)
+      mark_left(x.data(), y.data(), along[n], n, is_left.data(), x.size());
   }
+  Eigen::Vector3d operator[](std::size_t v) const { return {x[v], y[v], z[v]}; }
 };
 
 // Adds the cut of triangle t with the half plane of a finger, which begins a little behind the
 // palm's axis. The triangle has vertices on both sides of the plane.
-void add_cut(const GroundPatch& patch, const std::vector<Eigen::Vector3d>& vertices,
-             const std::vector<double>& side, const Eigen::Vector3d& axis,
+void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Eigen::Vector3d& axis,
              const Eigen::Vector2d& along, const FingerGeometry& finger, std::uint32_t t,
              std::vector<ProfileSegment>& profile) {
   const double farthest = finger.joint_radius_m + finger.proximal_m + finger.distal_m;
-  const auto [a, b, c] = patch.triangles[t];
-  const bool above_a = side[a] >= 0.0;
-  const bool above_b = side[b] >= 0.0;
-  const bool above_c = side[c] >= 0.0;
+  std::array<Eigen::Vector3d, 3> corners;
+  std::array<double, 3> side{};  // distances from the plane
+  for (std::size_t n = 0; n < 3; ++n) {
+    corners[n] = vertices[patch.triangles[t][n]];
+    side[n] = along.x() * corners[n].y() - along.y() * corners[n].x();
+  }
   // The vertex that is alone on its side, and the two others.
-  const auto [lone, first, second] = above_b == above_c   ? std::array{a, b, c}
-                                     : above_a == above_c ? std::array{b, c, a}
-                                                          : std::array{c, a, b};
-  const auto cut = [&, lone = lone](std::uint32_t other) {
+  const std::size_t lone = (side[1] >= 0.0) == (side[2] >= 0.0)   ? 0
+                           : (side[0] >= 0.0) == (side[2] >= 0.0) ? 1
+                                                                  : 2;
+  const auto cut = [&](std::size_t other) {
     const double share = side[lone] / (side[lone] - side[other]);
-    const Eigen::Vector3d point = vertices[lone] + share * (vertices[other] - vertices[lone]);
+    const Eigen::Vector3d point = corners[lone] + share * (corners[other] - corners[lone]);
     return Eigen::Vector2d(along.dot(point.head<2>()), point.z());
   };
-  ProfileSegment segment{cut(first), cut(second), t, patch.area_normals[t].dot(axis) > 0.0};
+  ProfileSegment segment{cut((lone + 1) % 3), cut((lone + 2) % 3), t,
+                         patch.area_normals[t].dot(axis) > 0.0};
   const auto [low, high] = std::minmax(segment.a.x(), segment.b.x());
   if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
 }
@@ -123,23 +127,23 @@ struct GroundCuts {
   std::vector<std::vector<ProfileSegment>> profiles;  // of the fingers
 };
 
-GroundCuts cuts_of(const GroundPatch& patch, const std::vector<Eigen::Vector3d>& vertices,
+GroundCuts cuts_of(const GroundPatch& patch, const CarriedVertices& vertices,
                    const Eigen::Vector3d& axis, const std::vector<Eigen::Vector2d>& along,
                    const FingerGeometry& finger, double palm_radius, double start_m) {
-  const VertexSides sides(vertices, along, palm_radius);
   GroundCuts cuts;
   cuts.profiles.resize(along.size());
   for (std::uint32_t t = 0; t < patch.triangles.size(); ++t) {
     const auto [a, b, c] = patch.triangles[t];
-    std::uint64_t crossed = (sides.above[a] ^ sides.above[b]) | (sides.above[b] ^ sides.above[c]);
+    std::uint64_t crossed =
+        (vertices.is_left[a] ^ vertices.is_left[b]) | (vertices.is_left[b] ^ vertices.is_left[c]);
     for (; crossed != 0; crossed &= crossed - 1) {
       const auto n = static_cast<std::size_t>(std::countr_zero(crossed));
-      add_cut(patch, vertices, sides.side[n], axis, along[n], finger, t, cuts.profiles[n]);
+      add_cut(patch, vertices, axis, along[n], finger, t, cuts.profiles[n]);
     }
-    if ((sides.beyond[a] & sides.beyond[b] & sides.beyond[c]) != 0) continue;
-    const std::array corners = {vertices[a], vertices[b], vertices[c]};
-    if (std::min({corners[0].z(), corners[1].z(), corners[2].z()}) > start_m) continue;
-    if (const auto over = height_over_disc(corners, palm_radius))
+    if ((vertices.beyond[a] & vertices.beyond[b] & vertices.beyond[c]) != 0) continue;
+    const auto [low, high] = std::minmax({vertices.z[a], vertices.z[b], vertices.z[c]});
+    if (low > start_m || (cuts.palm_m && high <= *cuts.palm_m)) continue;
+    if (const auto over = height_over_disc({vertices[a], vertices[b], vertices[c]}, palm_radius))
       cuts.palm_m = std::max(cuts.palm_m.value_or(*over), *over);
   }
   return cuts;
@@ -250,10 +254,10 @@ GroundPatch patch_around(const Ground& ground, const Eigen::Vector3d& location,
                          double tilt_rad, const ClosingOptions& options) {
   const FingerGeometry finger = finger_geometry(gripper);
   const double reach = finger.proximal_m + finger.distal_m;
-  const double height = options.start_height_m + reach;
   const double radius = std::max(finger.joint_radius_m + reach, 0.0005 * gripper.palm_diameter_mm) +
-                        offset_m + options.normal_radius_m + height * std::sin(tilt_rad);
-  return ground.patch(location, away, radius, height);
+                        offset_m + options.normal_radius_m;
+  return ground.patch(location, away, radius / std::cos(tilt_rad), options.start_height_m + reach,
+                      std::tan(tilt_rad));
 }
 
 ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
@@ -262,15 +266,16 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   const int count = gripper.fingers->count;
   ClosedGripper closed;
   closed.patch_from_gripper = patch_from_palm(pose);
-  const std::vector<Eigen::Vector3d> vertices = carried(patch, closed.patch_from_gripper.inverse());
   const Eigen::Vector3d axis = closed.patch_from_gripper.linear().col(2);
   std::vector<Eigen::Vector2d> along;  // of the fingers' planes
   for (int n = 0; n < count; ++n) {
     const double azimuth = 2.0 * std::numbers::pi * n / count;
     along.emplace_back(std::cos(azimuth), std::sin(azimuth));
   }
-  auto [palm, profiles] = cuts_of(patch, vertices, axis, along, finger,
-                                  0.0005 * gripper.palm_diameter_mm, options.start_height_m);
+  const double palm_radius = 0.0005 * gripper.palm_diameter_mm;
+  const CarriedVertices vertices(patch, closed.patch_from_gripper.inverse(), along, palm_radius);
+  auto [palm, profiles] =
+      cuts_of(patch, vertices, axis, along, finger, palm_radius, options.start_height_m);
   std::optional<double> height = palm;
   for (std::vector<ProfileSegment>& profile : profiles) {
     if (is_blocked(profile, finger, options.start_height_m)) {

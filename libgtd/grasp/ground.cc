@@ -102,10 +102,6 @@ struct Ground::Index {
     double radius;
     std::uint32_t triangle;
   };
-  struct Sphere {
-    Eigen::Vector3d center;
-    double radius;
-  };
 
   Index(const libmap::TriangleMesh& of, GroundErrors known) : mesh(of), errors(std::move(known)) {}
 
@@ -168,46 +164,20 @@ struct Ground::Index {
     for (const Entry& entry : small) entries[next[cell_of(entry.center)]++] = entry;
   }
 
-  bool is_within(const Entry& entry, const Sphere& sphere) const {
-    // Beyond rounding, the circumscribed sphere decides.
-    constexpr double more = 1.0 + 1e-9;
-    const double square = (entry.center - sphere.center).squaredNorm();
-    const double far = (sphere.radius + entry.radius) * more;
-    if (square > far * far) return false;
-    const double near = sphere.radius - entry.radius * more;
-    if (near > 0.0 && square * more < near * near) return true;
-    return square_distance(sphere.center,
-                           corners_of(mesh.vertices, mesh.triangles[entry.triangle])) <=
-           sphere.radius * sphere.radius;
-  }
-
-  // The triangles that come into one of the spheres and that `wanted` lets pass, in the mesh's
-  // order.
-  template <typename Wanted>
-  std::vector<std::uint32_t> within(const std::vector<Sphere>& spheres,
-                                    const Wanted& wanted) const {
-    std::vector<std::uint32_t> found;
-    const auto offer = [&](const Entry& entry) {
-      if (!wanted(entry)) return;
-      if (std::any_of(spheres.begin(), spheres.end(),
-                      [&](const Sphere& sphere) { return is_within(entry, sphere); }))
-        found.push_back(entry.triangle);
-    };
-    for (const Entry& entry : large) offer(entry);
-    Eigen::AlignedBox3d around;
-    for (const Sphere& sphere : spheres)
-      for (const double sign : {-1.0, 1.0})
-        around.extend(sphere.center +
-                      Eigen::Vector3d::Constant(sign * (sphere.radius + small_radius_m)));
-    const auto low = [&](std::size_t side) { return cell_along(side, around.min()[axes[side]]); };
-    const auto high = [&](std::size_t side) { return cell_along(side, around.max()[axes[side]]); };
-    for (std::int64_t i = low(0); i <= high(0); ++i) {
-      const auto begin = first[static_cast<std::size_t>(i * cells[1] + low(1))];
-      const auto end = first[static_cast<std::size_t>(i * cells[1] + high(1)) + 1];
-      for (std::size_t n = begin; n < end; ++n) offer(entries[n]);
+  // Calls use(entry) for the triangles that come into the box, and some others.
+  template <typename Use>
+  void visit(const Eigen::AlignedBox3d& around, const Use& use) const {
+    for (const Entry& entry : large) use(entry);
+    const Eigen::Vector3d low = around.min().array() - small_radius_m;
+    const Eigen::Vector3d high = around.max().array() + small_radius_m;
+    const std::int64_t j_low = cell_along(1, low[axes[1]]);
+    const std::int64_t j_high = cell_along(1, high[axes[1]]);
+    const std::int64_t i_high = cell_along(0, high[axes[0]]);
+    for (std::int64_t i = cell_along(0, low[axes[0]]); i <= i_high; ++i) {
+      const std::size_t end = first[static_cast<std::size_t>(i * cells[1] + j_high) + 1];
+      for (auto n = first[static_cast<std::size_t>(i * cells[1] + j_low)]; n < end; ++n)
+        use(entries[n]);
     }
-    sort(found);
-    return found;
   }
 
   // By a bit for each number where they lie close together.
@@ -236,29 +206,22 @@ class PatchVertices {
  public:
   explicit PatchVertices(std::size_t most) : slots_(std::bit_ceil(2 * most + 1)) {}
 
-  struct Slot {
-    std::uint32_t vertex = none;  // of the mesh
-    std::uint32_t number = none;  // of the patch
-    Eigen::Vector3d position;     // in the patch's frame
-  };
-  // `carry` gives the position of a vertex that is not there yet.
-  template <typename Carry>
-  Slot& slot_of(std::uint32_t vertex, const Carry& carry) {
+  // Of the patch; `none` if the vertex is new.
+  std::uint32_t& number_of(std::uint32_t vertex) {
     std::size_t at = (vertex * std::uint64_t{0x9e3779b97f4a7c15} >> 32U) & (slots_.size() - 1);
-    while (slots_[at].vertex != vertex) {
-      if (slots_[at].vertex == none) {
-        slots_[at].vertex = vertex;
-        slots_[at].position = carry(vertex);
-        break;
-      }
+    while (slots_[at].vertex != vertex && slots_[at].vertex != none)
       at = (at + 1) & (slots_.size() - 1);
-    }
-    return slots_[at];
+    slots_[at].vertex = vertex;
+    return slots_[at].number;
   }
 
   static constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
 
  private:
+  struct Slot {
+    std::uint32_t vertex = none;
+    std::uint32_t number = none;
+  };
   std::vector<Slot> slots_;
 };
 
@@ -286,58 +249,53 @@ Ground::Ground(Ground&&) noexcept = default;
 Ground& Ground::operator=(Ground&&) noexcept = default;
 
 GroundPatch Ground::patch(const Eigen::Vector3d& location, const Eigen::Vector3d& away,
-                          double radius_m, double above_m) const {
+                          double radius_m, double above_m, double widening) const {
   GroundPatch patch;
   patch.mesh_from_patch = patch_frame(location, away);
   const Eigen::Isometry3d patch_from_mesh = patch.mesh_from_patch.inverse();
   const Eigen::Vector3d axis = patch.mesh_from_patch.linear().col(2);
   const libmap::TriangleMesh& mesh = index_->mesh;
-  // Spheres along the axis that cover the cylinder.
-  double lowest = 0.0;
+  double lowest = above_m;
   for (const auto corner :
        {Eigen::AlignedBox3d::BottomLeftFloor, Eigen::AlignedBox3d::BottomRightFloor,
         Eigen::AlignedBox3d::TopLeftFloor, Eigen::AlignedBox3d::TopRightFloor,
         Eigen::AlignedBox3d::BottomLeftCeil, Eigen::AlignedBox3d::BottomRightCeil,
         Eigen::AlignedBox3d::TopLeftCeil, Eigen::AlignedBox3d::TopRightCeil})
     lowest = std::min(lowest, axis.dot(index_->box.corner(corner) - location));
-  std::vector<Index::Sphere> spheres;
-  const double half = std::max(radius_m, above_m);
-  for (double height = 0.0; height + half > lowest; height -= 2.0 * half)
-    spheres.push_back({location + height * axis, std::hypot(radius_m, half)});
-  const Eigen::Array3d most(radius_m, radius_m, above_m);
-  const auto triangles = index_->within(spheres, [&](const Index::Entry& entry) {
-    const Eigen::Array3d center = (patch_from_mesh * entry.center).array();
-    const double reach = entry.radius + 1e-9;
-    return (center - reach <= most).all() && (center.head<2>() + reach >= -radius_m).all();
-  });
-  PatchVertices vertices(std::min(3 * triangles.size(), mesh.vertices.size()));
-  const auto carry = [&](std::uint32_t vertex) -> Eigen::Vector3d {
-    return patch_from_mesh * mesh.vertices[vertex];
+  const auto radius_at = [&](double height) {
+    return radius_m + widening * std::max(above_m, -height);
   };
+  Eigen::AlignedBox3d around;
+  const Eigen::Vector3d beside =
+      radius_at(lowest) * (1.0 - axis.array().square()).max(0.0).sqrt().matrix();
+  for (const double height : {lowest, above_m})
+    for (const double sign : {-1.0, 1.0}) around.extend(location + height * axis + sign * beside);
+  std::vector<std::uint32_t> triangles;
+  index_->visit(around, [&](const Index::Entry& entry) {
+    const Eigen::Vector3d center = patch_from_mesh * entry.center;
+    const double size = entry.radius + 1e-9;
+    const double reach = radius_at(center.z() - size) + size;
+    if (center.head<2>().squaredNorm() <= reach * reach && center.z() - size <= above_m)
+      triangles.push_back(entry.triangle);
+  });
+  Index::sort(triangles);
+  PatchVertices vertices(std::min(3 * triangles.size(), mesh.vertices.size()));
   const bool has_errors = !index_->errors.vertex_errors_m.empty();
   for (const std::uint32_t n : triangles) {
-    std::array<PatchVertices::Slot*, 3> slots{};
-    Eigen::AlignedBox3d box;
-    for (std::size_t corner = 0; corner < 3; ++corner) {
-      slots[corner] = &vertices.slot_of(mesh.triangles[n][corner], carry);
-      box.extend(slots[corner]->position);
-    }
-    if ((box.min().array() > most).any() || (box.max().head<2>().array() < -radius_m).any())
-      continue;
     libmap::Triangle triangle{};
     for (std::size_t corner = 0; corner < 3; ++corner) {
-      PatchVertices::Slot& slot = *slots[corner];
-      if (slot.number == PatchVertices::none) {
-        slot.number = static_cast<std::uint32_t>(patch.vertices.size());
-        patch.vertices.push_back(slot.position);
+      const std::uint32_t vertex = mesh.triangles[n][corner];
+      std::uint32_t& number = vertices.number_of(vertex);
+      if (number == PatchVertices::none) {
+        number = static_cast<std::uint32_t>(patch.vertices.size());
+        patch.vertices.push_back(patch_from_mesh * mesh.vertices[vertex]);
         if (has_errors) {
-          const std::uint32_t vertex = mesh.triangles[n][corner];
           patch.vertex_errors_m.push_back(index_->errors.vertex_errors_m[vertex]);
           patch.vertex_normals.emplace_back(patch_from_mesh.linear() *
                                             index_->vertex_normals[vertex]);
         }
       }
-      triangle[corner] = slot.number;
+      triangle[corner] = number;
     }
     patch.triangles.push_back(triangle);
     if (has_errors) patch.is_unsure.push_back(index_->errors.is_unsure[n]);
@@ -352,13 +310,19 @@ double Ground::largest_error_m() const {
 }
 
 std::optional<double> Ground::distance(const Eigen::Vector3d& point, double radius_m) const {
-  double square = std::numeric_limits<double>::infinity();
-  const auto all = [](const Index::Entry&) { return true; };
-  for (const std::uint32_t n : index_->within({{point, radius_m}}, all))
-    square = std::min(square, square_distance(point, corners_of(index_->mesh.vertices,
-                                                                index_->mesh.triangles[n])));
-  if (square == std::numeric_limits<double>::infinity()) return std::nullopt;
-  return std::sqrt(square);
+  const libmap::TriangleMesh& mesh = index_->mesh;
+  double square = radius_m * radius_m;
+  bool is_near = false;
+  const Eigen::Vector3d side = Eigen::Vector3d::Constant(radius_m);
+  index_->visit({point - side, point + side}, [&](const Index::Entry& entry) {
+    const double reach = radius_m + entry.radius * (1.0 + 1e-9);
+    if ((entry.center - point).squaredNorm() > reach * reach) return;
+    const double here =
+        square_distance(point, corners_of(mesh.vertices, mesh.triangles[entry.triangle]));
+    is_near |= here <= square;
+    square = std::min(square, here);
+  });
+  return is_near ? std::optional(std::sqrt(square)) : std::nullopt;
 }
 
 }  // namespace libgtd

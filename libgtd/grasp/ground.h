@@ -53,10 +53,11 @@ class Ground {
   Ground& operator=(Ground&&) noexcept;
 
   // All triangles that come into the cylinder about the location along `away` (a direction out of
-  // the ground), from `above_m` down to the lowest part of the mesh, and some outside of it. May be
-  // called from several threads at once.
+  // the ground), from `above_m` down to the lowest part of the mesh, and some outside of it. Its
+  // radius is larger by `widening` times `above_m` or, if that is more, the depth below the
+  // location. May be called from several threads at once.
   GroundPatch patch(const Eigen::Vector3d& location, const Eigen::Vector3d& away, double radius_m,
-                    double above_m) const;
+                    double above_m, double widening = 0.0) const;
 
   // Distance from a point to the nearest triangle within `radius_m`, m; nothing if there is none.
   std::optional<double> distance(const Eigen::Vector3d& point, double radius_m) const;

@@ -53,8 +53,9 @@ GRASPMAP_CLONED void exchange(double* matrix, const double* change, double pivot
 }
 
 // How far each value may go before it is 0: infinitely far where it does not fall.
-GRASPMAP_CLONED void find_bounds(const double* values, const double* change, const double* smallest,
-                                 double* bounds, std::ptrdiff_t stride) {
+GRASPMAP_CLONED_CHOICE void find_bounds(const double* values, const double* change,
+                                        const double* smallest, double* bounds,
+                                        std::ptrdiff_t stride) {
   for (std::ptrdiff_t row = 0; row < stride; row += group)
     for (std::ptrdiff_t lane = row; lane < row + group; ++lane) {
       const double bound = values[lane] / change[lane];

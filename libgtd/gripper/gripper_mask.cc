@@ -192,6 +192,13 @@ GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& opt
   const double H = gripper.closing_height_mm;
   const double RB = gripper.palm_diameter_mm / 2.0 + H * tan_deg(gripper.closing_angle_deg) -
                     gripper.bottom_void_margin_mm;
+  mask.closed_radius_m = 0.001 * RB;
+  mask.open_radius_m = 0.001 * half;
+  // More than the spines' depth and than one voxel, which may be rounding: in the middle between
+  // two falls that heights in whole voxels can have, and a hair more, since filled gaps have half
+  // ones.
+  const double voxels = std::floor(std::max(1.0, gripper.spine_depth_mm / voxel_mm) + slack);
+  mask.min_fall_m = options.voxel_size_m * (voxels + 0.5 + 1e-6);
   fill(mask, [&](int x, int y, int s) {
     const double d = voxel_mm * std::hypot(x - mask.pivot_xy, y - mask.pivot_xy);
     const double depth = voxel_mm * (s - 1);

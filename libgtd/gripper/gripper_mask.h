@@ -36,6 +36,10 @@ struct GripperMaskOptions {
 struct GripperMask {
   Method method = Method::corrected;   // never calibrated
   std::optional<ClosingPath> closing;  // of method calibrated
+  // Of `corrected`: what the spines hold falls outward by more than this between these circles.
+  double closed_radius_m = 0.0;  // of the closed spines
+  double open_radius_m = 0.0;    // of the open fingers
+  double min_fall_m = 0.0;
   double voxel_size_m = 0.01;
   double palm_diameter_m = 0.0;  // of the gripper
   int side = 0;

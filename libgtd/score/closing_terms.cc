@@ -100,6 +100,18 @@ class Heights {
     return static_cast<std::ptrdiff_t>(cell.i) * width_ + cell.j;
   }
   double height(std::size_t at) const { return heights_[at]; }
+  // From the first of the cells around a column that has ground to the lowest one.
+  double fall(std::size_t at, const std::vector<Cell>& cells) const {
+    double first = unknown;
+    double lowest = std::numeric_limits<double>::infinity();
+    for (const Cell& cell : cells) {
+      const double height = heights_[at + static_cast<std::size_t>(step(cell))];
+      if (height == unknown) continue;
+      if (first == unknown) first = height;
+      lowest = std::min(lowest, height);
+    }
+    return first == unknown ? 0.0 : first - lowest;
+  }
   // dz/dx and dz/dy
   const std::array<double, 2>& rise(std::size_t at) const { return rises_[at]; }
 
@@ -222,6 +234,45 @@ class BlockCloser {
   std::array<std::vector<std::ptrdiff_t>, azimuths> closing_;
 };
 
+// From the circle of the closed spines outward, as columns around a pivot.
+std::vector<Cell> outward_cells(const GripperMask& mask, double angle) {
+  std::vector<Cell> cells;
+  const auto first = static_cast<int>(mask.closed_radius_m / mask.voxel_size_m);
+  for (int step = first; step <= mask.pivot_xy; ++step) {
+    const Cell cell{static_cast<int>(std::lround(step * std::cos(angle))),
+                    static_cast<int>(std::lround(step * std::sin(angle)))};
+    const double radius_m = std::hypot(cell.i, cell.j) * mask.voxel_size_m;
+    if (radius_m < mask.closed_radius_m || radius_m > mask.open_radius_m) continue;
+    if (cells.empty() || cells.back().i != cell.i || cells.back().j != cell.j)
+      cells.push_back(cell);
+  }
+  return cells;
+}
+
+// Calls use(members, heights) for each block of pivots, which are numbers in `pivots`, with the
+// heights of all columns within `reach` of them; in parallel.
+template <typename Use>
+void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivots, int reach,
+                    const Use& use) {
+  std::map<std::pair<int, int>, std::vector<std::size_t>> blocks;
+  for (std::size_t n = 0; n < pivots.size(); ++n) {
+    const Voxel& voxel = grid.voxels[pivots[n]];
+    blocks[{floor_divide(voxel.i, block_columns), floor_divide(voxel.j, block_columns)}].push_back(
+        n);
+  }
+  const std::vector<std::pair<std::pair<int, int>, std::vector<std::size_t>>> listed(blocks.begin(),
+                                                                                     blocks.end());
+  libmap::parallel_for(listed.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t b = begin; b < end; ++b) {
+      const auto& [place, members] = listed[b];
+      const int i = place.first * block_columns;
+      const int j = place.second * block_columns;
+      use(members,
+          Heights(grid, grown({i, i + block_columns, j, j + block_columns}, reach, reach)));
+    }
+  });
+}
+
 }  // namespace
 
 int closing_reach_voxels(const ClosingPath& path, double voxel_size_m) {
@@ -233,31 +284,37 @@ std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath
                                         const std::vector<std::size_t>& pivots) {
   const double voxel_size_m = grid.lattice.voxel_size_m;
   const Rays rays = make_rays(path, voxel_size_m);
-  const int reach = closing_reach_voxels(path, voxel_size_m);
-  std::map<std::pair<int, int>, std::vector<std::size_t>> blocks;
-  for (std::size_t n = 0; n < pivots.size(); ++n) {
-    const Voxel& voxel = grid.voxels[pivots[n]];
-    blocks[{floor_divide(voxel.i, block_columns), floor_divide(voxel.j, block_columns)}].push_back(
-        n);
-  }
-  std::vector<std::pair<std::pair<int, int>, std::vector<std::size_t>>> listed(blocks.begin(),
-                                                                               blocks.end());
   std::vector<ClosingTerms> terms(pivots.size());
-  libmap::parallel_for(listed.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-      const auto& [place, members] = listed[b];
-      const int i = place.first * block_columns;
-      const int j = place.second * block_columns;
-      const Heights heights(grid,
-                            grown({i, i + block_columns, j, j + block_columns}, reach, reach));
-      const BlockCloser closer(heights, rays, path);
-      for (const std::size_t n : members) {
-        const Voxel& voxel = grid.voxels[pivots[n]];
-        terms[n] = closer.terms(heights.index(voxel.i, voxel.j), (voxel.k + 0.5) * voxel_size_m);
-      }
-    }
-  });
+  for_each_block(grid, pivots, closing_reach_voxels(path, voxel_size_m),
+                 [&](const std::vector<std::size_t>& members, const Heights& heights) {
+                   const BlockCloser closer(heights, rays, path);
+                   for (const std::size_t n : members) {
+                     const Voxel& voxel = grid.voxels[pivots[n]];
+                     terms[n] = closer.terms(heights.index(voxel.i, voxel.j),
+                                             (voxel.k + 0.5) * voxel_size_m);
+                   }
+                 });
   return terms;
+}
+
+std::vector<double> outward_shares(const VoxelGrid& grid, const GripperMask& mask,
+                                   const std::vector<std::size_t>& pivots) {
+  std::array<std::vector<Cell>, azimuths> rays;
+  for (std::size_t a = 0; a < azimuths; ++a)
+    rays[a] = outward_cells(mask, 2.0 * std::numbers::pi * static_cast<double>(a) / azimuths);
+  std::vector<double> shares(pivots.size(), 0.0);
+  for_each_block(grid, pivots, mask.pivot_xy + gap_columns,
+                 [&](const std::vector<std::size_t>& members, const Heights& heights) {
+                   for (const std::size_t n : members) {
+                     const Voxel& voxel = grid.voxels[pivots[n]];
+                     const std::size_t at = heights.index(voxel.i, voxel.j);
+                     const auto falling = std::count_if(
+                         rays.begin(), rays.end(),
+                         [&](const auto& ray) { return heights.fall(at, ray) > mask.min_fall_m; });
+                     shares[n] = static_cast<double>(falling) / azimuths;
+                   }
+                 });
+  return shares;
 }
 
 }  // namespace libgtd

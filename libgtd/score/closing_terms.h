@@ -10,7 +10,7 @@
 
 #include <vector>
 
-#include "libgtd/gripper/closing_path.h"
+#include "libgtd/gripper/gripper_mask.h"
 #include "libgtd/terrain/voxel_grid.h"
 
 namespace libgtd {
@@ -23,5 +23,12 @@ int closing_reach_voxels(const ClosingPath& path, double voxel_size_m);
 // the voxels within the reach alone, not on other pivots or the number of threads.
 std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath& path,
                                         const std::vector<std::size_t>& pivots);
+
+// Of the same pivots, for a mask of method `corrected`: the share of 16 azimuths in which the
+// columns fall by more than min_fall_m from the circle of the closed spines toward that of the open
+// fingers. Columns without ground are skipped. A shape that the closed spines cannot reach, such as
+// a small ball on level ground, has the share 0.
+std::vector<double> outward_shares(const VoxelGrid& grid, const GripperMask& mask,
+                                   const std::vector<std::size_t>& pivots);
 
 }  // namespace libgtd

@@ -76,6 +76,8 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("i", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.i; });
   add("j", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.j; });
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
+  if (map.content.falling_shares)
+    add("falling_share", ScalarType::float32, [](const auto& one) { return one.falling_share; });
   if (map.content.terms) {
     add("closing_contact", ScalarType::float32, [](const auto& one) { return one.terms.contact; });
     add("closing_bearing", ScalarType::float32, [](const auto& one) { return one.terms.bearing; });

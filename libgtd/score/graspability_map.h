@@ -19,16 +19,18 @@ struct MapVoxel {
   bool border = false;     // the mask's window leaves the scanned area
   Obstacle obstacle = Obstacle::none;
   ClosingTerms terms{};                               // of method calibrated
+  double falling_share = 1.0;                         // of method corrected, upright masks
   float slope_deg = 0.0F;                             // of the surface, as SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // in the terrain frame: the mask's axis
 };
 
 // What a map says beside its scores.
 struct MapContent {
-  bool normals = false;    // the mask was tilted
-  bool slopes = false;     // obstacles are evaluated
-  bool terms = false;      // the method is calibrated
-  bool obstacles = false;  // and the whole map is there to evaluate them
+  bool normals = false;         // the mask was tilted
+  bool slopes = false;          // obstacles are evaluated
+  bool terms = false;           // the method is calibrated
+  bool falling_shares = false;  // the method is corrected, its masks upright
+  bool obstacles = false;       // and the whole map is there to evaluate them
 };
 
 struct GraspabilityMap {
@@ -46,8 +48,9 @@ const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 // A point for each voxel, at its center, colored by score and white below the zero plane, with the
 // fields score, ssv, gsv, convex, graspable, border and the voxel's i, j, k on the lattice. As the
 // content says: the mask's axis as the point's normal, from which the gripper comes; the fields
-// slope_deg and obstacle (the number of an Obstacle); the ClosingTerms closing_contact,
-// closing_bearing, closing_rise and closing_depth.
+// slope_deg and obstacle (the number of an Obstacle); falling_share, by which a score of method
+// `corrected` is multiplied; the ClosingTerms closing_contact, closing_bearing, closing_rise and
+// closing_depth.
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
 
 // Evaluates the obstacles of a map that has slopes, once all of it is there: sets each point's

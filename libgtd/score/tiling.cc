@@ -129,7 +129,11 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
   const std::vector<VoxelCounts> counts =
       match_voxels(grid, mask, pivots, options.instructions, progress);
   std::vector<ClosingTerms> terms;
-  if (mask.closing) terms = closing_terms(grid, *mask.closing, pivots);
+  std::vector<double> shares;  // of method corrected
+  if (mask.closing)
+    terms = closing_terms(grid, *mask.closing, pivots);
+  else if (mask.method == Method::corrected)
+    shares = outward_shares(grid, mask, pivots);
   std::vector<ScoredVoxel> scored(pivots.size());
   libmap::parallel_for(pivots.size(), pivots_per_chunk, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
@@ -140,7 +144,9 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
         one.terms = terms[n];
         one.score = mask.closing->model.probability(terms[n]);
       } else {
-        one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0;
+        if (!shares.empty()) one.falling_share = shares[n];
+        one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0 *
+                    one.falling_share;
       }
       one.border = (flags[pivots[n]] & is_border) != 0;
     }

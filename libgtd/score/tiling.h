@@ -28,9 +28,10 @@ std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare&
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;
-  double score = 0.0;    // score_percent / 100
-  bool border = false;   // the mask's window leaves the scanned area
-  ClosingTerms terms{};  // of method calibrated
+  double score = 0.0;          // score_percent / 100
+  bool border = false;         // the mask's window leaves the scanned area
+  ClosingTerms terms{};        // of method calibrated
+  double falling_share = 1.0;  // of method corrected, see outward_shares
 };
 
 struct ScoringOptions {

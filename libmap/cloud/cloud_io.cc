@@ -18,6 +18,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/file_size.h"
 #include "libmap/core/text.h"
+#include "libmap/raster/dem_reader.h"
 
 namespace libmap {
 namespace {
@@ -26,7 +27,10 @@ namespace {
 void require_format(const std::filesystem::path& path, bool is_read) {
   const std::string format = format_of(path);
   std::vector<std::string> formats = {".pcd", ".ply", ".csv"};
-  if (!is_read) formats.push_back(".vtp");
+  if (is_read)
+    formats.insert(formats.end(), {".tif", ".tiff"});
+  else
+    formats.emplace_back(".vtp");
   if (std::find(formats.begin(), formats.end(), format) != formats.end()) return;
   // No library of Debian 12 reads LAS, and LAZ even less.
   if (format == ".las" || format == ".laz")
@@ -38,7 +42,7 @@ void require_format(const std::filesystem::path& path, bool is_read) {
               {.file = path.string(),
                .field = "extension",
                .value = format.empty() ? "missing" : format,
-               .bound = is_read ? ".pcd, .ply or .csv" : ".pcd, .ply, .csv or .vtp"});
+               .bound = is_read ? ".pcd, .ply, .csv or .tif" : ".pcd, .ply, .csv or .vtp"});
 }
 
 // The file's bytes as the system's own cache holds them, without a copy.
@@ -63,6 +67,16 @@ GeometryColumns decode(const std::filesystem::path& path) {
   return decode_csv(*bytes, {});
 }
 
+GeometryFileInfo dem_file_info(const std::filesystem::path& path) {
+  GeometryFileInfo info;
+  info.format = "tif";
+  info.bytes = std::filesystem::file_size(path);
+  info.points = DemReader(path).info().pixels();
+  for (const char* const axis : {"x", "y", "z"})
+    info.fields.push_back({axis, ScalarType::float64, 1});
+  return info;
+}
+
 }  // namespace
 
 void require_cloud_format(const std::filesystem::path& path) { require_format(path, false); }
@@ -70,8 +84,8 @@ void require_cloud_format(const std::filesystem::path& path) { require_format(pa
 void refuse_vtp(const std::filesystem::path& path) {
   if (format_of(path) == ".vtp")
     throw Error(
-        ".vtp is written only, for ParaView; readable are clouds as .pcd, .ply or .csv and meshes "
-        "as .ply, .obj, .off, .stl or .glb",
+        ".vtp is written only, for ParaView; readable are clouds as .pcd, .ply, .csv or .tif and "
+        "meshes as .ply, .obj, .off, .stl, .glb or .tif",
         {.file = path.string()});
 }
 
@@ -119,8 +133,39 @@ void write_geometry_file(const std::filesystem::path& path,
   require_good();
 }
 
+std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& given) {
+  if (!std::filesystem::is_directory(given)) {
+    require_cloud_file(given);
+    return {given};
+  }
+  std::vector<std::filesystem::path> pieces;
+  for (const std::filesystem::directory_entry& entry : std::filesystem::directory_iterator(given)) {
+    const std::string format = format_of(entry.path());
+    // A .vtp is refused when it is opened: a terrain without it would be incomplete.
+    const bool is_cloud = format == ".pcd" || format == ".ply" || format == ".vtp" ||
+                          format == ".csv" || is_dem_path(entry.path());
+    if (is_cloud && entry.is_regular_file() && entry.path().filename().string().front() != '.')
+      pieces.push_back(entry.path());
+  }
+  if (pieces.empty())
+    throw Error("the folder contains no cloud (.pcd, .ply, .csv, .tif)", {.file = given.string()});
+  std::sort(pieces.begin(), pieces.end());
+  return pieces;
+}
+
 CloudReadResult read_cloud(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) {
+    CloudReadResult joined;
+    for (const std::filesystem::path& piece : cloud_pieces(path)) {
+      CloudReadResult read = read_cloud(piece);
+      append_cloud(read.cloud, joined.cloud);
+      joined.dropped_points += read.dropped_points;
+      joined.info = std::move(read.info);
+    }
+    return joined;
+  }
   require_cloud_file(path);
+  if (is_dem_path(path)) return {read_dem_cloud(path), 0, dem_file_info(path)};
   try {
     GeometryColumns content = decode(path);
     if (content.info.faces > 0)
@@ -135,6 +180,7 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
 
 GeometryFileInfo read_cloud_info(const std::filesystem::path& path) {
   require_cloud_file(path);
+  if (is_dem_path(path)) return dem_file_info(path);
   const std::string format = format_of(path);
   try {
     if (format == ".pcd") return pcd_info(read_head(path), std::filesystem::file_size(path));

@@ -5,6 +5,7 @@
 //   .ply   all                      comment     ascii, binary (little- or big-endian)
 //   .vtp   all                      field data  ascii, binary, binary_compressed (zlib); not read
 //   .csv   all, without types       no          text
+//   .tif   not written (a map: libmap/raster); a DEM is read as the centers of its pixels
 //
 // Coordinates are doubles in memory. They are written as float32 unless that moves some coordinate
 // by more than 1e-5 m, then as float64; normals as float32, colors as three bytes, integers as
@@ -20,6 +21,7 @@
 #include <memory>
 #include <ostream>
 #include <string>
+#include <vector>
 
 #include "libmap/cloud/geometry_file.h"
 #include "libmap/core/point_cloud.h"
@@ -38,8 +40,13 @@ struct CloudWriteOptions {
   bool big_endian = false;   // PLY, binary
 };
 
-// Throws Error naming the file: it cannot be read, is not of its format, promises more than it
-// holds, or has no fields x, y and z. A file of no points is an empty cloud.
+// The file itself, or the cloud files of a folder in the order of their names; hidden files are
+// passed over. Throws Error: nothing there, or a folder without a cloud file.
+std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& file_or_folder);
+
+// Of a folder all pieces together, and the last one's info. Throws Error naming the file: it cannot
+// be read, is not of its format, promises more than it holds, or has no fields x, y and z. A file
+// of no points is an empty cloud.
 CloudReadResult read_cloud(const std::filesystem::path& path);
 
 // The same of the header alone where the format has one (PCD, PLY); CSV is read whole.

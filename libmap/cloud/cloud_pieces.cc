@@ -1,6 +1,7 @@
 #include "libmap/cloud/cloud_pieces.h"
 
 #include <algorithm>
+#include <cmath>
 #include <fstream>
 #include <utility>
 
@@ -10,6 +11,7 @@
 #include "libmap/cloud/ply_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/raster/dem_reader.h"
 
 namespace libmap {
 
@@ -33,10 +35,14 @@ void append_points(const PointCloud& from, std::size_t begin, std::size_t end, P
 class CloudBlockReader {
  public:
   // Throws Error naming the file, as read_cloud does.
-  explicit CloudBlockReader(fs::path path) : path_(std::move(path)) {
+  CloudBlockReader(fs::path path, const std::optional<Georeference>& georeference)
+      : path_(std::move(path)) {
     require_cloud_file(path_);
     try {
-      if (!open_records()) read_whole();
+      if (is_dem_path(path_))
+        open_dem(georeference);
+      else if (!open_records())
+        read_whole();
     } catch (const Error& error) {
       throw error.in_file(path_.string());
     }
@@ -54,12 +60,19 @@ class CloudBlockReader {
     rows = std::min(rows, rows_left_);
     if (rows == 0) return false;
     const std::size_t begin = whole_.size() - rows_left_;
-    if (record_bytes_ > 0)
+    if (dem_)
+      append_pixels(rows, cloud);
+    else if (record_bytes_ > 0)
       append_records(rows, cloud);
     else
       append_points(whole_, begin, begin + rows, cloud);
     rows_left_ -= rows;
     return true;
+  }
+
+  // Of a DEM.
+  std::optional<Georeference> georeference() const {
+    return dem_ ? std::optional(dem_->info().georeference) : std::nullopt;
   }
 
   // From now on, normals are passed over.
@@ -93,6 +106,22 @@ class CloudBlockReader {
     viewpoint_ = records->viewpoint;
     file_.seekg(static_cast<std::streamoff>(records->begin));
     return true;
+  }
+
+  void open_dem(const std::optional<Georeference>& georeference) {
+    dem_.emplace(path_, georeference);
+    rows_left_ = dem_->info().pixels();
+  }
+
+  void append_pixels(std::size_t count, PointCloud& cloud) {
+    for (; count > 0; --count, ++next_pixel_) {
+      if (next_pixel_ == pixels_.heights_m.size()) {
+        if (!dem_->next(pixels_)) throw Error("ends too early", {.file = path_.string()});
+        next_pixel_ = 0;
+      }
+      if (!std::isnan(pixels_.heights_m[next_pixel_]))
+        cloud.positions.push_back(point_of(dem_->info(), pixels_, next_pixel_));
+    }
   }
 
   void read_whole() {
@@ -131,37 +160,25 @@ class CloudBlockReader {
   std::vector<std::byte> block_;
   std::size_t record_bytes_ = 0;
   std::vector<Column> columns_;
+  // ... or pixels of a DEM, those without a height included ...
+  std::optional<DemReader> dem_;
+  DemBlock pixels_;
+  std::size_t next_pixel_ = 0;
   // ... or the whole file.
   PointCloud whole_;
 };
 
 }  // namespace
 
-std::vector<fs::path> cloud_pieces(const fs::path& given) {
-  if (!fs::is_directory(given)) {
-    require_cloud_file(given);
-    return {given};
-  }
-  std::vector<fs::path> pieces;
-  for (const fs::directory_entry& entry : fs::directory_iterator(given)) {
-    const std::string format = format_of(entry.path());
-    // A .vtp is refused when it is opened: a terrain without it would be incomplete.
-    const bool is_cloud =
-        format == ".pcd" || format == ".ply" || format == ".vtp" || format == ".csv";
-    if (is_cloud && entry.is_regular_file() && entry.path().filename().string().front() != '.')
-      pieces.push_back(entry.path());
-  }
-  if (pieces.empty())
-    throw Error("the folder contains no cloud (.pcd, .ply, .csv)", {.file = given.string()});
-  std::sort(pieces.begin(), pieces.end());
-  return pieces;
-}
-
 PieceStream::PieceStream(std::vector<fs::path> pieces) : pieces_(std::move(pieces)) {
   bool is_first = true;
   fs::path first;
   for (const fs::path& piece : pieces_) {
-    const CloudBlockReader reader(piece);
+    const CloudBlockReader reader(piece, georeference_);
+    if (is_dem_path(piece) != is_dem_path(pieces_.front()))
+      throw Error("is in another frame: a folder contains DEMs alone or none",
+                  {.file = piece.string()});
+    if (!georeference_) georeference_ = reader.georeference();
     if (reader.is_empty()) continue;
     if (is_first) {
       first = piece;
@@ -182,7 +199,7 @@ void PieceStream::for_each_block(Need need, const Visit& visit) const {
   PointCloud block;
   block.viewpoint = viewpoint_;
   for (const fs::path& piece : pieces_) {
-    CloudBlockReader reader(piece);
+    CloudBlockReader reader(piece, georeference_);
     if (need == Need::positions) reader.leave_out_normals();
     while (reader.append(block_points - block.size(), block)) {
       if (block.size() < block_points) continue;
@@ -194,9 +211,9 @@ void PieceStream::for_each_block(Need need, const Visit& visit) const {
   if (!block.empty()) visit(block);
 }
 
-PieceFacts survey_piece(const fs::path& piece) {
+PieceFacts survey_piece(const fs::path& piece, const std::optional<Georeference>& georeference) {
   PieceFacts facts;
-  CloudBlockReader reader(piece);
+  CloudBlockReader reader(piece, georeference);
   reader.leave_out_normals();
   PointCloud block;
   while (reader.append(PointStream::block_points, block)) {
@@ -217,9 +234,10 @@ PieceFacts survey_piece(const fs::path& piece) {
 
 PiecesReadResult read_pieces(const std::vector<fs::path>& pieces) {
   PiecesReadResult result;
-  result.cloud.viewpoint = PieceStream(pieces).viewpoint();
+  const PieceStream stream(pieces);
+  result.cloud.viewpoint = stream.viewpoint();
   for (const fs::path& piece : pieces) {
-    CloudBlockReader reader(piece);
+    CloudBlockReader reader(piece, stream.georeference());
     while (reader.append(PointStream::block_points, result.cloud)) {
     }
     result.dropped_points += reader.dropped_points();

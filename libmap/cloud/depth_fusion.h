@@ -1,17 +1,18 @@
 // One oriented, colored cloud from all depth images of a scan.
 //
 // Frames whose poses do not agree are moved together first (frame_registration): a map is as sharp
-// as its poses. Then two passes over the frames. The first fits a plane to the pixels around each
-// pixel (depth_planes) and averages positions and normals in a hashed voxel grid (surface_voxels):
-// a coarse surface, one element per voxel. The second moves each element along its normal to the
-// weighted mean of what all frames measured within a disc around it (surface_refinement). Both
-// average where the rays meet the surface, not where noise has put the measurements: that is what
-// makes the means free of bias. Memory grows with the occupied voxels alone; besides, up to 64 MB
-// of decoded frames are kept for later passes (2.7 megapixels: 12 frames of 512 x 424), others are
-// decoded once per pass.
+// as its poses. Elements for that are taken from squares of the plan chosen by chance. Then two
+// passes over the frames. The first fits a plane to the pixels around each pixel (depth_planes) and
+// averages positions and normals in a hashed voxel grid (surface_voxels): a coarse surface, one
+// element per voxel. The second moves each element along its normal to the weighted mean of what
+// all frames measured within a disc around it (surface_refinement). Both average where the rays
+// meet the surface, not where noise has put the measurements: that is what makes the means free of
+// bias. Memory grows with the occupied voxels of a tile; besides, up to 128 MB of decoded depth is
+// kept for later passes (150 frames of 512 x 424), other frames are decoded once per pass.
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,6 +21,7 @@
 #include "libmap/cloud/surface_points.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
+#include "libmap/core/plan_tiles.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
@@ -42,6 +44,9 @@ struct DepthFusionOptions {
   // A point is dropped that more views see through than see, each counted by its cosine (Merrell et
   // al. 2007); larger keeps more.
   double max_seen_through = 0.3;
+  // The same of views that measured nothing around a point, though it is within what they measured
+  // elsewhere and not seen obliquely: what moves before an open background.
+  double max_missed = 1.5;
   // Points one voxel beyond the edge of what was measured, unless views see through them.
   bool extend_edges = true;
   bool color = true;
@@ -51,10 +56,10 @@ struct DepthFusionOptions {
 void bind(ParameterTable& table, DepthFusionOptions& options);
 
 struct DepthFusionResult {
-  // World frame; unit normals towards the cameras; colors if any frame has them. Fields: `views`,
-  // distinct frames; `expected_error` of the position along the normal, m, one standard deviation:
-  // from the noise, from how far frames disagree, and from how far the two passes do, as they do
-  // where the surface bends within a disc.
+  // Empty where tiles were made. World frame; unit normals towards the cameras; colors if any frame
+  // has them. Fields: `views`, distinct frames; `expected_error` of the position along the normal,
+  // m, one standard deviation: from the noise, from how far frames disagree, and from how far the
+  // two passes do, as they do where the surface bends within a disc.
   PointCloud cloud;
   DepthPixelCounts pixels;
   std::size_t frames = 0;  // used
@@ -72,6 +77,7 @@ struct DepthFusionResult {
   std::size_t occupied_voxels = 0;
   std::size_t elements = 0;  // of the surface, before points were made of them
   SurfacePointCounts points;
+  std::size_t points_made = 0;  // of the cloud, or all tiles
   StageTimings timings_s;
 };
 
@@ -82,5 +88,15 @@ struct DepthFusionResult {
 DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
                              const DepthFusionOptions& options = {},
                              Progress& progress = no_progress());
+
+// Takes the cloud of one tile; of `so_far`, frames, poses and registration are final.
+using UseFusedTile =
+    std::function<void(const PlanTile& tile, PointCloud cloud, const DepthFusionResult& so_far)>;
+// The same in square tiles of the world's x-y plane, with the side `tile_m`, rounded to whole
+// voxels; 0: one tile. Memory depends on the size of a tile, and each frame adds 4 kB. Each point
+// is in one tile only. It is the same point, bit for bit, as without tiles.
+DepthFusionResult fuse_depth_in_tiles(const ScanSource& scan, const Trajectory& world_from_base,
+                                      const DepthFusionOptions& options, double tile_m,
+                                      const UseFusedTile& use, Progress& progress = no_progress());
 
 }  // namespace libmap

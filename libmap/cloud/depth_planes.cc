@@ -26,9 +26,11 @@ struct InversePlanes {
 
 class PlaneFit {
  public:
-  PlaneFit(const DepthImage& depth, const PixelRays& rays, const DepthPlaneOptions& options)
+  PlaneFit(const DepthImage& depth, const PixelRays& rays, const DepthPlaneOptions& options,
+           const std::vector<std::uint8_t>& only)
       : rays_(rays),
         options_(options),
+        only_(only),
         width_(depth.width),
         height_(depth.height),
         size_(depth.pixels.size()),
@@ -53,6 +55,12 @@ class PlaneFit {
     return static_cast<std::size_t>(y + r) * stride_ + static_cast<std::size_t>(x + r);
   }
   float measured(int x, int y) const { return measured_[margin_at(x, y)]; }
+  // Any of four pixels side by side.
+  bool are_wanted(int x, int y) const {
+    if (only_.empty()) return true;
+    const auto first = only_.begin() + static_cast<std::ptrdiff_t>(at(x, y));
+    return std::any_of(first, first + std::min(4, width_ - x), [](int mark) { return mark != 0; });
+  }
 
   void take_measurements(const DepthImage& depth);
   InversePlanes fit_pairs() const;
@@ -81,6 +89,7 @@ class PlaneFit {
 
   const PixelRays& rays_;
   const DepthPlaneOptions& options_;
+  const std::vector<std::uint8_t>& only_;
   int width_;
   int height_;
   std::size_t size_;
@@ -177,6 +186,7 @@ InversePlanes PlaneFit::fit_pairs() const {
       static_cast<float>(options_.min_pair_share * static_cast<double>(offsets.size()));
   for (int y = 0; y < height_; ++y)
     for (int first = 0; first < width_; first += 4) {
+      if (!are_wanted(first, y)) continue;
       const PairSums sums = sum_pairs(first, y, offsets);
       const Four determinant = sums.column_square * sums.row_square - sums.product * sums.product;
       const Four value =
@@ -304,8 +314,9 @@ DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
 }
 
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
-                             const DepthPlaneOptions& options) {
-  return PlaneFit(depth, rays, options).run();
+                             const DepthPlaneOptions& options,
+                             const std::vector<std::uint8_t>& only) {
+  return PlaneFit(depth, rays, options, only).run();
 }
 
 }  // namespace libmap

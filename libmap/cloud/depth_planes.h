@@ -52,8 +52,10 @@ struct DepthPlanes {
 // For each pixel those pairs of opposite neighbors whose mean agrees with it within the noise:
 // their mean inverse depth and its least-squares slopes. A pixel with too few such pairs, at the
 // edge of a surface, takes the plane next to it that predicts its depth within the noise; if there
-// is none, it is flying. Image and rays have one size.
+// is none, it is flying. Image and rays have one size. `only`, if it is not empty, marks the pixels
+// whose planes are wanted, not 0; others have none, and the counts say nothing.
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
-                             const DepthPlaneOptions& options = {});
+                             const DepthPlaneOptions& options = {},
+                             const std::vector<std::uint8_t>& only = {});
 
 }  // namespace libmap

@@ -1,17 +1,8 @@
 #include "libmap/cloud/point_spool.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstdlib>
 #include <cstring>
-#include <utility>
-
-#include "libmap/core/error.h"
-#include "libmap/core/output_lock.h"
 
 namespace libmap {
 
@@ -34,20 +25,10 @@ const char* take(const char* at, T& value) {
 
 }  // namespace
 
-PointSpool::PointSpool(std::filesystem::path folder, const PointSpoolOptions& options)
-    : folder_(std::move(folder)),
+PointSpool::PointSpool(const std::filesystem::path& folder, const PointSpoolOptions& options)
+    : file_(folder),
       options_(options),
-      record_bytes_(bare_record_bytes + (options.has_normals ? sizeof(Eigen::Vector3f) : 0)) {
-  // Without a name it goes with the process, however that ends; not every file system has such.
-  file_ = open(folder_.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
-  if (file_ >= 0) return;
-  std::string name = (folder_ / ".points-XXXXXX").string();
-  file_ = mkostemp(name.data(), O_CLOEXEC);
-  if (file_ < 0) throw system_failure(folder_, "no file can be made in it", errno);
-  unlink(name.c_str());
-}
-
-PointSpool::~PointSpool() { close(file_); }
+      record_bytes_(bare_record_bytes + (options.has_normals ? sizeof(Eigen::Vector3f) : 0)) {}
 
 PointSpool::Square PointSpool::square_of(double x, double y) const {
   return {static_cast<std::int64_t>(std::floor(x / options_.square_m)),
@@ -77,16 +58,8 @@ void PointSpool::add(const PointCloud& cloud) {
 void PointSpool::flush() {
   for (auto& [square, records] : squares_) {
     if (records.buffer.empty()) continue;
-    std::size_t done = 0;
-    while (done < records.buffer.size()) {
-      const ssize_t written = pwrite(file_, records.buffer.data() + done,
-                                     records.buffer.size() - done, static_cast<off_t>(end_ + done));
-      if (written < 0 && errno == EINTR) continue;
-      if (written <= 0) throw system_failure(folder_, "points cannot be kept in it", errno);
-      done += static_cast<std::size_t>(written);
-    }
-    records.written.push_back({end_, done});
-    end_ += done;
+    records.written.push_back(
+        {file_.append(records.buffer.data(), records.buffer.size()), records.buffer.size()});
     std::vector<char>().swap(records.buffer);  // gives the memory back
   }
   buffered_ = 0;
@@ -96,15 +69,8 @@ void PointSpool::read_square(const Records& records, std::vector<char>& bytes) c
   bytes.resize(records.count * record_bytes_);
   std::size_t done = 0;
   for (const Extent& extent : records.written) {
-    std::size_t part = 0;
-    while (part < extent.bytes) {
-      const ssize_t got = pread(file_, bytes.data() + done + part, extent.bytes - part,
-                                static_cast<off_t>(extent.begin + part));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) throw system_failure(folder_, "the points kept in it cannot be read", errno);
-      part += static_cast<std::size_t>(got);
-    }
-    done += part;
+    file_.read(extent.begin, bytes.data() + done, extent.bytes);
+    done += extent.bytes;
   }
   std::copy(records.buffer.begin(), records.buffer.end(),
             bytes.begin() + static_cast<std::ptrdiff_t>(done));

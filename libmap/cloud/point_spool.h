@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/unnamed_file.h"
 
 namespace libmap {
 
@@ -24,10 +25,7 @@ class PointSpool {
  public:
   // Takes 32 bytes of disk a point, 44 with normals, in a file without a name in `folder`: nothing
   // is left of it, however the process ends. Throws Error (failed).
-  PointSpool(std::filesystem::path folder, const PointSpoolOptions& options);
-  ~PointSpool();
-  PointSpool(const PointSpool&) = delete;
-  PointSpool& operator=(const PointSpool&) = delete;
+  PointSpool(const std::filesystem::path& folder, const PointSpoolOptions& options);
 
   // Positions must be finite and less than 2^40 squares away from the origin.
   void add(const PointCloud& cloud);
@@ -59,11 +57,9 @@ class PointSpool {
   void for_squares_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
                       const Visit& visit) const;
 
-  std::filesystem::path folder_;
+  UnnamedFile file_;
   PointSpoolOptions options_;
   std::size_t record_bytes_ = 0;
-  int file_ = -1;
-  std::uint64_t end_ = 0;  // of the file
   std::size_t buffered_ = 0;
   std::size_t size_ = 0;
   std::map<Square, Records> squares_;

@@ -33,11 +33,11 @@ class NeighborCells {
       : cloud_(cloud),
         radius_m_(radius_m),
         deviations_m_(deviations_m),
-        origin_(bounds_of(cloud.positions).min) {
+        first_cell_((bounds_of(cloud.positions).min / radius_m).array().floor()) {
     std::vector<std::uint32_t> cell_of(cloud.size());
     for (std::size_t n = 0; n < cloud.size(); ++n)
       cell_of[n] = index_.find_or_add(
-          pack({((cloud.positions[n] - origin_) / radius_m).array().floor().cast<int>(), 0}));
+          pack({((cloud.positions[n] / radius_m).array().floor() - first_cell_).cast<int>(), 0}));
     starts_.assign(index_.size() + 1, 0);
     for (const std::uint32_t c : cell_of) ++starts_[c + 1];
     for (std::size_t c = 0; c < index_.size(); ++c) starts_[c + 1] += starts_[c];
@@ -56,8 +56,9 @@ class NeighborCells {
   void gather(std::size_t cell, std::vector<Neighbor>& neighbors) const {
     neighbors.clear();
     const Eigen::Vector3i there = unpack(index_.keys()[cell]).cell;
+    // Of whole numbers, so that it does not depend on what lies far off.
     const Eigen::Vector3d middle =
-        origin_ + (there.cast<double>().array() + 0.5).matrix() * radius_m_;
+        (first_cell_ + there.cast<double>().array() + 0.5).matrix() * radius_m_;
     add_members(cell, middle, neighbors);
     for (int n = 0; n < 27; ++n) {
       if (n == 13) continue;
@@ -82,7 +83,7 @@ class NeighborCells {
   const PointCloud& cloud_;
   double radius_m_;
   const std::vector<double>& deviations_m_;
-  Eigen::Vector3d origin_;
+  Eigen::Array3d first_cell_;  // cells count from 0 on
   VoxelIndex index_;
   std::vector<std::uint32_t> starts_;
   std::vector<std::uint32_t> members_;

@@ -1,6 +1,7 @@
 #include "libmap/cloud/surface_points.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <tuple>
@@ -22,6 +23,9 @@ constexpr float echo_certainty = 0.5F;
 // Voxels along the normal within which points of two voxels are the same.
 constexpr double max_echo_distance = 0.5;
 constexpr double normal_radius_voxels = 2.0;
+// What so few frames measured is dropped where others contradict this share of what is around it.
+constexpr std::uint32_t weak_frames = 2;
+constexpr double contradicted_share = 0.5;
 
 // Points that share a voxel, weighted by their certainty.
 struct MergedPoint {
@@ -32,6 +36,7 @@ struct MergedPoint {
   float expected_error_m = 0.0F;
   std::uint32_t frames = 0;  // 0: not begun
   bool extended = false;
+  bool is_wanted = true;  // in options.cells
 };
 
 Color to_color(const Eigen::Vector3f& color) {
@@ -47,12 +52,14 @@ class PointMaker {
       : surface_(surface), options_(options) {}
 
   SurfacePoints run() {
+    find_contradicted();
     points_.reserve(surface_.elements.size());
     // What was measured first: it speaks for its voxel before what lies beyond the edges.
     for (const bool extended : {false, true})
       for (std::size_t n = 0; n < surface_.elements.size(); ++n) {
         const SurfaceElement& element = surface_.elements[n];
-        if (element.extended == extended && is_confirmed(element, surface_.refined[n]))
+        if (element.extended == extended && is_contradicted_[n] == 0 &&
+            is_confirmed(element, surface_.refined[n]))
           merge(element, surface_.refined[n]);
       }
     drop_echoes();
@@ -60,6 +67,12 @@ class PointMaker {
   }
 
  private:
+  bool is_weak(std::size_t n) const { return surface_.refined[n].frames <= weak_frames; }
+  // 1 if its column of voxels is one of those asked for, 0 otherwise.
+  std::size_t wanted(const SurfaceElement& element) const;
+  bool is_contradicted(std::size_t n);
+  void find_contradicted();
+  void spread_contradiction();
   bool is_confirmed(const SurfaceElement& element, const RefinedElement& refined);
   void merge(const SurfaceElement& element, const RefinedElement& refined);
   bool is_echo(std::size_t point, std::size_t other, int axis) const;
@@ -68,25 +81,95 @@ class PointMaker {
 
   const RefinedSurface& surface_;
   const SurfacePointOptions& options_;
+  std::vector<char> is_contradicted_;  // one an element
   VoxelIndex index_;
   std::vector<MergedPoint> points_;
   SurfacePointCounts counts_;
 };
 
-bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElement& refined) {
-  counts_.max_views = std::max(counts_.max_views, std::size_t{refined.frames});
-  if (refined.frames < static_cast<std::uint32_t>(options_.min_views)) {
-    ++counts_.unconfirmed;
-    return false;
+std::size_t PointMaker::wanted(const SurfaceElement& element) const {
+  const Eigen::Vector2d place = element.position.head<2>().cast<double>() / options_.voxel_size_m;
+  return options_.cells.has_cell(place.array().floor().cast<int>()) ? 1 : 0;
+}
+
+bool PointMaker::is_contradicted(std::size_t n) {
+  const RefinedElement& refined = surface_.refined[n];
+  const auto seen = static_cast<double>(refined.seen);
+  if (static_cast<double>(refined.seen_through) > options_.max_seen_through * seen) {
+    counts_.seen_through += wanted(surface_.elements[n]);
+    return true;
   }
-  if (static_cast<double>(refined.seen_through) >
-      options_.max_seen_through * static_cast<double>(refined.seen)) {
-    ++counts_.seen_through;
+  if (static_cast<double>(refined.missed) > options_.max_missed * seen) {
+    counts_.missed += wanted(surface_.elements[n]);
+    return true;
+  }
+  return false;
+}
+
+void PointMaker::find_contradicted() {
+  is_contradicted_.resize(surface_.elements.size(), 0);
+  for (std::size_t n = 0; n < surface_.elements.size(); ++n)
+    if (surface_.refined[n].frames > 0 && is_contradicted(n)) is_contradicted_[n] = 1;
+  spread_contradiction();
+}
+
+// Other frames may see through a part only of what has moved: the rest, above or below, lies
+// outside their images. Squares of the plan, not all that hangs together: tiles then decide as the
+// whole does.
+void PointMaker::spread_contradiction() {
+  struct Counts {
+    std::size_t all = 0;
+    std::size_t contradicted = 0;
+  };
+  VoxelIndex blocks;
+  std::vector<std::uint32_t> block_of(surface_.elements.size(), VoxelIndex::none);
+  std::vector<Counts> counts;
+  const double block_m = contradiction_block * options_.voxel_size_m;
+  for (std::size_t n = 0; n < block_of.size(); ++n) {
+    if (!is_weak(n)) continue;
+    Eigen::Vector3i block = Eigen::Vector3i::Zero();
+    block.head<2>() = (surface_.elements[n].position.head<2>().cast<double>() / block_m)
+                          .array()
+                          .floor()
+                          .cast<int>();
+    block_of[n] = blocks.find_or_add(pack({block, 0}));
+    if (block_of[n] == counts.size()) counts.emplace_back();
+    ++counts[block_of[n]].all;
+    counts[block_of[n]].contradicted += is_contradicted_[n] != 0 ? 1 : 0;
+  }
+  std::vector<char> is_moved(counts.size(), 0);  // of squares, by those around them too
+  for (std::size_t number = 0; number < counts.size(); ++number) {
+    const Eigen::Vector3i block = unpack(blocks.keys()[number]).cell;
+    Counts around;
+    for (int step = 0; step < 9; ++step) {
+      const Eigen::Vector3i beside = block + Eigen::Vector3i(step % 3 - 1, step / 3 - 1, 0);
+      const std::uint32_t other = blocks.find(pack({beside, 0}));
+      if (other == VoxelIndex::none) continue;
+      around.all += counts[other].all;
+      around.contradicted += counts[other].contradicted;
+    }
+    is_moved[number] = static_cast<double>(around.contradicted) >=
+                               contradicted_share * static_cast<double>(around.all)
+                           ? 1
+                           : 0;
+  }
+  for (std::size_t n = 0; n < block_of.size(); ++n) {
+    if (block_of[n] == VoxelIndex::none || is_contradicted_[n] != 0 || is_moved[block_of[n]] == 0)
+      continue;
+    is_contradicted_[n] = 1;
+    counts_.beside += wanted(surface_.elements[n]);
+  }
+}
+
+bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElement& refined) {
+  counts_.max_views = std::max(counts_.max_views, wanted(element) * refined.frames);
+  if (refined.frames < static_cast<std::uint32_t>(options_.min_views)) {
+    counts_.unconfirmed += wanted(element);
     return false;
   }
   if (element.extended &&
       std::abs(static_cast<double>(refined.shift_m)) > max_extended_shift * options_.voxel_size_m) {
-    ++counts_.bent_away;
+    counts_.bent_away += wanted(element);
     return false;
   }
   return true;
@@ -102,9 +185,10 @@ void PointMaker::merge(const SurfaceElement& element, const RefinedElement& refi
   if (number == points_.size()) points_.emplace_back();
   MergedPoint& point = points_[number];
   if (point.frames > 0) {
-    ++counts_.merged;
+    counts_.merged += point.is_wanted ? 1 : 0;
     if (element.extended && !point.extended) return;
   }
+  point.is_wanted = options_.cells.has_cell(cell.head<2>());
   point.extended = element.extended;
   const float error = refined.expected_error_m;
   const float weight = 1.0F / (error * error);
@@ -149,7 +233,7 @@ void PointMaker::drop_echoes() {
   std::size_t kept = 0;
   for (std::size_t n = 0; n < points_.size(); ++n) {
     if (is_surplus[n] != 0)
-      ++counts_.merged;
+      counts_.merged += points_[n].is_wanted ? 1 : 0;
     else
       points_[kept++] = points_[n];
   }
@@ -164,20 +248,35 @@ SurfacePoints PointMaker::make_cloud() {
   cloud.normals.reserve(points_.size());
   views.values.reserve(points_.size());
   errors.values.reserve(points_.size());
+  std::vector<std::size_t> wanted;
   for (const MergedPoint& point : points_) {
+    if (point.is_wanted) wanted.push_back(cloud.size());
     cloud.positions.push_back((point.position / point.weight).cast<double>());
     cloud.normals.push_back(point.normal.normalized());
     if (surface_.has_color) cloud.colors.push_back(to_color(point.color / point.weight));
     views.values.push_back(std::min(65535.0, static_cast<double>(point.frames)));
     errors.values.push_back(static_cast<double>(point.expected_error_m));
-    counts_.extended_points += point.extended ? 1 : 0;
+    counts_.extended_points += point.extended && point.is_wanted ? 1 : 0;
   }
   fit_normals(cloud, normal_radius_voxels * options_.voxel_size_m, errors.values);
   cloud.fields = {std::move(views), std::move(errors)};
+  if (wanted.size() < cloud.size()) cloud = select_points(cloud, wanted);
   return {std::move(cloud), counts_};
 }
 
 }  // namespace
+
+SurfacePointCounts& SurfacePointCounts::operator+=(const SurfacePointCounts& more) {
+  unconfirmed += more.unconfirmed;
+  max_views = std::max(max_views, more.max_views);
+  seen_through += more.seen_through;
+  missed += more.missed;
+  beside += more.beside;
+  bent_away += more.bent_away;
+  merged += more.merged;
+  extended_points += more.extended_points;
+  return *this;
+}
 
 SurfacePoints make_surface_points(const RefinedSurface& surface,
                                   const SurfacePointOptions& options) {

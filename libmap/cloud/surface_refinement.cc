@@ -16,12 +16,18 @@ namespace {
 constexpr std::size_t chunk_size = 128;
 // Measurements further off than this many standard deviations have no weight (Tukey's biweight).
 constexpr float refinement_gate_sigmas = 4.0F;
+// More oblique views are not searched farther.
+constexpr float min_search_cosine = 0.2F;
 // Frames' worth of belief in the noise model against the scatter between frames.
 constexpr float prior_frames = 4.0F;
 // Smallest cosine of a pixel's ray and the plane's normal that is computed with.
 constexpr float min_cosine = 0.02F;
 // Part of a shift that is taken for an error left: on the test sites errors grow with it so.
 constexpr float bend_share = 0.5F;
+// Smallest cosine of the incidence at which every surface gives a measurement.
+constexpr float sure_cosine = 0.5F;
+// Part of the depths that a frame has measured in which it measures every surface.
+constexpr float sure_range = 0.95F;
 // How much color counts where no depth says that it is the element's own.
 constexpr float unmeasured_color_share = 1e-3F;
 
@@ -47,6 +53,7 @@ struct ElementSum {
   std::uint32_t frames = 0;
   float seen = 0.0F;
   float seen_through = 0.0F;
+  float missed = 0.0F;
   std::array<float, 3> color{};
   float color_weight = 0.0F;
   // The frame that is being gathered: it may have several cameras.
@@ -126,7 +133,10 @@ class ViewGather {
     }
     if (is_measured && miss < -seen.gate) return;  // hidden
     const HeightSum heights = disc(seen);
-    if (!(heights.weight > 0.0F)) return;
+    if (!(heights.weight > 0.0F)) {
+      if (should_measure(seen, x, y)) sum.missed += seen.cosine;
+      return;
+    }
     sum.current += heights;
     if (is_measured) sum.seen += seen.cosine;
     if (!view_.color.empty()) add_color(seen, is_measured ? 1.0F : unmeasured_color_share, sum);
@@ -166,9 +176,23 @@ class ViewGather {
     seen.information =
         1.0F / (seen.sigma * seen.sigma * square + lateral * lateral * (1.0F - square));
     seen.gate = refinement_gate_sigmas * seen.sigma +
-                static_cast<float>(options_.search_m) / std::max(seen.cosine, 0.2F);
+                static_cast<float>(options_.search_m) / std::max(seen.cosine, min_search_cosine);
     // At least the pixel's own footprint: a disc without a pixel says nothing.
-    seen.radius = std::max(static_cast<float>(options_.disc_radius_m), 1.5F * pixel_pitch_ * z);
+    seen.radius = std::max(static_cast<float>(options_.disc_radius_m),
+                           static_cast<float>(min_disc_pixels) * pixel_pitch_ * z);
+    return true;
+  }
+
+  // Whether the view would have measured the element, and has measured nothing around its pixel.
+  bool should_measure(const SeenElement& seen, int x, int y) const {
+    const float z = seen.position.z();
+    if (seen.cosine < sure_cosine || z * sure_range < view_.nearest_m ||
+        z > sure_range * view_.farthest_m || x < 1 || y < 1 || x + 1 >= view_.rays->width ||
+        y + 1 >= view_.rays->height)
+      return false;
+    for (int row = y - 1; row <= y + 1; ++row)
+      for (int column = x - 1; column <= x + 1; ++column)
+        if (view_.depth_m[view_index(column, row)] > 0.0F) return false;
     return true;
   }
 
@@ -302,6 +326,7 @@ RefinedElement result_of(const ElementSum& sum) {
   refined.frames = sum.frames;
   refined.seen = sum.seen;
   refined.seen_through = sum.seen_through;
+  refined.missed = sum.missed;
   if (sum.frames == 0) return refined;
   const float mean = sum.all.height / sum.all.weight;
   refined.shift_m = mean;
@@ -338,6 +363,11 @@ float pose_variance(const SurfaceRefinementOptions& options) {
 }
 
 }  // namespace
+
+double max_gate_m(const SurfaceRefinementOptions& options) {
+  return static_cast<double>(refinement_gate_sigmas) * options.noise.axial_at(options.max_depth_m) +
+         options.search_m / static_cast<double>(min_search_cosine);
+}
 
 RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
                               const SurfaceRefinementOptions& options,
@@ -412,6 +442,11 @@ RefinementView make_refinement_view(CameraView view, std::shared_ptr<const Pixel
   made.depth_m = std::move(view.depth.pixels);
   for (float& z : made.depth_m)
     if (!(z > 0.0F && std::isfinite(z))) z = 0.0F;
+  for (const float z : made.depth_m) {
+    if (z == 0.0F) continue;
+    made.nearest_m = made.nearest_m > 0.0F ? std::min(made.nearest_m, z) : z;
+    made.farthest_m = std::max(made.farthest_m, z);
+  }
   made.depth_m.resize(made.depth_m.size() + 4, 0.0F);
   for (const std::size_t n : rays->blind) made.depth_m[n] = 0.0F;
   made.color = std::move(view.color);

@@ -30,13 +30,20 @@ struct SurfaceRefinementOptions {
   double pose_error_m = 0.0;  // >= 0: standard deviation of a whole frame along the normal
 };
 
+// Depths that differ more from an element's plane have no weight, at any distance, m.
+double max_gate_m(const SurfaceRefinementOptions& options);
+// Radius of the smallest disc.
+inline constexpr double min_disc_pixels = 1.5;
+
 // One camera of one frame, made ready.
 struct RefinementView {
   std::uint32_t frame = 0;  // ascending; views of one frame count as one
   Camera depth_camera;
   Camera color_camera;
   std::vector<float> depth_m;  // 0 where there is no ray; four more than pixels
-  ColorImage color;            // may be empty
+  float nearest_m = 0.0F;      // of these depths
+  float farthest_m = 0.0F;
+  ColorImage color;  // may be empty
   std::shared_ptr<const PixelRays> rays;
   Pose camera_from_grid = Pose::Identity();
 };
@@ -49,6 +56,7 @@ struct RefinedElement {
   std::uint32_t frames = 0;   // that measured it
   float seen = 0.0F;          // views on whose central pixel it lies, by their cosine
   float seen_through = 0.0F;  // views that see beyond it there
+  float missed = 0.0F;        // views that measured nothing around it, though within their range
   Color color{};
 };
 

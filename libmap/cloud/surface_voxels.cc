@@ -6,6 +6,7 @@
 #include <optional>
 #include <utility>
 
+#include "libmap/cloud/plan_cells.h"
 #include "libmap/core/parallel.h"
 
 namespace libmap {
@@ -103,10 +104,23 @@ void SurfaceVoxels::add(const Eigen::Vector3f& place, const Eigen::Vector3f& nor
   sum.frames = 1;
 }
 
-void SurfaceVoxels::merge_frame(const SurfaceVoxels& frame) {
+SurfaceVoxels SurfaceVoxels::in(const PlanCells& cells) const {
+  SurfaceVoxels found;
+  for (std::size_t n = 0; n < sums_.size(); ++n) {
+    const std::uint64_t key = index_.keys()[n];
+    if (!cells.has_cell(unpack(key).cell.head<2>())) continue;
+    found.index_.find_or_add(key);
+    found.sums_.push_back(sums_[n]);
+  }
+  return found;
+}
+
+void SurfaceVoxels::merge_frame(const SurfaceVoxels& frame, const PlanCells& cells) {
   for (std::size_t n = 0; n < frame.sums_.size(); ++n) {
+    const VoxelPlace place = unpack(frame.index_.keys()[n]);
+    if (!cells.has_cell(place.cell.head<2>())) continue;
     const Sum& more = frame.sums_[n];
-    Sum& sum = side_of(unpack(frame.index_.keys()[n]), more.normal);
+    Sum& sum = side_of(place, more.normal);
     sum.weight += more.weight;
     sum.offset += more.offset;
     sum.normal += more.normal;

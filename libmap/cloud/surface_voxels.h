@@ -42,6 +42,8 @@ class VoxelIndex {
   std::uint32_t last_ = 0;            // asked for: pixels side by side share a voxel
 };
 
+struct PlanCells;  // plan_cells.h
+
 class SurfaceVoxels {
  public:
   // Sums over the measurements of a voxel; lengths in voxels.
@@ -55,8 +57,10 @@ class SurfaceVoxels {
   // One measurement, its place in voxels; places beyond voxel_cell_limit are left out. A
   // measurement whose normal points away from the first side's mean belongs to the other side.
   void add(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float weight);
-  // All that one frame measured.
-  void merge_frame(const SurfaceVoxels& frame);
+  // All that one frame measured in the columns `cells`.
+  void merge_frame(const SurfaceVoxels& frame, const PlanCells& cells);
+  // Those in the columns `cells`, in their order.
+  SurfaceVoxels in(const PlanCells& cells) const;
 
   std::size_t size() const { return sums_.size(); }
   const VoxelIndex& index() const { return index_; }

@@ -107,6 +107,26 @@ Pose from_numbers(const std::vector<double>& numbers) {
   return pose;
 }
 
+Json to_json_object(const Georeference& georeference) {
+  const Eigen::Vector3d& origin = georeference.origin_m;
+  return {{"crs_wkt", georeference.crs_wkt},
+          {"unit_m", georeference.unit_m},
+          {"origin_m", {origin.x(), origin.y(), origin.z()}}};
+}
+
+Georeference georeference_from(const Json& json) {
+  Georeference georeference;
+  georeference.crs_wkt = json.at("crs_wkt").get<std::string>();
+  georeference.unit_m = json.at("unit_m").get<double>();
+  const auto origin = json.at("origin_m").get<std::vector<double>>();
+  if (origin.size() != 3 || !(georeference.unit_m > 0.0))
+    throw Error("origin_m has 3 numbers, and unit_m is > 0", {.field = "georeference"});
+  georeference.origin_m = Eigen::Vector3d(origin.data());
+  if (!(georeference.origin_m.cwiseAbs().maxCoeff() <= max_position_m))
+    throw Error("an offset of at most 1e8 m", {.field = "georeference"});
+  return georeference;
+}
+
 template <typename Pairs>
 auto find_in(const Pairs& pairs, std::string_view name) -> decltype(&pairs.front().second) {
   for (const auto& [key, value] : pairs)
@@ -167,6 +187,7 @@ std::string to_json(const Manifest& manifest) {
   json["frame"] = manifest.frame;
   json["transforms"] = Json::object();
   for (const auto& [name, pose] : manifest.transforms) json["transforms"][name] = to_numbers(pose);
+  if (manifest.georeference) json["georeference"] = to_json_object(*manifest.georeference);
   json["results"] = to_json_object(manifest.results);
   Json timings = Json::object();
   for (const auto& [name, seconds] : manifest.timings_s) timings[name] = seconds;
@@ -194,6 +215,8 @@ Manifest parse_manifest(const std::string& text, const std::string& file) {
     manifest.frame = json.at("frame").get<std::string>();
     for (const auto& [name, numbers] : json.at("transforms").items())
       manifest.transforms.emplace_back(name, from_numbers(numbers.get<std::vector<double>>()));
+    if (json.contains("georeference"))
+      manifest.georeference = georeference_from(json.at("georeference"));
     manifest.results = from_json_object(json.at("results"));
     if (json.contains("run")) {
       const Json& run = json.at("run");

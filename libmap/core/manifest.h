@@ -10,6 +10,7 @@
 #include <variant>
 #include <vector>
 
+#include "libmap/core/georeference.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose.h"
 
@@ -32,7 +33,9 @@ struct Manifest {
   std::vector<std::pair<std::string, ManifestValue>> parameters;
   std::vector<ManifestInput> inputs;
   std::string frame;  // of the output's coordinates; lengths are meters
-  std::vector<std::pair<std::string, Pose>> transforms;        // by name, e.g. "terrain_from_input"
+  std::vector<std::pair<std::string, Pose>> transforms;  // by name, e.g. "terrain_from_input"
+  // Of the frame before site_from_map and terrain_from_input.
+  std::optional<Georeference> georeference;
   std::vector<std::pair<std::string, ManifestValue>> results;  // counts, residuals
   std::vector<std::pair<std::string, double>> timings_s;       // in the section "run"
   unsigned threads = 0;                                        // in the section "run"

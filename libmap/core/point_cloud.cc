@@ -76,6 +76,32 @@ void change_vectors(PointCloud& cloud, const std::string& name, const Change& ch
 
 }  // namespace
 
+void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields) {
+  const auto like = [&](const ScalarField& field) {
+    return std::find_if(more.begin(), more.end(), [&](const ScalarField& other) {
+      return other.name == field.name && other.type == field.type;
+    });
+  };
+  std::erase_if(fields, [&](const ScalarField& field) { return like(field) == more.end(); });
+  for (ScalarField& field : fields) {
+    const std::vector<double>& values = like(field)->values;
+    field.values.insert(field.values.end(), values.begin(), values.end());
+  }
+}
+
+void append_cloud(const PointCloud& more, PointCloud& cloud) {
+  if (more.empty()) return;
+  if (cloud.empty()) {
+    cloud = more;
+    return;
+  }
+  append_values(more.positions, cloud.positions);
+  append_values(more.normals, cloud.normals);
+  append_values(more.colors, cloud.colors);
+  append_fields(more.fields, cloud.fields);
+  if (more.viewpoint.matrix() != cloud.viewpoint.matrix()) cloud.viewpoint = Pose::Identity();
+}
+
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source) {
   PointCloud moved = cloud;
   for (Eigen::Vector3d& point : moved.positions) point = target_from_source * point;

@@ -56,6 +56,18 @@ struct PointCloud {
 // The points of `cloud` at `indices`, in that order, with all that belongs to them.
 PointCloud select_points(const PointCloud& cloud, const std::vector<std::size_t>& indices);
 
+// The points of `more` behind the others. Normals, colors and fields are left that both have; all
+// of one if the other has no points.
+void append_cloud(const PointCloud& more, PointCloud& cloud);
+// The same of one value per point.
+template <typename T>
+void append_values(const std::vector<T>& more, std::vector<T>& values) {
+  if (more.empty()) values.clear();
+  if (!values.empty()) values.insert(values.end(), more.begin(), more.end());
+}
+// The same of fields alone: those of both names and types.
+void append_fields(const std::vector<ScalarField>& more, std::vector<ScalarField>& fields);
+
 // The cloud moved: positions, a known viewpoint and the fields vp_x, vp_y, vp_z by
 // `target_from_source`; normals and the fields approach_x, approach_y, approach_z by its rotation.
 PointCloud transform_cloud(const PointCloud& cloud, const Pose& target_from_source);

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
+#include <tuple>
 #include <utility>
 
 #include "libmap/core/parallel.h"
@@ -61,6 +62,27 @@ struct FirstOfNearest {
   }
 };
 
+// The `count` nearest points, among equally near ones those of the lowest index.
+struct FirstOfNearestPoints {
+  std::size_t count;
+  std::vector<NeighborPoint> neighbors{};  // the nearest first
+
+  bool full() const { return neighbors.size() == count; }
+  double worstDist() const {
+    return full() ? with_margin(neighbors.back().square_m2) : std::numeric_limits<double>::max();
+  }
+  bool addPoint(double square_m2, std::size_t index) {
+    const NeighborPoint point{index, square_m2};
+    const auto before = [](const NeighborPoint& a, const NeighborPoint& b) {
+      return std::tie(a.square_m2, a.index) < std::tie(b.square_m2, b.index);
+    };
+    if (full() && !before(point, neighbors.back())) return true;
+    if (full()) neighbors.pop_back();
+    neighbors.insert(std::upper_bound(neighbors.begin(), neighbors.end(), point, before), point);
+    return true;
+  }
+};
+
 }  // namespace
 
 struct PointTree::Index {
@@ -78,13 +100,12 @@ PointTree& PointTree::operator=(PointTree&&) noexcept = default;
 
 std::vector<NeighborPoint> PointTree::nearest(const Eigen::Vector3d& point,
                                               std::size_t count) const {
-  count = std::min(count, index_->list.points.size());
-  std::vector<std::size_t> indices(count);
-  std::vector<double> squares(count);
-  if (count > 0) index_->tree.knnSearch(point.data(), count, indices.data(), squares.data());
-  std::vector<NeighborPoint> neighbors(count);
-  for (std::size_t n = 0; n < count; ++n) neighbors[n] = {indices[n], squares[n]};
-  return neighbors;
+  FirstOfNearestPoints result{std::min(count, index_->list.points.size())};
+  if (result.count > 0) {
+    result.neighbors.reserve(result.count);
+    index_->tree.findNeighbors(result, point.data(), nanoflann::SearchParams());
+  }
+  return std::move(result.neighbors);
 }
 
 NeighborPoint PointTree::nearest(const Eigen::Vector3d& point) const {

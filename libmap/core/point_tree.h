@@ -23,8 +23,8 @@ class PointTree {
   PointTree(PointTree&&) noexcept;
   PointTree& operator=(PointTree&&) noexcept;
 
-  // The `count` nearest points, or all if there are fewer, the nearest first. May be called from
-  // several threads at once.
+  // The `count` nearest points, or all if there are fewer, the nearest first, of equally near ones
+  // those of the lowest index. May be called from several threads at once.
   std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
   // The nearest one; there must be one.
   NeighborPoint nearest(const Eigen::Vector3d& point) const;

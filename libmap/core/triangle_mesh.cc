@@ -1,6 +1,7 @@
 #include "libmap/core/triangle_mesh.h"
 
 #include <Eigen/Geometry>
+#include <limits>
 
 #include "libmap/core/error.h"
 
@@ -31,6 +32,26 @@ void TriangleMesh::check() const {
         throw Error("there is no such vertex", {.field = "triangle " + std::to_string(i),
                                                 .value = "vertex " + std::to_string(index),
                                                 .bound = "< " + std::to_string(vertices.size())});
+}
+
+void append_mesh(const TriangleMesh& more, TriangleMesh& mesh) {
+  if (more.vertices.empty()) return;
+  if (mesh.vertices.empty()) {
+    mesh = more;
+    return;
+  }
+  const std::size_t first = mesh.vertices.size();
+  if (first + more.vertices.size() > std::numeric_limits<std::uint32_t>::max())
+    throw Error("too many vertices for one mesh");
+  append_values(more.vertices, mesh.vertices);
+  append_values(more.vertex_normals, mesh.vertex_normals);
+  append_values(more.vertex_colors, mesh.vertex_colors);
+  append_fields(more.vertex_fields, mesh.vertex_fields);
+  append_fields(more.face_fields, mesh.face_fields);
+  for (Triangle triangle : more.triangles) {
+    for (std::uint32_t& v : triangle) v += static_cast<std::uint32_t>(first);
+    mesh.triangles.push_back(triangle);
+  }
 }
 
 Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle) {

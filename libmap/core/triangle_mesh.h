@@ -26,6 +26,10 @@ struct TriangleMesh {
   void check() const;
 };
 
+// The vertices and triangles of `more` behind the others. Normals, colors and fields are left that
+// both have; all of one if the other has no vertices.
+void append_mesh(const TriangleMesh& more, TriangleMesh& mesh);
+
 // Twice-signed-area normal of a triangle, not normalized: its length is twice the area in m2.
 Eigen::Vector3d area_normal(const TriangleMesh& mesh, const Triangle& triangle);
 

@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -20,6 +21,9 @@ namespace libmap {
 namespace {
 
 constexpr double max_image_side = 65536;
+constexpr std::size_t max_camera_numbers = 64;
+constexpr std::size_t max_motion_numbers = 7'000'000;
+constexpr double max_timing_s = 10.0;
 
 [[noreturn]] void refuse(const std::string& field, const std::string& value,
                          const std::string& reason, const std::string& bound) {
@@ -44,27 +48,28 @@ int side_of(const YAML::Node& root, const std::string& field) {
 }
 
 void append_numbers(const YAML::Node& list, const std::string& field, int depth,
-                    std::vector<double>& numbers) {
+                    std::size_t max_numbers, std::vector<double>& numbers) {
   if (!list.IsSequence()) throw Error("not a list of numbers", {.field = field});
   for (const YAML::Node& entry : list) {
     if (entry.IsSequence() && depth < 1)
-      append_numbers(entry, field, depth + 1, numbers);  // row by row
+      append_numbers(entry, field, depth + 1, max_numbers, numbers);  // row by row
     else
       numbers.push_back(number_of(entry, field));
-    if (numbers.size() > 64)
+    if (numbers.size() > max_numbers)
       throw Error("contains more numbers than any camera has", {.field = field});
   }
 }
 
 // {rows, cols, data}, or the numbers alone.
-std::vector<double> matrix_of(const YAML::Node& node, const std::string& field) {
+std::vector<double> matrix_of(const YAML::Node& node, const std::string& field,
+                              std::size_t max_numbers = max_camera_numbers) {
   std::vector<double> numbers;
   if (!node.IsMap()) {
-    append_numbers(node, field, 0, numbers);
+    append_numbers(node, field, 0, max_numbers, numbers);
     return numbers;
   }
   if (!node["data"]) throw Error("is missing", {.field = field + ".data"});
-  if (!node["data"].IsNull()) append_numbers(node["data"], field + ".data", 0, numbers);
+  if (!node["data"].IsNull()) append_numbers(node["data"], field + ".data", 0, max_numbers, numbers);
   if (node["rows"] && node["cols"]) {
     const double promised =
         number_of(node["rows"], field + ".rows") * number_of(node["cols"], field + ".cols");
@@ -125,25 +130,58 @@ void read_distortion(const YAML::Node& root, Camera& camera) {
   camera.distortion = terms;
 }
 
+std::vector<double> sized_matrix(const YAML::Node& root, const std::string& field,
+                                 std::size_t size) {
+  if (!root[field]) throw Error("is missing", {.field = field});
+  std::vector<double> numbers = matrix_of(root[field], field);
+  if (numbers.size() != size)
+    refuse(field, std::to_string(numbers.size()) + " numbers", "wrong size",
+           std::to_string(size) + " numbers");
+  return numbers;
+}
+
 DepthCorrection depth_correction_of(const YAML::Node& root) {
   DepthCorrection depth;
-  if (!root["depth_correction"]) return depth;
-  const auto read = [&](const std::string& field, std::size_t size) {
-    if (!root[field]) throw Error("is missing", {.field = field});
-    std::vector<double> numbers = matrix_of(root[field], field);
-    if (numbers.size() != size)
-      refuse(field, std::to_string(numbers.size()) + " numbers", "wrong size",
-             std::to_string(size) + " numbers");
-    return numbers;
-  };
+  if (root["depth_scale"]) depth.scale = number_of(root["depth_scale"], "depth_scale");
+  if (!root["depth_correction"]) {
+    depth.check();
+    return depth;
+  }
   depth.spline_m = matrix_of(root["depth_correction"], "depth_correction");
-  const std::vector<double> range = read("depth_correction_range", 2);
+  const std::vector<double> range = sized_matrix(root, "depth_correction_range", 2);
   depth.first_m = range[0];
   depth.step_m = range[1];
-  const std::vector<double> radial = read("depth_correction_radial", depth.radial.size());
+  const std::vector<double> radial = 
+      sized_matrix(root, "depth_correction_radial", depth.radial.size());
   std::copy(radial.begin(), radial.end(), depth.radial.begin());
   depth.check();
   return depth;
+}
+
+void read_timing(const YAML::Node& root, CameraFile& file) {
+  if (root["camera_timing"]) {
+    const std::vector<double> timing = sized_matrix(root, "camera_timing", 2);
+    for (const double seconds : timing)
+      if (!(std::abs(seconds) <= max_timing_s))
+        refuse("camera_timing", to_text(seconds), "not a time within a frame", "-10 to 10");
+    file.depth_delay_s = timing[0];
+    file.rolling_shutter_s = timing[1];
+  }
+  if (!root["frame_motions"]) return;
+  const std::vector<double> numbers =
+      matrix_of(root["frame_motions"], "frame_motions", max_motion_numbers);
+  if (numbers.size() % 7 != 0)
+    refuse("frame_motions", std::to_string(numbers.size()) + " numbers", "wrong size",
+           "7 of each frame");
+  for (std::size_t n = 0; n < numbers.size(); n += 7)
+    file.motions.push_back({numbers[n],
+                            {numbers[n + 1], numbers[n + 2], numbers[n + 3]},
+                            {numbers[n + 4], numbers[n + 5], numbers[n + 6]}});
+  const auto by_stamp = [](const FrameMotion& a, const FrameMotion& b) {
+    return a.stamp_s < b.stamp_s;
+  };
+  if (!std::is_sorted(file.motions.begin(), file.motions.end(), by_stamp))
+    throw Error("stamps do not ascend", {.field = "frame_motions"});
 }
 
 // As cv::FileStorage, which does not take a flow map after a tag.
@@ -182,6 +220,21 @@ std::string quoted(const std::string& text) {
 
 }  // namespace
 
+Pose CameraFile::color_from_depth_at(double stamp_s) const {
+  const auto motion = std::lower_bound(
+      motions.begin(), motions.end(), stamp_s,
+      [](const FrameMotion& frame, double stamp) { return frame.stamp_s < stamp; });
+  if (depth_delay_s == 0.0 || motion == motions.end() || motion->stamp_s != stamp_s)
+    return color_from_depth;
+  const Eigen::Vector3d turn = depth_delay_s * motion->turn_rate;
+  Pose base_motion = Pose::Identity();
+  base_motion.translation() = depth_delay_s * motion->velocity;
+  if (turn.norm() > 0.0)
+    base_motion.linear() = Eigen::AngleAxisd(turn.norm(), turn.normalized()).toRotationMatrix();
+  return camera.base_from_camera.inverse() * base_motion * camera.base_from_camera *
+         color_from_depth;
+}
+
 Pose pose_from_yaml(const YAML::Node& node, const std::string& field) {
   const std::vector<double> m = matrix_of(node, field);
   if (m.size() != 12 && m.size() != 16)
@@ -216,6 +269,7 @@ CameraFile camera_from_yaml(const YAML::Node& root) {
   file.depth = depth_correction_of(root);
   if (root["depth_registration"])
     file.color_from_depth = pose_from_yaml(root["depth_registration"], "depth_registration");
+  read_timing(root, file);
   return file;
 }
 
@@ -246,13 +300,22 @@ std::string to_yaml(const CameraFile& file, const std::string& comment) {
   text += pose_text("local_transform", camera.base_from_camera);
   if (!file.color_from_depth.matrix().isIdentity(0.0))
     text += pose_text("depth_registration", file.color_from_depth);
-  const DepthCorrection& depth = file.depth;
-  if (depth.empty()) return text;
-  return text +
-         matrix_text("depth_correction", 1, static_cast<int>(depth.spline_m.size()),
-                     depth.spline_m) +
-         matrix_text("depth_correction_range", 1, 2, {depth.first_m, depth.step_m}) +
-         matrix_text("depth_correction_radial", 1, 3, {depth.radial.begin(), depth.radial.end()});
+  if (file.depth.scale != 1.0) text += "depth_scale: " + to_text(file.depth.scale) + "\n";
+  if (const DepthCorrection& depth = file.depth; !depth.spline_m.empty())
+    text += matrix_text("depth_correction", 1, static_cast<int>(depth.spline_m.size()),
+                        depth.spline_m) +
+            matrix_text("depth_correction_range", 1, 2, {depth.first_m, depth.step_m}) +
+            matrix_text("depth_correction_radial", 1, 3, {depth.radial.begin(), depth.radial.end()});
+  if (file.depth_delay_s != 0.0 || file.rolling_shutter_s != 0.0)
+    text += matrix_text("camera_timing", 1, 2, {file.depth_delay_s, file.rolling_shutter_s});
+  if (file.motions.empty()) return text;
+  std::vector<double> numbers;
+  for (const FrameMotion& frame : file.motions) {
+    numbers.push_back(frame.stamp_s);
+    numbers.insert(numbers.end(), frame.velocity.begin(), frame.velocity.end());
+    numbers.insert(numbers.end(), frame.turn_rate.begin(), frame.turn_rate.end());
+  }
+  return text + matrix_text("frame_motions", static_cast<int>(file.motions.size()), 7, numbers);
 }
 
 }  // namespace libmap

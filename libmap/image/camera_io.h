@@ -21,6 +21,10 @@
 //     {rows: 1, cols: 2, dt: d, data: [0.6, 0.2]}
 //   depth_correction_radial: !!opencv-matrix  # radial
 //     {rows: 1, cols: 3, dt: d, data: [...]}
+//   depth_scale: 1.008                        # scale; may be missing
+//   camera_timing: [0.01, 0.02]               # depth_delay_s, rolling_shutter_s; may be missing
+//   frame_motions: !!opencv-matrix            # FrameMotion of each frame; may be missing
+//     {rows: 60, cols: 7, dt: d, data: [...]}
 //
 // distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
 // order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without it the number
@@ -29,8 +33,10 @@
 // many (projection_matrix, avg_reprojection_error, ...).
 #pragma once
 
+#include <Eigen/Core>
 #include <filesystem>
 #include <string>
+#include <vector>
 
 #include "libmap/core/camera.h"
 #include "libmap/image/depth_correction.h"
@@ -41,6 +47,13 @@ class Node;
 
 namespace libmap {
 
+// How the base moves when a frame is taken, in its own frame.
+struct FrameMotion {
+  double stamp_s = 0.0;
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();   // m/s
+  Eigen::Vector3d turn_rate = Eigen::Vector3d::Zero();  // rad/s
+};
+
 struct CameraFile {
   std::string name{};  // may be empty
   Camera camera{};
@@ -48,9 +61,17 @@ struct CameraFile {
   // camera's own place (depth_registration, 3 x 4; may be missing), and what is added to it.
   Pose color_from_depth = Pose::Identity();
   DepthCorrection depth{};
+  // Depth is taken this much after the middle row of the picture, and the picture's rows one after
+  // the other in this time. The motions are those of the scan that they were estimated from.
+  double depth_delay_s = 0.0;
+  double rolling_shutter_s = 0.0;
+  std::vector<FrameMotion> motions{};  // by ascending stamp
 
+  // Of the frame of this stamp; the base does not move in frames that `motions` does not list.
+  Pose color_from_depth_at(double stamp_s) const;
   bool changes_depth() const {
-    return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0);
+    return !depth.empty() || !color_from_depth.matrix().isIdentity(0.0) ||
+           (depth_delay_s != 0.0 && !motions.empty());
   }
 };
 

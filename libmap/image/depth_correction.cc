@@ -31,16 +31,20 @@ DepthCorrection::Terms DepthCorrection::terms(double depth_m, double radius2) co
 }
 
 double DepthCorrection::at(double depth_m, double radius2) const {
-  if (empty()) return 0.0;
+  const double rescaled = (scale - 1.0) * depth_m;
+  if (spline_m.empty()) return rescaled;
   const Terms of = terms(depth_m, radius2);
   double sum = 0.0;
   for (std::size_t n = 0; n < 4; ++n) sum += of.spline[n] * spline_m[of.first + n];
   for (std::size_t n = 0; n < 3; ++n) sum += of.radial[n] * radial[n];
-  return sum;
+  return scale * sum + rescaled;
 }
 
 void DepthCorrection::check() const {
-  if (empty()) return;
+  if (!(scale >= 0.5 && scale <= 2.0))
+    throw Error("out of range",
+                {.field = "depth_scale", .value = to_text(scale), .bound = "0.5 to 2"});
+  if (spline_m.empty()) return;
   if (spline_m.size() < 4 || spline_m.size() > max_coefficients)
     throw Error("wrong number of coefficients", {.field = "depth_correction",
                                                  .value = std::to_string(spline_m.size()),

@@ -1,7 +1,7 @@
 // A smooth correction of a camera's depth: what is added to it as a function of depth (a uniform
-// cubic B-spline) and of the radius in the image. Linear in its numbers, so that they are estimated
-// by least squares. A model for each range and place was proposed by Teichman et al. (2013); a
-// scan holds too little for a map of every pixel.
+// cubic B-spline) and of the radius in the image, and a scale of the sum. Linear in the numbers that
+// are added, so that they are estimated by least squares. Teichman et al. (2013) correct each range
+// and each place in the image; a scan has too few data for that.
 #pragma once
 
 #include <array>
@@ -14,10 +14,11 @@
 namespace libmap {
 
 struct DepthCorrection {
-  double first_m = 0.0;            // depths before it are corrected as it is
+  double first_m = 0.0;            // nearer depths are corrected as this one
   double step_m = 0.0;             // between the spline's knots
   std::vector<double> spline_m{};  // its coefficients, 4 or more; empty: no correction at all
-  std::array<double, 3> radial{};  // of r^2 and r^4 (m), of depth r^2 (m a m); r is 1 in corners
+  std::array<double, 3> radial{};  // of r^2 and r^4 (m), of depth r^2; r is 1 in corners
+  double scale = 1.0;              // of the sum
 
   // What a depth takes from the spline (the coefficients from `first` on) and from the radial
   // terms.
@@ -27,13 +28,14 @@ struct DepthCorrection {
     std::array<double, 3> radial{};
   };
 
-  bool empty() const { return spline_m.empty(); }
+  bool empty() const { return spline_m.empty() && scale == 1.0; }
   double last_m() const { return first_m + step_m * (static_cast<double>(spline_m.size()) - 3.0); }
   // At a depth, and a squared radius as of `at`.
   Terms terms(double depth_m, double radius2) const;
-  // What is added to `depth_m`.
+  // The corrected depth less `depth_m`.
   double at(double depth_m, double radius2) const;
-  // Throws Error naming the field: a step > 0, no or 4 to 1000 coefficients of less than 1 m each.
+  // Throws Error naming the field: a step > 0, no or 4 to 1000 coefficients of less than 1 m each,
+  // a scale from 0.5 to 2.
   void check() const;
   bool operator==(const DepthCorrection&) const = default;
 };

@@ -185,18 +185,17 @@ Plan make_plan(const Source& source, const CropOptions& options) {
 }
 
 // What is done with a cut cloud or mesh: into the site, centered if the outline was not.
-template <typename Move>
-void finish(Plan& plan, const CropOptions& options, const std::vector<Vector3d>& positions,
-            const Move& move) {
+// bounds(pose) are those of what was cut, moved.
+template <typename Bounds, typename Move>
+void finish(Plan& plan, const CropOptions& options, const Bounds& bounds_moved, const Move& move) {
   CropReport& report = plan.report;
   Pose site_from_cut = plan.site_from_cut;
   const bool to_center = options.center && (!plan.prism.outline || options.frame == CropFrame::map);
   if (to_center) {
-    std::vector<Vector3d> in_site = positions;
-    for (Vector3d& position : in_site) position = site_from_cut * position;
-    const Bounds3d bounds = bounds_of(in_site);
+    const Eigen::AlignedBox3d bounds = bounds_moved(site_from_cut);
     Pose shift = Pose::Identity();
-    shift.translation().head<2>() = -(bounds.min + bounds.max).head<2>() / 2.0;
+    if (!bounds.isEmpty())
+      shift.translation().head<2>() = -(bounds.min() + bounds.max()).head<2>() / 2.0;
     site_from_cut = shift * site_from_cut;
   }
   if (!is_identity(site_from_cut)) move(site_from_cut);
@@ -204,14 +203,13 @@ void finish(Plan& plan, const CropOptions& options, const std::vector<Vector3d>&
   report.site_from_map = site_from_cut * plan.cut_from_map;
 }
 
-Error nothing_inside(const std::vector<Vector3d>& positions, const char* what) {
-  const Bounds3d bounds = bounds_of(positions);
+Error nothing_inside(const Eigen::AlignedBox3d& bounds, const char* what) {
   const auto text = [](const Vector3d& p) {
     return to_fixed_text(p.x(), 2) + ", " + to_fixed_text(p.y(), 2) + ", " +
            to_fixed_text(p.z(), 2);
   };
   return Error(std::string("nothing of the ") + what + " lies inside the cut: it reaches from " +
-               text(bounds.min) + " to " + text(bounds.max));
+               text(bounds.min()) + " to " + text(bounds.max()));
 }
 
 // A triangle seen from above, by its first corner and the sides to the two others.
@@ -276,22 +274,46 @@ void view_inside(const FlatTriangle& triangle, std::uint32_t n, double cell,
 
 // The surface seen from above: a sample in each cell that a triangle covers, its corners, and its
 // sides, which are all that is seen of an upright one. Cells are larger where those were too many.
-PointCloud view_of(const TriangleMesh& mesh, double cell) {
-  std::vector<TrianglePoint> samples;
+PointCloud view_of(const EachMesh& each, const Pose& level_from_map, double cell) {
   double area = 0.0;
   double length = 0.0;
-  for (const Triangle& triangle : mesh.triangles) {
-    area += std::abs(area_normal(mesh, triangle).z());
-    length += flat(mesh, triangle).length();
-  }
-  const double max_on_sides = max_side_samples + 3.0 * static_cast<double>(mesh.triangles.size());
+  double triangles = 0.0;
+  each([&](const TriangleMesh& given) {
+    const TriangleMesh mesh = transform_mesh(given, level_from_map);
+    for (const Triangle& triangle : mesh.triangles) {
+      area += std::abs(area_normal(mesh, triangle).z());
+      length += flat(mesh, triangle).length();
+    }
+    triangles += static_cast<double>(mesh.triangles.size());
+  });
+  const double max_on_sides = max_side_samples + 3.0 * triangles;
   cell = std::max({cell, std::sqrt(area / 2.0 / max_view_samples), length / max_on_sides});
-  for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {
-    const FlatTriangle triangle = flat(mesh, mesh.triangles[n]);
-    view_sides(triangle, n, cell, samples);
-    view_inside(triangle, n, cell, samples);
-  }
-  return points_on_surface(mesh, samples);
+  PointCloud view;
+  each([&](const TriangleMesh& given) {
+    const TriangleMesh mesh = transform_mesh(given, level_from_map);
+    std::vector<TrianglePoint> samples;
+    for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n) {
+      const FlatTriangle triangle = flat(mesh, mesh.triangles[n]);
+      view_sides(triangle, n, cell, samples);
+      view_inside(triangle, n, cell, samples);
+    }
+    PointCloud more = points_on_surface(mesh, samples);
+    if (view.empty()) {
+      view = std::move(more);
+      view.fields.clear();
+      return;
+    }
+    view.positions.insert(view.positions.end(), more.positions.begin(), more.positions.end());
+    view.colors.insert(view.colors.end(), more.colors.begin(), more.colors.end());
+    view.normals.insert(view.normals.end(), more.normals.begin(), more.normals.end());
+  });
+  return view;
+}
+
+Eigen::AlignedBox3d box_of(const std::vector<Vector3d>& positions, const Pose& pose) {
+  Eigen::AlignedBox3d box;
+  for (const Vector3d& position : positions) box.extend(pose * position);
+  return box;
 }
 
 Vector2d middle_of(const std::vector<Vector3d>& positions) {
@@ -326,39 +348,78 @@ CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) 
   Plan plan = make_plan(source, options);
   if (!is_identity(plan.cut_from_map)) kept = transform_cloud(kept, plan.cut_from_map);
   PointCloud inside = cut_cloud(kept, plan.prism);
-  if (inside.empty()) throw nothing_inside(kept.positions, "cloud");
-  finish(plan, options, inside.positions,
-         [&](const Pose& pose) { inside = transform_cloud(inside, pose); });
+  if (inside.empty()) throw nothing_inside(box_of(kept.positions, Pose::Identity()), "cloud");
+  finish(
+      plan, options, [&](const Pose& pose) { return box_of(inside.positions, pose); },
+      [&](const Pose& pose) { inside = transform_cloud(inside, pose); });
   return {std::move(inside), std::move(plan.report)};
 }
 
-CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options) {
-  mesh.check();
-  const double area = surface_area(mesh);
+CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
+                            const std::function<void(TriangleMesh)>& use) {
+  double area = 0.0;
+  Eigen::AlignedBox3d box;
+  each([&](const TriangleMesh& mesh) {
+    mesh.check();
+    area += surface_area(mesh);
+    for (const Vector3d& vertex : mesh.vertices) box.extend(vertex);
+  });
   if (!std::isfinite(area)) throw Error("a corner of a triangle is not finite");
   if (!(area > 0.0))
     throw Error("the mesh has no surface to crop",
                 {.field = "area", .value = to_text(area) + " m2", .bound = "> 0"});
   Source source;
-  source.middle = middle_of(mesh.vertices);
+  source.middle = (box.min() + box.max()).head<2>() / 2.0;
   if (options.level)
-    for (const SurfacePoint& sample :
-         sample_surface(mesh, ground_samples / area, options.ground.seed)) {
-      source.ground_points.push_back(sample.position);
-      source.normals.push_back(
-          area_normal(mesh, mesh.triangles[sample.triangle]).normalized().cast<float>());
-    }
+    each([&](const TriangleMesh& mesh) {
+      if (!(surface_area(mesh) > 0.0)) return;
+      for (const SurfacePoint& sample :
+           sample_surface(mesh, ground_samples / area, options.ground.seed)) {
+        source.ground_points.push_back(sample.position);
+        source.normals.push_back(
+            area_normal(mesh, mesh.triangles[sample.triangle]).normalized().cast<float>());
+      }
+    });
   source.view = [&](const Pose& level_from_map, double cell) {
-    return view_of(transform_mesh(mesh, level_from_map), cell);
+    return view_of(each, level_from_map, cell);
   };
   Plan plan = make_plan(source, options);
-  const TriangleMesh moved_mesh =
-      is_identity(plan.cut_from_map) ? mesh : transform_mesh(mesh, plan.cut_from_map);
-  TriangleMesh inside = cut_mesh(moved_mesh, plan.prism);
-  if (inside.triangles.empty()) throw nothing_inside(moved_mesh.vertices, "mesh");
-  finish(plan, options, inside.vertices,
-         [&](const Pose& pose) { inside = transform_mesh(inside, pose); });
-  return {std::move(inside), std::move(plan.report)};
+  const auto each_cut = [&](const std::function<void(TriangleMesh)>& use_cut) {
+    each([&](const TriangleMesh& mesh) {
+      use_cut(
+          cut_mesh(is_identity(plan.cut_from_map) ? mesh : transform_mesh(mesh, plan.cut_from_map),
+                   plan.prism));
+    });
+  };
+  Pose site_from_cut = Pose::Identity();
+  finish(
+      plan, options,
+      [&](const Pose& pose) {
+        Eigen::AlignedBox3d inside;
+        each_cut([&](const TriangleMesh& mesh) {
+          for (const Vector3d& vertex : mesh.vertices) inside.extend(pose * vertex);
+        });
+        return inside;
+      },
+      [&](const Pose& pose) { site_from_cut = pose; });
+  bool is_empty = true;
+  each_cut([&](TriangleMesh mesh) {
+    is_empty = is_empty && mesh.triangles.empty();
+    use(is_identity(site_from_cut) ? std::move(mesh) : transform_mesh(mesh, site_from_cut));
+  });
+  if (is_empty) {
+    Eigen::AlignedBox3d all;
+    each([&](const TriangleMesh& mesh) { all.extend(box_of(mesh.vertices, plan.cut_from_map)); });
+    throw nothing_inside(all, "mesh");
+  }
+  return std::move(plan.report);
+}
+
+CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options) {
+  CropMeshResult result;
+  result.report = crop_mesh_pieces([&](const UseMesh& use) { use(mesh); }, options,
+                                   [&](TriangleMesh cut) { result.mesh = std::move(cut); });
+  return result;
 }
 
 }  // namespace libmap

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <functional>
 #include <optional>
 #include <vector>
 
@@ -66,5 +67,12 @@ struct CropMeshResult {
 // inside.
 CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options);
 CropMeshResult crop_mesh(const TriangleMesh& mesh, const CropOptions& options);
+
+// The same of a mesh in pieces: each(use) calls use(piece) for all of them, in one order, whenever
+// it is called. `use` takes what is left of each, in that order; nothing is an empty mesh.
+using UseMesh = std::function<void(const TriangleMesh& mesh)>;
+using EachMesh = std::function<void(const UseMesh& use)>;
+CropReport crop_mesh_pieces(const EachMesh& each, const CropOptions& options,
+                            const std::function<void(TriangleMesh)>& use);
 
 }  // namespace libmap

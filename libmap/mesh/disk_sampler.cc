@@ -153,8 +153,11 @@ class Sampler {
         min_square_m2_(radius_m * radius_m * (1.0 + 1e-14)),
         seed_(seed),
         expected_(saturation_density * surface.area_m2 / (radius_m * radius_m)),
-        samples_(surface.low, 2.0 * radius_m, static_cast<std::size_t>(1.1 * expected_) + 16),
-        pieces_(surface.triangles, piece_size * radius_m, max_pieces) {}
+        samples_(surface.low, 2.0 * radius_m,
+                 static_cast<std::size_t>(1.1 * expected_) + surface.others.size() + 16),
+        pieces_(surface.triangles, piece_size * radius_m, max_pieces) {
+    for (const Eigen::Vector3d& other : surface.others) samples_.add(other);
+  }
 
   DiskSamples run(const std::function<bool(std::size_t)>& goes_on, Progress& progress) {
     progress.begin("darts", dart_rounds.size());
@@ -162,11 +165,12 @@ class Sampler {
       accept(darts(round, dart_rounds[round] * std::max(expected_, 1.0) / surface_.area_m2));
       progress.advance(1);
     }
-    if (goes_on(samples_.size())) fill_gaps(progress);
+    if (goes_on(places_.size())) fill_gaps(progress);
     progress.end();
     DiskSamples result;
-    result.positions.reserve(samples_.size());
-    for (std::size_t n = 0; n < samples_.size(); ++n) result.positions.push_back(samples_[n]);
+    result.positions.reserve(places_.size());
+    for (std::size_t n = surface_.others.size(); n < samples_.size(); ++n)
+      result.positions.push_back(samples_[n]);
     result.places = std::move(places_);
     return result;
   }

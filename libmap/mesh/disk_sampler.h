@@ -21,6 +21,8 @@ struct SampledSurface {
   double area_m2 = 0.0;  // > 0
   // Positions are rounded to single precision, which moves them so far at most; 0: they are not.
   double rounding_m = 0.0;
+  // Samples of other surfaces: no sample is nearer to them, and what they cover needs none.
+  std::vector<Eigen::Vector3d> others{};
 };
 
 struct DiskSamples {

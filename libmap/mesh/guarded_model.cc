@@ -3,8 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "libmap/core/error.h"
-#include "libmap/core/guarded_process.h"
+#include "libmap/core/guarded_arrays.h"
 
 namespace libmap {
 
@@ -14,25 +13,7 @@ namespace {
 constexpr std::uint64_t min_memory = std::uint64_t{1} << 30;
 constexpr std::uint64_t memory_per_byte = 100;
 
-// Arrays through the pipe: their length, then their bytes.
-template <typename Array>
-void send(const GuardedProcess::Write& write, const Array& values) {
-  const std::uint64_t count = values.size();
-  write({reinterpret_cast<const char*>(&count), sizeof count});
-  write({reinterpret_cast<const char*>(values.data()), count * sizeof values[0]});
-}
-
-template <typename Array>
-void receive(GuardedProcess& process, Array& values) {
-  const auto read = [&](void* bytes, std::size_t count) {
-    if (!process.read(bytes, count))
-      throw Error("is broken: the library for its format crashed on it" + process.end());
-  };
-  std::uint64_t count = 0;
-  read(&count, sizeof count);
-  values.resize(count);
-  read(values.data(), count * sizeof values[0]);
-}
+constexpr const char* broken = "is broken: the library for its format crashed on it";
 
 // Both ways: pass(array) of each in turn, `pictures` being as many as there are.
 template <typename Pass>
@@ -57,29 +38,19 @@ void pass_arrays(DecodedModel& decoded, std::vector<char>& pictures, const Pass&
 DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
   GuardedProcess process(
       min_memory + memory_per_byte * file_bytes, [&](const GuardedProcess::Write& write) {
-        const auto pass = [&](const auto& array) { send(write, array); };
         try {
           DecodedModel decoded = decode();
           std::vector<char> pictures(decoded.pictures.size());
-          pass(std::string());  // no error
-          pass_arrays(decoded, pictures, pass);
+          send_error(write, nullptr);
+          pass_arrays(decoded, pictures, [&](const auto& array) { send_array(write, array); });
         } catch (const Error& error) {
-          for (const std::string& text : {error.reason(), error.context().field,
-                                          error.context().value, error.context().bound})
-            pass(text);
+          send_error(write, &error);
         }
       });
-  const auto pass = [&](auto& array) { receive(process, array); };
-  std::string reason;
-  pass(reason);
-  if (!reason.empty()) {
-    ErrorContext context;
-    for (std::string* text : {&context.field, &context.value, &context.bound}) pass(*text);
-    throw Error(reason, context);
-  }
+  receive_error(process, broken);
   DecodedModel decoded;
   std::vector<char> pictures;
-  pass_arrays(decoded, pictures, pass);
+  pass_arrays(decoded, pictures, [&](auto& array) { receive_array(process, broken, array); });
   return decoded;
 }
 

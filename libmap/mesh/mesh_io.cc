@@ -13,6 +13,8 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/assimp_codec.h"
 #include "libmap/mesh/mesh_text.h"
+#include "libmap/raster/dem_mesh.h"
+#include "libmap/raster/dem_reader.h"
 
 namespace libmap {
 namespace {
@@ -82,6 +84,14 @@ MeshReadResult decode(const std::string& format, const std::shared_ptr<const std
   return {std::move(mesh), std::move(info)};
 }
 
+MeshReadResult read_dem(const std::filesystem::path& path) {
+  MeshReadResult result{read_dem_mesh(path), read_cloud_info(path)};
+  if (result.mesh.triangles.empty()) throw Error("contains no triangle", {.file = path.string()});
+  result.info.points = result.mesh.vertices.size();
+  result.info.faces = result.mesh.triangles.size();
+  return result;
+}
+
 ColumnSet columns_of_vertices(const TriangleMesh& mesh) {
   ColumnSet set;
   set.rows = mesh.vertices.size();
@@ -119,6 +129,20 @@ void encode(const std::string& format, const TriangleMesh& mesh, const MeshWrite
 
 }  // namespace
 
+std::vector<std::filesystem::path> mesh_pieces(const std::filesystem::path& given) {
+  if (!std::filesystem::is_directory(given)) return {given};
+  std::vector<std::filesystem::path> pieces;
+  for (const auto& entry : std::filesystem::directory_iterator(given))
+    if (is_read(format_of(entry.path())) && entry.is_regular_file() &&
+        entry.path().filename().string().front() != '.')
+      pieces.push_back(entry.path());
+  if (pieces.empty())
+    throw Error("the folder contains no mesh (.ply, .obj, .stl, .off, .glb)",
+                {.file = given.string()});
+  std::sort(pieces.begin(), pieces.end());
+  return pieces;
+}
+
 void require_mesh_format(const std::filesystem::path& path) {
   const std::string format = format_of(path);
   if (!is_read(format) && format != ".vtp")
@@ -126,8 +150,18 @@ void require_mesh_format(const std::filesystem::path& path) {
 }
 
 MeshReadResult read_mesh(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) {
+    MeshReadResult joined;
+    for (const std::filesystem::path& piece : mesh_pieces(path)) {
+      MeshReadResult read = read_mesh(piece);
+      append_mesh(read.mesh, joined.mesh);
+      joined.info = std::move(read.info);
+    }
+    return joined;
+  }
   refuse_vtp(path);
-  if (!is_read(format_of(path))) throw no_mesh_format(path, ".ply, .obj, .stl, .off or .glb");
+  if (is_dem_path(path)) return read_dem(path);
+  if (!is_read(format_of(path))) throw no_mesh_format(path, ".ply, .obj, .stl, .off, .glb or .tif");
   const auto bytes = read_geometry_bytes(path);
   try {
     MeshReadResult result = decode(format_of(path), bytes);
@@ -157,16 +191,23 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
 }
 
 FileKind file_kind(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) {
+    const auto is_mesh = [](const std::filesystem::directory_entry& entry) {
+      return is_read(format_of(entry.path())) && file_kind(entry.path()) == FileKind::mesh;
+    };
+    const std::filesystem::directory_iterator entries(path);
+    return std::any_of(begin(entries), end(entries), is_mesh) ? FileKind::mesh : FileKind::cloud;
+  }
   refuse_vtp(path);
   const std::string format = format_of(path);
   if (format == ".ply") return read_cloud_info(path).faces > 0 ? FileKind::mesh : FileKind::cloud;
-  if (is_read(format)) return FileKind::mesh;
+  if (is_read(format) || is_dem_path(path)) return FileKind::mesh;
   if (format == ".pcd" || format == ".csv") return FileKind::cloud;
   throw Error("neither a cloud nor a mesh",
               {.file = path.string(),
                .field = "extension",
                .value = format.empty() ? "missing" : format,
-               .bound = ".pcd, .ply, .csv, .obj, .stl, .off or .glb"});
+               .bound = ".pcd, .ply, .csv, .obj, .stl, .off, .glb or .tif"});
 }
 
 }  // namespace libmap

@@ -7,6 +7,7 @@
 //   .off   mesh_text       mesh_text       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
 //   .glb   assimp          assimp          float32; normals, colors
+//   .tif   libmap/raster   not written     a DEM; geometry alone
 //
 // float32 holds 24 bits: at 16 m from the origin a step is 2 micrometers, at 500 km (map
 // coordinates) 3 cm. Move such a mesh to a local origin, or use .ply or .vtp, which store float64
@@ -18,6 +19,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "libmap/cloud/geometry_file.h"
 #include "libmap/core/triangle_mesh.h"
@@ -37,11 +39,16 @@ struct MeshWriteOptions {
 
 enum class FileKind { cloud, mesh };  // what a file holds: points alone, or faces too
 
+// Of a folder all pieces together, vertices on seams once a piece, and the last one's info.
 // Polygons of more than three corners are cut into fans of triangles, each with the polygon's face
 // fields; lines and points are passed over. Throws Error naming the file: it cannot be read, is not
 // of its format, holds no triangle, promises more than it holds, has a corner that is no vertex or
 // a vertex that is not finite.
 MeshReadResult read_mesh(const std::filesystem::path& path);
+
+// The file itself, or the files of a folder with an extension that meshes are read from, in the
+// order of their names; hidden files are passed over. Throws Error: a folder without one.
+std::vector<std::filesystem::path> mesh_pieces(const std::filesystem::path& file_or_folder);
 
 // Writes straight to `path`; callers that need the file whole or not at all pass an OutputFile's
 // temporary path. What a format cannot keep (the table above) is left out. Throws Error: unknown
@@ -52,8 +59,9 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
 // Throws Error unless meshes are written in the format that the extension names.
 void require_mesh_format(const std::filesystem::path& path);
 
-// Whether the file holds a mesh (it has faces) or a cloud: by its extension, and for .ply by its
-// content. Throws Error: an extension of neither, or a file that cannot be read.
+// Whether the file holds a mesh (it has faces), or a folder one that does, or a cloud: by its
+// extension, and for .ply by its content. Throws Error: an extension of neither, or a file that
+// cannot be read.
 FileKind file_kind(const std::filesystem::path& path);
 
 }  // namespace libmap

@@ -28,7 +28,7 @@ SampledSurface surface_of(const TriangleMesh& mesh) {
   const Bounds3d bounds = bounds_of(mesh.vertices);
   const double farthest =
       std::max(bounds.min.cwiseAbs().maxCoeff(), bounds.max.cwiseAbs().maxCoeff());
-  SampledSurface surface{mesh, bounds.min, SurfacePieces(mesh), 0.0, 0.0};
+  SampledSurface surface{mesh, bounds.min, SurfacePieces(mesh), 0.0, 0.0, {}};
   if (farthest <= single_precision_m) {
     const auto single = static_cast<float>(farthest);
     const float step = std::nextafter(single, std::numeric_limits<float>::infinity()) - single;
@@ -127,19 +127,8 @@ class CountSearch {
   double too_large_ = std::numeric_limits<double>::infinity();
 };
 
-}  // namespace
-
-void bind(ParameterTable& table, PoissonDiskOptions& options) {
-  table.add("radius_m", options.radius_m, positive,
-            "least distance of two samples; no point of the surface is farther from one");
-  table.add("count", options.count, {0.0, max_samples},
-            "> 0: so many samples, to 1 %, of the radius that yields them");
-  table.add("seed", options.seed, {}, "of the random draws");
-}
-
-PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
-                                      Progress& progress) {
-  const SampledSurface surface = surface_of(mesh);
+PoissonDiskResult sample(const SampledSurface& surface, const PoissonDiskOptions& options,
+                         Progress& progress) {
   require_sense(surface, options);
   PoissonDiskResult result;
   result.area_m2 = surface.area_m2;
@@ -156,14 +145,60 @@ PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDis
       options.count == 0 ||
       std::abs(static_cast<double>(samples.positions.size()) - wanted) <= count_tolerance * wanted;
   result.smallest_distance_m = timed(result.timings_s, "smallest distance", [&] {
-    return smallest_distance(samples.positions, result.radius_m);
+    std::vector<Eigen::Vector3d> all = surface.others;
+    all.insert(all.end(), samples.positions.begin(), samples.positions.end());
+    return smallest_distance(all, result.radius_m);
   });
   const double per_sample_m2 = surface.area_m2 / static_cast<double>(samples.positions.size());
   result.relative_radius =
       result.smallest_distance_m / (2.0 * std::sqrt(per_sample_m2 / (2.0 * std::numbers::sqrt3)));
   result.cloud = timed(result.timings_s, "attributes",
-                       [&] { return points_on_surface(mesh, samples.places); });
+                       [&] { return points_on_surface(surface.mesh, samples.places); });
   result.cloud.positions = std::move(samples.positions);
+  return result;
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, PoissonDiskOptions& options) {
+  table.add("radius_m", options.radius_m, positive,
+            "least distance of two samples; no point of the surface is farther from one");
+  table.add("count", options.count, {0.0, max_samples},
+            "> 0: so many samples, to 1 %, of the radius that yields them");
+  table.add("seed", options.seed, {}, "of the random draws");
+}
+
+PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
+                                      Progress& progress) {
+  return sample(surface_of(mesh), options, progress);
+}
+
+PieceSampler::PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options)
+    : boxes_(std::move(boxes)), options_(options), near_(boxes_.size()) {
+  check_parameters(options);
+  if (options.count > 0)
+    throw Error("needs the whole surface at once, which comes in pieces",
+                {.field = "count", .value = std::to_string(options.count), .bound = "0"});
+}
+
+PoissonDiskResult PieceSampler::sample(const TriangleMesh& mesh, std::size_t number,
+                                       Progress& progress) {
+  if (!(surface_area(mesh) > 0.0)) return {};
+  SampledSurface surface = surface_of(mesh);
+  surface.others = std::move(near_[number]);
+  PoissonDiskOptions options = options_;
+  options.seed = mix_bits(options_.seed, number);
+  PoissonDiskResult result = libmap::sample(surface, options, progress);
+  for (std::size_t n = 0; n < boxes_.size(); ++n) {
+    if (n == number) continue;
+    const Eigen::Vector3d low = boxes_[n].min.array() - options.radius_m;
+    const Eigen::Vector3d high = boxes_[n].max.array() + options.radius_m;
+    const Bounds3d& own = boxes_[number];
+    if ((own.max.array() < low.array()).any() || (own.min.array() > high.array()).any()) continue;
+    for (const Eigen::Vector3d& position : result.cloud.positions)
+      if ((position.array() >= low.array()).all() && (position.array() <= high.array()).all())
+        near_[n].push_back(position);
+  }
   return result;
 }
 

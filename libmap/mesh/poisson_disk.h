@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
@@ -46,5 +47,22 @@ struct PoissonDiskResult {
 // or 2.5 million, whichever is more, or than 10^8.
 PoissonDiskResult sample_poisson_disk(const TriangleMesh& mesh, const PoissonDiskOptions& options,
                                       Progress& progress = no_progress());
+
+// The same surface in pieces, one after the other, by radius alone: no two samples of any pieces
+// are nearer than the radius, and seams have no gap. Memory depends on the size of a piece, and on
+// the samples near others.
+class PieceSampler {
+ public:
+  // `boxes` of all pieces. Throws Error if a number of samples is asked for.
+  PieceSampler(std::vector<Bounds3d> boxes, const PoissonDiskOptions& options);
+  // Of piece `number`, each once; a mesh without area has none.
+  PoissonDiskResult sample(const TriangleMesh& mesh, std::size_t number,
+                           Progress& progress = no_progress());
+
+ private:
+  std::vector<Bounds3d> boxes_;
+  PoissonDiskOptions options_;
+  std::vector<std::vector<Eigen::Vector3d>> near_;  // samples of other pieces, by piece
+};
 
 }  // namespace libmap

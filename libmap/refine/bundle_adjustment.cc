@@ -2,7 +2,6 @@
 
 #include <ceres/ceres.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -12,15 +11,20 @@
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/pose_residuals.h"
 #include "libmap/refine/rigid_motion.h"
+#include "libmap/refine/sparse_adjustment.h"
 
 namespace libmap {
 
 namespace {
 
 constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
-constexpr int point_steps = 3;
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
+constexpr double timing_prior_s = 0.03;
+// How a hand's motion differs from that between poses of a second or less.
+constexpr double motion_prior_m_per_s = 0.15;
+constexpr double motion_prior_rad_per_s = 0.25;
+constexpr double max_motion_gap_s = 3.0;
 
 std::size_t count_numbers(const std::vector<DepthCorrection>& corrections) {
   std::size_t count = 0;
@@ -34,19 +38,68 @@ std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   return cameras;
 }
 
+// How the base moves at each frame, in its own frame (m/s, rad/s): from the frame before to the one
+// after. Where there is none within max_motion_gap_s, it does not move.
+std::map<int, Vector6d> motion_between(const std::vector<FrameFeatures>& frames,
+                                       const std::map<int, Pose>& poses) {
+  std::vector<std::pair<double, int>> nodes;
+  for (const FrameFeatures& frame : frames)
+    if (poses.contains(frame.node)) nodes.emplace_back(frame.stamp_s, frame.node);
+  std::sort(nodes.begin(), nodes.end());
+  std::map<int, Vector6d> motions;
+  for (std::size_t n = 0; n < nodes.size(); ++n) {
+    const auto [time_s, node] = nodes[n];
+    const auto is_near = [&](const std::pair<double, int>& other) {
+      return std::abs(other.first - time_s) <= max_motion_gap_s;
+    };
+    const auto& before = n > 0 && is_near(nodes[n - 1]) ? nodes[n - 1] : nodes[n];
+    const auto& after = n + 1 < nodes.size() && is_near(nodes[n + 1]) ? nodes[n + 1] : nodes[n];
+    Vector6d& motion = motions[node] = Vector6d::Zero();
+    const double seconds = after.first - before.first;
+    if (!(seconds > 0.0)) continue;
+    const Pose& first = poses.at(before.second);
+    const Pose& last = poses.at(after.second);
+    const Eigen::Matrix3d base_from_map = poses.at(node).linear().transpose();
+    motion << base_from_map * (last.translation() - first.translation()),
+        base_from_map * rotation_vector_of(last.linear() * first.linear().transpose());
+    motion /= seconds;
+  }
+  return motions;
+}
+
 class Adjustment {
  public:
   Adjustment(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
-             const std::map<int, Pose>& poses, const BundleAdjustmentOptions& options)
+             const std::map<int, Pose>& poses, const BundleAdjustmentOptions& options,
+             const SensorCalibration& start)
       : frames_(frames),
         tracks_(tracks),
         options_(options),
-        cameras_(options.refine_intrinsics || options.refine_depth || options.refine_registration
+        cameras_(options.refine_intrinsics || options.refine_depth || options.refine_registration ||
+                         options.refine_timing
                      ? max_cameras(frames)
                      : 0),
-        corrections_(corrections_for(frames, refines_more() ? cameras_ : 0, options.depth_knot_m)),
-        blocks_(poses, 10 * cameras_ + count_numbers(corrections_)) {
+        corrections_(
+            corrections_for(frames, options.refine_depth ? cameras_ : 0, options.depth_knot_m)),
+        motions_(options.refine_timing ? motion_between(frames, poses) : std::map<int, Vector6d>{}),
+        blocks_(poses,
+                camera_numbers * cameras_ + count_numbers(corrections_) + 6 * motions_.size()) {
     result_.map_from_base = poses;
+    if (options.refine_registration) start_.color_from_depth = start.color_from_depth;
+    if (options.refine_timing) {
+      start_.timing = start.timing;
+      start_.motion = start.motion;
+    }
+    start_.color_from_depth.resize(cameras_, Pose::Identity());
+    start_.timing.resize(cameras_);
+    for (std::size_t n = 0; n < cameras_; ++n) {
+      timing(n)[0] = start_.timing[n].depth_delay_s;
+      timing(n)[1] = start_.timing[n].rolling_shutter_s;
+    }
+    for (const auto& [node, between] : motions_) {
+      const auto known = start_.motion.emplace(node, between).first;
+      Eigen::Map<Vector6d>(motion(node)) = known->second;
+    }
     for (const FeatureTrack& track : tracks_) {
       const Eigen::Vector3d point = place_of(track);
       points_.push_back({point.x(), point.y(), point.z()});
@@ -64,46 +117,48 @@ class Adjustment {
   bool has_pose(const Observation& seen) const {
     return blocks_.contains(frames_[seen.frame].node);
   }
-  double* intrinsics(std::size_t camera) const { return blocks_.rest() + 4 * camera; }
-  double* registration(std::size_t camera) const {
-    return blocks_.rest() + 4 * cameras_ + 6 * camera;
-  }
-  Eigen::Vector3d place_of(const FeatureTrack& track) const;
-  // The observation as the refined intrinsics have it.
-  Linearized linearized(const Observation& seen, const Eigen::Vector3d& point) const;
-  double weight_of(const Linearized& l) const {
-    return 1.0 / (1.0 + l.residual.squaredNorm() / (options_.robust_scale * options_.robust_scale));
-  }
+  double* intrinsics(std::size_t camera) const { return blocks_.rest() + camera_numbers * camera; }
+  double* registration(std::size_t camera) const { return intrinsics(camera) + 4; }
+  double* timing(std::size_t camera) const { return intrinsics(camera) + 10; }
   double* depth_numbers(std::size_t camera) const {
-    double* numbers = blocks_.rest() + 10 * cameras_;
+    double* numbers = intrinsics(cameras_);
     for (std::size_t n = 0; n < camera; ++n) numbers += 3 + corrections_[n].spline_m.size();
     return numbers;
   }
-  bool refines_more() const { return options_.refine_depth || options_.refine_registration; }
-  bool refines_more(std::size_t camera) const {
-    return refines_more() && !corrections_[camera].empty();
+  double* motion(int node) const {
+    return depth_numbers(corrections_.size()) +
+           6 * std::distance(motions_.begin(), motions_.find(node));
   }
+  // Blocks of a camera and of a node, in the order of ObservationCost.
+  std::vector<double*> calibration_blocks(const Feature& its, int node,
+                                          const CalibratedObservation& calibrated) const;
+  Eigen::Vector3d place_of(const FeatureTrack& track) const;
+  CalibratedObservation calibrated(const Observation& seen) const;
   void add_observation(ceres::Problem& problem, const Observation& seen, double* point);
   void add_observations(ceres::Problem& problem);
-  void add_intrinsics_priors(ceres::Problem& problem);
+  void add_camera_priors(ceres::Problem& problem, std::size_t camera);
   void add_depth_priors(ceres::Problem& problem, std::size_t camera);
-  void add_registration_prior(ceres::Problem& problem, std::size_t camera);
+  double motion_scale() const;
+  void take_calibration();
   void add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links);
   void solve(ceres::Problem& problem);
-  void add_to_system(const FeatureTrack& track, const Eigen::Vector3d& point,
-                     const std::map<int, std::size_t>& place);
-  void settle(const FeatureTrack& track, Eigen::Vector3d& point) const;
   void eliminate_points(const std::vector<GraphLinkResult>& links,
                         const std::vector<FeatureTrack>& system_tracks);
 
+  static constexpr std::size_t camera_numbers = 12;
+
   const std::vector<FrameFeatures>& frames_;
+  std::vector<FrameFeatures> calibrated_frames_;  // at the end
   const std::vector<FeatureTrack>& tracks_;
   const BundleAdjustmentOptions& options_;
   BundleAdjustmentResult result_;
   std::size_t cameras_ = 0;                   // with something to refine
   std::vector<DepthCorrection> corrections_;  // of 0: their knots
-  // Then, of each camera: a step of the intrinsics (4), of the registration (6), and a correction
-  // of depth, its radial numbers first. In one place, since Ceres orders blocks by address.
+  std::map<int, Vector6d> motions_;           // between poses
+  SensorCalibration start_;
+  // Then, of each camera: a step of the intrinsics (4), of the registration (6), its timing (2); a
+  // correction of depth, its radial numbers first; of each node its motion (6). In one place, since
+  // Ceres orders blocks by address.
   PoseBlocks blocks_;
   std::vector<std::array<double, 3>> points_;
 };
@@ -121,33 +176,59 @@ Eigen::Vector3d Adjustment::place_of(const FeatureTrack& track) const {
   return count > 0.0 ? Eigen::Vector3d(sum / count) : sum;
 }
 
-void Adjustment::add_observation(ceres::Problem& problem, const Observation& seen, double* point) {
+CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
+  CalibratedObservation calibrated;
+  if (cameras_ == 0) return calibrated;
+  const FrameFeatures& frame = frames_[seen.frame];
   const Feature& its = feature(seen);
-  const Camera& camera = frames_[seen.frame].cameras[its.camera];
-  auto* residual = new ObservationResidual(its, camera);
-  auto* loss = new ceres::CauchyLoss(options_.robust_scale);
-  double* pose = blocks_.at(frames_[seen.frame].node);
-  if (cameras_ == 0) {
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3>(residual), loss, pose, point);
-  } else if (!refines_more(its.camera)) {
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3, 4>(residual), loss, pose,
-        point, intrinsics(its.camera));
-  } else {
-    const DepthCorrection& depth = corrections_[its.camera];
-    const DepthCorrection::Terms terms =
-        depth.terms(static_cast<double>(its.depth_m), squared_radius_of(its, camera));
-    residual->set_terms(terms);
-    if (options_.refine_registration)
-      residual->set_registration(depth_by_registration(frames_[seen.frame], its));
-    double* spline = depth_numbers(its.camera) + 3 + terms.first;
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<ObservationResidual, 3, 7, 3, 4, 1, 1, 1, 1, 3, 6>(
-            residual),
-        loss, pose, point, intrinsics(its.camera), spline, spline + 1, spline + 2, spline + 3,
-        depth_numbers(its.camera), registration(its.camera));
+  const Camera& camera = frame.cameras[its.camera];
+  calibrated.intrinsics = options_.refine_intrinsics;
+  calibrated.registration = options_.refine_registration;
+  calibrated.timing = options_.refine_timing;
+  if (options_.refine_depth && !corrections_[its.camera].empty()) {
+    calibrated.depth = true;
+    calibrated.terms = corrections_[its.camera].terms(static_cast<double>(its.depth_m),
+                                                      squared_radius_of(its, camera));
   }
+  if (options_.refine_registration || options_.refine_timing) {
+    const RegisteredDepth depth =
+        registered_depth(frame, its, color_from_depth_of(frame, its, start_));
+    calibrated.added_m = depth.added_m;
+    calibrated.by_step = depth.by_step;
+  }
+  if (options_.refine_timing) {
+    const CameraTiming& timing = start_.timing[its.camera];
+    calibrated.row_share = row_share_of(its, camera);
+    calibrated.known_step =
+        (timing.depth_delay_s - timing.rolling_shutter_s * calibrated.row_share) *
+        motion_in_camera(camera, start_.motion.at(frame.node));
+  }
+  return calibrated;
+}
+
+std::vector<double*> Adjustment::calibration_blocks(const Feature& its, int node,
+                                                    const CalibratedObservation& calibrated) const {
+  std::vector<double*> blocks;
+  if (calibrated.intrinsics) blocks.push_back(intrinsics(its.camera));
+  if (calibrated.depth) {
+    double* const numbers = depth_numbers(its.camera);
+    for (std::size_t n = 0; n < 4; ++n) blocks.push_back(numbers + 3 + calibrated.terms.first + n);
+    blocks.push_back(numbers);
+  }
+  if (calibrated.registration) blocks.push_back(registration(its.camera));
+  if (calibrated.timing) blocks.insert(blocks.end(), {motion(node), timing(its.camera)});
+  return blocks;
+}
+
+void Adjustment::add_observation(ceres::Problem& problem, const Observation& seen, double* point) {
+  const FrameFeatures& frame = frames_[seen.frame];
+  const Feature& its = feature(seen);
+  const CalibratedObservation calibrated = this->calibrated(seen);
+  std::vector<double*> blocks = {blocks_.at(frame.node), point};
+  const std::vector<double*> more = calibration_blocks(its, frame.node, calibrated);
+  blocks.insert(blocks.end(), more.begin(), more.end());
+  problem.AddResidualBlock(new ObservationCost(its, frame.cameras[its.camera], calibrated),
+                           new ceres::CauchyLoss(options_.robust_scale), blocks);
 }
 
 void Adjustment::add_observations(ceres::Problem& problem) {
@@ -155,39 +236,36 @@ void Adjustment::add_observations(ceres::Problem& problem) {
     std::size_t views = 0;
     for (const Observation& seen : tracks_[t].observations) views += has_pose(seen) ? 1 : 0;
     if (views < 2) continue;
-    ++result_.tracks;
     for (const Observation& seen : tracks_[t].observations) {
       if (!has_pose(seen)) continue;
       ++result_.observations;
       add_observation(problem, seen, points_[t].data());
     }
   }
-  add_intrinsics_priors(problem);
-  for (std::size_t n = 0; n < corrections_.size(); ++n)
-    if (refines_more(n)) {
-      add_depth_priors(problem, n);
-      add_registration_prior(problem, n);
-    }
+  for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(problem, n);
+  for (const auto& [node, between] : motions_)
+    if (problem.HasParameterBlock(motion(node)))
+      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearResidual, 6, 6>(new NearResidual(
+                                   between, motion_prior_m_per_s, motion_prior_rad_per_s)),
+                               nullptr, motion(node));
 }
 
-void Adjustment::add_intrinsics_priors(ceres::Problem& problem) {
-  for (std::size_t n = 0; n < cameras_; ++n) {
-    if (!problem.HasParameterBlock(intrinsics(n))) continue;
+void Adjustment::add_camera_priors(ceres::Problem& problem, std::size_t camera) {
+  if (problem.HasParameterBlock(intrinsics(camera)))
     problem.AddResidualBlock(
         new ceres::AutoDiffCostFunction<IntrinsicsPrior, 4, 4>(
             new IntrinsicsPrior(options_.focal_prior, options_.center_prior_px)),
-        nullptr, intrinsics(n));
-    if (!options_.refine_intrinsics) problem.SetParameterBlockConstant(intrinsics(n));
-  }
-}
-
-void Adjustment::add_registration_prior(ceres::Problem& problem, std::size_t camera) {
-  double* const block = registration(camera);
-  if (!problem.HasParameterBlock(block)) return;
-  problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SmallResidual, 6, 6>(
-                               new SmallResidual(registration_prior_m, registration_prior_rad)),
-                           nullptr, block);
-  if (!options_.refine_registration) problem.SetParameterBlockConstant(block);
+        nullptr, intrinsics(camera));
+  if (options_.refine_depth && !corrections_[camera].empty()) add_depth_priors(problem, camera);
+  if (problem.HasParameterBlock(registration(camera)))
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearResidual, 6, 6>(new NearResidual(
+                                 step_between(start_.color_from_depth[camera], Pose::Identity()),
+                                 registration_prior_m, registration_prior_rad)),
+                             nullptr, registration(camera));
+  if (problem.HasParameterBlock(timing(camera)))
+    problem.AddResidualBlock(
+        new ceres::AutoDiffCostFunction<TimingPrior, 2, 2>(new TimingPrior(timing_prior_s)),
+        nullptr, timing(camera));
 }
 
 // Each number is small, the spline bends little, and depths keep their mean (depth_gauge).
@@ -228,10 +306,6 @@ void Adjustment::add_depth_priors(ceres::Problem& problem, std::size_t camera) {
   for (double& factor : spline) factor /= count * depth_gauge;
   for (double& factor : radii) factor /= count * depth_gauge;
   add(0, spline, radii);
-  if (options_.refine_depth) return;
-  for (std::size_t n = 0; n < depth.spline_m.size(); ++n)
-    problem.SetParameterBlockConstant(radial + 3 + n);
-  problem.SetParameterBlockConstant(radial);
 }
 
 void Adjustment::add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links) {
@@ -261,19 +335,10 @@ void Adjustment::solve(ceres::Problem& problem) {
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (auto& point : points_)
     if (problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
-  for (const auto& [node, block] : blocks_.all())
-    if (problem.HasParameterBlock(block)) ordering->AddElementToGroup(block, 1);
-  for (std::size_t n = 0; n < cameras_; ++n)
-    if (problem.HasParameterBlock(intrinsics(n))) ordering->AddElementToGroup(intrinsics(n), 1);
-  for (std::size_t n = 0; n < corrections_.size(); ++n) {
-    double* const numbers = depth_numbers(n);
-    if (problem.HasParameterBlock(numbers)) ordering->AddElementToGroup(numbers, 1);
-    for (std::size_t k = 0; k < corrections_[n].spline_m.size(); ++k)
-      if (problem.HasParameterBlock(numbers + 3 + k))
-        ordering->AddElementToGroup(numbers + 3 + k, 1);
-  }
-  for (std::size_t n = 0; n < cameras_; ++n)
-    if (problem.HasParameterBlock(registration(n))) ordering->AddElementToGroup(registration(n), 1);
+  std::vector<double*> others;
+  problem.GetParameterBlocks(&others);
+  for (double* const block : others)
+    if (!ordering->IsMember(block)) ordering->AddElementToGroup(block, 1);
   settings.linear_solver_ordering = ordering;
   ceres::Solver::Summary summary;
   ceres::Solve(settings, &problem, &summary);
@@ -283,96 +348,64 @@ void Adjustment::solve(ceres::Problem& problem) {
   result_.converged = summary.IsSolutionUsable();
 }
 
-Linearized Adjustment::linearized(const Observation& seen, const Eigen::Vector3d& point) const {
-  Feature its = feature(seen);
-  Camera camera = frames_[seen.frame].cameras[its.camera];
-  if (!result_.color_from_depth.empty()) {
-    const std::array<double, 6> derivatives = depth_by_registration(frames_[seen.frame], its);
-    double added = 0.0;
-    for (std::size_t n = 0; n < 6; ++n) added += derivatives[n] * registration(its.camera)[n];
-    its.depth_m += static_cast<float>(added);
-  }
-  if (!result_.depth.empty()) {
-    const auto z = static_cast<double>(its.depth_m);
-    its.depth_m =
-        static_cast<float>(z + result_.depth[its.camera].at(z, squared_radius_of(its, camera)));
-  }
-  if (!result_.intrinsics.empty()) {
-    its.ray = moved_ray(its, camera, result_.intrinsics[its.camera]);
-    camera = moved(camera, result_.intrinsics[its.camera]);
-  }
-  return linearize(its, camera, result_.map_from_base.at(frames_[seen.frame].node), point);
-}
-
-// The track's share of the normal equations, its point eliminated.
-void Adjustment::add_to_system(const FeatureTrack& track, const Eigen::Vector3d& point,
-                               const std::map<int, std::size_t>& place) {
-  const auto views = std::count_if(track.observations.begin(), track.observations.end(),
-                                   [&](const Observation& seen) { return has_pose(seen); });
-  if (views < 2) return;
-  Eigen::Matrix3d of_point = Eigen::Matrix3d::Zero();
-  std::vector<std::pair<std::size_t, Eigen::Matrix<double, 6, 3>>> mixed;
-  for (const Observation& seen : track.observations) {
-    if (!has_pose(seen)) continue;
-    const int node = frames_[seen.frame].node;
-    const Feature& its = feature(seen);
-    const Linearized l = linearized(seen, point);
-    const double weight = weight_of(l);
-    if (weight < 0.5) {
-      ++result_.outliers;
-    } else {
-      result_.reprojection_rms_px += l.residual.head<2>().squaredNorm() *
-                                     static_cast<double>(its.pixel_noise_px) *
-                                     static_cast<double>(its.pixel_noise_px) / 2.0;
-      result_.depth_rms_m += std::pow(l.residual.z() * static_cast<double>(its.depth_noise_m), 2);
-    }
-    const std::size_t row = place.at(node);
-    result_.information.add(row, row, weight * l.by_pose.transpose() * l.by_pose);
-    of_point += weight * l.by_point.transpose() * l.by_point;
-    mixed.emplace_back(row, weight * l.by_pose.transpose() * l.by_point);
-  }
-  const Eigen::Matrix3d inverse = of_point.inverse();
-  for (std::size_t a = 0; a < mixed.size(); ++a)
-    for (std::size_t b = a; b < mixed.size(); ++b)
-      result_.information.add(mixed[a].first, mixed[b].first,
-                              -mixed[a].second * inverse * mixed[b].second.transpose());
-}
-
-// Where the track's observations agree best at the poses as they are.
-void Adjustment::settle(const FeatureTrack& track, Eigen::Vector3d& point) const {
-  for (int step = 0; step < point_steps; ++step) {
-    Eigen::Matrix3d of_point = Eigen::Matrix3d::Zero();
-    Eigen::Vector3d side = Eigen::Vector3d::Zero();
-    for (const Observation& seen : track.observations) {
-      if (!has_pose(seen)) continue;
-      const Linearized l = linearized(seen, point);
-      of_point += weight_of(l) * l.by_point.transpose() * l.by_point;
-      side -= weight_of(l) * l.by_point.transpose() * l.residual;
-    }
-    point += of_point.ldlt().solve(side);
-  }
-}
-
 void Adjustment::eliminate_points(const std::vector<GraphLinkResult>& links,
                                   const std::vector<FeatureTrack>& system_tracks) {
-  std::map<int, std::size_t> place;
-  for (const auto& [node, pose] : result_.map_from_base) place.emplace(node, place.size());
-  result_.information = BlockSystem(place.size());
-  if (system_tracks.empty()) {
-    for (std::size_t t = 0; t < tracks_.size(); ++t)
-      add_to_system(tracks_[t], result_.points[t], place);
-  } else {
-    for (const FeatureTrack& track : system_tracks) {
-      Eigen::Vector3d point = place_of(track);
-      settle(track, point);
-      add_to_system(track, point, place);
-    }
-  }
-  const double kept = std::max(1.0, static_cast<double>(result_.observations - result_.outliers));
-  result_.reprojection_rms_px = std::sqrt(result_.reprojection_rms_px / kept);
-  result_.depth_rms_m = std::sqrt(result_.depth_rms_m / kept);
+  const TrackSystem observed(calibrated_frames_.empty() ? frames_ : calibrated_frames_,
+                             system_tracks.empty() ? tracks_ : system_tracks,
+                             options_.robust_scale);
+  const std::vector<Eigen::Vector3d> points =
+      system_tracks.empty() ? result_.points : observed.points_at(result_.map_from_base);
+  observed.totals(result_.map_from_base, points).add_to(result_);
+  result_.information = observed.system(result_.map_from_base, points);
   result_.information.add(link_system(result_.map_from_base, links));
   result_.information.clear_side();
+}
+
+// Only the product of time and motion is seen: the motions are right on average if their regression
+// on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
+// squares with both as measurements makes times too long.
+double Adjustment::motion_scale() const {
+  double mixed = 0.0;
+  double squares = 0.0;
+  for (const auto& [node, between] : motions_) {
+    Vector6d weight;
+    weight << Eigen::Vector3d::Constant(std::pow(motion_prior_m_per_s, -2)),
+        Eigen::Vector3d::Constant(std::pow(motion_prior_rad_per_s, -2));
+    const Eigen::Map<const Vector6d> estimated(motion(node));
+    mixed += between.dot(weight.cwiseProduct(estimated));
+    squares += between.dot(weight.cwiseProduct(between));
+  }
+  return mixed > 0.0 && squares > 0.0 ? mixed / squares : 1.0;
+}
+
+void Adjustment::take_calibration() {
+  SensorCalibration& found = result_.calibration;
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    const double* step = intrinsics(n);
+    if (options_.refine_intrinsics)
+      found.intrinsics.push_back({step[0], step[1], step[2], step[3]});
+    if (options_.refine_registration)
+      found.color_from_depth.push_back(
+          moved(Pose::Identity(), Eigen::Map<const Vector6d>(registration(n))) *
+          start_.color_from_depth[n]);
+    if (options_.refine_timing) found.timing.push_back({timing(n)[0], timing(n)[1]});
+    if (options_.refine_depth) {
+      const double* numbers = depth_numbers(n);
+      found.depth.push_back(corrections_[n]);
+      std::copy_n(numbers, 3, found.depth[n].radial.begin());
+      std::copy_n(numbers + 3, corrections_[n].spline_m.size(), found.depth[n].spline_m.begin());
+    }
+  }
+  const double scale = options_.refine_timing ? motion_scale() : 1.0;
+  for (CameraTiming& timing : found.timing) {
+    timing.depth_delay_s *= scale;
+    timing.rolling_shutter_s *= scale;
+  }
+  for (const auto& [node, between] : motions_)
+    found.motion.emplace(node, Eigen::Map<const Vector6d>(motion(node)) / scale);
+  if (found.empty()) return;
+  calibrated_frames_ = frames_;
+  for (FrameFeatures& frame : calibrated_frames_) calibrate(frame, found);
 }
 
 BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links,
@@ -389,19 +422,7 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
   if (result_.observations > 0) solve(problem);
   take_poses(problem, blocks_, result_.map_from_base);
   for (const auto& point : points_) result_.points.emplace_back(point[0], point[1], point[2]);
-  for (std::size_t n = 0; n < cameras_; ++n) {
-    const double* step = intrinsics(n);
-    result_.intrinsics.push_back({step[0], step[1], step[2], step[3]});
-    if (options_.refine_registration)
-      result_.color_from_depth.push_back(
-          moved(Pose::Identity(), Eigen::Map<const Vector6d>(registration(n))));
-  }
-  for (std::size_t n = 0; options_.refine_depth && n < cameras_; ++n) {
-    const double* numbers = depth_numbers(n);
-    result_.depth.push_back(corrections_[n]);
-    std::copy_n(numbers, 3, result_.depth[n].radial.begin());
-    std::copy_n(numbers + 3, corrections_[n].spline_m.size(), result_.depth[n].spline_m.begin());
-  }
+  take_calibration();
   eliminate_points(links, system_tracks);
   return std::move(result_);
 }
@@ -424,15 +445,14 @@ void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
   table.add("depth_knot_m", options.depth_knot_m, {0.02}, "between its knots");
 }
 
-BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
-                                     const std::vector<FeatureTrack>& tracks,
-                                     const std::map<int, Pose>& map_from_base,
-                                     const std::vector<GraphLinkResult>& links,
-                                     const std::vector<GraphComponent>& components,
-                                     const BundleAdjustmentOptions& options,
-                                     const std::vector<FeatureTrack>& system_tracks) {
+BundleAdjustmentResult adjust_bundle(
+    const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
+    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
+    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
+    const std::vector<FeatureTrack>& system_tracks, const SensorCalibration& start) {
   check_parameters(options);
-  return Adjustment(frames, tracks, map_from_base, options).run(links, components, system_tracks);
+  return Adjustment(frames, tracks, map_from_base, options, start)
+      .run(links, components, system_tracks);
 }
 
 BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
@@ -440,13 +460,26 @@ BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
                                      const std::map<int, Pose>& map_from_base,
                                      const std::vector<GraphLinkResult>& links,
                                      const std::vector<GraphComponent>& components,
-                                     const BundleAdjustmentOptions& options) {
-  const FeatureTracks tracks = build_tracks(frames, feature_links);
+                                     const BundleAdjustmentOptions& options,
+                                     const SensorCalibration& start, Progress& progress) {
+  check_parameters(options);
+  const bool refines = options.refine_intrinsics || options.refine_depth ||
+                       options.refine_registration || options.refine_timing;
+  const bool between_nodes =
+      std::none_of(links.begin(), links.end(),
+                   [](const GraphLinkResult& link) { return is_absolute(link.link); });
   FeatureTracks sparse;
   if (map_from_base.size() >= dense_below)
     sparse = build_tracks(frames, feature_links, TrackFrames::linked);
+  if (map_from_base.size() >= dense_below && !refines && between_nodes) {
+    BundleAdjustmentResult result =
+        adjust_sparse(frames, sparse.tracks, map_from_base, links, components, options, progress);
+    result.conflicts = sparse.conflicts;
+    return result;
+  }
+  const FeatureTracks tracks = build_tracks(frames, feature_links);
   BundleAdjustmentResult result = adjust_bundle(frames, tracks.tracks, map_from_base, links,
-                                                components, options, sparse.tracks);
+                                                components, options, sparse.tracks, start);
   result.conflicts = tracks.conflicts;
   return result;
 }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "libmap/core/parameters.h"
+#include "libmap/core/progress.h"
 #include "libmap/refine/block_system.h"
 #include "libmap/refine/feature_tracks.h"
 #include "libmap/refine/frame_calibration.h"
@@ -21,7 +22,8 @@ struct BundleAdjustmentOptions {
   bool refine_intrinsics = false;    // of each camera of the rig, the same in all frames; their
                                      // distortion stays
   bool refine_depth = false;         // a DepthCorrection of each camera
-  bool refine_registration = false;  // where depth lies to color, of each camera
+  bool refine_registration = false;  // of depth to color, of each camera
+  bool refine_timing = false;        // a CameraTiming of each camera, and the motion at each node
   double focal_prior = 0.02;         // > 0: standard deviation of the focal length, of itself
   double center_prior_px = 8.0;      // > 0: ... and of the principal point
   double depth_prior_m = 0.03;       // > 0: ... and of a correction of depth
@@ -37,10 +39,8 @@ inline constexpr double depth_gauge = 1e-6;
 
 struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
-  std::vector<Eigen::Vector3d> points;     // in the map, one a track
-  std::vector<IntrinsicsStep> intrinsics;  // of a frame's cameras; empty if not asked
-  std::vector<DepthCorrection> depth;      // the same
-  std::vector<Pose> color_from_depth;      // the same
+  std::vector<Eigen::Vector3d> points;  // in the map, one a track
+  SensorCalibration calibration;        // what was free
   // Of steps of the poses (rigid_motion.h), in the order of map_from_base, the points eliminated
   // (Schur complement), at the end: the links among them.
   BlockSystem information{0};
@@ -57,26 +57,24 @@ struct BundleAdjustmentResult {
   bool converged = false;
 };
 
-// Poses that the intrinsics and depths were refined with fit frames that move_intrinsics and
-// correct_depth have changed. `links`
-// are those of the graph at its optimum (odometry, closures of other sources, priors); the
-// gauge nodes of the components stay where they are. The information is that of `system_tracks`
-// where there are any: of TrackFrames::linked it is a little less, and sparse.
-BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
-                                     const std::vector<FeatureTrack>& tracks,
-                                     const std::map<int, Pose>& map_from_base,
-                                     const std::vector<GraphLinkResult>& links,
-                                     const std::vector<GraphComponent>& components,
-                                     const BundleAdjustmentOptions& options = {},
-                                     const std::vector<FeatureTrack>& system_tracks = {});
+// The poses fit frames that are calibrated by the result's calibration. `links` are those of the
+// graph at its optimum (odometry, closures of other sources, priors); the gauge nodes of the
+// components stay where they are. The information is that of `system_tracks` where there are any:
+// of TrackFrames::linked it is a little less, and sparse. `start` is where registration, timing and
+// motion begin, if they are free; without it, at the stored ones and the motion between poses.
+BundleAdjustmentResult adjust_bundle(
+    const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
+    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
+    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
+    const std::vector<FeatureTrack>& system_tracks = {}, const SensorCalibration& start = {});
 
-// The same of all that links of features say. More than a hundred frames or so are adjusted with
-// conjugate gradients, and with a sparse information: in time that grows with the observations.
-BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
-                                     const std::vector<FeatureLink>& feature_links,
-                                     const std::map<int, Pose>& map_from_base,
-                                     const std::vector<GraphLinkResult>& links,
-                                     const std::vector<GraphComponent>& components,
-                                     const BundleAdjustmentOptions& options = {});
+// The same of all that links of features say. More than a hundred frames or so are adjusted in the
+// sparse system of the links (sparse_adjustment.h); with calibration free, or with links that place
+// a node by itself, with conjugate gradients and a sparse information.
+BundleAdjustmentResult adjust_bundle(
+    const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& feature_links,
+    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
+    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
+    const SensorCalibration& start = {}, Progress& progress = no_progress());
 
 }  // namespace libmap

@@ -11,102 +11,80 @@
 #include <vector>
 
 #include "libmap/image/depth_correction.h"
-#include "libmap/refine/features.h"
+#include "libmap/refine/frame_calibration.h"
 #include "libmap/refine/pose_residuals.h"
 #include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 
-// x, y in the picture and depth, in standard deviations. The intrinsics are steps away from those
-// by which the feature's ray was made: of fx and fy in parts, of cx and cy in pixels.
-class ObservationResidual {
- public:
-  ObservationResidual(const Feature& feature, const Camera& camera)
-      : camera_from_base_(Eigen::Quaterniond(camera.base_from_camera.linear()).conjugate()),
-        origin_(camera.base_from_camera.inverse().translation()),
-        ray_(feature.ray.cast<double>()),
-        depth_(static_cast<double>(feature.depth_m)),
-        fx_(camera.fx),
-        fy_(camera.fy),
-        pixel_noise_(static_cast<double>(feature.pixel_noise_px)),
-        depth_noise_(static_cast<double>(feature.depth_noise_m)) {}
-
-  template <typename T>
-  bool operator()(const T* pose, const T* point, T* residual) const {
-    const std::array<T, 4> none = {T(0), T(0), T(0), T(0)};
-    return (*this)(pose, point, none.data(), residual);
-  }
-
-  // What a turn and a shift of depth against color add to the depth: linear, since both are small.
-  template <typename T>
-  bool operator()(const T* pose, const T* point, const T* intrinsics, const T* s0, const T* s1,
-                  const T* s2, const T* s3, const T* radial, const T* registration,
-                  T* residual) const {
-    if (!(*this)(pose, point, intrinsics, s0, s1, s2, s3, radial, residual)) return false;
-    for (std::size_t n = 0; n < 6; ++n)
-      residual[2] -= registration[n] * T(by_registration_[n]) / T(depth_noise_);
-    return true;
-  }
-
-  // s0 to s3 are those numbers of the depth correction's spline that the depth takes part in.
-  template <typename T>
-  bool operator()(const T* pose, const T* point, const T* intrinsics, const T* s0, const T* s1,
-                  const T* s2, const T* s3, const T* radial, T* residual) const {
-    if (!(*this)(pose, point, intrinsics, residual)) return false;
-    T added = s0[0] * T(terms_.spline[0]) + s1[0] * T(terms_.spline[1]) +
-              s2[0] * T(terms_.spline[2]) + s3[0] * T(terms_.spline[3]);
-    for (std::size_t n = 0; n < 3; ++n) added += radial[n] * T(terms_.radial[n]);
-    residual[2] -= added / T(depth_noise_);
-    return true;
-  }
-  void set_terms(const DepthCorrection::Terms& terms) { terms_ = terms; }
-  void set_registration(const std::array<double, 6>& derivatives) {
-    by_registration_ = derivatives;
-  }
-
-  template <typename T>
-  bool operator()(const T* pose, const T* point, const T* intrinsics, T* residual) const {
-    const PoseView<T> base(pose);
-    const Eigen::Map<const Eigen::Matrix<T, 3, 1>> in_map(point);
-    const Eigen::Matrix<T, 3, 1> in_base =
-        base.rotation.conjugate() * Eigen::Matrix<T, 3, 1>(in_map - base.translation);
-    const Eigen::Matrix<T, 3, 1> in_camera =
-        camera_from_base_.cast<T>() * in_base + origin_.template cast<T>();
-    if (in_camera.z() < T(1e-3)) return false;
-    const T x = in_camera.x() / in_camera.z();
-    const T y = in_camera.y() / in_camera.z();
-    residual[0] =
-        (T(fx_) * ((T(1) + intrinsics[0]) * x - T(ray_.x())) + intrinsics[2]) / T(pixel_noise_);
-    residual[1] =
-        (T(fy_) * ((T(1) + intrinsics[1]) * y - T(ray_.y())) + intrinsics[3]) / T(pixel_noise_);
-    residual[2] = (in_camera.z() - T(depth_)) / T(depth_noise_);
-    return true;
-  }
-
- private:
-  Eigen::Quaterniond camera_from_base_;
-  Eigen::Vector3d origin_;
-  Eigen::Vector2d ray_;
-  double depth_;
-  double fx_;
-  double fy_;
-  double pixel_noise_;
-  double depth_noise_;
-  DepthCorrection::Terms terms_{};
-  std::array<double, 6> by_registration_{};
+// What the calibration of its camera changes in one observation, linear about a calibration that is
+// known already.
+struct CalibratedObservation {
+  bool intrinsics = false;  // which of the camera's numbers are unknown
+  bool depth = false;
+  bool registration = false;
+  bool timing = false;
+  DepthCorrection::Terms terms{};
+  double added_m = 0.0;                    // to the depth, by the known registration and timing
+  Vector6d by_step = Vector6d::Zero();     // of the depth, by a step of the registration
+  Vector6d known_step = Vector6d::Zero();  // of the known timing
+  double row_share = 0.0;                  // row_share_of
 };
 
-// Each number of a block is small.
-class SmallResidual {
+// x, y in the picture and depth, in standard deviations, by pose (7), point (3) and then, those
+// that are unknown: intrinsics (4), four numbers of the depth's spline (1 each) and the radial ones
+// (3), registration (6), motion of the base (6) and timing (2). The intrinsics are steps away from
+// those by which the feature's ray was made: of fx and fy in parts, of cx and cy in pixels; the
+// registration is a step from the known one.
+class ObservationCost : public ceres::CostFunction {
  public:
-  SmallResidual(double shift_m, double turn_rad) : shift_m_(shift_m), turn_rad_(turn_rad) {}
+  ObservationCost(const Feature& feature, const Camera& camera,
+                  const CalibratedObservation& calibrated)
+      : camera_from_base_(camera.base_from_camera.linear().transpose()),
+        base_from_camera_(camera.base_from_camera.translation()),
+        ray_(feature.ray.cast<double>()),
+        depth_(static_cast<double>(feature.depth_m)),
+        focal_(camera.fx, camera.fy),
+        weight_(1.0 / static_cast<double>(feature.pixel_noise_px),
+                1.0 / static_cast<double>(feature.pixel_noise_px),
+                1.0 / static_cast<double>(feature.depth_noise_m)),
+        calibrated_(calibrated) {
+    set_num_residuals(3);
+    std::vector<int>& sizes = *mutable_parameter_block_sizes();
+    sizes = {7, 3};
+    if (calibrated.intrinsics) sizes.push_back(4);
+    if (calibrated.depth) sizes.insert(sizes.end(), {1, 1, 1, 1, 3});
+    if (calibrated.registration) sizes.push_back(6);
+    if (calibrated.timing) sizes.insert(sizes.end(), {6, 2});
+  }
+
+  // As Ceres calls it; false for a point that is not in front of the camera.
+  bool Evaluate(const double* const* blocks, double* residual, double** jacobians) const override;
+
+ private:
+  Eigen::Matrix3d camera_from_base_;
+  Eigen::Vector3d base_from_camera_;  // the camera's place
+  Eigen::Vector2d ray_;
+  double depth_;
+  Eigen::Vector2d focal_;
+  Eigen::Vector3d weight_;
+  CalibratedObservation calibrated_;
+};
+
+// A step or a motion is near `mean`: three numbers by one standard deviation, three by another.
+class NearResidual {
+ public:
+  NearResidual(const Vector6d& mean, double shift_m, double turn_rad)
+      : mean_(mean), shift_m_(shift_m), turn_rad_(turn_rad) {}
   template <typename T>
   bool operator()(const T* step, T* residual) const {
-    for (int n = 0; n < 6; ++n) residual[n] = step[n] / T(n < 3 ? shift_m_ : turn_rad_);
+    for (int n = 0; n < 6; ++n)
+      residual[n] = (step[n] - T(mean_[n])) / T(n < 3 ? shift_m_ : turn_rad_);
     return true;
   }
 
  private:
+  Vector6d mean_;
   double shift_m_;
   double turn_rad_;
 };
@@ -154,6 +132,20 @@ class IntrinsicsPrior {
  private:
   double focal_;
   double center_;
+};
+
+// Delay of depth and time of the rows are short.
+class TimingPrior {
+ public:
+  explicit TimingPrior(double short_s) : short_s_(short_s) {}
+  template <typename T>
+  bool operator()(const T* timing, T* residual) const {
+    for (int n = 0; n < 2; ++n) residual[n] = timing[n] / T(short_s_);
+    return true;
+  }
+
+ private:
+  double short_s_;
 };
 
 // Residual of an observation with its derivatives by a step of the pose and by the point.

@@ -84,7 +84,7 @@ void DepthSurface::set_camera(const Camera& depth_camera) {
   find_rays();
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column) {
-      SurfaceElement element;
+      SurfacePatch element;
       if (!before.at(column, row, element)) continue;
       const Eigen::Vector2d ray = ray_at(column, row);
       Cell& cell = cells_[index(column, row)];
@@ -111,7 +111,7 @@ void DepthSurface::correct(const DepthCorrection& correction) {
   };
   for (int row = 0; row < rows_; ++row)
     for (int column = 0; column < columns_; ++column) {
-      SurfaceElement element;
+      SurfacePatch element;
       if (!at(column, row, element)) continue;
       const double x_px = column * step_px_;
       const double y_px = row * step_px_;
@@ -157,7 +157,7 @@ Eigen::Vector2d DepthSurface::ray_at(int column, int row) const {
           (row * step_px_ - camera_.cy) / camera_.fy};
 }
 
-bool DepthSurface::at(int column, int row, SurfaceElement& element) const {
+bool DepthSurface::at(int column, int row, SurfacePatch& element) const {
   const Cell& cell = cells_[index(column, row)];
   if (cell.depth_m <= 0.0F) return false;
   element.point = static_cast<double>(cell.depth_m) * ray_at(column, row).homogeneous();
@@ -169,7 +169,7 @@ bool DepthSurface::at(int column, int row, SurfaceElement& element) const {
   return true;
 }
 
-bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfaceElement& element) const {
+bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
   if (columns_ == 0 || !(point_in_camera.z() > 0.0)) return false;
   Eigen::Vector2d pixel;
   if (rays_.empty()) {

@@ -13,7 +13,7 @@
 namespace libmap {
 
 // The surface through one pixel of the grid, in the camera's optical frame.
-struct SurfaceElement {
+struct SurfacePatch {
   Eigen::Vector3d point = Eigen::Vector3d::Zero();
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();  // towards the camera
   double noise_m = 0.0;                              // standard deviation along the normal
@@ -48,9 +48,9 @@ class DepthSurface {
   int columns() const { return columns_; }
   int rows() const { return rows_; }
   // The element at a grid place; false where nothing was measured.
-  bool at(int column, int row, SurfaceElement& element) const;
+  bool at(int column, int row, SurfacePatch& element) const;
   // The element whose pixel lies nearest to where the camera sees `point_in_camera`.
-  bool seen_at(const Eigen::Vector3d& point_in_camera, SurfaceElement& element) const;
+  bool seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
 
  private:
   Camera camera_{};

@@ -185,6 +185,17 @@ bool FeatureCache::read(const std::string& key, const std::vector<Camera>& depth
   }
 }
 
+std::shared_ptr<UnnamedFile> FeatureCache::unnamed_file() const {
+  if (!enabled()) return nullptr;
+  try {
+    std::error_code failure;
+    std::filesystem::create_directory(folder_, failure);
+    return std::make_shared<UnnamedFile>(folder_);
+  } catch (const Error&) {
+    return nullptr;
+  }
+}
+
 bool FeatureCache::write(const std::string& key, const FrameFeatures& frame) const {
   if (!enabled()) return false;
   try {

@@ -2,8 +2,10 @@
 #pragma once
 
 #include <filesystem>
+#include <memory>
 #include <string>
 
+#include "libmap/core/unnamed_file.h"
 #include "libmap/refine/features.h"
 #include "libmap/scan/rgbd_frame.h"
 
@@ -27,6 +29,8 @@ class FeatureCache {
   // of the key, or it is damaged, or another program's.
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,
             FrameFeatures& frame) const;
+  // In its folder; nullptr where there is none, or none can be made.
+  std::shared_ptr<UnnamedFile> unnamed_file() const;
   // A file that cannot be written is no error: the next run goes without it. False then.
   bool write(const std::string& key, const FrameFeatures& frame) const;
 

@@ -1,8 +1,10 @@
 #include "libmap/refine/feature_tracks.h"
 
 #include <algorithm>
+#include <compare>
+#include <cstdint>
+#include <numeric>
 #include <set>
-#include <tuple>
 #include <utility>
 
 #include "libmap/core/disjoint_sets.h"
@@ -11,75 +13,90 @@ namespace libmap {
 
 namespace {
 
-// Features of all frames as one row of numbers, joined into sets.
+// Features of all frames as one row of numbers, joined into sets; the members of a set are a ring.
 class FeatureSets {
  public:
   explicit FeatureSets(const std::vector<FrameFeatures>& frames) {
     for (std::size_t f = 0; f < frames.size(); ++f) {
-      begin_.push_back(members_.size());
-      for (std::size_t n = 0; n < frames[f].features.size(); ++n) members_.push_back({{f, n}});
+      begin_.push_back(frame_of_.size());
+      frame_of_.insert(frame_of_.end(), frames[f].features.size(), static_cast<std::uint32_t>(f));
     }
-    sets_ = DisjointSets<std::size_t>(members_.size());
+    sets_ = DisjointSets<std::uint32_t>(frame_of_.size());
+    next_.resize(frame_of_.size());
+    std::iota(next_.begin(), next_.end(), std::uint32_t{0});
   }
 
   enum class Join { joined, conflict, unlinked };
 
   // A conflict if the two sets hold different features of one frame.
   Join join(const Observation& a, const Observation& b, const std::set<FramePair>* linked) {
-    const std::size_t one = sets_.find(begin_[a.frame] + a.feature);
-    const std::size_t other = sets_.find(begin_[b.frame] + b.feature);
+    const std::uint32_t one = sets_.find(number_of(a));
+    const std::uint32_t other = sets_.find(number_of(b));
     if (one == other) return Join::joined;
     Join result = Join::joined;
-    for (const Observation& member : members_[other])
-      for (const Observation& its : members_[one]) {
-        if (member.frame == its.frame) return Join::conflict;
-        if (linked != nullptr && !linked->contains(std::minmax(member.frame, its.frame)))
+    for (const std::uint32_t member : members(other))
+      for (const std::uint32_t its : members(one)) {
+        const std::size_t frame = frame_of_[member];
+        const std::size_t its_frame = frame_of_[its];
+        if (frame == its_frame) return Join::conflict;
+        if (linked != nullptr && !linked->contains(std::minmax(frame, its_frame)))
           result = Join::unlinked;
       }
     if (result != Join::joined) return result;
     sets_.join(one, other);
-    const std::size_t root = sets_.find(one);
-    std::vector<Observation>& joined = members_[root == one ? other : one];
-    members_[root].insert(members_[root].end(), joined.begin(), joined.end());
-    joined.clear();
+    std::swap(next_[one], next_[other]);
     return Join::joined;
   }
 
   std::vector<FeatureTrack> tracks() {
     std::vector<FeatureTrack> result;
-    for (std::vector<Observation>& set : members_) {
-      if (set.size() < 2) continue;
-      std::sort(set.begin(), set.end(), [](const Observation& a, const Observation& b) {
-        return std::tie(a.frame, a.feature) < std::tie(b.frame, b.feature);
-      });
-      result.push_back({std::move(set)});
+    for (std::uint32_t n = 0; n < next_.size(); ++n) {
+      if (next_[n] == n || sets_.find(n) != n) continue;
+      FeatureTrack track;
+      std::vector<std::uint32_t> numbers = members(n);
+      std::sort(numbers.begin(), numbers.end());
+      for (const std::uint32_t number : numbers)
+        track.observations.push_back({frame_of_[number], number - begin_[frame_of_[number]]});
+      result.push_back(std::move(track));
     }
-    std::sort(result.begin(), result.end(), [](const FeatureTrack& a, const FeatureTrack& b) {
-      const Observation& first = a.observations.front();
-      const Observation& second = b.observations.front();
-      return std::tie(first.frame, first.feature) < std::tie(second.frame, second.feature);
-    });
     return result;
   }
 
  private:
+  std::uint32_t number_of(const Observation& seen) const {
+    return static_cast<std::uint32_t>(begin_[seen.frame] + seen.feature);
+  }
+  std::vector<std::uint32_t> members(std::uint32_t first) const {
+    std::vector<std::uint32_t> ring = {first};
+    for (std::uint32_t n = next_[first]; n != first; n = next_[n]) ring.push_back(n);
+    return ring;
+  }
+
   std::vector<std::size_t> begin_;
-  DisjointSets<std::size_t> sets_{0};
-  std::vector<std::vector<Observation>> members_;  // at the root of each set
+  std::vector<std::uint32_t> frame_of_;
+  std::vector<std::uint32_t> next_;
+  DisjointSets<std::uint32_t> sets_{0};
+};
+
+struct RankedMatch {
+  double chi_square = 0.0;
+  std::uint32_t link = 0;
+  std::uint32_t match = 0;
+  auto operator<=>(const RankedMatch&) const = default;
 };
 
 }  // namespace
 
 FeatureTracks build_tracks(const std::vector<FrameFeatures>& frames,
                            const std::vector<FeatureLink>& links, TrackFrames together) {
-  std::vector<std::tuple<double, std::size_t, std::size_t>> order;  // chi-square, link, match
+  std::vector<RankedMatch> order;
   for (std::size_t n = 0; n < links.size(); ++n) {
     const FeatureLink& link = links[n];
     for (std::size_t m = 0; m < link.matches.size(); ++m)
-      order.emplace_back(match_residual(frames[link.frames.first], frames[link.frames.second],
-                                        link.matches[m], link.link.from_from_to)
-                             .chi_square(),
-                         n, m);
+      order.push_back({match_residual(frames[link.frames.first], frames[link.frames.second],
+                                      link.matches[m], link.link.from_from_to)
+                           .chi_square(),
+                       static_cast<std::uint32_t>(n), static_cast<std::uint32_t>(m)});
   }
   std::sort(order.begin(), order.end());
   std::set<FramePair> linked;

@@ -189,7 +189,27 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
     if (!view.color.empty()) add_features(view, planes, options, frame);
   }
   if (!result.from_cache) cache.write(key, frame);
+  frame.stamp_s = read.stamp_s;
   return result;
+}
+
+// Of the first frame that has any.
+std::vector<Camera> cameras_of(const ScanSource& scan, const std::vector<int>& nodes) {
+  for (const int node : nodes) {
+    try {
+      const RgbdFrame frame = scan.read_frame(node, {.color = false, .depth = false});
+      if (!frame.cameras.empty()) return frame.cameras;
+    } catch (const Error&) {
+      // Reported when its pictures are read.
+    }
+  }
+  return {};
+}
+
+void keep_descriptors(const std::shared_ptr<UnnamedFile>& file, FrameFeatures& frame) {
+  frame.descriptors_begin = file->append(frame.descriptors.data(), frame.descriptors.size());
+  frame.descriptor_file = file;
+  std::vector<std::uint8_t>().swap(frame.descriptors);
 }
 
 }  // namespace
@@ -257,22 +277,44 @@ void add_features(const CameraView& view, const DepthPlanes& planes, const Featu
   }
 }
 
+int surface_step(std::size_t frames, const std::vector<Camera>& cameras,
+                 const FeatureOptions& options) {
+  constexpr int largest = 32;
+  const auto bytes_with = [&](int step_px) {
+    double cells = 0.0;
+    for (const Camera& camera : cameras)
+      cells += std::ceil(static_cast<double>(camera.width) / step_px) *
+               std::ceil(static_cast<double>(camera.height) / step_px);
+    return cells * static_cast<double>(sizeof(DepthSurface::Cell)) * static_cast<double>(frames);
+  };
+  int step_px = options.surface_step_px;
+  while (step_px < largest && bytes_with(step_px) > static_cast<double>(options.max_surface_bytes))
+    ++step_px;
+  return step_px;
+}
+
 FeatureResult find_features(const ScanSource& scan, const std::vector<int>& nodes,
-                            const FeatureOptions& options, Progress& progress,
+                            const FeatureOptions& given, Progress& progress,
                             const FeatureCache* cache) {
-  check(options);
+  check(given);
+  FeatureOptions options = given;
+  options.surface_step_px = surface_step(nodes.size(), cameras_of(scan, nodes), given);
   const FeatureCache none;
   const SingleThreadedOpenCv single;
   std::vector<FoundFeatures> frames(nodes.size());
   std::vector<std::optional<Error>> faults(nodes.size());
   PixelRayCache rays;
   MemoryBudget memory;
+  const std::shared_ptr<UnnamedFile> file =
+      cache != nullptr && nodes.size() > options.max_frames_in_memory ? cache->unnamed_file()
+                                                                      : nullptr;
   progress.begin("features", nodes.size());
   parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       try {
         frames[n] =
             features_of(scan, nodes[n], options, rays, cache != nullptr ? *cache : none, memory);
+        if (file != nullptr) keep_descriptors(file, frames[n].frame);
       } catch (const Error& error) {
         faults[n] = error;
       }
@@ -299,10 +341,16 @@ std::size_t descriptor_bytes(FeatureType type) {
 Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame) {
   const std::size_t bytes = descriptor_bytes(frame.type);
   const auto count = static_cast<Eigen::Index>(frame.features.size());
+  std::vector<std::uint8_t> read;
+  if (frame.descriptor_file != nullptr && frame.descriptors.empty()) {
+    read.resize(bytes * frame.features.size());
+    frame.descriptor_file->read(frame.descriptors_begin, read.data(), read.size());
+  }
+  const std::vector<std::uint8_t>& descriptors = read.empty() ? frame.descriptors : read;
   if (frame.type == FeatureType::sift) {
     Eigen::MatrixXf vectors =
         Eigen::Map<const Eigen::Matrix<std::uint8_t, Eigen::Dynamic, Eigen::Dynamic>>(
-            frame.descriptors.data(), static_cast<Eigen::Index>(bytes), count)
+            descriptors.data(), static_cast<Eigen::Index>(bytes), count)
             .cast<float>();
     vectors.colwise().normalize();
     return vectors;
@@ -311,8 +359,7 @@ Eigen::MatrixXf descriptor_vectors(const FrameFeatures& frame) {
   for (Eigen::Index n = 0; n < count; ++n)
     for (Eigen::Index bit = 0; bit < vectors.rows(); ++bit) {
       const std::uint8_t byte =
-          frame
-              .descriptors[static_cast<std::size_t>(n) * bytes + static_cast<std::size_t>(bit / 8)];
+          descriptors[static_cast<std::size_t>(n) * bytes + static_cast<std::size_t>(bit / 8)];
       vectors(bit, n) = ((byte >> (bit % 8)) & 1) != 0 ? 0.0625F : -0.0625F;
     }
   return vectors;

@@ -6,6 +6,7 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -14,6 +15,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/unnamed_file.h"
 #include "libmap/refine/depth_surface.h"
 #include "libmap/scan/scan_source.h"
 
@@ -33,10 +35,19 @@ struct FeatureOptions {
   double pixel_noise_px = 0.15;   // > 0: of a feature's place in the picture, at the finest scale
   double scale_noise = 0.06;      // >= 0: ... and what each pixel of its size adds (squared), px/px
   double surface_noise_m = 5e-4;  // >= 0: of a fitted plane's depth, whatever the number of pixels
-  int surface_step_px = 3;        // 1 to 32: of the grid of planes
+  int surface_step_px = 3;        // 1 to 32: of the grid of planes, at least
   DepthPlaneOptions planes{};     // of the depth images
+  // Not bound, for long scans: of all frames' surfaces; and frames whose descriptors are in memory,
+  // those of more are on disk beside the cache.
+  std::size_t max_surface_bytes = std::size_t{320} << 20U;
+  std::size_t max_frames_in_memory = 300;
 };
 void bind(ParameterTable& table, FeatureOptions& options);
+
+// The step of the grid with which the surfaces of so many frames with these cameras' pictures take
+// at most max_surface_bytes: 32 if none does.
+int surface_step(std::size_t frames, const std::vector<Camera>& cameras,
+                 const FeatureOptions& options);
 
 struct Feature {
   Eigen::Vector2f ray = Eigen::Vector2f::Zero();  // x/z and y/z in its camera
@@ -48,13 +59,16 @@ struct Feature {
 
 struct FrameFeatures {
   int node = 0;
+  double stamp_s = 0.0;
   std::vector<Camera> cameras;  // of the color images
   std::vector<Feature> features;
   FeatureType type = FeatureType::sift;
   std::vector<std::uint8_t> descriptors;  // 128 (SIFT) or 32 (ORB) bytes a feature; may be dropped
                                           // when all that look alike has been found
-  std::vector<DepthSurface> surfaces;     // one a camera
-  std::size_t without_depth = 0;          // features that were dropped for it
+  std::shared_ptr<const UnnamedFile> descriptor_file;  // where they are instead, if any
+  std::uint64_t descriptors_begin = 0;                 // in it
+  std::vector<DepthSurface> surfaces;                  // one a camera
+  std::size_t without_depth = 0;                       // features that were dropped for it
 
   // Where feature n lies by its depth, in its camera's optical frame; in the frame of the base.
   Eigen::Vector3d point_in_camera(std::size_t n) const;

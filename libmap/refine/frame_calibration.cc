@@ -8,20 +8,22 @@ namespace libmap {
 
 namespace {
 
-// The plane of depth that a feature's ray meets where depth lies otherwise to color than the
-// surface's camera has it; false where there is none.
-bool plane_at(const FrameFeatures& frame, const Feature& feature, SurfaceElement& element) {
+// The plane of depth that a feature's ray meets if the depth's camera is at `color_from_depth`;
+// false where there is none.
+bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& color_from_depth,
+              SurfacePatch& element) {
   if (feature.camera >= frame.surfaces.size()) return false;
   const DepthSurface& surface = frame.surfaces[feature.camera];
-  const Pose color_from_depth =
-      frame.cameras[feature.camera].base_from_camera.inverse() * surface.camera().base_from_camera;
+  const Pose seen_from = color_from_depth *
+                         frame.cameras[feature.camera].base_from_camera.inverse() *
+                         surface.camera().base_from_camera;
   const Eigen::Vector3d ray = feature.ray.cast<double>().homogeneous();
   double depth = static_cast<double>(feature.depth_m);
   // Where the ray meets the plane is where the plane is to be looked for.
   for (int round = 0; round < 4; ++round) {
-    if (!surface.seen_at(color_from_depth.inverse() * (depth * ray), element)) return false;
-    element.point = color_from_depth * element.point;
-    element.normal = color_from_depth.linear() * element.normal;
+    if (!surface.seen_at(seen_from.inverse() * (depth * ray), element)) return false;
+    element.point = seen_from * element.point;
+    element.normal = seen_from.linear() * element.normal;
     const double facing = element.normal.dot(ray);
     if (!(facing < -0.1 * ray.norm())) return false;
     const double met = element.normal.dot(element.point) / facing;
@@ -52,8 +54,6 @@ DepthCorrection correction_for(const std::vector<FrameFeatures>& frames, std::si
   return correction;
 }
 
-}  // namespace
-
 Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
                           const IntrinsicsStep& step) {
   const Eigen::Vector2d ray = feature.ray.cast<double>();
@@ -62,37 +62,45 @@ Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
       .cast<float>();
 }
 
-double squared_radius_of(const Feature& feature, const Camera& camera) {
-  const Eigen::Vector2d pixel = distort_to_pixel(camera, feature.ray.cast<double>());
-  return squared_image_radius(camera.width, camera.height, pixel.x(), pixel.y());
+void register_depth(FrameFeatures& frame, const SensorCalibration& calibration) {
+  for (Feature& feature : frame.features)
+    feature.depth_m += static_cast<float>(
+        registered_depth(frame, feature, color_from_depth_of(frame, feature, calibration)).added_m);
+  for (std::size_t n = 0; n < frame.surfaces.size(); ++n) {
+    Camera camera = frame.surfaces[n].camera();
+    if (n < calibration.color_from_depth.size())
+      camera.base_from_camera = camera.base_from_camera * calibration.color_from_depth[n];
+    const auto motion = calibration.motion.find(frame.node);
+    if (n < calibration.timing.size() && motion != calibration.motion.end())
+      camera.base_from_camera =
+          moved(Pose::Identity(), calibration.timing[n].depth_delay_s * motion->second) *
+          camera.base_from_camera;
+    frame.surfaces[n].set_camera(camera);
+  }
 }
 
-// The plane n p = h turned by w and shifted by t about the color camera is met by the ray r at
-// z = (h + n t) / (n r + w (n x r)).
-std::array<double, 6> depth_by_registration(const FrameFeatures& frame, const Feature& feature) {
-  SurfaceElement element;
-  if (!plane_at(frame, feature, element)) return {};
-  const Eigen::Vector3d ray = feature.ray.cast<double>().homogeneous();
-  const double facing = element.normal.dot(ray);
-  const Eigen::Vector3d by_shift = element.normal / facing;
-  const Eigen::Vector3d by_turn = -element.point.z() / facing * element.normal.cross(ray);
-  return {by_shift.x(), by_shift.y(), by_shift.z(), by_turn.x(), by_turn.y(), by_turn.z()};
+void correct_depth(FrameFeatures& frame, const std::vector<DepthCorrection>& corrections) {
+  for (Feature& feature : frame.features) {
+    const auto z = static_cast<double>(feature.depth_m);
+    const double radius2 = squared_radius_of(feature, frame.cameras[feature.camera]);
+    const double corrected = z + corrections[feature.camera].at(z, radius2);
+    if (corrected > 0.0) feature.depth_m = static_cast<float>(corrected);
+  }
+  for (std::size_t n = 0; n < frame.surfaces.size(); ++n) frame.surfaces[n].correct(corrections[n]);
 }
 
-std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,
-                                             std::size_t cameras, double knot_m) {
-  std::vector<DepthCorrection> corrections;
-  for (std::size_t n = 0; n < cameras; ++n)
-    corrections.push_back(correction_for(frames, n, knot_m));
-  return corrections;
-}
-
-Camera moved(Camera camera, const IntrinsicsStep& step) {
-  camera.fx *= 1.0 + step.fx_share;
-  camera.fy *= 1.0 + step.fy_share;
-  camera.cx += step.cx_px;
-  camera.cy += step.cy_px;
-  return camera;
+// Of each feature: how far the camera moves from the frame's time to that of the feature's row.
+std::vector<Pose> row_motions(const FrameFeatures& frame, const SensorCalibration& calibration) {
+  const auto motion = calibration.motion.find(frame.node);
+  if (calibration.timing.empty() || motion == calibration.motion.end()) return {};
+  std::vector<Pose> motions;
+  for (const Feature& feature : frame.features) {
+    const Camera& camera = frame.cameras[feature.camera];
+    const double time_s =
+        calibration.timing[feature.camera].rolling_shutter_s * row_share_of(feature, camera);
+    motions.push_back(moved(Pose::Identity(), time_s * motion_in_camera(camera, motion->second)));
+  }
+  return motions;
 }
 
 void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps) {
@@ -110,33 +118,92 @@ void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& st
     frame.cameras[n] = moved(frame.cameras[n], steps[n]);
 }
 
-void correct_depth(FrameFeatures& frame, const std::vector<DepthCorrection>& corrections) {
-  for (Feature& feature : frame.features) {
-    const auto z = static_cast<double>(feature.depth_m);
-    const double radius2 = squared_radius_of(feature, frame.cameras[feature.camera]);
-    const double corrected = z + corrections[feature.camera].at(z, radius2);
-    if (corrected > 0.0) feature.depth_m = static_cast<float>(corrected);
-  }
-  for (std::size_t n = 0; n < frame.surfaces.size(); ++n) frame.surfaces[n].correct(corrections[n]);
+}  // namespace
+
+Camera moved(Camera camera, const IntrinsicsStep& step) {
+  camera.fx *= 1.0 + step.fx_share;
+  camera.fy *= 1.0 + step.fy_share;
+  camera.cx += step.cx_px;
+  camera.cy += step.cy_px;
+  return camera;
 }
 
-void register_depth(FrameFeatures& frame, const std::vector<Pose>& color_from_depth) {
+void calibrate(FrameFeatures& frame, const SensorCalibration& calibration) {
+  // By pixels, which the stored camera made of the features' rays.
+  const std::vector<Pose> motions = row_motions(frame, calibration);
+  if (!calibration.color_from_depth.empty() || !motions.empty()) register_depth(frame, calibration);
+  if (!calibration.depth.empty()) correct_depth(frame, calibration.depth);
+  if (!calibration.intrinsics.empty()) move_intrinsics(frame, calibration.intrinsics);
+  for (std::size_t n = 0; n < motions.size(); ++n) {
+    Feature& feature = frame.features[n];
+    const Eigen::Vector3d point =
+        motions[n] * Eigen::Vector3d(static_cast<double>(feature.depth_m) *
+                                     feature.ray.cast<double>().homogeneous());
+    feature.ray = point.hnormalized().cast<float>();
+    feature.depth_m = static_cast<float>(point.z());
+  }
+}
+
+double squared_radius_of(const Feature& feature, const Camera& camera) {
+  const Eigen::Vector2d pixel = distort_to_pixel(camera, feature.ray.cast<double>());
+  return squared_image_radius(camera.width, camera.height, pixel.x(), pixel.y());
+}
+
+double row_share_of(const Feature& feature, const Camera& camera) {
+  const double row = distort_to_pixel(camera, feature.ray.cast<double>()).y();
+  return row / std::max(1, camera.height - 1) - 0.5;
+}
+
+Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion) {
+  const Eigen::Matrix3d camera_from_base = camera.base_from_camera.linear().transpose();
+  const Eigen::Vector3d turn = base_motion.tail<3>();
+  Vector6d motion;
+  motion << camera_from_base *
+                (base_motion.head<3>() + turn.cross(camera.base_from_camera.translation())),
+      camera_from_base * turn;
+  return motion;
+}
+
+Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
+                         const SensorCalibration& calibration) {
+  Pose pose = Pose::Identity();
+  if (feature.camera < calibration.color_from_depth.size())
+    pose = calibration.color_from_depth[feature.camera];
+  const auto motion = calibration.motion.find(frame.node);
+  if (feature.camera >= calibration.timing.size() || motion == calibration.motion.end())
+    return pose;
+  const Camera& camera = frame.cameras[feature.camera];
+  const CameraTiming& timing = calibration.timing[feature.camera];
+  const double later_s =
+      timing.depth_delay_s - timing.rolling_shutter_s * row_share_of(feature, camera);
+  return moved(Pose::Identity(), later_s * motion_in_camera(camera, motion->second)) * pose;
+}
+
+// The plane n p = h turned by w and shifted by t about the color camera is met by the ray r at
+// z = (h + n t) / (n r + w (n x r)).
+RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
+                                 const Pose& color_from_depth) {
+  SurfacePatch before;
+  SurfacePatch element;
+  RegisteredDepth depth;
+  if (!plane_at(frame, feature, Pose::Identity(), before) ||
+      !plane_at(frame, feature, color_from_depth, element))
+    return depth;
   // By how much the plane that the ray meets changes: features know their depth better than the
   // grid of planes does.
-  std::vector<double> before(frame.features.size(), 0.0);
-  SurfaceElement element;
-  for (std::size_t n = 0; n < before.size(); ++n)
-    if (plane_at(frame, frame.features[n], element)) before[n] = element.point.z();
-  for (std::size_t n = 0; n < frame.surfaces.size(); ++n) {
-    Camera camera = frame.surfaces[n].camera();
-    camera.base_from_camera = camera.base_from_camera * color_from_depth[n];
-    frame.surfaces[n].set_camera(camera);
-  }
-  for (std::size_t n = 0; n < before.size(); ++n) {
-    Feature& feature = frame.features[n];
-    if (before[n] > 0.0 && plane_at(frame, feature, element))
-      feature.depth_m += static_cast<float>(element.point.z() - before[n]);
-  }
+  depth.added_m = element.point.z() - before.point.z();
+  const Eigen::Vector3d ray = feature.ray.cast<double>().homogeneous();
+  const double facing = element.normal.dot(ray);
+  depth.by_step << element.normal / facing, -element.point.z() / facing * element.normal.cross(ray);
+  return depth;
+}
+
+std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,
+                                             std::size_t cameras, double knot_m) {
+  std::vector<DepthCorrection> corrections;
+  for (std::size_t n = 0; n < cameras; ++n)
+    corrections.push_back(correction_for(frames, n, knot_m));
+  return corrections;
 }
 
 }  // namespace libmap

@@ -4,10 +4,12 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>
+#include <map>
 #include <vector>
 
 #include "libmap/image/depth_correction.h"
 #include "libmap/refine/features.h"
+#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 
@@ -18,21 +20,54 @@ struct IntrinsicsStep {
   double cx_px = 0.0;
   double cy_px = 0.0;
 };
-// The camera with the step; and all of a frame that its cameras made: rays of features, surfaces.
-Camera moved(Camera camera, const IntrinsicsStep& step);
-void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps);
-// The frame as if its depth images had been corrected: features and surfaces.
-void correct_depth(FrameFeatures& frame, const std::vector<DepthCorrection>& corrections);
-// The frame as if depth had been taken from elsewhere than its registration to color claims.
-void register_depth(FrameFeatures& frame, const std::vector<Pose>& color_from_depth);
 
-// One feature's ray by the camera with the step.
-Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera, const IntrinsicsStep& step);
-// Where it lies in its image, as DepthCorrection takes it.
+// When a camera takes what it stores as one frame. Rows of a picture are exposed one after the
+// other, the middle row at the time of the frame's pose; depth is taken at one moment.
+struct CameraTiming {
+  double depth_delay_s = 0.0;      // depth after the picture's middle row
+  double rolling_shutter_s = 0.0;  // from the first to the last row of the picture
+};
+
+// How cameras differ from the stored ones, of each camera of the rig; empty: they do not.
+struct SensorCalibration {
+  std::vector<IntrinsicsStep> intrinsics{};
+  std::vector<DepthCorrection> depth{};
+  std::vector<Pose> color_from_depth{};  // where registered depth was taken from
+  std::vector<CameraTiming> timing{};
+  // With timing only: how the base moves at each node, in its own frame: m/s, rad/s.
+  std::map<int, Vector6d> motion{};
+
+  bool empty() const {
+    return intrinsics.empty() && depth.empty() && color_from_depth.empty() && timing.empty();
+  }
+};
+
+// The frame as if it had been recorded with the calibration: features and surfaces.
+void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
+
+// The camera with the step.
+Camera moved(Camera camera, const IntrinsicsStep& step);
+
+// Where the feature is in its image, as DepthCorrection takes it; and its row, from -0.5 (first) to
+// 0.5 (last), of which the picture's exposure is a part of CameraTiming::rolling_shutter_s late.
 double squared_radius_of(const Feature& feature, const Camera& camera);
-// Its depth by a small step (rigid_motion.h) of where depth is taken from, seen from the color
-// camera. 0 where there is no plane behind it.
-std::array<double, 6> depth_by_registration(const FrameFeatures& frame, const Feature& feature);
+double row_share_of(const Feature& feature, const Camera& camera);
+
+// The motion of the base as the camera has it.
+Vector6d motion_in_camera(const Camera& camera, const Vector6d& base_motion);
+// Where registered depth is taken from, seen from the color camera when it sees the feature.
+Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
+                         const SensorCalibration& calibration);
+
+// The depth of a feature if depth is taken from `color_from_depth`: what is added to that of the
+// stored registration, and by a small step (rigid_motion.h) of the color camera's view of it. 0
+// where there is no plane behind it.
+struct RegisteredDepth {
+  double added_m = 0.0;
+  Vector6d by_step = Vector6d::Zero();
+};
+RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
+                                 const Pose& color_from_depth);
 
 // No correction yet: knots for the depths of the features of each camera.
 std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,

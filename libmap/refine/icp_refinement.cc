@@ -1,6 +1,7 @@
 #include "libmap/refine/icp_refinement.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -9,8 +10,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/refine/icp_pairs.h"
 #include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/surface_samples.h"
 
@@ -18,40 +19,34 @@ namespace libmap {
 
 namespace {
 
-constexpr int overlap_samples = 300;
-constexpr double reach_m = 2.5;  // frames further apart are not tried
-constexpr double view_angle_deg = 100.0;
-constexpr std::size_t max_candidates = 24;
-constexpr std::size_t nearest_considered = 8 * max_candidates;
 constexpr double robust_scale = 2.5;  // of Geman and McClure's loss, standard deviations
 constexpr double min_distance_m = 0.004;
-constexpr double settled_m = 2e-6;
+constexpr double settled_step = 2e-6;
 constexpr double farthest_step = 0.2;  // m and rad
+constexpr double cell_m = 0.25;        // residuals of one cell of the map depend on each other
+constexpr std::size_t max_cells = 400;
 
-double overlap_of(const std::vector<BaseElement>& samples, const FrameFeatures& other,
-                  const Pose& other_from_base) {
-  if (samples.empty()) return 0.0;
-  double seen = 0.0;
-  for (const BaseElement& sample : samples) {
-    BaseElement element;
-    const Eigen::Vector3d point = other_from_base * sample.point;
-    if (seen_from_base(other, point, element) &&
-        std::abs(element.normal.dot(point - element.point)) < 0.05)
-      seen += 1.0;
-  }
-  return seen / static_cast<double>(samples.size());
-}
-
-using FramePair = std::pair<std::size_t, std::size_t>;
+using Cell = std::array<int, 3>;
 
 // Normal equations of one pair in steps of a_from_b.
 struct PairEquations {
   Matrix6d information = Matrix6d::Zero();
   Vector6d side = Vector6d::Zero();
+  std::map<Cell, Vector6d> side_of_cell;  // only where asked for
   double squares_m2 = 0.0;
   double weight = 0.0;
   std::size_t samples = 0;
   std::size_t degenerate = 0;
+
+  void add(const PairEquations& other) {
+    information += other.information;
+    side += other.side;
+    for (const auto& [cell, its] : other.side_of_cell)
+      side_of_cell.try_emplace(cell, Vector6d::Zero()).first->second += its;
+    squares_m2 += other.squares_m2;
+    weight += other.weight;
+    samples += other.samples;
+  }
 };
 
 class Alignment {
@@ -62,8 +57,6 @@ class Alignment {
       : frames_(frames), start_(poses), prior_(prior), components_(components), options_(options) {
     result_.map_from_base = poses;
     for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
-    for (std::size_t n = 0; n < components.size(); ++n)
-      for (const int node : components[n].nodes) component_[node] = n;
   }
 
   IcpResult run(const std::vector<PoseLink>& links, Progress& progress);
@@ -73,18 +66,16 @@ class Alignment {
     const auto pose = result_.map_from_base.find(frames_[frame].node);
     return pose == result_.map_from_base.end() ? nullptr : &pose->second;
   }
-  void pairs_of_links(const std::vector<PoseLink>& links);
-  void pairs_by_overlap();
-  std::vector<std::size_t> candidates_of(const PointTree& neighbors,
-                                         const std::vector<std::size_t>& posed,
-                                         std::size_t n) const;
-  void accumulate(std::size_t from, std::size_t onto, const Pose& onto_from_from, bool from_is_a,
-                  double max_distance_m, PairEquations& equations) const;
-  PairEquations equations_of(FramePair pair, double max_distance_m) const;
+  PairEquations half_of(const std::vector<BaseElement>& samples, std::size_t onto,
+                        const Pose& onto_from_from, bool from_is_a, double max_distance_m,
+                        bool by_cells) const;
+  std::vector<PairEquations> all_equations(double max_distance_m, bool by_cells) const;
   void drop_degenerate(PairEquations& equations) const;
   void add_prior(BlockSystem& system) const;
   double add_pairs(double max_distance_m, BlockSystem& system);
+  BlockSystem with_gauge(const BlockSystem& system) const;
   double step(double max_distance_m, double& rms_m);
+  double deviation_scale(double max_distance_m) const;
 
   const std::vector<FrameFeatures>& frames_;
   std::map<int, Pose> start_;
@@ -92,88 +83,18 @@ class Alignment {
   const std::vector<GraphComponent>& components_;
   const IcpOptions& options_;
   std::map<int, std::size_t> place_;
-  std::map<int, std::size_t> component_;
-  std::vector<std::vector<BaseElement>> samples_;
   std::vector<FramePair> pairs_;
   IcpResult result_;
 };
 
-void Alignment::pairs_of_links(const std::vector<PoseLink>& links) {
-  std::map<int, std::size_t> frame_of;
-  for (std::size_t f = 0; f < frames_.size(); ++f) frame_of[frames_[f].node] = f;
-  std::set<FramePair> pairs;
-  for (const PoseLink& link : links) {
-    const auto a = frame_of.find(link.from);
-    const auto b = frame_of.find(link.to);
-    if (a == frame_of.end() || b == frame_of.end() || a == b) continue;
-    if (pose_of(a->second) == nullptr || pose_of(b->second) == nullptr) continue;
-    pairs.insert(std::minmax(a->second, b->second));
-  }
-  pairs_.assign(pairs.begin(), pairs.end());
-}
-
-// Frames that may see what the n-th of those with a pose sees.
-std::vector<std::size_t> Alignment::candidates_of(const PointTree& neighbors,
-                                                  const std::vector<std::size_t>& posed,
-                                                  std::size_t n) const {
-  const std::size_t frame = posed[n];
-  const Pose& pose = *pose_of(frame);
-  std::vector<std::pair<double, std::size_t>> ranked;
-  for (const auto& [near, square_m2] : neighbors.around(n, nearest_considered, reach_m)) {
-    const std::size_t other = posed[near];
-    if (component_.at(frames_[frame].node) != component_.at(frames_[other].node)) continue;
-    const double angle =
-        rotation_vector_of(pose.linear().transpose() * pose_of(other)->linear()).norm() * 180.0 /
-        std::numbers::pi;
-    if (angle > view_angle_deg) continue;
-    ranked.emplace_back(std::sqrt(square_m2) / reach_m + angle / view_angle_deg, other);
-  }
-  std::sort(ranked.begin(), ranked.end());
-  ranked.resize(std::min(ranked.size(), max_candidates));
-  std::vector<std::size_t> candidates;
-  candidates.reserve(ranked.size());
-  for (const auto& [measure, other] : ranked) candidates.push_back(other);
-  return candidates;
-}
-
-void Alignment::pairs_by_overlap() {
-  std::vector<std::size_t> posed;
-  std::vector<Eigen::Vector3d> places;
-  for (std::size_t f = 0; f < frames_.size(); ++f) {
-    if (pose_of(f) == nullptr) continue;
-    posed.push_back(f);
-    places.emplace_back(pose_of(f)->translation());
-  }
-  if (posed.empty()) return;
-  const PointTree neighbors(places);
-  std::vector<std::vector<FramePair>> of_frame(posed.size());
-  parallel_for(posed.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const std::size_t f = posed[n];
-      const std::vector<BaseElement> few =
-          surface_samples(frames_[f], overlap_samples, SampleUse::estimation);
-      std::vector<std::pair<double, std::size_t>> ranked;
-      for (const std::size_t other : candidates_of(neighbors, posed, n)) {
-        const double share =
-            overlap_of(few, frames_[other], pose_of(other)->inverse() * *pose_of(f));
-        if (share >= options_.min_overlap) ranked.emplace_back(-share, other);
-      }
-      std::sort(ranked.begin(), ranked.end());
-      ranked.resize(std::min(ranked.size(), static_cast<std::size_t>(options_.pairs_per_frame)));
-      for (const auto& [share, other] : ranked) of_frame[n].push_back(std::minmax(f, other));
-    }
-  });
-  std::set<FramePair> pairs;
-  for (const auto& some : of_frame) pairs.insert(some.begin(), some.end());
-  pairs_.assign(pairs.begin(), pairs.end());
-}
-
-// Samples of `from` against the planes of `onto`. Residuals are linear in the step of a_from_b,
-// where `from` is b: p -> p + t + r x p before a_from_b; and where it is a, the inverse.
-void Alignment::accumulate(std::size_t from, std::size_t onto, const Pose& onto_from_from,
-                           bool from_is_a, double max_distance_m, PairEquations& equations) const {
+// Samples of a frame against the planes of `onto`. Residuals are linear in the step of a_from_b,
+// where the frame is b: p -> p + t + r x p before a_from_b; and where it is a, the inverse.
+PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::size_t onto,
+                                 const Pose& onto_from_from, bool from_is_a, double max_distance_m,
+                                 bool by_cells) const {
+  PairEquations equations;
   const double min_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
-  for (const BaseElement& sample : samples_[from]) {
+  for (const BaseElement& sample : samples) {
     const Eigen::Vector3d point = onto_from_from * sample.point;
     BaseElement plane;
     if (!seen_from_base(frames_[onto], point, plane)) continue;
@@ -206,10 +127,19 @@ void Alignment::accumulate(std::size_t from, std::size_t onto, const Pose& onto_
     equations.information +=
         (0.5 * weight) * (by_sample * by_plane.transpose() + by_plane * by_sample.transpose());
     equations.side -= weight * distance * by_sample;
+    if (by_cells) {
+      const Eigen::Vector3d place = *pose_of(onto) * point / cell_m;
+      const Cell cell = {static_cast<int>(std::floor(place.x())),
+                         static_cast<int>(std::floor(place.y())),
+                         static_cast<int>(std::floor(place.z()))};
+      equations.side_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
+          weight * distance * by_sample;
+    }
     equations.squares_m2 += distance * distance / (root * root);
     equations.weight += 1.0 / (root * root);
     ++equations.samples;
   }
+  return equations;
 }
 
 // Directions that a pair hardly binds, such as along a plane, are given no information at all: what
@@ -228,15 +158,7 @@ void Alignment::drop_degenerate(PairEquations& equations) const {
   }
   equations.information = kept * equations.information * kept;
   equations.side = kept * equations.side;
-}
-
-PairEquations Alignment::equations_of(FramePair pair, double max_distance_m) const {
-  PairEquations equations;
-  const Pose a_from_b = pose_of(pair.first)->inverse() * *pose_of(pair.second);
-  accumulate(pair.second, pair.first, a_from_b, false, max_distance_m, equations);
-  accumulate(pair.first, pair.second, a_from_b.inverse(), true, max_distance_m, equations);
-  drop_degenerate(equations);
-  return equations;
+  for (auto& [cell, side] : equations.side_of_cell) side = kept * side;
 }
 
 // What the prior asks of the poses as they are.
@@ -252,13 +174,37 @@ void Alignment::add_prior(BlockSystem& system) const {
   }
 }
 
+// Frame by frame, so that the samples of few are in memory; both halves of a pair are then added.
+std::vector<PairEquations> Alignment::all_equations(double max_distance_m, bool by_cells) const {
+  std::vector<std::vector<std::size_t>> pairs_of_frame(frames_.size());
+  for (std::size_t n = 0; n < pairs_.size(); ++n) {
+    pairs_of_frame[pairs_[n].first].push_back(n);
+    pairs_of_frame[pairs_[n].second].push_back(n);
+  }
+  std::vector<PairEquations> of_first(pairs_.size());
+  std::vector<PairEquations> of_second(pairs_.size());
+  parallel_each(frames_.size(), [&](std::size_t frame) {
+    if (pairs_of_frame[frame].empty()) return;
+    const std::vector<BaseElement> samples =
+        surface_samples(frames_[frame], options_.samples, SampleUse::estimation);
+    for (const std::size_t n : pairs_of_frame[frame]) {
+      const bool is_a = pairs_[n].first == frame;
+      const std::size_t other = is_a ? pairs_[n].second : pairs_[n].first;
+      (is_a ? of_first : of_second)[n] =
+          half_of(samples, other, pose_of(other)->inverse() * *pose_of(frame), is_a, max_distance_m,
+                  by_cells);
+    }
+  });
+  parallel_each(pairs_.size(), [&](std::size_t n) {
+    of_second[n].add(of_first[n]);
+    drop_degenerate(of_second[n]);
+  });
+  return of_second;
+}
+
 // What the surfaces of the pairs ask; their root mean square distance.
 double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
-  std::vector<PairEquations> equations(pairs_.size());
-  parallel_for(pairs_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      equations[n] = equations_of(pairs_[n], max_distance_m);
-  });
+  const std::vector<PairEquations> equations = all_equations(max_distance_m, false);
   double squares = 0.0;
   double weight = 0.0;
   result_.samples = 0;
@@ -282,6 +228,16 @@ double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
   return weight > 0.0 ? std::sqrt(squares / weight) : 0.0;
 }
 
+// Gauge nodes stand still: what they are bound by is not asked.
+BlockSystem Alignment::with_gauge(const BlockSystem& system) const {
+  BlockSystem bound(place_.size());
+  bound.add(system);
+  for (const GraphComponent& component : components_)
+    bound.add(place_.at(component.gauge_node), place_.at(component.gauge_node),
+              1e12 * Matrix6d::Identity());
+  return bound;
+}
+
 // One step of Gauss and Newton; how far the poses moved.
 double Alignment::step(double max_distance_m, double& rms_m) {
   BlockSystem system(place_.size());
@@ -289,12 +245,7 @@ double Alignment::step(double max_distance_m, double& rms_m) {
   rms_m = add_pairs(max_distance_m, system);
   result_.information = system;
   result_.information.clear_side();
-  // Gauge nodes stand still: what they are bound by is not asked.
-  BlockSystem bound(place_.size());
-  bound.add(system);
-  for (const GraphComponent& component : components_)
-    bound.add(place_.at(component.gauge_node), place_.at(component.gauge_node),
-              1e12 * Matrix6d::Identity());
+  const BlockSystem bound = with_gauge(system);
   const BlockSolver solver(bound, 1e-6);
   if (!solver.valid()) return std::numeric_limits<double>::infinity();
   const std::vector<Vector6d> moves = solver.solve(bound.side());
@@ -312,16 +263,66 @@ double Alignment::step(double max_distance_m, double& rms_m) {
   return farthest;
 }
 
+// By how much the errors of the poses exceed those of independent residuals, by the larger of two
+// measures. The mean over all unknowns of the cluster-robust covariance (Liang and Zeger 1986)
+// relative to the inverse of the information: residuals in one cell of the map share the noise of
+// the same patches of depth, and what depth is wrong there. And the chi-square of the way that the
+// surfaces moved the poses from the prior, which they do not share noise with (Birge 1932).
+double Alignment::deviation_scale(double max_distance_m) const {
+  BlockSystem system(place_.size());
+  add_prior(system);
+  std::map<Cell, std::map<std::size_t, Vector6d>> sides;
+  const std::vector<PairEquations> equations = all_equations(max_distance_m, true);
+  for (std::size_t n = 0; n < pairs_.size(); ++n) {
+    const std::size_t a = place_.at(frames_[pairs_[n].first].node);
+    const std::size_t b = place_.at(frames_[pairs_[n].second].node);
+    const RelativeJacobian jacobian =
+        relative_jacobian(pose_of(pairs_[n].first)->inverse() * *pose_of(pairs_[n].second));
+    for (const auto& [cell, side] : equations[n].side_of_cell) {
+      auto& of_cell = sides[cell];
+      of_cell.try_emplace(a, Vector6d::Zero()).first->second += jacobian.by_a.transpose() * side;
+      of_cell.try_emplace(b, Vector6d::Zero()).first->second += jacobian.by_b.transpose() * side;
+    }
+  }
+  const BlockSolver solver(with_gauge(result_.information), 1e-6);
+  if (!solver.valid() || sides.empty()) return 1.0;
+  const auto square = [&](const std::vector<Vector6d>& side) {
+    const std::vector<Vector6d> solved = solver.solve(side);
+    double sum = 0.0;
+    for (std::size_t n = 0; n < side.size(); ++n) sum += side[n].dot(solved[n]);
+    return sum;
+  };
+  const std::size_t stride = (sides.size() + max_cells - 1) / max_cells;
+  double squares = 0.0;
+  std::size_t number = 0;
+  std::size_t used = 0;
+  for (const auto& [cell, of_cell] : sides) {
+    if (number++ % stride != 0) continue;
+    ++used;
+    std::vector<Vector6d> side(place_.size(), Vector6d::Zero());
+    for (const auto& [place, part] : of_cell) side[place] = part;
+    squares += square(side);
+  }
+  squares *= static_cast<double>(sides.size()) / static_cast<double>(used);
+  const double unknowns = 6.0 * static_cast<double>(place_.size() - components_.size());
+  if (!(unknowns > 0.0)) return 1.0;
+  double way = 0.0;
+  std::size_t place = 0;
+  for (const auto& [node, pose] : result_.map_from_base)
+    way -= step_between(start_.at(node), pose).dot(system.side()[place++]);
+  const BlockSystem inverse = solver.selected_inverse(prior_);
+  double bound = unknowns;  // freedom of the way: what the prior does not decide
+  for (const auto& [key, block] : prior_.blocks())
+    bound -= (key.first == key.second ? 1.0 : 2.0) *
+             block.cwiseProduct(inverse.block(key.first, key.second)).sum();
+  const double by_way = bound > 1.0 ? way / bound : 0.0;
+  return std::sqrt(std::max({1.0, (squares + square(system.side())) / unknowns, by_way}));
+}
+
 IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress) {
-  samples_.resize(frames_.size());
-  parallel_for(frames_.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t f = begin; f < end; ++f)
-      samples_[f] = surface_samples(frames_[f], options_.samples, SampleUse::estimation);
-  });
-  if (options_.mode == IcpMode::links)
-    pairs_of_links(links);
-  else
-    pairs_by_overlap();
+  pairs_ = options_.mode == IcpMode::links
+               ? linked_pairs(frames_, start_, links)
+               : overlapping_pairs(frames_, start_, components_, options_);
   result_.pairs = pairs_.size();
   result_.information = prior_;
   if (pairs_.empty()) return std::move(result_);
@@ -340,14 +341,21 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
       // What nothing binds runs away: not a refinement.
       result_.map_from_base = start_;
       result_.information = prior_;
-      break;
+      progress.end();
+      return std::move(result_);
     }
-    if (tight && farthest < settled_m) {
+    if (tight && farthest < settled_step) {
       result_.converged = true;
       break;
     }
   }
   progress.end();
+  result_.deviation_scale = deviation_scale(max_distance_m);
+  BlockSystem honest(place_.size());
+  const double factor = 1.0 / (result_.deviation_scale * result_.deviation_scale);
+  for (const auto& [key, block] : result_.information.blocks())
+    honest.add(key.first, key.second, factor * block);
+  result_.information = std::move(honest);
   return std::move(result_);
 }
 

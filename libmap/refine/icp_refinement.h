@@ -33,7 +33,10 @@ void bind(ParameterTable& table, IcpOptions& options);
 
 struct IcpResult {
   std::map<int, Pose> map_from_base;
-  BlockSystem information{0};  // prior and surfaces together, in the order of the poses
+  // Prior and surfaces together, in the order of the poses, divided by the square of
+  // deviation_scale.
+  BlockSystem information{0};
+  double deviation_scale = 1.0;  // >= 1: how much larger errors are than independent noise explains
   std::size_t pairs = 0;
   std::size_t samples = 0;                // that matched, at the end
   std::size_t degenerate_directions = 0;  // of all pairs

@@ -163,20 +163,35 @@ std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, 
 }
 
 std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
+                                  const std::vector<GraphComponent>& components,
                                   const LoopClosureDetectionOptions& options, std::uint64_t seed) {
   std::set<FramePair> pairs;
+  std::vector<std::size_t> parts;
+  if (components.size() > 1) {
+    std::map<int, std::size_t> part_of;
+    for (std::size_t n = 0; n < components.size(); ++n)
+      for (const int node : components[n].nodes) part_of[node] = n;
+    for (const FrameFeatures& frame : frames) {
+      const auto part = part_of.find(frame.node);
+      parts.push_back(part == part_of.end() ? components.size() : part->second);
+    }
+  }
   // Frames that follow each other look most alike and are candidates already.
   const auto neighbors = static_cast<std::size_t>(options.neighbors);
   const auto wanted = static_cast<std::size_t>(options.similar_candidates);
   const auto similar =
-      find_similar_frames(frames, wanted + 2 * neighbors, options.appearance, seed);
+      find_similar_frames(frames, wanted + 2 * neighbors, options.appearance, seed, parts);
   for (std::size_t f = 0; f < similar.size(); ++f) {
     std::size_t taken = 0;
+    std::size_t taken_elsewhere = 0;
     for (const SimilarFrame& other : similar[f]) {
       const std::size_t apart = other.frame > f ? other.frame - f : f - other.frame;
       if (apart <= neighbors) continue;
-      if (taken++ == wanted) break;
-      pairs.insert(ordered(f, other.frame));
+      const bool elsewhere = !parts.empty() && parts[other.frame] != parts[f];
+      if (taken < wanted || (elsewhere && taken_elsewhere < wanted))
+        pairs.insert(ordered(f, other.frame));
+      ++taken;
+      taken_elsewhere += elsewhere ? 1 : 0;
     }
   }
   return pairs;

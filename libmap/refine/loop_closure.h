@@ -37,8 +37,9 @@ using FramePair = std::pair<std::size_t, std::size_t>;
 
 // Frames that follow each other, in the list, up to `neighbors` apart.
 std::set<FramePair> consecutive_pairs(const std::vector<FrameFeatures>& frames, int neighbors);
-// By appearance over the whole scan.
+// By appearance over the whole scan; where there are several components, as many between them too.
 std::set<FramePair> similar_pairs(const std::vector<FrameFeatures>& frames,
+                                  const std::vector<GraphComponent>& components,
                                   const LoopClosureDetectionOptions& options, std::uint64_t seed);
 // By the poses, within a component of the graph. Frames without pose have none.
 std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,

@@ -96,12 +96,29 @@ std::vector<Bag> bags_of(const std::vector<FrameFeatures>& frames, const Eigen::
   return bags;
 }
 
+// Appends the `count` most similar frames that are `wanted`.
+template <typename Wanted>
+void append_best(const std::vector<double>& cosine, std::size_t count, const Wanted& wanted,
+                 std::vector<SimilarFrame>& similar) {
+  std::vector<SimilarFrame> ranked;
+  for (std::size_t other = 0; other < cosine.size(); ++other)
+    if (cosine[other] > 0.0 && wanted(other)) ranked.push_back({other, cosine[other]});
+  const auto kept = static_cast<std::ptrdiff_t>(std::min(count, ranked.size()));
+  std::partial_sort(ranked.begin(), ranked.begin() + kept, ranked.end(),
+                    [](const SimilarFrame& a, const SimilarFrame& b) {
+                      return a.similarity != b.similarity ? a.similarity > b.similarity
+                                                          : a.frame < b.frame;
+                    });
+  similar.insert(similar.end(), ranked.begin(), ranked.begin() + kept);
+}
+
 }  // namespace
 
 std::vector<std::vector<SimilarFrame>> find_similar_frames(const std::vector<FrameFeatures>& frames,
                                                            std::size_t count,
                                                            const PlaceRecognitionOptions& options,
-                                                           std::uint64_t seed) {
+                                                           std::uint64_t seed,
+                                                           const std::vector<std::size_t>& parts) {
   std::vector<std::vector<SimilarFrame>> similar(frames.size());
   RandomStream random(seed, 0);
   const Eigen::MatrixXf samples =
@@ -116,17 +133,11 @@ std::vector<std::vector<SimilarFrame>> find_similar_frames(const std::vector<Fra
       std::vector<double> cosine(frames.size(), 0.0);
       for (const auto& [word, weight] : bags[f])
         for (const auto& [other, its] : frames_of_word.at(word)) cosine[other] += weight * its;
-      std::vector<SimilarFrame> ranked;
-      for (std::size_t other = 0; other < frames.size(); ++other)
-        if (other != f && cosine[other] > 0.0) ranked.push_back({other, cosine[other]});
-      const std::size_t kept = std::min(count, ranked.size());
-      std::partial_sort(ranked.begin(), ranked.begin() + static_cast<std::ptrdiff_t>(kept),
-                        ranked.end(), [](const SimilarFrame& a, const SimilarFrame& b) {
-                          return a.similarity != b.similarity ? a.similarity > b.similarity
-                                                              : a.frame < b.frame;
-                        });
-      ranked.resize(kept);
-      similar[f] = std::move(ranked);
+      append_best(
+          cosine, count, [&](std::size_t other) { return other != f; }, similar[f]);
+      if (!parts.empty())
+        append_best(
+            cosine, count, [&](std::size_t other) { return parts[other] != parts[f]; }, similar[f]);
     }
   });
   return similar;

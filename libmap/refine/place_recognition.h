@@ -21,11 +21,12 @@ struct SimilarFrame {
   double similarity = 0.0;  // cosine of the tf-idf weighted words, 0 to 1
 };
 
-// For each frame the `count` others that look most like it, the best first; those with no word in
-// common are left out. The same for any number of threads; `seed` picks the samples.
-std::vector<std::vector<SimilarFrame>> find_similar_frames(const std::vector<FrameFeatures>& frames,
-                                                           std::size_t count,
-                                                           const PlaceRecognitionOptions& options,
-                                                           std::uint64_t seed);
+// For each frame the `count` others that look most like it, the best first; then as many of other
+// parts, where `parts` names each frame's. Those with no word in common are left out. The same for
+// any number of threads; `seed` picks the samples.
+std::vector<std::vector<SimilarFrame>> find_similar_frames(
+    const std::vector<FrameFeatures>& frames, std::size_t count,
+    const PlaceRecognitionOptions& options, std::uint64_t seed,
+    const std::vector<std::size_t>& parts = {});
 
 }  // namespace libmap

@@ -16,15 +16,24 @@ namespace {
 constexpr const char* feature_group = "features";
 constexpr double settled_share = 0.01;  // new links of those before: with less, rounds end
 constexpr const char* odometry_group = "visual odometry";
+constexpr const char* depth_group = "depth odometry";
 
 // Says how two nodes lie to each other.
 bool is_motion(const PoseLink& link) {
   return link.from > 0 && link.to > 0 && link.from != link.to;
 }
 
+// "3, 5, 6, 10-40": of ten or more in a row the ends.
 std::string join_numbers(const std::vector<int>& numbers) {
   std::string text;
-  for (const int number : numbers) text += (text.empty() ? "" : ", ") + std::to_string(number);
+  for (std::size_t n = 0; n < numbers.size(); ++n) {
+    std::size_t last = n;
+    while (last + 1 < numbers.size() && numbers[last + 1] == numbers[last] + 1) ++last;
+    if (last < n + 9) last = n;
+    text += (text.empty() ? "" : ", ") + std::to_string(numbers[n]);
+    if (last > n) text += "-" + std::to_string(numbers[last]);
+    n = last;
+  }
   return text;
 }
 
@@ -106,6 +115,7 @@ void Refinement::find_frames() {
   FeatureResult found = find_features(scan_, nodes, options_.features, progress_, &cache_);
   frames_ = std::move(found.frames);
   result_.skipped = std::move(found.skipped);
+  check_known_lengths(frames_, options_.known_lengths);
   std::size_t without_depth = 0;
   for (const FrameFeatures& frame : frames_) {
     result_.features += frame.features.size();
@@ -133,6 +143,7 @@ void Refinement::odometry() {
   poses_ = std::move(tracked.map_from_base);
   parts_ = std::move(tracked.parts);
   links_ = std::move(tracked.links);
+  for (const PoseLink& link : tracked.depth_links) stored_.push_back({link, depth_group});
   tried_ = std::move(tracked.tried);
   result_.losses = std::move(tracked.losses);
   StageReport stage;
@@ -140,6 +151,7 @@ void Refinement::odometry() {
   stage.figures = {{"frames", static_cast<double>(tracked_.size())},
                    {"key_frames", static_cast<double>(tracked.key_frames.size())},
                    {"links", static_cast<double>(links_.size())},
+                   {"tracked_by_depth", static_cast<double>(tracked.depth_links.size())},
                    {"lost_nodes", static_cast<double>(result_.losses.size())},
                    {"relocalized", static_cast<double>(tracked.relocalized)},
                    {"parts", static_cast<double>(parts_.size())}};
@@ -151,16 +163,18 @@ void Refinement::odometry() {
   close(std::move(stage));
 }
 
-// Parts that visual odometry has begun and nothing has joined lie anywhere.
+// Parts that visual odometry has begun and nothing has joined lie anywhere; so do all but the
+// largest, where one map is wanted.
 void Refinement::leave_out_unjoined() {
-  if (tracked_.empty()) return;
+  if (tracked_.empty() && !options_.one_map) return;
   const bool nothing_known = is_all_tracked();
   std::vector<int> left;
   for (std::size_t n = 0; n < result_.components.size(); ++n) {
     const std::vector<int>& nodes = result_.components[n].nodes;
     const bool alone = std::all_of(nodes.begin(), nodes.end(),
                                    [&](int node) { return node < 0 || tracked_.contains(node); });
-    if (alone && !(n == 0 && nothing_known)) left.insert(left.end(), nodes.begin(), nodes.end());
+    if (options_.one_map ? n > 0 : alone && !(n == 0 && nothing_known))
+      left.insert(left.end(), nodes.begin(), nodes.end());
   }
   for (const int node : left) result_.covariance.erase(node);
   std::sort(left.begin(), left.end());
@@ -191,7 +205,8 @@ std::vector<FramePair> Refinement::candidates(int number) {
     pairs = consecutive_pairs(frames_, options_.closures.neighbors);
   } else {
     pairs = near_pairs(frames_, poses_, graph_.components, options_.closures);
-    if (number == 1) pairs.merge(similar_pairs(frames_, options_.closures, options_.seed));
+    if (number == 1)
+      pairs.merge(similar_pairs(frames_, graph_.components, options_.closures, options_.seed));
   }
   std::vector<FramePair> fresh;
   for (const FramePair& pair : pairs)
@@ -232,7 +247,9 @@ bool Refinement::round(int number) {
   const auto parts_before = parts_;
   links_.insert(links_.end(), verified.links.begin(), verified.links.end());
   join_new(verified.links);
+  progress_.begin("pose graph", 0);
   PoseGraphResult graph = optimize_pose_graph(poses_, with_features(links_), options_.graph);
+  progress_.end();
   stage.groups = graph.groups;
   if (evaluate(stage, poses_before, graph.map_from_base)) {
     links_.resize(before);
@@ -263,7 +280,7 @@ void Refinement::bundle() {
   stage.name = "bundle adjustment";
   BundleAdjustmentResult adjusted =
       adjust_bundle(frames_, links_, poses_, without_features(graph_.links, stored_.size()),
-                    graph_.components, options_.bundle_adjustment);
+                    graph_.components, options_.bundle_adjustment, {}, progress_);
   evaluate(stage, poses_, adjusted.map_from_base);
   stage.rejected = stage.rejected || !adjusted.converged;
   stage.figures = {{"tracks", static_cast<double>(adjusted.tracks)},
@@ -296,7 +313,8 @@ void Refinement::icp() {
                    {"degenerate_directions", static_cast<double>(aligned.degenerate_directions)},
                    {"iterations", static_cast<double>(aligned.iterations)},
                    {"initial_rms_m", aligned.initial_rms_m},
-                   {"final_rms_m", aligned.final_rms_m}};
+                   {"final_rms_m", aligned.final_rms_m},
+                   {"deviation_scale", aligned.deviation_scale}};
   if (!stage.rejected) {
     poses_ = std::move(aligned.map_from_base);
     information_ = std::move(aligned.information);
@@ -318,7 +336,9 @@ void Refinement::finish() {
   result_.findings = findings(result_.calibration, result_.cameras);
   result_.components = graph_.components;
   result_.without_links = graph_.without_links;
+  progress_.begin("covariances", 0);
   const GraphCovariance covariance(poses_, information_, graph_.components);
+  progress_.end();
   if (covariance.valid())
     for (const auto& [node, pose] : poses_)
       if (node > 0) result_.covariance[node] = covariance.of_node(node);
@@ -341,11 +361,11 @@ RefinementResult Refinement::run() {
     if (!round(number) && number > 0) break;
   information_ = link_system(poses_, graph_.links);
   if (links_.empty()) {
-    if (is_all_tracked())
+    if (is_all_tracked() && stored_.empty())
       throw Error("its pictures give no poses: no two of them could be matched",
                   {.field = "frames", .value = std::to_string(frames_.size())});
     result_.warnings.push_back(
-        "no two frames could be matched by features: the poses rest on the stored links alone");
+        "no two frames could be matched by features: the poses rest on the other links alone");
   } else {
     if (options_.bundle) bundle();
     if (options_.bundle && (options_.intrinsics != IntrinsicsMode::fixed || options_.correct_depth))
@@ -354,6 +374,7 @@ RefinementResult Refinement::run() {
     if (options_.icp.mode != IcpMode::off) icp();
     keep_start_if_better();
   }
+  find_scale();
   finish();
   leave_out_unjoined();
   return std::move(result_);

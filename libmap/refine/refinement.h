@@ -22,6 +22,7 @@
 #include "libmap/refine/initial_poses.h"
 #include "libmap/refine/loop_closure.h"
 #include "libmap/refine/pose_graph_optimization.h"
+#include "libmap/refine/scan_scale.h"
 #include "libmap/refine/sensor_calibration.h"
 #include "libmap/refine/visual_odometry.h"
 #include "libmap/trajectory/trajectory_error.h"
@@ -31,6 +32,9 @@ namespace libmap {
 // Whether the bundle adjustment estimates focal lengths and principal points too.
 // automatic: if what was held out fits better then, by more than chance explains.
 enum class IntrinsicsMode { fixed, refined, automatic };
+
+// What determines the scale where no lengths are known.
+enum class ScaleSource { depth, odometry };
 
 struct RefinementOptions {
   StartPoses start = StartPoses::automatic;
@@ -44,6 +48,9 @@ struct RefinementOptions {
   PoseGraphOptions graph{};
   BundleAdjustmentOptions bundle_adjustment{};
   IcpOptions icp{};
+  ScaleSource scale_from = ScaleSource::depth;
+  std::vector<KnownLength> known_lengths{};  // not bound; they determine the scale
+  bool one_map = false;  // not bound: parts that nothing joins to the largest get no poses
   std::uint64_t seed = 1;
 };
 void bind(ParameterTable& table, RefinementOptions& options);
@@ -83,6 +90,7 @@ struct RefinementResult {
   SensorCalibration calibration;      // as estimated
   std::vector<Camera> cameras;        // of the pictures, as stored
   std::vector<std::string> findings;  // about the sensor, a sentence each
+  std::string scale;                  // a sentence: what it comes from, and how certain it is
   std::vector<std::string> warnings;
 };
 

@@ -1,6 +1,9 @@
+#include <cmath>
 #include <map>
 #include <utility>
 
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
 #include "libmap/refine/refinement_work.h"
 
 namespace libmap {
@@ -8,6 +11,10 @@ namespace libmap {
 namespace {
 
 constexpr int max_calibrations = 3;
+// A calibration that changes less does not let other features match.
+constexpr double settled_m = 3e-4;
+constexpr double settled_rad = 2e-4;
+constexpr double settled_s = 1e-3;
 constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
 
 void add_figures(const CalibrationEstimate& estimate, StageReport& stage) {
@@ -24,6 +31,12 @@ void add_figures(const CalibrationEstimate& estimate, StageReport& stage) {
     stage.figures.emplace_back(camera + "cx_px", step.cx_px);
     stage.figures.emplace_back(camera + "cy_px", step.cy_px);
   }
+  for (std::size_t n = 0; n < estimate.calibration.timing.size(); ++n) {
+    const CameraTiming& timing = estimate.calibration.timing[n];
+    const std::string camera = "camera_" + std::to_string(n) + "_";
+    stage.figures.emplace_back(camera + "depth_delay_s", timing.depth_delay_s);
+    stage.figures.emplace_back(camera + "rolling_shutter_s", timing.rolling_shutter_s);
+  }
 }
 
 }  // namespace
@@ -37,14 +50,15 @@ bool Refinement::calibrate_sensor(const std::string& name) {
   const std::vector<GraphLinkResult> others = without_features(graph_.links, stored_.size());
   CalibrationChoice choice;
   choice.intrinsics = options_.intrinsics != IntrinsicsMode::fixed;
-  choice.depth = choice.registration = options_.correct_depth;
+  choice.depth = choice.registration = choice.timing = options_.correct_depth;
   choice.only_if_better = options_.intrinsics != IntrinsicsMode::refined;
   if (const SensorCalibration& known = result_.calibration; !known.empty()) {
     choice.intrinsics = !known.intrinsics.empty();
     choice.depth = !known.depth.empty();
     choice.registration = !known.color_from_depth.empty();
+    choice.timing = !known.timing.empty();
     choice.leave_out = false;
-    choice.color_from_depth = known.color_from_depth;
+    choice.start = known;
   }
   CalibrationEstimate estimate = estimate_calibration(
       frames_, links_, poses_, others, graph_.components, options_.bundle_adjustment, choice);
@@ -98,13 +112,16 @@ void Refinement::match_again() {
 void Refinement::calibrate_sensor() {
   std::vector<FrameFeatures> calibrated;
   for (int pass = 1; pass <= max_calibrations; ++pass) {
+    const SensorCalibration before = result_.calibration;
     if (!calibrate_sensor(pass == 1 ? "calibration" : "calibration " + std::to_string(pass))) {
       if (pass == 1) return;
       stored_frames_ = std::move(frames_);
       frames_ = std::move(calibrated);
       break;
     }
-    if (pass == max_calibrations || (pass > 1 && result_.calibration.color_from_depth.empty()))
+    if (pass == max_calibrations ||
+        (pass > 1 && takes_depth_from_near(before, result_.calibration, settled_m, settled_rad,
+                                           settled_s)))
       break;
     match_again();
     calibrated = std::move(frames_);
@@ -129,8 +146,54 @@ void Refinement::keep_start_if_better() {
   } else if (whole.matches.after > explained_cost) {
     result_.warnings.push_back(
         "held-out matches fit worse than noise explains: the sensor has faults that the "
-        "calibration does not cover, such as a delay or a rolling shutter");
+        "calibration does not cover");
   }
+}
+
+// Nothing else fixes the scale: depth, poses and their links of features keep their shape.
+void Refinement::find_scale() {
+  std::vector<GraphLinkResult> stored;
+  if (!scan_.graph().links.empty()) stored = without_features(graph_.links, stored_.size());
+  std::erase_if(stored, [&](const GraphLinkResult& link) {  // by depth itself
+    return tracked_.contains(link.link.from) || tracked_.contains(link.link.to);
+  });
+  const std::optional<ScaleEstimate> odometry = scale_by_odometry(stored, poses_);
+  const auto times = [](const ScaleEstimate& scale) {
+    return "x " + to_fixed_text(scale.factor, 5) + " +- " + to_fixed_text(scale.deviation, 5);
+  };
+  std::optional<ScaleEstimate> scale;
+  if (!options_.known_lengths.empty()) {
+    scale = scale_by_lengths(stored_frames_.empty() ? frames_ : stored_frames_,
+                             result_.calibration, poses_, options_.known_lengths);
+    result_.scale = "scale " + times(*scale) + " by known lengths: corrected";
+    if (scale->chi_square > 9.0)
+      result_.warnings.push_back("known lengths disagree by " +
+                                 to_fixed_text(std::sqrt(scale->chi_square), 1) +
+                                 " times their noise");
+  } else if (options_.scale_from == ScaleSource::odometry) {
+    if (!odometry)
+      throw Error("the scan has no links of odometry",
+                  {.field = "scale_from", .value = "odometry", .bound = "depth"});
+    scale = odometry;
+    result_.scale = "scale " + times(*scale) + " by odometry: corrected";
+  } else {
+    result_.scale = "scale comes from the depth camera alone" +
+                    (odometry ? "; by odometry it is " + times(*odometry) : "");
+  }
+  if (!scale) return;
+  StageReport stage;
+  stage.name = "scale";
+  stage.figures = {{"factor", scale->factor},
+                   {"deviation", scale->deviation},
+                   {"lengths", static_cast<double>(scale->lengths)},
+                   {"chi_square", scale->chi_square}};
+  const int fixed =
+      graph_.components.empty() ? poses_.begin()->first : graph_.components.front().gauge_node;
+  apply_scale(scale->factor, fixed, frames_.empty() ? 1 : frames_.front().cameras.size(), poses_,
+              result_.calibration);
+  for (std::size_t n = stored_.size(); n < graph_.links.size(); ++n)
+    graph_.links[n].link.from_from_to.translation() *= scale->factor;
+  close(std::move(stage));
 }
 
 }  // namespace libmap

@@ -26,6 +26,9 @@ void bind(ParameterTable& table, RefinementOptions& options) {
   table.add("correct_depth", options.correct_depth,
             "estimate a correction of depth by range and radius, if what was held out fits better "
             "then");
+  table.add("scale_from", options.scale_from,
+            {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
+            "what determines the scale where no lengths are known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "of all that is random");

@@ -51,6 +51,7 @@ class Refinement {
   void calibrate_sensor();
   void icp();
   void keep_start_if_better();
+  void find_scale();
   void finish();
   Trajectory trajectory(const std::map<int, Pose>& poses) const;
   void close(StageReport stage);

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
+#include <initializer_list>
 #include <numbers>
 #include <set>
 #include <utility>
@@ -25,7 +26,7 @@ struct Excerpt {
 
 // Breadth first from the frame with most links.
 std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links,
-                                    std::size_t most) {
+                                    std::size_t max_frames) {
   std::vector<std::vector<std::size_t>> joined(frames);
   for (const FeatureLink& link : links) {
     joined[link.frames.first].push_back(link.frames.second);
@@ -36,7 +37,7 @@ std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<Featur
                        [](const auto& a, const auto& b) { return a.size() < b.size(); });
   std::set<std::size_t> taken;
   std::deque<std::size_t> next = {static_cast<std::size_t>(first - joined.begin())};
-  while (!next.empty() && taken.size() < most) {
+  while (!next.empty() && taken.size() < max_frames) {
     const std::size_t frame = next.front();
     next.pop_front();
     if (!taken.insert(frame).second) continue;
@@ -48,10 +49,10 @@ std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<Featur
 Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
                    const std::map<int, Pose>& map_from_base,
                    const std::vector<GraphLinkResult>& graph_links,
-                   const std::vector<GraphComponent>& components, std::size_t most) {
+                   const std::vector<GraphComponent>& components, std::size_t max_frames) {
   Excerpt part;
   std::map<std::size_t, std::size_t> place;
-  for (const std::size_t f : joined_frames(frames.size(), links, most)) {
+  for (const std::size_t f : joined_frames(frames.size(), links, max_frames)) {
     const auto pose = map_from_base.find(frames[f].node);
     if (pose == map_from_base.end()) continue;
     place.emplace(f, part.frames.size());
@@ -81,18 +82,20 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
   return part;
 }
 
-constexpr int registration_rounds = 3;
+constexpr int max_rounds = 3;
 
 // What is free in an adjustment.
 struct Model {
   bool intrinsics = false;
   bool depth = false;
   bool registration = false;
+  bool timing = false;
 
   std::string name() const {
     std::string text;
-    for (const auto& [free, part] : {std::pair(intrinsics, "intrinsics"), std::pair(depth, "depth"),
-                                     std::pair(registration, "registration")})
+    for (const auto& [free, part] :
+         {std::pair(intrinsics, "intrinsics"), std::pair(depth, "depth"),
+          std::pair(registration, "registration"), std::pair(timing, "timing")})
       if (free) text += (text.empty() ? "" : "_") + std::string(part);
     return text;
   }
@@ -101,48 +104,30 @@ struct Model {
 // How what was held out fits with a model.
 struct Candidate {
   Model model;
-  SensorCalibration calibration;
   BundleAdjustmentResult adjustment;
   HeldOutCosts costs;
 };
 
-bool is_negligible(const Pose& registration) {
-  return registration.translation().norm() < 3e-4 &&
-         rotation_vector_of(registration.linear()).norm() < 2e-4;
-}
-
 Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOptions options,
-                    const std::vector<Pose>& color_from_depth) {
+                    SensorCalibration start) {
   options.refine_intrinsics = model.intrinsics;
   options.refine_depth = model.depth;
   options.refine_registration = model.registration;
+  options.refine_timing = model.timing;
   Candidate candidate;
   candidate.model = model;
-  std::vector<FrameFeatures> frames = part.frames;
   std::map<int, Pose> poses = part.poses;
-  if (model.registration && !color_from_depth.empty()) {
-    candidate.calibration.color_from_depth = color_from_depth;
-    for (FrameFeatures& frame : frames) register_depth(frame, color_from_depth);
-  }
-  // Other planes are met when depth is registered otherwise: once more from there.
-  const int rounds = model.registration && color_from_depth.empty() ? registration_rounds : 1;
-  for (int round = 0; round < rounds; ++round) {
-    candidate.adjustment =
-        adjust_bundle(frames, part.links, poses, part.graph_links, part.components, options);
+  // Other planes are met when depth is taken from elsewhere: once more from there.
+  for (int round = 0; round < max_rounds; ++round) {
+    candidate.adjustment = adjust_bundle(part.frames, part.links, poses, part.graph_links,
+                                         part.components, options, start);
+    const SensorCalibration& found = candidate.adjustment.calibration;
+    if (takes_depth_from_near(start, found, 3e-4, 2e-4, 3e-4)) break;
     poses = candidate.adjustment.map_from_base;
-    if (!model.registration) break;
-    std::vector<Pose>& all = candidate.calibration.color_from_depth;
-    const std::vector<Pose>& last = candidate.adjustment.color_from_depth;
-    all.resize(last.size(), Pose::Identity());
-    for (std::size_t n = 0; n < all.size(); ++n) all[n] = all[n] * last[n];
-    if (std::all_of(last.begin(), last.end(), is_negligible)) break;
-    frames = part.frames;
-    for (FrameFeatures& frame : frames) register_depth(frame, all);
+    start = found;
   }
-  if (model.intrinsics) candidate.calibration.intrinsics = candidate.adjustment.intrinsics;
-  if (model.depth) candidate.calibration.depth = candidate.adjustment.depth;
-  frames = part.frames;
-  for (FrameFeatures& frame : frames) calibrate(frame, candidate.calibration);
+  std::vector<FrameFeatures> frames = part.frames;
+  for (FrameFeatures& frame : frames) calibrate(frame, candidate.adjustment.calibration);
   candidate.costs = held_out_costs(frames, part.links, candidate.adjustment.map_from_base);
   return candidate;
 }
@@ -154,13 +139,6 @@ bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with) {
 }
 
 }  // namespace
-
-void calibrate(FrameFeatures& frame, const SensorCalibration& calibration) {
-  if (!calibration.color_from_depth.empty()) register_depth(frame, calibration.color_from_depth);
-  // Before the intrinsics: it goes by pixels, which the stored camera made of the features' rays.
-  if (!calibration.depth.empty()) correct_depth(frame, calibration.depth);
-  if (!calibration.intrinsics.empty()) move_intrinsics(frame, calibration.intrinsics);
-}
 
 CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frames,
                                          const std::vector<FeatureLink>& links,
@@ -174,8 +152,8 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   const HeldOutCosts before = held_out_costs(part.frames, part.links, part.poses);
   CalibrationEstimate estimate;
   estimate.frames = part.frames.size();
-  const auto attempt = [&](const Model& model, const std::vector<Pose>& color_from_depth) {
-    Candidate candidate = try_model(model, part, options, color_from_depth);
+  const auto attempt = [&](const Model& model, const SensorCalibration& start) {
+    Candidate candidate = try_model(model, part, options, start);
     estimate.tried.emplace_back(model.name(), evaluate_held_out(before, candidate.costs));
     return candidate;
   };
@@ -184,29 +162,68 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
     return candidate.adjustment.converged &&
            (choice.only_if_better ? change.is_clearly_better() : !change.is_worse());
   };
-  Candidate best =
-      attempt({choice.intrinsics, choice.depth, choice.registration}, choice.color_from_depth);
+  Model all{choice.intrinsics, choice.depth, choice.registration};
+  all.timing = choice.timing && !choice.start.timing.empty();
+  Candidate best = attempt(all, choice.start);
   // Too much freedom for little data may hide what intrinsics alone explain.
   if (!is_good(best) && choice.leave_out && choice.intrinsics &&
       (choice.depth || choice.registration))
-    best = attempt({choice.intrinsics, false, false}, {});
-  for (bool Model::*part_of : {&Model::registration, &Model::depth, &Model::intrinsics}) {
-    Model simpler = best.model;
-    simpler.*part_of = false;
-    if (!is_good(best) || !choice.only_if_better || !choice.leave_out || !(best.model.*part_of) ||
-        simpler.name().empty())
-      continue;
-    Candidate candidate = attempt(simpler, best.calibration.color_from_depth);
-    if (is_good(candidate) && !is_needed(candidate.costs, best.costs)) best = std::move(candidate);
+    best = attempt({.intrinsics = true}, {});
+  const auto leave_out = [&](std::initializer_list<bool Model::*> parts) {
+    for (bool Model::*const part_of : parts) {
+      Model simpler = best.model;
+      simpler.*part_of = false;
+      if (!is_good(best) || !choice.only_if_better || !choice.leave_out ||
+          !(best.model.*part_of) || simpler.name().empty())
+        continue;
+      Candidate candidate = attempt(simpler, best.adjustment.calibration);
+      if (is_good(candidate) && !is_needed(candidate.costs, best.costs))
+        best = std::move(candidate);
+    }
+  };
+  leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
+  if (choice.timing && choice.leave_out) {
+    const bool was_good = is_good(best);
+    Model timed = was_good ? best.model : Model{};
+    timed.timing = true;
+    Candidate candidate =
+        attempt(timed, was_good ? best.adjustment.calibration : SensorCalibration{});
+    if (is_good(candidate) && (!was_good || is_needed(best.costs, candidate.costs))) {
+      best = std::move(candidate);
+      leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
+    }
   }
-  if (is_good(best)) estimate.calibration = best.calibration;
+  if (is_good(best)) estimate.calibration = best.adjustment.calibration;
   estimate.held_out = evaluate_held_out(before, best.costs);
   estimate.adjustment = std::move(best.adjustment);
   return estimate;
 }
 
+bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
+                           double turn_rad, double time_s) {
+  const std::size_t cameras = std::max({a.color_from_depth.size(), b.color_from_depth.size(),
+                                        a.timing.size(), b.timing.size()});
+  const auto pose_of = [](const SensorCalibration& of, std::size_t n) {
+    return n < of.color_from_depth.size() ? of.color_from_depth[n] : Pose::Identity();
+  };
+  const auto timing_of = [](const SensorCalibration& of, std::size_t n) {
+    return n < of.timing.size() ? of.timing[n] : CameraTiming{};
+  };
+  for (std::size_t n = 0; n < cameras; ++n) {
+    const Vector6d step = step_between(pose_of(a, n), pose_of(b, n));
+    const CameraTiming at = timing_of(a, n);
+    const CameraTiming bt = timing_of(b, n);
+    if (step.head<3>().norm() > shift_m || step.tail<3>().norm() > turn_rad ||
+        std::abs(at.depth_delay_s - bt.depth_delay_s) > time_s ||
+        std::abs(at.rolling_shutter_s - bt.rolling_shutter_s) > time_s)
+      return false;
+  }
+  return true;
+}
+
 CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
-                             const SensorCalibration& calibration, std::size_t n) {
+                             const SensorCalibration& calibration, std::size_t n,
+                             const PoseGraph& graph) {
   CameraFile file{.camera = stored};
   if (n < calibration.intrinsics.size()) {
     // Estimated in pixels of the pictures, which may be smaller than the stored camera's.
@@ -218,6 +235,16 @@ CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
   if (n < calibration.color_from_depth.size())
     file.color_from_depth = calibration.color_from_depth[n];
   if (n < calibration.depth.size()) file.depth = calibration.depth[n];
+  if (n < calibration.timing.size()) {
+    file.depth_delay_s = calibration.timing[n].depth_delay_s;
+    file.rolling_shutter_s = calibration.timing[n].rolling_shutter_s;
+    for (const GraphNode& node : graph.nodes)
+      if (const auto motion = calibration.motion.find(node.id); motion != calibration.motion.end())
+        file.motions.push_back(
+            {node.stamp_s, motion->second.head<3>(), motion->second.tail<3>()});
+    std::stable_sort(file.motions.begin(), file.motions.end(),
+                     [](const FrameMotion& a, const FrameMotion& b) { return a.stamp_s < b.stamp_s; });
+  }
   return file;
 }
 
@@ -237,21 +264,24 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
   }
   for (std::size_t n = 0; n < std::min(calibration.depth.size(), cameras.size()); ++n) {
     const DepthCorrection& depth = calibration.depth[n];
-    if (depth.empty()) continue;
+    if (depth.spline_m.empty()) continue;
     constexpr int places = 100;
-    double lowest = depth.at(depth.first_m, 0.0);
+    const auto bend = [&](double z, double radius2) {
+      return depth.at(z, radius2) - (depth.scale - 1.0) * z;
+    };
+    double lowest = bend(depth.first_m, 0.0);
     double highest = lowest;
     for (int k = 0; k <= places; ++k) {
       const double z = depth.first_m + (depth.last_m() - depth.first_m) * k / places;
-      lowest = std::min(lowest, depth.at(z, 0.0));
-      highest = std::max(highest, depth.at(z, 0.0));
+      lowest = std::min(lowest, bend(z, 0.0));
+      highest = std::max(highest, bend(z, 0.0));
     }
     const double middle = 0.5 * (depth.first_m + depth.last_m());
     sentences.push_back(
         of_camera(n) + "depth bends by " + to_fixed_text(500.0 * (highest - lowest), 1) +
         " mm with range and by " +
-        to_fixed_text(1e3 * std::abs(depth.at(middle, 1.0) - depth.at(middle, 0.0)), 1) +
-        " mm toward the corners: corrected; the scale is that of the depth camera");
+        to_fixed_text(1e3 * std::abs(bend(middle, 1.0) - bend(middle, 0.0)), 1) +
+        " mm toward the corners: corrected");
   }
   for (std::size_t n = 0; n < std::min(calibration.color_from_depth.size(), cameras.size()); ++n) {
     const Pose& pose = calibration.color_from_depth[n];
@@ -260,6 +290,14 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
         to_fixed_text(1e3 * pose.translation().norm(), 1) + " mm and " +
         to_fixed_text(rotation_vector_of(pose.linear()).norm() * 180.0 / std::numbers::pi, 2) +
         " deg off: corrected");
+  }
+  for (std::size_t n = 0; n < std::min(calibration.timing.size(), cameras.size()); ++n) {
+    const CameraTiming& timing = calibration.timing[n];
+    const double delay_ms = 1e3 * timing.depth_delay_s;
+    sentences.push_back(of_camera(n) + "depth taken " + to_fixed_text(std::abs(delay_ms), 1) +
+                        " ms " + (delay_ms < 0.0 ? "before" : "after") +
+                        " color, rows of a picture exposed over " +
+                        to_fixed_text(1e3 * timing.rolling_shutter_s, 1) + " ms: corrected");
   }
   return sentences;
 }

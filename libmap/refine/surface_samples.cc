@@ -37,7 +37,7 @@ std::vector<BaseElement> surface_samples(const FrameFeatures& frame, int count, 
     const Pose& base_from_camera = surface.camera().base_from_camera;
     for (int row = step / 2; row < surface.rows(); row += step)
       for (int column = step / 2; column < surface.columns(); column += step) {
-        SurfaceElement element;
+        SurfacePatch element;
         if (is_for_checks(frame.node, camera, row, column) == (use == SampleUse::checks) &&
             surface.at(column, row, element))
           samples.push_back({base_from_camera * element.point,
@@ -51,7 +51,7 @@ bool seen_from_base(const FrameFeatures& frame, const Eigen::Vector3d& point_in_
                     BaseElement& element) {
   for (const DepthSurface& surface : frame.surfaces) {
     const Pose& base_from_camera = surface.camera().base_from_camera;
-    SurfaceElement seen;
+    SurfacePatch seen;
     if (!surface.seen_at(base_from_camera.inverse() * point_in_base, seen)) continue;
     element = {base_from_camera * seen.point, base_from_camera.linear() * seen.normal,
                seen.noise_m};

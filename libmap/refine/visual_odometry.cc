@@ -7,6 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/refine/pair_alignment.h"
 #include "libmap/refine/place_recognition.h"
 #include "libmap/refine/rigid_motion.h"
 
@@ -19,6 +20,8 @@ constexpr std::size_t longest_gap = 4;      // frames that one match alone may b
 constexpr std::size_t longest_run = 16;     // pairs that are verified at once
 constexpr double motion_agreement_m = 0.1;  // of two motions to one place
 constexpr double motion_agreement_rad = 5.0 * std::numbers::pi / 180.0;
+
+constexpr double max_extrapolation = 2.0;  // of the last motion
 
 constexpr double min_factor = 1e-3;  // of variances: rounding, where nothing is noisy
 
@@ -89,6 +92,7 @@ class Tracker {
   void begin_part(std::size_t frame);
   void pass_known(std::size_t frame);
   bool track(std::size_t frame);
+  bool track_by_depth(std::size_t frame);
   void place(std::size_t frame, std::size_t reference, const FeatureLink& link);
   void make_key(std::size_t frame);
   bool relocalize(std::size_t frame);
@@ -116,6 +120,7 @@ class Tracker {
   std::vector<std::vector<SimilarFrame>> similar_;
   std::size_t key_ = none;      // key frame
   std::size_t last_ = none;     // the frame tracked last
+  std::size_t before_ = none;   // the frame tracked before it
   std::size_t earlier_ = none;  // last frame before the way was lost
   std::size_t key_run_ = 0;     // key frames that followed each other
   VisualOdometryResult result_;
@@ -228,6 +233,7 @@ void Tracker::pass_known(std::size_t frame) {
 void Tracker::place(std::size_t frame, std::size_t reference, const FeatureLink& link) {
   pose_[frame] = pose_by(frame, reference, link);
   part_[frame] = part_[reference];
+  before_ = last_;
   last_ = frame;
   add_link(link, LinkType::neighbor);
   if (reference != key_) make_key(reference);
@@ -251,6 +257,27 @@ bool Tracker::track(std::size_t frame) {
     return true;
   }
   return false;
+}
+
+// A blurred picture has few features, its depth is as good as ever.
+bool Tracker::track_by_depth(std::size_t frame) {
+  if (last_ == none || frame - last_ > longest_gap || session_of(last_) != session_of(frame))
+    return false;
+  Pose guess = Pose::Identity();
+  const double before_s = before_ == none ? 0.0 : frames_[last_].stamp_s - frames_[before_].stamp_s;
+  if (before_s > 0.0 && last_ - before_ <= longest_gap && part_[before_] == part_[last_]) {
+    const double later_s = frames_[frame].stamp_s - frames_[last_].stamp_s;
+    const double steps = std::clamp(later_s / before_s, 0.0, max_extrapolation);
+    guess = moved(guess,
+                  steps * step_between(Pose::Identity(), pose_[before_].inverse() * pose_[last_]));
+  }
+  const std::optional<PoseLink> link = align_pair(frames_[last_], frames_[frame], guess);
+  if (!link) return false;
+  pose_[frame] = pose_[last_] * link->from_from_to;
+  part_[frame] = part_[last_];
+  before_ = std::exchange(last_, frame);
+  result_.depth_links.push_back(*link);
+  return true;
 }
 
 std::vector<std::size_t> Tracker::candidates_of(std::size_t frame) {
@@ -370,6 +397,7 @@ VisualOdometryResult Tracker::run(Progress& progress) {
       continue;
     }
     if (!is_usable(f)) {
+      if (track_by_depth(f)) continue;
       lose(f, none, "only " + std::to_string(frames_[f].features.size()) + " features with depth");
       begin_part(f);
       continue;
@@ -380,6 +408,7 @@ VisualOdometryResult Tracker::run(Progress& progress) {
       if (key_ == f && loose_.contains(part_[f])) relocalize(f);
       continue;
     }
+    if (!begins && track_by_depth(f)) continue;
     if (!begins) {
       loss_of_part_[none] = result_.losses.size();  // until the frame is in a part
       lose(f, key_,

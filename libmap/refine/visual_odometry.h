@@ -52,14 +52,16 @@ struct VisualOdometryResult {
   std::vector<std::vector<int>> parts;  // nodes in one frame; a frame bound to none is its own part
   // Of tracked frames (LinkType::neighbor), and of frames found again (local_space_closure).
   std::vector<FeatureLink> links;
-  std::set<FramePair> tried;  // pairs that need not be tried again
+  std::vector<PoseLink> depth_links;  // of frames that were tracked by depth alone
+  std::set<FramePair> tried;          // pairs that need not be tried again
   std::vector<int> key_frames;
   std::vector<TrackingLoss> losses;
   std::size_t relocalized = 0;  // parts joined to others, and frames found again
 };
 
 // Frames in the order of the list. A frame that neither its key frame nor the last frame explains
-// (verify_pairs) is lost; it is found again if the motions to two earlier frames agree, else it
+// (verify_pairs) is tracked by depth alone from where a steady motion leads (align_pair). If that
+// fails too, it is lost; it is found again if the motions to two earlier frames agree, else it
 // begins a part. A later key frame of the part may still join it to another. Motions are those of
 // estimate_relative_pose, their covariances scaled by the residuals of each. The same for any
 // number of threads. Throws Error: options out of their ranges.

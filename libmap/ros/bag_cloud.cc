@@ -18,12 +18,12 @@ std::string only_cloud_topic(const BagListing& listing) {
   std::string names;
   std::size_t count = 0;
   for (const BagTopic& topic : listing.topics) {
-    if (topic.type != ros_message::type_of<PointCloud2>()) continue;
+    if (!topic.is(PointCloud2::type)) continue;
     names += (count++ == 0 ? "" : ", ") + topic.name;
   }
   if (count == 1) return names;
   throw Error(count == 0 ? "no topic contains clouds" : "several topics contain clouds",
-              {.field = "topics of " + ros_message::type_of<PointCloud2>(),
+              {.field = std::string("topics of ") + PointCloud2::type.name,
                .value = count == 0 ? "none" : names,
                .bound = count == 0 ? "" : "one of them named as the topic"});
 }
@@ -32,12 +32,11 @@ BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,
                     const std::optional<double>& stamp_s) {
   const BagListing listing = list_bag(bag);
   const std::string name = wanted.empty() ? only_cloud_topic(listing) : wanted;
-  require_topic(listing, name, ros_message::type_of<PointCloud2>(),
-                ros_message::md5sum_of<PointCloud2>());
+  require_topic(listing, name, PointCloud2::type);
   BagCloudResult best;
   std::size_t messages = 0;
   read_bag(bag, {{name}}, [&](const BagMessage& message) {
-    CloudMessage cloud = decode_cloud(message.bytes);
+    CloudMessage cloud = decode_cloud(message.topic.encoding, message.bytes);
     const std::int64_t stamp_ns = cloud.stamp_ns == 0 ? message.recorded_ns : cloud.stamp_ns;
     const double stamp = ros_message::seconds_of(stamp_ns);
     const bool better =

@@ -1,4 +1,4 @@
-// A cloud out of a ROS 1 bag.
+// A cloud out of a bag.
 #pragma once
 
 #include <cstddef>

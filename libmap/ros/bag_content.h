@@ -38,6 +38,26 @@ struct BagPlaces {
   std::vector<BagPlace> places{};
 };
 
+// Square cells of a frame's x-y plane as grid_map_msgs/GridMap and nav_msgs/OccupancyGrid. Arrays
+// contain `columns` cells along x for each of `rows` steps along y, from the corner of smallest x
+// and y; NaN is unknown.
+struct BagGrid {
+  std::string grid_map_topic{};
+  std::string occupancy_topic{};
+  std::string frame{};
+  double cell_m = 0.0;
+  Eigen::Vector2d corner_m = Eigen::Vector2d::Zero();
+  std::size_t columns = 0;
+  std::size_t rows = 0;
+
+  struct Layer {
+    std::string name{};
+    std::vector<float> values{};
+  };
+  std::vector<Layer> layers{};     // of the GridMap; a cell is valid if the first one is
+  std::vector<float> occupancy{};  // from 0 to 1
+};
+
 // A frame that stands still in another (/tf_static).
 struct BagTransform {
   std::string parent{};

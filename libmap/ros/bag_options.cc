@@ -28,7 +28,10 @@ std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan) {
 
 const std::vector<std::pair<std::string, BagCompression>>& bag_compression_names() {
   static const std::vector<std::pair<std::string, BagCompression>> names = {
-      {"none", BagCompression::none}, {"bz2", BagCompression::bz2}, {"lz4", BagCompression::lz4}};
+      {"none", BagCompression::none},
+      {"bz2", BagCompression::bz2},
+      {"lz4", BagCompression::lz4},
+      {"zstd", BagCompression::zstd}};
   return names;
 }
 

@@ -27,7 +27,7 @@ struct Choice {
 };
 
 bool is_compressed_type(const BagTopic& topic) {
-  return topic.type == ros_message::type_of<ros_message::CompressedImage>();
+  return topic.is(ros_message::CompressedImage::type);
 }
 
 Choice chosen(const std::string& text, const BagListing& listing) {
@@ -40,11 +40,9 @@ Choice chosen(const std::string& text, const BagListing& listing) {
         return topic.name == choice.topic && is_compressed_type(topic);
       });
   if (choice.compressed)
-    require_topic(listing, choice.topic, ros_message::type_of<ros_message::CompressedImage>(),
-                  ros_message::md5sum_of<ros_message::CompressedImage>());
+    require_topic(listing, choice.topic, ros_message::CompressedImage::type);
   else
-    require_topic(listing, choice.topic, ros_message::type_of<ros_message::Image>(),
-                  ros_message::md5sum_of<ros_message::Image>());
+    require_topic(listing, choice.topic, ros_message::Image::type);
   return choice;
 }
 
@@ -55,7 +53,7 @@ std::vector<Choice> choices_of(const BagListing& listing, const BagRigOptions& o
   for (const BagTopic& topic : listing.topics) {
     const bool compressed = is_compressed_type(topic);
     if (compressed && !topic.name.ends_with("/compressedDepth")) continue;
-    if (compressed || topic.type == ros_message::type_of<ros_message::Image>())
+    if (compressed || topic.is(ros_message::Image::type))
       choices.push_back({{}, topic.name, compressed});
   }
   return choices;
@@ -146,8 +144,7 @@ Camera calibrated_camera(const SurveyedImages& images, const BagListing& listing
     return images.calibrations[images.calibration_at(images.stamps_ns.front())];
   if (!images.info_error.empty())
     throw Error("no camera info can be used: " + images.info_error, {.field = images.info_topic});
-  require_topic(listing, images.info_topic, ros_message::type_of<ros_message::CameraInfo>(),
-                ros_message::md5sum_of<ros_message::CameraInfo>());
+  require_topic(listing, images.info_topic, ros_message::CameraInfo::type);
   throw Error("contains no camera info", {.field = images.info_topic});
 }
 
@@ -162,8 +159,7 @@ std::string base_frame_of(const BagSurvey& survey, const BagRigOptions& options)
 void rig_from_bag(const BagSurvey& survey, const BagListing& listing, const BagRigOptions& options,
                   BagRigPlan& plan) {
   if (survey.transforms.empty())
-    require_topic(listing, options.transform_topic, ros_message::type_of<ros_message::TFMessage>(),
-                  ros_message::md5sum_of<ros_message::TFMessage>());
+    require_topic(listing, options.transform_topic, ros_message::TFMessage::type);
   const std::string base = base_frame_of(survey, options);
   for (std::size_t n = 0; n < survey.images.size(); ++n) {
     const SurveyedImages& images = survey.images[n];

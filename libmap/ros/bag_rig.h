@@ -1,4 +1,4 @@
-// The depth images of a robot's cameras out of a ROS 1 bag, as a rig and a folder of images
+// The depth images of a robot's cameras out of a bag, as a rig and a folder of images
 // (rig_images.h).
 #pragma once
 

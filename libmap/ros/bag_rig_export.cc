@@ -31,17 +31,22 @@ class ImageWriter {
 
   void take(const BagMessage& message) {
     const std::size_t camera = camera_of(message.topic.name);
-    const bool compressed =
-        message.topic.type == ros_message::type_of<ros_message::CompressedImage>();
+    const bool compressed = message.topic.is(ros_message::CompressedImage::type);
     DepthMessageHead head;
     try {
-      head = read_image_head(message.bytes, compressed);
+      head = read_image_head(message.topic.encoding, message.bytes, compressed);
     } catch (const Error& error) {
       return say_broken(camera, error.what());
     }
     const std::int64_t stamp = head.stamp_ns == 0 ? message.recorded_ns : head.stamp_ns;
     if (waiting_.erase({camera, stamp}) == 0) return;
-    batch_.push_back({{camera, stamp}, compressed, std::string(message.bytes), {}, {}, 0});
+    batch_.push_back({{camera, stamp},
+                      compressed,
+                      message.topic.encoding,
+                      std::string(message.bytes),
+                      {},
+                      {},
+                      0});
     if (batch_.size() == images_at_once) write_batch();
   }
 
@@ -60,6 +65,7 @@ class ImageWriter {
   struct Waiting {
     BagImage image;
     bool compressed = false;
+    MessageEncoding encoding = MessageEncoding::ros1;
     std::string bytes;
     std::string png;
     std::string error;
@@ -80,8 +86,8 @@ class ImageWriter {
   void encode(Waiting& one) const {
     const RigCamera& camera = plan_.rig.cameras[one.image.camera];
     try {
-      const DepthMessageImage depth =
-          decode_depth(one.bytes, one.compressed, {plan_.depth_unit_m, camera.depth_scale_m});
+      const DepthMessageImage depth = decode_depth(one.encoding, one.bytes, one.compressed,
+                                                   {plan_.depth_unit_m, camera.depth_scale_m});
       if (depth.image.width != camera.camera.width || depth.image.height != camera.camera.height)
         throw Error("does not fit the calibration",
                     {.field = "size",

@@ -32,7 +32,7 @@ bool is_rectified(const std::string& topic) {
 void take_image(const BagMessage& message, SurveyedImages& images) {
   DepthMessageHead head;
   try {
-    head = read_image_head(message.bytes, images.compressed);
+    head = read_image_head(message.topic.encoding, message.bytes, images.compressed);
   } catch (const Error&) {
     return;  // It is found broken again, and named, where it is read.
   }
@@ -46,7 +46,8 @@ void take_image(const BagMessage& message, SurveyedImages& images) {
 
 void take_info(const BagMessage& message, SurveyedImages& images) {
   try {
-    const CameraInfoMessage info = decode_camera_info(message.bytes, is_rectified(images.topic));
+    const CameraInfoMessage info =
+        decode_camera_info(message.topic.encoding, message.bytes, is_rectified(images.topic));
     const auto found =
         std::find_if(images.calibrations.begin(), images.calibrations.end(),
                      [&](const Camera& known) { return same_calibration(known, info.camera); });
@@ -60,7 +61,7 @@ void take_info(const BagMessage& message, SurveyedImages& images) {
 
 void take_transforms(const BagMessage& message, TransformTree& tree) {
   try {
-    add_transforms(message.bytes, tree);
+    add_transforms(message.topic.encoding, message.bytes, tree);
   } catch (const Error& error) {
     throw error.in_field(message.topic.name);
   }
@@ -103,12 +104,12 @@ BagSurvey survey_bag(const std::filesystem::path& bag,
   read_bag(bag, requests, [&](const BagMessage& message) {
     const std::string& topic = message.topic.name;
     if (!transform_topic.empty() && topic == transform_topic &&
-        message.topic.md5sum == ros_message::md5sum_of<ros_message::TFMessage>())
+        message.topic.has_definition_of(ros_message::TFMessage::type))
       take_transforms(message, survey.transforms);
     for (SurveyedImages& images : survey.images) {
       if (topic == images.topic) take_image(message, images);
       if (topic == images.info_topic &&
-          message.topic.md5sum == ros_message::md5sum_of<ros_message::CameraInfo>())
+          message.topic.has_definition_of(ros_message::CameraInfo::type))
         take_info(message, images);
     }
   });

@@ -10,8 +10,8 @@
 
 #include "libmap/cloud/cloud_columns.h"
 #include "libmap/core/error.h"
+#include "libmap/ros/message_codec.h"
 #include "libmap/ros/message_encoding.h"
-#include "libmap/ros/ros_messages.h"
 
 namespace libmap {
 
@@ -32,7 +32,7 @@ constexpr std::pair<std::uint8_t, StoredType> field_types[] = {
 StoredType type_of(const PointField& field) {
   for (const auto& [number, type] : field_types)
     if (number == field.datatype) return type;
-  throw Error("unknown type", {.field = "datatype of field " + ros_message::from_ros(field.name),
+  throw Error("unknown type", {.field = "datatype of field " + field.name,
                                .value = std::to_string(field.datatype),
                                .bound = "1 to 8"});
 }
@@ -75,18 +75,18 @@ std::shared_ptr<const std::string> packed_rows(const PointCloud2& message) {
 
 void add_columns(const PointField& field, const PointCloud2& message, const std::byte* first,
                  ColumnSet& set) {
-  const std::string name = ros_message::from_ros(field.name);
+  const std::string& name = field.name;
   const StoredType type = type_of(field);
   const std::size_t bytes = size_of(type);
   // Old drivers leave the count empty.
   const std::size_t count = std::max<std::uint32_t>(field.count, 1);
-  const bool swapped = (message.is_bigendian != 0) != (std::endian::native == std::endian::big);
+  const bool swapped = message.is_bigendian != (std::endian::native == std::endian::big);
   if (message.point_step < std::uint64_t{field.offset} + bytes * count)
     throw does_not_fit("point_step, of field " + name, message.point_step,
                        std::uint64_t{field.offset} + bytes * count);
   if ((name == "rgb" || name == "rgba") && bytes == 4 && count == 1 && !set.find("red"))
-    return add_packed_color_columns(first + field.offset, message.point_step,
-                                    message.is_bigendian != 0, set);
+    return add_packed_color_columns(first + field.offset, message.point_step, message.is_bigendian,
+                                    set);
   if (count > max_columns || set.columns.size() + count > max_columns)
     throw Error("more than 1024 numbers per point", {.field = "field " + name});
   for (std::size_t n = 0; n < count; ++n)
@@ -96,18 +96,17 @@ void add_columns(const PointField& field, const PointCloud2& message, const std:
 
 }  // namespace
 
-CloudMessage decode_cloud(std::string_view bytes) {
-  const auto message = ros_message::decode<PointCloud2>(bytes);
+CloudMessage decode_cloud(MessageEncoding encoding, std::string_view bytes) {
+  const auto message = ros_message::decode<PointCloud2>(encoding, bytes);
   check_sizes(message);
   const std::shared_ptr<const std::string> data = packed_rows(message);
   ColumnSet set;
   set.rows = std::size_t{message.width} * message.height;
   set.storage.push_back(data);
-  for (const PointField& field : message.fields)
+  for (const PointField& field : message.point_fields)
     add_columns(field, message, reinterpret_cast<const std::byte*>(data->data()), set);
   CloudFromColumns columns = cloud_from_columns(set, NotFinite::drop);
-  return {ros_message::nanoseconds_of(message.header.stamp),
-          ros_message::from_ros(message.header.frame_id), std::move(columns.cloud),
+  return {message.header.stamp.nanoseconds, message.header.frame_id, std::move(columns.cloud),
           columns.dropped_points};
 }
 
@@ -125,11 +124,11 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
     const bool is_color = column.name == "rgb";
     if (is_color) color_offset = offset;
     has_color = has_color || is_color;
-    field.name = ros_message::to_ros(column.name);
+    field.name = column.name;
     field.offset = static_cast<std::uint32_t>(offset);
     field.datatype = is_color ? std::uint8_t{PointField::FLOAT32} : number_of(column.type);
     field.count = 1;
-    message.fields.push_back(field);
+    message.point_fields.push_back(field);
     offset += size_of(stored_as(column.type));
   }
   constexpr std::uint64_t most = 0xFFFF0000;
@@ -146,7 +145,7 @@ PointCloud2 encode_cloud(const PointCloud& cloud) {
   message.width = static_cast<std::uint32_t>(set.rows);
   message.point_step = static_cast<std::uint32_t>(offset);
   message.row_step = static_cast<std::uint32_t>(set.rows * offset);
-  message.is_dense = 1;
+  message.is_dense = true;
   return message;
 }
 

@@ -1,4 +1,4 @@
-// Clouds as ROS 1 messages (sensor_msgs/PointCloud2), as their serialized bytes.
+// Clouds out of messages (sensor_msgs/PointCloud2), from their encoded bytes.
 #pragma once
 
 #include <cstddef>
@@ -7,6 +7,7 @@
 #include <string_view>
 
 #include "libmap/core/point_cloud.h"
+#include "libmap/ros/bag_reader.h"
 
 namespace libmap {
 
@@ -23,6 +24,6 @@ struct CloudMessage {
 // ... Throws Error naming the field: x, y or z missing, one outside its point or twice there, an
 // unknown type, more than 1024 numbers per point, data shorter than height and row_step say, rows
 // shorter than their points.
-CloudMessage decode_cloud(std::string_view bytes);
+CloudMessage decode_cloud(MessageEncoding encoding, std::string_view bytes);
 
 }  // namespace libmap

@@ -8,7 +8,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/image/image_codec.h"
-#include "libmap/ros/ros_messages.h"
+#include "libmap/ros/message_codec.h"
 
 namespace libmap {
 
@@ -63,7 +63,7 @@ T value_at(const char* bytes, bool swapped) {
 }
 
 DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits& units) {
-  const std::string encoding = ros_message::from_ros(message.encoding);
+  const std::string& encoding = message.encoding;
   if (!is_depth_encoding(encoding, false))
     throw Error("no depth image",
                 {.field = "encoding", .value = encoding, .bound = "16UC1 or 32FC1"});
@@ -101,7 +101,7 @@ DepthMessageImage decode_raw(const ros_message::Image& message, const DepthUnits
 
 DepthMessageImage decode_compressed(const ros_message::CompressedImage& message,
                                     const DepthUnits& units) {
-  const std::string format = ros_message::from_ros(message.format);
+  const std::string& format = message.format;
   if (!is_depth_encoding(format, true))
     throw Error("no compressed depth image",
                 {.field = "format",
@@ -138,19 +138,19 @@ Camera camera_of(const ros_message::CameraInfo& info, bool rectified) {
   Camera camera;
   camera.width = static_cast<int>(std::min<std::uint32_t>(info.width, 1U << 20));
   camera.height = static_cast<int>(std::min<std::uint32_t>(info.height, 1U << 20));
-  const bool projected = rectified && info.P[0] > 0;
-  camera.fx = projected ? info.P[0] : info.K[0];
-  camera.fy = projected ? info.P[5] : info.K[4];
-  camera.cx = projected ? info.P[2] : info.K[2];
-  camera.cy = projected ? info.P[6] : info.K[5];
+  const bool projected = rectified && info.p[0] > 0;
+  camera.fx = projected ? info.p[0] : info.k[0];
+  camera.fy = projected ? info.p[5] : info.k[4];
+  camera.cx = projected ? info.p[2] : info.k[2];
+  camera.cy = projected ? info.p[6] : info.k[5];
   if (projected) return camera;
-  camera.distortion.assign(info.D.begin(), info.D.end());
+  camera.distortion.assign(info.d.begin(), info.d.end());
   if (std::all_of(camera.distortion.begin(), camera.distortion.end(),
                   [](double d) { return d == 0; })) {
     camera.distortion.clear();
     return camera;
   }
-  const std::string model = ros_message::from_ros(info.distortion_model);
+  const std::string& model = info.distortion_model;
   if (model == "equidistant" || model == "fisheye")
     camera.distortion_model = DistortionModel::equidistant;
   else if (model == "plumb_bob" || model == "rational_polynomial")
@@ -184,34 +184,29 @@ bool is_depth_encoding(const std::string& encoding, bool compressed) {
   return encoding == "16UC1" || encoding == "mono16" || encoding == "32FC1";
 }
 
-DepthMessageHead read_image_head(std::string_view bytes, bool compressed) {
-  DepthMessageHead head;
-  ros_message::read_serialized(bytes, [&](ros::serialization::IStream& stream) {
-    ros_message::Header header;
-    ros_message::Text encoding;
-    stream.next(header);
-    if (!compressed) {
-      std::uint32_t size[2];
-      stream.next(size[0]);
-      stream.next(size[1]);
-    }
-    stream.next(encoding);
-    head = {ros_message::nanoseconds_of(header.stamp), ros_message::from_ros(header.frame_id),
-            ros_message::from_ros(encoding)};
-  });
-  return head;
+DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes,
+                                 bool compressed) {
+  using ros_message::Head;
+  if (compressed) {
+    const auto head = ros_message::decode<Head<ros_message::CompressedImage>>(encoding, bytes);
+    return {head.header.stamp.nanoseconds, head.header.frame_id, head.format};
+  }
+  const auto head = ros_message::decode<Head<ros_message::Image>>(encoding, bytes);
+  return {head.header.stamp.nanoseconds, head.header.frame_id, head.encoding};
 }
 
-DepthMessageImage decode_depth(std::string_view bytes, bool compressed, const DepthUnits& units) {
+DepthMessageImage decode_depth(MessageEncoding encoding, std::string_view bytes, bool compressed,
+                               const DepthUnits& units) {
   if (compressed)
-    return decode_compressed(ros_message::decode<ros_message::CompressedImage>(bytes), units);
-  return decode_raw(ros_message::decode<ros_message::Image>(bytes), units);
+    return decode_compressed(ros_message::decode<ros_message::CompressedImage>(encoding, bytes),
+                             units);
+  return decode_raw(ros_message::decode<ros_message::Image>(encoding, bytes), units);
 }
 
-CameraInfoMessage decode_camera_info(std::string_view bytes, bool rectified) {
-  const auto info = ros_message::decode<ros_message::CameraInfo>(bytes);
-  CameraInfoMessage message{ros_message::nanoseconds_of(info.header.stamp),
-                            camera_of(info, rectified)};
+CameraInfoMessage decode_camera_info(MessageEncoding encoding, std::string_view bytes,
+                                     bool rectified) {
+  const auto info = ros_message::decode<ros_message::CameraInfo>(encoding, bytes);
+  CameraInfoMessage message{info.header.stamp.nanoseconds, camera_of(info, rectified)};
   apply_region(info, message.camera);
   message.camera.check();
   return message;

@@ -1,5 +1,5 @@
-// Depth images and camera calibrations as ROS 1 messages (sensor_msgs/Image, CompressedImage,
-// CameraInfo), as their serialized bytes.
+// Depth images and camera calibrations out of messages (sensor_msgs/Image, CompressedImage,
+// CameraInfo), from their encoded bytes.
 #pragma once
 
 #include <cstdint>
@@ -9,6 +9,7 @@
 
 #include "libmap/core/camera.h"
 #include "libmap/core/image.h"
+#include "libmap/ros/bag_reader.h"
 
 namespace libmap {
 
@@ -20,7 +21,7 @@ struct DepthMessageHead {
 };
 
 // `bytes` may end after the encoding, 1 KiB at most. Throws Error if they end before.
-DepthMessageHead read_image_head(std::string_view bytes, bool compressed);
+DepthMessageHead read_image_head(MessageEncoding encoding, std::string_view bytes, bool compressed);
 
 // 16UC1, mono16, 32FC1; of a CompressedImage a format of compressed_depth_image_transport.
 bool is_depth_encoding(const std::string& encoding, bool compressed);
@@ -38,7 +39,8 @@ struct DepthMessageImage {
 
 // Throws Error: an encoding that is no depth, no size or more than 2^27 pixels, data shorter than
 // its size says, rows that are shorter than their pixels, a broken PNG.
-DepthMessageImage decode_depth(std::string_view bytes, bool compressed, const DepthUnits& units);
+DepthMessageImage decode_depth(MessageEncoding encoding, std::string_view bytes, bool compressed,
+                               const DepthUnits& units);
 
 struct CameraInfoMessage {
   std::int64_t stamp_ns = 0;
@@ -47,6 +49,7 @@ struct CameraInfoMessage {
 
 // K and D; of `rectified` images P, which have no distortion any more. Binning and region of
 // interest as image_geometry has them. Throws Error: not calibrated, an unknown distortion model.
-CameraInfoMessage decode_camera_info(std::string_view bytes, bool rectified);
+CameraInfoMessage decode_camera_info(MessageEncoding encoding, std::string_view bytes,
+                                     bool rectified);
 
 }  // namespace libmap

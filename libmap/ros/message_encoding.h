@@ -1,4 +1,4 @@
-// Plain data as ROS 1 messages, without their headers. Inside libmap/ros alone.
+// Plain data as messages, most without their headers. Inside libmap/ros alone.
 #pragma once
 
 #include <cstdint>
@@ -31,5 +31,14 @@ ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places);
 
 // For each place an arrow that ends there, and its text; and one list of balls for all.
 ros_message::MarkerArray encode_markers(const BagPlaces& places, const ros_message::Header& header);
+
+// From the corner of largest x and y, x first: what the arrays have in the opposite order.
+// Column-major with the labels and strides of grid_map (https://github.com/ANYbotics/grid_map,
+// grid_map_ros/include/grid_map_ros/GridMapMsgHelpers.hpp); the circular buffer begins at 0, 0.
+ros_message::GridMap encode_grid_map(const BagGrid& grid, const ros_message::Header& header);
+
+// In percent; unknown is -1.
+ros_message::OccupancyGrid encode_occupancy_grid(const BagGrid& grid,
+                                                 const ros_message::Header& header);
 
 }  // namespace libmap

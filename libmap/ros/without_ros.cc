@@ -1,9 +1,6 @@
-// Stands for libmap/ros in builds without ROS's libraries: every function says what is missing.
+// Stands for ROS 1's storage in builds without its libraries: it says what is missing.
 #include "libmap/core/error.h"
-#include "libmap/ros/bag_cloud.h"
-#include "libmap/ros/bag_reader.h"
-#include "libmap/ros/bag_rig.h"
-#include "libmap/ros/bag_writer.h"
+#include "libmap/ros/bag_storage.h"
 
 namespace libmap {
 
@@ -17,28 +14,11 @@ namespace {
 
 }  // namespace
 
-void require_ros() { refuse(); }
+const BagStorage ros1_storage = {"bag of ROS 1",
+                                 [](const std::filesystem::path&, RecordedTopics&) { refuse(); },
+                                 [](const std::filesystem::path&, const std::vector<BagRequest>&,
+                                    const TakeMessage&) { refuse(); }};
 
-BagListing list_bag(const std::filesystem::path&) { refuse(); }
-
-BagCloudResult read_bag_cloud(const std::filesystem::path&, const std::string&,
-                              const std::optional<double>&) {
-  refuse();
-}
-
-BagRigPlan plan_bag_rig(const std::filesystem::path&, const BagRigOptions&,
-                        const std::optional<double>&) {
-  refuse();
-}
-BagRigExport export_bag_rig(const std::filesystem::path&, const BagRigPlan&,
-                            const std::filesystem::path&) {
-  refuse();
-}
-
-void write_bag(const std::filesystem::path&, const BagContent&, BagCompression) { refuse(); }
-void write_rig_bag(const std::filesystem::path&, const CameraRig&, const std::vector<RigImage>&,
-                   const RigBagOptions&) {
-  refuse();
-}
+std::unique_ptr<BagSink> new_ros1_bag(const std::filesystem::path&, BagCompression) { refuse(); }
 
 }  // namespace libmap

@@ -25,6 +25,7 @@ class CalibratedScan : public ScanSource {
   const std::filesystem::path& path() const override { return scan_->path(); }
   const PoseGraph& graph() const override { return scan_->graph(); }
   const std::vector<std::string>& warnings() const override { return scan_->warnings(); }
+  SourceNode source_of(int node) const override { return scan_->source_of(node); }
   std::string image_name(int node) const override { return scan_->image_name(node); }
   RgbdFrame read_frame(int node, FrameParts parts) const override;
 
@@ -109,8 +110,9 @@ void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
                 {.field = "camera", .value = size_of(camera), .bound = size_of(known)});
   const Pose base_from_camera = camera.base_from_camera;
   // By the stored camera, as it was estimated.
-  if (!calibration.color_from_depth.matrix().isIdentity(0.0))
-    frame.depth = registered_depth(frame, calibration.color_from_depth);
+  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);
+  if (!color_from_depth.matrix().isIdentity(0.0))
+    frame.depth = registered_depth(frame, color_from_depth);
   camera = known;
   camera.base_from_camera = base_from_camera;
   correct_depth(frame.depth, calibration.depth);

@@ -18,6 +18,12 @@ struct FrameParts {
   bool depth = true;
 };
 
+// What a node is in the file that it comes from.
+struct SourceNode {
+  std::filesystem::path path;
+  int node = 0;
+};
+
 class ScanSource {
  public:
   virtual ~ScanSource() = default;
@@ -31,6 +37,8 @@ class ScanSource {
     static const std::vector<std::string> none;
     return none;
   }
+  // Of several scans that were joined, each has a path and numbers of its own.
+  virtual SourceNode source_of(int node) const { return {path(), node}; }
   // The name of the file of the node's color image, without its folder; empty where images are not
   // files.
   virtual std::string image_name([[maybe_unused]] int node) const { return {}; }
@@ -39,8 +47,9 @@ class ScanSource {
   virtual RgbdFrame read_frame(int node, FrameParts parts = {}) const = 0;
 };
 
-// An RTAB-Map database, or a folder in the layout of the TUM RGB-D benchmark. Throws Error if the
-// path is neither.
+// An RTAB-Map database, a folder in the layout of the TUM RGB-D benchmark, or a folder of
+// databases, joined in the order of their names (joined_scan.h). Throws Error if the path is none
+// of them.
 std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path);
 
 }  // namespace libmap

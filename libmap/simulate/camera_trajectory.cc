@@ -10,6 +10,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/random_stream.h"
+#include "libmap/core/text.h"
 
 namespace libmap {
 
@@ -159,9 +160,100 @@ std::vector<double> paced_loops(const Way& way, const CameraTrajectoryOptions& o
   return loops;
 }
 
+// How a hand holds a camera: its pose from where it is and looks.
+class Hand {
+ public:
+  // A hand sways with the steps of a walk; a look wanders in some ten seconds.
+  Hand(const CameraTrajectoryOptions& options, double gaze_m, std::uint64_t seed)
+      : sway_m_(options.sway_m),
+        tremor_deg_(options.tremor_deg),
+        gaze_m_(gaze_m),
+        sway_(wander3(seed, 0, 0.4, 2.0)),
+        turn_(wander3(seed, 3, 0.4, 2.0)),
+        gaze_(wander3(seed, 6, 0.04, 0.15)) {}
+
+  Pose pose(const Eigen::Vector3d& way, const Eigen::Vector3d& target, double time_s) const {
+    const Eigen::Vector3d position = way + sway_m_ * at(sway_, time_s);
+    // The look wanders over the ground more than up and down.
+    const Eigen::Vector3d looked_at =
+        target + gaze_m_ * Eigen::Vector3d(1.0, 1.0, 0.3).cwiseProduct(at(gaze_, time_s));
+    Pose pose = make_pose_from_rpy(position, Eigen::Vector3d::Zero());
+    pose.linear() = look_at(position, looked_at) *
+                    make_pose_from_rpy({0, 0, 0}, tremor_deg_ * at(turn_, time_s)).linear();
+    return pose;
+  }
+
+ private:
+  double sway_m_;
+  double tremor_deg_;
+  double gaze_m_;
+  Wander3 sway_;
+  Wander3 turn_;
+  Wander3 gaze_;
+};
+
+// Lanes along the longer side of a rectangle, joined by half circles.
+class Serpentine {
+ public:
+  Serpentine(const Eigen::AlignedBox2d& box, const SerpentineOptions& options) {
+    swapped_ = box.sizes().y() > box.sizes().x();
+    low_ = in_lanes(box.min());
+    const Eigen::Vector2d size = in_lanes(box.sizes());
+    const double width = std::max(0.0, size.y() - 2.0 * options.border_m);
+    lanes_ = 1 + static_cast<int>(std::ceil(width / options.lane_m - 1e-9));
+    radius_ = lanes_ > 1 ? 0.5 * width / (lanes_ - 1) : 0.0;
+    straight_ = std::max(0.0, size.x() - 2.0 * (options.border_m + radius_));
+    low_ += Eigen::Vector2d(0.5 * (size.x() - straight_), 0.5 * (size.y() - width));
+  }
+
+  double length() const { return lanes_ * straight_ + (lanes_ - 1) * pi * radius_; }
+  // At a length of way from the start; beyond the ends straight on.
+  Eigen::Vector2d at(double way_m) const {
+    const double period = straight_ + pi * radius_;
+    const int lane =
+        period > 0.0 ? static_cast<int>(std::clamp(std::floor(way_m / period), 0.0, lanes_ - 1.0))
+                     : 0;
+    const double along = way_m - lane * period;
+    const double forward = lane % 2 == 0 ? 1.0 : -1.0;
+    Eigen::Vector2d place(0.5 * straight_ + forward * (along - 0.5 * straight_),
+                          2.0 * radius_ * lane);
+    if (along > straight_ && lane + 1 < lanes_) {
+      const double angle = (along - straight_) / radius_;
+      place.x() = 0.5 * straight_ * (1.0 + forward) + forward * radius_ * std::sin(angle);
+      place.y() += radius_ * (1.0 - std::cos(angle));
+    }
+    return in_lanes(low_ + place);
+  }
+
+ private:
+  Eigen::Vector2d in_lanes(const Eigen::Vector2d& xy) const {
+    return swapped_ ? Eigen::Vector2d(xy.y(), xy.x()) : xy;
+  }
+
+  bool swapped_ = false;  // lanes along y
+  Eigen::Vector2d low_ = Eigen::Vector2d::Zero();
+  int lanes_ = 1;
+  double radius_ = 0.0;
+  double straight_ = 0.0;
+};
+
 }  // namespace
 
+void bind(ParameterTable& table, SerpentineOptions& options) {
+  table.add("lane_m", options.lane_m, positive, "between lanes of a serpentine at most, m");
+  table.add("border_m", options.border_m, not_negative,
+            "between a serpentine and the border of the ground, m");
+  table.add("ahead_m", options.ahead_m, positive,
+            "distance along a serpentine at which the ground is looked at, m");
+}
+
 void bind(ParameterTable& table, CameraTrajectoryOptions& options) {
+  table.add("path", options.path,
+            {{"auto", CameraPath::automatic},
+             {"loops", CameraPath::loops},
+             {"serpentine", CameraPath::serpentine}},
+            "way of the camera; auto: loops around a mesh, a serpentine over a folder of clouds");
+  bind(table, options.serpentine);
   table.add("frames", options.frames, {1.0, 1e6}, "number of poses");
   table.add("loops", options.loops, {1.0, 1000.0}, "number of loops around the site");
   table.add("radius_m", options.radius_m, not_negative,
@@ -204,37 +296,79 @@ double surrounding_ground_height(const TriangleMesh& mesh) {
 CameraMotion camera_motion(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
                            std::uint64_t seed) {
   const Way way = way_of(mesh, options);
-  const double gaze_m = way.radius * std::tan(options.gaze_deg * pi / 180.0);
-  // A hand sways with the steps of a walk; a look wanders in some ten seconds.
-  return [=, loops = paced_loops(way, options), sway = wander3(seed, 0, 0.4, 2.0),
-          turn = wander3(seed, 3, 0.4, 2.0),
-          gaze = wander3(seed, 6, 0.04, 0.15)](std::size_t frame, double after_s) {
+  const Hand hand(options, way.radius * std::tan(options.gaze_deg * pi / 180.0), seed);
+  return [=, loops = paced_loops(way, options)](std::size_t frame, double after_s) {
     const std::size_t last = std::max<std::size_t>(loops.size(), 2) - 2;
     const std::size_t step = std::min(frame, last);
     const double pace = loops.size() > 1 ? loops[step + 1] - loops[step] : 0.0;
     const double loop = loops[frame] + after_s / options.frame_interval_s * pace;
     const double time_s = static_cast<double>(frame) * options.frame_interval_s + after_s;
-    const Eigen::Vector3d position =
-        position_on(way, options, loop) + options.sway_m * at(sway, time_s);
-    // The look wanders over the ground more than up and down.
-    const Eigen::Vector3d target =
-        way.target + gaze_m * Eigen::Vector3d(1.0, 1.0, 0.3).cwiseProduct(at(gaze, time_s));
-    Pose pose = make_pose_from_rpy(position, Eigen::Vector3d::Zero());
-    pose.linear() = look_at(position, target) *
-                    make_pose_from_rpy({0, 0, 0}, options.tremor_deg * at(turn, time_s)).linear();
-    return pose;
+    return hand.pose(position_on(way, options, loop), way.target, time_s);
   };
+}
+
+CameraMotion serpentine_motion(const GroundHeights& ground, const CameraTrajectoryOptions& options,
+                               std::uint64_t seed) {
+  if (ground.empty()) throw Error("the ground has no points");
+  const Serpentine way(ground.box(), options.serpentine);
+  const double height_m = options.height_m > 0.0 ? options.height_m : 1.4;
+  const double ahead_m = options.serpentine.ahead_m;
+  const double gaze_m = std::hypot(height_m, ahead_m) * std::tan(options.gaze_deg * pi / 180.0);
+  const Hand hand(options, gaze_m, seed);
+  return [=, heights = ground](std::size_t frame, double after_s) {
+    const double time_s = static_cast<double>(frame) * options.frame_interval_s + after_s;
+    const double way_m = way.length() * time_s / (options.frame_interval_s * options.frames);
+    const auto on_ground = [&](double at_m) {
+      const Eigen::Vector2d place = way.at(at_m);
+      return Eigen::Vector3d(place.x(), place.y(), heights.height(place));
+    };
+    return hand.pose(on_ground(way_m) + height_m * Eigen::Vector3d::UnitZ(),
+                     on_ground(way_m + ahead_m), time_s);
+  };
+}
+
+CameraMotion motion_through(Trajectory poses) {
+  return [poses = std::move(poses)](std::size_t frame, double after_s) {
+    const Pose& here = poses.at(frame).world_from_base;
+    if (after_s == 0.0 || poses.size() < 2) return here;
+    // Towards the next pose; from the last one as from the one before it.
+    const std::size_t from = std::min(frame, poses.size() - 2);
+    const double share = after_s / (poses[from + 1].stamp_s - poses[from].stamp_s);
+    const Pose motion = poses[from].world_from_base.inverse() * poses[from + 1].world_from_base;
+    const Eigen::AngleAxisd turn(motion.linear());
+    Pose part = Pose::Identity();
+    part.linear() = Eigen::AngleAxisd(share * turn.angle(), turn.axis()).toRotationMatrix();
+    part.translation() = share * motion.translation();
+    return here * part;
+  };
+}
+
+Trajectory poses_of_motion(const CameraMotion& motion, const CameraTrajectoryOptions& options) {
+  Trajectory trajectory;
+  for (std::size_t n = 0; n < static_cast<std::size_t>(options.frames); ++n)
+    trajectory.push_back({0, 0.0, motion(n, 0.0)});
+  return numbered(std::move(trajectory), options.frame_interval_s);
 }
 
 Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
                         std::uint64_t seed) {
-  const CameraMotion motion = camera_motion(mesh, options, seed);
-  Trajectory trajectory;
-  for (std::size_t n = 0; n < static_cast<std::size_t>(options.frames); ++n)
-    trajectory.push_back({static_cast<int>(n) + 1,
-                          first_stamp_s + static_cast<double>(n) * options.frame_interval_s,
-                          motion(n, 0.0)});
-  return trajectory;
+  return poses_of_motion(camera_motion(mesh, options, seed), options);
+}
+
+Trajectory numbered(Trajectory poses, double frame_interval_s) {
+  const bool stamped = std::any_of(poses.begin(), poses.end(),
+                                   [](const TrajectoryPose& pose) { return pose.stamp_s != 0.0; });
+  for (std::size_t n = 0; n < poses.size(); ++n) {
+    TrajectoryPose& pose = poses[n];
+    pose.node = static_cast<int>(n) + 1;
+    if (!stamped) pose.stamp_s = first_stamp_s + static_cast<double>(n) * frame_interval_s;
+    if (n > 0 && !(pose.stamp_s > poses[n - 1].stamp_s))
+      throw Error("poses are not in the order of time",
+                  {.field = "stamp of pose " + std::to_string(n + 1),
+                   .value = to_text(pose.stamp_s),
+                   .bound = "> " + to_text(poses[n - 1].stamp_s)});
+  }
+  return poses;
 }
 
 }  // namespace libmap

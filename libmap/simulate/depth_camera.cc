@@ -50,31 +50,29 @@ std::vector<Eigen::Vector2d> lattice_rays(const Camera& camera, int width, int h
 
 }  // namespace
 
-PixelRays make_pixel_rays(const Camera& camera) {
+ViewRays make_view_rays(const Camera& camera) {
   return {camera.width, camera.height, ray_table(camera),
           lattice_rays(camera, camera.width + 1, camera.height + 1, -0.5)};
 }
 
-struct VisibleSurface::Parts {
+struct VisibleSurface::Seen {
+  float depth = 0.0F;
+  float incidence_cos = 0.0F;
+  Eigen::Vector3f color = background;
+};
+
+struct VisibleSurface::Part {
   RayCaster caster;
   TriangleMesh mesh;  // with vertex normals
   std::uint64_t texture_seed = 1;
 
-  struct Seen {
-    float depth = 0.0F;
-    float incidence_cos = 0.0F;
-    Eigen::Vector3f color = background;
-  };
-  using Sink = std::function<void(std::size_t column, const Seen& seen)>;
-  void view_row(std::span<const Eigen::Vector2d> rays, const Pose& world_from_camera,
-                bool with_color, const Sink& sink) const;
   Eigen::Vector3f albedo(const RayHit& hit, const Eigen::Vector3d& point) const;
   Seen look(const RayHit& hit, const Eigen::Vector3d& origin, const Eigen::Vector3d& direction,
             bool with_color) const;
 };
 
-Eigen::Vector3f VisibleSurface::Parts::albedo(const RayHit& hit,
-                                              const Eigen::Vector3d& point) const {
+Eigen::Vector3f VisibleSurface::Part::albedo(const RayHit& hit,
+                                             const Eigen::Vector3d& point) const {
   const auto to_vector = [](const Color& color) -> Eigen::Vector3f {
     return Eigen::Vector3f(color[0], color[1], color[2]) / 255.0F;
   };
@@ -85,10 +83,9 @@ Eigen::Vector3f VisibleSurface::Parts::albedo(const RayHit& hit,
          static_cast<float>(hit.v) * to_vector(mesh.vertex_colors[t[2]]);
 }
 
-VisibleSurface::Parts::Seen VisibleSurface::Parts::look(const RayHit& hit,
-                                                        const Eigen::Vector3d& origin,
-                                                        const Eigen::Vector3d& direction,
-                                                        bool with_color) const {
+VisibleSurface::Seen VisibleSurface::Part::look(const RayHit& hit, const Eigen::Vector3d& origin,
+                                                const Eigen::Vector3d& direction,
+                                                bool with_color) const {
   Seen seen;
   seen.depth = static_cast<float>(hit.distance);
   const Triangle& t = mesh.triangles[hit.triangle];
@@ -109,20 +106,28 @@ VisibleSurface::Parts::Seen VisibleSurface::Parts::look(const RayHit& hit,
   return seen;
 }
 
-void VisibleSurface::Parts::view_row(std::span<const Eigen::Vector2d> rays,
-                                     const Pose& world_from_camera, bool with_color,
-                                     const Sink& sink) const {
+void VisibleSurface::view_row(std::span<const Eigen::Vector2d> rays, const Pose& world_from_camera,
+                              bool with_color, const Sink& sink) const {
   std::vector<Eigen::Vector3d> directions;
   directions.reserve(rays.size());
   for (const Eigen::Vector2d& ray : rays)
     directions.emplace_back(world_from_camera.linear() * Eigen::Vector3d(ray.x(), ray.y(), 1.0));
-  std::vector<RayHit> hits(rays.size());
   const Eigen::Vector3d origin = world_from_camera.translation();
-  caster.cast_bundle(origin, directions, hits);
+  std::vector<RayHit> hits(rays.size());
+  std::vector<RayHit> nearest(rays.size(), RayHit{.triangle = RayHit::no_triangle});
+  std::vector<const Part*> seen(rays.size(), nullptr);
+  for (const std::shared_ptr<const Part>& part : parts_) {
+    part->caster.cast_bundle(origin, directions, hits);
+    for (std::size_t i = 0; i < hits.size(); ++i) {
+      if (hits[i].triangle == RayHit::no_triangle) continue;
+      if (seen[i] != nullptr && !(hits[i].distance < nearest[i].distance)) continue;
+      nearest[i] = hits[i];
+      seen[i] = part.get();
+    }
+  }
   for (std::size_t i = 0; i < hits.size(); ++i)
-    sink(i, hits[i].triangle == RayHit::no_triangle
-                ? Seen{}
-                : look(hits[i], origin, directions[i], with_color));
+    sink(i, seen[i] == nullptr ? Seen{}
+                               : seen[i]->look(nearest[i], origin, directions[i], with_color));
 }
 
 const std::vector<std::pair<std::string, TextureSource>>& texture_source_names() {
@@ -134,30 +139,39 @@ const std::vector<std::pair<std::string, TextureSource>>& texture_source_names()
 }
 
 VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
-                               std::uint64_t texture_seed)
-    : parts_(new Parts{RayCaster(mesh), mesh, texture_seed}) {
-  std::vector<Color>& colors = parts_->mesh.vertex_colors;
+                               std::uint64_t texture_seed, ShadingNormals normals) {
+  const auto part = std::make_shared<Part>(Part{RayCaster(mesh), mesh, texture_seed});
+  std::vector<Color>& colors = part->mesh.vertex_colors;
   if (texture == TextureSource::mesh && colors.empty())
     throw Error("the mesh has no colors of its own");
   const bool plain = std::all_of(colors.begin(), colors.end(),
                                  [&](const Color& color) { return color == colors.front(); });
   if (texture == TextureSource::rock || (texture == TextureSource::automatic && plain))
     colors.clear();
-  parts_->mesh.vertex_normals = estimate_vertex_normals(mesh);
-  parts_->mesh.vertex_fields.clear();
-  parts_->mesh.face_fields.clear();
+  if (normals == ShadingNormals::estimated)
+    part->mesh.vertex_normals = estimate_vertex_normals(mesh);
+  else if (mesh.vertex_normals.empty())
+    throw Error("the mesh has no normals of its own");
+  part->mesh.vertex_fields.clear();
+  part->mesh.face_fields.clear();
+  parts_ = {part};
 }
-VisibleSurface::~VisibleSurface() = default;
-VisibleSurface::VisibleSurface(VisibleSurface&&) noexcept = default;
-VisibleSurface& VisibleSurface::operator=(VisibleSurface&&) noexcept = default;
 
-SurfaceView VisibleSurface::view(const PixelRays& rays, const Pose& world_from_camera,
+VisibleSurface::VisibleSurface(std::span<const VisibleSurface> parts) {
+  for (const VisibleSurface& part : parts)
+    parts_.insert(parts_.end(), part.parts_.begin(), part.parts_.end());
+}
+
+const RayCaster& VisibleSurface::caster() const { return parts_.front()->caster; }
+const TriangleMesh& VisibleSurface::mesh() const { return parts_.front()->mesh; }
+
+SurfaceView VisibleSurface::view(const ViewRays& rays, const Pose& world_from_camera,
                                  bool with_color) const {
   return view(
       rays, [&](double) { return world_from_camera; }, with_color);
 }
 
-SurfaceView VisibleSurface::view(const PixelRays& rays, const PoseOfRow& world_from_camera,
+SurfaceView VisibleSurface::view(const ViewRays& rays, const PoseOfRow& world_from_camera,
                                  bool with_color) const {
   const int w = rays.width;
   const int h = rays.height;
@@ -175,20 +189,19 @@ SurfaceView VisibleSurface::view(const PixelRays& rays, const PoseOfRow& world_f
       static_cast<std::size_t>(h) + 1, rows_a_task, [&](std::size_t begin, std::size_t end) {
         for (std::size_t y = begin; y < end; ++y) {
           const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
-          parts_->view_row(row_of(rays.corners, y, w + 1),
-                           world_from_camera(static_cast<double>(y) - 0.5), with_color,
-                           [&](std::size_t x, const Parts::Seen& seen) {
-                             view.corner_depth.pixels[corner_start + x] = seen.depth;
-                             if (with_color) corner_color.pixels[corner_start + x] = seen.color;
-                           });
+          view_row(row_of(rays.corners, y, w + 1), world_from_camera(static_cast<double>(y) - 0.5),
+                   with_color, [&](std::size_t x, const Seen& seen) {
+                     view.corner_depth.pixels[corner_start + x] = seen.depth;
+                     if (with_color) corner_color.pixels[corner_start + x] = seen.color;
+                   });
           if (y == static_cast<std::size_t>(h)) continue;
           const std::size_t start = y * static_cast<std::size_t>(w);
-          parts_->view_row(row_of(rays.centers, y, w), world_from_camera(static_cast<double>(y)),
-                           with_color, [&](std::size_t x, const Parts::Seen& seen) {
-                             view.depth.pixels[start + x] = seen.depth;
-                             view.incidence_cos.pixels[start + x] = seen.incidence_cos;
-                             if (with_color) view.color.pixels[start + x] = seen.color;
-                           });
+          view_row(row_of(rays.centers, y, w), world_from_camera(static_cast<double>(y)),
+                   with_color, [&](std::size_t x, const Seen& seen) {
+                     view.depth.pixels[start + x] = seen.depth;
+                     view.incidence_cos.pixels[start + x] = seen.incidence_cos;
+                     if (with_color) view.color.pixels[start + x] = seen.color;
+                   });
         }
       });
   for (int y = 0; with_color && y < h; ++y)
@@ -204,6 +217,8 @@ void bind_noise(ParameterTable& table, DepthSensorOptions& options) {
             "standard deviation of the depth noise along the ray at range 0, m");
   table.add("noise_of_range", options.noise_of_range, not_negative,
             "what that deviation grows by, m a m of range");
+  table.add("noise_of_square", options.noise_of_square, not_negative,
+            "and by the square of the range, as of stereo cameras, 1/m");
   table.add("depth_offset_m", options.depth_offset_m, any_number, "added to every range, m");
   table.add("max_incidence_deg", options.max_incidence_deg, {0.0, 90.0},
             "surfaces seen flatter give nothing, degrees from the normal; 90: none is too flat");
@@ -317,7 +332,8 @@ std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double inc
   }
   if (grazing_fate < grazing_loss(incidence_cos, options.max_incidence_deg)) return {0.0, kind};
   const double range = depth * range_of_depth;
-  const double deviation = options.noise_m + options.noise_of_range * range;
+  const double deviation =
+      options.noise_m + options.noise_of_range * range + options.noise_of_square * range * range;
   const double measured_range = range + options.depth_offset_m + deviation * random.normal();
   double measured = measured_range / range_of_depth;
   if (options.depth_step_m > 0)
@@ -329,7 +345,7 @@ std::pair<double, PixelKind> measure_pixel(const PixelDepths& depths, double inc
 
 }  // namespace
 
-DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
+DepthMeasurement measure_depth(const SurfaceView& view, const ViewRays& rays,
                                const DepthSensorOptions& options, std::uint64_t seed) {
   DepthMeasurement result{.depth = DepthImage(view.depth.width, view.depth.height)};
   struct Counts {

@@ -9,6 +9,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -20,19 +21,21 @@
 
 namespace libmap {
 
+class RayCaster;
+
 // x/z, y/z of the rays through a camera's pixels and their corners; NaN where there is no ray.
-struct PixelRays {
+struct ViewRays {
   int width = 0;
   int height = 0;
   std::vector<Eigen::Vector2d> centers;  // width * height
   std::vector<Eigen::Vector2d> corners;  // (width + 1) * (height + 1); (0, 0) is at pixel -0.5 -0.5
 };
-PixelRays make_pixel_rays(const Camera& camera);
+ViewRays make_view_rays(const Camera& camera);
 
 // One view without noise. Depths are 0 where there is no surface.
 struct SurfaceView {
   DepthImage depth;              // at the pixels' centers
-  DepthImage corner_depth;       // at their corners, as PixelRays::corners
+  DepthImage corner_depth;       // at their corners, as ViewRays::corners
   Image<float> incidence_cos;    // of the angle between ray and normal at the center
   Image<Eigen::Vector3f> color;  // 0 to 1: half the center's, an eighth of each corner's
 };
@@ -42,31 +45,44 @@ struct SurfaceView {
 enum class TextureSource { automatic, mesh, rock };
 const std::vector<std::pair<std::string, TextureSource>>& texture_source_names();
 
-// A mesh ready to be looked at. Light comes from the sky and a little more from one side.
+// Where the normals that light falls on come from: the mesh's vertices must have them.
+enum class ShadingNormals { estimated, of_vertices };
+
+// Meshes ready to be looked at; copies share them. Light comes from the sky and a little more from
+// one side.
 class VisibleSurface {
  public:
   // Throws Error as RayCaster does, and where the mesh's own colors are asked for and there are
   // none. The mesh may go away afterwards.
   explicit VisibleSurface(const TriangleMesh& mesh,
                           TextureSource texture = TextureSource::automatic,
-                          std::uint64_t texture_seed = 1);
-  ~VisibleSurface();
-  VisibleSurface(VisibleSurface&&) noexcept;
-  VisibleSurface& operator=(VisibleSurface&&) noexcept;
+                          std::uint64_t texture_seed = 1,
+                          ShadingNormals normals = ShadingNormals::estimated);
+  // All parts together; where several are equally near, the first is seen.
+  explicit VisibleSurface(std::span<const VisibleSurface> parts);
 
   // Rows in parallel. May be called from several threads at once. Without `with_color` the view's
   // color is empty.
-  SurfaceView view(const PixelRays& rays, const Pose& world_from_camera,
+  SurfaceView view(const ViewRays& rays, const Pose& world_from_camera,
                    bool with_color = true) const;
   // The same of a camera that moves while it reads its rows one after the other; row -0.5 is the
   // upper border of the first.
   using PoseOfRow = std::function<Pose(double row)>;
-  SurfaceView view(const PixelRays& rays, const PoseOfRow& world_from_camera,
+  SurfaceView view(const ViewRays& rays, const PoseOfRow& world_from_camera,
                    bool with_color = true) const;
 
+  // Of the first part.
+  const RayCaster& caster() const;
+  const TriangleMesh& mesh() const;  // with vertex normals
+
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  struct Part;
+  struct Seen;
+  using Sink = std::function<void(std::size_t column, const Seen& seen)>;
+  void view_row(std::span<const Eigen::Vector2d> rays, const Pose& world_from_camera,
+                bool with_color, const Sink& sink) const;
+
+  std::vector<std::shared_ptr<const Part>> parts_;
 };
 
 // Defaults: the Kinect v2's limits (0.5 to 4.5 m, whole millimeters) and the noise of the scans
@@ -74,6 +90,7 @@ class VisibleSurface {
 struct DepthSensorOptions {
   double noise_m = 0.002;         // standard deviation along the ray at range 0 ...
   double noise_of_range = 0.005;  // ... and what it grows by, m a m of range
+  double noise_of_square = 0.0;   // ... and of range squared, as of stereo cameras, 1/m
   double depth_offset_m = 0.0;    // added to every range
   double depth_step_m = 0.001;    // depths are multiples of it; 0: not rounded
   double near_m = 0.5;            // of the measured depth
@@ -99,7 +116,7 @@ struct DepthMeasurement {
 };
 
 // Grazing measurements are lost more and more over the last 10 degrees before max_incidence_deg.
-DepthMeasurement measure_depth(const SurfaceView& view, const PixelRays& rays,
+DepthMeasurement measure_depth(const SurfaceView& view, const ViewRays& rays,
                                const DepthSensorOptions& options, std::uint64_t seed);
 
 struct PhotoOptions {

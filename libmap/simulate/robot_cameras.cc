@@ -7,6 +7,7 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/ray_caster.h"
+#include "libmap/simulate/multipath.h"
 
 namespace libmap {
 
@@ -49,8 +50,10 @@ std::vector<RobotCameraImage> simulate_robot_cameras(const TriangleMesh& mesh, c
     sensor.depth_step_m = 0.0;
     sensor.near_m = camera.near_m;
     sensor.far_m = camera.far_m;
-    const PixelRays rays = make_pixel_rays(camera.camera);
-    SurfaceView view = surface.view(rays, world_from_robot * camera.camera.base_from_camera, false);
+    const ViewRays rays = make_view_rays(camera.camera);
+    const Pose world_from_camera = world_from_robot * camera.camera.base_from_camera;
+    SurfaceView view = surface.view(rays, world_from_camera, false);
+    add_multipath(view, surface, rays, world_from_camera, options.faults.multipath);
     distort_depth(view, options.faults);
     RobotCameraImage image;
     image.measurement = measure_depth(view, rays, sensor, mix_bits(options.seed, camera_key + i));

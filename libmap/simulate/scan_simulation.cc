@@ -10,6 +10,8 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
+#include "libmap/simulate/depth_registration.h"
+#include "libmap/simulate/multipath.h"
 
 namespace libmap {
 
@@ -18,12 +20,14 @@ namespace {
 constexpr double degrees = 180.0 / std::numbers::pi;
 // Frames that are drawn at the same time.
 constexpr std::size_t batch = 8;
+constexpr double far_deviations = 6.0;  // of depth's noise, beyond the largest depth
 
 // Keys of the random numbers; frames take those from `frame_key` on, four each.
 constexpr std::uint64_t trajectory_key = 1;
 constexpr std::uint64_t odometry_key = 2;
 constexpr std::uint64_t closure_key = 3;
 constexpr std::uint64_t fault_key = 4;
+constexpr std::uint64_t recording_key = 5;
 constexpr std::uint64_t frame_key = 1000;
 
 double turn_of(const Pose& motion) { return Eigen::AngleAxisd(motion.linear()).angle(); }
@@ -75,44 +79,115 @@ void add_closures(PoseGraph& graph, const Trajectory& truth, const LoopClosureOp
                      RandomStream(mix_bits(seed, closure_key), first * truth.size() + last)));
 }
 
+// The color camera at the size of depth images.
+Camera at_depth_size(const Camera& camera, const CalibrationFaults& faults) {
+  RgbdFrame frame;
+  frame.cameras = {camera};
+  frame.depth = DepthImage(faults.depth_width_px > 0 ? faults.depth_width_px : camera.width,
+                           faults.depth_height_px > 0 ? faults.depth_height_px : camera.height);
+  return camera_views(frame).front().depth_camera;
+}
+
 // Takes the frames of a scan.
 class ScanCamera {
  public:
-  ScanCamera(const TriangleMesh& mesh, const ScanSimulationOptions& options)
+  ScanCamera(const ScanScene& scene, const ScanSimulationOptions& options)
       : options_(options),
         faults_(options.faults.calibration),
-        rays_(make_pixel_rays(options.camera)),
-        surface_(mesh, options.texture, options.seed),
-        motion_(camera_motion(mesh, options.trajectory, mix_bits(options.seed, trajectory_key))),
+        rays_(make_view_rays(options.camera)),
+        depth_camera_(at_depth_size(options.camera, faults_)),
+        depth_rays_(make_view_rays(depth_camera_)),
+        scene_(scene),
         color_from_depth_(color_from_depth(faults_, mix_bits(options.seed, fault_key))) {}
 
-  DepthMeasurement take(std::size_t n, RgbdFrame& frame) const;
+  DepthMeasurement take(std::size_t n, const VisibleSurface& surface, RgbdFrame& frame) const;
+
+  // Where a frame looks from, and how far.
+  std::vector<Pose> world_from_cameras(std::size_t n) const;
+  ViewRange range() const;
 
  private:
   Pose world_from_camera(std::size_t n, double after_s) const {
-    return motion_(n, after_s) * options_.camera.base_from_camera;
+    return options_.events.seen_pose(scene_.motion(n, after_s), n) *
+           options_.camera.base_from_camera;
   }
   bool is_depth_apart() const {
-    return faults_.depth_shift_mm != 0.0 || faults_.depth_turn_deg != 0.0 ||
+    return has_own_lens() || faults_.depth_shift_mm != 0.0 || faults_.depth_turn_deg != 0.0 ||
            faults_.depth_delay_s != 0.0 || faults_.rolling_shutter_s != 0.0;
   }
-  SurfaceView picture_view(std::size_t n) const;
+  bool has_own_lens() const {
+    return faults_.depth_baseline_mm != 0.0 || depth_camera_.width != options_.camera.width ||
+           depth_camera_.height != options_.camera.height;
+  }
+  Pose world_from_depth_camera(std::size_t n) const {
+    return world_from_camera(n, faults_.depth_delay_s) * color_from_depth_;
+  }
+  SurfaceView view(std::size_t n, const VisibleSurface& surface, const ViewRays& rays,
+                   const VisibleSurface::PoseOfRow& world_from_camera, bool with_color) const;
+  SurfaceView picture_view(std::size_t n, const VisibleSurface& surface) const;
   ColorImage photo_of(SurfaceView& view, std::size_t n, std::uint64_t key) const;
 
   const ScanSimulationOptions& options_;
   const CalibrationFaults& faults_;
-  PixelRays rays_;
-  VisibleSurface surface_;
-  CameraMotion motion_;
+  ViewRays rays_;
+  Camera depth_camera_;
+  ViewRays depth_rays_;
+  const ScanScene& scene_;
   Pose color_from_depth_;
 };
 
-SurfaceView ScanCamera::picture_view(std::size_t n) const {
-  if (faults_.rolling_shutter_s == 0.0) return surface_.view(rays_, world_from_camera(n, 0.0));
+SurfaceView ScanCamera::view(std::size_t n, const VisibleSurface& surface, const ViewRays& rays,
+                             const VisibleSurface::PoseOfRow& world_from_camera,
+                             bool with_color) const {
+  SurfaceView view = surface.view(rays, world_from_camera, with_color);
+  for (const ExtraBody& body : scene_.bodies)
+    if (const auto world_from_body = body.world_from_body(n)) {
+      const Pose body_from_world = world_from_body->inverse();
+      take_nearer(
+          view,
+          body.surface->view(
+              rays, [&](double row) -> Pose { return body_from_world * world_from_camera(row); },
+              with_color));
+    }
+  return view;
+}
+
+std::vector<Pose> ScanCamera::world_from_cameras(std::size_t n) const {
+  std::vector<Pose> poses = {world_from_camera(n, 0.0)};
+  if (faults_.rolling_shutter_s != 0.0)
+    for (const double share : {-0.5, 0.5})
+      poses.push_back(world_from_camera(n, share * faults_.rolling_shutter_s));
+  if (is_depth_apart()) poses.push_back(world_from_depth_camera(n));
+  return poses;
+}
+
+// What is measured nearer than far_m, by whatever noise and faults, in the picture of either
+// camera.
+ViewRange ScanCamera::range() const {
+  const DepthFaults& faults = options_.faults.depth;
+  const double far_m = options_.depth.far_m;
+  const double widest =
+      1.0 + 0.01 * std::abs(faults.scale_percent) +
+      far_deviations * (options_.depth.noise_of_range + options_.depth.noise_of_square * far_m);
+  const double seen_m = far_m * widest + far_deviations * options_.depth.noise_m +
+                        std::abs(options_.depth.depth_offset_m) + std::abs(faults.wiggle_m) +
+                        std::abs(faults.corner_m);
+  ViewRange range = view_range(rays_, seen_m);
+  const ViewRange of_depth = view_range(depth_rays_, seen_m);
+  range.rays.extend(of_depth.rays);
+  return range;
+}
+
+SurfaceView ScanCamera::picture_view(std::size_t n, const VisibleSurface& surface) const {
   const double row_s = faults_.rolling_shutter_s / std::max(1, rays_.height - 1);
-  return surface_.view(rays_, [&](double row) {
-    return world_from_camera(n, row_s * (row - 0.5 * (rays_.height - 1)));
-  });
+  const Pose middle = world_from_camera(n, 0.0);
+  return view(
+      n, surface, rays_,
+      [&](double row) {
+        return row_s == 0.0 ? middle
+                            : world_from_camera(n, row_s * (row - 0.5 * (rays_.height - 1)));
+      },
+      true);
 }
 
 ColorImage ScanCamera::photo_of(SurfaceView& view, std::size_t n, std::uint64_t key) const {
@@ -128,19 +203,28 @@ ColorImage ScanCamera::photo_of(SurfaceView& view, std::size_t n, std::uint64_t 
   return compress_photo(take_photo(view, options_.photo, mix_bits(options_.seed, key + 1)), faults);
 }
 
-DepthMeasurement ScanCamera::take(std::size_t n, RgbdFrame& frame) const {
+DepthMeasurement ScanCamera::take(std::size_t n, const VisibleSurface& surface,
+                                  RgbdFrame& frame) const {
   const auto key = frame_key + 4 * static_cast<std::uint64_t>(n);
-  SurfaceView view = picture_view(n);
+  SurfaceView view = picture_view(n, surface);
   frame.cameras = {stored_camera(options_.camera, faults_)};
   frame.color = photo_of(view, n, key);
+  const Pose world_from_depth = world_from_depth_camera(n);
   if (is_depth_apart())
-    view = surface_.view(rays_, world_from_camera(n, faults_.depth_delay_s) * color_from_depth_,
-                         false);
+    view = this->view(
+        n, surface, depth_rays_, [&](double) { return world_from_depth; }, false);
+  add_multipath(view, surface, depth_rays_, world_from_depth, options_.faults.depth.multipath);
   distort_depth(view, options_.faults.depth);
+  DepthSensorOptions sensor = options_.depth;
+  sensor.far_m = options_.events.far_at(n, sensor.far_m);
   DepthMeasurement measured =
-      measure_depth(view, rays_, options_.depth, mix_bits(options_.seed, key));
+      measure_depth(view, depth_rays_, sensor, mix_bits(options_.seed, key));
   measured.measured -=
       punch_holes(measured.depth, options_.faults.depth, mix_bits(options_.seed, key + 2));
+  if (faults_.depth_baseline_mm != 0.0)
+    measured.depth =
+        register_depth(measured.depth, depth_camera_, at_depth_size(frame.cameras.front(), faults_),
+                       stored_color_from_depth(faults_));
   return measured;
 }
 
@@ -200,24 +284,70 @@ Camera kinect_v2_camera() {
   return {.width = 512, .height = 424, .fx = 365.0, .fy = 365.0, .cx = 256.0, .cy = 212.0};
 }
 
-ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
+ScanScene scene_of(const TriangleMesh& mesh, const ScanSimulationOptions& options,
+                   const Trajectory& poses) {
+  const std::uint64_t seed = mix_bits(options.seed, trajectory_key);
+  ScanScene scene;
+  scene.surfaces = [surface = VisibleSurface(mesh, options.texture, options.texture_seed())](
+                       const std::vector<std::vector<Pose>>& frames, const ViewRange&) {
+    return std::vector<VisibleSurface>(frames.size(), surface);
+  };
+  if (!poses.empty()) {
+    scene.motion = motion_through(poses);
+  } else if (options.trajectory.path == CameraPath::serpentine) {
+    GroundHeights ground;
+    ground.add(mesh.vertices);
+    scene.motion = serpentine_motion(ground, options.trajectory, seed);
+  } else {
+    scene.motion = camera_motion(mesh, options.trajectory, seed);
+  }
+  scene.bodies = extra_bodies(mesh, options.events, options.seed);
+  scene.truth = poses.empty() ? poses_of_motion(scene.motion, options.trajectory) : poses;
+  return scene;
+}
+
+ScanScene scene_of(TerrainSurface& terrain, const GroundHeights& ground,
+                   const ScanSimulationOptions& options, const Trajectory& poses) {
+  ScanScene scene;
+  scene.surfaces = [&](const std::vector<std::vector<Pose>>& frames, const ViewRange& range) {
+    return terrain.seen_from(frames, range);
+  };
+  scene.motion = poses.empty() ? serpentine_motion(ground, options.trajectory,
+                                                   mix_bits(options.seed, trajectory_key))
+                               : motion_through(poses);
+  scene.truth = poses.empty() ? poses_of_motion(scene.motion, options.trajectory) : poses;
+  return scene;
+}
+
+ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress) {
-  const ScanCamera camera(mesh, options);
-  const Trajectory truth =
-      carry_camera(mesh, options.trajectory, mix_bits(options.seed, trajectory_key));
+  const ScanCamera camera(scene, options);
+  const std::vector<RecordedFrame> recorded = recorded_frames(
+      scene.truth.size(), options.faults.recording, mix_bits(options.seed, recording_key));
+  Trajectory truth;
+  for (const RecordedFrame& one : recorded) {
+    TrajectoryPose pose = scene.truth[one.frame];
+    pose.stamp_s += one.stamp_error_s;
+    pose.world_from_base = options.events.seen_pose(pose.world_from_base, one.frame);
+    truth.push_back(pose);
+  }
   ScanSimulationResult result;
   result.graph = simulate_odometry(truth, options.odometry, options.closures, options.seed);
   result.path_length_m = path_length(truth);
   progress.begin("frames", truth.size());
   for (std::size_t first = 0; first < truth.size(); first += batch) {
     const std::size_t count = std::min(batch, truth.size() - first);
+    std::vector<std::vector<Pose>> poses;
+    for (std::size_t i = 0; i < count; ++i)
+      poses.push_back(camera.world_from_cameras(recorded[first + i].images_of));
+    const std::vector<VisibleSurface> surfaces = scene.surfaces(poses, camera.range());
     std::array<RgbdFrame, batch> frames;
     std::array<DepthMeasurement, batch> measured;
     parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
       for (std::size_t i = begin; i < end; ++i) {
         frames[i].node = truth[first + i].node;
         frames[i].stamp_s = truth[first + i].stamp_s;
-        measured[i] = camera.take(first + i, frames[i]);
+        measured[i] = camera.take(recorded[first + i].images_of, surfaces[i], frames[i]);
         frames[i].depth = std::move(measured[i].depth);
       }
     });
@@ -235,6 +365,11 @@ ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulatio
   if (result.measured_pixels == 0)
     throw Error("no frame sees any of the mesh within the depth camera's range");
   return result;
+}
+
+ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
+                                   const FrameSink& sink, Progress& progress) {
+  return simulate_scan(scene_of(mesh, options), options, sink, progress);
 }
 
 }  // namespace libmap

@@ -15,7 +15,9 @@
 #include "libmap/scan/rgbd_frame.h"
 #include "libmap/simulate/camera_trajectory.h"
 #include "libmap/simulate/depth_camera.h"
+#include "libmap/simulate/scan_events.h"
 #include "libmap/simulate/sensor_faults.h"
+#include "libmap/simulate/terrain_surface.h"
 
 namespace libmap {
 
@@ -58,9 +60,13 @@ struct ScanSimulationOptions {
   DepthSensorOptions depth{};
   PhotoOptions photo{};
   SensorFaults faults{};
+  ScanEvents events{};
   OdometryOptions odometry{};
   LoopClosureOptions closures{};
   std::uint64_t seed = 1;
+  std::uint64_t rock_seed =
+      0;  // of the rock's colors; 0: `seed`. Scans of the same ground share it
+  std::uint64_t texture_seed() const { return rock_seed == 0 ? seed : rock_seed; }
 };
 
 struct ScanSimulationResult {
@@ -73,11 +79,31 @@ struct ScanSimulationResult {
   double path_length_m = 0.0;
 };
 
+// What is scanned, and the way of the camera.
+struct ScanScene {
+  // What each of a few frames can see, by the poses of its cameras.
+  using Surfaces = std::function<std::vector<VisibleSurface>(
+      const std::vector<std::vector<Pose>>& world_from_camera, const ViewRange& range)>;
+  Surfaces surfaces;
+  CameraMotion motion;
+  std::vector<ExtraBody> bodies;  // of the options' events; of a terrain none
+  Trajectory truth;               // at the frames, as numbered() gives it
+};
+// The scene of a mesh, and of terrain that outlives it; `poses`: given ones, empty: the options'
+// path.
+ScanScene scene_of(const TriangleMesh& mesh, const ScanSimulationOptions& options,
+                   const Trajectory& poses = {});
+ScanScene scene_of(TerrainSurface& terrain, const GroundHeights& ground,
+                   const ScanSimulationOptions& options, const Trajectory& poses = {});
+
 // Frames go to `sink` one by one in the order of their nodes; a few are in memory at a time. Ground
 // truth poses are those of the camera's body in the mesh's frame when the middle row of the picture
-// is taken. Throws Error where the mesh has
-// no triangle, or where no frame has any depth.
+// is taken. Throws Error where the mesh has no
+// triangle, or where no frame has any depth.
 using FrameSink = std::function<void(const GraphNode& node, const RgbdFrame& frame)>;
+ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationOptions& options,
+                                   const FrameSink& sink, Progress& progress = no_progress());
+// Around the mesh, or over it where the options say so.
 ScanSimulationResult simulate_scan(const TriangleMesh& mesh, const ScanSimulationOptions& options,
                                    const FrameSink& sink, Progress& progress = no_progress());
 

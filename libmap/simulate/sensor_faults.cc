@@ -58,6 +58,9 @@ void bind(ParameterTable& table, DepthFaults& faults) {
             "(Teichman et al. 2013), m");
   table.add("depth_holes", faults.holes, zero_to_one,
             "fault: share of the image in discs without depth");
+  table.add("multipath", faults.multipath, zero_to_one,
+            "fault: reflectance of surfaces that mirror the light of a time-of-flight camera onto "
+            "others, which rounds concave edges (Fuchs 2010)");
 }
 
 void bind(ParameterTable& table, PhotoFaults& faults) {
@@ -82,6 +85,11 @@ void bind(ParameterTable& table, CalibrationFaults& faults) {
             "fault: length of the error of depth registered to color, mm");
   table.add("registration_turn_deg", faults.depth_turn_deg, {0.0, 45.0},
             "fault: its angle, degrees; directions are drawn from the seed");
+  table.add("depth_baseline_mm", faults.depth_baseline_mm, any_number,
+            "place of the depth camera to the right of the color camera, mm; 0: the same place");
+  table.add("depth_width_px", faults.depth_width_px, {0, 16384},
+            "width of depth images, which cover what color does; 0: color's");
+  table.add("depth_height_px", faults.depth_height_px, {0, 16384}, "their height; 0: color's");
   table.add("depth_delay_s", faults.depth_delay_s, any_number,
             "fault: depth is taken this much after color, s");
   table.add("rolling_shutter_s", faults.rolling_shutter_s, not_negative,
@@ -89,10 +97,20 @@ void bind(ParameterTable& table, CalibrationFaults& faults) {
             "its depth is global), s");
 }
 
+void bind(ParameterTable& table, RecordingFaults& faults) {
+  table.add("dropped_frames", faults.dropped_frames, zero_to_one,
+            "fault: share of the frames after the first that are missing");
+  table.add("duplicated_frames", faults.duplicated_frames, zero_to_one,
+            "fault: share of the frames that repeat the images of the frame before");
+  table.add("stamp_error_s", faults.stamp_error_s, not_negative,
+            "fault: standard deviation of the stored stamps, s");
+}
+
 void bind(ParameterTable& table, SensorFaults& faults) {
   bind(table, faults.depth);
   bind(table, faults.photo);
   bind(table, faults.calibration);
+  bind(table, faults.recording);
 }
 
 double DepthFaults::measured(double depth_m, double radius2) const {
@@ -115,7 +133,28 @@ Pose color_from_depth(const CalibrationFaults& faults, std::uint64_t seed) {
   const Eigen::Vector3d axis = random_direction(random);
   pose.translation() = 1e-3 * faults.depth_shift_mm * shift;
   pose.linear() = Eigen::AngleAxisd(faults.depth_turn_deg * pi / 180.0, axis).toRotationMatrix();
+  return stored_color_from_depth(faults) * pose;
+}
+
+Pose stored_color_from_depth(const CalibrationFaults& faults) {
+  Pose pose = Pose::Identity();
+  pose.translation().x() = 1e-3 * faults.depth_baseline_mm;
   return pose;
+}
+
+std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFaults& faults,
+                                           std::uint64_t seed) {
+  std::vector<RecordedFrame> recorded;
+  for (std::size_t n = 0; n < frames; ++n) {
+    RandomStream random(seed, n);
+    const double fate = random.uniform();
+    const double repetition = random.uniform();
+    if (n > 0 && fate < faults.dropped_frames) continue;
+    const bool repeats = n > 0 && repetition < faults.duplicated_frames;
+    recorded.push_back({n, repeats ? recorded.back().images_of : n,
+                        faults.stamp_error_s > 0.0 ? faults.stamp_error_s * random.normal() : 0.0});
+  }
+  return recorded;
 }
 
 void distort_depth(SurfaceView& view, const DepthFaults& faults) {

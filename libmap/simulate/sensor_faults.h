@@ -3,8 +3,10 @@
 // a fault that is off draws no random number and changes no byte.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <vector>
 
 #include "libmap/core/camera.h"
 #include "libmap/core/image.h"
@@ -21,8 +23,9 @@ struct DepthFaults {
   double scale_percent = 0.0;  // of depth, added
   double wiggle_m = 0.0;       // amplitude of sin(2 pi depth / wiggle_period_m), added
   double wiggle_period_m = 1.2;
-  double corner_m = 0.0;  // added at the corners, growing with the squared radius
-  double holes = 0.0;     // share of the image in discs without depth
+  double corner_m = 0.0;   // added at the corners, growing with the squared radius
+  double holes = 0.0;      // share of the image in discs without depth
+  double multipath = 0.0;  // reflectance of surfaces that mirror light onto others (multipath.h)
 
   bool changes_depth() const { return scale_percent != 0 || wiggle_m != 0 || corner_m != 0; }
   // What is measured at `depth_m`, without noise; radius2: from the middle of the image, of that of
@@ -46,25 +49,50 @@ struct CalibrationFaults {
   double focal_percent = 0.0;  // of the stored focal lengths, too large
   double cx_px = 0.0;          // of the stored principal point, too large
   double cy_px = 0.0;
-  double depth_shift_mm = 0.0;     // length of the error of depth registered to color, ...
-  double depth_turn_deg = 0.0;     // ... and its angle, in directions drawn from the seed
+  double depth_shift_mm = 0.0;  // length of the error of depth registered to color, ...
+  double depth_turn_deg = 0.0;  // ... and its angle, in directions drawn from the seed
+  // The depth camera's place to the right of the color camera, known: its images are registered to
+  // color, with shadows. 0: both look from one place, but for the errors above.
+  double depth_baseline_mm = 0.0;
+  int depth_width_px = 0;  // of depth images, which cover what color does; 0: color's size
+  int depth_height_px = 0;
   double depth_delay_s = 0.0;      // depth is taken this much after color
   double rolling_shutter_s = 0.0;  // from the first to the last row of a picture; depth is global,
                                    // as of the RealSense D435
 };
 void bind(ParameterTable& table, CalibrationFaults& faults);
 
+// What the recorder does with frames.
+struct RecordingFaults {
+  double dropped_frames = 0.0;     // share of the frames after the first that are missing
+  double duplicated_frames = 0.0;  // share that repeat the images of the frame before
+  double stamp_error_s = 0.0;      // standard deviation of the stored stamps
+};
+void bind(ParameterTable& table, RecordingFaults& faults);
+
 struct SensorFaults {
   DepthFaults depth{};
   PhotoFaults photo{};
   CalibrationFaults calibration{};
+  RecordingFaults recording{};
 };
 void bind(ParameterTable& table, SensorFaults& faults);
 
 // The camera as the scan stores it.
 Camera stored_camera(Camera camera, const CalibrationFaults& faults);
-// Where registered depth looks from, as seen from the color camera: the same for a whole scan.
+// Where depth looks from, as seen from the color camera: the same for a whole scan. And where it is
+// stored to look from.
 Pose color_from_depth(const CalibrationFaults& faults, std::uint64_t seed);
+Pose stored_color_from_depth(const CalibrationFaults& faults);
+
+// A frame that is stored: of frames that count from 0, which one it is and whose images it has.
+struct RecordedFrame {
+  std::size_t frame = 0;
+  std::size_t images_of = 0;
+  double stamp_error_s = 0.0;
+};
+std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFaults& faults,
+                                           std::uint64_t seed);
 
 // Depths of a view as the sensor errs, before its noise.
 void distort_depth(SurfaceView& view, const DepthFaults& faults);

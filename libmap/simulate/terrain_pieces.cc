@@ -119,29 +119,16 @@ void TerrainPiecesOptions::check() const {
                                     .bound = "large enough for at most 1,000,000 pieces"});
 }
 
-std::vector<TerrainPiece> terrain_pieces(const TerrainPiecesOptions& options) {
+std::vector<PlanTile> terrain_pieces(const TerrainPiecesOptions& options) {
   options.check();
-  std::vector<TerrainPiece> pieces;
+  std::vector<PlanTile> pieces;
   for (std::int64_t i = 0; cells_of_piece(i, options.size_x_m, options).count() > 0; ++i)
     for (std::int64_t j = 0; cells_of_piece(j, options.size_y_m, options).count() > 0; ++j)
       pieces.push_back({i, j});
   return pieces;
 }
 
-std::string piece_file_name(const TerrainPiece& piece) {
-  return "piece_" + to_text(piece.i) + "_" + to_text(piece.j) + ".pcd";
-}
-
-bool is_piece_file_name(const std::string& name) {
-  const std::string start = "piece_";
-  const std::size_t between = name.find('_', start.size());
-  if (name.rfind(start, 0) != 0 || between == std::string::npos) return false;
-  const auto i = parse_integer(name.substr(start.size(), between - start.size()));
-  const auto j = parse_integer(name.substr(between + 1, name.find('.') - between - 1));
-  return i && j && name == piece_file_name({*i, *j});
-}
-
-PointCloud sample_piece(const TerrainPiecesOptions& options, const TerrainPiece& piece) {
+PointCloud sample_piece(const TerrainPiecesOptions& options, const PlanTile& piece) {
   options.check();
   const double spacing = options.spacing_m;
   const CellRange x = cells_of_piece(piece.i, options.size_x_m, options);

@@ -2,11 +2,10 @@
 #pragma once
 
 #include <cstddef>
-#include <cstdint>
-#include <string>
 #include <vector>
 
 #include "libmap/core/parameters.h"
+#include "libmap/core/plan_tiles.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/simulate/rocky_terrain.h"
 
@@ -26,20 +25,14 @@ struct TerrainPiecesOptions {
 // All but the size.
 void bind(ParameterTable& table, TerrainPiecesOptions& options);
 
-// Where a piece lies, in pieces from the origin.
-struct TerrainPiece {
-  std::int64_t i = 0;
-  std::int64_t j = 0;
-};
-std::vector<TerrainPiece> terrain_pieces(const TerrainPiecesOptions& options);
-std::string piece_file_name(const TerrainPiece& piece);  // "piece_3_0.pcd"
-bool is_piece_file_name(const std::string& name);
+// The pieces that cover the terrain, ascending.
+std::vector<PlanTile> terrain_pieces(const TerrainPiecesOptions& options);
 
 // The points of one piece, with normals, in meters, z up: the plan is cut into squares of
 // `spacing_m`, and each holds a point for each spacing_m^2 of its surface, by chance rounded up or
 // down, at least one. A piece depends on its place, the seed, the spacing and the terrain alone;
 // one that the size cuts off holds the same points as the whole one as far as it goes. Sizes are
 // rounded to whole spacings.
-PointCloud sample_piece(const TerrainPiecesOptions& options, const TerrainPiece& piece);
+PointCloud sample_piece(const TerrainPiecesOptions& options, const PlanTile& piece);
 
 }  // namespace libmap

@@ -8,7 +8,6 @@
 #include <limits>
 
 #include "libmap/core/parallel.h"
-#include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/hole_patch.h"
 #include "libmap/surface/self_intersections.h"
 #include "libmap/surface/triangle_repair.h"
@@ -47,8 +46,8 @@ struct Reach {
 };
 
 // Whether each loop is its component's outer boundary.
-std::vector<bool> outer_boundaries(const TriangleMesh& mesh,
-                                   const std::vector<BoundaryLoop>& loops) {
+std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const std::vector<BoundaryLoop>& loops,
+                                   const std::optional<PlanBox>& known) {
   const MeshComponents components = connected_components(mesh);
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> longest(components.areas_m2.size(), none);
@@ -74,9 +73,11 @@ std::vector<bool> outer_boundaries(const TriangleMesh& mesh,
     for (const std::uint32_t v : mesh.triangles[t])
       here.of_component_m = std::max(here.of_component_m, (mesh.vertices[v] - here.middle).norm());
   }
+  const std::vector<bool> are_beyond = components_beyond(mesh, components, known);
   std::vector<bool> is_outer(loops.size(), false);
   for (std::size_t c = 0; c < reach.size(); ++c)
-    if (longest[c] != none && 2.0 * reach[c].of_boundary_m >= reach[c].of_component_m)
+    if (longest[c] != none && !are_beyond[c] &&
+        2.0 * reach[c].of_boundary_m >= reach[c].of_component_m)
       is_outer[longest[c]] = true;
   return is_outer;
 }
@@ -257,16 +258,29 @@ std::vector<bool> free_patches(const TriangleMesh& base, const std::vector<Bound
 
 }  // namespace
 
-std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m) {
+std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
+                                    const std::optional<PlanBox>& known) {
+  std::vector<bool> are_beyond(components.areas_m2.size(), false);
+  if (!known) return are_beyond;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t)
+    for (const std::uint32_t v : mesh.triangles[t])
+      if (!known->contains(mesh.vertices[v].head<2>()))
+        are_beyond[components.of_triangle[t]] = true;
+  return are_beyond;
+}
+
+std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
+                                     const std::optional<PlanBox>& known) {
   std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposites_of(mesh));
   if (loops.empty()) return {};
-  const std::vector<bool> is_outer = outer_boundaries(mesh, loops);
+  const std::vector<bool> is_outer = outer_boundaries(mesh, loops, known);
   std::vector<BoundaryLoop> holes;
   for (std::size_t n = 0; n < loops.size(); ++n) {
     if (is_outer[n]) continue;
     const std::vector<Eigen::Vector3d> positions = positions_of(mesh, loops[n]);
     Eigen::AlignedBox3d box;
     for (const Eigen::Vector3d& p : positions) box.extend(p);
+    if (known && !known->contains(PlanBox(box.min().head<2>(), box.max().head<2>()))) continue;
     // The box's longest side is no longer than the diameter, its diagonal no shorter.
     if (box.sizes().maxCoeff() > max_hole_m) continue;
     if (box.diagonal().norm() <= max_hole_m || diameter_of(positions) <= max_hole_m)

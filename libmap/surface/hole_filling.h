@@ -1,12 +1,15 @@
 // Holes of a surface found and closed.
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstddef>
+#include <optional>
 #include <vector>
 
 #include "libmap/core/progress.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {
 
@@ -18,8 +21,14 @@ using BoundaryLoop = std::vector<HalfEdge>;  // as boundary_loops()
 // The boundaries of an oriented manifold whose diameter (largest distance between two of their
 // vertices) is at most `max_hole_m`. The longest boundary of a component is its outer one and left
 // out, unless all of it is less than half as far from its middle as the farthest vertex of the
-// component.
-std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m);
+// component. The mesh goes on beyond the box `known` in x and y: what reaches beyond it is no hole,
+// and a component that does has its outer boundary there.
+using PlanBox = Eigen::AlignedBox2d;
+std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
+                                     const std::optional<PlanBox>& known = std::nullopt);
+// Of each component, whether it reaches beyond.
+std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponents& components,
+                                    const std::optional<PlanBox>& known);
 
 // What a patch must be to be kept.
 enum class PatchCheck {

@@ -71,7 +71,8 @@ class Cleaning {
 
   // `cause` says what has taken all that there was.
   void require_triangles(const TriangleMesh& mesh, const ErrorContext& cause) {
-    if (mesh.triangles.empty()) throw Error("nothing is left of the mesh", cause);
+    if (mesh.triangles.empty() && !options_.known)
+      throw Error("nothing is left of the mesh", cause);
   }
 
   double merge_distance() {
@@ -126,17 +127,19 @@ class Cleaning {
     for (const double area : components.areas_m2) largest = std::max(largest, area);
     const double smallest =
         std::max(options_.min_island_area_m2, options_.min_island_share * largest);
+    std::vector<bool> are_kept = components_beyond(mesh_(), components, options_.known);
     std::size_t islands = 0;
-    for (const double area : components.areas_m2)
-      if (area < smallest) {
-        ++islands;
-        result_.island_area_m2 += area;
-      }
+    for (std::size_t c = 0; c < are_kept.size(); ++c) {
+      if (are_kept[c]) continue;
+      are_kept[c] = components.areas_m2[c] >= smallest;
+      if (are_kept[c]) continue;
+      ++islands;
+      result_.island_area_m2 += components.areas_m2[c];
+    }
     if (islands == 0) return;
     result_.islands += islands;
     std::vector<bool> keep(mesh_().triangles.size());
-    for (std::size_t t = 0; t < keep.size(); ++t)
-      keep[t] = components.areas_m2[components.of_triangle[t]] >= smallest;
+    for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = are_kept[components.of_triangle[t]];
     TriangleMesh kept = select_triangles(mesh_(), keep);
     require_triangles(kept, {.field = "min_island_area_m2",
                              .value = to_text(options_.min_island_area_m2),
@@ -155,7 +158,7 @@ class Cleaning {
   }
 
   void fill_small_holes() {
-    result_.filling = fill_holes(mesh_(), find_holes(mesh_(), options_.max_hole_m),
+    result_.filling = fill_holes(mesh_(), find_holes(mesh_(), options_.max_hole_m, options_.known),
                                  PatchCheck::intersection, progress_);
   }
 

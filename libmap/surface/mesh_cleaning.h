@@ -15,6 +15,7 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
@@ -39,6 +40,8 @@ struct MeshCleaningOptions {
   // >= 0: no point of the decimated surface lies farther from the surface before, nor a vertex of
   // that one from the decimated surface; 0: no decimation.
   double decimation_error_m = 0.0;
+  // The mesh goes on beyond, in x and y: what reaches there is no island and no hole.
+  std::optional<PlanBox> known = std::nullopt;
 };
 void bind(ParameterTable& table, MeshCleaningOptions& options);
 

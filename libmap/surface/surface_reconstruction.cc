@@ -1,12 +1,13 @@
 #include "libmap/surface/surface_reconstruction.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <tuple>
 
 #include "libmap/core/error.h"
-#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
@@ -32,12 +33,33 @@ constexpr double max_grid_cells = 1 << 20;
 constexpr double min_width = 1e-4;
 
 constexpr std::size_t value_neighbors = 4;
+// Cells beyond which only the nearest point has a say in a vertex's values.
+constexpr double max_value_cells = 12.0;
+
+// The first bits of a positive number: 64 steps an octave.
+constexpr unsigned dropped_bits = 46;
+
+bool has_normal(const PointCloud& cloud, std::size_t n) {
+  const float length = cloud.normals[n].norm();
+  return cloud.positions[n].allFinite() && std::isfinite(length) && length > 0.0F;
+}
+
+// Samples are nowhere farther from the surface, in cells.
+double max_reach_cells(const SurfaceReconstructionOptions& options) {
+  return options.support_cells * max_spacing_cells + 1.0;
+}
+// Larger distances between samples change nothing, in cells.
+double max_known_spacing(const SurfaceReconstructionOptions& options) {
+  return std::max(max_spacing_cells, max_reach_cells(options) / options.trim_distance_cells);
+}
 
 // Each vertex takes the mean of the 4 nearest points, weighted by 1 / (d^2 + radius^2); fields of
 // whole numbers the nearest point's value. A NaN of one point counts for nothing. Replaces colors
 // and fields; `tree` holds the cloud's positions.
-void carry_values(const PointCloud& cloud, const PointTree& tree, double radius_m,
+void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_size_m,
                   TriangleMesh& mesh) {
+  const double radius_m = 0.5 * cell_size_m;
+  const double max_m = max_value_cells * cell_size_m;
   const std::size_t count = mesh.vertices.size();
   mesh.vertex_colors.assign(cloud.has_colors() ? count : 0, Color{});
   mesh.vertex_fields.clear();
@@ -46,7 +68,9 @@ void carry_values(const PointCloud& cloud, const PointTree& tree, double radius_
   if (cloud.empty() || (!cloud.has_colors() && cloud.fields.empty())) return;
   parallel_for(count, 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      const auto neighbors = tree.nearest(mesh.vertices[v], value_neighbors);
+      auto neighbors = tree.nearest(mesh.vertices[v], value_neighbors);
+      while (neighbors.back().square_m2 > max_m * max_m && neighbors.size() > 1)
+        neighbors.pop_back();
       const auto weight = [&](const NeighborPoint& point) {
         return 1.0 / (point.square_m2 + radius_m * radius_m);
       };
@@ -88,17 +112,23 @@ struct UsedPoint {
 
 class Reconstruction {
  public:
-  Reconstruction(const PointCloud& cloud, const SurfaceReconstructionOptions& options,
-                 Progress& progress)
-      : cloud_(cloud), options_(options), progress_(progress) {}
+  // `survey` is of the whole cloud, of which `cloud` is a part; nullptr: it is the whole.
+  Reconstruction(const PointCloud& cloud, const SurfaceSurvey* survey,
+                 const SurfaceReconstructionOptions& options, Progress& progress)
+      : cloud_(cloud), options_(options), progress_(progress), is_part_(survey != nullptr) {
+    if (is_part_) survey_ = *survey;
+  }
 
   SurfaceReconstructionResult run() {
+    if (is_part_ && cloud_.empty()) return {};
     timed("samples", [&] {
       choose_points();
       choose_cell_size();
+      if (!is_part_) check_cell_size();
       make_samples();
       find_spacings();
     });
+    if (samples_.empty()) return std::move(result_);
     TriangleMesh surface;
     const bool is_poisson = options_.method == SurfaceMethod::poisson;
     timed(is_poisson ? "poisson" : "implicit", [&] {
@@ -109,7 +139,7 @@ class Reconstruction {
     });
     timed("trimming", [&] { trim(surface); });
     timed("values", [&] {
-      carry_values(cloud_, PointTree(cloud_.positions), 0.5 * result_.cell_size_m, result_.mesh);
+      carry_values(cloud_, PointTree(cloud_.positions), result_.cell_size_m, result_.mesh);
       result_.mesh.vertex_normals = estimate_vertex_normals(result_.mesh);
     });
     return std::move(result_);
@@ -127,6 +157,7 @@ class Reconstruction {
 
   void choose_points();
   void choose_cell_size();
+  void check_cell_size();
   double weight_of(std::size_t point) const;
   void make_samples();
   void add_cell(const UsedPoint* begin, const UsedPoint* end);
@@ -137,6 +168,8 @@ class Reconstruction {
   const PointCloud& cloud_;
   const SurfaceReconstructionOptions& options_;
   Progress& progress_;
+  bool is_part_;
+  SurfaceSurvey survey_;
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
@@ -150,14 +183,12 @@ class Reconstruction {
 
 void Reconstruction::choose_points() {
   cloud_.check();
+  if (!is_part_) survey_.add(cloud_, options_.weigh_by_error);
   if (!cloud_.has_normals()) throw Error("the cloud has no normals");
-  for (std::size_t n = 0; n < cloud_.size(); ++n) {
-    const float length = cloud_.normals[n].norm();
-    if (cloud_.positions[n].allFinite() && std::isfinite(length) && length > 0.0F)
-      used_.push_back(n);
-  }
+  for (std::size_t n = 0; n < cloud_.size(); ++n)
+    if (has_normal(cloud_, n)) used_.push_back(n);
   result_.dropped_points = cloud_.size() - used_.size();
-  if (used_.empty()) throw Error("no point of the cloud has a normal");
+  if (survey_.points() == 0) throw Error("no point of the cloud has a normal");
   // By position, so that the order of the points has no influence.
   const auto& positions = cloud_.positions;
   const auto& normals = cloud_.normals;
@@ -170,6 +201,9 @@ void Reconstruction::choose_points() {
 }
 
 void Reconstruction::choose_cell_size() {
+  origin_ = survey_.origin();
+  result_.cell_size_m = options_.cell_size_m;
+  if (is_part_) return;
   std::vector<Eigen::Vector3d> places;
   places.reserve(used_.size());
   for (const std::size_t n : used_)
@@ -191,9 +225,11 @@ void Reconstruction::choose_cell_size() {
   if (!(spread[1] > min_width * min_width * spread[2]))
     throw too_thin("the points lie on a line: there is no surface through them");
   result_.spacing_m = median_spacing(places);
-  result_.cell_size_m = options_.cell_size_m > 0.0 ? options_.cell_size_m : result_.spacing_m;
-  const Bounds3d bounds = bounds_of(places);
-  origin_ = (bounds.min + bounds.max) / 2;
+  if (!(options_.cell_size_m > 0.0)) result_.cell_size_m = result_.spacing_m;
+}
+
+void Reconstruction::check_cell_size() {
+  const Bounds3d& bounds = survey_.bounds();
   const double extent = (bounds.max - bounds.min).maxCoeff();
   // The surface is kept as far as cells reach: such ones would invent ground around the points.
   if (result_.cell_size_m > extent)
@@ -229,18 +265,8 @@ double Reconstruction::weight_of(std::size_t point) const {
 }
 
 void Reconstruction::make_samples() {
-  errors_ = options_.weigh_by_error ? cloud_.find_field("expected_error") : nullptr;
-  if (errors_ != nullptr) {
-    std::vector<double> errors;
-    for (const std::size_t n : used_)
-      if (errors_->values[n] > 0.0 && std::isfinite(errors_->values[n]))
-        errors.push_back(errors_->values[n]);
-    if (errors.empty()) {
-      errors_ = nullptr;
-    } else {
-      median_error_m_ = median(std::move(errors));
-    }
-  }
+  median_error_m_ = survey_.median_error_m();
+  errors_ = median_error_m_ > 0.0 ? cloud_.find_field("expected_error") : nullptr;
   std::vector<UsedPoint> points;
   points.reserve(used_.size());
   for (const std::size_t n : used_) {
@@ -296,17 +322,24 @@ void Reconstruction::find_spacings() {
   places_.reserve(samples_.size());
   for (const SurfaceSample& sample : samples_) places_.push_back(sample.position.cast<double>());
   spacings_m_.resize(samples_.size());
+  const double max_m = options_.method == SurfaceMethod::poisson
+                           ? std::numeric_limits<double>::infinity()
+                           : max_known_spacing(options_) * result_.cell_size_m;
   const PointTree tree(places_);
   parallel_for(samples_.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
+      spacings_m_[n] = max_m;
+      if (is_part_ && neighbors.size() <= spacing_neighbors) continue;
       // The disc that reaches the last of them holds so many.
       const double count = static_cast<double>(neighbors.size()) - 0.5;
-      spacings_m_[n] = std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count);
-      samples_[n].spacing_m =
-          static_cast<float>(std::min(spacings_m_[n], max_spacing_cells * result_.cell_size_m));
+      spacings_m_[n] =
+          std::min(max_m, std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count));
     }
   });
+  for (std::size_t n = 0; n < samples_.size(); ++n)
+    samples_[n].spacing_m =
+        static_cast<float>(std::min(spacings_m_[n], max_spacing_cells * result_.cell_size_m));
 }
 
 // Whether the triangle lies near samples, and on their side.
@@ -314,7 +347,7 @@ bool Reconstruction::is_near(const TriangleMesh& mesh, const Triangle& triangle,
                              const PointTree& tree) const {
   const Eigen::Vector3d normal = area_normal(mesh, triangle);
   for (const std::uint32_t corner : triangle) {
-    const NeighborPoint nearest = tree.nearest(mesh.vertices[corner]);
+    const NeighborPoint nearest = tree.first_of_nearest(mesh.vertices[corner]);
     const double reach =
         options_.trim_distance_cells * std::max(result_.cell_size_m, spacings_m_[nearest.index]);
     if (nearest.square_m2 > reach * reach ||
@@ -338,6 +371,35 @@ void Reconstruction::trim(TriangleMesh& surface) {
 
 }  // namespace
 
+void SurfaceSurvey::add(const PointCloud& cloud, bool weigh_by_error) {
+  if (!cloud.empty() && !cloud.has_normals()) throw Error("the cloud has no normals");
+  const ScalarField* errors = weigh_by_error ? cloud.find_field("expected_error") : nullptr;
+  for (std::size_t n = 0; n < cloud.size(); ++n) {
+    if (!has_normal(cloud, n)) {
+      ++dropped_;
+      continue;
+    }
+    const Eigen::Vector3d& place = cloud.positions[n];
+    bounds_.min = points_ == 0 ? place : Eigen::Vector3d(bounds_.min.cwiseMin(place));
+    bounds_.max = points_ == 0 ? place : Eigen::Vector3d(bounds_.max.cwiseMax(place));
+    ++points_;
+    if (errors != nullptr && errors->values[n] > 0.0 && std::isfinite(errors->values[n]))
+      ++errors_[std::bit_cast<std::uint64_t>(errors->values[n]) >> dropped_bits];
+  }
+}
+
+double SurfaceSurvey::median_error_m() const {
+  std::size_t count = 0;
+  for (const auto& [bits, number] : errors_) count += number;
+  std::size_t below = 0;
+  for (const auto& [bits, number] : errors_) {
+    below += number;
+    // The middle of the step.
+    if (2 * below > count) return std::bit_cast<double>((2 * bits + 1) << (dropped_bits - 1));
+  }
+  return 0.0;
+}
+
 void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
   table.add("method", options.method,
             {{"implicit", SurfaceMethod::implicit}, {"poisson", SurfaceMethod::poisson}},
@@ -360,7 +422,31 @@ SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options,
                                                 Progress& progress) {
   check_parameters(options);
-  return Reconstruction(cloud, options, progress).run();
+  return Reconstruction(cloud, nullptr, options, progress).run();
+}
+
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,
+                                             const SurfaceReconstructionOptions& options,
+                                             Progress& progress) {
+  check_parameters(options);
+  surface_margin_m(options);
+  return Reconstruction(part, &survey, options, progress).run();
+}
+
+double surface_margin_m(const SurfaceReconstructionOptions& options) {
+  if (options.method != SurfaceMethod::implicit)
+    throw Error("is not local, so that its surface cannot be made in parts",
+                {.field = "method", .value = "poisson", .bound = "implicit"});
+  if (!(options.cell_size_m > 0.0))
+    throw Error("must be given for a surface that is made in parts",
+                {.field = "cell_size_m", .value = to_text(options.cell_size_m), .bound = "> 0"});
+  // A vertex depends on samples that reach its cube, they on those around them and each on the
+  // points of its cell.
+  const double around =
+      max_known_spacing(options) *
+      std::sqrt((static_cast<double>(spacing_neighbors) + 0.5) / std::numbers::pi);
+  const double cells = std::max(max_reach_cells(options) + around, max_value_cells) + 4.0;
+  return cells * options.cell_size_m;
 }
 
 }  // namespace libmap

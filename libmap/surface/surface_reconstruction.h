@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <map>
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
@@ -40,6 +42,28 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options);
 // PCL's tables grow with the square of that number.
 inline constexpr int max_octree_depth = 12;
 
+// What all parts of a surface have in common that are made of parts of a cloud. Clouds may be added
+// part by part, in any order.
+class SurfaceSurvey {
+ public:
+  // Throws Error if the cloud has points but no normals.
+  void add(const PointCloud& cloud, bool weigh_by_error);
+
+  std::size_t points() const { return points_; }           // with a normal
+  std::size_t dropped_points() const { return dropped_; }  // without
+  const Bounds3d& bounds() const { return bounds_; }       // of those with a normal
+  // By whole cells from there the grid counts.
+  Eigen::Vector3d origin() const { return (bounds_.min + bounds_.max) / 2; }
+  // To 1.6 %; 0 if no point has an expected error.
+  double median_error_m() const;
+
+ private:
+  std::size_t points_ = 0;
+  std::size_t dropped_ = 0;
+  Bounds3d bounds_;
+  std::map<std::uint64_t, std::size_t> errors_;  // by their first bits
+};
+
 struct SurfaceReconstructionResult {
   // Unit vertex normals. Colors and fields carried over from the points around each vertex.
   TriangleMesh mesh;
@@ -62,5 +86,14 @@ struct SurfaceReconstructionResult {
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
                                                 Progress& progress = no_progress());
+
+// The same surface, but for rounding of the vertices' order, of a part of a cloud that `survey` has
+// seen whole: exactly so farther than surface_margin_m() inside of where points are missing. For
+// implicit surfaces with a cell size that is given; of too few points, nothing.
+SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,
+                                             const SurfaceReconstructionOptions& options,
+                                             Progress& progress = no_progress());
+// Throws Error naming the option that surfaces cannot be made in parts with.
+double surface_margin_m(const SurfaceReconstructionOptions& options);
 
 }  // namespace libmap

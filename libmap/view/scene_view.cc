@@ -274,6 +274,37 @@ std::vector<std::pair<std::string, Shading>> shading_names() {
   return {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}};
 }
 
+void bind(ParameterTable& table, SceneLayer& layer) {
+  Coloring& coloring = layer.coloring;
+  table.add("color", coloring.mode, color_mode_names(), "what colors show");
+  table.add("field", coloring.field, "field that is shown with color: field");
+  table.add("color_scale", coloring.scale, color_scale_names(),
+            "colors of continuous values; diverging: blue below and red above 0");
+  table.add("range_min", coloring.range_min, any_number, "value at the lower end of the colors");
+  table.add("range_max", coloring.range_max, any_number,
+            "value at their upper end; equal to range_min: from the data");
+  table.add("single_color", coloring.color, "color with color: single, #rrggbb");
+  table.add("point_shape", layer.point_shape, point_shape_names(), "shape of a point");
+  table.add("point_size_m", layer.point_size_m, not_negative,
+            "edge of a point, m; 0: from their spacing");
+  table.add("shading", layer.shading, shading_names(), "where light falls");
+}
+
+void bind(ParameterTable& table, SceneViewOptions& options) {
+  table.add("view", options.view, viewpoint_names(), "from where");
+  table.add("title", options.title, "above the scene");
+  table.add("scale_bar", options.scale_bar, "show the scale bar");
+  table.add("background", options.background, "#rrggbb or a name");
+}
+
+void bind_single(ParameterTable& table, SceneViewOptions& options) {
+  const Range pixels{1.0, max_side_px};
+  table.add("width_px", options.width, pixels, "width of the picture, pixels");
+  table.add("height_px", options.height, pixels, "height of the picture, pixels");
+  table.add("legend", options.legend, "show the legend");
+  table.add("axes", options.axes, "show the axes");
+}
+
 ColorImage render_scene(const Scene& scene, const SceneViewOptions& options) {
   const Setup setup = set_up(scene, options);
   return draw_offscreen(options.width, options.height,

@@ -8,6 +8,7 @@
 #include <variant>
 #include <vector>
 
+#include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/textured_mesh.h"
@@ -40,6 +41,8 @@ struct SceneLayer {
   Shading shading = Shading::automatic;
   double point_size_m = 0.0;  // side of a cube or square; 0: from the spacing, gaps closed
 };
+// All but the shape, the height of the zero plane and the legend of own colors.
+void bind(ParameterTable& table, SceneLayer& layer);
 
 // What is known of a marked place: green, red, or dark before there is a verdict.
 enum class Verdict { none, pass, fail };
@@ -84,6 +87,9 @@ struct SceneViewOptions {
   // On the page around the scene lie title, legend, axes and scale bar; parts for which a small
   // picture has no room are left out.
 };
+// The keys of any picture; and those of one of a single scene: its size, legend and axes.
+void bind(ParameterTable& table, SceneViewOptions& options);
+void bind_single(ParameterTable& table, SceneViewOptions& options);
 
 // The picture of `scene`; the same scene and options give the same bytes on the same machine.
 // Starts a VirtualDisplay of its own if no display answers: hold one around several calls to start

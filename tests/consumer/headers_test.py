@@ -42,7 +42,7 @@ HEADERS = {
     "optional": "nullopt",
     "stdexcept": "runtime_error",
     "string": "basic_string char_traits to_string",
-    "type_traits": "is_same_v",
+    "type_traits": "is_same_v is_trivially_copyable_v",
     "utility": "in_range",
     "variant": "monostate",
 }

@@ -22,3 +22,14 @@ mv "$scratch/prefix" "$scratch/moved"
 "$scratch/moved/bin/graspmap" score "$scratch/scene.pcd" --voxel-size 0.03 -o "$scratch/map.pcd" \
   --quiet
 "$scratch/moved/bin/graspmap" info "$scratch/map.pcd" | grep 'kind: graspability map'
+# So does the Python module, where it is built.
+module=$scratch/moved/lib/python3/dist-packages
+if [ -d "$module" ]; then
+  PYTHONPATH=$module /usr/bin/python3 -B -c "if True:
+    import sys, graspmap
+    terrain = graspmap.read_cloud(sys.argv[1])
+    graspmap.write_cloud(sys.argv[2], graspmap.score(terrain, voxel_size_m=0.03).map)
+    assert graspmap.__file__.startswith(sys.argv[3])" \
+    "$scratch/scene.pcd" "$scratch/python.pcd" "$scratch/moved"
+  cmp "$scratch/map.pcd" "$scratch/python.pcd"
+fi

@@ -8,7 +8,8 @@ check_documents.py BUILD_FOLDER SOURCE_FOLDER [RUN_DOCUMENT...]
 - Commands, options, their choices, variables of make files and scripts are those that there are: in
   blocks, and in `code` within sentences.
 - Links lead to files and headings that exist.
-- Each command has a page in tools/manual, with its picture, and the index lists it.
+- Each command has a page in tools/manual, with its picture; the index lists it, and the gallery
+  shows its picture.
 """
 
 import pathlib
@@ -19,7 +20,7 @@ from command_lines import Program, line_faults, words_of
 from documents import Document
 
 COMMAND_LINE = re.compile(
-    r"(\$ |graspmap(?!:)\b[^:]*(\s|$)|make -f|scripts/\w|build/\S*graspmap |cmake |ctest |g?db |apt)")
+    r"(\$ |graspmap(?![:.])\b[^:]*(\s|$)|make -f|scripts/\w|build/\S*graspmap |cmake |ctest |g?db |apt)")
 CONDITIONS = {"data", "long", "elsewhere"}
 # Options of other programs that sentences name by themselves.
 FOREIGN_OPTIONS = {"--install", "--prefix", "--requeue", "--array", "--cpus-per-task", "--mem",
@@ -146,6 +147,8 @@ class Checker:
         folder = self.source / MANUAL
         index = Document(folder / "README.md")
         listed = {target for _, target in index.links()}
+        gallery = Document(folder / "GALLERY.md")
+        exhibits = " ".join(line for _, line in gallery.prose)
         for name in self.program.commands:
             page = folder / f"{name}.md"
             if not page.is_file():
@@ -158,13 +161,16 @@ class Checker:
             if len(names) != 1:
                 self.fault(page, 1, f"it does not show pictures/{name}.png or .jpg")
                 continue
-            picture = folder / names.pop()
+            picture = names.pop()
+            if f"({picture})" not in exhibits:
+                self.fault(gallery.path, 1, f"it does not show the picture of {name}")
+            picture = folder / picture
             if picture.is_file():
                 size = picture.stat().st_size
                 if not SMALLEST_PICTURE <= size <= LARGEST_PICTURE:
                     self.fault(page, 1, f"{picture.name} has {size} bytes")
         for page in folder.glob("*.md"):
-            if page.stem not in [*self.program.commands, "README"]:
+            if page.stem not in [*self.program.commands, "README", "GALLERY"]:
                 self.fault(page, 1, "there is no such command")
 
 

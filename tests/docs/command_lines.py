@@ -112,7 +112,7 @@ def make_faults(words, source):
     """What is wrong with the words of a `make -f FILE VARIABLE=...`."""
     if "-f" not in words[:-1]:
         return []
-    name = words[words.index("-f") + 1]
+    name = words[words.index("-f") + 1].removeprefix("/usr/share/graspmap/")
     if PLACEHOLDER.search(name):
         return []
     if not (source / name).is_file():

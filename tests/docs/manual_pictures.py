@@ -62,7 +62,7 @@ def main():
     build, source = (pathlib.Path(word).resolve() for word in sys.argv[1:3])
     manual = source / "tools/manual"
     pages = sys.argv[3:] or sorted(path.stem for path in manual.glob("*.md")
-                                   if path.stem != "README")
+                                   if path.stem.islower())
     run = [sys.executable, str(pathlib.Path(__file__).parent / "check_transcripts.py"), str(build),
            str(source)]
     with tempfile.TemporaryDirectory() as scratch:

@@ -33,8 +33,8 @@ def read_manifest(path):
     return json.loads(path.with_name(path.name + ".json").read_text(encoding="utf-8"))
 
 
-def score_of(point, threshold):
-    """The score of method `corrected` from its counts."""
+def matched_of(point, threshold):
+    """The score of method `corrected` from its counts, before the factor falling_share."""
     share = point["gsv"] / point["ssv"]
     if point["ssv"] <= threshold and share >= 0.6:
         share -= (threshold - point["ssv"]) / threshold
@@ -49,7 +49,10 @@ def check_map(points, manifest):
     for point in points:
         for axis, index, start in zip("xyz", "ijk", origin):
             assert abs(point[axis] - (start + size * (point[index] + 0.5))) < 1e-5, "center"
-        assert abs(point["score"] - score_of(point, parameters["solid_voxel_threshold"])) < 1e-6
+        matched = matched_of(point, parameters["solid_voxel_threshold"])
+        azimuths = 16 * point["falling_share"]
+        assert azimuths == int(azimuths) and 0 <= azimuths <= 16, "falling_share"
+        assert abs(point["score"] - matched * point["falling_share"]) < 1e-6, "score"
         above = point["z"] >= parameters["zero_plane_m"]
         color = next(c for least, c in COLORS if point["score"] >= least - 1e-6) if above else (255,) * 3
         assert (point["rgb"] >> 16 & 255, point["rgb"] >> 8 & 255, point["rgb"] & 255) == color

@@ -26,7 +26,7 @@ bool run_features(std::string_view bytes) {
     if (!cache.read("key", small_cameras(), frame)) throw libmap::Error("not taken");
     for (std::size_t n = 0; n < frame.features.size(); ++n) frame.point_in_base(n);
     for (const libmap::DepthSurface& surface : frame.surfaces) {
-      libmap::SurfaceElement element;
+      libmap::SurfacePatch element;
       surface.at(0, 0, element);
       surface.seen_at({0.1, 0.1, 1.0}, element);
     }

@@ -11,12 +11,8 @@ namespace graspmap_fuzz {
 const std::vector<FuzzTarget>& fuzz_targets() {
   static const std::vector<FuzzTarget> targets = [] {
     std::vector<FuzzTarget> all;
-    for (const auto& part :
-         {scan_targets(), cloud_targets(), mesh_targets(), text_targets(), map_targets(),
-#ifdef GRASPMAP_FUZZ_ROS
-          bag_targets(),
-#endif
-          feature_targets()})
+    for (const auto& part : {scan_targets(), cloud_targets(), mesh_targets(), text_targets(),
+                             map_targets(), feature_targets(), bag_targets()})
       all.insert(all.end(), part.begin(), part.end());
     std::sort(all.begin(), all.end(), [](const FuzzTarget& a, const FuzzTarget& b) {
       return std::string_view(a.name) < b.name;

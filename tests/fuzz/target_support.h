@@ -22,7 +22,7 @@ std::vector<FuzzTarget> mesh_targets();
 std::vector<FuzzTarget> text_targets();
 std::vector<FuzzTarget> map_targets();
 std::vector<FuzzTarget> feature_targets();
-std::vector<FuzzTarget> bag_targets();  // of builds with ROS alone
+std::vector<FuzzTarget> bag_targets();
 
 // What errors name as the file.
 inline constexpr const char* file_name = "bytes";

@@ -248,8 +248,54 @@ def maps(corpus):
     damage_file(corpus, "footholds", "footholds.csv", "CSV")
 
 
+def tiff(tags, data=b""):
+    """A little-endian TIFF of one directory; tags: {number: (type, count, value)}; the data are at byte 8."""
+    at = 8 + len(data)
+    entries = b"".join(struct.pack("<HHII", tag, *what) for tag, what in sorted(tags.items()))
+    return b"II*\0" + struct.pack("<I", at) + data + struct.pack("<H", len(tags)) + entries + bytes(4)
+
+
+def dem(corpus):
+    damage_file(corpus, "dem", "dem.tif", "TIFF")
+    scale = struct.pack("<3d6d", 0.02, 0.02, 0, 0, 0, 0, 500000, 5400000, 0)
+    values = struct.pack("<16f", *range(16))
+    # 4 x 4 pixels of float32 in one strip; the transform before them.
+    good = {256: (3, 1, 4), 257: (3, 1, 4), 258: (3, 1, 32), 259: (3, 1, 1), 262: (3, 1, 1), 273: (4, 1, 8 + len(scale)),
+            277: (3, 1, 1), 278: (3, 1, 4), 279: (4, 1, 64), 339: (3, 1, 3), 33550: (12, 3, 8), 33922: (12, 6, 32)}
+
+    def add(name, refused=True, **changes):
+        tags = {**good, **{int(tag[1:]): what for tag, what in changes.items()}}
+        corpus.add("dem", f"TIFF {name}", ".tif", tiff({t: w for t, w in tags.items() if w}, scale + values), refused)
+
+    add("that is sound", False)
+    add("10^9 x 10^9", t256=(4, 1, 10 ** 9), t257=(4, 1, 10 ** 9))
+    add("60000 x 60000 in one strip", t256=(4, 1, 60000), t257=(4, 1, 60000), t278=(4, 1, 60000), t259=(3, 1, 8))
+    add("60000 x 60000 in rows that are not there", t256=(4, 1, 60000), t257=(4, 1, 60000), t278=(4, 1, 1))
+    add("4 x 0", t257=(3, 1, 0))
+    add("of 7 bits", False, t258=(3, 1, 7))
+    add("of 8 bits", t258=(3, 1, 8), t339=None, t279=(4, 1, 16))
+    add("of an unknown compression", t259=(3, 1, 60000))
+    add("of JPEG that is none", t259=(3, 1, 7))
+    add("of deflate that is none", t259=(3, 1, 8))
+    add("with a strip at 2^32-1", t273=(4, 1, 2 ** 32 - 1))
+    add("with a strip of 2^32-1 bytes", False, t279=(4, 1, 2 ** 32 - 1))
+    add("of 60000 bands", t277=(3, 1, 60000))
+    add("without a transform", t33550=None, t33922=None)
+    add("with a transform at 2^32-1", t33550=(12, 3, 2 ** 32 - 1))
+    add("that is its own directory", False, t330=(4, 1, 8 + len(scale) + 64))
+    for name, number in (("NaN", float("nan")), ("infinite", float("inf")), ("1e300", 1e300), ("0", 0.0), ("-1", -1.0)):
+        other = struct.pack("<9d", number, *struct.unpack("<9d", scale)[1:])
+        corpus.add("dem", f"TIFF pixels {name} wide", ".tif", tiff(good, other + values), name != "-1")
+    for name, number in (("NaN", float("nan")), ("1e38", 1e38), ("-1e38", -1e38)):
+        corpus.add("dem", f"TIFF all {name}", ".tif", tiff(good, scale + struct.pack("<16f", *[number] * 16)), True)
+    corpus.add("dem", "VRT of another file", ".tif", "<VRTDataset rasterXSize=\"1\" rasterYSize=\"1\"><VRTRasterBand><SimpleSource>"
+               "<SourceFilename>/etc/passwd</SourceFilename></SimpleSource></VRTRasterBand></VRTDataset>", True)
+    corpus.add("dem", "address", ".tif", "/vsicurl/http://localhost/dem.tif", True)
+
+
 def make(corpus):
     pcd(corpus)
+    dem(corpus)
     ply(corpus)
     vtp(corpus)
     obj_stl_off(corpus)

@@ -3,7 +3,7 @@ import os
 
 EXTENSIONS = {
     "cloud": ".pcd", "map": ".pcd", "mesh": ".ply", "scan": ".db", "poses": ".tum", "tiles": ".tiles",
-    "bag": ".bag", "points": ".csv", "lookup": ".csv", "gripper": ".yaml", "scenario": ".yaml", "picture": ".png",
+    "bag": ".bag", "points": ".csv", "lookup": ".csv", "gripper": ".yaml", "dem": ".tif", "scenario": ".yaml", "picture": ".png",
     "transform": ".txt", "rig-folder": "", "run-folder": "",
 }
 
@@ -38,7 +38,7 @@ def make(corpus):
     corpus.add("cloud", "size of a sparse file", ".pcd", b"# .PCD v0.7\nVERSION 0.7\n", True)
     os.truncate(corpus.cases[-1].path, 1 << 40)
     for kind, extension in (("scan", ".db"), ("mesh", ".stl"), ("mesh", ".glb"), ("mesh", ".obj"), ("cloud", ".ply"),
-                            ("cloud", ".csv"), ("bag", ".bag"), ("poses", ".g2o"), ("gripper", ".yaml"),
+                            ("cloud", ".csv"), ("bag", ".bag"), ("poses", ".g2o"), ("gripper", ".yaml"), ("dem", ".tif"),
                             ("picture", ".png"), ("points", ".csv")):
         corpus.add(kind, f"{extension[1:]} of a tebibyte of zeros", extension, b"", True)
         os.truncate(corpus.cases[-1].path, 1 << 40)

@@ -1,5 +1,7 @@
 """Scan databases and folders, rig folders, images and bags, broken field by field."""
+import contextlib
 import functools
+import shutil
 import sqlite3
 import struct
 import zlib
@@ -285,6 +287,46 @@ def bags(corpus):
     add("other encoding", good.replace(b"16UC1", b"64XC9").replace(b"mono16", b"mono99"))
 
 
+def ros2_bags(corpus):
+    damage_file(corpus, "bag", "rig.mcap", "MCAP")
+    damage_file(corpus, "bag", "rig_bag/bag_0.db3", "BAG of ROS 2")
+    good = corpus.good / "rig_bag/bag_0.db3"
+
+    def changed(name, statement, *values, refused=False):
+        path = corpus.path("bag", f"BAG of ROS 2 {name}", ".db3", refused)
+        shutil.copyfile(good, path)
+        with contextlib.closing(sqlite3.connect(path)) as database:
+            database.execute(statement, values)
+            database.commit()
+
+    def transforms(*frames):
+        """CDR of a tf2_msgs/msg/TFMessage: (parent, child), each at the other's origin."""
+        data = bytearray(struct.pack("<I", len(frames)))
+        for pair in frames:
+            data += bytes(-len(data) % 4 + 8)
+            for frame in pair:
+                data += bytes(-len(data) % 4) + struct.pack("<I", len(frame) + 1) + frame.encode() + b"\0"
+            data += bytes(-len(data) % 8) + struct.pack("<7d", 0, 0, 0, 0, 0, 0, 1)
+        return b"\0\1\0\0" + bytes(data)
+
+    static = "UPDATE messages SET data = ? WHERE topic_id = 1"
+    optical = "front_depth_optical_frame"
+    changed("TF in a circle", static, transforms(("a", optical), (optical, "a")))
+    changed("TF that moves", static, transforms(("base_link", optical), ("map", optical)))
+    changed("2^32-1 transforms", static, b"\0\1\0\0\xff\xff\xff\xff")
+    for name, head in (("of parameter lists", b"\0\3\0\0"), ("of no encoding", b"\xff\xff\xff\xff")):
+        changed(f"messages {name}", "UPDATE messages SET data = ? || substr(data, 5)", head)
+    changed("messages of 2^32-1", "UPDATE messages SET data = x'00010000' || zeroblob(8) || x'ffffffff'")
+    changed("messages cut", "UPDATE messages SET data = substr(data, 1, length(data) / 2)")
+    changed("messages NULL", "UPDATE messages SET data = ''")
+    changed("stamps of 2^63-1", "UPDATE messages SET timestamp = 9223372036854775807")
+    changed("other encoding", "UPDATE topics SET serialization_format = 'json'")
+    changed("without messages", "DROP TABLE messages", refused=True)
+    changed("messages of nothing", "UPDATE messages SET topic_id = 99", refused=True)
+    changed("10^5 topics", "WITH RECURSIVE n(i) AS (SELECT 100 UNION ALL SELECT i + 1 FROM n LIMIT 100000) "
+            "INSERT INTO topics SELECT i, '/t' || i, 'a/msg/B', 'cdr', '' FROM n")
+
+
 def make(corpus):
     database_links(corpus)
     database_rows(corpus)
@@ -294,3 +336,4 @@ def make(corpus):
     frame_folders(corpus)
     rigs(corpus)
     bags(corpus)
+    ros2_bags(corpus)

@@ -3,7 +3,7 @@ import hashlib
 import json
 import shutil
 
-from corpus import damage_file, damage_text
+from corpus import damage_file, damage_text, damaged_bytes
 from damage_scans import in_folder
 
 YAML = {"gripper": "gripper.yaml", "scenario": "scenario.yaml", "rig": "rig.yaml", "camera": "camera.yaml",
@@ -38,6 +38,30 @@ def yaml(corpus):
             for place, key in enumerate(numeric_keys(text)):
                 if place in corpus.random(kind, name).sample(range(40), 12):
                     add(f"{key} {name}", with_value(text, key, number))
+
+
+def urdf(corpus):
+    """A gripper file whose URDF is broken."""
+    mapping = (corpus.good / "hubrobo-urdf.yaml").read_text().replace("hubrobo.urdf", "broken.urdf")
+    good = (corpus.good / "hubrobo.urdf").read_text()
+
+    def add(name, content, refused=True):
+        path = corpus.path("urdf", f"URDF {name}", ".yaml", refused)
+        path.write_text(mapping)
+        path.with_name("broken.urdf").write_bytes(content if isinstance(content, bytes) else content.encode())
+
+    for name, content, refused in damaged_bytes(good.encode(), corpus.random("urdf", "URDF")):
+        add(name, content, refused)
+    add("nested 12,000 deep", "<robot name='r'>" + "<a>" * 12_000)
+    add("10^5 links", "<robot name='r'>" + "".join(f"<link name='l{n}'/>" for n in range(10 ** 5)) + "</robot>")
+    add("of entities that multiply", "<!DOCTYPE r [<!ENTITY a 'aaaa'>" + "".join(
+        f"<!ENTITY a{n} '{'&a%d;' % (n - 1) * 9}'>" for n in range(1, 12)) + "]>" + good, False)
+    for name, old, new in (("circle", '<parent link="palm"/> <child link="finger_2"/>', '<parent link="finger_2_tip"/> <child link="finger_2"/>'),
+                           ("NaN", 'xyz="0 0 -0.015"', 'xyz="nan 0 -0.015"'), ("1e999", 'xyz="0 0 -0.015"', 'xyz="1e999 0 -0.015"'),
+                           ("1e300", 'xyz="0 0 -0.015"', 'xyz="1e300 0 -0.015"'), ("millimeters", 'xyz="0 0 -0.015"', 'xyz="0 0 -15"'),
+                           ("degrees", 'upper="1.3089969"', 'upper="75"'), ("no limit", 'upper="1.3089969"', ""),
+                           ("axis of nothing", 'xyz="0 -1 0"', 'xyz="0 0 0"'), ("wrong axis", 'xyz="0 -1 0"', 'xyz="1 0 0"')):
+        add(name, good.replace(old, new, 1))
 
 
 def numeric_keys(text):
@@ -123,7 +147,7 @@ def tables(corpus):
         add("formula", header + "\n" + ",".join(["=cmd()"] * (header.count(",") + 1)) + "\n", kind != "lookup")
         add("commas in numbers", text.replace(".", ","), True)
         add("semicolons", text.replace(",", ";"), True)
-        add("2 10^4 rows", header + "\n" + (first + "\n") * 20_000)
+        add("5000 rows", header + "\n" + (first + "\n") * 5000)
     damage_file(corpus, "cloud", "cloud.csv", "CSV")
     damage_text(corpus, "cloud", "cloud.csv", "CSV")
     corpus.add("cloud", "CSV 10^6 columns", ".csv", "x,y,z" + ",c" * 1_000_000 + "\n")
@@ -230,6 +254,7 @@ def runs(corpus):
 
 def make(corpus):
     yaml(corpus)
+    urdf(corpus)
     poses(corpus)
     tables(corpus)
     tile_files(corpus)

@@ -93,6 +93,8 @@ COMMANDS = [
     ["convert", "mesh.ply", "-o", "mesh.glb"],
     ["simulate", "cameras", "mesh.ply", "--rig", "rig.yaml", "-o", "rig"],
     ["bag", "rig", "-o", "rig.bag"],
+    ["bag", "rig", "-o", "rig.mcap"],
+    ["bag", "rig", "-o", "rig_bag"],
     ["simulate", "scan", "mesh.ply", "--camera", "camera.yaml", "--frames", "5", "-o", "scan.db"],
     ["convert", "scan.db", "-o", "frames"],
     ["convert", "scan.db", "-o", "scan.colmap", "--colmap", "poses.colmap"],
@@ -101,6 +103,7 @@ COMMANDS = [
     ["convert", "poses.tum", "-o", "poses.g2o"],
     ["convert", "poses.tum", "-o", "poses.toro"],
     SCORE + ["-o", "map.pcd"],
+    ["convert", "map.pcd", "-o", "dem.tif"],
     SCORE + ["--tile-size", "0.2", "-o", "map.tiles"],
     SCORE + ["--tile-size", "0.2", "--tile", "1/2", "-o", "share_1.pcd"],
     SCORE + ["--tile-size", "0.2", "--tile", "2/2", "-o", "share_2.pcd"],
@@ -144,6 +147,8 @@ def make(folder, graspmap, source):
     for name, text in TEXTS.items():
         (folder / name).write_text(text)
     shutil.copy(source / "data/grippers/scar-e.yaml", folder / "gripper.yaml")
+    for name in ("hubrobo-urdf.yaml", "hubrobo.urdf"):
+        shutil.copy(source / "data/grippers" / name, folder)
     (folder / "pictures").mkdir()
     for n in range(4):
         (folder / "pictures" / f"board_{n}.png").write_bytes(board(0.1 * n - 0.15, 0.25 * n - 0.35))

@@ -23,7 +23,9 @@ using graspmap_test::wrong_usage;
 
 // Builds without ROS's packages have the command too.
 bool has_ros() {
-  const ProgramResult result = graspmap({"bag", "none.bag", "--list"});
+  write_text(scratch("probe.bag"), "#ROSBAG V2.0\n");
+  const ProgramResult result = graspmap({"bag", "probe.bag", "--list"});
+  fs::remove(scratch("probe.bag"));
   if (result.exit_code != 1) return true;
   EXPECT_NE(result.standard_error.find("built without ROS 1; missing: "), std::string::npos);
   EXPECT_EQ(std::count(result.standard_error.begin(), result.standard_error.end(), '\n'), 1);
@@ -38,6 +40,15 @@ std::string python() {
   const std::string debians = "/usr/bin/python3";
   if (!fs::exists(debians)) return {};
   return graspmap_test::run_program({debians, "-c", "import rosbag"}).exit_code == 0 ? debians : "";
+}
+
+// rosbag2_check.py, which needs nothing but Python itself.
+ProgramResult check2(const std::vector<std::string>& words) {
+  std::vector<std::string> line = {
+      "/usr/bin/python3",
+      (graspmap_test::source_folder() / "tests/tools/rosbag2_check.py").string()};
+  line.insert(line.end(), words.begin(), words.end());
+  return graspmap_test::run_program(line, {.folder = scratch("")});
 }
 
 ProgramResult check(const std::vector<std::string>& words) {
@@ -93,6 +104,34 @@ TEST(BagCommand, ImagesIntoABagAndBackGiveTheSamePanorama) {
   // The way on: a map.
   ASSERT_TRUE(succeeded(graspmap({"score", "back.pcd", "-o", "map.pcd", "--up", "0,0,1"})));
   EXPECT_GT(libmap::read_cloud(scratch("map.pcd")).cloud.size(), 1000U);
+}
+
+TEST(BagCommand, ImagesThroughBagsOfRos2GiveTheSamePanorama) {
+  write_run();
+  std::vector<std::string> range = {"--near", "0.28", "--far", "1.5", "--strict"};
+  const auto back = [&](const std::string& bag, const std::string& folder) {
+    std::vector<std::string> words = {"bag", bag, "-o", folder};
+    words.insert(words.end(), range.begin(), range.end());
+    return succeeded(graspmap(words));
+  };
+  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "recorded"})));
+  ASSERT_TRUE(back("recorded", "back"));
+  expect_same_panorama("back");
+  EXPECT_EQ(json_of("back.json")["inputs"].size(), 2U);
+  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.mcap", "--compression", "zstd"})));
+  ASSERT_TRUE(back("run.mcap", "again"));
+  expect_same_panorama("again");
+  // Repacked by other code: big-endian, in two files, as a later version, topics in the order of
+  // their stamps.
+  for (const char* name : camera_names)
+    range.insert(range.end(), {"--topic", "/" + std::string(name) + "/depth/image_raw"});
+  ASSERT_EQ(check2({"copy", "recorded", "copied"}).standard_error, "");
+  ASSERT_TRUE(back("copied", "of_copy"));
+  expect_same_panorama("of_copy");
+  EXPECT_EQ(json_of("of_copy.json")["inputs"].size(), 3U);
+  // One file by its own name, without metadata.yaml.
+  ASSERT_TRUE(back("recorded/bag_0.db3", "of_file"));
+  expect_same_panorama("of_file");
 }
 
 TEST(BagCommand, FineDepthsComeBackWithARigOfOnesOwn) {
@@ -195,6 +234,118 @@ TEST(BagCommand, AMapsBagAsPythonReadsIt) {
   EXPECT_EQ(topics["/footholds"]["markers"].size(), 2 * footholds.size() + 1);
 }
 
+TEST(BagCommand, AMapsBagOfRos2AsPythonReadsIt) {
+  write_map_parts();
+  ASSERT_TRUE(succeeded(graspmap(map_bag("map_bag"))));
+  const ProgramResult shown = check2({"show", "map_bag"});
+  ASSERT_EQ(shown.exit_code, 0) << shown.standard_error;
+  const nlohmann::json topics = nlohmann::json::parse(shown.standard_output);
+  ASSERT_EQ(topics.size(), 8U);
+  for (const auto& [name, topic] : topics.items()) {
+    EXPECT_TRUE(topic["latched"]) << name;
+    EXPECT_EQ(topic["stamp"], 1600000000500000000) << name;
+  }
+  const libmap::PointCloud map = libmap::read_cloud(scratch("map.pcd")).cloud;
+  const nlohmann::json& points = topics["/graspability_map"]["message"];
+  EXPECT_EQ(points["header"]["frame_id"], "terrain");
+  EXPECT_EQ(points["width"], map.size());
+  EXPECT_EQ(points["data"].size(), map.size() * points["point_step"].get<std::size_t>());
+  const libmap::PointCloud footholds = libmap::read_cloud(scratch("f.csv")).cloud;
+  EXPECT_EQ(topics["/foothold_poses"]["message"]["poses"].size(), footholds.size());
+  EXPECT_EQ(topics["/footholds"]["message"]["markers"].size(), 2 * footholds.size() + 1);
+  const nlohmann::json& transform = topics["/tf_static"]["message"]["transforms"][0];
+  EXPECT_EQ(transform["header"]["frame_id"], "terrain");
+  EXPECT_EQ(transform["child_frame_id"], "map");
+  // Each point of the map is in the cell where it is, below none of its neighbors in that column.
+  const nlohmann::json& grid = topics["/graspability_grid"]["message"];
+  const nlohmann::json& occupancy = topics["/graspability_occupancy"]["message"];
+  const double cell = grid["info"]["resolution"];
+  EXPECT_DOUBLE_EQ(cell, json_of("map.pcd.json")["parameters"]["voxel_size_m"]);
+  const auto width = occupancy["info"]["width"].get<std::size_t>();
+  const std::size_t cells = width * occupancy["info"]["height"].get<std::size_t>();
+  ASSERT_EQ(grid["layers"][0], "elevation");
+  const auto score = std::find(grid["layers"].begin(), grid["layers"].end(), "score");
+  ASSERT_NE(score, grid["layers"].end());
+  const nlohmann::json& scores =
+      grid["data"][static_cast<std::size_t>(score - grid["layers"].begin())]["data"];
+  const nlohmann::json& heights = grid["data"][0]["data"];
+  ASSERT_EQ(heights.size(), cells);
+  ASSERT_EQ(occupancy["data"].size(), cells);
+  std::map<std::size_t, std::size_t> tops;
+  for (std::size_t n = 0; n < map.size(); ++n) {
+    const Eigen::Vector3d& point = map.positions[n];
+    const double x =
+        (point.x() - occupancy["info"]["origin"]["position"]["x"].get<double>()) / cell;
+    const double y =
+        (point.y() - occupancy["info"]["origin"]["position"]["y"].get<double>()) / cell;
+    const std::size_t index = static_cast<std::size_t>(y) * width + static_cast<std::size_t>(x);
+    ASSERT_LT(index, cells);
+    const auto [top, is_new] = tops.emplace(index, n);
+    if (!is_new && point.z() > map.positions[top->second].z()) top->second = n;
+  }
+  for (const auto& [index, n] : tops) {
+    EXPECT_FLOAT_EQ(heights[cells - 1 - index], static_cast<float>(map.positions[n].z()));
+    const double value = map.find_field("score")->values[n];
+    EXPECT_FLOAT_EQ(scores[cells - 1 - index], static_cast<float>(value));
+    EXPECT_NEAR(occupancy["data"][index].get<double>(), 100 * (1 - value), 0.51);
+  }
+  EXPECT_EQ(
+      static_cast<std::size_t>(std::count(occupancy["data"].begin(), occupancy["data"].end(), -1)),
+      cells - tops.size());
+}
+
+TEST(BagCommand, MapsComeBackFromBagsOfRos2) {
+  write_map_parts();
+  for (const std::string name : {"a", "a.mcap"}) {
+    ASSERT_TRUE(succeeded(graspmap(map_bag(name))));
+    ASSERT_TRUE(succeeded(graspmap({"bag", name, "-o", "m.pcd", "--topic", "/graspability_map"})));
+    EXPECT_TRUE(content("m.pcd") == content("map.pcd"));
+    const ProgramResult info = graspmap({"info", name, "--json"});
+    ASSERT_TRUE(succeeded(info));
+    const nlohmann::json listing = nlohmann::json::parse(info.standard_output);
+    EXPECT_EQ(listing["kind"], name == "a" ? "bag of ROS 2 (sqlite3)" : "bag of ROS 2 (mcap)");
+    EXPECT_EQ(listing["messages"], 8);
+    EXPECT_EQ(listing["topics"][1]["type"], "sensor_msgs/msg/PointCloud2");
+  }
+  // Written again over its own; never over a folder of others.
+  EXPECT_TRUE(succeeded(graspmap(map_bag("a"))));
+  write_text(scratch("a/notes.txt"), "mine");
+  EXPECT_TRUE(bad_input(graspmap(map_bag("a")), {"notes.txt"}));
+}
+
+TEST(BagCommand, BadBagsOfRos2AreOneLine) {
+  write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
+  const ProgramResult written = graspmap({"bag", "map.csv", "-o", "good.mcap"});
+  ASSERT_TRUE(succeeded(written));
+  EXPECT_NE(written.standard_error.find("no voxel size"), std::string::npos);
+  ASSERT_TRUE(succeeded(graspmap({"bag", "map.csv", "-o", "good", "--cell-size", "0.01"})));
+  const std::vector<std::string> before = graspmap_test::names_in_scratch();
+  const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
+    words.insert(words.begin(), "bag");
+    EXPECT_TRUE(bad_input(graspmap(words), parts));
+  };
+  says({"map.csv", "-o", "out.zip"}, {"out.zip", ".zip", ".mcap"});
+  says({"map.csv", "-o", "out", "--cell-size", "1", "--compression", "lz4"},
+       {"compression", "must be none"});
+  says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--compression", "bz2"}, {"bz2", "zstd"});
+  says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--stamp", "4000000000"},
+       {"ROS has no such time", "2^31"});
+  says({"map.csv", "-o", "out", "--cell-size", "-1"}, {"--cell-size"});
+  says({"good.mcap", "-o", "out.mcap"}, {"something else than a bag"});
+  says({"good.mcap", "-o", "out"}, {"topics of images is none"});
+  fs::create_directory(scratch("open"));
+  fs::copy(scratch("good/bag_0.db3"), scratch("open/bag_0.db3"));
+  says({"open", "--list"}, {"open/metadata.yaml", "ros2 bag reindex"});
+  write_text(scratch("open/metadata.yaml"), content("good/metadata.yaml"));
+  write_text(scratch("open/bag_0.db3"), content("good/bag_0.db3").substr(0, 5000));
+  says({"open", "--list"}, {"open/bag_0.db3"});
+  write_text(scratch("open/cut.mcap"), content("good.mcap").substr(0, 500));
+  says({"open/cut.mcap", "--list"}, {"open/cut.mcap", "is cut off"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"is cut off"}));
+  fs::remove_all(scratch("open"));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), before);
+}
+
 TEST(BagCommand, SameBytesOnEveryRunAndMapsComeBack) {
   REQUIRE_ROS();
   write_map_parts();
@@ -276,7 +427,8 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
   says({"good.bag", "-o", "out.bag"}, {"something else than a bag"});
   says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});
-  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd", "no ROS 1 bag"});
+  says({"terrain.pcd", "--list"}, {"terrain.pcd", "is no bag"});
+  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: no such field"});
   says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
   says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
   says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});

@@ -56,6 +56,20 @@ TEST(Compare, DistancesAndCompleteness) {
   EXPECT_TRUE(names_in_scratch() == (std::vector<std::string>{"points.ply", "square.ply"}));
 }
 
+// Points 1, 2 and 3 mm above the square, each of which states 1.4 mm.
+TEST(Compare, SharesWithinStatedDeviations) {
+  write_square_and_points();
+  EXPECT_FALSE(compared({}).contains("within_one_deviation"));
+  libmap::PointCloud cloud;
+  for (int x = 0; x < 30; ++x) cloud.positions.emplace_back(0.03 * x, 0.5, 0.001 * (1 + x % 3));
+  cloud.add_field("expected_error", libmap::ScalarType::float32).values.assign(30, 0.0014);
+  cloud.fields.back().values[0] = 0.0009;  // beyond one, within two
+  libmap::write_cloud(scratch("points.ply"), cloud);
+  const nlohmann::json json = compared({});
+  EXPECT_NEAR(json.at("within_one_deviation"), 9.0 / 30.0, 1e-9);
+  EXPECT_NEAR(json.at("within_two_deviations"), 20.0 / 30.0, 1e-9);
+}
+
 TEST(Compare, TransformAndBox) {
   write_square_and_points();
   const nlohmann::json moved = compared({"--transform=1,0,-0.003,0,0,90"});

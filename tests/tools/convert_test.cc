@@ -178,8 +178,9 @@ TEST(Convert, VtpIsWrittenOnly) {
                              {"crop", "a.vtp", "--size", "1x1", "-o", "b.ply"},
                              {"compare", "a.vtp", "terrain.pcd"},
                              {"bag", "a.vtp", "-o", "b.bag"}})
-    EXPECT_TRUE(bad_input(graspmap(words), {"a.vtp: .vtp is written only, for ParaView",
-                                            ".pcd, .ply or .csv", ".obj, .off, .stl or .glb"}))
+    EXPECT_TRUE(
+        bad_input(graspmap(words), {"a.vtp: .vtp is written only, for ParaView",
+                                    ".pcd, .ply, .csv or .tif", ".obj, .off, .stl, .glb or .tif"}))
         << words.front();
 }
 

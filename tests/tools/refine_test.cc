@@ -9,6 +9,7 @@
 #include "libmap/image/camera_io.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/calibrated_scan.h"
+#include "libmap/scan/joined_scan.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"
@@ -286,6 +287,65 @@ TEST(Refine, UnusableLinksAndFramesAreLeftOutAndNamed) {
       << result.standard_error;
   EXPECT_NE(result.standard_error.find("node 4: has no calibration"), std::string::npos)
       << result.standard_error;
+}
+
+// A length twice as long makes a scale twice as large.
+TEST(Refine, KnownLengthsDetermineTheScale) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = scan_file("site_tiny_q.db");
+  const auto factor = [&](const std::string& known_length) {
+    EXPECT_TRUE(succeeded(graspmap({"refine", scan, "--no-correct-depth", "--intrinsics", "fixed",
+                                    "--known-length", known_length, "--known-length", known_length,
+                                    "--force", "-o", "known.tum", "--report", "known.json"})));
+    const nlohmann::json report = json_of("known.json");
+    for (const nlohmann::json& stage : report.at("stages"))
+      if (stage.at("stage") == "scale") return stage.at("factor").get<double>();
+    return 0.0;
+  };
+  const double one = factor("1:20:60-1:100:60.5=1");
+  EXPECT_GT(one, 0.0);
+  EXPECT_NEAR(factor("1:20:60-1:100:60.5=2"), 2.0 * one, 1e-9);
+  EXPECT_TRUE(bad_input(graspmap({"refine", scan, "-o", "p.tum", "--known-length", "1:2:3=1"}),
+                        {"1:2:3=1", "METERS > 0"}));
+}
+
+// Scans of the same ground, or of another, with small pictures.
+void write_scan(const std::string& name, const std::string& seed, const std::string& start_deg,
+                const std::string& rock) {
+  libmap::CameraFile file;
+  file.camera = {.width = 192, .height = 160, .fx = 137, .fy = 137, .cx = 95.5, .cy = 79.5};
+  graspmap_test::write_text(scratch("camera.yaml"), libmap::to_yaml(file));
+  if (!std::filesystem::exists(scratch("scene.ply"))) {
+    ASSERT_TRUE(succeeded(graspmap({"simulate", "scene", "--mesh", "-o", "scene.ply"})));
+  }
+  ASSERT_TRUE(
+      succeeded(graspmap({"simulate", "scan", "scene.ply", "-o", name, "--camera", "camera.yaml",
+                          "--frames", "16", "--loops", "1", "--texture", "rock", "--seed", seed,
+                          "--rock-seed", rock, "--start", start_deg})));
+}
+
+TEST(RefineScans, OverlappingOnesAreJoinedAndOthersAreReported) {
+  write_scan("a.db", "1", "0", "1");
+  write_scan("b.db", "2", "7", "1");
+  ASSERT_TRUE(succeeded(graspmap({"refine", "a.db", "b.db", "-o", "poses.tum"})));
+  const auto joined = libmap::open_scans({scratch("a.db"), scratch("b.db")});
+  const libmap::NodeTrajectory read =
+      libmap::assign_nodes(libmap::read_trajectory(scratch("poses.tum")).poses, joined->graph());
+  const auto error = libmap::absolute_trajectory_error(
+      read.poses, libmap::trajectory_of(joined->graph(), libmap::PoseSource::ground_truth));
+  EXPECT_EQ(error.poses, 32U);
+  EXPECT_LT(error.rmse_m, 0.004);
+  EXPECT_EQ(json_of("poses.tum.json").at("inputs").size(), 2U);
+  // Other rock.
+  write_scan("c.db", "3", "0", "9");
+  const auto result = graspmap({"refine", "a.db", "c.db", "-o", "apart.tum"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("c.db"), std::string::npos);
+  EXPECT_EQ(libmap::read_trajectory(scratch("apart.tum")).poses.size(), 16U);
+  EXPECT_TRUE(
+      bad_input(graspmap({"refine", "a.db", "b.db", "-o", "p.tum", "--write-database", "o.db"}),
+                {"--write-database"}));
+  EXPECT_TRUE(bad_input(graspmap({"refine", "a.db", "a.db", "-o", "p.tum"}), {"a.db"}));
 }
 
 TEST(Refine, BadInputIsOneLine) {

@@ -5,6 +5,7 @@
 #include "libmap/image/camera_io.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/simulate/rocky_terrain.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 
@@ -20,6 +21,7 @@ using graspmap_test::write_text;
 using graspmap_test::wrong_usage;
 using libmap::LinkType;
 using libmap::PoseSource;
+using Words = std::vector<std::string>;
 
 const Eigen::Vector3d ball_center(0.2, 0.1, 0.3);
 
@@ -121,6 +123,85 @@ TEST(SimulateScanCommand, TakesACameraFileAndAnOffset) {
     EXPECT_NEAR(difference * rays[p].homogeneous().norm(), 0.018, 1e-5);
   }
   EXPECT_GT(both, 1000U);
+}
+
+void write_small_camera() {
+  libmap::CameraFile file;
+  file.camera = {.width = 48, .height = 40, .fx = 34, .fy = 34, .cx = 23.5, .cy = 19.5};
+  write_text(scratch("small.yaml"), libmap::to_yaml(file));
+}
+
+void write_ground() {
+  ASSERT_TRUE(succeeded(graspmap({"simulate", "terrain", "--size", "4x3", "--piece", "2",
+                                  "--spacing", "0.02", "-o", "ground"})));
+  write_small_camera();
+}
+
+TEST(SimulateScanCommand, TerrainAlongASerpentine) {
+  write_ground();
+  const auto run = [](const std::string& threads, const std::string& to) {
+    return succeeded(graspmap({"simulate", "scan", "ground", "-o", to, "--camera", "small.yaml",
+                               "--frames", "10", "--noise", "0", "--noise-of-range", "0",
+                               "--flying-pixels", "0", "--threads", threads}));
+  };
+  ASSERT_TRUE(run("1", "a.db"));
+  ASSERT_TRUE(run("3", "b.db"));
+  EXPECT_EQ(content("a.db"), content("b.db"));
+  const auto source = libmap::open_scan(scratch("a.db"));
+  ASSERT_EQ(source->graph().nodes.size(), 10U);
+  const libmap::RockyTerrain terrain({}, {Eigen::Vector2d(0, 0), Eigen::Vector2d(4, 3)});
+  std::size_t points = 0;
+  std::size_t off = 0;
+  for (const libmap::GraphNode& node : source->graph().nodes) {
+    const libmap::RgbdFrame frame = source->read_frame(node.id);
+    const auto rays = libmap::ray_table(frame.cameras[0]);
+    for (std::size_t p = 0; p < rays.size(); ++p) {
+      const auto depth = static_cast<double>(frame.depth.pixels[p]);
+      if (depth == 0) continue;
+      const Eigen::Vector3d point = *node.truth_from_base * (frame.cameras[0].base_from_camera *
+                                                             (depth * rays[p].homogeneous()));
+      ++points;
+      off += std::abs(point.z() - terrain.height(point.x(), point.y())) > 0.01;
+    }
+  }
+  EXPECT_GT(points, 8000U);
+  // Steep faces are cut by triangles of 2 cm.
+  EXPECT_LT(static_cast<double>(off), 0.1 * static_cast<double>(points));
+  const auto manifest = json_of("a.db.json");
+  EXPECT_EQ(manifest["frame"], "terrain");
+  EXPECT_EQ(manifest["inputs"].size(), 5U);
+  EXPECT_GT(manifest["results"]["path_length_m"], 2.0);
+}
+
+TEST(SimulateScanCommand, AlongAGivenTrajectory) {
+  write_ground();
+  write_text(scratch("way.tum"),
+             "100.0 1.0 1.0 1.5 0 0.3826834 0 0.9238795\n"
+             "100.5 1.2 1.1 1.5 0 0.3826834 0 0.9238795\n"
+             "102.0 1.5 1.1 1.6 0 0.3826834 0 0.9238795\n");
+  const Words command = {"simulate", "scan",       "ground",       "-o",     "way.db",
+                         "--camera", "small.yaml", "--trajectory", "way.tum"};
+  ASSERT_TRUE(succeeded(graspmap(command)));
+  const libmap::PoseGraph& graph = libmap::open_scan(scratch("way.db"))->graph();
+  ASSERT_EQ(graph.nodes.size(), 3U);
+  EXPECT_DOUBLE_EQ(graph.nodes[1].stamp_s, 100.5);
+  EXPECT_NEAR(graph.nodes[2].truth_from_base->translation().x(), 1.5, 1e-6);
+  EXPECT_NEAR(graph.nodes[2].truth_from_base->linear()(2, 0), -std::sqrt(0.5), 1e-6);
+  const auto with = [&](Words more) {
+    more.insert(more.begin(), command.begin(), command.end());
+    return graspmap(more);
+  };
+  EXPECT_TRUE(bad_input(with({"--frames", "5"}), {"--frames"}));
+  EXPECT_TRUE(bad_input(with({"--target", "0,0,0"}), {"--target"}));
+  write_text(scratch("way.tum"), "2 1 1 1.5 0 0 0 1\n1 1 1 1.5 0 0 0 1\n");
+  EXPECT_TRUE(bad_input(with({"--force"}), {"way.tum", "stamp of pose 2", "> 2"}));
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "ground", "-o", "c.db", "--path", "loops"}),
+                        {"--path", "loops"}));
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "ground", "-o", "c.db", "--texture", "mesh"}),
+                        {"--texture", "mesh"}));
+  std::filesystem::create_directory(scratch("empty"));
+  EXPECT_TRUE(bad_input(graspmap({"simulate", "scan", "empty", "-o", "c.db"}), {"empty"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("c.db")));
 }
 
 TEST(SimulateScanCommand, BadInputIsOneLineAndLeavesNothing) {

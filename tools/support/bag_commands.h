@@ -25,6 +25,7 @@ struct BagCommandOptions {
   std::string frame = "auto";
   double stamp_offset_s = 0.0;
   double arrow_m = libmap::BagPlaces{}.arrow_m;
+  double cell_size_m = 0.0;
   libmap::BagCompression compression = libmap::BagCompression::none;
 };
 

@@ -1,4 +1,4 @@
-// graspmap bag IN.bag: what a bag holds, its depth images as a rig's folder, one of its clouds.
+// graspmap bag IN: what a bag holds, its depth images as a rig's folder, one of its clouds.
 #include <iostream>
 
 #include "libmap/cloud/cloud_io.h"
@@ -28,6 +28,10 @@ void print_text(const libmap::BagListing& listing) {
                            libmap::to_fixed_text(listing.start_s, 6),
                            libmap::to_fixed_text(listing.end_s, 6),
                            listing.end_s - listing.start_s);
+}
+
+void add_bag_input(const BagCommandOptions& options, Run& run) {
+  for (const fs::path& file : libmap::files_of_bag(options.input)) run.add_input(file);
 }
 
 void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
@@ -78,7 +82,7 @@ void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
   const std::vector<std::string> names = libmap::names_in_rig_folder(plan);
   run.claim_output_tree(options.output, names, {options.input});
   for (const std::string& warning : plan.warnings) run.warn(options.input + ": " + warning);
-  run.add_input(options.input);
+  add_bag_input(options, run);
   run.manifest().frame = "robot";
   run.write_output_tree(options.output, names, [&](const fs::path& temporary) {
     report(plan, libmap::export_bag_rig(options.input, plan, temporary), options, run);
@@ -94,7 +98,7 @@ void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
                                   options.topics.empty() ? std::string() : options.topics.front(),
                                   bag_stamp(options));
   });
-  run.add_input(options.input);
+  add_bag_input(options, run);
   run.manifest().frame = result.frame;
   run.add_results({{"topic", result.topic},
                    {"stamp_s", result.stamp_s},

@@ -1,4 +1,4 @@
-// graspmap bag ... -o OUT.bag: a map and what belongs to it, or a rig's images, as a bag.
+// graspmap bag ... -o BAG: a map and what belongs to it, or a rig's images, as a bag.
 #include <variant>
 
 #include "libgtd/shape/convexity.h"
@@ -120,19 +120,96 @@ void add_transform(const CloudFile& map, const std::string& map_frame,
     run.warn("no transform from {} to {} is known", terrain_frame, map_frame);
 }
 
+// The map seen from above: each cell has what its topmost voxel has.
+libmap::BagGrid grid_of(const CloudFile& map, double cell_m) {
+  libmap::BagGrid grid;
+  grid.grid_map_topic = "/graspability_grid";
+  grid.occupancy_topic = "/graspability_occupancy";
+  grid.cell_m = cell_m;
+  const std::vector<Eigen::Vector3d>& points = map.cloud.positions;
+  const libmap::Bounds3d bounds = libmap::bounds_of(points);
+  // Voxels have their centers in the middle of cells.
+  grid.corner_m = bounds.min.head<2>().array() - cell_m / 2;
+  const Eigen::Array2d cells = (bounds.max - bounds.min).head<2>().array() / cell_m + 1.5;
+  constexpr double max_cells = 1 << 26;
+  if (!(cells.prod() <= max_cells))
+    throw libmap::Error("makes too many cells for a message", {.file = map.path,
+                                                               .field = "cell_size_m",
+                                                               .value = libmap::to_text(cell_m),
+                                                               .bound = "<= 2^26 cells"});
+  grid.columns = static_cast<std::size_t>(cells.x());
+  grid.rows = static_cast<std::size_t>(cells.y());
+  std::vector<std::size_t> top(grid.columns * grid.rows, points.size());
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    const Eigen::Array2d cell = (points[n].head<2>() - grid.corner_m).array() / cell_m;
+    std::size_t& held =
+        top[static_cast<std::size_t>(cell.y()) * grid.columns + static_cast<std::size_t>(cell.x())];
+    if (held == points.size() || points[n].z() > points[held].z()) held = n;
+  }
+  const auto layer = [&](const std::string& name, const auto& value) {
+    grid.layers.push_back({name, std::vector<float>(top.size(), std::nanf(""))});
+    for (std::size_t n = 0; n < top.size(); ++n)
+      if (top[n] < points.size()) grid.layers.back().values[n] = static_cast<float>(value(top[n]));
+  };
+  layer("elevation", [&](std::size_t n) { return points[n].z(); });
+  for (const libmap::ScalarField& field : map.cloud.fields)
+    layer(field.name, [&](std::size_t n) { return field.values[n]; });
+  const std::vector<double>& score = map.cloud.find_field("score")->values;
+  layer("occupancy", [&](std::size_t n) { return 1.0 - std::clamp(score[n], 0.0, 1.0); });
+  grid.occupancy = std::move(grid.layers.back().values);
+  grid.layers.pop_back();
+  return grid;
+}
+
+void add_grid(const CloudFile& map, const std::string& frame, const BagCommandOptions& options,
+              libmap::BagContent& content, Run& run) {
+  double cell_m = options.cell_size_m;
+  if (cell_m == 0 && map.manifest) {
+    const double* voxel = std::get_if<double>(map.manifest->find_parameter("voxel_size_m"));
+    if (voxel) cell_m = *voxel;
+  }
+  if (!(cell_m > 0) || map.cloud.empty())
+    return run.warn("{}: {}, so the bag has no grids", map.path,
+                    map.cloud.empty() ? "no points" : "no voxel size is known (--cell-size)");
+  content.grids.push_back(grid_of(map, cell_m));
+  content.grids.back().frame = frame;
+}
+
+void claim_bag(const BagCommandOptions& options, const std::vector<std::string>& inputs, Run& run) {
+  if (libmap::bag_format_of(options.output) == libmap::BagFormat::sqlite)
+    run.claim_output_tree(options.output, libmap::names_in_bag_folder(), inputs);
+  else
+    run.claim_output(options.output, inputs);
+}
+
+// write(path, format) makes the bag.
+template <typename Write>
+void write_claimed_bag(const BagCommandOptions& options, Run& run, const Write& write) {
+  const libmap::BagFormat format = libmap::bag_format_of(options.output);
+  const auto write_whole = [&](const fs::path& temporary) {
+    if (!temporary.empty()) write(temporary, format);
+  };
+  if (format == libmap::BagFormat::sqlite)
+    run.write_output_tree(options.output, libmap::names_in_bag_folder(), write_whole);
+  else
+    run.write_output(options.output, write_whole);
+}
+
 void add_results(const libmap::BagContent& content, Run& run) {
   for (const libmap::BagCloud& cloud : content.clouds)
     run.add_results({{cloud.topic + ".points", cloud.cloud.size()}});
   for (const libmap::BagPlaces& places : content.places)
     run.add_results({{"footholds", places.places.size()}});
+  for (const libmap::BagGrid& grid : content.grids)
+    run.add_results(
+        {{"cells_x", grid.columns}, {"cells_y", grid.rows}, {"cell_size_m", grid.cell_m}});
   run.add_results({{"stamp_s", content.stamp_s}});
 }
 
 }  // namespace
 
 void write_map_bag(const BagCommandOptions& options, Run& run) {
-  run.claim_output(options.output,
-                   {options.input, options.terrain, options.curvature, options.footholds});
+  claim_bag(options, {options.input, options.terrain, options.curvature, options.footholds}, run);
   const CloudFile map = read(options.input, run);
   if (!map.cloud.find_field("score"))
     throw libmap::Error("no such field: is this a map?", {.file = options.input, .field = "score"});
@@ -159,17 +236,19 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
     content.places.push_back(places_of(*footholds, options.arrow_m));
     content.places.back().frame = frame_id(footholds->frame(), terrain_frame);
   }
+  if (libmap::bag_format_of(options.output) != libmap::BagFormat::ros1)
+    add_grid(map, map_frame, options, content, run);
   run.manifest().frame = map_frame;
   add_results(content, run);
-  run.write_output(options.output, [&](const fs::path& temporary) {
-    libmap::write_bag(temporary, content, options.compression);
+  write_claimed_bag(options, run, [&](const fs::path& path, libmap::BagFormat format) {
+    libmap::write_bag(path, format, content, options.compression);
   });
   run.say("{} clouds and {} footholds at {} s", content.clouds.size(),
           footholds ? footholds->cloud.size() : 0, libmap::to_fixed_text(content.stamp_s, 6));
 }
 
 void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
-  run.claim_output(options.output);
+  claim_bag(options, {}, run);
   const fs::path own = fs::path(options.input) / libmap::rig_file_name;
   const libmap::CameraRig rig =
       read_named_rig(options.rig.empty() ? own.string() : options.rig, run);
@@ -182,8 +261,8 @@ void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
                                   .compression = options.compression};
   run.manifest().frame = bag.base_frame;
   run.add_results({{"cameras", rig.cameras.size()}, {"images", images.size()}});
-  run.write_output(options.output, [&](const fs::path& temporary) {
-    libmap::write_rig_bag(temporary, rig, images, bag);
+  write_claimed_bag(options, run, [&](const fs::path& path, libmap::BagFormat format) {
+    libmap::write_rig_bag(path, format, rig, images, bag);
   });
   run.say("{} images of {} cameras", images.size(), rig.cameras.size());
 }

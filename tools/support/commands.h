@@ -18,7 +18,7 @@ constexpr CommandEntry commands[] = {
     {"Scan", "calibrate", "calibrate a camera from pictures of a chessboard"},
     {"Scan", "refine", "refine the poses of a scan: loop closures, pose graph, bundle adjustment"},
     {"Scan", "fuse", "fuse the depth images of a scan or a camera rig into one cloud"},
-    {"Scan", "bag", "read and write ROS 1 bags without ROS"},
+    {"Scan", "bag", "read and write ROS bags without ROS"},
     {"Surface", "mesh", "reconstruct a surface from a cloud"},
     {"Surface", "texture", "texture a mesh with the photographs of its scan"},
     {"Surface", "crop", "level a cloud or mesh and crop it to the test site"},

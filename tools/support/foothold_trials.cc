@@ -68,7 +68,7 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
                         {.file = gripper_file.string(), .field = "fingers"});
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);
-  run.add_input(gripper_file);
+  for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
   const auto ground = in_file(options.mesh, [&] { return libgtd::Ground(mesh); });
   std::vector<libgtd::Foothold>& footholds = result.footholds;
   const std::size_t found = footholds.size();

@@ -1,5 +1,6 @@
 #include "tools/support/grasp_map.h"
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <map>
@@ -166,19 +167,25 @@ class MapGrasping {
 
   void require_usable() const {
     const std::vector<StoredTile>& tiles = map_.index().tiles;
-    bool is_on_mesh = false;
-    for (std::size_t n = 0; n < tiles.size() && !is_on_mesh; ++n) {
+    std::size_t voxels = 0;
+    std::size_t on_mesh = 0;
+    for (std::size_t n = 0; n < tiles.size(); ++n) {
       const libmap::PointCloud points = map_.load(n);
       for (const std::string& name : grasp_fields())
         if (points.find_field(name) != nullptr)
           throw libmap::Error("the map has this field already", {.field = name});
-      for (std::size_t p = 0; p < points.size() && !is_on_mesh; ++p)
-        is_on_mesh = ground_.distance(mesh_from_map_ * points.positions[p], options_.max_distance_m)
-                         .has_value();
+      voxels += points.size();
+      on_mesh += static_cast<std::size_t>(std::count_if(
+          points.positions.begin(), points.positions.end(), [&](const Eigen::Vector3d& position) {
+            return ground_.distance(mesh_from_map_ * position, options_.max_distance_m).has_value();
+          }));
     }
-    if (!is_on_mesh)
+    if (on_mesh == 0)
       throw libmap::Error("none of its voxels is on the mesh",
                           {.bound = "within " + libmap::to_text(options_.max_distance_m) + " m"});
+    if (2 * on_mesh < voxels)
+      run_.warn("only {} of {} voxels are within {} m of the mesh: is the map in its frame?",
+                on_mesh, voxels, options_.max_distance_m);
   }
 
   // The plan that is there, if it is of the same mesh, map and parameters; else a new one. The

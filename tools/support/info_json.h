@@ -20,7 +20,7 @@ inline nlohmann::ordered_json bounds_json(const std::vector<Eigen::Vector3d>& po
   return {{"min", numbers_json(bounds.min)}, {"max", numbers_json(bounds.max)}};
 }
 
-// Topics, messages and times of a ROS 1 bag.
+// Topics, messages and times of a bag.
 inline nlohmann::ordered_json bag_json(const libmap::BagListing& listing) {
   nlohmann::ordered_json topics = nlohmann::ordered_json::array();
   for (const libmap::BagTopic& topic : listing.topics)

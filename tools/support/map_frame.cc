@@ -1,5 +1,7 @@
 #include "tools/support/map_frame.h"
 
+#include "libmap/raster/dem_reader.h"
+
 namespace graspmap_tools {
 
 PointFrameNames point_frame_names() {
@@ -86,10 +88,13 @@ PointFrame frame_of_points(const std::string& points, PointFrame asked, const st
 
 std::optional<libmap::Pose> site_from_map_of(const std::string& file) {
   const auto manifest = manifest_of(file);
-  if (!manifest) return std::nullopt;
-  const libmap::Pose* site_from_map = manifest->find_transform(site_from_map_name);
-  const libmap::Pose* terrain_from_input = manifest->find_transform(terrain_from_input_name);
-  if (manifest->frame != "terrain" || terrain_from_input == nullptr)
+  return manifest ? site_from_map_of(*manifest) : std::nullopt;
+}
+
+std::optional<libmap::Pose> site_from_map_of(const libmap::Manifest& manifest) {
+  const libmap::Pose* site_from_map = manifest.find_transform(site_from_map_name);
+  const libmap::Pose* terrain_from_input = manifest.find_transform(terrain_from_input_name);
+  if (manifest.frame != "terrain" || terrain_from_input == nullptr)
     return site_from_map == nullptr ? std::nullopt : std::optional(*site_from_map);
   return site_from_map == nullptr ? *terrain_from_input : *terrain_from_input * *site_from_map;
 }
@@ -112,6 +117,12 @@ void carry_transforms(const std::string& input, Run& run) {
   if (const auto site_from_map = site_from_map_of(input))
     run.manifest().transforms.emplace_back(site_from_map_name, *site_from_map);
   carry_truth_transform(input, run);
+  carry_georeference(input, run);
+}
+
+void carry_georeference(const std::string& input, Run& run) {
+  if (const auto georeference = libmap::read_georeference(input))
+    run.manifest().georeference = georeference;
 }
 
 void carry_frame(const std::string& input, Run& run) {
@@ -129,6 +140,7 @@ void carry_facts(const libmap::Manifest& source, Run& run) {
   libmap::Manifest& manifest = run.manifest();
   manifest.frame = source.frame;
   manifest.transforms = source.transforms;
+  manifest.georeference = source.georeference;
   carry(source.parameters, manifest.parameters);
   carry(source.results, manifest.results);
 }

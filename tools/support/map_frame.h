@@ -38,6 +38,7 @@ inline constexpr const char* site_from_map_name = "site_from_map";
 // From the map before it was cropped, or in which a simulated robot stood, to the points in `file`,
 // as the file's manifest says; nothing if it says nothing.
 std::optional<libmap::Pose> site_from_map_of(const std::string& file);
+std::optional<libmap::Pose> site_from_map_of(const libmap::Manifest& manifest);
 
 // The name of the transform of what lies in the frame of a scan's true poses, or was made from
 // that.
@@ -46,16 +47,17 @@ inline constexpr const char* truth_from_poses_name = "ground_truth_from_poses";
 // Whether `file`, or what it was made from, lies in the frame of true poses, as its manifest says.
 bool is_from_true_frame(const std::string& file);
 
-// For an output in the frame of `input`: its manifest gets the input's site_from_map and
-// ground_truth_from_poses, those that it has.
+// For an output in the frame of `input`: its manifest gets the input's site_from_map,
+// ground_truth_from_poses and georeference, those that it has.
 void carry_transforms(const std::string& input, Run& run);
 // The same and the frame's name.
 void carry_frame(const std::string& input, Run& run);
 // For a map made of a map: frame, transforms, and the parameters and results that the run's
 // manifest does not have itself, such as its zero plane, lattice and method.
 void carry_facts(const libmap::Manifest& source, Run& run);
-// ground_truth_from_poses alone.
+// One of them alone; a DEM (.tif) is a georeference itself.
 void carry_truth_transform(const std::string& input, Run& run);
+void carry_georeference(const std::string& input, Run& run);
 
 // For an output in the terrain frame of `map`: its manifest gets the map's terrain_from_input.
 void carry_terrain_transform(const std::string& map, Run& run);

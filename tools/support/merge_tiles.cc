@@ -4,7 +4,9 @@
 #include "libgtd/score/tile_store.h"
 #include "libmap/cloud/pcd_parts.h"
 #include "libmap/core/parallel.h"
+#include "libmap/raster/dem_reader.h"
 #include "tools/support/command_line.h"
+#include "tools/support/raster_output.h"
 
 using namespace graspmap_tools;
 
@@ -89,6 +91,7 @@ void copy_common_facts(const libmap::Manifest& part, libmap::Manifest& whole) {
     if (parameter.first != "tile") whole.parameters.push_back(parameter);
   whole.frame = part.frame;
   whole.transforms = part.transforms;
+  whole.georeference = part.georeference;
   for (const char* name : {"lattice_origin_m", "plane_rmse_m", "up_source", "input_points",
                            "occupied_voxels", "mask_side_voxels", "mask_layers", "normal_radius_m"})
     if (const libmap::ManifestValue* value = part.find_result(name))
@@ -147,8 +150,9 @@ libmap::PointCloud load_row(const MapTiles& tiles, const std::string& store, con
   return joined(parts, store);
 }
 
-void merge_store(const std::string& store, const std::string& output,
-                 const libmap::CloudWriteOptions& writing, Run& run) {
+void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
+                 Run& run) {
+  const libmap::CloudWriteOptions& writing = options.writing;
   if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
     throw libmap::Error("a tile store is written as binary .pcd",
                         {.file = output, .field = "--encoding"});
@@ -160,9 +164,19 @@ void merge_store(const std::string& store, const std::string& output,
   run.add_results({{"scored_voxels", index.voxels()},
                    {"border_voxels", index.border_voxels()},
                    {"graspable_voxels", index.graspable_voxels()}});
+  const auto tell = [&] {
+    run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
+  };
+  if (libmap::is_dem_path(output)) {
+    const auto visit_rows = [&](const auto& visit) {
+      for (const TileRow& row : rows_of(index)) visit(load_row(tiles, store, row));
+    };
+    write_raster(output, raster_of(visit_rows, index.manifest, options.pixel_size_m), run);
+    return tell();
+  }
   run.write_output(
       output, [&](const auto& temporary) { write_merged(tiles, store, temporary, writing, run); });
-  run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
+  tell();
 }
 
 }  // namespace
@@ -193,13 +207,13 @@ bool graspmap_tools::is_part_of_map(const std::string& file) {
 }
 
 void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
-                                 const libmap::CloudWriteOptions& writing, Run& run) {
-  libmap::require_cloud_format(output);
+                                 const MergeOptions& options, Run& run) {
+  if (!libmap::is_dem_path(output)) libmap::require_cloud_format(output);
   run.claim_output(output, tiles);
   const auto store = std::find_if(tiles.begin(), tiles.end(), is_tile_store);
   if (store != tiles.end()) {
     if (tiles.size() > 1) throw libmap::Error("a tile store is merged by itself", {.file = *store});
-    return merge_store(*store, output, writing, run);
+    return merge_store(*store, output, options, run);
   }
   std::vector<libmap::Manifest> manifests;
   for (const std::string& tile : tiles) {
@@ -224,6 +238,12 @@ void graspmap_tools::merge_tiles(const std::vector<std::string>& tiles, const st
   run.say("{} scored voxels from {} files", whole.size(), parts.size());
   in_file(libmap::manifest_path(tiles.front()).string(),
           [&] { evaluate_obstacles(manifests.front(), whole, run); });
-  run.write_output(output,
-                   [&](const auto& temporary) { libmap::write_cloud(temporary, whole, writing); });
+  if (libmap::is_dem_path(output)) {
+    const auto visit_whole = [&](const auto& visit) { visit(whole); };
+    write_raster(output, raster_of(visit_whole, manifests.front(), options.pixel_size_m), run);
+    return;
+  }
+  run.write_output(output, [&](const auto& temporary) {
+    libmap::write_cloud(temporary, whole, options.writing);
+  });
 }

@@ -16,11 +16,16 @@ void write_merged(const MapTiles& tiles, const std::string& store,
                   const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
                   Run& run);
 
+struct MergeOptions {
+  libmap::CloudWriteOptions writing;
+  double pixel_size_m = 0.0;  // of a raster, .tif; 0: the voxel size
+};
+
 // Writes the same bytes as scoring in one run. `tiles` are all shares that `score --tile K/N`
 // wrote, in any order, or one tile store, which is merged row by row of tiles. Throws Error if a
 // share is missing, given twice, or of another map.
-// A store is written as binary .pcd or in another format.
+// A store is written as binary .pcd, in another format, or as .tif (the raster alone is in memory).
 void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
-                 const libmap::CloudWriteOptions& writing, Run& run);
+                 const MergeOptions& options, Run& run);
 
 }  // namespace graspmap_tools

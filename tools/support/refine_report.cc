@@ -195,6 +195,7 @@ std::string refinement_json(const std::string& scan, const libmap::RefinementRes
                      {"frames_skipped", skipped},
                      {"stored_links_rejected", rejected},
                      {"sensor", result.findings},
+                     {"scale", result.scale},
                      {"warnings", result.warnings},
                      {"nodes", nodes_json(result)}};
   return json.dump(2) + "\n";
@@ -219,6 +220,7 @@ std::string refinement_text(const std::string& scan, const libmap::RefinementRes
     fmt::format_to(out, "stored link {} -> {} rejected: {}\n", link.from, link.to,
                    to_text(link.type));
   for (const std::string& finding : result.findings) fmt::format_to(out, "sensor: {}\n", finding);
+  fmt::format_to(out, "{}\n", result.scale);
   for (const std::string& warning : result.warnings) fmt::format_to(out, "warning: {}\n", warning);
   fmt::format_to(
       out,

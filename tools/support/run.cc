@@ -97,6 +97,15 @@ Run::Run(std::string command, RunOptions options, libmap::Progress& progress)
 }
 
 void Run::add_input(const fs::path& path) {
+  if (fs::is_directory(path)) {
+    std::vector<fs::path> files;
+    for (const fs::directory_entry& entry : fs::directory_iterator(path))
+      if (entry.is_regular_file() && entry.path().filename().string().front() != '.')
+        files.push_back(entry.path());
+    std::sort(files.begin(), files.end());
+    for (const fs::path& file : files) add_input(file);
+    return;
+  }
   manifest_.add_input(path);
   const fs::path place = path.lexically_relative(libmap::data_folder());
   if (!place.empty() && *place.begin() != "..") manifest_.inputs.back().path = place.string();

@@ -57,8 +57,8 @@ class Run {
 
   void add_results(const Results& results) { graspmap_tools::add_results(results, manifest_); }
 
-  // Hashes an input into the manifest; the toolkit's own data by its place among them, so that the
-  // manifest does not depend on where the toolkit lies.
+  // Hashes an input into the manifest, of a folder each file; the toolkit's own data by its place
+  // among them, so that the manifest does not depend on where the toolkit lies.
   void add_input(const std::filesystem::path& path);
 
   // To stderr: unless --quiet; always; with --verbose only.

@@ -3,6 +3,7 @@
 #include <set>
 
 #include "libmap/scan/calibrated_scan.h"
+#include "libmap/scan/joined_scan.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"
@@ -130,7 +131,13 @@ void add_calibration_option(Command& command, std::string& calibration) {
 
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool strict, Run& run,
                                               const std::string& calibration) {
-  auto scan = run.timed("open", [&] { return libmap::open_scan(path); });
+  return open_scan(std::vector<std::string>{path}, strict, run, calibration);
+}
+
+std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& scans, bool strict,
+                                              Run& run, const std::string& calibration) {
+  const std::string& path = scans.front();
+  auto scan = run.timed("open", [&] { return libmap::open_scans({scans.begin(), scans.end()}); });
   for (const std::string& warning : scan->warnings()) {
     if (strict && !libmap::is_about_unknown_part(warning))
       throw libmap::Error(warning).in_file(path);

@@ -29,6 +29,9 @@ void add_calibration_option(Command& command, std::string& calibration);
 // of the calibration, if there is one.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
                                               const std::string& calibration = {});
+// The same of several scans, joined (joined_scan.h).
+std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& scans, bool strict,
+                                              Run& run, const std::string& calibration = {});
 
 // The poses that `poses` names, by ascending node; "auto" becomes the source that was taken. Says
 // so, and keeps it in the manifest. Nodes without a pose are a warning, an Error if `strict`.

@@ -162,7 +162,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
 SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run& run) {
   SceneFile read;
   libmap::Scene& scene = read.scene;
-  libmap::SceneLayer layer;
+  libmap::SceneLayer layer = options.layer;
   const auto box = parse_rectangle(options.box);
   if (is_tile_store(file)) {
     MapWindow window = read_window(MapTiles(file), box, options.max_points);
@@ -184,14 +184,10 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
     throw libmap::Error("there is nothing to draw: no point with finite coordinates",
                         {.file = file});
   const auto manifest = libmap::read_manifest_of(file);
-  layer.coloring = options.coloring;
   if (const auto* mesh = std::get_if<libmap::TriangleMesh>(&layer.shape))
     for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(*mesh))
       layer.coloring.own_legend.entries.push_back({part.color, part.text});
   layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
-  layer.point_shape = options.point_shape;
-  layer.shading = options.shading;
-  layer.point_size_m = options.point_size_m;
   scene.layers.push_back(std::move(layer));
   const libmap::Pose* terrain_from_input = terrain_from_input_of(manifest);
   if (terrain_from_input != nullptr) {
@@ -223,26 +219,14 @@ void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
 }  // namespace
 
 void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
-  table.add("color", options.coloring.mode, libmap::color_mode_names(), "what colors show");
-  table.add("field", options.coloring.field, "field that is shown with color: field");
-  table.add("color_scale", options.coloring.scale, libmap::color_scale_names(),
-            "colors of continuous values; diverging: blue below and red above 0");
-  table.add("range_min", options.coloring.range_min, libmap::any_number,
-            "value at the lower end of the colors");
-  table.add("range_max", options.coloring.range_max, libmap::any_number,
-            "value at their upper end; equal to range_min: from the data");
-  table.add("single_color", options.coloring.color, "color with color: single, #rrggbb");
+  bind(table, options.layer);
   table.add(
       "zero_plane", options.zero_plane,
       "height in the terrain frame below which ground is white, m; auto: the map's own, none");
-  table.add("point_shape", options.point_shape, libmap::point_shape_names(), "shape of a point");
-  table.add("point_size_m", options.point_size_m, libmap::not_negative,
-            "edge of a point, m; 0: from their spacing");
   table.add("box", options.box,
             "show this rectangle of a cloud or map alone: X0,Y0,X1,Y1 in its frame, m");
   table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
             "of a tile store: larger parts are downsampled to about so many points");
-  table.add("shading", options.shading, libmap::shading_names(), "where light falls");
   bind_points(table, options);
   table.add("heading", options.heading,
             {{"auto", MapHeading::automatic},

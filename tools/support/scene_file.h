@@ -19,12 +19,9 @@ struct SceneFileOptions {
   std::string verdict;
   std::string zero_plane = "auto";
   PointFrame points_frame = PointFrame::automatic;
-  double point_size_m = 0.0;
   std::string box;  // of the plan that is shown
   std::uint64_t max_points = 1'000'000;
-  libmap::Coloring coloring;
-  libmap::PointShape point_shape = libmap::PointShape::automatic;
-  libmap::Shading shading = libmap::Shading::automatic;
+  libmap::SceneLayer layer;  // its shape is the file's
   MapHeading heading = MapHeading::automatic;
 };
 

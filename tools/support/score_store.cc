@@ -1,5 +1,6 @@
 #include "tools/support/score_store.h"
 
+#include "libgtd/gripper/gripper_io.h"
 #include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
@@ -41,7 +42,8 @@ std::int64_t modified_ns(const fs::path& path) {
 // What is known of each file from an earlier run, if it is the same by name, size and time; else
 // it is read.
 std::vector<TerrainPiece> survey(const std::vector<fs::path>& files,
-                                 const std::vector<TerrainPiece>& known) {
+                                 const std::vector<TerrainPiece>& known,
+                                 const std::optional<libmap::Georeference>& georeference) {
   std::vector<TerrainPiece> pieces(files.size());
   libmap::parallel_each(files.size(), [&](std::size_t n) {
     TerrainPiece& piece = pieces[n];
@@ -57,7 +59,7 @@ std::vector<TerrainPiece> survey(const std::vector<fs::path>& files,
       return;
     }
     piece.input.sha256 = libmap::sha256_of_file(files[n]);
-    const libmap::PieceFacts facts = libmap::survey_piece(files[n]);
+    const libmap::PieceFacts facts = libmap::survey_piece(files[n], georeference);
     piece.points = facts.points;
     piece.dropped_points = facts.dropped_points;
     piece.box = facts.box;
@@ -142,8 +144,8 @@ class StoreScoring {
       throw libmap::Error(
           "is complete, but its folder `progress` is not there: --force starts again",
           {.file = options_.store});
-    std::vector<TerrainPiece> pieces =
-        survey(files_, earlier ? earlier->pieces : std::vector<TerrainPiece>{});
+    std::vector<TerrainPiece> pieces = survey(
+        files_, earlier ? earlier->pieces : std::vector<TerrainPiece>{}, stream.georeference());
     TilePlan plan;
     plan.index.manifest = manifest_of(pieces);
     plan.key = libgtd::key_of(plan.index.manifest);
@@ -172,7 +174,7 @@ class StoreScoring {
     libmap::Manifest& manifest = run_.manifest();
     carry_transforms(options_.terrain, run_);
     for (const TerrainPiece& piece : pieces) manifest.inputs.push_back(piece.input);
-    run_.add_input(options_.gripper_file);
+    for (const auto& input : libgtd::gripper_files(options_.gripper_file)) run_.add_input(input);
     manifest.frame = options_.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
     libmap::Manifest copy = manifest;
     copy.timings_s.clear();
@@ -247,6 +249,8 @@ class StoreScoring {
     if (earlier.index.manifest.parameters != plan.index.manifest.parameters ||
         earlier.index.manifest.version != plan.index.manifest.version)
       refuse("contains tiles of other parameters: --force starts again");
+    if (earlier.index.manifest.georeference != plan.index.manifest.georeference)
+      refuse("has its offset from another first piece: new pieces need names behind it");
     const auto same = [](const TerrainPiece& a, const TerrainPiece& b) {
       return a.input.sha256 == b.input.sha256;
     };

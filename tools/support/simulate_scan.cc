@@ -1,9 +1,13 @@
-// graspmap simulate scan: a scan of a mesh by a depth camera carried by hand.
+// graspmap simulate scan: a scan of a mesh or a large terrain by a depth camera carried by hand.
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/cloud_pieces.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/simulate/scan_simulation.h"
 #include "libmap/trajectory/trajectory_error.h"
+#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
 #include "tools/support/usages.h"
@@ -12,19 +16,28 @@ using namespace graspmap_tools;
 
 namespace {
 
+namespace fs = std::filesystem;
+
 struct SimulateScanOptions {
-  std::string mesh;
+  std::string scene;  // mesh, cloud or folder of clouds
   std::string output;
   std::string camera;
   std::string target = "auto";
+  std::string trajectory;
   libmap::ScanSimulationOptions simulation;
   libmap::RtabmapWriterOptions writer;
 };
 
+constexpr std::size_t spool_buffer_bytes = std::size_t{32} << 20U;
+
 void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
   libmap::ScanSimulationOptions& simulation = options.simulation;
   table.add("camera", options.camera,
-            "calibration file of the camera (.yaml); empty: a Kinect v2, 512 x 424 pixels");
+            "calibration file of the camera (.yaml), or one of the toolkit's: realsense-d435, "
+            "ipad-lidar; empty: a Kinect v2, 512 x 424 pixels");
+  table.add("trajectory", options.trajectory,
+            "poses of what carries the camera (.tum, .kitti, .g2o, .toro), in the frame of what is "
+            "scanned, one per frame; empty: a path of the options below");
   bind(table, simulation.trajectory);
   table.add("target", options.target,
             "what is looked at, X,Y,Z in the mesh's frame; auto: the site's center");
@@ -33,6 +46,7 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             "the mesh's own colors, or rock; auto: rock where the mesh has but one color");
   bind(table, simulation.photo);
   bind(table, simulation.faults);
+  bind(table, simulation.events);
   bind(table, simulation.odometry);
   bind(table, simulation.closures);
   table.add("depth_format", options.writer.depth,
@@ -44,6 +58,8 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
             {{"jpeg", libmap::ImageFormat::jpeg}, {"png", libmap::ImageFormat::png}},
             "how color is stored");
   table.add("seed", simulation.seed, libmap::not_negative, "of all that is random");
+  table.add("rock_seed", simulation.rock_seed, libmap::not_negative,
+            "of the rock's colors, which scans of the same ground share; 0: that of seed");
 }
 
 void add_results(const libmap::ScanSimulationResult& result, Run& run) {
@@ -73,18 +89,97 @@ void add_results(const libmap::ScanSimulationResult& result, Run& run) {
   if (result.empty_frames > 0) run.warn("{} frames see nothing within range", result.empty_frames);
 }
 
-void write_scan(const libmap::TriangleMesh& mesh, const SimulateScanOptions& options,
-                const std::filesystem::path& path, Run& run) {
+libmap::Trajectory given_poses(const SimulateScanOptions& options) {
+  if (options.trajectory.empty()) return {};
+  const double frame_interval_s = options.simulation.trajectory.frame_interval_s;
+  libmap::CameraTrajectoryOptions path = options.simulation.trajectory;
+  path.frame_interval_s = libmap::CameraTrajectoryOptions{}.frame_interval_s;
+  const std::string reason = "is not for --trajectory, which says where the camera is";
+  refuse_set(path, libmap::bind, reason);
+  refuse_given({{"--target", options.target != "auto"}}, reason);
+  return in_file(options.trajectory, [&] {
+    return libmap::numbered(libmap::read_trajectory(options.trajectory).poses, frame_interval_s);
+  });
+}
+
+void add_inputs(const std::vector<fs::path>& scene, const SimulateScanOptions& options, Run& run) {
+  for (const fs::path& input : scene) run.add_input(input);
+  for (const std::string& input : {options.camera, options.trajectory})
+    if (!input.empty()) run.add_input(input);
+}
+
+void write_scan(const libmap::ScanScene& scene, const SimulateScanOptions& options,
+                const fs::path& path, Run& run) {
   libmap::RtabmapWriter writer(path, options.writer);
-  const libmap::ScanSimulationResult result = libmap::simulate_scan(
-      mesh, options.simulation,
-      [&](const libmap::GraphNode& node, const libmap::RgbdFrame& frame) {
-        writer.add_node(node, frame);
-      },
-      run.progress());
+  const libmap::ScanSimulationResult result = run.timed("frames", [&] {
+    return libmap::simulate_scan(
+        scene, options.simulation,
+        [&](const libmap::GraphNode& node, const libmap::RgbdFrame& frame) {
+          writer.add_node(node, frame);
+        },
+        run.progress());
+  });
   for (const libmap::PoseLink& link : result.graph.links) writer.add_link(link);
   writer.finish();
   add_results(result, run);
+}
+
+void scan_mesh(const SimulateScanOptions& options, const libmap::Trajectory& poses, Run& run) {
+  const libmap::TriangleMesh mesh =
+      run.timed("read", [&] { return libmap::read_mesh(options.scene).mesh; });
+  add_inputs({options.scene}, options, run);
+  run.manifest().frame = "mesh";
+  in_file(options.scene, [&] {
+    const libmap::ScanScene scene = libmap::scene_of(mesh, options.simulation, poses);
+    run.write_output(options.output,
+                     [&](const auto& temporary) { write_scan(scene, options, temporary, run); });
+  });
+}
+
+// Its points are in a file of the output's folder that has no name: memory does not grow with the
+// terrain.
+void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& poses, Run& run) {
+  if (options.simulation.texture == libmap::TextureSource::mesh)
+    throw libmap::Error("clouds have no surface colors",
+                        {.field = "--texture", .value = "mesh", .bound = "auto or rock"});
+  if (poses.empty() && options.simulation.trajectory.path == libmap::CameraPath::loops)
+    throw libmap::Error("loops are around a mesh",
+                        {.field = "--path", .value = "loops", .bound = "auto or serpentine"});
+  const libmap::ScanEvents& events = options.simulation.events;
+  refuse_given({{"--walker-first-frame", events.walker_first_frame > 0},
+                {"--stone-moved-frame", events.stone_moved_frame > 0},
+                {"--ceiling-first-frame", events.ceiling_first_frame > 0},
+                {"--multipath", options.simulation.faults.depth.multipath > 0.0}},
+               "is for the scan of a mesh");
+  const libmap::PieceStream stream(libmap::cloud_pieces(options.scene));
+  add_inputs(stream.pieces(), options, run);
+  run.manifest().frame = "terrain";
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::GroundHeights ground;
+    libmap::PointSpool points(
+        temporary.has_parent_path() ? temporary.parent_path() : fs::path("."),
+        {.square_m = libmap::GroundHeights::cell_m, .buffer_bytes = spool_buffer_bytes});
+    std::size_t count = 0;
+    for (const fs::path& piece : stream.pieces()) count += libmap::read_cloud_info(piece).points;
+    run.progress().begin("points", count);
+    run.timed("read", [&] {
+      stream.for_each_block(libmap::PointStream::Need::positions,
+                            [&](const libmap::PointCloud& block) {
+                              ground.add(block.positions);
+                              points.add(block);
+                              run.progress().advance(block.size());
+                            });
+      points.finish();
+    });
+    run.progress().end();
+    libmap::TerrainSurface terrain(points, ground,
+                                   {.texture_seed = options.simulation.texture_seed()});
+    in_file(options.scene, [&] {
+      write_scan(libmap::scene_of(terrain, ground, options.simulation, poses), options, temporary,
+                 run);
+    });
+    run.detail("{} squares of the terrain were triangulated", terrain.squares_made());
+  });
 }
 
 void simulate(SimulateScanOptions& options, Run& run) {
@@ -92,29 +187,34 @@ void simulate(SimulateScanOptions& options, Run& run) {
   if (options.target != "auto")
     simulation.trajectory.target = parse_vector(options.target, "--target");
   simulation.depth.check();
-  run.claim_output(options.output, {options.mesh, options.camera});
+  run.claim_output(options.output, {options.scene, options.camera, options.trajectory});
   if (!options.output.ends_with(".db"))
     throw libmap::Error("a scan is written as a database",
                         {.file = options.output, .bound = "a name.db"});
-  if (!options.camera.empty()) simulation.camera = libmap::read_camera(options.camera).camera;
-  const libmap::TriangleMesh mesh =
-      run.timed("read", [&] { return libmap::read_mesh(options.mesh).mesh; });
-  run.add_input(options.mesh);
-  if (!options.camera.empty()) run.add_input(options.camera);
-  run.manifest().frame = "mesh";
-  in_file(options.mesh, [&] {
-    run.write_output(options.output,
-                     [&](const auto& temporary) { write_scan(mesh, options, temporary, run); });
-  });
+  if (!options.camera.empty()) {
+    options.camera = libmap::find_data_file("cameras", options.camera).string();
+    simulation.camera = libmap::read_camera(options.camera).camera;
+  }
+  const libmap::Trajectory poses = given_poses(options);
+  if (fs::is_directory(options.scene) ||
+      libmap::file_kind(options.scene) == libmap::FileKind::cloud)
+    scan_terrain(options, poses, run);
+  else
+    scan_mesh(options, poses, run);
 }
 
 }  // namespace
 
 int graspmap_tools::simulate_scan(int argc, char** argv) {
   SimulateScanOptions options;
-  Command command("simulate scan", "A scan of a mesh by a depth camera carried by hand.");
-  command.input("MESH", options.mesh, "what is scanned (.ply, .obj, .stl, .off, .glb)");
+  Command command("simulate scan",
+                  "A scan of a mesh or a terrain by a depth camera carried by hand.");
+  command.input("SCENE", options.scene,
+                "what is scanned: a mesh (.ply, .obj, .stl, .off, .glb), or a height field as a "
+                "cloud or a folder of clouds of any size (.pcd, .ply, .csv)");
   command.output(options.output, "RTAB-Map database with true poses (.db)");
   bind(command.parameters(), options);
+  command.config_resolver(
+      [](const std::string& name) { return libmap::find_data_file("sensors", name); });
   return command.run(argc, argv, [&](Run& run) { simulate(options, run); });
 }

@@ -4,6 +4,7 @@
 #include "libmap/simulate/terrain_pieces.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
+#include "tools/support/piece_folder.h"
 #include "tools/support/usages.h"
 
 using namespace graspmap_tools;
@@ -18,29 +19,15 @@ struct SimulateTerrainOptions {
   libmap::TerrainPiecesOptions pieces;
 };
 
-// The names of this terrain's pieces, and of those of an earlier one that it replaces.
-std::vector<std::string> folder_names(const fs::path& folder,
-                                      const std::vector<libmap::TerrainPiece>& pieces) {
-  std::vector<std::string> names;
-  names.reserve(pieces.size());
-  for (const libmap::TerrainPiece& piece : pieces) names.push_back(libmap::piece_file_name(piece));
-  if (!fs::is_directory(folder)) return names;
-  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
-    const std::string name = entry.path().filename().string();
-    if (libmap::is_piece_file_name(name)) names.push_back(name);
-  }
-  return names;
-}
-
 // Each piece is made, written and forgotten. Returns the number of points.
 std::size_t write_pieces(const SimulateTerrainOptions& options,
-                         const std::vector<libmap::TerrainPiece>& pieces, const fs::path& folder,
+                         const std::vector<libmap::PlanTile>& pieces, const fs::path& folder,
                          Run& run) {
   run.progress().begin("pieces", pieces.size());
   std::vector<std::size_t> points(pieces.size());
   libmap::parallel_each(pieces.size(), [&](std::size_t n) {
     const libmap::PointCloud cloud = libmap::sample_piece(options.pieces, pieces[n]);
-    libmap::write_cloud(folder / libmap::piece_file_name(pieces[n]), cloud);
+    libmap::write_cloud(folder / libmap::piece_file_name(pieces[n], ".pcd"), cloud);
     points[n] = cloud.size();
     run.progress().advance(1);
   });
@@ -57,8 +44,8 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
         "not a size", {.field = "--size", .value = options.size, .bound = "M or XxY, meters, > 0"});
   options.pieces.size_x_m = size->x();
   options.pieces.size_y_m = size->y();
-  const std::vector<libmap::TerrainPiece> pieces = libmap::terrain_pieces(options.pieces);
-  const std::vector<std::string> names = folder_names(options.output, pieces);
+  const std::vector<libmap::PlanTile> pieces = libmap::terrain_pieces(options.pieces);
+  const std::vector<std::string> names = piece_folder_names(options.output);
   run.claim_output_tree(options.output, names);
   run.manifest().frame = "terrain";
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {

@@ -112,6 +112,50 @@ TEST(ClosingTerms, ShapesInOrder) {
   EXPECT_GT(pit.rise, flat.rise + 1.2);
 }
 
+double share_at_origin(const std::vector<Voxel>& ground) {
+  const VoxelGrid grid = grid_of(ground);
+  const auto mask =
+      libgtd::make_gripper_mask(gripper_named("scar-e"), {libgtd::Method::corrected, 0.01, 1});
+  const auto at = std::find_if(grid.voxels.rbegin(), grid.voxels.rend(),
+                               [](const Voxel& v) { return v.i == 0 && v.j == 0; });
+  return libgtd::outward_shares(grid, mask,
+                                {static_cast<std::size_t>(grid.voxels.rend() - at - 1)})[0];
+}
+
+// The circle of the closed spines has a radius of 49.4 mm, that of the open fingers one of 127 mm.
+TEST(OutwardShares, OfShapes) {
+  const auto ball = [](double radius) {
+    return ground([radius](int i, int j) {
+      const double square = radius * radius - i * i - j * j;
+      return square > 0 ? static_cast<int>(std::floor(std::sqrt(square))) : 0;
+    });
+  };
+  EXPECT_EQ(share_at_origin(ball(4)), 0);
+  EXPECT_EQ(share_at_origin(ball(5)), 0);
+  for (const double radius : {7.5, 10.0, 15.0, 25.0}) EXPECT_EQ(share_at_origin(ball(radius)), 1);
+  // One voxel may be rounding, two are a fall.
+  const auto step = [](int fall) {
+    return ground([fall](int i, int j) { return std::hypot(i, j) < 9 ? 0 : -fall; });
+  };
+  EXPECT_EQ(share_at_origin(step(0)), 0);
+  EXPECT_EQ(share_at_origin(step(1)), 0);
+  EXPECT_EQ(share_at_origin(step(2)), 1);
+  // A bowl and a pit fall inward. Of a slope of 45 degrees, the azimuths at right angles to its
+  // fall stay level.
+  EXPECT_EQ(share_at_origin(step(-5)), 0);
+  EXPECT_EQ(share_at_origin(ground([](int i, int) { return i; })), 7.0 / 16);
+  EXPECT_EQ(share_at_origin(ground([](int i, int) { return i + 1000000; })), 7.0 / 16);
+}
+
+TEST(OutwardShares, SkipColumnsWithoutGround) {
+  auto voxels = ground([](int i, int j) { return std::hypot(i, j) < 9 ? 0 : -3; });
+  std::erase_if(voxels, [](const Voxel& v) { return v.i > 8; });
+  EXPECT_LT(share_at_origin(voxels), 1);
+  EXPECT_GT(share_at_origin(voxels), 0.5);
+  std::erase_if(voxels, [](const Voxel& v) { return std::hypot(v.i, v.j) > 1; });
+  EXPECT_EQ(share_at_origin(voxels), 0);
+}
+
 TEST(ClosingTerms, UpToThreeColumnsOfAGapAreFilled) {
   const auto holes = [](int width) {
     std::vector<Voxel> voxels = ground([](int, int) { return 0; });

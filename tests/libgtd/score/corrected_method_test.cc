@@ -94,14 +94,17 @@ TEST(Corrected, QuarterTurnTurnsTheMap) {
   }
 }
 
-// Fault 7: the pivot lies in the void layer, so that no score reaches 1.
+// Fault 7: the pivot lies in the void layer, so that no score reaches 1. The ground is a cone: it
+// falls outward.
 TEST(Corrected, GroundCutFromTheMaskScoresOne) {
   const GripperMask mask = corrected_mask();
   std::vector<Voxel> ground;
   for (int z = 0; z < mask.solid_layers; ++z)
     for (int x = 0; x < mask.side; ++x)
-      for (int y = 0; y < mask.side; ++y)
-        if (mask.is_solid(x, y, z)) ground.push_back({x, y, z});
+      for (int y = 0; y < mask.side; ++y) {
+        const double radius = std::hypot(x - mask.pivot_xy, y - mask.pivot_xy);
+        if (mask.is_solid(x, y, z) && z <= mask.pivot_z - 0.4 * radius) ground.push_back({x, y, z});
+      }
   const VoxelGrid grid = grid_of(ground);
   const auto scored = score_tiles(grid, mask, make_tiles(grid, 100), {});
   const Voxel pivot{mask.pivot_xy, mask.pivot_xy, mask.pivot_z};

@@ -287,7 +287,7 @@ TEST(CloudIo, UnknownExtensionNamesTheKnownOnes) {
     const fs::path path = scratch_folder() / name;
     write_text(path, "x");
     const Error error = error_of([&] { read_cloud(path); });
-    EXPECT_THAT(error.what(), HasSubstr(".pcd, .ply or .csv"));
+    EXPECT_THAT(error.what(), HasSubstr(".pcd, .ply, .csv or .tif"));
     EXPECT_EQ(error.context().file, path.string());
     EXPECT_THROW(write_cloud(path, sample_cloud(1)), Error);
     EXPECT_THROW(read_cloud_info(path), Error);

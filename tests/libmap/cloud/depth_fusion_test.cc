@@ -213,6 +213,35 @@ TEST(DepthFusion, WhatOthersSeeThroughIsDropped) {
   EXPECT_GT(confirmed.points.unconfirmed, 200U);
 }
 
+// One frame of thirteen sees a ball above a table; behind it is nothing that others could measure.
+TEST(DepthFusion, WhatOthersMissIsDropped) {
+  const Surface table = box({-0.6, -0.6, -0.05}, {0.6, 0.6, 0.0});
+  MemoryScan scan = ring_scan(table, 12, {}, Eigen::Vector3d::Zero(), 1.5, 0.5);
+  scan.see(nearest_of({table, sphere({0, 0, 0.35}, 0.1)}), looking({1.5, 0, 0.5}, {0, 0, 0}),
+           small_camera(), {}, random_engine());
+  const DepthFusionResult result = fuse_depth(scan, scan.poses);
+  EXPECT_EQ(points_above(result.cloud, 0.1), 0U);
+  EXPECT_GT(result.points.missed, 20U);
+  DepthFusionOptions options;
+  options.max_missed = 1000;
+  const DepthFusionResult all = fuse_depth(scan, scan.poses, options);
+  EXPECT_GT(points_above(all.cloud, 0.1), 20U);
+  EXPECT_EQ(points_above(all.cloud, -0.01) - points_above(all.cloud, 0.1),
+            points_above(result.cloud, -0.01))
+      << "the table stays, its edge too";
+}
+
+// A post whose upper part is outside the images of the others: it goes with the lower part.
+TEST(DepthFusion, WhatHangsTogetherWithWhatIsDroppedIsDropped) {
+  MemoryScan scan = ring_scan(plane_z(0), 11, {});
+  const Surface post = box({-0.05, -0.05, 0.1}, {0.05, 0.05, 0.9});
+  scan.see(nearest_of({plane_z(0), post}), looking({1.2, 0, 0.7}, {0, 0, 0.5}), small_camera(), {},
+           random_engine());
+  const DepthFusionResult result = fuse_depth(scan, scan.poses);
+  EXPECT_EQ(points_above(result.cloud, 0.15), 0U);
+  EXPECT_GT(result.points.beside, 50U);
+}
+
 TEST(DepthFusion, SameBytesForAnyNumberOfThreads) {
   const MemoryScan scan = ring_scan(step_scene, 11, kinect);
   std::vector<PointCloud> clouds;

@@ -56,7 +56,7 @@ TEST(SurfaceVoxels, SidesOfASheetStayApart) {
     SurfaceVoxels one;
     const float side = frame % 2 == 0 ? 1.0F : -1.0F;
     one.add({0.5F, 0.5F, 0.5F + 0.2F * side}, {0, 0, side}, 1.0F);
-    all.merge_frame(one);
+    all.merge_frame(one, {});
   }
   ASSERT_EQ(all.size(), 2U);
   for (const SurfaceVoxels::Sum& sum : all.sums()) {

@@ -248,6 +248,37 @@ TEST(CameraIo, BadFilesAreNamed) {
   }
 }
 
+TEST(CameraIo, TimingMotionsAndScaleAreReadBackAsWritten) {
+  libmap::CameraFile file = parse_camera(plain, "a");
+  file.depth.scale = 1.0081;
+  file.depth_delay_s = 0.0103;
+  file.rolling_shutter_s = 0.02;
+  file.motions = {{1.5, {0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}}, {2.5, {1, 2, 3}, {-1, 0, 0.25}}};
+  const libmap::CameraFile read = parse_camera(libmap::to_yaml(file), "a");
+  EXPECT_EQ(read.depth.scale, 1.0081);
+  EXPECT_EQ(read.depth_delay_s, 0.0103);
+  EXPECT_EQ(read.rolling_shutter_s, 0.02);
+  ASSERT_EQ(read.motions.size(), 2U);
+  EXPECT_EQ(read.motions[1].stamp_s, 2.5);
+  EXPECT_EQ(read.motions[1].velocity, Eigen::Vector3d(1, 2, 3));
+  EXPECT_EQ(read.motions[1].turn_rate, Eigen::Vector3d(-1, 0, 0.25));
+  EXPECT_TRUE(read.changes_depth());
+  // Depth of the second frame is taken 10.3 ms later: the base has gone 1, 2, 3 m/s on.
+  const libmap::Pose base_from_camera = read.camera.base_from_camera;
+  const libmap::Pose base_motion =
+      base_from_camera * read.color_from_depth_at(2.5) * base_from_camera.inverse();
+  EXPECT_LT((base_motion.translation() - 0.0103 * Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
+  EXPECT_TRUE(read.color_from_depth_at(2.0).matrix().isIdentity(0.0)) << "no such frame";
+  const auto refuses = [](const std::string& text, const std::string& field) {
+    EXPECT_EQ(error_of([&] { parse_camera(plain + text, "a"); }).context().field, field);
+  };
+  refuses("depth_scale: 3\n", "depth_scale");
+  refuses("camera_timing: [1]\n", "camera_timing");
+  refuses("camera_timing: [11, 0]\n", "camera_timing");
+  refuses("frame_motions: [1, 2, 3]\n", "frame_motions");
+  refuses("frame_motions: [2, 0, 0, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0, 0]\n", "frame_motions");
+}
+
 TEST(CameraIo, HugeListsEndEarly) {
   std::string text = "image_width: 3\nimage_height: 4\ncamera_matrix: [1";
   for (int n = 0; n < 10000; ++n) text += ", 1";

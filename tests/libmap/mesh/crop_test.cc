@@ -112,6 +112,37 @@ TEST(Crop, AnyRotationOfTheMapGivesTheSameSite) {
   EXPECT_LT(bounds_of(hanging.cloud.positions).min.z(), -0.75);
 }
 
+TEST(Crop, PiecesAreCutAsTheWhole) {
+  const TriangleMesh mesh = transform_mesh(site_mesh(), tilted);
+  std::vector<bool> is_first(mesh.triangles.size());
+  for (std::size_t t = 0; t < is_first.size(); t += 3) is_first[t] = true;
+  std::vector<TriangleMesh> pieces = {select_triangles(mesh, is_first), {}};
+  is_first.flip();
+  pieces.push_back(select_triangles(mesh, is_first));
+  const EachMesh each = [&](const UseMesh& use) {
+    for (const TriangleMesh& piece : pieces) use(piece);
+  };
+  for (CropOptions options : {box_options({1, -2}, {3, 0}), CropOptions{}}) {
+    options.center = true;
+    const CropMeshResult whole = crop_mesh(mesh, options);
+    std::vector<double> areas;
+    std::vector<Vector3d> vertices;
+    const CropReport report = crop_mesh_pieces(each, options, [&](const TriangleMesh& cut) {
+      areas.push_back(surface_area(cut));
+      vertices.insert(vertices.end(), cut.vertices.begin(), cut.vertices.end());
+    });
+    ASSERT_EQ(areas.size(), 3U);
+    EXPECT_EQ(areas[1], 0.0);
+    // The ground is found among other samples.
+    EXPECT_NEAR(areas[0] + areas[2], surface_area(whole.mesh), 1e-4);
+    EXPECT_TRUE(report.site_from_map.isApprox(whole.report.site_from_map, 1e-4));
+    EXPECT_NEAR((bounds_of(vertices).max - bounds_of(whole.mesh.vertices).max).norm(), 0, 1e-3);
+  }
+  CropOptions beside = box_options({70, 70}, {71, 71});
+  EXPECT_EQ(error_of([&] { crop_mesh_pieces(each, beside, [](const TriangleMesh&) {}); }).kind(),
+            ErrorKind::bad_input);
+}
+
 TEST(Crop, BoxInTheLevelFrame) {
   CropOptions options = box_options({1, -2}, {3, 0});
   const CropMeshResult mesh = crop_mesh(transform_mesh(site_mesh(), tilted), options);

@@ -395,7 +395,7 @@ TEST(MeshFiles, UnknownExtensionNamesTheKnownOnes) {
   const fs::path path = scratch_folder() / "mesh.objj";
   write_text(path, "x");
   EXPECT_THAT(error_of([&] { read_mesh(path); }).what(),
-              HasSubstr(".ply, .obj, .stl, .off or .glb"));
+              HasSubstr(".ply, .obj, .stl, .off, .glb or .tif"));
   EXPECT_THROW(write_mesh(path, sheet(2)), Error);
 }
 

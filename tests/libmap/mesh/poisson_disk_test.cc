@@ -122,6 +122,40 @@ bool same_bytes(const PoissonDiskResult& a, const PoissonDiskResult& b) {
          a.cloud.normals == b.cloud.normals && a.cloud.fields == b.cloud.fields;
 }
 
+TEST(PieceSampler, SeamsAreSampledAsAllElse) {
+  const TriangleMesh mesh = rough_mesh(0.02);
+  // In squares of 0.25 m, and what lies on the seams in either.
+  constexpr std::size_t pieces = 16;
+  std::vector<TriangleMesh> parts;
+  std::vector<Bounds3d> boxes;
+  for (std::size_t n = 0; n < pieces; ++n) {
+    std::vector<bool> keep;
+    for (const Triangle& triangle : mesh.triangles) {
+      const Eigen::Vector3d center = center_of(mesh, triangle);
+      keep.push_back(std::floor(4 * center.x()) + 4 * std::floor(4 * center.y()) ==
+                     static_cast<double>(n));
+    }
+    parts.push_back(select_triangles(mesh, keep));
+    boxes.push_back(bounds_of(parts.back().vertices));
+  }
+  const PoissonDiskOptions options = {.radius_m = 0.01};
+  PieceSampler sampler(boxes, options);
+  PoissonDiskResult joined;
+  for (std::size_t n = 0; n < pieces; ++n) {
+    const PoissonDiskResult part = sampler.sample(parts[n], n);
+    EXPECT_GE(part.smallest_distance_m, options.radius_m);
+    joined.area_m2 += part.area_m2;
+    joined.cloud.positions.insert(joined.cloud.positions.end(), part.cloud.positions.begin(),
+                                  part.cloud.positions.end());
+  }
+  EXPECT_GE(smallest_pair(joined.cloud.positions), options.radius_m);
+  EXPECT_LE(largest_hole(mesh, joined.cloud.positions, 50000), 1.001 * options.radius_m + 1e-7);
+  const auto whole = static_cast<double>(by_radius(mesh, 0.01).cloud.size());
+  EXPECT_NEAR(static_cast<double>(joined.cloud.size()) / whole, 1.0, 0.01);
+  EXPECT_TRUE(PieceSampler(boxes, options).sample(TriangleMesh(), 0).cloud.empty());
+  EXPECT_EQ(error_of([&] { PieceSampler(boxes, {.count = 100}); }).context().field, "count");
+}
+
 TEST(PoissonDisk, MaximalOnAnyTessellation) {
   for (const double radius : {0.3, 0.05, 0.02}) {
     SCOPED_TRACE(radius);

@@ -55,8 +55,8 @@ void expect_same(const FeatureResult& one, const FeatureResult& other) {
     ASSERT_EQ(b.surfaces.size(), 1U);
     for (int row = 0; row < a.surfaces[0].rows(); ++row)
       for (int column = 0; column < a.surfaces[0].columns(); ++column) {
-        libmap::SurfaceElement in_a;
-        libmap::SurfaceElement in_b;
+        libmap::SurfacePatch in_a;
+        libmap::SurfacePatch in_b;
         ASSERT_EQ(a.surfaces[0].at(column, row, in_a), b.surfaces[0].at(column, row, in_b));
         ASSERT_EQ(in_a.point, in_b.point);
         ASSERT_EQ(in_a.normal, in_b.normal);
@@ -70,6 +70,25 @@ std::vector<fs::path> files_in(const fs::path& folder) {
   for (const auto& entry : fs::directory_iterator(folder)) files.push_back(entry.path());
   std::sort(files.begin(), files.end());
   return files;
+}
+
+TEST(FeatureCache, DescriptorsOfLongScansAreInAFileWithoutAName) {
+  const TexturedScan scan = two_frames();
+  const FeatureCache cache(folder());
+  libmap::FeatureOptions options;
+  const FeatureResult in_memory = found(scan, cache, options);
+  const auto before = files_in(folder());
+  options.max_frames_in_memory = 1;
+  const FeatureResult on_disk = found(scan, cache, options);
+  for (std::size_t f = 0; f < 2; ++f) {
+    EXPECT_FALSE(in_memory.frames[f].descriptors.empty());
+    EXPECT_TRUE(on_disk.frames[f].descriptors.empty());
+    EXPECT_EQ(libmap::descriptor_vectors(on_disk.frames[f]),
+              libmap::descriptor_vectors(in_memory.frames[f]));
+  }
+  EXPECT_EQ(files_in(folder()), before);
+  // Without a folder they stay where they are.
+  EXPECT_FALSE(found(scan, {}, options).frames[0].descriptors.empty());
 }
 
 TEST(FeatureCache, GivesBackTheSame) {

@@ -118,8 +118,8 @@ double share_of_other_elements(const std::vector<libmap::FrameFeatures>& one,
   for (std::size_t n = 0; n < one.size(); ++n)
     for (int row = 0; row < one[n].surfaces[0].rows(); ++row)
       for (int column = 0; column < one[n].surfaces[0].columns(); ++column) {
-        libmap::SurfaceElement a;
-        libmap::SurfaceElement b;
+        libmap::SurfacePatch a;
+        libmap::SurfacePatch b;
         if (!one[n].surfaces[0].at(column, row, a) || !other[n].surfaces[0].at(column, row, b))
           continue;
         elements += 1.0;
@@ -145,7 +145,8 @@ TEST(HeldOut, SurfacesAreSeenThroughTheCameraThatIsRefined) {
     frame.cameras = {libmap::moved(frame.cameras[0], wrong_by)};
   auto found = libmap::find_features(scan, {1, 2, 3});
   const auto wrong = libmap::surface_costs(found.frames, links, truth);
-  for (libmap::FrameFeatures& frame : found.frames) libmap::move_intrinsics(frame, {step});
+  for (libmap::FrameFeatures& frame : found.frames)
+    libmap::calibrate(frame, {.intrinsics = {step}});
   const auto put_right = libmap::surface_costs(found.frames, links, truth);
   const auto from_start = libmap::surface_costs(right.frames, links, truth);
   EXPECT_GT(libmap::compare_held_out(wrong, put_right).count, 50U);
@@ -165,7 +166,8 @@ TEST(HeldOut, SurfacesTurnWithTheCorrectionOfDepth) {
   for (auto& [node, frame] : scan.frames) libmap::correct_depth(frame.depth, correction);
   const auto wanted = libmap::find_features(scan, {1, 2});
   EXPECT_GT(share_of_other_elements(found.frames, wanted.frames), 0.5);
-  for (libmap::FrameFeatures& frame : found.frames) libmap::correct_depth(frame, {correction});
+  for (libmap::FrameFeatures& frame : found.frames)
+    libmap::calibrate(frame, {.depth = {correction}});
   EXPECT_LT(share_of_other_elements(found.frames, wanted.frames), 0.05);
 }
 

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 
 #include "libmap/core/parallel.h"
+#include "libmap/refine/pair_alignment.h"
 #include "libmap/scan/trajectory_text.h"
 #include "tests/libmap/refine/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
@@ -137,6 +139,7 @@ TEST(Refinement, NullPosesComeFromLinksOrPicturesAndTheRestIsNamed) {
   }
   scan.frames[8].color =
       libmap::ColorImage(scan.frames[6].color.width, scan.frames[6].color.height, {90, 90, 90});
+  for (float& meters : scan.frames[8].depth.pixels) meters = meters > 0.0F ? 1.0F : 0.0F;
   const RefinementResult result = libmap::refine_poses(scan, small_options());
   EXPECT_EQ(result.poses.size(), 7U);
   EXPECT_LT(
@@ -191,6 +194,62 @@ TEST(IcpRefinement, ReliefBringsFramesTogether) {
   }
 }
 
+double stated_scale(const std::function<double(double, double)>& bend, double prior_error_m) {
+  TexturedScan scan;
+  std::map<int, Pose> start;
+  std::vector<int> nodes;
+  for (int n = 0; n < 5; ++n) {
+    scan.see(boulders(), around(14.0 * n), Vector6d::Zero(), false);
+    libmap::DepthImage& depth = scan.frames.at(n + 1).depth;
+    for (std::size_t p = 0; p < depth.pixels.size(); ++p)
+      if (depth.pixels[p] > 0.0F)
+        depth.pixels[p] += static_cast<float>(
+            bend(static_cast<double>(p % 256), static_cast<double>(depth.pixels[p])));
+    start[n + 1] = around(14.0 * n);
+    if (n > 0) start[n + 1].translation().z() += n % 2 == 0 ? prior_error_m : -prior_error_m;
+    nodes.push_back(n + 1);
+  }
+  const auto found = libmap::find_features(scan, nodes, {});
+  libmap::BlockSystem prior(5);  // poses are known to 1 mm and 1 mrad
+  for (std::size_t n = 0; n < 5; ++n) prior.add(n, n, 1e6 * libmap::Matrix6d::Identity());
+  return libmap::align_surfaces(found.frames, start, prior, {{nodes, 1}}, {}, {}).deviation_scale;
+}
+
+// Depth that errs alike at neighboring pixels tells less than its number of samples; surfaces that
+// contradict what was known before are wrong or it was: what is stated grows with both.
+TEST(IcpRefinement, DeviationsGrowWhereResidualsDependOnEachOtherOrContradictThePrior) {
+  const auto nothing = [](double, double) { return 0.0; };
+  const double clean = stated_scale(nothing, 0.0);
+  EXPECT_LT(clean, 1.5);
+  const auto bent = [](double column, double z) {
+    return 0.006 * std::sin(0.05 * column) + 0.004 * std::sin(9.0 * z);
+  };
+  EXPECT_GT(stated_scale(bent, 0.0), 2.0 * clean);
+  EXPECT_GT(stated_scale(nothing, 0.006), 2.0 * clean);
+}
+
+TEST(IcpRefinement, DepthAloneTellsTheMotionOfAPair) {
+  TexturedScan scan;
+  scan.see(boulders(), around(0), Vector6d::Zero(), false);
+  scan.see(boulders(), around(12), Vector6d::Zero(), false);
+  scan.see(plane_z(0.0), looking({0.8, 0, 1.1}, {0.0, 0, 0}), Vector6d::Zero(), false);
+  const auto found = libmap::find_features(scan, {1, 2, 3}, {});
+  const Pose truth = around(0).inverse() * around(12);
+  Vector6d away;
+  away << 0.01, -0.01, 0.01, 0.01, 0.01, -0.01;
+  const auto link =
+      libmap::align_pair(found.frames[0], found.frames[1], libmap::moved(truth, away));
+  ASSERT_TRUE(link);
+  EXPECT_EQ(link->from, 1);
+  EXPECT_EQ(link->to, 2);
+  // Across the ground it is found; around the boulders it stays near the guess, and says so.
+  const Vector6d error = libmap::step_between(truth, link->from_from_to);
+  EXPECT_LT(std::abs(error[0]) + std::abs(error[2]), 0.01);
+  EXPECT_LT(std::abs(error[4]), 2e-3);
+  EXPECT_LT(error.dot(link->information * error) / 6.0, 9.0);
+  EXPECT_FALSE(libmap::align_pair(found.frames[0], found.frames[2], truth)) << "another place";
+}
+
 TEST(IcpRefinement, WantsABlockOfThePriorForEachPose) {
   const libmap::Error error = graspmap_test::error_of([] {
     libmap::align_surfaces({}, {{1, Pose::Identity()}}, libmap::BlockSystem(3), {}, {});
@@ -220,6 +279,17 @@ TEST(Features, OptionsOutOfTheirRangesAreNamed) {
 
 // OpenCV 4.6 places SIFT's features a quarter of a pixel off; ours stand where the picture has
 // them.
+TEST(Features, SurfacesOfLongScansFitTheirMemory) {
+  const libmap::Camera camera{.width = 512, .height = 424, .fx = 365, .fy = 365};
+  libmap::FeatureOptions options;
+  EXPECT_EQ(libmap::surface_step(60, {camera}, options), 3);
+  const int step = libmap::surface_step(3000, {camera}, options);
+  EXPECT_EQ(step, 5);
+  EXPECT_GE(libmap::surface_step(3000, {camera, camera}, options), 7);
+  EXPECT_EQ(libmap::surface_step(100'000'000, {camera}, options), 32);
+  EXPECT_EQ(libmap::surface_step(3000, {}, options), 3);
+}
+
 TEST(Features, StandWhereTheBlobsAre) {
   TexturedScan scan;
   scan.see(plane_z(0.0), looking({0, 0, 1.2}, {0.6, 0, 0}), Vector6d::Zero(), false, {});

@@ -2,8 +2,10 @@
 
 #include <gtest/gtest.h>
 
+#include "libmap/core/parallel.h"
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/feature_tracks.h"
+#include "libmap/refine/sparse_adjustment.h"
 #include "tests/libmap/refine/synthetic_features.h"
 #include "tests/support/test_support.h"
 
@@ -180,6 +182,54 @@ TEST(BundleAdjustment, RecoversAnExactScene) {
   EXPECT_EQ(result.tracks, 150U);
 }
 
+TEST(SparseAdjustment, FindsTheOptimumOfTheGeneralSolver) {
+  const Scene scene = scene_of(7, {.apply = true});
+  std::vector<libmap::GraphLinkResult> links;
+  for (int node = 1; node < 7; ++node) {
+    libmap::PoseLink link{.from = node, .to = node + 1};
+    link.from_from_to = libmap::moved(scene.truth.at(node).inverse() * scene.truth.at(node + 1),
+                                      random_step(0.003, 0.003));
+    link.information = 1e5 * libmap::Matrix6d::Identity();
+    links.push_back({link, false, 0.5, 0.0});
+  }
+  links.push_back(links.front());
+  links.back().link.from_from_to = Pose::Identity();
+  links.back().rejected = true;
+  const auto general =
+      libmap::adjust_bundle(scene.frames, scene.tracks, scene.start, links, scene.components);
+  const auto sparse =
+      libmap::adjust_sparse(scene.frames, scene.tracks, scene.start, links, scene.components, {});
+  EXPECT_TRUE(sparse.converged);
+  EXPECT_NEAR(sparse.final_cost, general.final_cost, 1e-5 * general.final_cost);
+  EXPECT_EQ(sparse.observations, general.observations);
+  EXPECT_EQ(sparse.tracks, general.tracks);
+  EXPECT_NEAR(sparse.reprojection_rms_px, general.reprojection_rms_px, 1e-4);
+  for (const auto& [node, pose] : general.map_from_base)
+    EXPECT_LT(libmap::step_between(pose, sparse.map_from_base.at(node)).norm(), 5e-5);
+  EXPECT_EQ(sparse.map_from_base.at(1).matrix(), scene.start.at(1).matrix());
+  for (std::size_t a = 0; a < 7; ++a)
+    EXPECT_LT((sparse.information.block(a, a) - general.information.block(a, a)).norm(),
+              1e-3 * general.information.block(a, a).norm());
+  for (const unsigned threads : {1U, 3U}) {
+    const libmap::ThreadLimit limit(threads);
+    const auto again =
+        libmap::adjust_sparse(scene.frames, scene.tracks, scene.start, links, scene.components, {});
+    for (const auto& [node, pose] : sparse.map_from_base)
+      EXPECT_EQ(again.map_from_base.at(node).matrix(), pose.matrix());
+  }
+}
+
+TEST(SparseAdjustment, RecoversAnExactSceneAndNeverWorsens) {
+  const Scene scene = scene_of(6, {});
+  const auto result = libmap::adjust_sparse(scene.frames, scene.tracks, scene.start, {},
+                                            scene.components, {.max_iterations = 60});
+  EXPECT_LT(error_of_poses(scene, result.map_from_base), 2e-6);
+  const auto one_step = libmap::adjust_sparse(scene.frames, scene.tracks, scene.start, {},
+                                              scene.components, {.max_iterations = 1});
+  EXPECT_LE(one_step.final_cost, one_step.initial_cost);
+  EXPECT_EQ(one_step.iterations, 1);
+}
+
 TEST(BundleAdjustment, OptionsOutOfTheirRangesAreNamed) {
   const auto refusal = [](const libmap::BundleAdjustmentOptions& options) {
     return std::string(error_of([&] {
@@ -218,7 +268,7 @@ TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
   const Scene scene = scene_of(8, {});
   std::vector<FrameFeatures> frames = scene.frames;
   for (FrameFeatures& frame : frames)  // as if pictures lay 0.4 px right and 0.3 px up
-    libmap::move_intrinsics(frame, {{0.0, 0.0, -0.4, 0.3}});
+    libmap::calibrate(frame, {.intrinsics = {{0.0, 0.0, -0.4, 0.3}}});
   for (FrameFeatures& frame : frames) frame.cameras = {graspmap_test::feature_camera()};
   libmap::BundleAdjustmentOptions options;
   const auto held =
@@ -227,9 +277,9 @@ TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
   options.max_iterations = 100;
   const auto free =
       libmap::adjust_bundle(frames, scene.tracks, scene.start, {}, scene.components, options);
-  ASSERT_EQ(free.intrinsics.size(), 1U);
-  EXPECT_NEAR(free.intrinsics[0].cx_px, 0.4, 0.05);
-  EXPECT_NEAR(free.intrinsics[0].cy_px, -0.3, 0.05);
+  ASSERT_EQ(free.calibration.intrinsics.size(), 1U);
+  EXPECT_NEAR(free.calibration.intrinsics[0].cx_px, 0.4, 0.05);
+  EXPECT_NEAR(free.calibration.intrinsics[0].cy_px, -0.3, 0.05);
   EXPECT_LT(free.final_cost, 0.2 * held.final_cost);
   EXPECT_LT(error_of_poses(scene, free.map_from_base), error_of_poses(scene, held.map_from_base));
 }
@@ -252,7 +302,7 @@ TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
           measured(z, libmap::squared_image_radius(512, 424, pixel.x(), pixel.y())));
       before = std::max(before, std::abs(feature.depth_m / z / 1.008 - 1.0));
     }
-    libmap::move_intrinsics(frame, {{0.01, 0.01, 4.0, 0.0}});
+    libmap::calibrate(frame, {.intrinsics = {{0.01, 0.01, 4.0, 0.0}}});
   }
   libmap::BundleAdjustmentOptions options;
   options.refine_intrinsics = true;
@@ -260,17 +310,17 @@ TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
   options.max_iterations = 100;
   const auto found =
       libmap::adjust_bundle(frames, scene.tracks, scene.start, {}, scene.components, options);
-  ASSERT_EQ(found.depth.size(), 1U);
-  EXPECT_NEAR(found.intrinsics[0].fx_share, 1.0 / 1.01 - 1.0, 1e-3);
-  EXPECT_NEAR(found.intrinsics[0].fy_share, 1.0 / 1.01 - 1.0, 1e-3);
-  EXPECT_NEAR(found.intrinsics[0].cx_px, -4.0, 0.3);
+  ASSERT_EQ(found.calibration.depth.size(), 1U);
+  EXPECT_NEAR(found.calibration.intrinsics[0].fx_share, 1.0 / 1.01 - 1.0, 1e-3);
+  EXPECT_NEAR(found.calibration.intrinsics[0].fy_share, 1.0 / 1.01 - 1.0, 1e-3);
+  EXPECT_NEAR(found.calibration.intrinsics[0].cx_px, -4.0, 0.3);
   double sum = 0.0;
   double squares = 0.0;
   double gauge = 0.0;
   double count = 0.0;
   for (std::size_t f = 0; f < frames.size(); ++f) {
     FrameFeatures corrected = frames[f];
-    libmap::correct_depth(corrected, found.depth);
+    libmap::calibrate(corrected, {.depth = found.calibration.depth});
     for (std::size_t n = 0; n < corrected.features.size(); ++n) {
       const double ratio = corrected.features[n].depth_m / scene.frames[f].features[n].depth_m;
       gauge += corrected.features[n].depth_m / frames[f].features[n].depth_m - 1.0;

@@ -79,6 +79,7 @@ class TexturedScan : public libmap::ScanSource {
     const libmap::Pose eye = truth * camera.base_from_camera;
     libmap::RgbdFrame frame;
     frame.node = node;
+    frame.stamp_s = node;
     frame.cameras = {camera};
     frame.depth = render_depth(surface, camera, eye, noise, engine_);
     frame.color = libmap::ColorImage(camera.width, camera.height, {90, 90, 90});

@@ -11,7 +11,7 @@
 namespace bag_rig_test {
 
 namespace fs = std::filesystem;
-namespace rm = libmap::ros_message;
+namespace rm = graspmap_test::rm;
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
 using graspmap_test::sample_depth;
@@ -163,11 +163,9 @@ TEST(BagRig, CompressedDepth) {
 
 TEST(BagRig, CalibrationsOfAllKinds) {
   const auto camera_of = [](const rm::CameraInfo& info, bool rectified) {
-    const auto size = ros::serialization::serializationLength(info);
-    std::string bytes(size, '\0');
-    ros::serialization::OStream stream(reinterpret_cast<std::uint8_t*>(bytes.data()), size);
-    ros::serialization::serialize(stream, info);
-    return libmap::decode_camera_info(bytes, rectified).camera;
+    return libmap::decode_camera_info(libmap::MessageEncoding::ros1, rm::serialized(info),
+                                      rectified)
+        .camera;
   };
   rm::CameraInfo info = sample_info("a", 1.0);
   info.D = {0.1, 0.02, 0.001, 0.002, 0.3};

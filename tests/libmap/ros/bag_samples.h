@@ -1,19 +1,83 @@
-// Bags of the tests' own messages, written by librosbag itself.
+// Bags of the tests' own messages, of ROS 1's own types, encoded and written by its libraries.
 #pragma once
 
+#include <geometry_msgs/PoseArray.h>
+#include <ros/serialization.h>
 #include <rosbag/bag.h>
+#include <sensor_msgs/CameraInfo.h>
+#include <sensor_msgs/CompressedImage.h>
+#include <sensor_msgs/Image.h>
+#include <sensor_msgs/PointCloud2.h>
+#include <tf2_msgs/TFMessage.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "libmap/core/pose.h"
-#include "libmap/ros/ros_messages.h"
 
 namespace graspmap_test {
 
-namespace rm = libmap::ros_message;
+namespace rm {
+
+// With the `rebind` that the message headers ask for, which std::allocator lost in C++20.
+template <typename T>
+struct RebindAllocator : std::allocator<T> {
+  template <typename U>
+  struct rebind {
+    using other = RebindAllocator<U>;
+  };
+  RebindAllocator() = default;
+  template <typename U>
+  RebindAllocator(const RebindAllocator<U>&) noexcept {}
+};
+template <>
+struct RebindAllocator<void> {
+  using value_type = void;
+  template <typename U>
+  struct rebind {
+    using other = RebindAllocator<U>;
+  };
+};
+
+using Allocator = RebindAllocator<void>;
+using Text = std::basic_string<char, std::char_traits<char>, RebindAllocator<char>>;
+using Header = std_msgs::Header_<Allocator>;
+using Image = sensor_msgs::Image_<Allocator>;
+using CompressedImage = sensor_msgs::CompressedImage_<Allocator>;
+using CameraInfo = sensor_msgs::CameraInfo_<Allocator>;
+using PointCloud2 = sensor_msgs::PointCloud2_<Allocator>;
+using PointField = sensor_msgs::PointField_<Allocator>;
+using TransformStamped = geometry_msgs::TransformStamped_<Allocator>;
+using TFMessage = tf2_msgs::TFMessage_<Allocator>;
+using PoseArray = geometry_msgs::PoseArray_<Allocator>;
+using Marker = visualization_msgs::Marker_<Allocator>;
+using MarkerArray = visualization_msgs::MarkerArray_<Allocator>;
+
+inline Text to_ros(std::string_view text) { return Text(text.begin(), text.end()); }
+inline std::string from_ros(const Text& text) { return {text.begin(), text.end()}; }
+
+template <typename Message>
+std::string serialized(const Message& message) {
+  std::string bytes(ros::serialization::serializationLength(message), '\0');
+  ros::serialization::OStream stream(reinterpret_cast<std::uint8_t*>(bytes.data()),
+                                     static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::serialize(stream, message);
+  return bytes;
+}
+template <typename Message>
+Message decode(std::string bytes) {
+  Message message;
+  ros::serialization::IStream stream(reinterpret_cast<std::uint8_t*>(bytes.data()),
+                                     static_cast<std::uint32_t>(bytes.size()));
+  ros::serialization::deserialize(stream, message);
+  return message;
+}
+
+}  // namespace rm
 
 class SampleBag {
  public:

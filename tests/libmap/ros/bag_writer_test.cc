@@ -7,17 +7,18 @@
 
 #include "libmap/image/image_codec.h"
 #include "libmap/ros/bag_reader.h"
-#include "libmap/ros/ros_messages.h"
+#include "tests/libmap/ros/bag_samples.h"
 #include "tests/support/test_support.h"
 
 namespace bag_writer_test {
 
 namespace fs = std::filesystem;
-namespace rm = libmap::ros_message;
+namespace rm = graspmap_test::rm;
 using graspmap_test::error_of;
 using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using libmap::BagContent;
+using libmap::BagFormat;
 using libmap::BagPlaces;
 using testing::HasSubstr;
 
@@ -43,7 +44,7 @@ BagPlaces places() {
 }
 
 TEST(BagWriter, PosesPointAlongTheDirection) {
-  libmap::write_bag(bag_path(), {.stamp_s = 2.0, .places = {places()}});
+  libmap::write_bag(bag_path(), BagFormat::ros1, {.stamp_s = 2.0, .places = {places()}});
   const auto poses = rm::decode<rm::PoseArray>(messages_of(bag_path()).at("/foothold_poses"));
   EXPECT_EQ(rm::from_ros(poses.header.frame_id), "terrain");
   EXPECT_EQ(poses.header.stamp, ros::Time(2.0));
@@ -63,7 +64,7 @@ TEST(BagWriter, PosesPointAlongTheDirection) {
 }
 
 TEST(BagWriter, MarkersStandAtThePlaces) {
-  libmap::write_bag(bag_path(), {.places = {places()}});
+  libmap::write_bag(bag_path(), BagFormat::ros1, {.places = {places()}});
   const auto markers = rm::decode<rm::MarkerArray>(messages_of(bag_path()).at("/footholds"));
   ASSERT_EQ(markers.markers.size(), 7U);  // the balls; an arrow and a text each
   const rm::Marker& balls = markers.markers[0];
@@ -93,9 +94,10 @@ TEST(BagWriter, SameContentSameBytes) {
   content.transforms = {{"terrain", "base_link", libmap::Pose::Identity()}};
   content.clouds = {{"/map", "terrain", {}}};
   for (const auto& [name, compression] : libmap::bag_compression_names()) {
-    libmap::write_bag(bag_path(), content, compression);
+    if (compression == libmap::BagCompression::zstd) continue;
+    libmap::write_bag(bag_path(), BagFormat::ros1, content, compression);
     const std::string first = read_text(bag_path());
-    libmap::write_bag(bag_path(), content, compression);
+    libmap::write_bag(bag_path(), BagFormat::ros1, content, compression);
     EXPECT_EQ(first, read_text(bag_path())) << name;
     const libmap::BagListing listing = libmap::list_bag(bag_path());
     EXPECT_EQ(listing.messages, 4U);
@@ -106,15 +108,18 @@ TEST(BagWriter, SameContentSameBytes) {
 
 TEST(BagWriter, WhatRosCannotHoldIsSaid) {
   for (const double stamp : {0.0, -1.0, 4294967295.0, 1e300, std::nan("")})
-    EXPECT_THAT(error_of([&] { libmap::write_bag(bag_path(), {.stamp_s = stamp}); }).what(),
+    EXPECT_THAT(error_of([&] {
+                  libmap::write_bag(bag_path(), BagFormat::ros1, {.stamp_s = stamp});
+                }).what(),
                 HasSubstr("ROS has no such time"));
   for (const char* topic : {"", "/", "map", "/a b", "/a/", "/\xc3\xa4"})
-    EXPECT_THAT(error_of([&] {
-                  libmap::write_bag(bag_path(), {.clouds = {{topic, "terrain", {}}}});
-                }).what(),
-                HasSubstr("no name of a ROS topic"));
+    EXPECT_THAT(
+        error_of([&] {
+          libmap::write_bag(bag_path(), BagFormat::ros1, {.clouds = {{topic, "terrain", {}}}});
+        }).what(),
+        HasSubstr("no name of a ROS topic"));
   const libmap::Error full =
-      error_of([] { libmap::write_bag("/dev/full", {.places = {places()}}); });
+      error_of([] { libmap::write_bag("/dev/full", BagFormat::ros1, {.places = {places()}}); });
   EXPECT_EQ(full.kind(), libmap::ErrorKind::failed);
 }
 

@@ -12,12 +12,13 @@
 namespace cloud_message_test {
 
 namespace fs = std::filesystem;
-namespace rm = libmap::ros_message;
+namespace rm = graspmap_test::rm;
 using graspmap_test::bytes_of;
 using graspmap_test::error_of;
 using graspmap_test::sample_header;
 using graspmap_test::SampleBag;
 using graspmap_test::scratch_folder;
+using libmap::BagFormat;
 using libmap::PointCloud;
 using testing::ElementsAre;
 using testing::HasSubstr;
@@ -147,7 +148,8 @@ PointCloud full_cloud() {
 
 TEST(CloudMessage, WrittenCloudsComeBackWhole) {
   const PointCloud cloud = full_cloud();
-  libmap::write_bag(bag_path(), {.stamp_s = 12.5, .clouds = {{"/map", "terrain", cloud}}});
+  libmap::write_bag(bag_path(), BagFormat::ros1,
+                    {.stamp_s = 12.5, .clouds = {{"/map", "terrain", cloud}}});
   const libmap::BagCloudResult result = libmap::read_bag_cloud(bag_path());
   EXPECT_EQ(result.frame, "terrain");
   EXPECT_EQ(result.stamp_s, 12.5);
@@ -161,10 +163,10 @@ TEST(CloudMessage, WrittenCloudsComeBackWhole) {
 TEST(CloudMessage, LayoutOfWrittenClouds) {
   PointCloud cloud = full_cloud();
   cloud.positions[0].x() = 100000.25;  // which files would hold as float64
-  const rm::PointCloud2 message = libmap::encode_cloud(cloud);
+  const libmap::ros_message::PointCloud2 message = libmap::encode_cloud(cloud);
   std::vector<std::string> layout;
-  for (const rm::PointField& one : message.fields)
-    layout.push_back(rm::from_ros(one.name) + " " + std::to_string(one.offset) + " " +
+  for (const libmap::ros_message::PointField& one : message.point_fields)
+    layout.push_back(one.name + " " + std::to_string(one.offset) + " " +
                      std::to_string(one.datatype) + " " + std::to_string(one.count));
   EXPECT_THAT(layout, ElementsAre("x 0 7 1", "y 4 7 1", "z 8 7 1", "normal_x 12 7 1",
                                   "normal_y 16 7 1", "normal_z 20 7 1", "rgb 24 7 1",
@@ -172,7 +174,7 @@ TEST(CloudMessage, LayoutOfWrittenClouds) {
   EXPECT_EQ(message.point_step, 45U);
   EXPECT_EQ(message.row_step, 45U * 50);
   EXPECT_EQ(message.data.size(), 45U * 50);
-  EXPECT_EQ(message.is_bigendian, 0);
+  EXPECT_FALSE(message.is_bigendian);
   float x = 0;
   std::memcpy(&x, message.data.data() + 45, 4);
   EXPECT_EQ(x, 0.25F);

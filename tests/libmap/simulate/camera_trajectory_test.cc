@@ -175,4 +175,96 @@ TEST(SurroundingGroundHeight, IsNotTiltedByRocks) {
   EXPECT_DOUBLE_EQ(libmap::surrounding_ground_height(mesh), -0.2);
 }
 
+libmap::GroundHeights plain_ground(double length_m, double width_m) {
+  std::vector<Eigen::Vector3d> points;
+  for (double x = 0.0; x <= length_m + 1e-9; x += 0.25)
+    for (double y = 0.0; y <= width_m + 1e-9; y += 0.25) points.emplace_back(x, y, 0.4);
+  libmap::GroundHeights ground;
+  ground.add(points);
+  return ground;
+}
+
+TEST(Serpentine, LanesToAndFroJoinedByHalfCircles) {
+  CameraTrajectoryOptions options = steady();
+  options.frames = 2000;
+  options.height_m = 1.0;
+  options.serpentine = {.lane_m = 1.6, .border_m = 1.0, .ahead_m = 2.0};
+  // Width 8 - 2: 5 lanes, 1.5 m apart; straight: 20 - 2 (1 + 0.75).
+  const double radius = 0.75;
+  const double straight = 16.5;
+  const double length = 5 * straight + 4 * std::numbers::pi * radius;
+  for (const bool along_y : {false, true}) {
+    const Trajectory way = libmap::poses_of_motion(
+        libmap::serpentine_motion(plain_ground(along_y ? 8 : 20, along_y ? 20 : 8), options, 1),
+        options);
+    ASSERT_EQ(way.size(), 2000U);
+    // Chords of the half circles are 1.5 mm shorter in all.
+    EXPECT_NEAR(libmap::path_length(way), length * 1999 / 2000, 3e-3);
+    const auto at = [&](std::size_t n) -> Eigen::Vector2d {
+      const Eigen::Vector3d place = way[n].world_from_base.translation();
+      return along_y ? Eigen::Vector2d(place.y(), place.x()) : Eigen::Vector2d(place.head<2>());
+    };
+    EXPECT_LT((at(0) - Eigen::Vector2d(1.75, 1.0)).norm(), 1e-9);
+    for (std::size_t n = 0; n < way.size(); ++n) {
+      const Pose& pose = way[n].world_from_base;
+      EXPECT_NEAR(pose.translation().z(), 1.4, 1e-9);
+      EXPECT_GE(at(n).x(), 1.0 - 1e-9);
+      EXPECT_LE(at(n).x(), 19.0 + 1e-9);
+      const double way_m = length * static_cast<double>(n) / 2000;
+      const double in_lane = std::fmod(way_m, straight + std::numbers::pi * radius);
+      const int lane = static_cast<int>(way_m / (straight + std::numbers::pi * radius));
+      const double forward = lane % 2 == 0 ? 1.0 : -1.0;
+      if (in_lane > straight - options.serpentine.ahead_m) continue;
+      EXPECT_NEAR(at(n).y(), 1.0 + 1.5 * lane, 1e-9);
+      EXPECT_NEAR(at(n).x(), 10.0 + forward * (in_lane - 0.5 * straight), 1e-6);
+      // Looks at the ground 2 m further, 1 m below.
+      const double ahead = forward * pose.linear()(along_y ? 1 : 0, 0);
+      EXPECT_NEAR(ahead, 2.0 / std::sqrt(5.0), 1e-9);
+      EXPECT_NEAR(pose.linear()(2, 0), -1.0 / std::sqrt(5.0), 1e-9);
+    }
+    EXPECT_NEAR(at(1999).y(), 7.0, 1e-9);
+  }
+}
+
+TEST(Serpentine, GroundNarrowerThanALane) {
+  CameraTrajectoryOptions options = steady();
+  options.frames = 10;
+  const Trajectory way =
+      libmap::poses_of_motion(libmap::serpentine_motion(plain_ground(5, 0.5), options, 1), options);
+  for (const libmap::TrajectoryPose& pose : way) {
+    EXPECT_NEAR(pose.world_from_base.translation().y(), 0.25, 1e-9);
+    EXPECT_TRUE(pose.world_from_base.matrix().allFinite());
+  }
+  EXPECT_THROW(libmap::serpentine_motion({}, options, 1), libmap::Error);
+}
+
+TEST(MotionThrough, GivenPosesAndScrewsBetweenThem) {
+  Trajectory poses(3);
+  for (std::size_t n = 0; n < 3; ++n) {
+    poses[n].stamp_s = 10.0 + static_cast<double>(n) * static_cast<double>(n);
+    poses[n].world_from_base = libmap::make_pose_from_rpy({1.0 * static_cast<double>(n), 2, 3},
+                                                          {0, 0, 30.0 * static_cast<double>(n)});
+  }
+  const libmap::CameraMotion motion = libmap::motion_through(poses);
+  for (std::size_t n = 0; n < 3; ++n)
+    EXPECT_EQ(motion(n, 0.0).matrix(), poses[n].world_from_base.matrix());
+  EXPECT_TRUE(motion(0, 1.0).isApprox(poses[1].world_from_base, 1e-12));
+  EXPECT_TRUE(motion(1, 3.0).isApprox(poses[2].world_from_base, 1e-12));
+  const Pose between = motion(1, 1.5);
+  EXPECT_NEAR(std::atan2(between.linear()(1, 0), between.linear()(0, 0)) * degrees, 45.0, 1e-9);
+}
+
+TEST(Numbered, StampsOrTheirAbsenceInOrder) {
+  const Trajectory unstamped = libmap::numbered(Trajectory(3), 0.5);
+  EXPECT_EQ(unstamped[2].node, 3);
+  EXPECT_DOUBLE_EQ(unstamped[2].stamp_s, 1.7e9 + 1.0);
+  Trajectory poses(3);
+  for (std::size_t n = 0; n < 3; ++n) poses[n].stamp_s = 5.0 + static_cast<double>(n);
+  EXPECT_DOUBLE_EQ(libmap::numbered(poses, 0.5)[1].stamp_s, 6.0);
+  poses[2].stamp_s = 6.0;
+  const libmap::Error error = error_of([&] { libmap::numbered(poses, 0.5); });
+  EXPECT_EQ(error.context().value, "6");
+  EXPECT_EQ(error.context().bound, "> 6");
+}
+
 }  // namespace camera_trajectory_test

@@ -20,9 +20,9 @@ using graspmap_test::square_mesh;
 using graspmap_test::uniform;
 using libmap::Camera;
 using libmap::DepthSensorOptions;
-using libmap::PixelRays;
 using libmap::Pose;
 using libmap::SurfaceView;
+using libmap::ViewRays;
 using libmap::VisibleSurface;
 
 constexpr double radians = std::numbers::pi / 180.0;
@@ -41,7 +41,7 @@ Pose looking_down(const Eigen::Vector3d& position) {
   return libmap::make_pose_from_rpy(position, {180.0, 0.0, 0.0});
 }
 
-Eigen::Vector3d ray_of(const PixelRays& rays, std::size_t index) {
+Eigen::Vector3d ray_of(const ViewRays& rays, std::size_t index) {
   return rays.centers[index].homogeneous();
 }
 
@@ -50,7 +50,7 @@ TEST(SurfaceView, DepthOfAPlaneIsExact) {
   distorted.distortion_model = libmap::DistortionModel::radial_tangential;
   distorted.distortion = {0.08, -0.1, 0.001, -0.002, 0.02};
   for (const Camera& camera : {small_camera(), distorted}) {
-    const PixelRays rays = libmap::make_pixel_rays(camera);
+    const ViewRays rays = libmap::make_view_rays(camera);
     const VisibleSurface surface(square_mesh(0.25, 50.0));
     for (int i = 0; i < 10; ++i) {
       const Pose pose = looking_down({uniform(-1, 1), uniform(-1, 1), uniform(1, 3)}) *
@@ -77,7 +77,7 @@ TEST(SurfaceView, DepthOfABallIsThatOfItsSphere) {
   const double radius = 0.3;
   const Eigen::Vector3d center(0.05, -0.02, 0.4);
   const VisibleSurface surface(ball_mesh(250, 500, center, radius));
-  const PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const ViewRays rays = libmap::make_view_rays(small_camera());
   const Pose pose = looking_down({0, 0, 1.5});
   const SurfaceView view = surface.view(rays, pose);
   int hits = 0;
@@ -104,7 +104,7 @@ TEST(SurfaceView, DepthOfABallIsThatOfItsSphere) {
 
 TEST(SurfaceView, NothingBehindTheCameraOrBesideTheMesh) {
   const VisibleSurface surface(square_mesh(0.0));
-  const PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const ViewRays rays = libmap::make_view_rays(small_camera());
   for (const Pose& pose : {looking_down({0, 0, -1}), looking_down({100, 0, 1})}) {
     const SurfaceView view = surface.view(rays, pose);
     EXPECT_TRUE(std::all_of(view.depth.pixels.begin(), view.depth.pixels.end(),
@@ -118,7 +118,7 @@ TEST(SurfaceView, NothingBehindTheCameraOrBesideTheMesh) {
 TEST(SurfaceView, ColorsAreTheVerticesAndTheLightIsTheSameOnAPlane) {
   libmap::TriangleMesh mesh = square_mesh(0.0);
   mesh.vertex_colors = {{200, 40, 0}, {200, 80, 0}, {200, 80, 0}, {200, 40, 0}};
-  const PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const ViewRays rays = libmap::make_view_rays(small_camera());
   const SurfaceView view = VisibleSurface(mesh).view(rays, looking_down({0, 0, 1}));
   const Eigen::Vector3f middle = view.color.at(31, 24);
   for (int y = 4; y < 44; ++y)
@@ -136,7 +136,7 @@ TEST(SurfaceView, ColorsAreTheVerticesAndTheLightIsTheSameOnAPlane) {
 
 TEST(SurfaceView, RockWhereTheMeshHasNoTexture) {
   const auto spread = [](const libmap::TriangleMesh& mesh, libmap::TextureSource texture) {
-    const PixelRays rays = libmap::make_pixel_rays(small_camera());
+    const ViewRays rays = libmap::make_view_rays(small_camera());
     const SurfaceView view = VisibleSurface(mesh, texture, 3).view(rays, looking_down({0, 0, 1}));
     double sum = 0, squares = 0, count = 0;
     for (int y = 4; y < 44; ++y)
@@ -162,7 +162,7 @@ struct Residuals {
   std::size_t count = 0;
 };
 Residuals residuals_at(double distance, const DepthSensorOptions& options, std::uint64_t seed) {
-  const PixelRays rays = libmap::make_pixel_rays(small_camera(4));
+  const ViewRays rays = libmap::make_view_rays(small_camera(4));
   const SurfaceView view =
       VisibleSurface(square_mesh(0.0, 50.0)).view(rays, looking_down({0, 0, distance}), false);
   const auto measured = libmap::measure_depth(view, rays, options, seed);
@@ -203,7 +203,7 @@ TEST(MeasureDepth, NoiseHasTheStatedSizeAtEachRange) {
 }
 
 TEST(MeasureDepth, WholeMillimetersWithinTheLimits) {
-  const PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const ViewRays rays = libmap::make_view_rays(small_camera());
   const VisibleSurface surface(square_mesh(0.0, 50.0));
   const Pose pose = looking_down({0, 0, 1.2}) * libmap::make_pose_from_rpy({0, 0, 0}, {40, 0, 0});
   const SurfaceView view = surface.view(rays, pose, false);
@@ -227,7 +227,7 @@ TEST(MeasureDepth, WholeMillimetersWithinTheLimits) {
 
 // A square 1 m below the camera, from -0.2 to 0.2, over one 2 m below.
 struct Step {
-  PixelRays rays = libmap::make_pixel_rays(small_camera(2));
+  ViewRays rays = libmap::make_view_rays(small_camera(2));
   SurfaceView view;
   Step() {
     const libmap::TriangleMesh mesh =
@@ -287,7 +287,7 @@ TEST(MeasureDepth, EdgePixelsAreLostInTheStatedShare) {
 }
 
 TEST(MeasureDepth, APlaneHasNoEdgesHoweverFlatItIsSeen) {
-  const PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const ViewRays rays = libmap::make_view_rays(small_camera());
   const VisibleSurface surface(square_mesh(0.0, 1e4));
   const Pose pose = looking_down({0, 0, 0.3}) * libmap::make_pose_from_rpy({0, 0, 0}, {70, 0, 0});
   const SurfaceView view = surface.view(rays, pose, false);
@@ -300,7 +300,7 @@ TEST(MeasureDepth, APlaneHasNoEdgesHoweverFlatItIsSeen) {
 }
 
 TEST(MeasureDepth, GrazingSurfacesAreLostMoreAndMore) {
-  const PixelRays rays = libmap::make_pixel_rays(small_camera(4));
+  const ViewRays rays = libmap::make_view_rays(small_camera(4));
   const VisibleSurface surface(square_mesh(0.0, 1e3));
   const Pose pose = looking_down({0, 0, 0.5}) * libmap::make_pose_from_rpy({0, 0, 0}, {65, 0, 0});
   const SurfaceView view = surface.view(rays, pose, false);
@@ -343,7 +343,7 @@ TEST(TakePhoto, DarkerCornersAndNoiseOfTheStatedSize) {
 TEST(DepthCamera, SameImagesForAnyThreadCountAndOthersForAnotherSeed) {
   const libmap::TriangleMesh mesh =
       graspmap_test::join_meshes(square_mesh(0.0, 2.0), ball_mesh(20, 40, {0, 0, 0.3}, 0.4));
-  const PixelRays rays = libmap::make_pixel_rays(small_camera(2));
+  const ViewRays rays = libmap::make_view_rays(small_camera(2));
   std::vector<libmap::DepthImage> depths;
   std::vector<libmap::ColorImage> colors;
   for (const unsigned threads : {1U, 2U, 4U}) {
@@ -370,7 +370,7 @@ TEST(DepthCamera, RefusesWhatCannotBe) {
 
 TEST(DepthCamera, InsideAClosedBallOnlyWhatIsNotTooNear) {
   const VisibleSurface surface(ball_mesh(20, 40, {0, 0, 0}, 0.3));
-  const PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const ViewRays rays = libmap::make_view_rays(small_camera());
   const SurfaceView view = surface.view(rays, looking_down({0, 0, 0}), false);
   EXPECT_TRUE(std::all_of(view.depth.pixels.begin(), view.depth.pixels.end(),
                           [](float depth) { return depth > 0.1F; }));

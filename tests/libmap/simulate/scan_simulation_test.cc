@@ -273,7 +273,9 @@ TEST(SimulateScan, OneTriangleIsEnough) {
 
 TEST(SimulateScan, NothingToSeeIsAnError) {
   const auto nothing = [](const auto&, const auto&) {};
-  EXPECT_NE(std::string(error_of([&] { libmap::simulate_scan({}, small_scan(), nothing); }).what())
+  EXPECT_NE(std::string(error_of([&] {
+                          libmap::simulate_scan(libmap::TriangleMesh{}, small_scan(), nothing);
+                        }).what())
                 .find("no triangles"),
             std::string::npos);
   // Inside a ball nothing is far enough; before a mesh a thousand times too large nothing near.

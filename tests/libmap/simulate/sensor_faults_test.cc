@@ -9,6 +9,9 @@
 
 #include "libmap/core/random_stream.h"
 #include "libmap/image/depth_correction.h"
+#include "libmap/mesh/ray_caster.h"
+#include "libmap/simulate/depth_registration.h"
+#include "libmap/simulate/multipath.h"
 #include "libmap/simulate/scan_simulation.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 
@@ -132,7 +135,7 @@ TEST(SensorFaults, DepthIsTakenElsewhereAndLater) {
 
 TEST(SensorFaults, RowsAreSeenFromWhereTheCameraIsThen) {
   const libmap::VisibleSurface surface(scene());
-  const libmap::PixelRays rays = libmap::make_pixel_rays(small_camera());
+  const libmap::ViewRays rays = libmap::make_view_rays(small_camera());
   const auto pose_at = [](double row) {
     return libmap::make_pose_from_rpy({-1.0 + 0.001 * row, 0.1, 1.0}, {0.0, 40.0, 0.02 * row}) *
            libmap::optical_to_body_rotation();
@@ -177,6 +180,171 @@ TEST(SensorFaults, ExposureStaysWithinItsBounds) {
     EXPECT_EQ(color.x(), color.z());
     EXPECT_GE(color.x(), 0.3F - 1e-6F);
     EXPECT_LE(color.x(), 0.7F + 1e-6F);
+  }
+}
+
+// Within a ball of radius R, all is R away, and a point sees all of the ball, on the mean 4/3 R
+// away: light of strength rho arrives after R + 2/3 R.
+TEST(SensorFaults, MultipathInABallIsThatOfItsMeanChord) {
+  const libmap::VisibleSurface ball(graspmap_test::ball_mesh(100, 200, {0, 0, 0}, 1.2));
+  const libmap::ViewRays rays = libmap::make_view_rays(small_camera());
+  const Pose center = libmap::make_pose_from_rpy({0, 0, 0}, {10, 20, 30});
+  SurfaceView view = ball.view(rays, center, false);
+  const SurfaceView plain = view;
+  libmap::add_multipath(view, ball, rays, center, 0.4);
+  const double added = 0.4 / 1.4 * 2.0 / 3.0 * 1.2;
+  for (std::size_t n = 0; n < rays.centers.size(); n += 7) {
+    const double range_of_depth = rays.centers[n].homogeneous().norm();
+    const auto error = static_cast<double>(view.depth.pixels[n] - plain.depth.pixels[n]);
+    EXPECT_NEAR(error * range_of_depth, added, 0.01 * added);
+  }
+  for (std::size_t n = 0; n < rays.corners.size(); n += 7)
+    EXPECT_GT(view.corner_depth.pixels[n], plain.corner_depth.pixels[n]);
+}
+
+TEST(SensorFaults, MultipathLeavesWhatIsFlatOrConvex) {
+  const libmap::VisibleSurface ball(graspmap_test::ball_mesh(60, 120, {2, 0, 0}, 0.5));
+  const libmap::VisibleSurface floor(graspmap_test::square_mesh(-1.0, 5.0));
+  const libmap::ViewRays rays = libmap::make_view_rays(small_camera());
+  const Pose pose =
+      libmap::make_pose_from_rpy({0, 0, 0}, {0, 25, 0}) * libmap::optical_to_body_rotation();
+  for (const libmap::VisibleSurface* surface : {&ball, &floor}) {
+    SurfaceView view = surface->view(rays, pose, false);
+    const SurfaceView plain = view;
+    libmap::add_multipath(view, *surface, rays, pose, 1.0);
+    EXPECT_EQ(view.depth, plain.depth);
+  }
+}
+
+// Of two planes at a right angle, against the sum over small squares of the other plane.
+TEST(SensorFaults, MultipathInACornerIsTheSumOverItsOtherSide) {
+  libmap::TriangleMesh corner = graspmap_test::square_mesh(0.0, 1.0);  // z = 0, x and y from -1
+  corner.vertices.insert(corner.vertices.end(), {{1, -1, 0}, {1, 1, 0}, {1, 1, 2}, {1, -1, 2}});
+  corner.triangles.insert(corner.triangles.end(), {{4, 6, 5}, {4, 7, 6}});
+  const Eigen::Vector3d camera(0.0, 0.0, 1.5);
+  const Eigen::Vector3d point(0.8, 0.0, 0.0);
+  const double range = (point - camera).norm();
+  double light = 0.0;
+  double sum = 0.0;
+  constexpr int steps = 400;
+  const double side = 2.0 / steps;
+  for (int i = 0; i < steps; ++i)
+    for (int j = 0; j < steps; ++j) {
+      const Eigen::Vector3d q(1.0, -1.0 + (i + 0.5) * side, (j + 0.5) * side);
+      const Eigen::Vector3d way = q - point;
+      const Eigen::Vector3d to_camera = camera - q;
+      const double d = way.norm();
+      const double r = to_camera.norm();
+      // Cosines at the point, at q towards the point, at q towards the camera, at the point again.
+      const double form = (way.z() / d) * (way.x() / d) / (M_PI * d * d) * side * side;
+      const double part = form * (-to_camera.x() / r) / (r * r) * range * range / (1.5 / range);
+      light += part;
+      sum += part * 0.5 * (d + r - range);
+    }
+  const double expected = 0.5 * sum / (1.0 + 0.5 * light);
+  const libmap::VisibleSurface surface(corner);
+  // One pixel, straight at the point.
+  const libmap::Camera eye{.width = 1, .height = 1, .fx = 100, .fy = 100, .cx = 0, .cy = 0};
+  const libmap::ViewRays rays = libmap::make_view_rays(eye);
+  Pose pose = Pose::Identity();
+  pose.linear() = Eigen::Quaterniond::FromTwoVectors(Eigen::Vector3d::UnitZ(), point - camera)
+                      .toRotationMatrix();
+  pose.translation() = camera;
+  SurfaceView view = surface.view(rays, pose, false);
+  libmap::add_multipath(view, surface, rays, pose, 0.5);
+  EXPECT_GT(expected, 0.01);
+  EXPECT_NEAR(static_cast<double>(view.depth.at(0, 0)) - range, expected, 0.1 * expected);
+}
+
+// A wall at 2 m with a board at 1 m before its right half, seen from 10 cm to the left: the board's
+// edge moves by 5 px, that of the wall by 2.5 px.
+TEST(SensorFaults, DepthRegisteredToColorHasAShadow) {
+  const libmap::Camera camera = small_camera();
+  libmap::DepthImage depth(64, 48, 2.0F);
+  for (int y = 0; y < 48; ++y)
+    for (int x = 32; x < 64; ++x) depth.at(x, y) = 1.0F;
+  Pose color_from_depth = Pose::Identity();
+  color_from_depth.translation() = Eigen::Vector3d(0.1, 0.0, 0.02);
+  const libmap::DepthImage seen = libmap::register_depth(depth, camera, camera, color_from_depth);
+  EXPECT_FLOAT_EQ(seen.at(50, 20), 1.02F);
+  EXPECT_FLOAT_EQ(seen.at(10, 20), 2.02F);
+  // 31.5 px is where the board begins: at (0.5 / 50 + 0.1) / 1.02 * 50 px from the middle.
+  EXPECT_EQ(seen.at(35, 20), 0.0F) << "between the wall's end at 33.97 and the board's at 36.4";
+  EXPECT_EQ(seen.at(36, 20), 0.0F);
+  EXPECT_FLOAT_EQ(seen.at(37, 20), 1.02F);
+  EXPECT_FLOAT_EQ(seen.at(33, 20), 2.02F);
+  // From the other side the board hides the wall.
+  color_from_depth.translation() = Eigen::Vector3d(-0.1, 0.0, 0.0);
+  const libmap::DepthImage hidden = libmap::register_depth(depth, camera, camera, color_from_depth);
+  EXPECT_FLOAT_EQ(hidden.at(26, 20), 2.0F);
+  EXPECT_FLOAT_EQ(hidden.at(27, 20), 1.0F);
+}
+
+// A third of the size in each direction; the surface is where it is.
+TEST(SensorFaults, DepthHasItsOwnSizeAndPlace) {
+  ScanSimulationOptions options = small_scan();
+  options.faults.calibration.depth_width_px = 32;
+  options.faults.calibration.depth_height_px = 24;
+  options.faults.calibration.depth_baseline_mm = 40.0;
+  const auto frames = frames_of(options);
+  const auto motion =
+      libmap::camera_motion(scene(), options.trajectory, libmap::mix_bits(options.seed, 1));
+  for (std::size_t n = 0; n < frames.size(); ++n) {
+    ASSERT_EQ(frames[n].depth.width, 32);
+    ASSERT_EQ(frames[n].color.width, 64);
+    EXPECT_GT(std::count_if(frames[n].depth.pixels.begin(), frames[n].depth.pixels.end(),
+                            [](float z) { return z > 0.0F; }),
+              300);
+    // Where a pixel of depth falls on one of color it is moved by half a pixel at most.
+    const libmap::Camera camera = libmap::camera_views(frames[n]).front().depth_camera;
+    EXPECT_LT(deviation(frames[n], camera, Pose(motion(n, 0.0) * options.camera.base_from_camera)),
+              0.5 * 3.0 / 25.0);
+  }
+}
+
+TEST(SensorFaults, FramesAreDroppedRepeatedAndMisdated) {
+  const auto recorded = libmap::recorded_frames(
+      2000, {.dropped_frames = 0.2, .duplicated_frames = 0.1, .stamp_error_s = 0.01}, 7);
+  EXPECT_NEAR(static_cast<double>(recorded.size()), 1600.0, 60.0);
+  EXPECT_EQ(recorded.front().frame, 0U);
+  std::size_t repeated = 0;
+  double squares = 0.0;
+  for (std::size_t n = 0; n < recorded.size(); ++n) {
+    squares += recorded[n].stamp_error_s * recorded[n].stamp_error_s;
+    if (recorded[n].images_of == recorded[n].frame) continue;
+    ++repeated;
+    EXPECT_EQ(recorded[n].images_of, recorded[n - 1].images_of);
+  }
+  EXPECT_NEAR(static_cast<double>(repeated), 160.0, 40.0);
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(recorded.size())), 0.01, 0.0006);
+
+  ScanSimulationOptions options = small_scan();
+  const auto plain = frames_of(options);
+  options.faults.recording.duplicated_frames = 1.0;
+  const auto frozen = frames_of(options);
+  ASSERT_EQ(frozen.size(), plain.size());
+  for (const libmap::RgbdFrame& frame : frozen) EXPECT_EQ(frame.depth, plain[0].depth);
+  EXPECT_EQ(frozen[3].stamp_s, plain[3].stamp_s);
+  options.faults.recording = {.dropped_frames = 1.0};
+  EXPECT_EQ(frames_of(options).size(), 1U);
+}
+
+TEST(SensorFaults, NoiseOfStereoGrowsWithTheSquareOfRange) {
+  const libmap::ViewRays rays = libmap::make_view_rays(
+      {.width = 100, .height = 100, .fx = 1e4, .fy = 1e4, .cx = 50, .cy = 50});
+  for (const float z : {1.0F, 3.0F}) {
+    const SurfaceView view{libmap::DepthImage(100, 100, z),
+                           libmap::DepthImage(101, 101, z),
+                           libmap::Image<float>(100, 100, 1.0F),
+                           {}};
+    libmap::DepthSensorOptions sensor = libmap::ideal_depth_sensor(0.1, 9.0);
+    sensor.noise_of_square = 0.004;
+    const auto measured = libmap::measure_depth(view, rays, sensor, 3).depth;
+    double squares = 0.0;
+    for (const float depth : measured.pixels)
+      squares += std::pow(static_cast<double>(depth - z), 2);
+    EXPECT_NEAR(std::sqrt(squares / 1e4), 0.004 * static_cast<double>(z * z),
+                0.03 * 0.004 * static_cast<double>(z * z));
   }
 }
 

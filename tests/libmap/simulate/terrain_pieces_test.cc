@@ -131,7 +131,7 @@ TEST(RockyTerrain, HeightsOfRocksFollowThePowerLaw) {
 TEST(TerrainPieces, MeetAtTheirSeams) {
   const TerrainPiecesOptions options = small_pieces();
   const RockyTerrain terrain(options.terrain, rectangle(0, 0, 3, 2));
-  for (const TerrainPiece& piece : terrain_pieces(options)) {
+  for (const PlanTile& piece : terrain_pieces(options)) {
     const PointCloud cloud = sample_piece(options, piece);
     for (const Eigen::Vector3d& p : cloud.positions) {
       EXPECT_EQ(p.z(), terrain.height(p.x(), p.y()));
@@ -194,14 +194,6 @@ TEST(TerrainPieces, AreAsManyAsTheSizeNeeds) {
   EXPECT_EQ(terrain_pieces(options).size(), 8U);
   options.size_x_m = 0.3;
   EXPECT_EQ(terrain_pieces(options).size(), 2U);
-}
-
-TEST(TerrainPieces, NamesAreThoseOfTheirPlaces) {
-  EXPECT_EQ(piece_file_name({3, 0}), "piece_3_0.pcd");
-  EXPECT_TRUE(is_piece_file_name("piece_3_0.pcd"));
-  for (const char* name : {"piece_3.pcd", "piece_03_0.pcd", "piece_3_0.ply", "piece_a_0.pcd",
-                           "piece_3_0.pcd.json", "piece_", "", "piece_3_0_1.pcd"})
-    EXPECT_FALSE(is_piece_file_name(name)) << name;
 }
 
 TEST(TerrainPieces, ImpossibleOptionsAreNamed) {

@@ -1,0 +1,20 @@
+// Where local coordinates are on the Earth or another body.
+#pragma once
+
+#include <Eigen/Core>
+#include <string>
+
+namespace libmap {
+
+// Local coordinates (x east, y north, z up, meters) are those of a projected coordinate reference
+// system (CRS) minus an offset, which keeps them small: easting = (origin_m.x + x) / unit_m,
+// northing = (origin_m.y + y) / unit_m, height = origin_m.z + z in meters.
+struct Georeference {
+  std::string crs_wkt;  // WKT 2 (ISO 19162:2019); empty: the CRS is not known
+  double unit_m = 1.0;  // of eastings and northings
+  Eigen::Vector3d origin_m = Eigen::Vector3d::Zero();
+
+  bool operator==(const Georeference&) const = default;
+};
+
+}  // namespace libmap

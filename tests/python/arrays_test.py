@@ -1,0 +1,308 @@
+#!/usr/bin/python3
+"""Clouds, meshes and poses as arrays; options, errors, progress and threads of the Python module.
+
+arrays_test.py BUILD_FOLDER
+"""
+
+import gc
+import pickle
+import threading
+import time
+import unittest
+
+import support
+
+import graspmap
+import numpy as np
+
+
+def plain(count=61, spacing_m=0.01):
+    """A level grid of points with a round hill, z up, with normals."""
+    x, y = np.meshgrid(np.arange(count) * spacing_m, np.arange(count) * spacing_m)
+    middle = 0.5 * count * spacing_m
+    z = 0.05 * np.exp(-((x - middle)**2 + (y - middle)**2) / 0.005)
+    positions = np.stack([x, y, z], axis=-1).reshape(-1, 3)
+    return graspmap.Cloud(positions, normals=np.tile([0, 0, 1], (len(positions), 1)))
+
+
+def square(side_m=0.3):
+    """Two level triangles."""
+    return graspmap.Mesh([[0, 0, 0], [side_m, 0, 0], [side_m, side_m, 0], [0, side_m, 0]],
+                         [[0, 1, 2], [0, 2, 3]])
+
+
+class Arrays(unittest.TestCase):
+    def test_cloud_keeps_what_it_is_given(self):
+        positions = np.array([[0, 1, 2], [3, 4, 5.5]])
+        colors = np.array([[1, 2, 3], [4, 5, 6]], np.uint8)
+        cloud = graspmap.Cloud(positions, normals=np.float32([[0, 0, 1], [1, 0, 0]]), colors=colors,
+                               fields={"score": np.float32([0.5, np.nan]), "i": np.int32([7, -8])})
+        np.testing.assert_array_equal(cloud.positions, positions)
+        np.testing.assert_array_equal(cloud.normals, [[0, 0, 1], [1, 0, 0]])
+        np.testing.assert_array_equal(cloud.colors, colors)
+        np.testing.assert_array_equal(cloud.fields["score"], [0.5, np.nan])
+        np.testing.assert_array_equal(cloud.fields["i"], [7, -8])
+        self.assertEqual(cloud.field_types, {"score": "float32", "i": "int32"})
+        self.assertIsNone(graspmap.Cloud(positions).normals)
+        self.assertEqual(len(graspmap.Cloud(np.zeros((0, 3)))), 0)
+
+    def test_views_share_memory_and_outlive_their_owner(self):
+        cloud = plain()
+        first, second = cloud.positions, cloud.positions
+        self.assertTrue(np.shares_memory(first, second))
+        self.assertFalse(first.flags.owndata)
+        expected = first.copy()
+        del cloud, second
+        gc.collect()
+        plain()
+        np.testing.assert_array_equal(first, expected)
+        with self.assertRaises(ValueError):
+            first[0, 0] = 1.0
+
+    def test_arrays_of_any_layout(self):
+        wide = np.arange(24, dtype=np.float32).reshape(4, 6)
+        cloud = graspmap.Cloud(wide[::2, ::2])
+        np.testing.assert_array_equal(cloud.positions, wide[::2, ::2])
+        cloud = graspmap.Cloud(np.asfortranarray(wide[:, :3]))
+        np.testing.assert_array_equal(cloud.positions, wide[:, :3])
+
+    def test_selection(self):
+        cloud = plain()
+        high = cloud.positions[:, 2] > 0.01
+        np.testing.assert_array_equal(cloud[high].positions, cloud.positions[high])
+        np.testing.assert_array_equal(cloud[[3, -1]].positions, cloud.positions[[3, -1]])
+        np.testing.assert_array_equal(cloud[5:50:7].positions, cloud.positions[5:50:7])
+        with self.assertRaises(IndexError):
+            cloud[[len(cloud)]]
+        with self.assertRaises(graspmap.Error) as raised:
+            cloud[high[1:]]
+        self.assertEqual(raised.exception.bound, str(len(cloud)))
+
+    def test_transform(self):
+        turn = np.array([[0, -1, 0, 1], [1, 0, 0, 2], [0, 0, 1, 3], [0, 0, 0, 1.0]])
+        cloud = plain().transformed(turn)
+        expected = plain().positions @ turn[:3, :3].T + turn[:3, 3]
+        np.testing.assert_allclose(cloud.positions, expected, atol=1e-12)
+
+    def test_poses(self):
+        matrices = np.tile(np.eye(4), (3, 1, 1))
+        matrices[:, 0, 3] = [1, 2, 3]
+        matrices[1, :3, :3] = [[0, -1, 0], [1, 0, 0], [0, 0, 1]]
+        poses = graspmap.Poses([4, 5, 9], matrices, stamps_s=[0.5, 1.5, 2.5])
+        np.testing.assert_array_equal(poses.nodes, [4, 5, 9])
+        np.testing.assert_array_equal(poses.stamps_s, [0.5, 1.5, 2.5])
+        np.testing.assert_array_equal(poses.world_from_base, matrices)
+        file = support.scratch_folder(self) / "poses.tum"
+        graspmap.write_poses(file, poses, nodes=True)
+        again = graspmap.read_poses(file)
+        np.testing.assert_array_equal(again.nodes, poses.nodes)
+        np.testing.assert_allclose(again.world_from_base, matrices, atol=1e-9)
+
+    def test_files(self):
+        folder = support.scratch_folder(self)
+        cloud = plain()
+        graspmap.write_cloud(folder / "cloud.pcd", cloud)
+        again = graspmap.read_cloud(str(folder / "cloud.pcd"))
+        np.testing.assert_allclose(again.positions, cloud.positions, atol=1e-6)
+        graspmap.write_mesh(folder / "mesh.ply", square())
+        mesh = graspmap.read_mesh(folder / "mesh.ply")
+        np.testing.assert_array_equal(mesh.triangles, [[0, 1, 2], [0, 2, 3]])
+        self.assertAlmostEqual(mesh.area_m2, 0.09, places=6)
+        self.assertEqual(sorted(path.name for path in folder.iterdir()), ["cloud.pcd", "mesh.ply"])
+
+    def test_an_output_of_a_command_is_not_overwritten(self):
+        folder = support.scratch_folder(self)
+        graspmap.write_mesh(folder / "mesh.ply", square())
+        support.graspmap_command("resample", "mesh.ply", "-o", "cloud.ply", folder=folder)
+        self.assertEqual(graspmap.read_manifest(folder / "cloud.ply")["command"], "resample")
+        self.assertIsNone(graspmap.read_manifest(folder / "mesh.ply"))
+        with self.assertRaises(graspmap.Error) as raised:
+            graspmap.write_cloud(folder / "cloud.ply", plain())
+        self.assertEqual(raised.exception.file, str(folder / "cloud.ply.json"))
+
+
+class Errors(unittest.TestCase):
+    def error(self, function, *arguments, **values):
+        with self.assertRaises(graspmap.Error) as raised:
+            function(*arguments, **values)
+        return raised.exception
+
+    def test_wrong_arrays(self):
+        for given, value in [(np.zeros((3, 4)), "(3, 4)"), (np.zeros(3), "(3,)"),
+                             (np.zeros((2, 3), complex), "complex128"),
+                             (np.array([["a", "b", "c"]]), "<U1")]:
+            error = self.error(graspmap.Cloud, given)
+            self.assertEqual(error.field, "positions")
+            self.assertIn(value, error.value)
+            self.assertIn("(N, 3)", error.bound)
+        self.assertIn("row 1", self.error(graspmap.Cloud, [[0, 0, 0], [0, np.nan, 0]]).field)
+        points = np.zeros((2, 3))
+        self.assertEqual(self.error(graspmap.Cloud, points, colors=[[0.5, 0, 0]] * 2).field, "colors")
+        self.assertIn("score", self.error(graspmap.Cloud, points, fields={"score": ["a", "b"]}).field)
+        self.error(graspmap.Cloud, points, normals=np.zeros((3, 3)))
+        self.assertEqual(self.error(graspmap.Mesh, points, [[0, 1, -1]]).field, "triangles")
+        self.error(graspmap.Mesh, points, [[0, 1, 2]])
+        self.assertEqual(self.error(plain().transformed, 2 * np.eye(4)).field, "target_from_source")
+        self.error(graspmap.Poses, [1, 2], np.eye(4)[None])
+        self.error(graspmap.to_png, np.zeros((3, 3), np.uint8))
+
+    def test_options_are_checked_as_on_the_command_line(self):
+        error = self.error(graspmap.resample, square(), radius_m=-1.0)
+        self.assertEqual((error.field, error.value, error.bound, error.kind),
+                         ("radius_m", "-1", "> 0", "bad_input"))
+        error = self.error(graspmap.resample, square(), radus_m=1.0)
+        self.assertEqual(error.field, "radus_m")
+        self.assertIn("radius_m", error.reason)
+        self.assertEqual(self.error(graspmap.resample, square(), radius_m=[1]).field, "radius_m")
+        error = self.error(graspmap.score, plain(), method="none")
+        self.assertEqual((error.field, error.value), ("method", "none"))
+        self.assertEqual(self.error(graspmap.score, plain(), gripper="ropebot").value, "ropebot")
+        self.assertEqual(
+            self.error(graspmap.score, plain(), options={"gripper": {"opening_angle_deg": 500}}).field,
+            "opening_angle_deg")
+        self.assertEqual(self.error(graspmap.options, "scores").field, "stage")
+        self.assertEqual(self.error(graspmap.resample, square(), threads=5000).field, "threads")
+
+    def test_files_that_are_none(self):
+        error = self.error(graspmap.read_cloud, "none.pcd")
+        self.assertEqual((error.file, error.kind), ("none.pcd", "bad_input"))
+        self.error(graspmap.read_mesh, "none.ply")
+        self.error(graspmap.open_scan, "none.db")
+        self.error(graspmap.write_cloud, "cloud.txt", plain())
+        self.error(graspmap.write_cloud, "no/such/folder/cloud.pcd", plain())
+
+    def test_an_error_can_be_pickled(self):
+        error = pickle.loads(pickle.dumps(self.error(graspmap.read_cloud, "none.pcd")))
+        self.assertEqual(error.file, "none.pcd")
+
+    def test_wrong_data(self):
+        self.error(graspmap.score, graspmap.Cloud(np.zeros((0, 3))))
+        self.error(graspmap.lookup, graspmap.Cloud(np.zeros((0, 3))), [[0, 0, 0]])
+        self.error(graspmap.grasp, square(), [[9, 9, 9]])
+        self.error(graspmap.grasp, square(), [[0.1, 0.1, 0]], surface_error="much")
+        self.error(graspmap.evaluate, {"graspable": [1, 0], "score": [0.5]})
+        self.error(graspmap.evaluate, {"graspable": [1, 0], "score": [0.5, 0.1]}, label="verdict")
+        self.error(graspmap.render, plain(), markers=[[0, 0, 0]], labels=["a", "b"])
+        self.error(graspmap.mesh, graspmap.Cloud(plain().positions))
+
+
+class Options(unittest.TestCase):
+    def test_keywords_and_dicts_set_the_same(self):
+        by_keyword = graspmap.resample(square(), radius_m=0.02, seed=7)
+        by_dict = graspmap.resample(square(), options={"radius_m": 0.02, "seed": np.int64(7)})
+        other = graspmap.resample(square(), options={"radius_m": 0.02, "seed": 8}, seed=9)
+        np.testing.assert_array_equal(by_keyword.cloud.positions, by_dict.cloud.positions)
+        self.assertEqual(by_keyword.radius_m, 0.02)
+        self.assertFalse(np.array_equal(by_keyword.cloud.positions, other.cloud.positions))
+        nine = graspmap.resample(square(), radius_m=0.02, seed=9)
+        np.testing.assert_array_equal(other.cloud.positions, nine.cloud.positions)
+
+    def test_are_those_of_the_commands(self):
+        """Each key of a stage is one that --print-config of its command prints with this default."""
+        for stage in ("refine", "fuse", "mesh", "resample", "score", "grasp", "lookup", "evaluate",
+                      "footholds", "render"):
+            printed = support.graspmap_command(stage, "--print-config", folder="/").stdout
+            defaults = {}
+            for line in printed.splitlines():
+                key, _, rest = line.partition(":")
+                defaults[key] = rest.partition("  #")[0].strip().strip('"')
+            for option in graspmap.options(stage):
+                self.assertEqual(defaults.get(option["key"]), option["default"], option["key"])
+
+    def test_overrides_of_a_gripper(self):
+        spot = [[0.15, 0.15, 0.0]]
+        held = [graspmap.grasp(square(), spot, trials=2, draws=2, options={"gripper": measures})
+                for measures in ({}, {"opening_angle_deg": 40})]
+        self.assertEqual([result.trials[0] for result in held], [4, 4])
+        self.assertNotEqual(held[0].columns, held[1].columns)
+        with self.assertRaises(graspmap.Error) as raised:
+            graspmap.grasp(square(), spot, options={"gripper": {"opening_angle": 40}})
+        self.assertEqual(raised.exception.field, "opening_angle")
+
+
+class Progress(unittest.TestCase):
+    def test_is_told_and_the_result_is_the_same(self):
+        calls = []
+        told = graspmap.score(plain(), progress=lambda *words: calls.append(words))
+        quiet = graspmap.score(plain(), threads=1)
+        self.assertTrue(calls)
+        for stage, done, total in calls:
+            self.assertTrue(stage)
+            self.assertGreaterEqual(done, 0)
+            self.assertTrue(total == 0 or done <= total)
+        for name, values in told.map.fields.items():
+            np.testing.assert_array_equal(values, quiet.map.fields[name])
+
+    def test_what_it_raises_ends_the_call(self):
+        def interrupt(*_):
+            raise KeyboardInterrupt
+        with self.assertRaises(KeyboardInterrupt):
+            graspmap.score(plain(), progress=interrupt)
+        self.assertGreater(graspmap.score(plain()).occupied_voxels, 0)
+
+    def test_other_threads_run_meanwhile(self):
+        """A thread of Python counts while the main one is within a call."""
+        counts = []
+        stop = threading.Event()
+
+        def count():
+            while not stop.wait(0.001):
+                counts.append(time.monotonic())
+
+        counter = threading.Thread(target=count)
+        counter.start()
+        begin = time.monotonic()
+        graspmap.resample(square(1.0), radius_m=0.003)
+        end = time.monotonic()
+        stop.set()
+        counter.join()
+        self.assertGreater(sum(begin < at < end for at in counts), 1)
+
+
+class Results(unittest.TestCase):
+    def test_named_fields_are_those_of_the_dict(self):
+        result = graspmap.resample(square(), radius_m=0.05)
+        self.assertEqual(set(result.as_dict()), {
+            "cloud", "radius_m", "area_m2", "smallest_distance_m", "relative_radius",
+            "count_reached", "timings_s"})
+        self.assertIs(result.as_dict()["cloud"], result.cloud)
+        self.assertIn("radius_m = 0.05", repr(result))
+
+    def test_closed_forms(self):
+        result = graspmap.resample(square(), radius_m=0.05)
+        self.assertAlmostEqual(result.area_m2, 0.09)
+        points = result.cloud.positions
+        distances = np.linalg.norm(points[:, None] - points[None], axis=-1)
+        self.assertGreaterEqual(distances[np.triu_indices(len(points), 1)].min(), 0.05)
+        map_ = graspmap.Cloud([[0, 0, 0], [1, 0, 0]], fields={"score": [0.25, 0.75]})
+        found = graspmap.lookup(map_, [[0.01, 0, 0], [0.5, 0, 0], [1, 0.02, 0]])
+        np.testing.assert_array_equal(found.found, [True, False, True])
+        np.testing.assert_allclose(found.distance_m, [0.01, 0.5, 0.02])
+        np.testing.assert_array_equal(found.map_point[[0, 2]], [0, 1])
+        np.testing.assert_array_equal(found.values["score"], [0.25, np.nan, 0.75])
+        table = {"graspable": [True, False, 1, 0], "score": np.array([0.9, 0.1, 0.4, 0.6])}
+        self.assertEqual(graspmap.evaluate(table).areas, {"score": 0.75})
+        table["score"][3] = np.nan
+        self.assertEqual(graspmap.evaluate(table, bootstrap=0).areas, {"score": 1.0})
+
+    def test_a_map_of_a_plane_and_its_footholds(self):
+        scored = graspmap.score(plain(), plane="none", method="corrected", threads=1)
+        np.testing.assert_array_equal(scored.terrain_from_input, np.eye(4))
+        self.assertEqual(scored.voxel_size_m, 0.01)
+        self.assertIsNone(scored.plane_rmse_m)
+        voxels = np.stack([scored.map.fields[axis] for axis in "ijk"], axis=-1)
+        centers = np.array(scored.lattice_origin_m) + 0.01 * (voxels + 0.5)
+        np.testing.assert_allclose(scored.map.positions, centers, atol=1e-9)
+        best = graspmap.footholds(scored.map, graspable_only=False, border=True, separation_m=0.2)
+        np.testing.assert_array_equal(best.cloud.positions, scored.map.positions[best.map_point])
+        scores = scored.map.fields["score"]
+        self.assertEqual(best.cloud.fields["score"][0], scores.max())
+
+    def test_normals_of_a_plane(self):
+        made = graspmap.estimate_normals(graspmap.Cloud(plain(20).positions * [1, 1, 0]))
+        np.testing.assert_allclose(np.abs(made.cloud.normals[:, 2]), 1.0, atol=1e-6)
+        self.assertEqual(made.undefined, 0)
+
+
+if __name__ == "__main__":
+    support.main()

@@ -1,0 +1,289 @@
+#include <algorithm>
+
+#include "libmap/cloud/cloud_io.h"
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "libmap/mesh/mesh_io.h"
+#include "tools/python/values.h"
+
+namespace graspmap_python {
+
+namespace {
+
+namespace fs = std::filesystem;
+using libmap::PointCloud;
+using libmap::ScalarField;
+using libmap::ScalarType;
+using libmap::TriangleMesh;
+
+// NumPy's names of the types, by ScalarType.
+constexpr const char* type_names[] = {"int8",  "uint8",  "int16",   "uint16",
+                                      "int32", "uint32", "float32", "float64"};
+
+py::object normals_of(const std::vector<Eigen::Vector3f>& normals, py::handle owner) {
+  if (normals.empty()) return py::none();
+  return view(normals.front().data(), rows(normals.size(), 3), owner);
+}
+
+py::object colors_of(const std::vector<libmap::Color>& colors, py::handle owner) {
+  if (colors.empty()) return py::none();
+  return view(colors.front().data(), rows(colors.size(), 3), owner);
+}
+
+py::array positions_of(const std::vector<Eigen::Vector3d>& positions, py::handle owner) {
+  const double* data = positions.empty() ? nullptr : positions.front().data();
+  return view(data, rows(positions.size(), 3), owner);
+}
+
+py::dict fields_of(const std::vector<ScalarField>& fields, py::handle owner) {
+  py::dict dict;
+  for (const ScalarField& field : fields)
+    dict[field.name.c_str()] =
+        view(field.values.data(), {static_cast<py::ssize_t>(field.values.size())}, owner);
+  return dict;
+}
+
+py::dict types_of(const std::vector<ScalarField>& fields) {
+  py::dict dict;
+  for (const ScalarField& field : fields)
+    dict[field.name.c_str()] = type_names[static_cast<std::size_t>(field.type)];
+  return dict;
+}
+
+std::vector<Eigen::Vector3f> normals_from(const py::object& given, const std::string& name) {
+  std::vector<Eigen::Vector3f> normals;
+  if (given.is_none()) return normals;
+  for (const Eigen::Vector3d& normal : positions_from(given, name, Finite::any))
+    normals.push_back(normal.cast<float>());
+  return normals;
+}
+
+std::vector<libmap::Color> colors_from(const py::object& given, const std::string& name) {
+  std::vector<libmap::Color> colors;
+  if (given.is_none()) return colors;
+  const char* const bound = "uint8 of shape (N, 3)";
+  const py::array array = checked_array(given, name, "u", bound, 3);
+  if (array.itemsize() != 1)
+    throw libmap::Error(
+        "wrong type",
+        {.field = name, .value = py::str(array.dtype()).cast<std::string>(), .bound = bound});
+  const auto bytes = py::array_t<std::uint8_t, py::array::c_style>::ensure(array);
+  colors.resize(static_cast<std::size_t>(bytes.shape(0)));
+  std::copy_n(bytes.data(), bytes.size(), colors.empty() ? nullptr : colors.front().data());
+  return colors;
+}
+
+ScalarType type_of(const py::array& array) {
+  const std::string name = py::str(array.dtype()).cast<std::string>();
+  const auto* const found = std::find(std::begin(type_names), std::end(type_names), name);
+  if (found != std::end(type_names)) return static_cast<ScalarType>(found - std::begin(type_names));
+  if (name == "bool") return ScalarType::uint8;
+  // Files have no integers of 64 bits.
+  return array.dtype().kind() == 'f' ? ScalarType::float32 : ScalarType::float64;
+}
+
+std::vector<ScalarField> fields_from(const py::dict& given) {
+  std::vector<ScalarField> fields;
+  for (const auto& [name, values] : given) {
+    ScalarField& field = fields.emplace_back();
+    field.name = py::str(name).cast<std::string>();
+    const py::array array =
+        checked_array(py::reinterpret_borrow<py::object>(values), "field " + field.name, "biuf",
+                      "numbers of shape (N,)", 0);
+    field.type = type_of(array);
+    const auto numbers =
+        py::array_t<double, py::array::c_style | py::array::forcecast>::ensure(array);
+    field.values.assign(numbers.data(), numbers.data() + numbers.size());
+  }
+  return fields;
+}
+
+std::shared_ptr<PointCloud> make_cloud(const py::object& positions, const py::object& normals,
+                                       const py::object& colors, const py::dict& fields,
+                                       const py::object& viewpoint) {
+  PointCloud cloud;
+  cloud.positions = positions_from(positions, "positions");
+  cloud.normals = normals_from(normals, "normals");
+  cloud.colors = colors_from(colors, "colors");
+  cloud.fields = fields_from(fields);
+  if (!viewpoint.is_none()) cloud.viewpoint = pose_from(viewpoint, "viewpoint");
+  cloud.check();
+  return shared(std::move(cloud));
+}
+
+std::vector<libmap::Triangle> triangles_from(const py::object& given) {
+  const auto array = py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(
+      checked_array(given, "triangles", "iu", "whole numbers of shape (M, 3)", 3));
+  std::vector<libmap::Triangle> triangles(static_cast<std::size_t>(array.shape(0)));
+  const std::int64_t* from = array.data();
+  for (libmap::Triangle& triangle : triangles)
+    for (std::uint32_t& corner : triangle) {
+      if (*from < 0 || *from > std::numeric_limits<std::uint32_t>::max())
+        throw libmap::Error(
+            "is no vertex",
+            {.field = "triangles", .value = std::to_string(*from), .bound = "indices of vertices"});
+      corner = static_cast<std::uint32_t>(*from++);
+    }
+  return triangles;
+}
+
+std::shared_ptr<TriangleMesh> make_mesh(const py::object& vertices, const py::object& triangles,
+                                        const py::object& normals, const py::object& colors,
+                                        const py::dict& vertex_fields,
+                                        const py::dict& face_fields) {
+  TriangleMesh mesh;
+  mesh.vertices = positions_from(vertices, "vertices");
+  mesh.triangles = triangles_from(triangles);
+  mesh.vertex_normals = normals_from(normals, "vertex_normals");
+  mesh.vertex_colors = colors_from(colors, "vertex_colors");
+  mesh.vertex_fields = fields_from(vertex_fields);
+  mesh.face_fields = fields_from(face_fields);
+  mesh.check();
+  return shared(std::move(mesh));
+}
+
+std::shared_ptr<PointCloud> selected(const PointCloud& cloud, const py::object& which) {
+  const py::ssize_t size = static_cast<py::ssize_t>(cloud.size());
+  const char* const bound = "a slice, a truth value for each point, or whole numbers of shape (K,)";
+  const py::module_ numpy = py::module_::import("numpy");
+  const py::object numbers_of_slice =
+      py::isinstance<py::slice>(which) ? numpy.attr("arange")(size)[which] : which;
+  py::array array = checked_array(numbers_of_slice, "index", "biu", bound, 0);
+  if (array.dtype().kind() == 'b') {
+    if (array.size() != size)
+      throw libmap::Error(
+          "wrong length",
+          {.field = "index", .value = std::to_string(array.size()), .bound = std::to_string(size)});
+    array = numpy.attr("flatnonzero")(array);
+  }
+  const auto numbers =
+      py::array_t<std::int64_t, py::array::c_style | py::array::forcecast>::ensure(array);
+  std::vector<std::size_t> indices;
+  for (py::ssize_t n = 0; n < numbers.size(); ++n) {
+    const std::int64_t index = numbers.at(n) < 0 ? numbers.at(n) + size : numbers.at(n);
+    if (index < 0 || index >= size)
+      throw py::index_error("index " + std::to_string(numbers.at(n)) + " of a cloud of " +
+                            std::to_string(size) + " points");
+    indices.push_back(static_cast<std::size_t>(index));
+  }
+  return shared(libmap::select_points(cloud, indices));
+}
+
+void add_cloud(py::module_& module) {
+  py::class_<PointCloud, std::shared_ptr<PointCloud>>(
+      module, "Cloud",
+      "A cloud of points, as it is: a changed one is a new one, made of arrays or by "
+      "`cloud[index]`\n"
+      "(truth values or whole numbers). A map is a cloud of its voxels.")
+      .def(py::init(&make_cloud), py::arg("positions"), py::arg("normals") = py::none(),
+           py::arg("colors") = py::none(), py::arg("fields") = py::dict(),
+           py::arg("viewpoint") = py::none())
+      .def_property_readonly(
+          "positions",
+          [](const py::object& self) {
+            return positions_of(self.cast<PointCloud&>().positions, self);
+          },
+          "(N, 3) float64, m")
+      .def_property_readonly(
+          "normals",
+          [](const py::object& self) { return normals_of(self.cast<PointCloud&>().normals, self); },
+          "(N, 3) float32, or None")
+      .def_property_readonly(
+          "colors",
+          [](const py::object& self) { return colors_of(self.cast<PointCloud&>().colors, self); },
+          "(N, 3) uint8: red, green, blue; or None")
+      .def_property_readonly(
+          "fields",
+          [](const py::object& self) { return fields_of(self.cast<PointCloud&>().fields, self); },
+          "{name: (N,) float64}")
+      .def_property_readonly(
+          "field_types", [](const PointCloud& cloud) { return types_of(cloud.fields); },
+          "{name: type of the numbers in files}")
+      .def_property_readonly(
+          "viewpoint", [](const PointCloud& cloud) { return matrix_of(cloud.viewpoint); },
+          "(4, 4) float64: cloud_from_sensor; the identity where not known")
+      .def(
+          "transformed",
+          [](const PointCloud& cloud, const py::object& target_from_source) {
+            const libmap::Pose pose = pose_from(target_from_source, "target_from_source");
+            return shared(libmap::transform_cloud(cloud, pose));
+          },
+          py::arg("target_from_source"), "The cloud moved by a rigid transform (4, 4).")
+      .def("__getitem__", &selected, py::arg("index"))
+      .def("__len__", &PointCloud::size);
+}
+
+void add_mesh(py::module_& module) {
+  py::class_<TriangleMesh, std::shared_ptr<TriangleMesh>>(
+      module, "Mesh", "A triangle mesh, as it is: a changed one is a new one, made of arrays.")
+      .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"),
+           py::arg("vertex_normals") = py::none(), py::arg("vertex_colors") = py::none(),
+           py::arg("vertex_fields") = py::dict(), py::arg("face_fields") = py::dict())
+      .def_property_readonly(
+          "vertices",
+          [](const py::object& self) {
+            return positions_of(self.cast<TriangleMesh&>().vertices, self);
+          },
+          "(V, 3) float64, m")
+      .def_property_readonly(
+          "triangles",
+          [](const py::object& self) {
+            const auto& triangles = self.cast<TriangleMesh&>().triangles;
+            return view(triangles.empty() ? nullptr : triangles.front().data(),
+                        rows(triangles.size(), 3), self);
+          },
+          "(T, 3) uint32: vertices, counter-clockwise from outside")
+      .def_property_readonly(
+          "vertex_normals",
+          [](const py::object& self) {
+            return normals_of(self.cast<TriangleMesh&>().vertex_normals, self);
+          },
+          "(V, 3) float32, or None")
+      .def_property_readonly(
+          "vertex_colors",
+          [](const py::object& self) {
+            return colors_of(self.cast<TriangleMesh&>().vertex_colors, self);
+          },
+          "(V, 3) uint8, or None")
+      .def_property_readonly(
+          "vertex_fields",
+          [](const py::object& self) {
+            return fields_of(self.cast<TriangleMesh&>().vertex_fields, self);
+          },
+          "{name: (V,) float64}")
+      .def_property_readonly(
+          "face_fields",
+          [](const py::object& self) {
+            return fields_of(self.cast<TriangleMesh&>().face_fields, self);
+          },
+          "{name: (T,) float64}")
+      .def_property_readonly("area_m2", &libmap::surface_area);
+}
+
+}  // namespace
+
+void add_shapes(py::module_& module) {
+  add_cloud(module);
+  add_mesh(module);
+  module.def("read_cloud", [](const fs::path& path) {
+    return without_lock([&] { return shared(libmap::read_cloud(path).cloud); });
+  });
+  module.def("read_mesh", [](const fs::path& path) {
+    return without_lock([&] { return shared(libmap::read_mesh(path).mesh); });
+  });
+  module.def("write_cloud", [](const fs::path& path, const PointCloud& cloud) {
+    libmap::require_cloud_format(path);
+    write_whole(path, [&](const fs::path& file) { libmap::write_cloud(file, cloud); });
+  });
+  module.def("write_mesh", [](const fs::path& path, const TriangleMesh& mesh) {
+    libmap::require_mesh_format(path);
+    write_whole(path, [&](const fs::path& file) { libmap::write_mesh(file, mesh); });
+  });
+  module.def("read_manifest", [](const fs::path& path) -> std::optional<std::string> {
+    const auto manifest = libmap::read_manifest_of(path);
+    if (!manifest) return std::nullopt;
+    return libmap::to_json(*manifest);
+  });
+}
+
+}  // namespace graspmap_python
