@@ -6,6 +6,7 @@
 #include <limits>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "libgtd/score/scanned_area.h"
@@ -22,6 +23,12 @@ constexpr int block_columns = 64;
 // The open finger rests on the ground: only what rises more than rounding into its way is met.
 constexpr double clearance_m = 1e-5;
 constexpr double unknown = -std::numeric_limits<double>::infinity();
+// Of where the gripper comes to rest, in lengths of a finger: the standard deviation of a normal
+// distribution that is cut at twice of it. Pose and tilt of the palm, the azimuths of its fingers
+// and the width of a column all blur what it meets; this value makes the verdicts of the virtual
+// field test on the fitted sites nearly as likely as any larger one.
+constexpr double spread = 0.25;
+constexpr double cut = 2.0;
 
 // Places around a pivot as columns, for one azimuth.
 struct Cell {
@@ -31,9 +38,15 @@ struct Cell {
   bool has_spines = false;
 };
 
+struct Rest {
+  Cell cell;
+  double weight = 0.0;
+};
+
 struct Rays {
-  std::vector<Cell> palm;  // depth 0
-  std::vector<Cell> open;  // of all azimuths
+  std::vector<Rest> rests;  // where the gripper may come to rest
+  std::vector<Cell> palm;   // depth 0
+  std::vector<Cell> open;   // of all azimuths
   std::array<std::vector<Cell>, azimuths> closing;
   std::array<std::array<double, azimuths>, azimuths> weights{};  // side, azimuth; 1 in sum
 };
@@ -45,8 +58,18 @@ bool is_new(const std::vector<Cell>& cells, const Cell& next) {
   });
 }
 
+int rest_columns(const ClosingPath& path, double voxel_size_m) {
+  return static_cast<int>(cut * spread * path.finger_length_m / voxel_size_m);
+}
+
 Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   Rays rays;
+  const double sigma = spread * path.finger_length_m / voxel_size_m;  // in columns
+  const int farthest = rest_columns(path, voxel_size_m);
+  for (int i = -farthest; i <= farthest; ++i)
+    for (int j = -farthest; j <= farthest; ++j)
+      if (const double distance = std::hypot(i, j) / sigma; distance <= cut)
+        rays.rests.push_back({{i, j}, std::exp(-0.5 * distance * distance)});
   const int palm = static_cast<int>(std::ceil(path.palm_radius_m / voxel_size_m));
   for (int i = -palm; i <= palm; ++i)
     for (int j = -palm; j <= palm; ++j)
@@ -99,6 +122,7 @@ class Heights {
   std::ptrdiff_t step(const Cell& cell) const {
     return static_cast<std::ptrdiff_t>(cell.i) * width_ + cell.j;
   }
+  std::size_t size() const { return heights_.size(); }
   double height(std::size_t at) const { return heights_[at]; }
   // From the first of the cells around a column that has ground to the lowest one.
   double fall(std::size_t at, const std::vector<Cell>& cells) const {
@@ -161,22 +185,58 @@ class Heights {
 class BlockCloser {
  public:
   BlockCloser(const Heights& heights, const Rays& rays, const ClosingPath& path)
-      : heights_(heights), rays_(rays), path_(path) {
+      : heights_(heights), rays_(rays), path_(path), met_(heights.size()) {
     for (const Cell& cell : rays.palm) palm_.push_back(heights.step(cell));
     for (const Cell& cell : rays.open) open_.push_back(heights.step(cell));
     for (std::size_t a = 0; a < azimuths; ++a)
       for (const Cell& cell : rays.closing[a]) closing_[a].push_back(heights.step(cell));
   }
 
-  ClosingTerms terms(std::size_t pivot, double pivot_height) const {
-    const double palm = palm_height(pivot);
+  // The pivot's column must have ground.
+  ClosingTerms terms(std::size_t pivot, double pivot_height) {
+    Met sum;
+    double weights = 0.0;
+    for (const Rest& rest : rays_.rests) {
+      const std::size_t at = pivot + static_cast<std::size_t>(heights_.step(rest.cell));
+      if (heights_.height(at) == unknown) continue;
+      const Met& met = met_at(at);
+      sum.contact += rest.weight * met.contact;
+      sum.bearing += rest.weight * met.bearing;
+      sum.palm += rest.weight * (met.palm - pivot_height);
+      sum.depth += rest.weight * met.depth;
+      weights += rest.weight;
+    }
+    const double lengths = weights * path_.finger_length_m;
+    return {.contact = sum.contact / weights,
+            .bearing = sum.bearing / weights,
+            .rise = sum.palm / lengths,
+            .depth = sum.depth / lengths};
+  }
+
+ private:
+  // What a gripper meets that comes to rest on a column.
+  struct Met {
+    double contact = 0.0;
+    double bearing = 0.0;
+    double palm = 0.0;   // m
+    double depth = 0.0;  // of the contacts, mean, m
+  };
+
+  const Met& met_at(std::size_t at) {
+    std::optional<Met>& met = met_[at];
+    if (!met) met = close_on(at);
+    return *met;
+  }
+
+  Met close_on(std::size_t at_rest) const {
+    const double palm = palm_height(at_rest);
     std::array<double, azimuths> contacts{};
     std::array<double, azimuths> bearings{};
     double depths = 0.0;
     double touching = 0.0;
     for (std::size_t a = 0; a < azimuths; ++a) {
       const Cell* cell = nullptr;
-      const std::size_t at = first_contact(pivot, palm, a, cell);
+      const std::size_t at = first_contact(at_rest, palm, a, cell);
       if (cell == nullptr || !cell->has_spines) continue;
       contacts[a] = 1.0;
       depths += cell->depth;
@@ -189,11 +249,10 @@ class BlockCloser {
     }
     return {.contact = weakest(contacts),
             .bearing = weakest(bearings),
-            .rise = (palm - pivot_height) / path_.finger_length_m,
-            .depth = touching > 0.0 ? depths / touching / path_.finger_length_m : 0.0};
+            .palm = palm,
+            .depth = touching > 0.0 ? depths / touching : 0.0};
   }
 
- private:
   double palm_height(std::size_t pivot) const {
     double palm = unknown;
     for (const std::ptrdiff_t step : palm_)
@@ -232,6 +291,7 @@ class BlockCloser {
   std::vector<std::ptrdiff_t> palm_;
   std::vector<std::ptrdiff_t> open_;
   std::array<std::vector<std::ptrdiff_t>, azimuths> closing_;
+  std::vector<std::optional<Met>> met_;  // of each column, once it is needed
 };
 
 // From the circle of the closed spines outward, as columns around a pivot.
@@ -277,7 +337,8 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
 
 int closing_reach_voxels(const ClosingPath& path, double voxel_size_m) {
   // A place may be rounded half a column outward; its fall looks one farther, and gaps are filled.
-  return static_cast<int>(std::ceil(path.reach_m() / voxel_size_m + 0.5)) + 1 + gap_columns;
+  return static_cast<int>(std::ceil(path.reach_m() / voxel_size_m + 0.5)) + 1 + gap_columns +
+         rest_columns(path, voxel_size_m);
 }
 
 std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath& path,
@@ -287,7 +348,7 @@ std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath
   std::vector<ClosingTerms> terms(pivots.size());
   for_each_block(grid, pivots, closing_reach_voxels(path, voxel_size_m),
                  [&](const std::vector<std::size_t>& members, const Heights& heights) {
-                   const BlockCloser closer(heights, rays, path);
+                   BlockCloser closer(heights, rays, path);
                    for (const std::size_t n : members) {
                      const Voxel& voxel = grid.voxels[pivots[n]];
                      terms[n] = closer.terms(heights.index(voxel.i, voxel.j),

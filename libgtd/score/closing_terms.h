@@ -1,11 +1,13 @@
 // What a closing gripper would meet at a voxel, from the heights of the columns around it: the
 // terms of method `calibrated` (ClosingTerms in libgtd/gripper/hold_model.h).
 //
-// The palm comes down upright on the voxel's column until it or an open finger meets ground. Each
+// The palm comes down upright on a column until it or an open finger meets ground. Each
 // of 16 fingers then follows its closing path until one of its places is in the ground. Where that
 // is the outer half of the distal link, its spines bear as much as the ground's fall outward
 // allows. A side's share is the mean over the azimuths weighted with the cosine to the side, if
-// positive.
+// positive. A voxel's terms are the mean over the columns with ground around it, with normal
+// weights of a standard deviation of a quarter of the finger's length, cut at twice of it: where
+// the gripper comes to rest is not known better.
 #pragma once
 
 #include <vector>

@@ -95,14 +95,13 @@ TEST(ClosingTerms, ShapesInOrder) {
   // A cone: the ground falls outward, so that spines bear more.
   const auto cone = terms_at_origin(
       ground([](int i, int j) { return -static_cast<int>(std::lround(0.6 * std::hypot(i, j))); }));
-  EXPECT_NEAR(cone.contact, 1, 1e-12);
+  EXPECT_NEAR(cone.contact, 1, 0.01);
   EXPECT_GT(cone.bearing, flat.bearing + 0.1);
-  // A thin post over a deep pit: nothing to close on.
+  // A thin post over a deep pit: nothing to close on, but where it is beside the palm's middle.
   const auto post = terms_at_origin(
       ground([](int i, int j) { return std::max(std::abs(i), std::abs(j)) < 1 ? 0 : -40; }));
-  EXPECT_EQ(post.contact, 0);
-  EXPECT_EQ(post.bearing, 0);
-  EXPECT_EQ(post.depth, 0);
+  EXPECT_LT(post.contact, 0.15);
+  EXPECT_LT(post.bearing, 0.1 * flat.bearing);
   // The edge of a cliff: no contact on one side.
   const auto cliff = terms_at_origin(ground([](int i, int) { return i <= 1 ? 0 : -40; }));
   EXPECT_LT(cliff.contact, 0.3);
@@ -163,12 +162,12 @@ TEST(ClosingTerms, UpToThreeColumnsOfAGapAreFilled) {
     return terms_at_origin(voxels);
   };
   EXPECT_NEAR(holes(6).contact, 1, 1e-12);
-  EXPECT_LT(holes(20).contact, 0.5);
+  EXPECT_LT(holes(20).contact, 0.6);
 }
 
-// From the definition, column by column from a map.
-ClosingTerms slow_terms(const std::map<std::pair<int, int>, double>& heights, const Voxel& pivot,
-                        const ClosingPath& path) {
+// From the definition, column by column from a map, where the gripper rests on the pivot's column.
+ClosingTerms slow_terms_there(const std::map<std::pair<int, int>, double>& heights,
+                              const Voxel& pivot, const ClosingPath& path) {
   const auto at = [&](int i, int j) {
     const auto found = heights.find({i, j});
     return found == heights.end() ? -1e9 : found->second;
@@ -229,6 +228,32 @@ ClosingTerms slow_terms(const std::map<std::pair<int, int>, double>& heights, co
           touching > 0 ? depth / touching / length : 0};
 }
 
+// The mean over the columns around it; `there` keeps their terms above a height of 0.
+ClosingTerms slow_terms(const std::map<std::pair<int, int>, double>& heights, const Voxel& pivot,
+                        const ClosingPath& path,
+                        std::map<std::pair<int, int>, ClosingTerms>& there) {
+  const double sigma = path.finger_length_m / 4;
+  const double height = 0.01 * (pivot.k + 0.5);
+  ClosingTerms sum;
+  double weights = 0;
+  for (int i = -20; i <= 20; ++i)
+    for (int j = -20; j <= 20; ++j) {
+      const std::pair<int, int> column{pivot.i + i, pivot.j + j};
+      const double distance = 0.01 * std::hypot(i, j);
+      if (distance > 2 * sigma || !heights.contains(column)) continue;
+      if (!there.contains(column))
+        there[column] = slow_terms_there(heights, {column.first, column.second, 0}, path);
+      const ClosingTerms& terms = there[column];
+      const double weight = std::exp(-distance * distance / (2 * sigma * sigma));
+      sum.contact += weight * terms.contact;
+      sum.bearing += weight * terms.bearing;
+      sum.rise += weight * (terms.rise + (0.005 - height) / path.finger_length_m);
+      sum.depth += weight * terms.depth;
+      weights += weight;
+    }
+  return {sum.contact / weights, sum.bearing / weights, sum.rise / weights, sum.depth / weights};
+}
+
 TEST(ClosingTerms, AgreeWithTheirDefinition) {
   const VoxelGrid grid = grid_of(graspmap_test::random_ground(80, -33, 12));
   const ClosingPath path = libgtd::make_closing_path(with_model("limbero"), 0.01);
@@ -253,8 +278,9 @@ TEST(ClosingTerms, AgreeWithTheirDefinition) {
   }
   const auto terms = terms_of(grid, path);
   std::size_t differences = 0;
+  std::map<std::pair<int, int>, ClosingTerms> there;
   for (std::size_t n = 0; n < terms.size(); ++n) {
-    const ClosingTerms slow = slow_terms(heights, grid.voxels[n], path);
+    const ClosingTerms slow = slow_terms(heights, grid.voxels[n], path, there);
     // A height on the boundary of a voxel's layer or an angle between two degrees may round either
     // way in single precision.
     if (std::abs(terms[n].contact - slow.contact) > 1e-9 ||
