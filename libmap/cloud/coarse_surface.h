@@ -13,7 +13,7 @@ namespace libmap {
 
 // Fits planes to the pixels of one depth image (m) and adds those in `cells` to the voxels of the
 // grid, each weighted by its cosine, its support and the noise of its depth. What became of the
-// pixels; with thinned cells the counts say nothing.
+// pixels; with downsampled cells the counts say nothing.
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
                                   double voxel_size_m, const PlanCells& cells,
