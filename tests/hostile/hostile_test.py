@@ -40,7 +40,7 @@ WALL_S = 90  # of a loaded machine
 MEMORY_MB = 500
 ADDRESS_SPACE = 12 << 30
 FILE_SIZE = 1 << 30
-SAMPLE = 150     # of the runs that the short run leaves out
+SAMPLE = 60      # of the runs that the short run leaves out
 FOREIGN = 12     # files of other kinds in each place
 
 # What a library or the C++ runtime says of itself is no reason for a user.
@@ -219,7 +219,7 @@ def planned(cases, seed, full):
     short = [draw.choice(pairs) for pairs in first.values()]
     without = [pair for pair in rest if id(pair[0]) not in first]
     others = [pair for pair in common + rest + foreign if pair not in short]
-    return short + draw.sample(without, min(len(without), 60)) + draw.sample(others, SAMPLE)
+    return short + draw.sample(without, min(len(without), 30)) + draw.sample(others, SAMPLE)
 
 
 def templates(graspmap, good, folder, jobs):
