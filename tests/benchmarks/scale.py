@@ -2,10 +2,6 @@
 """Time and memory of `graspmap score` into a tile store against the size of the terrain.
 
 usage: scale.py BUILD_FOLDER [--sides 3,10,30,100] [--repeat N] [--folder FOLDER] [--page README.md]
-       scale.py BUILD_FOLDER --pieces [--sides 3,10,30]
-
-With --pieces instead: `mesh`, `crop` and `resample` of the same terrains in folders of pieces, as
-ratios to the area.
 
 Simulates square rocky terrains at 1 cm, scores each out of core as a process of its own, and looks a
 million locations up in the largest map's store. Prints a Markdown table; with --page, puts it between
@@ -52,30 +48,6 @@ def score(graspmap, terrain, store, repeat):
         runs.append(measure([graspmap, "score", terrain, "-o", store, "--zero-plane", "-0.05",
                              "--quiet"]))
     return min(runs, key=lambda run: run[1])
-
-
-def piece_stages(graspmap, folder, side):
-    """Of each stage the seconds of processor time a square meter, and the peak MiB."""
-    subprocess.run([graspmap, "simulate", "terrain", "--size", str(side), "-o", folder / "terrain",
-                    "--quiet"], check=True)
-    stages = {"mesh": ["terrain", "-o", "mesh", "--cell-size", "0.01"],
-              "crop": ["mesh", "-o", "site"],
-              "resample": ["site", "-o", "samples"]}
-    found = {}
-    for name, (source, _, target, *flags) in stages.items():
-        _, processor, peak = measure([graspmap, name, folder / source, "-o", folder / target,
-                                      *flags, "--quiet"])
-        found[name] = (processor / (side * side), peak)
-    return found
-
-
-def table_of_pieces(graspmap, folder, sides):
-    lines = ["| side m | stage | CPU s per m2 | peak MiB |", "|---|---|---|---|"]
-    for side in sides:
-        for name, (processor, peak) in piece_stages(graspmap, folder, side).items():
-            lines.append(f"| {side} | {name} | {processor:.3f} | {peak:.0f} |")
-            print(lines[-1], file=sys.stderr)
-    return "\n".join(lines)
 
 
 def write_points(path, side, count):
@@ -143,15 +115,11 @@ def main():
     parser.add_argument("--repeat", type=int, default=1, help="runs of each; the minimum counts")
     parser.add_argument("--folder", help="where the temporary folder goes")
     parser.add_argument("--page", type=pathlib.Path)
-    parser.add_argument("--pieces", action="store_true", help="stages that write folders of pieces")
     options = parser.parse_args()
     sides = [int(side) for side in options.sides.split(",")]
     graspmap = options.build / "graspmap"
     with tempfile.TemporaryDirectory(prefix="graspmap_scale_", dir=options.folder) as name:
         folder = pathlib.Path(name)
-        if options.pieces:
-            print(table_of_pieces(graspmap, folder, sides))
-            return
         rows = []
         for side in sides:
             rows.append(row_of(graspmap, folder, side, options.repeat if side < 50 else 1))

@@ -22,11 +22,12 @@ listing() {
 
 # SHA-256 of all files below the folder $1, in its order, but those whose name fits the pattern $2. Of
 # what tells how long a run took, without that: of a manifest the section `run`, its last; of a
-# report, which shows all of these, the name alone.
+# store's plan, when its inputs were written; of a report, which shows all of these, the name alone.
 digest() {
   (cd "$1" && find . -mindepth 1 ! -type d ! -name "${2:-}" | LC_ALL=C sort | while read -r file; do
     case $file in
       */report.html | */report.html.json) echo "$file" ;;
+      */progress/plan.json) sed '/"modified_ns"/d' "$file" | sha256sum | sed "s|-|$file|" ;;
       *.json) sed '/^  "run": {/,$d' "$file" | sha256sum | sed "s|-|$file|" ;;
       *) sha256sum "$file" ;;
     esac

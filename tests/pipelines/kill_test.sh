@@ -2,14 +2,18 @@
 # A pipeline, killed again and again at random moments and begun once more, ends with the bytes of an
 # undisturbed run, and leaves no temporary file and no process behind. At one moment in three only one
 # of its processes is killed, and the others a little later. KILLS: how often (6); SPACING: of the
-# scene's points; SEED: of the moments; DEMO=1: the whole demo instead, scan, scene and report, with
-# the variables of make in DEMO_WITH.
+# scene's points; SEED: of the moments; PIECES=1: a scan's way to its map in folders of pieces instead;
+# DEMO=1: the whole demo, scan, scene and report, with the variables of make in DEMO_WITH.
 . "$(dirname "$0")/check.sh"
 kills=${KILLS:-6}
 RANDOM=${SEED:-1}
 set -m # a process group a job
 if [ -n "${DEMO:-}" ]; then
   pipeline="demo.mk ${DEMO_WITH:-}"
+elif [ -n "${PIECES:-}" ]; then
+  "$graspmap" simulate terrain --size 3 --spacing 0.02 -o "$scratch/ground" --quiet
+  "$graspmap" simulate scan "$scratch/ground" --frames 10 -o "$scratch/scan.db" --quiet
+  pipeline="scan.mk SCAN=$scratch/scan.db POSES=odometry TILES=1.5 FUSE=--voxel-size=0.02 MESH=--cell-size=0.02"
 else
   pipeline="primitive_shapes.mk SPACING=${SPACING:-0.02}"
 fi

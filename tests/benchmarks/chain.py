@@ -1,0 +1,144 @@
+#!/usr/bin/python3
+"""Time and memory of every stage from a scan to its map, in pieces, against the area.
+
+usage: chain.py BUILD_FOLDER [--sides 3,10] [--frames-per-m2 3.4] [--folder FOLDER] [--page README.md]
+
+Simulates square rocky terrains at 1 cm and a scan in lanes over each, and runs every stage of
+pipelines/scan.mk with folders of pieces as a process of its own, with two threads; the field test
+with 8 poses of 2 draws. Prints a Markdown table with the exponents between the first and the last
+side; with --page, puts it between the marks of that page and the chart chain.png beside it. All files
+are in a temporary folder in FOLDER (TMPDIR), about 12 MB a frame and square meter, and are removed.
+A side that ended earlier is read from FOLDER/chain_SIDE.json instead.
+"""
+
+import argparse
+import json
+import math
+import os
+import pathlib
+import subprocess
+import sys
+import tempfile
+import time
+
+BEGIN = "<!-- chain: written by scripts/bench chain -->"
+END = "<!-- end of chain -->"
+# Stage: words, what it reads and makes in the folder.
+STAGES = {
+    "simulate scan": "simulate scan ground --frames {frames} --seed 71 -o scan.db",
+    "refine": "refine scan.db -o poses.tum --report refine.json",
+    "fuse": "fuse scan.db --poses poses.tum -o cloud --corrected-poses fused.tum",
+    "mesh": "mesh cloud -o mesh --cell-size 0.01",
+    "crop": "crop mesh -o site",
+    "texture": "texture site --scan scan.db --poses fused.tum -o model",
+    "resample": "resample site -o samples",
+    "score": "score samples -o map.tiles",
+    "grasp": "grasp site --map map.tiles -o held.tiles --trials 8 --map-draws 2",
+}
+
+
+def measure(words, folder):
+    """(wall s, processor s, peak resident MB) of a command; ends if it fails."""
+    start = time.monotonic()
+    process = subprocess.Popen(words, cwd=folder)
+    _, status, usage = os.wait4(process.pid, 0)
+    process.returncode = os.waitstatus_to_exitcode(status)
+    wall = time.monotonic() - start
+    if process.returncode != 0:
+        sys.exit(f"chain.py: {' '.join(map(str, words))}: ended with {process.returncode}")
+    return {"wall_s": wall, "processor_s": usage.ru_utime + usage.ru_stime,
+            "peak_mb": usage.ru_maxrss / 1024}
+
+
+def run_chain(graspmap, folder, side, frames):
+    """Of each stage its figures, and the errors of the refined poses and of the meshes."""
+    subprocess.run([graspmap, "simulate", "terrain", "--size", str(side), "--seed", "71", "-o", "ground",
+                    "--quiet"], cwd=folder, check=True)
+    found = {"side_m": side, "frames": frames, "stages": {}}
+    for name, words in STAGES.items():
+        line = [graspmap, *words.format(frames=frames).split(), "--threads", "2", "--quiet"]
+        found["stages"][name] = measure(line, folder)
+        print(f"{side} m, {name}: {found['stages'][name]['processor_s']:.1f} s", file=sys.stderr)
+    stages = json.loads((folder / "refine.json").read_text())["stages"]
+    found["rmse_mm"] = [1e3 * stage["absolute_error"]["rmse_m"] for stage in (stages[0], stages[-1])]
+    return found
+
+
+def exponent(first, last, value):
+    """Of a power law of the area through both."""
+    areas = last["side_m"] ** 2 / first["side_m"] ** 2
+    if areas <= 1 or not value(first) > 0:
+        return float("nan")
+    return math.log(value(last) / value(first)) / math.log(areas)
+
+
+def table_of(runs):
+    lines = ["| side m, frames | " + " | ".join(STAGES) + " |", "|---|" + "---|" * len(STAGES)]
+    for run in runs:
+        lines.append(f"| {run['side_m']}, {run['frames']} | " + " | ".join(
+            f"{run['stages'][name]['processor_s']:.1f} s, {run['stages'][name]['peak_mb']:.0f} MB"
+            for name in STAGES) + " |")
+    if len(runs) > 1:
+        lines.append("| exponents of area | " + " | ".join(
+            "{:.2f}, {:.2f}".format(*(
+                exponent(runs[0], runs[-1], lambda run, key=key, name=name: run["stages"][name][key])
+                for key in ("processor_s", "peak_mb"))) for name in STAGES) + " |")
+    errors = ", ".join(f"{run['rmse_mm'][0]:.1f} -> {run['rmse_mm'][1]:.2f} mm at {run['side_m']} m"
+                       for run in runs)
+    return "\n".join(lines) + f"\n\nRMSE of the poses, odometry -> refined: {errors}."
+
+
+def draw(runs, path):
+    import matplotlib
+    matplotlib.use("Agg")
+    from matplotlib import pyplot
+    figure, axes = pyplot.subplots(1, 2, figsize=(9, 3.6))
+    areas = [run["side_m"] ** 2 for run in runs]
+    for axis, key, label in zip(axes, ("processor_s", "peak_mb"), ("processor time, s", "peak memory, MB")):
+        for name in STAGES:
+            axis.loglog(areas, [run["stages"][name][key] for run in runs], "o-", label=name)
+        axis.set(xlabel="area, m2", ylabel=label)
+        axis.grid(True, which="both", alpha=0.3)
+    axes[1].legend(fontsize=7)
+    figure.tight_layout()
+    figure.savefig(path, dpi=90)
+
+
+def put_into_page(page, text):
+    content = page.read_text(encoding="utf-8")
+    if BEGIN not in content or END not in content:
+        sys.exit(f"chain.py: {page}: the marks of this table are not there: {BEGIN} ... {END}")
+    before, rest = content.split(BEGIN, 1)
+    page.write_text(before + BEGIN + "\n\n" + text + "\n\n" + END + rest.split(END, 1)[1],
+                    encoding="utf-8")
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("build", type=pathlib.Path)
+    parser.add_argument("--sides", default="3,10")
+    parser.add_argument("--frames-per-m2", type=float, default=3.4)
+    parser.add_argument("--folder", type=pathlib.Path, help="where the temporary folder goes")
+    parser.add_argument("--page", type=pathlib.Path)
+    options = parser.parse_args()
+    graspmap = (options.build / "graspmap").resolve()
+    runs = []
+    for side in map(int, options.sides.split(",")):
+        kept = options.folder / f"chain_{side}.json" if options.folder else None
+        if kept and kept.exists():
+            runs.append(json.loads(kept.read_text()))
+            continue
+        with tempfile.TemporaryDirectory(prefix="graspmap_chain_", dir=options.folder) as name:
+            frames = max(20, round(options.frames_per_m2 * side * side))
+            runs.append(run_chain(graspmap, pathlib.Path(name), side, frames))
+        if kept:
+            kept.write_text(json.dumps(runs[-1]))
+    text = table_of(runs)
+    print(text)
+    if options.page:
+        draw(runs, options.page.parent / "chain.png")
+        put_into_page(options.page, text + "\n\n![Time and memory of each stage](chain.png)")
+
+
+if __name__ == "__main__":
+    main()
