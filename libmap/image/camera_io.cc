@@ -69,7 +69,8 @@ std::vector<double> matrix_of(const YAML::Node& node, const std::string& field,
     return numbers;
   }
   if (!node["data"]) throw Error("is missing", {.field = field + ".data"});
-  if (!node["data"].IsNull()) append_numbers(node["data"], field + ".data", 0, max_numbers, numbers);
+  if (!node["data"].IsNull())
+    append_numbers(node["data"], field + ".data", 0, max_numbers, numbers);
   if (node["rows"] && node["cols"]) {
     const double promised =
         number_of(node["rows"], field + ".rows") * number_of(node["cols"], field + ".cols");
@@ -151,7 +152,7 @@ DepthCorrection depth_correction_of(const YAML::Node& root) {
   const std::vector<double> range = sized_matrix(root, "depth_correction_range", 2);
   depth.first_m = range[0];
   depth.step_m = range[1];
-  const std::vector<double> radial = 
+  const std::vector<double> radial =
       sized_matrix(root, "depth_correction_radial", depth.radial.size());
   std::copy(radial.begin(), radial.end(), depth.radial.begin());
   depth.check();
@@ -302,10 +303,11 @@ std::string to_yaml(const CameraFile& file, const std::string& comment) {
     text += pose_text("depth_registration", file.color_from_depth);
   if (file.depth.scale != 1.0) text += "depth_scale: " + to_text(file.depth.scale) + "\n";
   if (const DepthCorrection& depth = file.depth; !depth.spline_m.empty())
-    text += matrix_text("depth_correction", 1, static_cast<int>(depth.spline_m.size()),
-                        depth.spline_m) +
-            matrix_text("depth_correction_range", 1, 2, {depth.first_m, depth.step_m}) +
-            matrix_text("depth_correction_radial", 1, 3, {depth.radial.begin(), depth.radial.end()});
+    text +=
+        matrix_text("depth_correction", 1, static_cast<int>(depth.spline_m.size()),
+                    depth.spline_m) +
+        matrix_text("depth_correction_range", 1, 2, {depth.first_m, depth.step_m}) +
+        matrix_text("depth_correction_radial", 1, 3, {depth.radial.begin(), depth.radial.end()});
   if (file.depth_delay_s != 0.0 || file.rolling_shutter_s != 0.0)
     text += matrix_text("camera_timing", 1, 2, {file.depth_delay_s, file.rolling_shutter_s});
   if (file.motions.empty()) return text;

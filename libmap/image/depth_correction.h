@@ -1,7 +1,7 @@
 // A smooth correction of a camera's depth: what is added to it as a function of depth (a uniform
-// cubic B-spline) and of the radius in the image, and a scale of the sum. Linear in the numbers that
-// are added, so that they are estimated by least squares. Teichman et al. (2013) correct each range
-// and each place in the image; a scan has too few data for that.
+// cubic B-spline) and of the radius in the image, and a scale of the sum. Linear in the numbers
+// that are added, so that they are estimated by least squares. Teichman et al. (2013) correct each
+// range and each place in the image; a scan has too few data for that.
 #pragma once
 
 #include <array>

@@ -56,8 +56,7 @@ bool ObservationCost::Evaluate(const double* const* blocks, double* residual,
     added_by_time = depth_by_motion.dot(motion);
     added += later_s * added_by_time - calibrated_.by_step.dot(calibrated_.known_step);
   }
-  const Eigen::Vector3d p =
-      camera_from_base_ * (in_base - time_s * velocity - base_from_camera_);
+  const Eigen::Vector3d p = camera_from_base_ * (in_base - time_s * velocity - base_from_camera_);
   if (p.z() < 1e-3) return false;
   if (calibrated_.depth) {
     for (std::size_t n = 0; n < 4; ++n) added += blocks[depth + n][0] * calibrated_.terms.spline[n];

@@ -120,8 +120,8 @@ void Refinement::calibrate_sensor() {
       break;
     }
     if (pass == max_calibrations ||
-        (pass > 1 && takes_depth_from_near(before, result_.calibration, settled_m, settled_rad,
-                                           settled_s)))
+        (pass > 1 &&
+         takes_depth_from_near(before, result_.calibration, settled_m, settled_rad, settled_s)))
       break;
     match_again();
     calibrated = std::move(frames_);
@@ -163,8 +163,8 @@ void Refinement::find_scale() {
   };
   std::optional<ScaleEstimate> scale;
   if (!options_.known_lengths.empty()) {
-    scale = scale_by_lengths(stored_frames_.empty() ? frames_ : stored_frames_,
-                             result_.calibration, poses_, options_.known_lengths);
+    scale = scale_by_lengths(stored_frames_.empty() ? frames_ : stored_frames_, result_.calibration,
+                             poses_, options_.known_lengths);
     result_.scale = "scale " + times(*scale) + " by known lengths: corrected";
     if (scale->chi_square > 9.0)
       result_.warnings.push_back("known lengths disagree by " +

@@ -173,8 +173,8 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
     for (bool Model::*const part_of : parts) {
       Model simpler = best.model;
       simpler.*part_of = false;
-      if (!is_good(best) || !choice.only_if_better || !choice.leave_out ||
-          !(best.model.*part_of) || simpler.name().empty())
+      if (!is_good(best) || !choice.only_if_better || !choice.leave_out || !(best.model.*part_of) ||
+          simpler.name().empty())
         continue;
       Candidate candidate = attempt(simpler, best.adjustment.calibration);
       if (is_good(candidate) && !is_needed(candidate.costs, best.costs))
@@ -201,8 +201,8 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
 
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s) {
-  const std::size_t cameras = std::max({a.color_from_depth.size(), b.color_from_depth.size(),
-                                        a.timing.size(), b.timing.size()});
+  const std::size_t cameras = std::max(
+      {a.color_from_depth.size(), b.color_from_depth.size(), a.timing.size(), b.timing.size()});
   const auto pose_of = [](const SensorCalibration& of, std::size_t n) {
     return n < of.color_from_depth.size() ? of.color_from_depth[n] : Pose::Identity();
   };
@@ -240,10 +240,10 @@ CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
     file.rolling_shutter_s = calibration.timing[n].rolling_shutter_s;
     for (const GraphNode& node : graph.nodes)
       if (const auto motion = calibration.motion.find(node.id); motion != calibration.motion.end())
-        file.motions.push_back(
-            {node.stamp_s, motion->second.head<3>(), motion->second.tail<3>()});
-    std::stable_sort(file.motions.begin(), file.motions.end(),
-                     [](const FrameMotion& a, const FrameMotion& b) { return a.stamp_s < b.stamp_s; });
+        file.motions.push_back({node.stamp_s, motion->second.head<3>(), motion->second.tail<3>()});
+    std::stable_sort(
+        file.motions.begin(), file.motions.end(),
+        [](const FrameMotion& a, const FrameMotion& b) { return a.stamp_s < b.stamp_s; });
   }
   return file;
 }
@@ -277,11 +277,10 @@ std::vector<std::string> findings(const SensorCalibration& calibration,
       highest = std::max(highest, bend(z, 0.0));
     }
     const double middle = 0.5 * (depth.first_m + depth.last_m());
-    sentences.push_back(
-        of_camera(n) + "depth bends by " + to_fixed_text(500.0 * (highest - lowest), 1) +
-        " mm with range and by " +
-        to_fixed_text(1e3 * std::abs(bend(middle, 1.0) - bend(middle, 0.0)), 1) +
-        " mm toward the corners: corrected");
+    sentences.push_back(of_camera(n) + "depth bends by " +
+                        to_fixed_text(500.0 * (highest - lowest), 1) + " mm with range and by " +
+                        to_fixed_text(1e3 * std::abs(bend(middle, 1.0) - bend(middle, 0.0)), 1) +
+                        " mm toward the corners: corrected");
   }
   for (std::size_t n = 0; n < std::min(calibration.color_from_depth.size(), cameras.size()); ++n) {
     const Pose& pose = calibration.color_from_depth[n];

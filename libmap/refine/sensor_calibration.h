@@ -1,5 +1,5 @@
-// Focal lengths, principal points, depth corrections, registration of depth to color and timing of a
-// scan's cameras from the scan itself.
+// Focal lengths, principal points, depth corrections, registration of depth to color and timing of
+// a scan's cameras from the scan itself.
 #pragma once
 
 #include <cstddef>
@@ -36,11 +36,11 @@ struct CalibrationEstimate {
 
 // Bundle adjustments with free intrinsics, depth corrections and registration of depth to color,
 // all together at first, since a false focal length absorbs errors of depth. If that fits the
-// held-out data clearly better, each of them is left out again unless the fit becomes clearly worse;
-// if not, intrinsics alone are tried. Timing needs a motion for each frame, so it is tried last. A long
-// scan is represented by the
-// `max_frames` frames that links join most closely to the one with most links: more frames do not
-// improve the estimate. `links` join frames, `graph_links` are other links of the graph.
+// held-out data clearly better, each of them is left out again unless the fit becomes clearly
+// worse; if not, intrinsics alone are tried. Timing needs a motion for each frame, so it is tried
+// last. A long scan is represented by the `max_frames` frames that links join most closely to the
+// one with most links: more frames do not improve the estimate. `links` join frames, `graph_links`
+// are other links of the graph.
 CalibrationEstimate estimate_calibration(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
@@ -51,8 +51,8 @@ CalibrationEstimate estimate_calibration(
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s);
 
-// The n-th of the cameras with the calibration, for a file; `picture` is the camera of its pictures,
-// `graph` has the stamps of the nodes.
+// The n-th of the cameras with the calibration, for a file; `picture` is the camera of its
+// pictures, `graph` has the stamps of the nodes.
 CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
                              const SensorCalibration& calibration, std::size_t n,
                              const PoseGraph& graph);

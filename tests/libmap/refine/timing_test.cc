@@ -104,8 +104,9 @@ struct Way {
   std::vector<libmap::GraphComponent> components = {{{}, 1}};
 };
 
-// A camera that sways by up to 0.6 m/s in front of `points`, and whose pictures' rows are exposed one
-// after the other. At a steady speed nothing tells the rows' times from the places of the points.
+// A camera that sways by up to 0.6 m/s in front of `points`, and whose pictures' rows are exposed
+// one after the other. At a steady speed nothing tells the rows' times from the places of the
+// points.
 Way way_with_rows(const std::vector<Eigen::Vector3d>& points, double rolling_shutter_s) {
   Way way;
   const auto pose_at = [](double time_s) { return beside(0.4 * std::sin(1.5 * time_s)); };
@@ -136,11 +137,11 @@ TEST(BundleAdjustment, FindsTheTimeOfThePicturesRows) {
   const Way way = way_with_rows(points, 0.06);
   libmap::BundleAdjustmentOptions options;
   options.max_iterations = 100;
-  const auto held = libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components,
-                                          options);
+  const auto held =
+      libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components, options);
   options.refine_timing = true;
-  const auto free = libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components,
-                                          options);
+  const auto free =
+      libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components, options);
   ASSERT_EQ(free.calibration.timing.size(), 1U);
   EXPECT_NEAR(free.calibration.timing[0].rolling_shutter_s, 0.06, 0.006);
   EXPECT_EQ(free.calibration.motion.size(), way.frames.size());
@@ -165,8 +166,8 @@ TEST(BundleAdjustment, FindsNoTimeWhereRowsAreExposedAtOnce) {
   const Way way = way_with_rows(random_points(150), 0.0);
   libmap::BundleAdjustmentOptions options;
   options.refine_timing = true;
-  const auto found = libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components,
-                                           options);
+  const auto found =
+      libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components, options);
   EXPECT_NEAR(found.calibration.timing.at(0).rolling_shutter_s, 0.0, 1e-4);
   EXPECT_NEAR(found.calibration.timing.at(0).depth_delay_s, 0.0, 1e-4);
 }
@@ -182,9 +183,8 @@ TEST(SensorCalibration, LateDepthIsMovedBack) {
   EXPECT_LT((pose.translation() - Eigen::Vector3d(0.0, 0.0, 0.02)).norm(), 1e-12);
   calibration.timing[0].rolling_shutter_s = 0.05;
   const double row = libmap::row_share_of(frame.features[0], frame.cameras[0]);
-  EXPECT_NEAR(
-      libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
-      0.4 * (0.05 - 0.05 * row), 1e-12);
+  EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
+              0.4 * (0.05 - 0.05 * row), 1e-12);
 }
 
 }  // namespace timing_test
