@@ -5,6 +5,7 @@
 #include "libmap/texture/textured_mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/piece_folder.h"
 #include "tools/support/scan_poses.h"
 
 using namespace graspmap_tools;
@@ -23,6 +24,7 @@ struct TextureCommandOptions {
   PosesOption poses;
   std::string calibration;
   MeshFrame frame = MeshFrame::automatic;
+  double margin_m = 2.0;
   libmap::TextureOptions texture;
   libmap::TexturedMeshWriteOptions writing;
 };
@@ -35,6 +37,8 @@ void bind(libmap::ParameterTable& table, TextureCommandOptions& options) {
             "frame of the mesh; ground-truth: poses are aligned with the true ones; auto: as the "
             "mesh's manifest says, else poses");
   libmap::bind(table, options.texture);
+  table.add("margin_m", options.margin_m, libmap::not_negative,
+            "where the output is a folder: what is further from a piece does not hide it, m");
   table.add("image_format", options.writing.image_format,
             {{"png", libmap::ImageFormat::png}, {"jpeg", libmap::ImageFormat::jpeg}},
             "of the texture's pages");
@@ -74,13 +78,13 @@ libmap::TextureResult textured(const TextureCommandOptions& options, const libma
   });
 }
 
-void add_results(const libmap::TextureResult& result, Run& run) {
+void add_results(const libmap::TextureReport& result, Run& run) {
   std::vector<double> gains;
   for (const Eigen::Vector3f& gain : result.exposure.gains)
     for (const float channel : gain) gains.push_back(static_cast<double>(channel));
   run.add_results({{"photographs", result.photos},
                    {"skipped_frames", result.skipped.size()},
-                   {"triangles", result.model.mesh.triangles.size()},
+                   {"triangles", result.seen_triangles + result.unseen_triangles},
                    {"triangles_by_cutting", result.cut_triangles},
                    {"seen_triangles", result.seen_triangles},
                    {"unseen_triangles", result.unseen_triangles},
@@ -89,7 +93,7 @@ void add_results(const libmap::TextureResult& result, Run& run) {
                    {"charts", result.charts},
                    {"split_charts", result.split_charts},
                    {"shrunk_charts", result.shrunk_charts},
-                   {"pages", result.model.pages.size()},
+                   {"pages", result.pages},
                    {"texel_size_m", result.texel_size_m},
                    {"atlas_scale", result.atlas_scale},
                    {"seams_before_m", result.seams_before_m},
@@ -100,18 +104,18 @@ void add_results(const libmap::TextureResult& result, Run& run) {
                    {"vignetting", result.exposure.vignetting}});
 }
 
-void say_result(const libmap::TextureResult& result, Run& run) {
+void say_result(const libmap::TextureReport& result, Run& run) {
+  const std::size_t triangles = result.seen_triangles + result.unseen_triangles;
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
   run.add_timings(result.timings_s);
   run.say(
       "{} photographs, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) "
       "are seen by none and gray",
-      result.photos, result.charts, result.model.pages.size(),
-      result.model.pages.size() == 1 ? "" : "s", 1e3 * result.texel_size_m, result.unseen_triangles,
-      result.model.mesh.triangles.size(), result.unseen_m2);
+      result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
+      1e3 * result.texel_size_m, result.unseen_triangles, triangles, result.unseen_m2);
   // More than what lies behind the rocks: the poses are of another frame, or see another part.
-  if (5 * result.unseen_triangles > result.model.mesh.triangles.size())
+  if (5 * result.unseen_triangles > triangles)
     run.warn("a fifth of the triangles or more is seen by no photograph: see --frame and --poses");
   if (result.split_charts > 0)
     run.say("{} charts larger than a page were cut", result.split_charts);
@@ -149,22 +153,30 @@ std::vector<fs::path> pages_of_earlier_run(const fs::path& output) {
   return pages;
 }
 
-void texture(TextureCommandOptions options, Run& run) {
-  libmap::require_textured_format(options.output);
-  libmap::require_mesh_format(options.mesh);
+std::vector<std::string> inputs_of(const TextureCommandOptions& options) {
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.mesh);
   inputs.push_back(options.calibration);
-  run.claim_output(options.output, inputs);
+  return inputs;
+}
+
+void report(const TextureCommandOptions& options, const libmap::TextureReport& result, Run& run) {
+  run.add_input(options.mesh);
+  if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
+  add_results(result, run);
+  say_result(result, run);
+}
+
+void texture(TextureCommandOptions options, Run& run) {
+  libmap::require_textured_format(options.output);
+  if (!fs::is_directory(options.mesh)) libmap::require_mesh_format(options.mesh);
+  run.claim_output(options.output, inputs_of(options));
   run.require_own_companions(options.output,
                              libmap::companions_of_model(options.output, options.writing));
   const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
-  run.add_input(options.mesh);
-  if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
-  add_results(result, run);
-  say_result(result, run);
+  report(options, result, run);
   const std::vector<fs::path> old_pages = pages_of_earlier_run(options.output);
   const std::vector<libmap::ModelFile> files =
       libmap::textured_mesh_files(options.output, result.model, options.writing);
@@ -174,19 +186,51 @@ void texture(TextureCommandOptions options, Run& run) {
   if (!run.options().dry_run) remove_old_pages(old_pages, files);
 }
 
+// Each piece's model is made, written and forgotten.
+void texture_in_pieces(TextureCommandOptions options, Run& run) {
+  const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
+  const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".glb");
+  run.claim_output_tree(options.output, names, inputs_of(options));
+  const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
+  const libmap::Trajectory poses = poses_of(options, *scan, run);
+  run.write_output_tree(options.output, names, [&](const fs::path& folder) {
+    if (folder.empty()) return;
+    libmap::MeshPieceIndex index(pieces);
+    const auto write = [&](std::size_t piece, const libmap::TexturedMesh& model) {
+      const fs::path file = folder / (index.path(piece).stem().string() + ".glb");
+      for (const libmap::ModelFile& part :
+           libmap::textured_mesh_files(file, model, options.writing))
+        part.write(part.path);
+    };
+    report(options,
+           in_file(options.mesh,
+                   [&] {
+                     return libmap::texture_pieces(index, options.margin_m, *scan, poses,
+                                                   options.texture, write, run.progress());
+                   }),
+           run);
+    run.add_results({{"pieces", pieces.size()}});
+  });
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
   TextureCommandOptions options;
   Command command("texture");
-  command.input("MESH", options.mesh, "mesh in the frame of the poses (.ply, .obj, ...)");
+  command.input("MESH", options.mesh,
+                "mesh in the frame of the poses (.ply, .obj, ...), or a folder of its pieces");
   command.output(
       options.output,
-      "textured mesh (.glb; .obj: with STEM.mtl and a picture per page, STEM_0.png ...)");
+      std::string("textured mesh (.glb; .obj: with STEM.mtl and a picture per page, STEM_0.png "
+                  "...)") +
+          or_piece_folder);
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   bind(command.parameters(), options);
-  return command.run(argc, argv, [&](Run& run) { texture(options, run); });
+  return command.run(argc, argv, [&](Run& run) {
+    is_piece_folder(options.output) ? texture_in_pieces(options, run) : texture(options, run);
+  });
 }

@@ -1,6 +1,7 @@
 // Wall times of the steps of a stage, as its result struct and the manifest keep them.
 #pragma once
 
+#include <algorithm>
 #include <chrono>
 #include <string>
 #include <utility>
@@ -10,14 +11,20 @@ namespace libmap {
 
 using StageTimings = std::vector<std::pair<std::string, double>>;  // step, seconds
 
-// Adds the time from its construction to its end, by an exception too.
+// Adds the time from its construction to its end, by an exception too; the times of steps of one
+// name are one.
 class StageTimer {
  public:
   StageTimer(StageTimings& timings_s, std::string name)
       : timings_s_(timings_s), name_(std::move(name)) {}
   ~StageTimer() {
     const std::chrono::duration<double> taken = std::chrono::steady_clock::now() - start_;
-    timings_s_.emplace_back(std::move(name_), taken.count());
+    const auto same = std::find_if(timings_s_.begin(), timings_s_.end(),
+                                   [this](const auto& timing) { return timing.first == name_; });
+    if (same != timings_s_.end())
+      same->second += taken.count();
+    else
+      timings_s_.emplace_back(std::move(name_), taken.count());
   }
   StageTimer(const StageTimer&) = delete;
   StageTimer& operator=(const StageTimer&) = delete;

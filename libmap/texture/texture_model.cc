@@ -7,6 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/mesh_parts.h"
 #include "libmap/texture/mesh_subdivision.h"
 #include "libmap/texture/texture_painting.h"
 #include "libmap/texture/texture_photos.h"
@@ -17,6 +18,9 @@ namespace {
 
 // Views of a triangle among which one is chosen.
 constexpr std::size_t views_a_triangle = 12;
+// Vertices whose colors are compared between all photographs; of each of many pieces at least.
+constexpr std::size_t observed_vertices = 20000;
+constexpr std::size_t min_observed_vertices = 200;
 // Triangles that all photographs show smaller are not cut; nor are any where more would come out.
 constexpr double min_cut_px = 16.0;
 constexpr std::uint64_t max_cut_triangles = 2'500'000;
@@ -37,104 +41,174 @@ bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& 
 
 class Texturing {
  public:
-  Texturing(const TextureOptions& options, Progress& progress)
-      : options_(options), progress_(progress) {}
+  Texturing(const ScanSource& scan, const Trajectory& world_from_base,
+            const TextureOptions& options, Progress& progress);
 
-  TextureResult run(const TriangleMesh& input, const ScanSource& scan,
-                    const Trajectory& world_from_base);
+  TextureResult whole(const TriangleMesh& mesh);
+  TextureReport pieces(MeshPieceIndex& index, double margin_m, const UseModel& use);
 
  private:
   template <typename Step>
   auto timed(const char* name, const Step& step) {
-    return libmap::timed(result_.timings_s, name, step);
+    return libmap::timed(report_.timings_s, name, step);
   }
-  TriangleMesh cut_finely(const TriangleMesh& input, const TexturePhotos& photos);
+  MeshWithMargin cut_finely(MeshWithMargin part) const;
+  std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
+  void even_out(const std::vector<ColorObservation>& observations) {
+    report_.exposure = even_out_exposure(observations, photos_->size(), options_.exposure);
+  }
+  TextureViewRequest views_of(const MeshWithMargin& part) const {
+    return {part.triangles, views_a_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
+            0};
+  }
+  // With all of its vertices, of which those of the margin belong to no triangle.
+  TexturedMesh paint(MeshWithMargin part, const TextureViews& views, Progress& progress);
   void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);
-  void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh,
-                    const TexturePhotos& photos);
+  void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh);
+  TextureReport finished();
 
   const TextureOptions& options_;
   Progress& progress_;
-  TextureResult result_;
+  std::unique_ptr<TexturePhotos> photos_;
+  TextureReport report_;
+  double texels_ = 0.0;
 };
 
-TriangleMesh Texturing::cut_finely(const TriangleMesh& input, const TexturePhotos& photos) {
-  if (!(options_.max_side_m > 0.0)) return input;
+Texturing::Texturing(const ScanSource& scan, const Trajectory& world_from_base,
+                     const TextureOptions& options, Progress& progress)
+    : options_(options), progress_(progress) {
+  check_parameters(options);
+  photos_ = timed("photographs", [&] {
+    return std::make_unique<TexturePhotos>(scan, world_from_base, options.strict, progress);
+  });
+  report_.photos = photos_->size();
+  report_.skipped = photos_->skipped();
+}
+
+MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
+  if (!(options_.max_side_m > 0.0)) return part;
   SubdivisionResult fine = split_long_sides(
-      input, options_.max_side_m, max_cut_triangles,
-      [&photos](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, photos); });
-  result_.cut_triangles = fine.mesh.triangles.size() - input.triangles.size();
-  return std::move(fine.mesh);
+      part.mesh, options_.max_side_m, max_cut_triangles,
+      [this](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, *photos_); });
+  // Parts take the place of their triangle.
+  const auto own = std::lower_bound(fine.source.begin(), fine.source.end(), part.triangles);
+  return {std::move(fine.mesh), static_cast<std::size_t>(own - fine.source.begin())};
 }
 
 void Texturing::count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label) {
   for (std::size_t t = 0; t < label.size(); ++t) {
     const double area = 0.5 * area_normal(mesh, mesh.triangles[t]).norm();
-    (label[t] == no_photo ? result_.unseen_m2 : result_.seen_m2) += area;
-    ++(label[t] == no_photo ? result_.unseen_triangles : result_.seen_triangles);
+    (label[t] == no_photo ? report_.unseen_m2 : report_.seen_m2) += area;
+    ++(label[t] == no_photo ? report_.unseen_triangles : report_.seen_triangles);
   }
-  if (result_.seen_triangles == 0)
-    throw Error("none of its triangles is seen by any of " + std::to_string(result_.photos) +
-                " photographs: mesh and poses may lie in different frames");
 }
 
-void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh,
-                             const TexturePhotos& photos) {
-  result_.charts = atlas.charts.size();
-  result_.split_charts = atlas.split_charts;
-  result_.shrunk_charts = atlas.shrunk_charts;
-  result_.atlas_scale = atlas.scale;
-  double texels = 0.0;
+void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh) {
+  report_.charts += atlas.charts.size();
+  report_.split_charts += atlas.split_charts;
+  report_.shrunk_charts += atlas.shrunk_charts;
+  report_.pages += atlas.pages.size();
+  report_.atlas_scale = std::min(report_.atlas_scale, atlas.scale);
   for (const TextureChart& chart : atlas.charts)
     for (const std::uint32_t t : chart.triangles) {
-      const PhotoProjector& projector = photos[chart.photo].projector;
+      const PhotoProjector& projector = (*photos_)[chart.photo].projector;
       const Triangle& corners = mesh.triangles[t];
       const Eigen::Vector2d a = place_on_page(chart, projector, mesh.vertices[corners[0]]);
       const Eigen::Vector2d ab = place_on_page(chart, projector, mesh.vertices[corners[1]]) - a;
       const Eigen::Vector2d ac = place_on_page(chart, projector, mesh.vertices[corners[2]]) - a;
-      texels += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
+      texels_ += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
     }
-  result_.texel_size_m = texels > 0.0 ? std::sqrt(result_.seen_m2 / texels) : 0.0;
 }
 
-TextureResult Texturing::run(const TriangleMesh& input, const ScanSource& scan,
-                             const Trajectory& world_from_base) {
-  check_parameters(options_);
-  input.check();
-  if (input.triangles.empty()) throw Error("the mesh has no triangles");
-  const auto photos = timed("photographs", [&] {
-    return std::make_unique<TexturePhotos>(scan, world_from_base, options_.strict, progress_);
-  });
-  result_.photos = photos->size();
-  result_.skipped = photos->skipped();
-  const TriangleMesh mesh = timed("cutting", [&] { return cut_finely(input, *photos); });
-  const TextureViews views = timed("views", [&] {
-    return find_texture_views(mesh, *photos, options_.views, views_a_triangle,
-                              static_cast<std::size_t>(options_.blend_views) + 1, progress_);
-  });
+TexturedMesh Texturing::paint(MeshWithMargin part, const TextureViews& views, Progress& progress) {
+  TriangleMesh& mesh = part.mesh;
+  mesh.triangles.resize(part.triangles);
+  for (ScalarField& field : mesh.face_fields) field.values.resize(part.triangles);
   const auto opposite = timed("edges", [&] { return opposites_of(mesh); });
   const TextureLabels labels = timed("labeling", [&] {
     return label_triangles(mesh, opposite, views.of_triangles, options_.labeling);
   });
-  result_.seams_before_m = labels.seams_before_m;
-  result_.seams_m = labels.seams_m;
+  report_.seams_before_m += labels.seams_before_m;
+  report_.seams_m += labels.seams_m;
   count_seen(mesh, labels.photos);
-  result_.exposure = timed("exposure", [&] {
-    return even_out_exposure(views.observations, photos->size(), options_.exposure);
-  });
   const TextureAtlas atlas = timed("atlas", [&] {
-    return make_texture_atlas(mesh, opposite, labels.photos, *photos, options_.atlas);
+    return make_texture_atlas(mesh, opposite, labels.photos, *photos_, options_.atlas);
   });
-  count_charts(atlas, mesh, *photos);
-  result_.model = timed("painting", [&] {
-    TexturedMesh model = atlas.make_model(mesh, *photos);
+  count_charts(atlas, mesh);
+  return timed("painting", [&] {
+    TexturedMesh model = atlas.make_model(mesh, *photos_);
     const BlendingShares shares =
         share_views(views.of_vertices, options_.blend_views, options_.blend_exponent);
-    paint_texture(atlas, {*photos, result_.exposure, shares, options_.unseen_color}, model,
-                  progress_);
+    paint_texture(atlas, {*photos_, report_.exposure, shares, options_.unseen_color}, model,
+                  progress);
     return model;
   });
-  return std::move(result_);
+}
+
+TextureReport Texturing::finished() {
+  if (report_.seen_triangles == 0)
+    throw Error("none of its triangles is seen by any of " + std::to_string(report_.photos) +
+                " photographs: mesh and poses may lie in different frames");
+  report_.texel_size_m = texels_ > 0.0 ? std::sqrt(report_.seen_m2 / texels_) : 0.0;
+  return std::move(report_);
+}
+
+TextureResult Texturing::whole(const TriangleMesh& mesh) {
+  mesh.check();
+  if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
+  const MeshWithMargin part = timed("cutting", [&] {
+    return cut_finely({mesh, mesh.triangles.size()});
+  });
+  report_.cut_triangles = part.triangles - mesh.triangles.size();
+  TextureViewRequest request = views_of(part);
+  request.observed_vertices = observed_vertices;
+  const TextureViews views = timed("views", [&] {
+    return find_texture_views(part.mesh, *photos_, options_.views, request, progress_);
+  });
+  timed("exposure", [&] { even_out(views.observations); });
+  TexturedMesh model = paint(part, views, progress_);
+  return {finished(), std::move(model)};
+}
+
+// Of all pieces together.
+std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double margin_m) {
+  const std::size_t wanted = std::max(min_observed_vertices, observed_vertices / index.size());
+  std::vector<ColorObservation> all;
+  std::size_t before = 0;
+  progress_.begin("exposure", index.size());
+  for (std::size_t piece = 0; piece < index.size(); ++piece) {
+    const MeshWithMargin part = cut_finely(index.with_margin(piece, margin_m));
+    const TextureViews views = find_texture_views(part.mesh, *photos_, options_.views,
+                                                  {part.triangles, 0, 0, wanted}, no_progress());
+    for (ColorObservation seen : views.observations) {
+      seen.vertex += static_cast<std::uint32_t>(before);
+      all.push_back(seen);
+    }
+    before += views.observed_vertices;
+    progress_.advance(1);
+  }
+  progress_.end();
+  return all;
+}
+
+TextureReport Texturing::pieces(MeshPieceIndex& index, double margin_m, const UseModel& use) {
+  timed("exposure", [&] { even_out(observe(index, margin_m)); });
+  progress_.begin("texture", index.size());
+  for (std::size_t piece = 0; piece < index.size(); ++piece) {
+    MeshWithMargin part = index.with_margin(piece, margin_m);
+    const std::size_t uncut = part.triangles;
+    part = timed("cutting", [&] { return cut_finely(std::move(part)); });
+    report_.cut_triangles += part.triangles - uncut;
+    const TextureViews views = timed("views", [&] {
+      return find_texture_views(part.mesh, *photos_, options_.views, views_of(part), no_progress());
+    });
+    TexturedMesh model = paint(std::move(part), views, no_progress());
+    model.mesh = select_triangles(model.mesh, std::vector<bool>(model.mesh.triangles.size(), true));
+    use(piece, model);
+    progress_.advance(1);
+  }
+  progress_.end();
+  return finished();
 }
 
 }  // namespace
@@ -174,7 +248,17 @@ void bind(ParameterTable& table, TextureOptions& options) {
 TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options,
                            Progress& progress) {
-  return Texturing(options, progress).run(mesh, scan, world_from_base);
+  return Texturing(scan, world_from_base, options, progress).whole(mesh);
+}
+
+TextureReport texture_pieces(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
+                             const Trajectory& world_from_base, const TextureOptions& options,
+                             const UseModel& use, Progress& progress) {
+  Texturing texturing(scan, world_from_base, options, progress);
+  if (pieces.size() > 1) return texturing.pieces(pieces, margin_m, use);
+  TextureResult result = texturing.whole(pieces.with_margin(0, 0.0).mesh);
+  use(0, result.model);
+  return result;
 }
 
 }  // namespace libmap

@@ -7,6 +7,7 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <utility>
 #include <vector>
 
@@ -16,6 +17,7 @@
 #include "libmap/core/progress.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/textured_mesh.h"
+#include "libmap/mesh/mesh_piece_index.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_atlas.h"
 #include "libmap/texture/texture_exposure.h"
@@ -42,8 +44,8 @@ struct TextureOptions {
 };
 void bind(ParameterTable& table, TextureOptions& options);
 
-struct TextureResult {
-  TexturedMesh model;
+// Of one model, or of all pieces together.
+struct TextureReport {
   std::size_t photos = 0;
   std::vector<std::pair<int, Error>> skipped;  // frames, and what they lack
   std::size_t cut_triangles = 0;               // more triangles than the mesh had
@@ -54,12 +56,17 @@ struct TextureResult {
   std::size_t charts = 0;
   std::size_t split_charts = 0;
   std::size_t shrunk_charts = 0;
-  double atlas_scale = 1.0;     // below 1 where charts were made smaller for max_pages
+  std::size_t pages = 0;
+  double atlas_scale = 1.0;     // below 1 where charts were made smaller for max_pages; the least
   double texel_size_m = 0.0;    // root of the mean area of a texel on the surface
   double seams_before_m = 0.0;  // with the best photograph for every triangle
   double seams_m = 0.0;
   TextureExposure exposure;
   StageTimings timings_s;
+};
+
+struct TextureResult : TextureReport {
+  TexturedMesh model;
 };
 
 // `mesh` lies in the world of the poses. The same bytes for any number of threads. Throws Error:
@@ -68,5 +75,15 @@ struct TextureResult {
 TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options = {},
                            Progress& progress = no_progress());
+
+using UseModel = std::function<void(std::size_t piece, const TexturedMesh& model)>;
+
+// Calls use(piece, model) for each piece of a mesh, so that memory depends on the size of a piece:
+// each is looked at once for the exposure, which is one for all, and once for its colors. What is
+// up to `margin_m` around a piece may hide it; what stands further away does not. A single piece
+// becomes the model of texture_mesh. Throws Error as texture_mesh.
+TextureReport texture_pieces(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
+                             const Trajectory& world_from_base, const TextureOptions& options,
+                             const UseModel& use, Progress& progress = no_progress());
 
 }  // namespace libmap

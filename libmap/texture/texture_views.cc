@@ -1,8 +1,10 @@
 #include "libmap/texture/texture_views.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <memory>
 #include <numbers>
 
 #include "libmap/core/parallel.h"
@@ -17,8 +19,6 @@ constexpr std::size_t vertices_per_chunk = 4096;
 // Of a photograph's smaller side: within it, towards the border, a view counts less and less.
 constexpr double border_band = 0.15;
 constexpr double min_border_share = 0.05;
-// Vertices whose colors are compared between all photographs.
-constexpr std::size_t wanted_observed_vertices = 20000;
 // A triangle that is larger in the photograph is tested at its center too.
 constexpr float center_test_px = 6.0F;
 
@@ -44,10 +44,12 @@ double smooth_step(double t) {
 class ViewFinder {
  public:
   ViewFinder(const TriangleMesh& mesh, const TexturePhotos& photos,
-             const TextureViewOptions& options, TextureViews& views)
+             const TextureViewOptions& options, const TextureViewRequest& request,
+             TextureViews& views)
       : mesh_(mesh),
         photos_(photos),
         options_(options),
+        request_(request),
         views_(views),
         caster_(mesh),
         around_(triangles_at_vertices(mesh.triangles, mesh.vertices.size())),
@@ -57,11 +59,17 @@ class ViewFinder {
     normals_.reserve(mesh.triangles.size());
     for (const Triangle& triangle : mesh.triangles)
       normals_.push_back(area_normal(mesh, triangle).normalized());
+    choose_vertices();
   }
 
   void look_from(std::size_t photo) {
     projector_ = &photos_[photo].projector;
-    project_vertices();
+    if (projector_->max_pixels(center_, radius_m_, 1.0) == 0.0) return;
+    project(asked_);
+    if (std::none_of(asked_.begin(), asked_.end(),
+                     [this](std::uint32_t v) { return vertices_[v].in_image; }))
+      return;
+    project(others_);
     fill_cells();
     rate_triangles(photos_[photo].sharpness);
     cast_to_vertices();
@@ -72,7 +80,8 @@ class ViewFinder {
   }
 
  private:
-  void project_vertices();
+  void choose_vertices();
+  void project(const std::vector<std::uint32_t>& vertices);
   void fill_cells();
   bool is_beside_occluder(std::size_t triangle) const;
   void devalue_occluded_edges();
@@ -95,11 +104,20 @@ class ViewFinder {
   const TriangleMesh& mesh_;
   const TexturePhotos& photos_;
   const TextureViewOptions& options_;
+  const TextureViewRequest& request_;
   TextureViews& views_;
   RayCaster caster_;
   VertexTriangles around_;
   double min_cos_;
   std::vector<Eigen::Vector3d> normals_;
+  // Vertices whose views are asked for, a ball around them, and the triangles that decide on them.
+  std::vector<std::uint32_t> asked_;
+  std::vector<std::uint32_t> others_;
+  std::vector<std::uint32_t> observed_;
+  Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
+  double radius_m_ = 0.0;
+  std::vector<std::uint32_t> rated_;
+  std::vector<std::uint32_t> corners_;  // of these
   // Of the photograph at hand.
   const PhotoProjector* projector_ = nullptr;
   std::vector<SeenVertex> vertices_;
@@ -112,13 +130,51 @@ class ViewFinder {
   std::vector<Eigen::Vector3d> cell_rays_;
 };
 
-void ViewFinder::project_vertices() {
+void ViewFinder::choose_vertices() {
+  std::vector<std::uint8_t> is_asked(mesh_.vertices.size(), 0);
+  for (std::size_t t = 0; t < request_.triangles; ++t)
+    for (const std::uint32_t v : mesh_.triangles[t]) is_asked[v] = 1;
+  const auto collect = [&](std::vector<std::uint32_t>& vertices, std::uint8_t wanted) {
+    for (std::uint32_t v = 0; v < is_asked.size(); ++v)
+      if (is_asked[v] == wanted) vertices.push_back(v);
+  };
+  collect(asked_, 1);
+  if (request_.observed_vertices > 0) {
+    const std::size_t step = std::max<std::size_t>(1, asked_.size() / request_.observed_vertices);
+    for (std::size_t i = 0; i < asked_.size(); i += step) observed_.push_back(asked_[i]);
+    views_.observed_vertices = observed_.size();
+  }
+  if (request_.views_a_vertex == 0 && request_.views_a_triangle == 0) {
+    std::fill(is_asked.begin(), is_asked.end(), std::uint8_t{0});
+    for (const std::uint32_t v : observed_) is_asked[v] = 1;
+    asked_ = observed_;
+  }
+  collect(others_, 0);
+  Eigen::AlignedBox3d box;
+  for (const std::uint32_t v : asked_) {
+    box.extend(mesh_.vertices[v]);
+    for (const std::uint32_t t : around_.of(v)) rated_.push_back(t);
+  }
+  const auto make_unique = [](std::vector<std::uint32_t>& numbers) {
+    std::sort(numbers.begin(), numbers.end());
+    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
+  };
+  make_unique(rated_);
+  for (const std::uint32_t t : rated_)
+    corners_.insert(corners_.end(), mesh_.triangles[t].begin(), mesh_.triangles[t].end());
+  make_unique(corners_);
+  if (box.isEmpty()) return;
+  center_ = box.center();
+  radius_m_ = box.diagonal().norm() / 2.0;
+}
+
+void ViewFinder::project(const std::vector<std::uint32_t>& vertices) {
   const Camera& camera = projector_->camera();
   const double border = options_.border_px;
-  parallel_for(vertices_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const Eigen::Vector3d seen = projector_->project(mesh_.vertices[v]);
-      SeenVertex& vertex = vertices_[v];
+  parallel_for(vertices.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      const Eigen::Vector3d seen = projector_->project(mesh_.vertices[vertices[i]]);
+      SeenVertex& vertex = vertices_[vertices[i]];
       vertex = {static_cast<float>(seen.x()), static_cast<float>(seen.y()),
                 static_cast<float>(seen.z()), false, false};
       vertex.in_image = seen.z() > 0.0 && seen.x() >= border && seen.y() >= border &&
@@ -178,9 +234,11 @@ bool ViewFinder::is_beside_occluder(std::size_t t) const {
 
 void ViewFinder::devalue_occluded_edges() {
   if (options_.occlusion_margin_px == 0) return;
-  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
-      if (qualities_[t] > 0.0F && is_beside_occluder(t)) qualities_[t] *= beside_occluder;
+  parallel_for(rated_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) {
+      float& quality = qualities_[rated_[i]];
+      if (quality > 0.0F && is_beside_occluder(rated_[i])) quality *= beside_occluder;
+    }
   });
 }
 
@@ -208,8 +266,8 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
 }
 
 void ViewFinder::rate_triangles(double sharpness) {
-  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) qualities_[t] = rate(t, sharpness);
+  parallel_for(rated_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) qualities_[rated_[i]] = rate(rated_[i], sharpness);
   });
 }
 
@@ -235,7 +293,7 @@ std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points)
 void ViewFinder::cast_to_vertices() {
   std::vector<std::uint32_t> wanted;
   std::vector<Eigen::Vector3d> points;
-  for (std::uint32_t v = 0; v < vertices_.size(); ++v) {
+  for (const std::uint32_t v : corners_) {
     if (!vertices_[v].in_image) continue;
     const auto around = around_.of(v);
     if (std::none_of(around.begin(), around.end(),
@@ -261,7 +319,7 @@ float ViewFinder::longest_side_px(const Triangle& triangle) const {
 void ViewFinder::test_triangles() {
   std::vector<std::uint32_t> wanted;
   std::vector<Eigen::Vector3d> centers;
-  for (std::uint32_t t = 0; t < qualities_.size(); ++t) {
+  for (const std::uint32_t t : rated_) {
     if (!(qualities_[t] > 0.0F)) continue;
     const Triangle& triangle = mesh_.triangles[t];
     if (!vertices_[triangle[0]].visible || !vertices_[triangle[1]].visible ||
@@ -287,30 +345,31 @@ float ViewFinder::quality_at(std::uint32_t v) const {
 }
 
 void ViewFinder::keep(std::uint32_t photo) {
-  parallel_for(qualities_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
-      if (qualities_[t] > 0.0F) views_.of_triangles.insert(t, {photo, qualities_[t]});
-  });
-  parallel_for(vertices_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const float quality = quality_at(static_cast<std::uint32_t>(v));
-      if (quality > 0.0F) views_.of_vertices.insert(v, {photo, quality});
-    }
-  });
+  if (request_.views_a_triangle > 0)
+    parallel_for(request_.triangles, vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t t = begin; t < end; ++t)
+        if (qualities_[t] > 0.0F) views_.of_triangles.insert(t, {photo, qualities_[t]});
+    });
+  if (request_.views_a_vertex > 0)
+    parallel_for(asked_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) {
+        const float quality = quality_at(asked_[i]);
+        if (quality > 0.0F) views_.of_vertices.insert(asked_[i], {photo, quality});
+      }
+    });
 }
 
 void ViewFinder::observe(std::uint32_t photo) {
-  const std::size_t step = std::max<std::size_t>(1, vertices_.size() / wanted_observed_vertices);
   const Camera& camera = projector_->camera();
-  const auto image = photos_.image(photo);
+  std::shared_ptr<const ColorImage> image;  // decoded only where it shows any
   const Eigen::Vector2d middle((camera.width - 1) / 2.0, (camera.height - 1) / 2.0);
-  for (std::size_t v = 0; v < vertices_.size(); v += step) {
-    const SeenVertex& vertex = vertices_[v];
-    if (!(quality_at(static_cast<std::uint32_t>(v)) > 0.0F)) continue;
+  for (std::uint32_t i = 0; i < observed_.size(); ++i) {
+    const SeenVertex& vertex = vertices_[observed_[i]];
+    if (!(quality_at(observed_[i]) > 0.0F)) continue;
+    if (!image) image = photos_.image(photo);
     const Eigen::Vector2d pixel(static_cast<double>(vertex.x), static_cast<double>(vertex.y));
     views_.observations.push_back(
-        {static_cast<std::uint32_t>(v), photo,
-         static_cast<float>((pixel - middle).squaredNorm() / middle.squaredNorm()),
+        {i, photo, static_cast<float>((pixel - middle).squaredNorm() / middle.squaredNorm()),
          sample_bilinear(*image, pixel.x(), pixel.y())});
   }
 }
@@ -334,12 +393,12 @@ void ViewTable::insert(std::size_t row, ViewQuality view) {
 }
 
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,
-                                const TextureViewOptions& options, std::size_t views_a_triangle,
-                                std::size_t views_a_vertex, Progress& progress) {
+                                const TextureViewOptions& options,
+                                const TextureViewRequest& request, Progress& progress) {
   TextureViews views;
-  views.of_triangles = ViewTable(mesh.triangles.size(), views_a_triangle);
-  views.of_vertices = ViewTable(mesh.vertices.size(), views_a_vertex);
-  ViewFinder finder(mesh, photos, options, views);
+  views.of_triangles = ViewTable(request.triangles, request.views_a_triangle);
+  views.of_vertices = ViewTable(mesh.vertices.size(), request.views_a_vertex);
+  ViewFinder finder(mesh, photos, options, request, views);
   progress.begin("views", photos.size());
   for (std::size_t photo = 0; photo < photos.size(); ++photo) {
     finder.look_from(photo);

@@ -53,26 +53,39 @@ class ViewTable {
 
 // What one photograph shows at one vertex.
 struct ColorObservation {
-  std::uint32_t vertex = 0;
+  std::uint32_t vertex = 0;  // of those that are observed
   std::uint32_t photo = 0;
   float radius2 = 0.0F;  // squared distance from the image's middle, 1 in its corners
   Eigen::Vector3f color = Eigen::Vector3f::Zero();  // 0 to 255
 };
 
+// What is asked for of a mesh, and of which part.
+struct TextureViewRequest {
+  // The first so many triangles and their vertices. The others may hide them, and decide with them
+  // how well their common vertices are seen.
+  std::size_t triangles = 0;
+  // 0 both: none, which takes much less time.
+  std::size_t views_a_triangle = 0;
+  std::size_t views_a_vertex = 0;
+  std::size_t observed_vertices = 0;  // about so many, at most twice as many
+};
+
 struct TextureViews {
   // Of triangles that a photograph sees whole.
   ViewTable of_triangles;
-  // Of vertices of which a photograph sees all triangles whole: the least of their qualities.
+  // Of vertices of which a photograph sees all triangles whole: the least of their qualities. One
+  // row for each vertex of the mesh, empty for those of other triangles alone.
   ViewTable of_vertices;
-  // All views of some of the vertices, spread over the mesh.
+  // All views of some of the vertices, spread over the part.
   std::vector<ColorObservation> observations;
+  std::size_t observed_vertices = 0;
 };
 
 // Corners and center of a triangle must be in the photograph and not be hidden (one ray each,
 // Embree). The same for any number of threads. The mesh must have a triangle, and no triangle large
 // against a photograph: it would be seen whole by none.
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,
-                                const TextureViewOptions& options, std::size_t views_a_triangle,
-                                std::size_t views_a_vertex, Progress& progress);
+                                const TextureViewOptions& options,
+                                const TextureViewRequest& request, Progress& progress);
 
 }  // namespace libmap

@@ -9,7 +9,9 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/point_tree.h"
+#include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace pieces_test {
@@ -17,6 +19,7 @@ namespace pieces_test {
 namespace fs = std::filesystem;
 
 using graspmap_test::bad_input;
+using graspmap_test::content;
 using graspmap_test::data_folder;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
@@ -105,6 +108,46 @@ TEST(Pieces, FusedCloudIsThatOfOneFile) {
   EXPECT_EQ(sorted("cloud"), sorted("cloud.pcd"));
   EXPECT_EQ(json_of("cloud.json").at("results").at("points"),
             json_of("cloud.pcd.json").at("results").at("points"));
+}
+
+TEST(Pieces, OneModelPerPiece) {
+  GRASPMAP_REQUIRE_DATA();
+  const std::string scan = data_folder() / "scans" / "site_tiny_q.db";
+  ASSERT_TRUE(succeeded(graspmap(
+      {"fuse", scan, "-o", "cloud", "--tile-size", "2", "--corrected-poses", "poses.tum"})));
+  ASSERT_TRUE(succeeded(
+      graspmap({"mesh", "cloud", "-o", "mesh", "--cell-size", "0.03", "--tile-size", "2"})));
+  Words texture = {"texture", "mesh", "--scan", scan, "--poses", "poses.tum", "-o", "model"};
+  ASSERT_TRUE(succeeded(graspmap(texture)));
+  EXPECT_EQ(files_in("model"), files_in("mesh"));
+  const nlohmann::json results = json_of("model.json").at("results");
+  EXPECT_EQ(results.at("pieces"), files_in("mesh"));
+  EXPECT_EQ(json_of("model.json").at("inputs").size(), files_in("mesh") + 2);
+  std::size_t triangles = 0;
+  std::size_t pages = 0;
+  for (const fs::directory_entry& entry : fs::directory_iterator(scratch("model"))) {
+    const libmap::TexturedMesh model = libmap::read_textured_mesh(entry.path());
+    triangles += model.mesh.triangles.size();
+    pages += model.pages.size();
+  }
+  EXPECT_EQ(results.at("triangles"), triangles);
+  EXPECT_EQ(results.at("pages"), pages);
+  EXPECT_EQ(json_of("mesh.json").at("results").at("triangles").get<std::size_t>() +
+                results.at("triangles_by_cutting").get<std::size_t>(),
+            triangles);
+  // In one picture, as the model in one file.
+  texture.back() = "model.glb";
+  ASSERT_TRUE(succeeded(graspmap(texture)));
+  for (const std::string name : {"model", "model.glb"})
+    ASSERT_TRUE(succeeded(graspmap({"render", name, "--color", "texture", "--width", "320",
+                                    "--height", "240", "-o", name + ".png"})));
+  const libmap::ColorImage a = libmap::decode_color(content("model.png"));
+  const libmap::ColorImage b = libmap::decode_color(content("model.glb.png"));
+  ASSERT_EQ(a.pixels.size(), b.pixels.size());
+  std::size_t different = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); ++i)
+    different += std::abs(a.pixels[i][0] - b.pixels[i][0]) > 8 ? 1 : 0;
+  EXPECT_LT(different, a.pixels.size() / 100);
 }
 
 }  // namespace pieces_test

@@ -9,6 +9,7 @@
 #include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/plan_tiles.h"
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
@@ -159,6 +160,15 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
   return window;
 }
 
+// The files of a folder of textured pieces; none if it is another one, or a file.
+std::vector<std::filesystem::path> models_in(const std::string& file) {
+  std::vector<std::filesystem::path> models;
+  for (const std::string& name : libmap::piece_file_names(file))
+    if (libmap::format_of(name) == ".glb") models.push_back(std::filesystem::path(file) / name);
+  std::sort(models.begin(), models.end());
+  return models;
+}
+
 SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run& run) {
   SceneFile read;
   libmap::Scene& scene = read.scene;
@@ -170,6 +180,12 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
     layer.shape = std::move(window.cloud);
   } else if (libmap::is_textured_format(file)) {
     layer.shape = libmap::read_textured_mesh(file);
+  } else if (const std::vector<std::filesystem::path> models = models_in(file); !models.empty()) {
+    for (const std::filesystem::path& model : models) {
+      if (model != models.front()) scene.layers.push_back(std::move(layer));
+      layer = options.layer;
+      layer.shape = libmap::read_textured_mesh(model);
+    }
   } else if (libmap::file_kind(file) == libmap::FileKind::mesh) {
     layer.shape = libmap::read_mesh(file).mesh;
   } else {

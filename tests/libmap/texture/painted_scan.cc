@@ -5,6 +5,7 @@
 #include <numbers>
 
 #include "libmap/mesh/ray_caster.h"
+#include "tests/support/test_support.h"
 
 namespace graspmap_test {
 
@@ -114,6 +115,22 @@ Eigen::Vector3d soft_marks(const Eigen::Vector3d& p) {
   return {130.0 + 40.0 * std::sin(q.x() / 0.3) + 30.0 * std::cos(q.y() / 0.15),
           120.0 + 30.0 * std::sin((q.x() + q.y()) / 0.25) + 25.0 * std::cos(q.z() / 0.2),
           110.0 + 45.0 * std::cos(q.x() / 0.2) * std::sin(q.y() / 0.24)};
+}
+
+void spoil(PaintedScan& scan, std::vector<Eigen::Vector3d>& gains) {
+  for (std::size_t i = 0; i < scan.size(); ++i) {
+    gains.emplace_back(uniform(0.75, 1.2), uniform(0.75, 1.2), uniform(0.75, 1.2));
+    libmap::ColorImage& photo = scan.photo(i);
+    const Eigen::Vector2d middle((photo.width - 1) / 2.0, (photo.height - 1) / 2.0);
+    for (int y = 0; y < photo.height; ++y)
+      for (int x = 0; x < photo.width; ++x) {
+        const double r2 = (Eigen::Vector2d(x, y) - middle).squaredNorm() / middle.squaredNorm();
+        for (std::size_t c = 0; c < 3; ++c)
+          photo.at(x, y)[c] = static_cast<std::uint8_t>(std::lround(std::min(
+              255.0,
+              photo.at(x, y)[c] * gains[i][static_cast<Eigen::Index>(c)] * (1.0 - 0.3 * r2))));
+      }
+  }
 }
 
 }  // namespace graspmap_test

@@ -39,6 +39,10 @@ class PaintedScan : public libmap::ScanSource {
   std::vector<libmap::ColorImage> photos_;
 };
 
+// Each photograph brighter or darker, of another tint (`gains` gets them), and dark towards its
+// corners.
+void spoil(PaintedScan& scan, std::vector<Eigen::Vector3d>& gains);
+
 // 220 x 180 pixels.
 libmap::Camera small_camera();
 

@@ -22,6 +22,7 @@ using graspmap_test::looking_at;
 using graspmap_test::PaintedScan;
 using graspmap_test::small_camera;
 using graspmap_test::soft_marks;
+using graspmap_test::spoil;
 using graspmap_test::uniform;
 using libmap::TextureOptions;
 using libmap::TextureResult;
@@ -118,23 +119,6 @@ TEST(TextureModel, LensesThatBend) {
   const ColorErrors errors = errors_of(result.model, marks, within(result.model.mesh, 0.37));
   EXPECT_LT(errors.mean, 0.8);
   EXPECT_LT(errors.max, 6.0);
-}
-
-// Each photograph brighter or darker, of another tint, and dark towards its corners.
-void spoil(PaintedScan& scan, std::vector<Eigen::Vector3d>& gains) {
-  for (std::size_t i = 0; i < scan.size(); ++i) {
-    gains.emplace_back(uniform(0.75, 1.2), uniform(0.75, 1.2), uniform(0.75, 1.2));
-    libmap::ColorImage& photo = scan.photo(i);
-    const Eigen::Vector2d middle((photo.width - 1) / 2.0, (photo.height - 1) / 2.0);
-    for (int y = 0; y < photo.height; ++y)
-      for (int x = 0; x < photo.width; ++x) {
-        const double r2 = (Eigen::Vector2d(x, y) - middle).squaredNorm() / middle.squaredNorm();
-        for (std::size_t c = 0; c < 3; ++c)
-          photo.at(x, y)[c] = static_cast<std::uint8_t>(std::lround(std::min(
-              255.0,
-              photo.at(x, y)[c] * gains[i][static_cast<Eigen::Index>(c)] * (1.0 - 0.3 * r2))));
-      }
-  }
 }
 
 TEST(TextureModel, EvensOutExposureAndCorners) {

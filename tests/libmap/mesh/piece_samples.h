@@ -1,0 +1,35 @@
+// Meshes cut into folders of pieces.
+#pragma once
+
+#include <filesystem>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "libmap/core/plan_tiles.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_parts.h"
+
+namespace graspmap_test {
+
+// Files of the triangles whose centers are in each square, in the order of their names.
+inline std::vector<std::filesystem::path> write_pieces(const libmap::TriangleMesh& mesh,
+                                                       double tile_m,
+                                                       const std::filesystem::path& folder) {
+  std::map<std::filesystem::path, std::vector<bool>> parts;
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const Eigen::Vector2d center = center_of(mesh, mesh.triangles[t]).head<2>();
+    const std::string name = piece_file_name(libmap::plan_tile_at(center, tile_m), ".ply");
+    std::vector<bool>& marks = parts[folder / name];
+    marks.resize(mesh.triangles.size());
+    marks[t] = true;
+  }
+  std::vector<std::filesystem::path> files;
+  for (const auto& [file, marks] : parts) {
+    libmap::write_mesh(file, libmap::select_triangles(mesh, marks));
+    files.push_back(file);
+  }
+  return files;
+}
+
+}  // namespace graspmap_test
