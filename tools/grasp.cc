@@ -139,7 +139,9 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   require_map_output(input, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
-  const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
+  graspmap_tools::GroundPieces ground(
+      options.mesh, gripper, options.grasp.closing.start_height_m,
+      [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
   run.add_input(options.mesh);
   run.add_input(graspmap_tools::is_tile_store(options.map)
                     ? graspmap_tools::store_index_path(options.map).string()
@@ -151,7 +153,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   input.parameters_hash = parameters_hash(gripper, options);
   run.add_results({{"parameters_sha256", input.parameters_hash}});
   options.grasp.check();
-  grasp_map(input, mesh, ground_of(mesh, options), gripper, options.grasp, run);
+  grasp_map(input, ground, gripper, options.grasp, run);
 }
 
 void grasp_places(GraspCommandOptions& options, Run& run) {

@@ -33,6 +33,8 @@ class MeshPieceIndex {
   // Pieces are in the order of their paths as given.
   std::size_t size() const { return pieces_.size(); }
   const std::filesystem::path& path(std::size_t piece) const { return pieces_[piece].path; }
+  // Of its vertices, x and y.
+  const Eigen::AlignedBox2d& box(std::size_t piece) const { return pieces_[piece].box; }
 
   // The piece, and of the others the triangles with a corner within `margin_m` of its bounding box
   // in x and y. The pieces read last are kept, up to 3 million triangles.

@@ -12,6 +12,7 @@
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_io.h"
+#include "libmap/mesh/mesh_parts.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace grasp_test {
@@ -336,6 +337,40 @@ TEST(GraspCommand, SharesOfAMapAreTheMap) {
   ASSERT_TRUE(succeeded(graspmap(map_words("seed.pcd", {"--seed", "2"}))));
   ASSERT_TRUE(succeeded(graspmap({"convert", "held.tiles", "-o", "merged.pcd", "--force"})));
   EXPECT_EQ(content("merged.pcd"), content("seed.pcd"));
+}
+
+// A mesh in pieces: gripper and ground at a seam are those of the whole mesh, and the tiles of the
+// map have no influence.
+TEST(GraspCommand, OnAMeshInPieces) {
+  write_map();
+  const libmap::TriangleMesh whole = libmap::read_mesh(scratch("ground.ply")).mesh;
+  std::filesystem::create_directories(scratch("pieces"));
+  for (const bool left : {true, false}) {
+    std::vector<bool> keep;
+    for (const libmap::Triangle& triangle : whole.triangles)
+      keep.push_back((libmap::center_of(whole, triangle).x() < 0.1) == left);
+    libmap::write_mesh(scratch(left ? "pieces/a.ply" : "pieces/b.ply"),
+                       libmap::select_triangles(whole, keep));
+  }
+  ASSERT_TRUE(succeeded(graspmap(map_words("whole.pcd"))));
+  auto words = map_words("pieces.pcd");
+  words[1] = "pieces";
+  ASSERT_TRUE(succeeded(graspmap(words)));
+  const auto expected = libmap::read_cloud(scratch("whole.pcd")).cloud;
+  const auto found = libmap::read_cloud(scratch("pieces.pcd")).cloud;
+  ASSERT_EQ(found.positions, expected.positions);
+  std::size_t different = 0;
+  for (const char* name : {"hold_probability", "holding_force_n", "grasp_unseen"})
+    for (std::size_t n = 0; n < found.size(); ++n)
+      different +=
+          std::abs(found.find_field(name)->values[n] - expected.find_field(name)->values[n]) > 1e-4;
+  // Sums over triangles have another order.
+  EXPECT_LE(different, found.size() / 200);
+  const std::string bytes = content("pieces.pcd");
+  words = on_many_tiles(words);
+  words.emplace_back("--force");
+  ASSERT_TRUE(succeeded(graspmap(words)));
+  EXPECT_EQ(content("pieces.pcd"), bytes);
 }
 
 TEST(GraspCommand, MapsInAllFormats) {

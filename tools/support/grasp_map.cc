@@ -6,7 +6,6 @@
 #include <map>
 
 #include "libgtd/evaluate/voxel_map.h"
-#include "libgtd/grasp/grip_candidates.h"
 #include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
@@ -121,8 +120,7 @@ class TiledMap {
 
 class MapGrasping {
  public:
-  MapGrasping(const GraspMapInput& input, const libmap::TriangleMesh& mesh,
-              const libgtd::Ground& ground, const libgtd::Gripper& gripper,
+  MapGrasping(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
               const libgtd::GraspOptions& options, Run& run)
       : input_(input),
         gripper_(gripper),
@@ -130,7 +128,6 @@ class MapGrasping {
         run_(run),
         map_(input.map_file),
         ground_(ground),
-        from_above_(mesh, gripper, {.start_height_m = options.closing.start_height_m}),
         mesh_from_map_(map_from_input(map_.index().manifest).inverse()),
         progress_(is_store() ? input.output : input.output + ".progress") {
     carry_facts(map_.index().manifest, run);
@@ -175,10 +172,15 @@ class MapGrasping {
         if (points.find_field(name) != nullptr)
           throw libmap::Error("the map has this field already", {.field = name});
       voxels += points.size();
-      on_mesh += static_cast<std::size_t>(std::count_if(
-          points.positions.begin(), points.positions.end(), [&](const Eigen::Vector3d& position) {
-            return ground_.distance(mesh_from_map_ * position, options_.max_distance_m).has_value();
-          }));
+      for (const auto& [piece, members] : by_piece(points))
+        for (const std::size_t voxel : members)
+          on_mesh +=
+              ground_.piece(piece)
+                      .ground
+                      .distance(mesh_from_map_ * points.positions[voxel], options_.max_distance_m)
+                      .has_value()
+                  ? 1
+                  : 0;
     }
     if (on_mesh == 0)
       throw libmap::Error("none of its voxels is on the mesh",
@@ -237,38 +239,51 @@ class MapGrasping {
     run_.progress().end();
   }
 
-  // The places in the mesh's frame where the gripper is closed; nothing at the others.
+  // The numbers of the points on each piece of the ground.
+  std::map<std::size_t, std::vector<std::size_t>> by_piece(const libmap::PointCloud& points) const {
+    std::map<std::size_t, std::vector<std::size_t>> members;
+    for (std::size_t n = 0; n < points.size(); ++n)
+      members[ground_.piece_at(mesh_from_map_ * points.positions[n])].push_back(n);
+    return members;
+  }
+
+  // Of the points of these numbers, those where the gripper is closed; nothing of the others.
   std::vector<std::optional<Eigen::Vector3d>> candidates_of(
-      const std::vector<Eigen::Vector3d>& positions) const {
-    std::vector<std::optional<Eigen::Vector3d>> candidates(positions.size());
+      const GroundPieces::Piece& piece, const libmap::PointCloud& points,
+      const std::vector<std::size_t>& members) const {
+    std::vector<std::optional<Eigen::Vector3d>> candidates(members.size());
     constexpr std::size_t grain = 256;
-    libmap::parallel_for(positions.size(), grain, [&](std::size_t begin, std::size_t end) {
+    libmap::parallel_for(members.size(), grain, [&](std::size_t begin, std::size_t end) {
       for (std::size_t n = begin; n < end; ++n) {
-        const Eigen::Vector3d place = mesh_from_map_ * positions[n];
+        const Eigen::Vector3d place = mesh_from_map_ * points.positions[members[n]];
         // Along a normal the gripper comes from anywhere.
-        if (options_.approach == libgtd::ApproachDirection::up && !from_above_.may_hold(place))
+        if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(place))
           continue;
-        if (ground_.distance(place, options_.max_distance_m)) candidates[n] = place;
+        if (piece.ground.distance(place, options_.max_distance_m)) candidates[n] = place;
       }
     });
     return candidates;
   }
 
   libmap::PointCloud tested(libmap::PointCloud points, libmap::Progress& steps) const {
-    const auto candidates = candidates_of(points.positions);
-    std::vector<Eigen::Vector3d> places;
-    for (const auto& candidate : candidates)
-      if (candidate) places.push_back(*candidate);
-    steps.advance(points.size() - places.size());
-    const auto results = libgtd::test_grasps(ground_, gripper_, places, options_, steps);
     std::array<std::vector<double>*, field_count> fields{};
     points.fields.reserve(points.fields.size() + field_count);
     for (std::size_t field = 0; field < field_count; ++field)
       fields[field] = &points.add_field(grasp_fields()[field], libmap::ScalarType::float32).values;
-    auto next = results.begin();
-    for (std::size_t n = 0; n < points.size(); ++n) {
-      const Values values = candidates[n] ? values_of(*next++) : no_candidate;
-      for (std::size_t field = 0; field < field_count; ++field) (*fields[field])[n] = values[field];
+    for (const auto& [number, members] : by_piece(points)) {
+      const GroundPieces::Piece& piece = ground_.piece(number);
+      const auto candidates = candidates_of(piece, points, members);
+      std::vector<Eigen::Vector3d> places;
+      for (const auto& candidate : candidates)
+        if (candidate) places.push_back(*candidate);
+      steps.advance(members.size() - places.size());
+      const auto results = libgtd::test_grasps(piece.ground, gripper_, places, options_, steps);
+      auto next = results.begin();
+      for (std::size_t n = 0; n < members.size(); ++n) {
+        const Values values = candidates[n] ? values_of(*next++) : no_candidate;
+        for (std::size_t field = 0; field < field_count; ++field)
+          (*fields[field])[members[n]] = values[field];
+      }
     }
     return points;
   }
@@ -329,8 +344,7 @@ class MapGrasping {
   const libgtd::GraspOptions& options_;
   Run& run_;
   TiledMap map_;
-  const libgtd::Ground& ground_;
-  libgtd::GripCandidates from_above_;
+  GroundPieces& ground_;
   libmap::Pose mesh_from_map_;
   libgtd::TileProgress progress_;
   libgtd::TilePlan plan_;
@@ -361,10 +375,9 @@ void require_map_output(const GraspMapInput& input, Run& run) {
                         {.field = "--force"});
 }
 
-void grasp_map(const GraspMapInput& input, const libmap::TriangleMesh& mesh,
-               const libgtd::Ground& ground, const libgtd::Gripper& gripper,
+void grasp_map(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run) {
-  MapGrasping(input, mesh, ground, gripper, options, run).grasp();
+  MapGrasping(input, ground, gripper, options, run).grasp();
 }
 
 }  // namespace graspmap_tools

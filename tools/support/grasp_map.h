@@ -6,7 +6,7 @@
 
 #include "libgtd/grasp/grasp_trials.h"
 #include "libgtd/score/tiling.h"
-#include "libmap/core/triangle_mesh.h"
+#include "tools/support/ground_pieces.h"
 #include "tools/support/run.h"
 
 namespace graspmap_tools {
@@ -29,8 +29,7 @@ void require_map_output(const GraspMapInput& input, Run& run);
 // OUTPUT.progress, which goes when the map in one file is there: a run that was killed is resumed.
 // The run's manifest has the inputs. Throws Error: the map is empty or has one of the fields, or
 // none of its voxels is on the mesh, or the store is of something else.
-void grasp_map(const GraspMapInput& input, const libmap::TriangleMesh& mesh,
-               const libgtd::Ground& ground, const libgtd::Gripper& gripper,
+void grasp_map(const GraspMapInput& input, GroundPieces& ground, const libgtd::Gripper& gripper,
                const libgtd::GraspOptions& options, Run& run);
 
 }  // namespace graspmap_tools
