@@ -15,6 +15,8 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/piece_folder.h"
+#include "tools/support/piece_progress.h"
+#include "tools/support/store_filling.h"
 
 using namespace graspmap_tools;
 
@@ -30,6 +32,7 @@ struct MeshOptions {
   std::string cloud;
   std::string output;
   NormalSource normals = NormalSource::automatic;
+  std::string tile = "1/1";
   bool report = false;
   bool json = false;
   libmap::NormalEstimationOptions estimation;
@@ -205,6 +208,14 @@ void mesh(const MeshOptions& options, Run& run) {
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
 
+PieceProgress::Facts facts_of(const libmap::SurfaceTile& made) {
+  return {{"vertices", made.mesh.vertices.size()},
+          {"triangles", made.mesh.triangles.size()},
+          {"area_m2", libmap::surface_area(made.mesh)},
+          {"component_areas_m2", made.component_areas_m2},
+          {"seams", made.seams}};
+}
+
 // Of the pieces that are written.
 struct Totals {
   std::int64_t pieces = 0;
@@ -212,60 +223,92 @@ struct Totals {
   std::int64_t triangles = 0;
   double area_m2 = 0.0;
 
-  // -1: it is not written after all.
-  void add(const libmap::TriangleMesh& mesh, int sign) {
-    pieces += mesh.triangles.empty() ? 0 : sign;
-    vertices += sign * static_cast<std::int64_t>(mesh.vertices.size());
-    triangles += sign * static_cast<std::int64_t>(mesh.triangles.size());
-    area_m2 += sign * libmap::surface_area(mesh);
+  void add(const libmap::TriangleMesh& mesh) {
+    add({{"vertices", mesh.vertices.size()},
+         {"triangles", mesh.triangles.size()},
+         {"area_m2", libmap::surface_area(mesh)}});
+  }
+  void add(const PieceProgress::Facts& facts) {
+    const auto count = facts.at("triangles").get<std::int64_t>();
+    pieces += count > 0 ? 1 : 0;
+    vertices += facts.at("vertices").get<std::int64_t>();
+    triangles += count;
+    area_m2 += facts.at("area_m2").get<double>();
   }
 };
 
-// Each tile is made, written and forgotten.
-void write_tiles(const MeshOptions& options, libmap::PieceIndex& index,
-                 const libmap::SurfaceSurvey& survey,
-                 const std::map<libmap::PlanTile, std::size_t>& tiles, const fs::path& folder,
-                 Run& run) {
-  const auto file_of = [&](const libmap::PlanTile& tile) {
-    return folder / libmap::piece_file_name(tile, ".ply");
-  };
+// The pieces that are done, without islands that go across them.
+Totals put_together(const MeshOptions& options, const PieceProgress& progress,
+                    const std::vector<libmap::PlanTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
-  Totals totals;
-  run.progress().begin("tiles", tiles.size());
-  for (const auto& [tile, points] : tiles) {
-    const libmap::PlanBox box =
-        libmap::plan_box_of(tile, options.surface.tile_m, options.surface.margin_m());
-    const libmap::SurfaceTile made = libmap::make_surface_tile(
-        index.points_in(box.min(), box.max()), survey, tile, options.surface);
-    run.progress().advance(1);
+  for (const libmap::PlanTile& tile : tiles) {
+    const PieceProgress::Facts facts = progress.facts(tile);
+    libmap::SurfaceTile made;
+    facts.at("component_areas_m2").get_to(made.component_areas_m2);
+    facts.at("seams").get_to(made.seams);
     islands.add(tile, made);
-    totals.add(made.mesh, 1);
-    if (!made.mesh.triangles.empty()) libmap::write_mesh(file_of(tile), made.mesh);
   }
-  run.progress().end();
-  for (const auto& [tile, dropped] : islands.dropped(options.surface.cleaning)) {
-    const libmap::TriangleMesh mesh = libmap::read_mesh(file_of(tile)).mesh;
-    const libmap::TriangleMesh kept = libmap::without_components(mesh, dropped);
-    totals.add(mesh, -1);
-    totals.add(kept, 1);
-    if (kept.triangles.empty())
-      fs::remove(file_of(tile));
-    else
-      libmap::write_mesh(file_of(tile), kept);
+  const libmap::SurfaceIslands::Dropped dropped = islands.dropped(options.surface.cleaning);
+  Totals totals;
+  for (const libmap::PlanTile& tile : tiles) {
+    const PieceProgress::Facts facts = progress.facts(tile);
+    const fs::path to = folder / libmap::piece_file_name(tile, ".ply");
+    const auto components = dropped.find(tile);
+    if (components != dropped.end()) {
+      const libmap::TriangleMesh kept = libmap::without_components(
+          libmap::read_mesh(progress.file(tile, ".ply")).mesh, components->second);
+      totals.add(kept);
+      if (!kept.triangles.empty()) libmap::write_mesh(to, kept);
+    } else if (facts.at("triangles") > 0) {
+      totals.add(facts);
+      PieceProgress::link_file(progress.file(tile, ".ply"), to);
+    }
   }
   if (totals.triangles == 0)
     throw libmap::Error("no surface was found: the points are too few, or their normals cancel",
                         {.file = options.cloud});
-  run.add_results({{"points", index.points()},
-                   {"dropped_points", survey.dropped_points()},
-                   {"cell_size_m", options.surface.reconstruction.cell_size_m},
-                   {"pieces", totals.pieces},
+  run.add_results({{"pieces", totals.pieces},
                    {"islands_across_tiles", islands.islands()},
                    {"vertices", totals.vertices},
                    {"triangles", totals.triangles},
                    {"area_m2", totals.area_m2}});
-  run.say("{} points -> {} triangles in {} pieces", index.points(), totals.triangles,
-          totals.pieces);
+  return totals;
+}
+
+// Each tile is made, written and forgotten.
+void make_tiles(const MeshOptions& options, PieceProgress& progress, Run& run) {
+  libmap::SurfaceSurvey survey;
+  std::map<libmap::PlanTile, std::size_t> points_in_tiles;
+  libmap::PieceIndex index = run.timed("survey", [&] {
+    return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
+                              [&](const libmap::PointCloud& piece) {
+                                survey.add(piece, options.surface.reconstruction.weigh_by_error);
+                                libmap::add_surface_tiles(piece, options.surface, points_in_tiles);
+                              });
+  });
+  check_points(options.cloud, index.points(), index.dropped_points(), run);
+  if (survey.dropped_points() > 0)
+    run.warn("{} of {} points have no normal and are left out", survey.dropped_points(),
+             index.points());
+  run.add_results({{"points", index.points()},
+                   {"dropped_points", survey.dropped_points()},
+                   {"cell_size_m", options.surface.reconstruction.cell_size_m}});
+  std::vector<libmap::PlanTile> tiles;
+  for (const auto& [tile, points] : points_in_tiles) tiles.push_back(tile);
+  const auto make = [&](const libmap::PlanTile& tile, const fs::path& to) {
+    const libmap::PlanBox box =
+        libmap::plan_box_of(tile, options.surface.tile_m, options.surface.margin_m());
+    const libmap::SurfaceTile made = libmap::make_surface_tile(
+        index.points_in(box.min(), box.max()), survey, tile, options.surface);
+    if (!made.mesh.triangles.empty()) libmap::write_mesh(to, made.mesh);
+    return facts_of(made);
+  };
+  const auto finish = [&](const fs::path& folder) {
+    const Totals totals = put_together(options, progress, tiles, folder, run);
+    run.say("{} points -> {} triangles in {} pieces", index.points(), totals.triangles,
+            totals.pieces);
+  };
+  progress.make({tiles, ".ply", make, finish});
 }
 
 void mesh_in_tiles(const MeshOptions& options, Run& run) {
@@ -276,27 +319,12 @@ void mesh_in_tiles(const MeshOptions& options, Run& run) {
     throw libmap::Error("sides are chosen over the whole cloud: not in pieces",
                         {.field = "--normals", .value = "estimate", .bound = "auto or cloud"});
   options.surface.check();
-  const std::vector<std::string> names = piece_folder_names(options.output);
-  run.claim_output_tree(options.output, names, {options.cloud});
-  libmap::SurfaceSurvey survey;
-  std::map<libmap::PlanTile, std::size_t> tiles;
   in_file(options.cloud, [&] {
-    libmap::PieceIndex index = run.timed("survey", [&] {
-      return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
-                                [&](const libmap::PointCloud& piece) {
-                                  survey.add(piece, options.surface.reconstruction.weigh_by_error);
-                                  libmap::add_surface_tiles(piece, options.surface, tiles);
-                                });
-    });
-    check_points(options.cloud, index.points(), index.dropped_points(), run);
-    if (survey.dropped_points() > 0)
-      run.warn("{} of {} points have no normal and are left out", survey.dropped_points(),
-               index.points());
     run.add_input(options.cloud);
     carry_frame(options.cloud, run);
-    run.write_output_tree(options.output, names, [&](const fs::path& folder) {
-      if (!folder.empty()) write_tiles(options, index, survey, tiles, folder, run);
-    });
+    PieceProgress progress(options.output, piece_folder_names(options.output), {options.cloud},
+                           parse_share(options.tile), run);
+    if (!progress.is_complete()) make_tiles(options, progress, run);
   });
 }
 
@@ -308,11 +336,15 @@ int main(int argc, char** argv) {
   command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv), or a folder of pieces");
   command.output(options.output,
                  std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_piece_folder);
+  command.option("--tile", "K/N", options.tile,
+                 "make only share K of N of the pieces; the last share completes the folder");
   command.flag("--report", options.report,
                "print what the mesh is as a surface, and how far the points lie from it");
   command.flag("--json", options.json, "that report as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
-    is_piece_folder(options.output) ? mesh_in_tiles(options, run) : mesh(options, run);
+    if (is_piece_folder(options.output)) return mesh_in_tiles(options, run);
+    refuse_given({{"--tile", options.tile != MeshOptions{}.tile}}, "is for a folder of pieces");
+    mesh(options, run);
   });
 }

@@ -4,14 +4,16 @@
 #   make -f pipelines/slurm/tiles.mk TERRAIN=terrain OUT=folder SHARES=100 [SCENARIO=NAME|FILE]
 #        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
 #   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... MESH=mesh.ply [GRASP="..."] held [held_map]
+#   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... SURFACE="--cell-size 0.01" mesh
 #
 # TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
 # render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. `held` tests the gripper
 # at every voxel of the map on MESH, in the frame of TERRAIN: $(OUT)/held.tiles, merged by `held_map`
-# to $(OUT)/held.pcd. TERRAIN, MESH, OUT and graspmap itself must be reached by the same path on all
+# to $(OUT)/held.pcd. `mesh` makes the surface of TERRAIN, a cloud with normals, in a folder of pieces,
+# $(OUT)/mesh; SURFACE holds the flags of graspmap mesh, among them --cell-size. TERRAIN, MESH, OUT and graspmap itself must be reached by the same path on all
 # nodes. SBATCH holds further flags of sbatch, among them --cpus-per-task and --array=1-100%10 to run
 # ten at a time. A second run does nothing; after a run that failed, the next makes what is missing.
-# Logs: $(OUT)/logs, $(OUT)/held_logs.
+# Logs: $(OUT)/logs, $(OUT)/held_logs, $(OUT)/mesh_logs.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../../build/release/graspmap) graspmap)
@@ -20,6 +22,7 @@ SHARES ?= 16
 SCORE ?=
 MESH ?=
 GRASP ?=
+SURFACE ?=
 SBATCH ?=
 TRIES ?= 3
 
@@ -46,15 +49,18 @@ store := $(abspath $(OUT))/map.tiles
 held := $(abspath $(OUT))/held.tiles
 logs := $(abspath $(OUT))/logs
 held_logs := $(abspath $(OUT))/held_logs
+surface := $(abspath $(OUT))/mesh
+mesh_logs := $(abspath $(OUT))/mesh_logs
 score_flags := --config $(SCENARIO) $(SCORE)
 
-.PHONY: tiles map held held_map FORCE
+.PHONY: tiles map held held_map mesh FORCE
 tiles: $(store)/index.json
 map: $(OUT)/map.pcd
 held: $(held)/index.json
 held_map: $(OUT)/held.pcd
+mesh: $(surface)
 
-$(OUT) $(logs) $(held_logs):
+$(OUT) $(logs) $(held_logs) $(mesh_logs):
 	@mkdir -p $@
 
 # A stamp of what the tiles depend on: written anew only if it changes, and then tiles of another
@@ -68,6 +74,11 @@ export grasped_with := $(scored_with) $(MESH) $(GRASP)
 $(OUT)/grasped_with: FORCE | $(OUT)
 	@printf '%s\n' "$$grasped_with" | cmp -s - $@ || \
 	  { rm -rf $(held) $(held).json && printf '%s\n' "$$grasped_with" > $@; }
+
+export meshed_with := $(TERRAIN) $(SURFACE)
+$(OUT)/meshed_with: FORCE | $(OUT)
+	@printf '%s\n' "$$meshed_with" | cmp -s - $@ || \
+	  { rm -rf $(surface) $(surface).json $(surface).progress && printf '%s\n' "$$meshed_with" > $@; }
 
 # $(call in_shares,LOGS,STORE,COMMAND WORDS). sbatch --wait ends when the last task has, with the
 # largest of their exit codes. A task that has been put back into the queue is not at its end.
@@ -85,6 +96,9 @@ $(store)/index.json: $(TERRAIN) $(OUT)/scored_with | $(logs)
 $(held)/index.json: $(MESH) $(store)/index.json $(OUT)/grasped_with | $(held_logs)
 	$(if $(MESH),,$(error MESH is not set: the mesh on which the gripper is tested))
 	$(call in_shares,$(held_logs),$(held),grasp $(mesh) --map $(store) $(GRASP))
+
+$(surface): $(TERRAIN) $(OUT)/meshed_with | $(mesh_logs)
+	$(call in_shares,$(mesh_logs),$@,mesh $(terrain) $(SURFACE))
 
 $(OUT)/map.pcd: $(store)/index.json
 	@exec $(program) convert $(store) -o $@

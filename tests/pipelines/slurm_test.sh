@@ -19,11 +19,12 @@ SLURM_LOCAL=$scratch/slurm
 export SLURM_LOCAL
 slurm_local=$source/scripts/slurm-local
 
-# The first try of share 2 is killed while it works, if it has not ended by then; the task sees the
-# exit code of SIGKILL in any case.
+# The first try of share 2 of a map is killed while it works, if it has not ended by then; the task
+# sees the exit code of SIGKILL in any case.
 cat >"$scratch/graspmap" <<END
 #!/bin/sh
-if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ]; then
+if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ] &&
+    [ "\$1" != mesh ]; then
   timeout -s KILL 0.15 "$graspmap" "\$@" || true
   exit 137
 fi
@@ -74,20 +75,26 @@ for node in node1 node2; do
   grep -q "on $node\$" "$out"/logs/*.log || fail "$node did nothing"
 done
 
-# A gripper on a mesh at each voxel: again the map of a single process.
+# A gripper on a mesh at each voxel, and at the same time the pieces of a mesh: again the files of a
+# single process.
 "$graspmap" simulate site --edge-length 0.05 -o "$scratch/site" --quiet
 "$graspmap" resample "$scratch/site/mesh.ply" --radius 0.03 -o "$scratch/site.pcd" --quiet
 held() {
   run "$@" TERRAIN="$scratch/site.pcd" OUT="$scratch/held" SHARES=3 MESH="$scratch/site/mesh.ply" \
-    SCORE="--voxel-size 0.06 --tile-size 1" GRASP="--trials 2 --map-draws 1"
+    SCORE="--voxel-size 0.06 --tile-size 1" GRASP="--trials 2 --map-draws 1" \
+    SURFACE="--cell-size 0.05 --tile-size 0.7"
 }
-held held_map
+held -j2 held_map mesh
 "$graspmap" grasp "$scratch/site/mesh.ply" --map "$scratch/held/map.tiles" --trials 2 --map-draws 1 \
   -o "$scratch/held.pcd" --quiet
 cmp "$scratch/held.pcd" "$scratch/held/held.pcd" || fail "the test by Slurm differs from the local one"
+"$graspmap" mesh "$scratch/site.pcd" --cell-size 0.05 --tile-size 0.7 -o "$scratch/mesh" --quiet
+diff -r "$scratch/mesh" "$scratch/held/mesh" || fail "the mesh by Slurm differs from the local one"
+[ "$(cat "$scratch"/held/mesh_logs/*.log | grep -c ', try 1, ')" -eq 3 ] || fail "not three shares"
+[ ! -e "$scratch/held/mesh.progress" ] || fail "the pieces were left"
 
 jobs=$(scontrol --oneliner show jobs | wc -l)
-held held_map
+held -j2 held_map mesh
 before=$(listing "$out")
 run map TERRAIN="$site" SHARES=4
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"

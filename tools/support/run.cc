@@ -247,10 +247,14 @@ void Run::write_output_folder(const fs::path& given, const Files& files) {
   }
 }
 
-void Run::claim_output_tree(const fs::path& given, const std::vector<std::string>& names,
-                            const std::vector<std::string>& inputs) {
+void Run::check_output_tree(const fs::path& given, const std::vector<std::string>& inputs) {
   require_other_than_inputs(given, inputs);
   require_own_folder(given, "");
+}
+
+void Run::claim_output_tree(const fs::path& given, const std::vector<std::string>& names,
+                            const std::vector<std::string>& inputs) {
+  check_output_tree(given, inputs);
   // Made and dropped at once: what cannot be written or replaced is found before the work.
   const libmap::OutputFolder probe(given, names);
   claim_manifest(without_trailing_slash(given.string()));

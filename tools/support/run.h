@@ -118,7 +118,10 @@ class Run {
   // A folder of any number of files: writer(temporary) fills a folder beside it, which then takes
   // the place of `folder` as a whole. An earlier one that holds anything but `names`, or is one of
   // the inputs, is an Error, with --force too. With --dry-run the writer gets no folder (an empty
-  // path) and nothing is written.
+  // path) and nothing is written. check_output_tree throws as claim_output_tree but for `names`,
+  // and claims nothing: for folders that several runs make together.
+  void check_output_tree(const std::filesystem::path& folder,
+                         const std::vector<std::string>& inputs = {});
   void claim_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,
                          const std::vector<std::string>& inputs = {});
   void write_output_tree(const std::filesystem::path& folder, const std::vector<std::string>& names,

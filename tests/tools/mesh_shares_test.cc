@@ -1,0 +1,148 @@
+// graspmap mesh into a folder, in shares and after a kill.
+#include <gtest/gtest.h>
+#include <sys/stat.h>
+
+#include <chrono>
+#include <csignal>
+#include <filesystem>
+#include <thread>
+
+#include "libmap/cloud/cloud_io.h"
+#include "tests/support/running_program.h"
+#include "tests/tools/tool_test_support.h"
+
+namespace mesh_shares_test {
+
+namespace fs = std::filesystem;
+
+using graspmap_test::bad_input;
+using graspmap_test::content;
+using graspmap_test::graspmap;
+using graspmap_test::json_of;
+using graspmap_test::scratch;
+using graspmap_test::succeeded;
+using Words = std::vector<std::string>;
+
+// A bumpy square, and above it a strip of 0.05 m2 through four tiles.
+void write_cloud() {
+  libmap::PointCloud cloud;
+  const auto add = [&](double x, double y, double z) {
+    cloud.positions.emplace_back(x, y, z);
+    cloud.normals.emplace_back(0, 0, 1);
+  };
+  for (int i = 0; i < 60; ++i)
+    for (int j = 0; j < 60; ++j)
+      add(0.02 * i - 0.6, 0.02 * j - 0.6, 0.01 * std::sin(0.5 * i) * std::cos(0.4 * j));
+  for (int i = -25; i <= 25; ++i)
+    for (int j = -1; j <= 1; ++j) add(0.02 * i, 0.02 * j + 0.1, 0.5);
+  libmap::write_cloud(scratch("cloud.pcd"), cloud);
+}
+
+Words mesh_words(const std::string& output, const Words& more = {}) {
+  Words words = {"mesh",        "cloud.pcd", "-o",         output, "--cell-size",          "0.02",
+                 "--tile-size", "0.3",       "--max-hole", "0",    "--min-island-area-m2", "0.1"};
+  words.insert(words.end(), more.begin(), more.end());
+  return words;
+}
+
+std::map<std::string, std::string> files_of(const std::string& folder) {
+  std::map<std::string, std::string> files;
+  for (const fs::directory_entry& entry : fs::directory_iterator(scratch(folder)))
+    files[entry.path().filename()] = content(folder + "/" + entry.path().filename().string());
+  return files;
+}
+
+void expect_same(const std::string& folder, const std::string& whole) {
+  EXPECT_TRUE(files_of(folder) == files_of(whole));
+  nlohmann::json own = json_of(folder + ".json");
+  nlohmann::json other = json_of(whole + ".json");
+  own.erase("run");
+  other.erase("run");
+  EXPECT_EQ(own, other);
+  EXPECT_FALSE(fs::exists(scratch(folder + ".progress")));
+}
+
+TEST(MeshShares, TogetherAreTheFolderOfOneRun) {
+  write_cloud();
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("whole"))));
+  EXPECT_EQ(json_of("whole.json").at("results").at("islands_across_tiles"), 1);
+  for (const std::string share : {"3/3", "1/3"})
+    ASSERT_TRUE(succeeded(graspmap(mesh_words("shared", {"--tile", share}))));
+  EXPECT_FALSE(fs::exists(scratch("shared")));
+  // Pieces of other parameters do not mix, and one share does not remove those of others.
+  EXPECT_TRUE(
+      bad_input(graspmap(mesh_words("shared", {"--tile", "2/3", "--smoothing-iterations", "3"})),
+                {"shared.progress", "--force"}));
+  EXPECT_TRUE(bad_input(graspmap(mesh_words("shared", {"--tile", "2/3", "--force"})), {"--force"}));
+  EXPECT_TRUE(bad_input(graspmap(mesh_words("shared", {"--tile", "4/3"})), {"--tile", "4/3"}));
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("shared", {"--tile", "2/3"}))));
+  expect_same("shared", "whole");
+  // Again, as a queue does that lost sight of a task.
+  const auto again = graspmap(mesh_words("shared", {"--tile", "1/3"}));
+  ASSERT_TRUE(succeeded(again));
+  EXPECT_NE(again.standard_error.find("all pieces are there"), std::string::npos);
+  expect_same("shared", "whole");
+  // A run of all pieces begins anew with other parameters.
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--tile", "1/2"}))));
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--smoothing-iterations", "1"}))));
+  EXPECT_FALSE(files_of("other") == files_of("whole"));
+  EXPECT_FALSE(fs::exists(scratch("other.progress")));
+}
+
+// Those that are done and not empty.
+std::vector<fs::path> done_pieces(const std::string& progress) {
+  std::vector<fs::path> pieces;
+  std::error_code ignored;
+  for (const auto& entry : fs::recursive_directory_iterator(scratch(progress), ignored)) {
+    fs::path path = entry.path();
+    if (path.extension() == ".json" && fs::exists(path.replace_extension(".ply")))
+      pieces.push_back(path);
+  }
+  return pieces;
+}
+
+// The file itself, not one of the same content.
+ino_t inode_of(const fs::path& path) {
+  struct stat status {};
+  return stat(path.c_str(), &status) == 0 ? status.st_ino : 0;
+}
+
+TEST(MeshShares, AKilledRunIsResumed) {
+  write_cloud();
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("whole"))));
+  {
+    Words words = mesh_words("killed");
+    words.insert(words.begin(), graspmap_test::build_folder() / "graspmap");
+    graspmap_test::RunningProgram running(words, {.folder = scratch("")});
+    while (done_pieces("killed.progress").size() < 2 && !running.has_ended())
+      std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    kill(running.process(), SIGKILL);
+    running.wait();
+  }
+  ASSERT_FALSE(fs::exists(scratch("killed"))) << "it has dozens of pieces";
+  std::map<std::string, ino_t> before;
+  for (const fs::path& piece : done_pieces("killed.progress"))
+    before[piece.filename()] = inode_of(piece);
+  ASSERT_GE(before.size(), 2U);
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("killed"))));
+  expect_same("killed", "whole");
+  std::size_t kept = 0;
+  for (const auto& [name, inode] : before)
+    kept += inode_of(scratch("killed") / name) == inode ? 1 : 0;
+  EXPECT_GE(kept + 4, before.size()) << "the strip's four pieces are written anew without it";
+  EXPECT_GT(kept, 0U);
+}
+
+TEST(MeshShares, NothingIsLeftOfABadInput) {
+  libmap::PointCloud cloud;
+  cloud.positions = {{0, 0, 0}, {0.01, 0, 0}};
+  cloud.normals = {{0, 0, 1}, {0, 0, -1}};
+  libmap::write_cloud(scratch("cloud.pcd"), cloud);
+  EXPECT_TRUE(bad_input(graspmap(mesh_words("none")), {"cloud.pcd", "no surface"}));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), Words{"cloud.pcd"});
+  ASSERT_TRUE(succeeded(graspmap(mesh_words("none", {"--dry-run"}))));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), Words{"cloud.pcd"});
+  EXPECT_TRUE(bad_input(graspmap(mesh_words("one.ply", {"--tile", "1/2"})), {"--tile"}));
+}
+
+}  // namespace mesh_shares_test

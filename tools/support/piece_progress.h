@@ -1,0 +1,77 @@
+// Folders of pieces that are made piece by piece, so that a run that was killed at any moment is
+// resumed by the same command, and so that several runs make shares of one folder:
+//
+//   FOLDER.progress/KEY/piece_I_J.json   facts on a piece that is done
+//   FOLDER.progress/KEY/piece_I_J.*      its file, there before its facts; none if it is empty
+//   FOLDER.progress/KEY/K_of_N.lock      held by the run of share K/N
+//
+// KEY hashes the version, the parameters and the contents of the inputs.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "libgtd/score/tiling.h"
+#include "libmap/core/output_lock.h"
+#include "libmap/core/plan_tiles.h"
+#include "tools/support/run.h"
+
+namespace graspmap_tools {
+
+class PieceProgress {
+ public:
+  using Facts = nlohmann::json;
+
+  // Claims the folder `output`, unless other runs make other shares of it; `names` and `inputs` as
+  // for Run::claim_output_tree. The manifest of `run` must have its parameters and inputs. Pieces
+  // of an earlier run with another key are removed; where shares are made or another process works
+  // on them, they are an Error instead, and so are shares with --force, which removes all pieces.
+  PieceProgress(const std::string& output, const std::vector<std::string>& names,
+                const std::vector<std::string>& inputs, const libgtd::TileShare& share, Run& run);
+
+  // Whether the folder itself is there, as shares of this key have made it; says so.
+  bool is_complete() const;
+
+  struct Work {
+    std::vector<libmap::PlanTile> tiles;  // of all shares
+    std::string extension;                // of their files
+    // Writes a piece to `to`, unless it is empty, and returns facts on it.
+    std::function<Facts(const libmap::PlanTile& tile, const std::filesystem::path& to)> make;
+    // Fills the output with the pieces that are done.
+    std::function<void(const std::filesystem::path& folder)> finish;
+  };
+  // Makes the pieces of the share that are missing, and the folder if then all pieces are done;
+  // else says how many are. With --dry-run nothing is made. Throws Error (failed) if another
+  // process works on this share.
+  void make(const Work& work);
+
+  // Of a piece that is done. file() may not exist: the piece is empty.
+  Facts facts(const libmap::PlanTile& tile) const;
+  std::filesystem::path file(const libmap::PlanTile& tile, const std::string& extension) const;
+  // The file of a piece once more at `to`: a link where the file system has them, else a copy.
+  static void link_file(const std::filesystem::path& file, const std::filesystem::path& to);
+
+ private:
+  bool is_done(const libmap::PlanTile& tile) const;
+  bool is_put_together() const;
+  void remove_other_keys(bool all) const;
+  void remove_pieces() const;
+  void make_missing(const Work& work);
+  void put_together(const Work& work);
+  std::filesystem::path lock_path() const;
+
+  std::filesystem::path output_;
+  std::vector<std::string> names_;
+  std::vector<std::string> inputs_;
+  libgtd::TileShare share_;
+  Run& run_;
+  std::string key_;
+  std::filesystem::path folder_;
+  std::optional<libmap::FileLock> lock_;
+};
+
+}  // namespace graspmap_tools
