@@ -4,11 +4,11 @@
 usage: chain.py BUILD_FOLDER [--sides 3,10] [--frames-per-m2 3.4] [--folder FOLDER] [--page README.md]
 
 Simulates square rocky terrains at 1 cm and a scan in lanes over each, and runs every stage of
-pipelines/scan.mk with folders of pieces as a process of its own, with two threads; the field test
-with 8 poses of 2 draws. Prints a Markdown table with the exponents between the first and the last
-side; with --page, puts it between the marks of that page and the chart chain.png beside it. All files
-are in a temporary folder in FOLDER (TMPDIR), about 12 MB a frame and square meter, and are removed.
-A side that ended earlier is read from FOLDER/chain_SIDE.json instead.
+pipelines/scan.mk with folders of pieces as a process of its own, with two threads; of the field test
+with 8 poses of 2 draws one share in 40. Prints a Markdown table with the exponents between the first
+and the last side; with --page, puts it between the marks of that page and the chart chain.png beside
+it. All files are in a temporary folder in FOLDER (TMPDIR) and are removed. A side that ended earlier is
+read from FOLDER/chain_SIDE.json instead.
 """
 
 import argparse
@@ -33,7 +33,7 @@ STAGES = {
     "texture": "texture site --scan scan.db --poses fused.tum -o model",
     "resample": "resample site -o samples",
     "score": "score samples -o map.tiles",
-    "grasp": "grasp site --map map.tiles -o held.tiles --trials 8 --map-draws 2",
+    "grasp, 1 of 40 shares": "grasp site --map map.tiles -o held.tiles --trials 8 --map-draws 2 --tile 1/40",
 }
 
 
