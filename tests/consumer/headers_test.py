@@ -28,7 +28,7 @@ HEADERS = {
     "cstdio": "FILE",
     "cstdint": "int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t",
     "cstring": "memcpy",
-    "algorithm": "copy lower_bound max min nth_element",
+    "algorithm": "copy find_if lower_bound max min nth_element",
     "bit": "bit_cast",
     "exception": "exception",
     "fstream": "ofstream",
