@@ -36,7 +36,7 @@ struct TerrainSurfaceOptions {
   double square_spacings = 256.0;     // width of a square in spacings of the points; rounded to
                                       // whole cells of the heights
   double gap_spacings = 5.0;          // gaps in the plan wider than about twice this stay open
-  std::size_t kept_points = 800'000;  // in memory, unless cameras see more at once
+  std::size_t kept_points = 500'000;  // in memory, unless cameras see more at once
   std::uint64_t texture_seed = 1;
 };
 
