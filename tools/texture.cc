@@ -1,4 +1,6 @@
 // graspmap texture: a mesh and the photographs of a scan -> a textured mesh.
+#include <malloc.h>
+
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_model.h"
@@ -188,6 +190,8 @@ void texture(TextureCommandOptions options, Run& run) {
 
 // Each piece's model is made, written and forgotten.
 void texture_in_pieces(TextureCommandOptions options, Run& run) {
+  // Arrays of a piece go back to the system: the heap would keep what the next does not fit into.
+  mallopt(M_MMAP_THRESHOLD, 1 << 20);
   const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
   const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".glb");
   run.claim_output_tree(options.output, names, inputs_of(options));

@@ -117,6 +117,9 @@ void cut(SubdivisionResult& result, std::vector<std::uint8_t>& open,
   std::vector<Triangle> triangles;
   std::vector<std::uint32_t> source;
   std::vector<std::uint8_t> open_parts;
+  triangles.reserve(fine.triangles.size());
+  source.reserve(fine.triangles.size());
+  open_parts.reserve(fine.triangles.size());
   for (std::size_t t = 0; t < fine.triangles.size(); ++t)
     for (const Triangle& part : parts_of(
              fine, fine.triangles[t], {middles[3 * t], middles[3 * t + 1], middles[3 * t + 2]})) {
@@ -131,16 +134,16 @@ void cut(SubdivisionResult& result, std::vector<std::uint8_t>& open,
 
 }  // namespace
 
-SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
+SubdivisionResult split_long_sides(TriangleMesh mesh, double max_side_m,
                                    std::uint64_t max_triangles, const NeedsCutting& needs_cutting) {
   SubdivisionResult result;
-  result.mesh = mesh;
+  const std::vector<ScalarField> face_fields = mesh.face_fields;
   result.max_side_m = std::max(max_side_m, min_side * largest_coordinate(mesh));
   result.source.resize(mesh.triangles.size());
   for (std::uint32_t t = 0; t < result.source.size(); ++t) result.source[t] = t;
-  TriangleMesh& fine = result.mesh;
   const std::uint64_t most = std::max<std::uint64_t>(max_triangles, 2 * mesh.triangles.size());
   std::vector<std::uint8_t> open(mesh.triangles.size(), 1);
+  TriangleMesh& fine = result.mesh = std::move(mesh);
   for (;;) {
     close_triangles(fine, result.max_side_m, needs_cutting, open);
     const MeshEdges edges = edges_of(fine.triangles, fine.vertices.size());
@@ -155,7 +158,7 @@ SubdivisionResult split_long_sides(const TriangleMesh& mesh, double max_side_m,
   for (std::size_t f = 0; f < fine.face_fields.size(); ++f) {
     std::vector<double> values;
     values.reserve(result.source.size());
-    for (const std::uint32_t t : result.source) values.push_back(mesh.face_fields[f].values[t]);
+    for (const std::uint32_t t : result.source) values.push_back(face_fields[f].values[t]);
     fine.face_fields[f].values = std::move(values);
   }
   return result;

@@ -23,7 +23,7 @@ using NeedsCutting = std::function<bool(const TriangleMesh& mesh, const Triangle
 // `max_triangles`, and more than twice those of the mesh, a longer side is aimed at. Values at new
 // vertices are interpolated, parts of a triangle have its fields.
 SubdivisionResult split_long_sides(
-    const TriangleMesh& mesh, double max_side_m, std::uint64_t max_triangles,
+    TriangleMesh mesh, double max_side_m, std::uint64_t max_triangles,
     const NeedsCutting& needs_cutting = [](const TriangleMesh&, const Triangle&) { return true; });
 
 }  // namespace libmap

@@ -21,6 +21,9 @@ constexpr std::size_t views_a_triangle = 12;
 // Vertices whose colors are compared between all photographs; of each of many pieces at least.
 constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
+// Of decoded photographs that are kept; a piece needs those near it alone.
+constexpr std::size_t max_image_bytes = std::size_t{400} << 20;
+constexpr std::size_t max_image_bytes_in_pieces = std::size_t{128} << 20;
 // Triangles that all photographs show smaller are not cut; nor are any where more would come out.
 constexpr double min_cut_px = 16.0;
 constexpr std::uint64_t max_cut_triangles = 2'500'000;
@@ -39,10 +42,18 @@ bool is_shown(const TriangleMesh& mesh, const Triangle& t, const TexturePhotos& 
   return false;
 }
 
+bool has_longer_side(const TriangleMesh& mesh, double side_m) {
+  return std::any_of(mesh.triangles.begin(), mesh.triangles.end(), [&](const Triangle& t) {
+    return (mesh.vertices[t[0]] - mesh.vertices[t[1]]).squaredNorm() > side_m * side_m ||
+           (mesh.vertices[t[1]] - mesh.vertices[t[2]]).squaredNorm() > side_m * side_m ||
+           (mesh.vertices[t[2]] - mesh.vertices[t[0]]).squaredNorm() > side_m * side_m;
+  });
+}
+
 class Texturing {
  public:
   Texturing(const ScanSource& scan, const Trajectory& world_from_base,
-            const TextureOptions& options, Progress& progress);
+            const TextureOptions& options, Progress& progress, std::size_t max_image_bytes);
 
   TextureResult whole(const TriangleMesh& mesh);
   TextureReport pieces(MeshPieceIndex& index, double margin_m, const UseModel& use);
@@ -62,7 +73,7 @@ class Texturing {
             0};
   }
   // With all of its vertices, of which those of the margin belong to no triangle.
-  TexturedMesh paint(MeshWithMargin part, const TextureViews& views, Progress& progress);
+  TexturedMesh paint(MeshWithMargin part, TextureViews views, Progress& progress);
   void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);
   void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh);
   TextureReport finished();
@@ -75,20 +86,21 @@ class Texturing {
 };
 
 Texturing::Texturing(const ScanSource& scan, const Trajectory& world_from_base,
-                     const TextureOptions& options, Progress& progress)
+                     const TextureOptions& options, Progress& progress, std::size_t max_image_bytes)
     : options_(options), progress_(progress) {
   check_parameters(options);
   photos_ = timed("photographs", [&] {
-    return std::make_unique<TexturePhotos>(scan, world_from_base, options.strict, progress);
+    return std::make_unique<TexturePhotos>(scan, world_from_base, options.strict, progress,
+                                           max_image_bytes);
   });
   report_.photos = photos_->size();
   report_.skipped = photos_->skipped();
 }
 
 MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
-  if (!(options_.max_side_m > 0.0)) return part;
+  if (!(options_.max_side_m > 0.0) || !has_longer_side(part.mesh, options_.max_side_m)) return part;
   SubdivisionResult fine = split_long_sides(
-      part.mesh, options_.max_side_m, max_cut_triangles,
+      std::move(part.mesh), options_.max_side_m, max_cut_triangles,
       [this](const TriangleMesh& mesh, const Triangle& t) { return is_shown(mesh, t, *photos_); });
   // Parts take the place of their triangle.
   const auto own = std::lower_bound(fine.source.begin(), fine.source.end(), part.triangles);
@@ -120,7 +132,7 @@ void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh
     }
 }
 
-TexturedMesh Texturing::paint(MeshWithMargin part, const TextureViews& views, Progress& progress) {
+TexturedMesh Texturing::paint(MeshWithMargin part, TextureViews views, Progress& progress) {
   TriangleMesh& mesh = part.mesh;
   mesh.triangles.resize(part.triangles);
   for (ScalarField& field : mesh.face_fields) field.values.resize(part.triangles);
@@ -128,6 +140,7 @@ TexturedMesh Texturing::paint(MeshWithMargin part, const TextureViews& views, Pr
   const TextureLabels labels = timed("labeling", [&] {
     return label_triangles(mesh, opposite, views.of_triangles, options_.labeling);
   });
+  views.of_triangles = {};
   report_.seams_before_m += labels.seams_before_m;
   report_.seams_m += labels.seams_m;
   count_seen(mesh, labels.photos);
@@ -162,11 +175,11 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
   report_.cut_triangles = part.triangles - mesh.triangles.size();
   TextureViewRequest request = views_of(part);
   request.observed_vertices = observed_vertices;
-  const TextureViews views = timed("views", [&] {
+  TextureViews views = timed("views", [&] {
     return find_texture_views(part.mesh, *photos_, options_.views, request, progress_);
   });
   timed("exposure", [&] { even_out(views.observations); });
-  TexturedMesh model = paint(part, views, progress_);
+  TexturedMesh model = paint(std::move(part), std::move(views), progress_);
   return {finished(), std::move(model)};
 }
 
@@ -248,13 +261,14 @@ void bind(ParameterTable& table, TextureOptions& options) {
 TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options,
                            Progress& progress) {
-  return Texturing(scan, world_from_base, options, progress).whole(mesh);
+  return Texturing(scan, world_from_base, options, progress, max_image_bytes).whole(mesh);
 }
 
 TextureReport texture_pieces(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
                              const Trajectory& world_from_base, const TextureOptions& options,
                              const UseModel& use, Progress& progress) {
-  Texturing texturing(scan, world_from_base, options, progress);
+  Texturing texturing(scan, world_from_base, options, progress,
+                      pieces.size() > 1 ? max_image_bytes_in_pieces : max_image_bytes);
   if (pieces.size() > 1) return texturing.pieces(pieces, margin_m, use);
   TextureResult result = texturing.whole(pieces.with_margin(0, 0.0).mesh);
   use(0, result.model);

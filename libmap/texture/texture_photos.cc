@@ -18,7 +18,6 @@ namespace {
 constexpr std::size_t frames_in_flight = 8;
 // How much more than a pinhole a lens may enlarge.
 constexpr double max_distortion = 2.0;
-constexpr std::size_t max_kept_bytes = std::size_t{400} << 20;
 
 std::size_t bytes_of(const ColorImage& image) { return image.pixels.size() * sizeof(Color); }
 
@@ -157,8 +156,8 @@ TexturePhotos::Frame TexturePhotos::read_frame(const TrajectoryPose& pose) const
 }
 
 TexturePhotos::TexturePhotos(const ScanSource& scan, const Trajectory& world_from_base, bool strict,
-                             Progress& progress)
-    : scan_(scan) {
+                             Progress& progress, std::size_t max_kept_bytes)
+    : scan_(scan), max_kept_bytes_(max_kept_bytes) {
   Trajectory poses = world_from_base;
   std::stable_sort(
       poses.begin(), poses.end(),
@@ -200,7 +199,7 @@ void TexturePhotos::keep(std::size_t photo, std::shared_ptr<const ColorImage> im
   kept_bytes_ += bytes_of(*image);
   images_[photo] = std::move(image);
   order_.push_back(photo);
-  while (kept_bytes_ > max_kept_bytes && order_.size() > 1) {
+  while (kept_bytes_ > max_kept_bytes_ && order_.size() > 1) {
     kept_bytes_ -= bytes_of(*images_[order_.front()]);
     images_[order_.front()].reset();
     order_.pop_front();

@@ -64,9 +64,10 @@ class TexturePhotos {
  public:
   // Reads each frame of `world_from_base` once, by ascending node. Frames without color, with a
   // pose that is not finite or that cannot be decoded are skipped and listed; with `strict` they
-  // are an Error. Throws Error if no photograph is left. `scan` must outlive this.
+  // are an Error. Throws Error if no photograph is left. `scan` must outlive this. So many bytes of
+  // images are kept at most.
   TexturePhotos(const ScanSource& scan, const Trajectory& world_from_base, bool strict,
-                Progress& progress);
+                Progress& progress, std::size_t max_kept_bytes);
 
   std::size_t size() const { return photos_.size(); }
   const TexturePhoto& operator[](std::size_t photo) const { return photos_[photo]; }
@@ -81,6 +82,7 @@ class TexturePhotos {
   void keep(std::size_t photo, std::shared_ptr<const ColorImage> image) const;
 
   const ScanSource& scan_;
+  std::size_t max_kept_bytes_ = 0;
   std::vector<TexturePhoto> photos_;
   std::vector<std::pair<int, Error>> skipped_;
 

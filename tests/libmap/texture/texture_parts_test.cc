@@ -208,7 +208,7 @@ struct AtlasCase {
       mesh,
       [](std::uint32_t, const Eigen::Vector3d&) { return Eigen::Vector3d::Constant(100).eval(); },
       graspmap_test::small_camera(), graspmap_test::circle_of_cameras(3, 0.4, 0.9)};
-  libmap::TexturePhotos photos{scan, scan.poses(), false, libmap::no_progress()};
+  libmap::TexturePhotos photos{scan, scan.poses(), false, libmap::no_progress(), 1 << 24};
   std::vector<libmap::HalfEdge> opposite =
       libmap::opposites_of(mesh.triangles, libmap::edges_of(mesh.triangles, mesh.vertices.size()));
 };

@@ -149,7 +149,7 @@ TEST(TexturePieces, LongSidesAreCutAlikeOnBothSidesOfASeam) {
 TEST(TexturePieces, VerticesOnSeamsAreSeenAlikeByBothPieces) {
   const TriangleMesh mesh = ground(40, 0.8);
   const PaintedScan scan(mesh, marks, small_camera(), circle_of_cameras(8, 0.4, 0.8));
-  const libmap::TexturePhotos photos(scan, scan.poses(), true, libmap::no_progress());
+  const libmap::TexturePhotos photos(scan, scan.poses(), true, libmap::no_progress(), 1 << 24);
   MeshPieceIndex index = pieces_of(mesh);
   std::map<Position, std::vector<libmap::ViewQuality>> seen;
   int common = 0;
