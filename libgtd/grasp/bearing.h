@@ -57,10 +57,7 @@ class BearingContact {
   bool is_link() const { return is_link_; }
   std::size_t spines() const { return spines_; }
 
-  // The largest product of a force of the set with `worth`, and a force that has it.
-  double max_product(const Eigen::Vector3d& worth, SpineSharing sharing) const {
-    return max_local_product(frame().transpose() * worth, sharing);
-  }
+  // A force of the set with the largest product with `worth`.
   Eigen::Vector3d best_force(const Eigen::Vector3d& worth, SpineSharing sharing) const {
     return best_local_force(frame().transpose() * worth, sharing);
   }
@@ -70,7 +67,8 @@ class BearingContact {
     frame << normal_, drag_, lateral_;
     return frame;
   }
-  // As max_product and best_force, of a worth's products with the columns of `frame`.
+  // The largest product, and a force that has it, of a worth's products with the columns of
+  // `frame`.
   double max_local_product(const Eigen::Vector3d& local, SpineSharing sharing) const;
   Eigen::Vector3d best_local_force(const Eigen::Vector3d& local, SpineSharing sharing) const;
   // For pictures: the edges of the forces on the steepest facet (adhesion: of all forces), unit

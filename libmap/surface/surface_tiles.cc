@@ -82,7 +82,14 @@ void cut_out(const TriangleMesh& mesh, const std::vector<bool>& marks, SurfaceTi
 void SurfaceTileOptions::check() const {
   if (!(tile_m > 0.0 && std::isfinite(tile_m)))
     throw Error("out of range", {.field = "tile_size_m", .value = to_text(tile_m), .bound = "> 0"});
-  surface_margin_m(reconstruction);
+  // Each tile takes all points around it: with more, tiles would save neither memory nor time.
+  constexpr double max_margin_tiles = 16.0;
+  if (margin_m() > max_margin_tiles * tile_m)
+    throw Error("the surface of a tile depends on points too far around it",
+                {.field = "tile_size_m",
+                 .value = to_text(tile_m),
+                 .bound = ">= " + to_text(margin_m() / max_margin_tiles) +
+                          ", by cell_size_m, trim_distance_cells and max_hole_m"});
   if (cleaning.decimation_error_m > 0.0)
     throw Error("needs the whole surface at once, which is made in tiles",
                 {.field = "decimation_error_m",

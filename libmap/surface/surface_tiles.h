@@ -23,7 +23,8 @@ struct SurfaceTileOptions {
   MeshCleaningOptions cleaning{};
 
   // Throws Error naming an option that needs the whole surface at once: Poisson reconstruction,
-  // cells of no given size, decimation.
+  // cells of no given size, decimation; or tile_size_m, if margin_m() is more than 16 times as
+  // large.
   void check() const;
   // Points so far around a square have a say in its surface.
   double margin_m() const;

@@ -14,15 +14,13 @@ read from FOLDER/chain_SIDE.json instead.
 import argparse
 import json
 import math
-import os
 import pathlib
 import subprocess
 import sys
 import tempfile
-import time
 
-BEGIN = "<!-- chain: written by scripts/bench chain -->"
-END = "<!-- end of chain -->"
+from benchmark_runs import measure, put_into_page
+
 # Stage: words, what it reads and makes in the folder.
 STAGES = {
     "simulate scan": "simulate scan ground --frames {frames} --seed 71 -o scan.db",
@@ -37,19 +35,6 @@ STAGES = {
 }
 
 
-def measure(words, folder):
-    """(wall s, processor s, peak resident MB) of a command; ends if it fails."""
-    start = time.monotonic()
-    process = subprocess.Popen(words, cwd=folder)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    wall = time.monotonic() - start
-    if process.returncode != 0:
-        sys.exit(f"chain.py: {' '.join(map(str, words))}: ended with {process.returncode}")
-    return {"wall_s": wall, "processor_s": usage.ru_utime + usage.ru_stime,
-            "peak_mb": usage.ru_maxrss / 1024}
-
-
 def run_chain(graspmap, folder, side, frames):
     """Of each stage its figures, and the errors of the refined poses and of the meshes."""
     subprocess.run([graspmap, "simulate", "terrain", "--size", str(side), "--seed", "71", "-o", "ground",
@@ -57,7 +42,7 @@ def run_chain(graspmap, folder, side, frames):
     found = {"side_m": side, "frames": frames, "stages": {}}
     for name, words in STAGES.items():
         line = [graspmap, *words.format(frames=frames).split(), "--threads", "2", "--quiet"]
-        found["stages"][name] = measure(line, folder)
+        found["stages"][name] = dict(zip(("wall_s", "processor_s", "peak_mb"), measure(line, folder)))
         print(f"{side} m, {name}: {found['stages'][name]['processor_s']:.1f} s", file=sys.stderr)
     stages = json.loads((folder / "refine.json").read_text())["stages"]
     found["rmse_mm"] = [1e3 * stage["absolute_error"]["rmse_m"] for stage in (stages[0], stages[-1])]
@@ -104,15 +89,6 @@ def draw(runs, path):
     figure.savefig(path, dpi=90)
 
 
-def put_into_page(page, text):
-    content = page.read_text(encoding="utf-8")
-    if BEGIN not in content or END not in content:
-        sys.exit(f"chain.py: {page}: the marks of this table are not there: {BEGIN} ... {END}")
-    before, rest = content.split(BEGIN, 1)
-    page.write_text(before + BEGIN + "\n\n" + text + "\n\n" + END + rest.split(END, 1)[1],
-                    encoding="utf-8")
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=pathlib.Path)
@@ -137,7 +113,7 @@ def main():
     print(text)
     if options.page:
         draw(runs, options.page.parent / "chain.png")
-        put_into_page(options.page, text + "\n\n![Time and memory of each stage](chain.png)")
+        put_into_page(options.page, "chain", text + "\n\n![Time and memory of each stage](chain.png)")
 
 
 if __name__ == "__main__":

@@ -12,28 +12,13 @@ FOLDER (TMPDIR), about 9 GB for 100 x 100 m, and are removed.
 import argparse
 import csv
 import json
-import os
 import pathlib
 import random
 import subprocess
 import sys
 import tempfile
-import time
 
-BEGIN = "<!-- scale: written by scripts/bench scale -->"
-END = "<!-- end of scale -->"
-
-
-def measure(words):
-    """(wall s, processor s, peak resident MiB) of a command; ends if it fails."""
-    start = time.monotonic()
-    process = subprocess.Popen(words)
-    _, status, usage = os.wait4(process.pid, 0)
-    process.returncode = os.waitstatus_to_exitcode(status)
-    wall = time.monotonic() - start
-    if process.returncode != 0:
-        sys.exit(f"scale.py: {' '.join(map(str, words))}: ended with {process.returncode}")
-    return wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+from benchmark_runs import measure, put_into_page
 
 
 def bytes_of(folder):
@@ -99,15 +84,6 @@ def table_of(rows):
     return "\n".join(lines)
 
 
-def put_into_page(page, text):
-    content = page.read_text(encoding="utf-8")
-    if BEGIN not in content or END not in content:
-        sys.exit(f"scale.py: {page}: the marks of this table are not there: {BEGIN} ... {END}")
-    before, rest = content.split(BEGIN, 1)
-    page.write_text(before + BEGIN + "\n\n" + text + "\n\n" + END + rest.split(END, 1)[1],
-                    encoding="utf-8")
-
-
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("build", type=pathlib.Path)
@@ -133,7 +109,7 @@ def main():
                 writer.writerows(rows)
             subprocess.run([options.build / "benchmarks/scale_chart", folder / "scale.csv",
                             options.page.parent / "scale.png"], check=True)
-            put_into_page(options.page, text + "\n\n![Time and memory against area](scale.png)")
+            put_into_page(options.page, "scale", text + "\n\n![Time and memory against area](scale.png)")
 
 
 if __name__ == "__main__":

@@ -19,8 +19,8 @@ SLURM_LOCAL=$scratch/slurm
 export SLURM_LOCAL
 slurm_local=$source/scripts/slurm-local
 
-# The first try of share 2 of a map is killed while it works, if it has not ended by then; the task
-# sees the exit code of SIGKILL in any case.
+# The first try of share 2 of a map is killed after 0.15 s. Even if it has ended before, its task
+# reports the exit code of SIGKILL.
 cat >"$scratch/graspmap" <<END
 #!/bin/sh
 if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ] &&

@@ -190,6 +190,7 @@ TEST(SurfaceTiles, OptionsThatNeedTheWholeSurfaceAreNamed) {
   EXPECT_EQ(field_of([](auto& o) { o.reconstruction.cell_size_m = 0.0; }), "cell_size_m");
   EXPECT_EQ(field_of([](auto& o) { o.cleaning.decimation_error_m = 0.1; }), "decimation_error_m");
   EXPECT_EQ(field_of([](auto& o) { o.tile_m = 0.0; }), "tile_size_m");
+  EXPECT_EQ(field_of([](auto& o) { o.reconstruction.trim_distance_cells = 1e-4; }), "tile_size_m");
 }
 
 }  // namespace surface_tiles_test
