@@ -42,7 +42,7 @@ def run_chain(graspmap, folder, side, frames):
     found = {"side_m": side, "frames": frames, "stages": {}}
     for name, words in STAGES.items():
         line = [graspmap, *words.format(frames=frames).split(), "--threads", "2", "--quiet"]
-        found["stages"][name] = dict(zip(("wall_s", "processor_s", "peak_mb"), measure(line, folder)))
+        found["stages"][name] = dict(zip(("wall_s", "processor_s", "peak_mib"), measure(line, folder)))
         print(f"{side} m, {name}: {found['stages'][name]['processor_s']:.1f} s", file=sys.stderr)
     stages = json.loads((folder / "refine.json").read_text())["stages"]
     found["rmse_mm"] = [1e3 * stage["absolute_error"]["rmse_m"] for stage in (stages[0], stages[-1])]
@@ -61,13 +61,13 @@ def table_of(runs):
     lines = ["| side m, frames | " + " | ".join(STAGES) + " |", "|---|" + "---|" * len(STAGES)]
     for run in runs:
         lines.append(f"| {run['side_m']}, {run['frames']} | " + " | ".join(
-            f"{run['stages'][name]['processor_s']:.1f} s, {run['stages'][name]['peak_mb']:.0f} MB"
+            f"{run['stages'][name]['processor_s']:.1f} s, {run['stages'][name]['peak_mib']:.0f} MiB"
             for name in STAGES) + " |")
     if len(runs) > 1:
         lines.append("| exponents of area | " + " | ".join(
             "{:.2f}, {:.2f}".format(*(
                 exponent(runs[0], runs[-1], lambda run, key=key, name=name: run["stages"][name][key])
-                for key in ("processor_s", "peak_mb"))) for name in STAGES) + " |")
+                for key in ("processor_s", "peak_mib"))) for name in STAGES) + " |")
     errors = ", ".join(f"{run['rmse_mm'][0]:.1f} -> {run['rmse_mm'][1]:.2f} mm at {run['side_m']} m"
                        for run in runs)
     return "\n".join(lines) + f"\n\nRMSE of the poses, odometry -> refined: {errors}."
@@ -79,7 +79,7 @@ def draw(runs, path):
     from matplotlib import pyplot
     figure, axes = pyplot.subplots(1, 2, figsize=(9, 3.6))
     areas = [run["side_m"] ** 2 for run in runs]
-    for axis, key, label in zip(axes, ("processor_s", "peak_mb"), ("processor time, s", "peak memory, MB")):
+    for axis, key, label in zip(axes, ("processor_s", "peak_mib"), ("processor time, s", "peak memory, MiB")):
         for name in STAGES:
             axis.loglog(areas, [run["stages"][name][key] for run in runs], "o-", label=name)
         axis.set(xlabel="area, m2", ylabel=label)
