@@ -247,6 +247,8 @@ Json tiles_json(const InfoOptions& options, Run& run, Faults& faults) {
 Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
   if (is_tile_store(options.file)) return tiles_json(options, run, faults);
   const bool is_bag = libmap::is_bag_path(options.file);
+  if (!options.verify && std::filesystem::path(options.file).extension() == ".yaml")
+    return camera_info(options.file);
   if (!is_bag && may_be_scan(options.file)) {
     ScanInfo scan = scan_info(options.file, options.verify, run.progress());
     faults.scan = std::move(scan.faults);
@@ -307,7 +309,8 @@ void info(InfoOptions& options, Run& run) {
 int main(int argc, char** argv) {
   InfoOptions options;
   Command command("info");
-  command.input("FILE", options.file, "scan, cloud, mesh, map, tile store (.tiles) or bag of ROS");
+  command.input("FILE", options.file,
+                "scan, camera (.yaml), cloud, mesh, map, tile store (.tiles) or bag of ROS");
   command.flag("--json", options.json, "as JSON");
   command.flag("--verify", options.verify,
                "read all that a scan or a tile store contains and list what is broken");

@@ -69,6 +69,9 @@ void add_results(const libmap::RefinementResult& result, Run& run) {
        {"nodes_without_links", result.without_links.size()},
        {"frames_skipped", result.skipped.size()},
        {"features", result.features},
+       {"sensor", result.findings.empty() ? std::optional<std::string>()
+                                          : fmt::format("{}", fmt::join(result.findings, "; "))},
+       {"scale", result.scale},
        {"stages_undone", std::count_if(result.stages.begin(), result.stages.end(),
                                        [](const auto& stage) { return stage.rejected; })}});
   for (const libmap::StageReport& stage : result.stages) {
@@ -151,8 +154,11 @@ libmap::CameraFile camera_of(const libmap::RefinementResult& result,
                            .field = "cameras",
                            .value = std::to_string(cameras.size()),
                            .bound = "1"});
-    return libmap::calibrated_camera(cameras.front(), result.cameras.front(), result.calibration, 0,
-                                     scan.graph());
+    libmap::CameraFile file = libmap::calibrated_camera(cameras.front(), result.cameras.front(),
+                                                        result.calibration, 0, scan.graph());
+    file.findings = result.findings;
+    file.findings.push_back(result.scale);
+    return file;
   }
   throw libmap::Error("the scan has no calibration", {.file = scan.path().string()});
 }

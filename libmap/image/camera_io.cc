@@ -185,6 +185,16 @@ void read_timing(const YAML::Node& root, CameraFile& file) {
     throw Error("stamps do not ascend", {.field = "frame_motions"});
 }
 
+void read_findings(const YAML::Node& root, CameraFile& file) {
+  const YAML::Node list = root["findings"];
+  if (!list) return;
+  if (!list.IsSequence()) throw Error("not a list of sentences", {.field = "findings"});
+  for (const YAML::Node& sentence : list) {
+    if (!sentence.IsScalar()) throw Error("not a list of sentences", {.field = "findings"});
+    file.findings.push_back(sentence.Scalar());
+  }
+}
+
 // As cv::FileStorage, which does not take a flow map after a tag.
 std::string matrix_text(const std::string& key, int rows, int cols,
                         const std::vector<double>& numbers) {
@@ -271,6 +281,7 @@ CameraFile camera_from_yaml(const YAML::Node& root) {
   if (root["depth_registration"])
     file.color_from_depth = pose_from_yaml(root["depth_registration"], "depth_registration");
   read_timing(root, file);
+  read_findings(root, file);
   return file;
 }
 
@@ -310,6 +321,10 @@ std::string to_yaml(const CameraFile& file, const std::string& comment) {
         matrix_text("depth_correction_radial", 1, 3, {depth.radial.begin(), depth.radial.end()});
   if (file.depth_delay_s != 0.0 || file.rolling_shutter_s != 0.0)
     text += matrix_text("camera_timing", 1, 2, {file.depth_delay_s, file.rolling_shutter_s});
+  if (!file.findings.empty()) {
+    text += "findings:\n";
+    for (const std::string& sentence : file.findings) text += "  - " + quoted(sentence) + "\n";
+  }
   if (file.motions.empty()) return text;
   std::vector<double> numbers;
   for (const FrameMotion& frame : file.motions) {

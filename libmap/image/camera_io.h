@@ -25,6 +25,7 @@
 //   camera_timing: [0.01, 0.02]               # depth_delay_s, rolling_shutter_s; may be missing
 //   frame_motions: !!opencv-matrix            # FrameMotion of each frame; may be missing
 //     {rows: 60, cols: 7, dt: d, data: [...]}
+//   findings: ["depth bends by ..."]          # CameraFile; may be missing
 //
 // distortion_model  plumb_bob: k1 k2 p1 p2 [k3]; rational_polynomial: 8 or 12 terms in OpenCV's
 // order; equidistant or fisheye: k1 k2 k3 k4, or RTAB-Map's k1 k2 0 0 k3 k4. Without it the number
@@ -65,7 +66,8 @@ struct CameraFile {
   // the other in this time. The motions are those of the scan that they were estimated from.
   double depth_delay_s = 0.0;
   double rolling_shutter_s = 0.0;
-  std::vector<FrameMotion> motions{};  // by ascending stamp
+  std::vector<FrameMotion> motions{};   // by ascending stamp
+  std::vector<std::string> findings{};  // what the estimation found, a sentence each
 
   // Of the frame of this stamp; the base does not move in frames that `motions` does not list.
   Pose color_from_depth_at(double stamp_s) const;

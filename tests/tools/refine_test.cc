@@ -22,6 +22,7 @@ using graspmap_test::content;
 using graspmap_test::data_folder;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
+using graspmap_test::ProgramResult;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
 
@@ -257,8 +258,16 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
   EXPECT_EQ(b.cameras.at(0).fx, found.camera.fx);
   for (std::size_t n = 0; n < a.depth.pixels.size(); ++n)
     ASSERT_NEAR(a.depth.pixels[n], b.depth.pixels[n], 5.1e-4) << "whole millimeters";
-  ASSERT_TRUE(succeeded(graspmap({"fuse", "scan.db", "--poses", "poses.tum", "--calibration",
-                                  "found.yaml", "--voxel-size", "0.05", "-o", "cloud.ply"})));
+  const ProgramResult fused = graspmap({"fuse", "scan.db", "--poses", "poses.tum", "--calibration",
+                                        "found.yaml", "--voxel-size", "0.05", "-o", "cloud.ply"});
+  ASSERT_TRUE(succeeded(fused));
+  // What was found about the sensor goes with the calibration.
+  for (const std::string& output :
+       {fused.standard_error, graspmap({"info", "found.yaml"}).standard_output,
+        graspmap({"info", "found.db"}).standard_output})
+    for (const std::string words :
+         {"stored focal length 1.", "depth bends by ", "scale comes from the depth camera alone"})
+      EXPECT_NE(output.find(words), std::string::npos) << words << output;
   EXPECT_TRUE(
       bad_input(graspmap({"fuse", "scan.db", "--calibration", "camera.yaml2", "-o", "c.ply"}),
                 {"camera.yaml2"}));

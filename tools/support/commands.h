@@ -34,7 +34,7 @@ constexpr CommandEntry commands[] = {
      "evaluate looked-up scores against a field test: ROC, AUC, accuracy"},
     {"Pictures and files", "render", "draw clouds, meshes and maps, one or several side by side"},
     {"Pictures and files", "report", "write one HTML report of a whole run"},
-    {"Pictures and files", "info", "describe a scan, cloud, mesh, map, tile store or bag"},
+    {"Pictures and files", "info", "describe a scan, camera, cloud, mesh, map, tile store or bag"},
     {"Pictures and files", "convert", "convert scans, poses, clouds, meshes and maps; merge tiles"},
 };
 

@@ -8,6 +8,7 @@
 #include <tuple>
 
 #include "libmap/core/error.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 #include "libmap/trajectory/trajectory_error.h"
@@ -337,6 +338,15 @@ Json verification_json(const libmap::ScanVerificationResult& result) {
 bool may_be_scan(const std::string& path) {
   return std::filesystem::path(path).extension() == ".db" || std::filesystem::is_directory(path) ||
          (std::filesystem::is_regular_file(path) && libmap::is_sqlite_file(path));
+}
+
+Json camera_info(const std::string& path) {
+  const libmap::CameraFile file = libmap::read_camera(path);
+  Json json = {{"kind", "camera"}, {"name", file.name.empty() ? Json(nullptr) : Json(file.name)}};
+  json.update(camera_json(file.camera));
+  json["changes_depth"] = file.changes_depth();
+  json["findings"] = file.findings;
+  return json;
 }
 
 ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progress) {

@@ -16,6 +16,8 @@ struct ScanInfo {
   nlohmann::ordered_json json;
   std::vector<libmap::ScanFault> faults;  // found with `verify`
 };
+// Of a camera file.
+nlohmann::ordered_json camera_info(const std::string& path);
 ScanInfo scan_info(const std::string& path, bool verify, libmap::Progress& progress);
 
 }  // namespace graspmap_tools

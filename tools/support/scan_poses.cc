@@ -147,7 +147,9 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
   const libmap::CameraFile camera = libmap::read_camera(calibration);
   run.add_input(calibration);
   run.say("camera of {}: {}", calibration,
-          camera.depth.empty() ? "intrinsics" : "intrinsics and depth correction");
+          !camera.findings.empty() ? fmt::format("{}", fmt::join(camera.findings, "; "))
+          : camera.depth.empty()   ? "intrinsics"
+                                   : "intrinsics and depth correction");
   return libmap::with_calibration(std::move(scan), camera);
 }
 

@@ -253,11 +253,13 @@ TEST(CameraIo, TimingMotionsAndScaleAreReadBackAsWritten) {
   file.depth.scale = 1.0081;
   file.depth_delay_s = 0.0103;
   file.rolling_shutter_s = 0.02;
+  file.findings = {"depth: \"bent\", corrected", "scale x 1.0081"};
   file.motions = {{1.5, {0.1, 0.2, 0.3}, {0.4, 0.5, 0.6}}, {2.5, {1, 2, 3}, {-1, 0, 0.25}}};
   const libmap::CameraFile read = parse_camera(libmap::to_yaml(file), "a");
   EXPECT_EQ(read.depth.scale, 1.0081);
   EXPECT_EQ(read.depth_delay_s, 0.0103);
   EXPECT_EQ(read.rolling_shutter_s, 0.02);
+  EXPECT_EQ(read.findings, file.findings);
   ASSERT_EQ(read.motions.size(), 2U);
   EXPECT_EQ(read.motions[1].stamp_s, 2.5);
   EXPECT_EQ(read.motions[1].velocity, Eigen::Vector3d(1, 2, 3));
@@ -273,6 +275,8 @@ TEST(CameraIo, TimingMotionsAndScaleAreReadBackAsWritten) {
     EXPECT_EQ(error_of([&] { parse_camera(plain + text, "a"); }).context().field, field);
   };
   refuses("depth_scale: 3\n", "depth_scale");
+  refuses("findings: bent\n", "findings");
+  refuses("findings: [[bent]]\n", "findings");
   refuses("camera_timing: [1]\n", "camera_timing");
   refuses("camera_timing: [11, 0]\n", "camera_timing");
   refuses("frame_motions: [1, 2, 3]\n", "frame_motions");
