@@ -5,9 +5,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <utility>
 
 #include "libmap/refine/bundle_residuals.h"
+#include "libmap/refine/calibration_uncertainty.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/pose_residuals.h"
 #include "libmap/refine/rigid_motion.h"
@@ -139,7 +142,9 @@ class Adjustment {
   void add_camera_priors(ceres::Problem& problem, std::size_t camera);
   void add_depth_priors(ceres::Problem& problem, std::size_t camera);
   double motion_scale() const;
+  SensorCalibration calibration(double motion_scale) const;
   void take_calibration();
+  void find_alternatives(ceres::Problem& problem);
   void add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links);
   void solve(ceres::Problem& problem);
   void eliminate_points(const std::vector<GraphLinkResult>& links,
@@ -378,8 +383,8 @@ double Adjustment::motion_scale() const {
   return mixed > 0.0 && squares > 0.0 ? mixed / squares : 1.0;
 }
 
-void Adjustment::take_calibration() {
-  SensorCalibration& found = result_.calibration;
+SensorCalibration Adjustment::calibration(double motion_scale) const {
+  SensorCalibration found;
   for (std::size_t n = 0; n < cameras_; ++n) {
     const double* step = intrinsics(n);
     if (options_.refine_intrinsics)
@@ -388,7 +393,8 @@ void Adjustment::take_calibration() {
       found.color_from_depth.push_back(
           moved(Pose::Identity(), Eigen::Map<const Vector6d>(registration(n))) *
           start_.color_from_depth[n]);
-    if (options_.refine_timing) found.timing.push_back({timing(n)[0], timing(n)[1]});
+    if (options_.refine_timing)
+      found.timing.push_back({motion_scale * timing(n)[0], motion_scale * timing(n)[1]});
     if (options_.refine_depth) {
       const double* numbers = depth_numbers(n);
       found.depth.push_back(corrections_[n]);
@@ -396,16 +402,45 @@ void Adjustment::take_calibration() {
       std::copy_n(numbers + 3, corrections_[n].spline_m.size(), found.depth[n].spline_m.begin());
     }
   }
-  const double scale = options_.refine_timing ? motion_scale() : 1.0;
-  for (CameraTiming& timing : found.timing) {
-    timing.depth_delay_s *= scale;
-    timing.rolling_shutter_s *= scale;
-  }
   for (const auto& [node, between] : motions_)
-    found.motion.emplace(node, Eigen::Map<const Vector6d>(motion(node)) / scale);
-  if (found.empty()) return;
+    found.motion.emplace(node, Eigen::Map<const Vector6d>(motion(node)) / motion_scale);
+  return found;
+}
+
+void Adjustment::take_calibration() {
+  if (cameras_ == 0) return;
+  result_.calibration = calibration(options_.refine_timing ? motion_scale() : 1.0);
   calibrated_frames_ = frames_;
-  for (FrameFeatures& frame : calibrated_frames_) calibrate(frame, found);
+  for (FrameFeatures& frame : calibrated_frames_) calibrate(frame, result_.calibration);
+}
+
+void Adjustment::find_alternatives(ceres::Problem& problem) {
+  FreeBlocks blocks;
+  for (auto& point : points_)
+    if (problem.HasParameterBlock(point.data())) blocks.points.push_back(point.data());
+  for (const auto& [node, block] : blocks_.all())
+    if (problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block))
+      blocks.poses.push_back(block);
+  std::vector<double*> all;
+  problem.GetParameterBlocks(&all);
+  std::copy_if(all.begin(), all.end(), std::back_inserter(blocks.cameras),
+               [&](const double* block) {
+                 return std::greater_equal<>()(block, static_cast<const double*>(blocks_.rest())) &&
+                        std::less<>()(block, static_cast<const double*>(blocks_.end()));
+               });
+  std::sort(blocks.cameras.begin(), blocks.cameras.end());
+  const double scale = options_.refine_timing ? motion_scale() : 1.0;
+  for (const Eigen::VectorXd& change : likely_changes(problem, blocks, options_.alternatives)) {
+    const std::vector<double> best(static_cast<const double*>(blocks_.rest()), blocks_.end());
+    Eigen::Index first = 0;
+    for (double* const block : blocks.cameras) {
+      const int size = problem.ParameterBlockSize(block);
+      Eigen::Map<Eigen::VectorXd>(block, size) += change.segment(first, size);
+      first += size;
+    }
+    result_.alternatives.push_back(calibration(scale));
+    std::copy(best.begin(), best.end(), blocks_.rest());
+  }
 }
 
 BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links,
@@ -423,6 +458,7 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
   take_poses(problem, blocks_, result_.map_from_base);
   for (const auto& point : points_) result_.points.emplace_back(point[0], point[1], point[2]);
   take_calibration();
+  if (options_.alternatives > 0 && cameras_ > 0) find_alternatives(problem);
   eliminate_points(links, system_tracks);
   return std::move(result_);
 }
@@ -453,6 +489,12 @@ BundleAdjustmentResult adjust_bundle(
   check_parameters(options);
   return Adjustment(frames, tracks, map_from_base, options, start)
       .run(links, components, system_tracks);
+}
+
+FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,
+                                 const std::vector<FeatureLink>& feature_links, std::size_t poses) {
+  return build_tracks(frames, feature_links,
+                      poses < dense_below ? TrackFrames::any : TrackFrames::linked);
 }
 
 BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,

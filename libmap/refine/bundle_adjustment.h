@@ -29,6 +29,7 @@ struct BundleAdjustmentOptions {
   double depth_prior_m = 0.03;       // > 0: ... and of a correction of depth
   double depth_bend_m = 0.005;       // > 0: ... and of its second difference from knot to knot
   double depth_knot_m = 0.2;         // >= 0.02: between the knots of its spline
+  std::size_t alternatives = 0;      // not bound: of the result's calibration
 };
 void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 
@@ -41,6 +42,9 @@ struct BundleAdjustmentResult {
   std::map<int, Pose> map_from_base;
   std::vector<Eigen::Vector3d> points;  // in the map, one a track
   SensorCalibration calibration;        // what was free
+  // Calibrations one standard deviation away in independent directions: those that move the
+  // positions of the poses most.
+  std::vector<SensorCalibration> alternatives;
   // Of steps of the poses (rigid_motion.h), in the order of map_from_base, the points eliminated
   // (Schur complement), at the end: the links among them.
   BlockSystem information{0};
@@ -76,5 +80,9 @@ BundleAdjustmentResult adjust_bundle(
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const SensorCalibration& start = {}, Progress& progress = no_progress());
+
+// The tracks whose system is the information of a result with so many poses.
+FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,
+                                 const std::vector<FeatureLink>& feature_links, std::size_t poses);
 
 }  // namespace libmap

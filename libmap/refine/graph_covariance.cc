@@ -1,6 +1,7 @@
 #include "libmap/refine/graph_covariance.h"
 
 #include <algorithm>
+#include <iterator>
 #include <limits>
 #include <utility>
 
@@ -11,6 +12,7 @@ namespace {
 // Keeps unknowns that no link binds, such as the rotation of a landmark that is only a point, from
 // making the system singular; nothing beside the information of any link.
 constexpr double damping = 1e-6;
+constexpr double gauge_weight = 1e12;
 
 constexpr std::size_t held = std::numeric_limits<std::size_t>::max();
 
@@ -96,6 +98,17 @@ Matrix6d GraphCovariance::of_relative(int a, int b) const {
   const Matrix6d mixed = jacobian.by_b * parts_->between(b, a) * jacobian.by_a.transpose();
   return jacobian.by_a * of_node(a) * jacobian.by_a.transpose() +
          jacobian.by_b * of_node(b) * jacobian.by_b.transpose() + mixed + mixed.transpose();
+}
+
+BlockSystem with_gauges(const BlockSystem& system, const std::map<int, Pose>& map_from_base,
+                        const std::vector<GraphComponent>& components) {
+  BlockSystem bound = system;
+  for (const GraphComponent& component : components) {
+    const auto place = static_cast<std::size_t>(
+        std::distance(map_from_base.begin(), map_from_base.find(component.gauge_node)));
+    bound.add(place, place, gauge_weight * Matrix6d::Identity());
+  }
+  return bound;
 }
 
 BlockSystem link_system(const std::map<int, Pose>& map_from_base,

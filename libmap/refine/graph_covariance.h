@@ -38,6 +38,10 @@ class GraphCovariance {
   std::unique_ptr<Parts> parts_;
 };
 
+// The system with the gauge node of each component held: what it is bound by is not asked.
+BlockSystem with_gauges(const BlockSystem& system, const std::map<int, Pose>& map_from_base,
+                        const std::vector<GraphComponent>& components);
+
 // The information of links between poses as a system over `map_from_base`'s nodes, in their order,
 // and its right-hand side: minus the gradient of half the weighted squares.
 BlockSystem link_system(const std::map<int, Pose>& map_from_base,

@@ -11,6 +11,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/icp_pairs.h"
 #include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/surface_samples.h"
@@ -60,6 +61,12 @@ class Alignment {
   }
 
   IcpResult run(const std::vector<PoseLink>& links, Progress& progress);
+  BlockSystem system_of(const std::vector<FramePair>& pairs, double max_distance_m) {
+    pairs_ = pairs;
+    BlockSystem system(place_.size());
+    add_pairs(max_distance_m, system);
+    return system;
+  }
 
  private:
   const Pose* pose_of(std::size_t frame) const {
@@ -73,7 +80,6 @@ class Alignment {
   void drop_degenerate(PairEquations& equations) const;
   void add_prior(BlockSystem& system) const;
   double add_pairs(double max_distance_m, BlockSystem& system);
-  BlockSystem with_gauge(const BlockSystem& system) const;
   double step(double max_distance_m, double& rms_m);
   double deviation_scale(double max_distance_m) const;
 
@@ -228,16 +234,6 @@ double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
   return weight > 0.0 ? std::sqrt(squares / weight) : 0.0;
 }
 
-// Gauge nodes stand still: what they are bound by is not asked.
-BlockSystem Alignment::with_gauge(const BlockSystem& system) const {
-  BlockSystem bound(place_.size());
-  bound.add(system);
-  for (const GraphComponent& component : components_)
-    bound.add(place_.at(component.gauge_node), place_.at(component.gauge_node),
-              1e12 * Matrix6d::Identity());
-  return bound;
-}
-
 // One step of Gauss and Newton; how far the poses moved.
 double Alignment::step(double max_distance_m, double& rms_m) {
   BlockSystem system(place_.size());
@@ -245,7 +241,7 @@ double Alignment::step(double max_distance_m, double& rms_m) {
   rms_m = add_pairs(max_distance_m, system);
   result_.information = system;
   result_.information.clear_side();
-  const BlockSystem bound = with_gauge(system);
+  const BlockSystem bound = with_gauges(system, result_.map_from_base, components_);
   const BlockSolver solver(bound, 1e-6);
   if (!solver.valid()) return std::numeric_limits<double>::infinity();
   const std::vector<Vector6d> moves = solver.solve(bound.side());
@@ -284,7 +280,8 @@ double Alignment::deviation_scale(double max_distance_m) const {
       of_cell.try_emplace(b, Vector6d::Zero()).first->second += jacobian.by_b.transpose() * side;
     }
   }
-  const BlockSolver solver(with_gauge(result_.information), 1e-6);
+  const BlockSolver solver(with_gauges(result_.information, result_.map_from_base, components_),
+                           1e-6);
   if (!solver.valid() || sides.empty()) return 1.0;
   const auto square = [&](const std::vector<Vector6d>& side) {
     const std::vector<Vector6d> solved = solver.solve(side);
@@ -356,6 +353,8 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   for (const auto& [key, block] : result_.information.blocks())
     honest.add(key.first, key.second, factor * block);
   result_.information = std::move(honest);
+  result_.frame_pairs = std::move(pairs_);
+  result_.max_distance_m = max_distance_m;
   return std::move(result_);
 }
 
@@ -387,6 +386,14 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                  .value = std::to_string(prior.size()),
                  .bound = std::to_string(map_from_base.size())});
   return Alignment(frames, map_from_base, prior, components, options).run(links, progress);
+}
+
+BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
+                           const std::map<int, Pose>& map_from_base,
+                           const std::vector<FramePair>& pairs, double max_distance_m,
+                           const IcpOptions& options) {
+  const BlockSystem nothing(map_from_base.size());
+  return Alignment(frames, map_from_base, nothing, {}, options).system_of(pairs, max_distance_m);
 }
 
 }  // namespace libmap

@@ -10,6 +10,7 @@
 #include "libmap/core/progress.h"
 #include "libmap/refine/block_system.h"
 #include "libmap/refine/features.h"
+#include "libmap/refine/loop_closure.h"
 #include "libmap/refine/pose_graph_optimization.h"
 
 namespace libmap {
@@ -44,6 +45,8 @@ struct IcpResult {
   double final_rms_m = 0.0;
   int iterations = 0;
   bool converged = false;
+  std::vector<FramePair> frame_pairs;  // that were laid against each other
+  double max_distance_m = 0.0;         // between a sample and a plane at the end
 };
 
 // `prior` holds what is known already (BundleAdjustmentResult::information), of steps from
@@ -54,5 +57,12 @@ IcpResult align_surfaces(const std::vector<FrameFeatures>& frames,
                          const std::vector<GraphComponent>& components,
                          const std::vector<PoseLink>& links, const IcpOptions& options = {},
                          Progress& progress = no_progress());
+
+// What the surfaces of pairs of frames ask of steps of the poses as they are. The same for any
+// number of threads.
+BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
+                           const std::map<int, Pose>& map_from_base,
+                           const std::vector<FramePair>& pairs, double max_distance_m,
+                           const IcpOptions& options);
 
 }  // namespace libmap

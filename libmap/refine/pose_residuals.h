@@ -43,6 +43,7 @@ class PoseBlocks {
   bool contains(int node) const { return place_.contains(node); }
   double* at(int node) const { return place_.at(node); }
   double* rest() const { return rest_; }
+  const double* end() const { return values_.data() + values_.size(); }
   const std::map<int, double*>& all() const { return place_; }
   Pose pose(int node) const {
     const double* block = place_.at(node);

@@ -78,7 +78,9 @@ struct RefinementResult {
   Trajectory poses;                // by ascending node
   std::vector<PoseLink> links;     // stored ones as recalibrated, then those found; none rejected
   std::vector<PoseLink> closures;  // those found, among the links
-  std::map<int, Matrix6d> covariance;  // of a step of each pose against its component's gauge node
+  // Of a step of each pose against its component's gauge node, that of the calibration included; in
+  // units of the depth camera, whose own scale error is not.
+  std::map<int, Matrix6d> covariance;
   std::vector<GraphComponent> components;
   std::vector<StageReport> stages;             // "start" first
   std::vector<std::pair<int, Error>> skipped;  // frames without features and why

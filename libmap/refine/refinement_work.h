@@ -50,6 +50,7 @@ class Refinement {
   void match_again();
   void calibrate_sensor();
   void icp();
+  void vary_calibration();
   void keep_start_if_better();
   void find_scale();
   void finish();
@@ -79,6 +80,12 @@ class Refinement {
   std::set<FramePair> tried_;
   PoseGraphResult graph_;
   BlockSystem information_{0};
+  std::vector<FramePair> surface_pairs_;  // that have moved the poses
+  double surface_distance_m_ = 0.0;
+  double deviation_scale_ = 1.0;  // IcpResult
+  bool by_observations_ = false;  // whether the information is that of a bundle adjustment
+  // Of each node, by calibrations that are as likely: independent, a standard deviation each.
+  std::map<int, std::vector<Vector6d>> moves_;
 };
 
 // Of the graph's links, those that are not of features.

@@ -82,7 +82,7 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
   return part;
 }
 
-constexpr int max_rounds = 3;
+constexpr int max_rounds = 4;
 
 // What is free in an adjustment.
 struct Model {
@@ -122,7 +122,7 @@ Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOpt
     candidate.adjustment = adjust_bundle(part.frames, part.links, poses, part.graph_links,
                                          part.components, options, start);
     const SensorCalibration& found = candidate.adjustment.calibration;
-    if (takes_depth_from_near(start, found, 3e-4, 2e-4, 3e-4)) break;
+    if (takes_depth_from_near(start, found, 1e-4, 5e-5, 3e-4)) break;
     poses = candidate.adjustment.map_from_base;
     start = found;
   }
@@ -197,6 +197,23 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   estimate.held_out = evaluate_held_out(before, best.costs);
   estimate.adjustment = std::move(best.adjustment);
   return estimate;
+}
+
+BundleAdjustmentResult vary_calibration(
+    const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
+    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
+    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
+    const SensorCalibration& known, std::size_t count, std::size_t max_frames) {
+  const Excerpt part =
+      excerpt_of(frames, links, map_from_base, graph_links, components, max_frames);
+  BundleAdjustmentOptions varied = options;
+  varied.refine_intrinsics = !known.intrinsics.empty();
+  varied.refine_depth = !known.depth.empty();
+  varied.refine_registration = !known.color_from_depth.empty();
+  varied.refine_timing = !known.timing.empty();
+  varied.alternatives = count;
+  return adjust_bundle(part.frames, part.links, part.poses, part.graph_links, part.components,
+                       varied, known);
 }
 
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,

@@ -47,6 +47,13 @@ CalibrationEstimate estimate_calibration(
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
     const CalibrationChoice& choice, std::size_t max_frames = 80);
 
+// The calibration again, from where it is, with `count` alternatives.
+BundleAdjustmentResult vary_calibration(
+    const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
+    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
+    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
+    const SensorCalibration& known, std::size_t count, std::size_t max_frames = 80);
+
 // Whether registrations and timings of all cameras differ by no more than this.
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s);

@@ -55,6 +55,35 @@ TEST(Refinement, BringsADriftingLoopToTheTruth) {
   EXPECT_LT(claimed, 5e-3);
 }
 
+// A principal point turns all frames about themselves: against the first one, the poses are as
+// uncertain as the camera that they rest on.
+TEST(Refinement, DeviationsCoverAnEstimatedCamera) {
+  TexturedScan scan = loop_of(14);
+  const auto deviation = [](const RefinementResult& result) {
+    return std::sqrt(result.covariance.at(8).topLeftCorner<3, 3>().trace());
+  };
+  const RefinementResult stored = libmap::refine_poses(scan, small_options());
+  for (auto& [node, frame] : scan.frames)
+    frame.cameras = {libmap::moved(frame.cameras[0], {0.03, 0.03, 6.0, -5.0})};
+  const RefinementResult estimated = libmap::refine_poses(scan, small_options());
+  ASSERT_TRUE(stored.calibration.intrinsics.empty());
+  ASSERT_EQ(estimated.calibration.intrinsics.size(), 1U);
+  EXPECT_GT(deviation(estimated), 1.5 * deviation(stored));
+  const auto from_first = [](const Pose& first, const Pose& pose) {
+    return Pose(first.inverse() * pose);
+  };
+  for (const libmap::TrajectoryPose& pose : estimated.poses) {
+    if (pose.node == 1) continue;
+    const Vector6d error = libmap::step_between(
+        from_first(*scan.graph_.nodes[0].truth_from_base,
+                   *scan.graph_.nodes[static_cast<std::size_t>(pose.node - 1)].truth_from_base),
+        from_first(estimated.poses[0].world_from_base, pose.world_from_base));
+    const Eigen::Matrix3d covariance = estimated.covariance.at(pose.node).topLeftCorner<3, 3>();
+    EXPECT_LT(error.head<3>().dot(covariance.ldlt().solve(error.head<3>())), 16.3)
+        << "chi-square of three, one in a thousand: node " << pose.node;
+  }
+}
+
 TEST(Refinement, SameBytesForAnyNumberOfThreads) {
   const TexturedScan scan = loop_of(6);
   const auto bytes = [&](unsigned threads) {

@@ -284,6 +284,33 @@ TEST(BundleAdjustment, FindsAShiftedPrincipalPoint) {
   EXPECT_LT(error_of_poses(scene, free.map_from_base), error_of_poses(scene, held.map_from_base));
 }
 
+// The errors of the calibration are as large as the alternatives to it say.
+TEST(BundleAdjustment, AlternativesAreAsFarAsTheTruth) {
+  double sum = 0.0;
+  constexpr int trials = 30;
+  for (int n = 0; n < trials; ++n) {
+    const Scene scene = scene_of(4, {.apply = true});
+    libmap::BundleAdjustmentOptions options;
+    options.robust_scale = 1e3;
+    options.refine_intrinsics = true;
+    options.alternatives = 4;
+    const auto result = libmap::adjust_bundle(scene.frames, scene.tracks, scene.start, {},
+                                              scene.components, options);
+    const auto numbers = [](const libmap::SensorCalibration& calibration) {
+      const libmap::IntrinsicsStep& step = calibration.intrinsics.at(0);
+      return Eigen::Vector4d(step.fx_share, step.fy_share, step.cx_px, step.cy_px);
+    };
+    ASSERT_EQ(result.alternatives.size(), 4U);
+    Eigen::Matrix4d deviations;
+    for (int k = 0; k < 4; ++k)
+      deviations.col(k) =
+          numbers(result.alternatives[static_cast<std::size_t>(k)]) - numbers(result.calibration);
+    sum += deviations.fullPivLu().solve(numbers(result.calibration)).squaredNorm();
+  }
+  // Four numbers, whose truth is 0: chi-square of four.
+  EXPECT_NEAR(sum / trials, 4.0, 1.5);
+}
+
 // Depth that bends with range and toward the corners, and focal lengths that are 1 % off: both are
 // found together, but for the scale, which nothing tells.
 TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
