@@ -7,7 +7,7 @@
 #   make -f pipelines/bag.mk BAG=robot.bag SCENARIO=artificial_rocks_realtime OUT=folder \
 #        [EVERY=10] [BAG_FLAGS="--near 0.28 --far 1.5"] [METHOD=corrected] [SCORE="..."] -j2
 #
-# EVERY takes every n-th moment of the bag. BAG_FLAGS are further flags of `graspmap bag`, such as
+# EVERY takes every n-th moment of the bag. BAG_FLAGS are further flags of `graspmap convert`, such as
 # topics, a rig, a range; FOOTHOLDS of `graspmap footholds`. A second run does nothing; other variables make again
 # what depends on them. Names must not hold spaces.
 
@@ -50,7 +50,7 @@ $(OUT)/read_with $(OUT)/scored_with: FORCE | $(OUT)
 # The folder's manifest stands for the folder.
 $(OUT)/images.json: $(BAG) $(wildcard $(BAG)/*) $(OUT)/read_with
 	@rm -rf $(OUT)/images
-	@exec $(GRASPMAP) bag $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
+	@exec $(GRASPMAP) convert $(BAG) -o $(OUT)/images --every $(EVERY) $(BAG_FLAGS)
 
 # The bag of a map; its manifest stands for a folder.
 map_bag := $(if $(filter %.bag,$(BAG)),map.bag,$(if $(filter %.mcap,$(BAG)),map.mcap,map_bag.json))
@@ -70,7 +70,7 @@ $(OUT)/%/footholds.csv: $(OUT)/%/map.pcd
 	@exec $(GRASPMAP) footholds $< -o $@ $(FOOTHOLDS)
 
 $(OUT)/%/$(map_bag): $(OUT)/%/map.pcd $(OUT)/%/footholds.csv
-	@exec $(GRASPMAP) bag $< -o $(@:.json=) --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
+	@exec $(GRASPMAP) convert $< -o $(@:.json=) --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
 
 $(OUT)/%/top.png: $(OUT)/%/map.pcd
 	@exec $(GRASPMAP) render $< -o $@ --view top --color score --title "$* s" --quiet

@@ -461,5 +461,6 @@ int compare_surfaces(int argc, char** argv) {
 int main(int argc, char** argv) {
   const bool edges =
       std::any_of(argv, argv + argc, [](const std::string& word) { return word == "--edges"; });
-  return run_usage(argc, argv, edges, compare_surfaces, compare_edges);
+  return run_usage(argc, argv, {compare_surfaces, compare_edges},
+                   edges ? compare_edges : compare_surfaces);
 }

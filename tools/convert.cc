@@ -1,8 +1,13 @@
 // graspmap convert: any format to any other.
+#include <algorithm>
+#include <set>
+
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/single_precision.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/raster/dem_reader.h"
+#include "libmap/ros/bag_reader.h"
+#include "libmap/scan/rig_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
@@ -16,6 +21,7 @@ using namespace graspmap_tools;
 
 namespace {
 
+namespace fs = std::filesystem;
 using libmap::FileEncoding;
 using libmap::TrajectoryFormat;
 
@@ -183,7 +189,7 @@ void convert_poses(const ConvertOptions& options, Run& run) {
   const bool nodes = read.poses.front().node != 0;
   const auto is_output = [&](TrajectoryFormat format, const char* extension) {
     return named ? options.output_poses_format == format
-                 : std::filesystem::path(options.output).extension() == extension;
+                 : fs::path(options.output).extension() == extension;
   };
   if (!nodes &&
       (is_output(TrajectoryFormat::g2o, ".g2o") || is_output(TrajectoryFormat::toro, ".toro")))
@@ -220,23 +226,6 @@ void convert(ConvertOptions& options, Run& run) {
     convert_cloud(options, run);
 }
 
-// A database, or a folder of frames. A folder that is converted to a file is another one, such as a
-// model of COLMAP.
-bool names_scan(int argc, char** argv) {
-  bool has_scan = false;
-  bool to_file = false;
-  for (int n = 1; n < argc; ++n) {
-    const std::string word = argv[n];
-    const bool is_output =
-        n > 1 && (std::string(argv[n - 1]) == "-o" || std::string(argv[n - 1]) == "--output");
-    if (is_output) to_file = std::filesystem::path(word).has_extension();
-    if (is_output || word.starts_with("-")) continue;
-    if (word.ends_with(".db")) return true;
-    has_scan = has_scan || is_scan_path(word);
-  }
-  return has_scan && !to_file;
-}
-
 int convert_file(int argc, char** argv) {
   ConvertOptions options;
   Command command("convert");
@@ -265,8 +254,73 @@ int convert_file(int argc, char** argv) {
   return command.run(argc, argv, [&](Run& run) { convert(options, run); });
 }
 
+// The words of a command line that is not parsed yet: values of options count as inputs.
+struct Words {
+  std::vector<std::string> inputs;
+  std::vector<std::string> options;
+  fs::path output;
+
+  bool any_input(const std::function<bool(const std::string&)>& is) const {
+    return std::any_of(inputs.begin(), inputs.end(), is);
+  }
+  bool any_option(const std::set<std::string>& names) const {
+    return std::any_of(options.begin(), options.end(),
+                       [&](const std::string& option) { return names.contains(option); });
+  }
+};
+
+Words words_of(int argc, char** argv) {
+  Words words;
+  for (int n = 1; n < argc; ++n) {
+    const std::string word = argv[n];
+    const std::string option = word.substr(0, word.find('='));
+    if (word == "-o" || word == "--output") {
+      if (n + 1 < argc) words.output = argv[++n];
+    } else if (option == "--output" || word.starts_with("-o")) {
+      words.output = word.substr(option == "--output" ? option.size() + 1 : 2);
+    } else if (word.starts_with("-")) {
+      words.options.push_back(option);
+    } else {
+      words.inputs.push_back(word);
+    }
+  }
+  return words;
+}
+
+bool is_rig_folder(const std::string& path) {
+  std::error_code code;
+  return fs::exists(fs::path(path) / libmap::rig_file_name, code);
+}
+
+bool has_cloud_extension(const std::string& path) {
+  const std::string format = libmap::format_of(path);
+  return format == ".pcd" || format == ".ply" || format == ".csv" || format == ".vtp" ||
+         libmap::is_dem_path(path);
+}
+
+// A scan is a database, or a folder of frames; a folder that is converted to a file is another one,
+// such as a model of COLMAP. Of all else a folder without an extension is a bag: of a rig, or of
+// one map; several are the shares of a map, which become a file.
+Usage* usage_of(const Words& words) {
+  if (words.any_input([](const std::string& word) { return word.ends_with(".db"); }))
+    return convert_scan;
+  if (libmap::has_bag_extension(words.output) || words.any_input(libmap::is_bag_path) ||
+      words.any_input(is_rig_folder) ||
+      words.any_option({"--topic", "--rig", "--terrain", "--curvature", "--footholds"}))
+    return convert_bag;
+  if (words.output.has_extension()) return convert_file;
+  if (words.any_input(is_scan_path)) return convert_scan;
+  const bool is_map =
+      !words.output.empty() &&
+      std::count_if(words.inputs.begin(), words.inputs.end(), has_cloud_extension) == 1 &&
+      !words.any_option({"--encoding", "--big-endian", "--pixel-size", "--poses-format",
+                         "--output-poses-format"});
+  return is_map ? convert_bag : convert_file;
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_usage(argc, argv, names_scan(argc, argv), convert_file, convert_scan);
+  return run_usage(argc, argv, {convert_file, convert_scan, convert_bag},
+                   usage_of(words_of(argc, argv)));
 }

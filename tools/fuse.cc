@@ -200,5 +200,6 @@ int fuse_scan(int argc, char** argv) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  return run_usage(argc, argv, argc > 1 && names_rig(argc, argv), fuse_scan, fuse_rig);
+  return run_usage(argc, argv, {fuse_scan, fuse_rig},
+                   argc > 1 && names_rig(argc, argv) ? fuse_rig : fuse_scan);
 }

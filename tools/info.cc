@@ -132,6 +132,23 @@ Json mesh_json(const InfoOptions& options) {
           {"face_fields", fields_json(mesh.face_fields)}};
 }
 
+Json bag_json(const std::string& path) {
+  const libmap::BagListing listing = libmap::list_bag(path);
+  Json topics = Json::array();
+  for (const libmap::BagTopic& topic : listing.topics)
+    topics.push_back({{"name", topic.name},
+                      {"type", topic.type},
+                      {"md5sum", topic.md5sum},
+                      {"messages", topic.messages},
+                      {"latching", topic.latching}});
+  return {{"kind", listing.storage},
+          {"messages", listing.messages},
+          {"start_s", listing.start_s},
+          {"end_s", listing.end_s},
+          {"duration_s", listing.end_s - listing.start_s},
+          {"topics", topics}};
+}
+
 std::string plain(const Json& value) {
   if (value.is_null()) return "none";
   if (value.is_string()) return value.get<std::string>();
@@ -257,12 +274,7 @@ Json content_json(const InfoOptions& options, Run& run, Faults& faults) {
   if (options.verify)
     throw libmap::Error("only scans and tile stores are verified",
                         {.file = options.file, .field = "--verify"});
-  if (is_bag) {
-    const libmap::BagListing listing = libmap::list_bag(options.file);
-    Json json = {{"kind", listing.storage}};
-    json.update(bag_json(listing));
-    return json;
-  }
+  if (is_bag) return bag_json(options.file);
   return libmap::file_kind(options.file) == libmap::FileKind::mesh ? mesh_json(options)
                                                                    : cloud_json(options.file);
 }

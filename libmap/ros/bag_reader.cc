@@ -68,9 +68,13 @@ void RecordedTopics::add(std::size_t index, std::size_t messages, std::int64_t f
   last_ns = std::max(last_ns, last);
 }
 
-bool is_bag_path(const fs::path& path) {
+bool has_bag_extension(const fs::path& path) {
   const std::string extension = lower_case(path.extension().string());
-  if (extension == ".bag" || extension == ".mcap" || extension == ".db3") return true;
+  return extension == ".bag" || extension == ".mcap" || extension == ".db3";
+}
+
+bool is_bag_path(const fs::path& path) {
+  if (has_bag_extension(path)) return true;
   std::error_code code;
   if (!fs::is_directory(path, code)) return false;
   if (fs::exists(path / rosbag2_metadata_name, code)) return true;

@@ -47,8 +47,10 @@ struct BagListing {
   double end_s = 0.0;
 };
 
-// Whether the path names a bag: *.bag, *.mcap, *.db3, or a folder with metadata.yaml or files of
-// the latter two.
+// *.bag, *.mcap or *.db3.
+bool has_bag_extension(const std::filesystem::path& path);
+// Whether the path names a bag: by its extension, or a folder with metadata.yaml or files of the
+// latter two.
 bool is_bag_path(const std::filesystem::path& path);
 // The files of a bag that exists: itself, or metadata.yaml and all that it names. Throws Error as
 // list_bag, for a folder.

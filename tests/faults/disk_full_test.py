@@ -47,8 +47,8 @@ MORE = [
     "mask -o out.pcd",
     "convert {good}/map.tiles -o out.csv",
     "analyze {good}/map.pcd -o out",
-    "bag {good}/map.bag --topic /merged_pcd -o out.csv",
-    "bag {good}/rig -o out.bag",
+    "convert {good}/map.bag --topic /merged_pcd -o out.csv",
+    "convert {good}/rig -o out.bag",
 ]
 PRINTING = [
     "info {good}/scan.db",
@@ -56,7 +56,7 @@ PRINTING = [
     "compare {good}/terrain.pcd {good}/mesh.ply",
     "mesh {good}/terrain.pcd --cell-size 0.05 --report -o out.ply",
     "compare --edges {good}/mesh.ply",
-    "bag {good}/rig.bag --list",
+    "info {good}/rig.bag",
     "score --print-config",
     "score --help",
     "simulate --help",

@@ -92,9 +92,9 @@ COMMANDS = [
     ["convert", "mesh.ply", "-o", "mesh.off"],
     ["convert", "mesh.ply", "-o", "mesh.glb"],
     ["simulate", "cameras", "mesh.ply", "--rig", "rig.yaml", "-o", "rig"],
-    ["bag", "rig", "-o", "rig.bag"],
-    ["bag", "rig", "-o", "rig.mcap"],
-    ["bag", "rig", "-o", "rig_bag"],
+    ["convert", "rig", "-o", "rig.bag"],
+    ["convert", "rig", "-o", "rig.mcap"],
+    ["convert", "rig", "-o", "rig_bag"],
     ["simulate", "scan", "mesh.ply", "--camera", "camera.yaml", "--frames", "5", "-o", "scan.db"],
     ["convert", "scan.db", "-o", "frames"],
     ["convert", "scan.db", "-o", "scan.colmap", "--colmap", "poses.colmap"],
@@ -109,7 +109,7 @@ COMMANDS = [
     SCORE + ["--tile-size", "0.2", "--tile", "2/2", "-o", "share_2.pcd"],
     ["footholds", "map.pcd", "--border", "--no-graspable-only", "-o", "footholds.csv"],
     ["lookup", "map.pcd", "points.csv", "-o", "lookup.csv"],
-    ["bag", "map.pcd", "--terrain", "terrain.pcd", "--footholds", "footholds.csv", "-o", "map.bag"],
+    ["convert", "map.pcd", "--terrain", "terrain.pcd", "--footholds", "footholds.csv", "-o", "map.bag"],
 ]
 
 

@@ -21,10 +21,10 @@ using graspmap_test::succeeded;
 using graspmap_test::write_text;
 using graspmap_test::wrong_usage;
 
-// Builds without ROS's packages have the command too.
+// Builds without ROS's packages have the commands too.
 bool has_ros() {
   write_text(scratch("probe.bag"), "#ROSBAG V2.0\n");
-  const ProgramResult result = graspmap({"bag", "probe.bag", "--list"});
+  const ProgramResult result = graspmap({"info", "probe.bag"});
   fs::remove(scratch("probe.bag"));
   if (result.exit_code != 1) return true;
   EXPECT_NE(result.standard_error.find("built without ROS 1; missing: "), std::string::npos);
@@ -92,9 +92,9 @@ void expect_same_panorama(const std::string& folder) {
 TEST(BagCommand, ImagesIntoABagAndBackGiveTheSamePanorama) {
   REQUIRE_ROS();
   write_run();
-  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag", "--compression", "lz4"})));
-  ASSERT_TRUE(succeeded(
-      graspmap({"bag", "run.bag", "-o", "back", "--near", "0.28", "--far", "1.5", "--strict"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "run", "-o", "run.bag", "--compression", "lz4"})));
+  ASSERT_TRUE(succeeded(graspmap(
+      {"convert", "run.bag", "-o", "back", "--near", "0.28", "--far", "1.5", "--strict"})));
   expect_same_panorama("back");
   const nlohmann::json manifest = json_of("back.json");
   EXPECT_EQ(manifest["results"]["moments"], 1);
@@ -110,15 +110,15 @@ TEST(BagCommand, ImagesThroughBagsOfRos2GiveTheSamePanorama) {
   write_run();
   std::vector<std::string> range = {"--near", "0.28", "--far", "1.5", "--strict"};
   const auto back = [&](const std::string& bag, const std::string& folder) {
-    std::vector<std::string> words = {"bag", bag, "-o", folder};
+    std::vector<std::string> words = {"convert", bag, "-o", folder};
     words.insert(words.end(), range.begin(), range.end());
     return succeeded(graspmap(words));
   };
-  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "recorded"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "run", "-o", "recorded"})));
   ASSERT_TRUE(back("recorded", "back"));
   expect_same_panorama("back");
   EXPECT_EQ(json_of("back.json")["inputs"].size(), 2U);
-  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.mcap", "--compression", "zstd"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "run", "-o", "run.mcap", "--compression", "zstd"})));
   ASSERT_TRUE(back("run.mcap", "again"));
   expect_same_panorama("again");
   // Repacked by other code: big-endian, in two files, as a later version, topics in the order of
@@ -137,9 +137,9 @@ TEST(BagCommand, ImagesThroughBagsOfRos2GiveTheSamePanorama) {
 TEST(BagCommand, FineDepthsComeBackWithARigOfOnesOwn) {
   REQUIRE_ROS();
   write_run("1600000000.25", "0.0001");
-  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag"})));
-  ASSERT_TRUE(succeeded(
-      graspmap({"bag", "run.bag", "-o", "back", "--rig", "rig.yaml", "--depth-scale", "0.0001"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "run", "-o", "run.bag"})));
+  ASSERT_TRUE(succeeded(graspmap(
+      {"convert", "run.bag", "-o", "back", "--rig", "rig.yaml", "--depth-scale", "0.0001"})));
   expect_same_panorama("back");
 }
 
@@ -147,12 +147,12 @@ TEST(BagCommand, PythonsBagsAreReadAlike) {
   REQUIRE_ROS();
   if (python().empty()) GTEST_SKIP() << "python3-rosbag is not installed";
   write_run();
-  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "run", "-o", "run.bag"})));
   ASSERT_TRUE(succeeded(check({"copy", "run.bag", "copy.bag"})));
   ASSERT_FALSE(content("run.bag") == content("copy.bag"));
   // The copy's topics are in the order of their stamps.
-  std::vector<std::string> words = {"bag",    "copy.bag", "-o",    "back",
-                                    "--near", "0.28",     "--far", "1.5"};
+  std::vector<std::string> words = {"convert", "copy.bag", "-o",    "back",
+                                    "--near",  "0.28",     "--far", "1.5"};
   for (const char* name : camera_names)
     words.insert(words.end(), {"--topic", "/" + std::string(name) + "/depth/image_raw"});
   ASSERT_TRUE(succeeded(graspmap(words)));
@@ -162,7 +162,7 @@ TEST(BagCommand, PythonsBagsAreReadAlike) {
 TEST(BagCommand, AnImageThatCannotBeUsedIsAWarningOrStrictlyAnError) {
   REQUIRE_ROS();
   write_run();
-  ASSERT_TRUE(succeeded(graspmap({"bag", "run", "-o", "run.bag"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "run", "-o", "run.bag"})));
   std::string bag = content("run.bag");
   // The text's length, the text, a byte of the bytes' order, the bytes of a row.
   const std::size_t encoding = bag.find(std::string("\5\0\0\0", 4) + "16UC1");
@@ -171,10 +171,10 @@ TEST(BagCommand, AnImageThatCannotBeUsedIsAWarningOrStrictlyAnError) {
   write_text(scratch("run.bag"), bag);
   const std::string fault =
       "/depth/image_raw: 1 images cannot be used: step is 7: shorter than a row of 96 pixels";
-  EXPECT_TRUE(bad_input(graspmap({"bag", "run.bag", "-o", "strict", "--strict"}),
+  EXPECT_TRUE(bad_input(graspmap({"convert", "run.bag", "-o", "strict", "--strict"}),
                         {"error: run.bag: /", fault, ">= 192"}));
   EXPECT_FALSE(fs::exists(scratch("strict")));
-  const ProgramResult result = graspmap({"bag", "run.bag", "-o", "back"});
+  const ProgramResult result = graspmap({"convert", "run.bag", "-o", "back"});
   ASSERT_TRUE(succeeded(result));
   EXPECT_NE(result.standard_error.find(fault), std::string::npos) << result.standard_error;
   EXPECT_EQ(json_of("back.json")["results"]["images_broken"], 1);
@@ -191,7 +191,7 @@ void write_map_parts() {
 }
 
 std::vector<std::string> map_bag(const std::string& output) {
-  return {"bag",         "map.pcd",     "-o",    output,    "--terrain",
+  return {"convert",     "map.pcd",     "-o",    output,    "--terrain",
           "terrain.pcd", "--footholds", "f.csv", "--stamp", "1600000000.5"};
 }
 
@@ -298,7 +298,8 @@ TEST(BagCommand, MapsComeBackFromBagsOfRos2) {
   write_map_parts();
   for (const std::string name : {"a", "a.mcap"}) {
     ASSERT_TRUE(succeeded(graspmap(map_bag(name))));
-    ASSERT_TRUE(succeeded(graspmap({"bag", name, "-o", "m.pcd", "--topic", "/graspability_map"})));
+    ASSERT_TRUE(
+        succeeded(graspmap({"convert", name, "-o", "m.pcd", "--topic", "/graspability_map"})));
     EXPECT_TRUE(content("m.pcd") == content("map.pcd"));
     const ProgramResult info = graspmap({"info", name, "--json"});
     ASSERT_TRUE(succeeded(info));
@@ -315,16 +316,17 @@ TEST(BagCommand, MapsComeBackFromBagsOfRos2) {
 
 TEST(BagCommand, BadBagsOfRos2AreOneLine) {
   write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
-  const ProgramResult written = graspmap({"bag", "map.csv", "-o", "good.mcap"});
+  const ProgramResult written = graspmap({"convert", "map.csv", "-o", "good.mcap"});
   ASSERT_TRUE(succeeded(written));
   EXPECT_NE(written.standard_error.find("no voxel size"), std::string::npos);
-  ASSERT_TRUE(succeeded(graspmap({"bag", "map.csv", "-o", "good", "--cell-size", "0.01"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.csv", "-o", "good", "--cell-size", "0.01"})));
   const std::vector<std::string> before = graspmap_test::names_in_scratch();
   const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
-    words.insert(words.begin(), "bag");
+    words.insert(words.begin(), "convert");
     EXPECT_TRUE(bad_input(graspmap(words), parts));
   };
-  says({"map.csv", "-o", "out.zip"}, {"out.zip", ".zip", ".mcap"});
+  says({"map.csv", "-o", "out.db3"}, {"out.db3", "is no format of a bag", ".mcap"});
+  says({"map.csv", "-o", "out.zip"}, {"out.zip", ".zip"});
   says({"map.csv", "-o", "out", "--cell-size", "1", "--compression", "lz4"},
        {"compression", "must be none"});
   says({"map.csv", "-o", "out.mcap", "--cell-size", "1", "--compression", "bz2"}, {"bz2", "zstd"});
@@ -335,13 +337,13 @@ TEST(BagCommand, BadBagsOfRos2AreOneLine) {
   says({"good.mcap", "-o", "out"}, {"topics of images is none"});
   fs::create_directory(scratch("open"));
   fs::copy(scratch("good/bag_0.db3"), scratch("open/bag_0.db3"));
-  says({"open", "--list"}, {"open/metadata.yaml", "ros2 bag reindex"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {"open/metadata.yaml", "ros2 bag reindex"}));
+  says({"open", "-o", "out"}, {"open/metadata.yaml", "ros2 bag reindex"});
   write_text(scratch("open/metadata.yaml"), content("good/metadata.yaml"));
   write_text(scratch("open/bag_0.db3"), content("good/bag_0.db3").substr(0, 5000));
-  says({"open", "--list"}, {"open/bag_0.db3"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "open"}), {"open/bag_0.db3"}));
   write_text(scratch("open/cut.mcap"), content("good.mcap").substr(0, 500));
-  says({"open/cut.mcap", "--list"}, {"open/cut.mcap", "is cut off"});
-  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"is cut off"}));
+  EXPECT_TRUE(bad_input(graspmap({"info", "open/cut.mcap"}), {"open/cut.mcap", "is cut off"}));
   fs::remove_all(scratch("open"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
@@ -354,21 +356,81 @@ TEST(BagCommand, SameBytesOnEveryRunAndMapsComeBack) {
   again.insert(again.end(), {"--threads", "1"});
   ASSERT_TRUE(succeeded(graspmap(again)));
   EXPECT_TRUE(content("a.bag") == content("b.bag"));
-  ASSERT_TRUE(succeeded(graspmap({"bag", "a.bag", "-o", "m.pcd", "--topic", "/graspability_map"})));
+  ASSERT_TRUE(
+      succeeded(graspmap({"convert", "a.bag", "-o", "m.pcd", "--topic", "/graspability_map"})));
   EXPECT_TRUE(content("m.pcd") == content("map.pcd"));
   EXPECT_EQ(json_of("m.pcd.json")["results"]["stamp_s"], 1600000000.5);
-  const ProgramResult list = graspmap({"bag", "a.bag", "--list", "--json"});
-  ASSERT_TRUE(succeeded(list));
-  const nlohmann::json listing = nlohmann::json::parse(list.standard_output);
-  EXPECT_EQ(listing["messages"], 6);
-  EXPECT_EQ(listing["topics"][1]["name"], "/merged_pcd");
-  EXPECT_EQ(listing["topics"][1]["type"], "sensor_msgs/PointCloud2");
+}
+
+TEST(BagCommand, InfoListsTheTopics) {
+  REQUIRE_ROS();
+  write_map_parts();
+  ASSERT_TRUE(succeeded(graspmap(map_bag("a.bag"))));
   const ProgramResult info = graspmap({"info", "a.bag", "--json"});
   ASSERT_TRUE(succeeded(info));
-  nlohmann::json same = nlohmann::json::parse(info.standard_output);
-  EXPECT_EQ(same["kind"], "bag of ROS 1");
-  EXPECT_EQ(same["made_by"].get<std::string>().substr(0, 13), "graspmap bag ");
-  for (const auto& [name, value] : listing.items()) EXPECT_EQ(same[name], value) << name;
+  const nlohmann::json listing = nlohmann::json::parse(info.standard_output);
+  EXPECT_EQ(listing["kind"], "bag of ROS 1");
+  EXPECT_EQ(listing["made_by"].get<std::string>().substr(0, 17), "graspmap convert ");
+  EXPECT_EQ(listing["messages"], 6);
+  EXPECT_EQ(listing["start_s"], 1600000000.5);
+  EXPECT_EQ(listing["end_s"], 1600000000.5);
+  EXPECT_EQ(listing["duration_s"], 0);
+  EXPECT_EQ(listing["topics"][1]["name"], "/merged_pcd");
+  EXPECT_EQ(listing["topics"][1]["type"], "sensor_msgs/PointCloud2");
+  EXPECT_EQ(listing["topics"][1]["messages"], 1);
+  EXPECT_EQ(listing["topics"][1]["latching"], true);
+  const ProgramResult text = graspmap({"info", "a.bag"});
+  ASSERT_TRUE(succeeded(text));
+  EXPECT_NE(text.standard_output.find("\n  name /merged_pcd, type sensor_msgs/PointCloud2, md5sum "
+                                      "1158d486dd51d683ce2f1be655c3c181, messages 1, latching "
+                                      "yes\n"),
+            std::string::npos)
+      << text.standard_output;
+}
+
+// What of a command line makes it one of a bag; of all else nothing becomes a bag by mistake.
+TEST(BagCommand, WhatIsABagIsDecidedByInputAndOutput) {
+  write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
+  write_text(scratch("cloud.csv"), "x,y,z\n0,0,0\n");
+  write_text(scratch("poses.csv"), "0,0,0,0,1,0,0,0\n");
+  write_text(scratch("scan.db"), "");
+  fs::create_directory(scratch("folder"));
+  fs::create_directory(scratch("rig"));
+  write_text(scratch("rig/rig.yaml"), "cameras: []\n");
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.csv", "-o", "viz", "--quiet"})));
+  EXPECT_TRUE(fs::exists(scratch("viz/metadata.yaml")));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.csv", "--output=viz.mcap", "--quiet"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "-o", "map.ply", "map.csv"})));
+  ASSERT_TRUE(succeeded(graspmap(
+      {"convert", "viz.mcap", "--topic", "/graspability_map", "-o", "back.csv", "--quiet"})));
+  const std::vector<std::string> before = graspmap_test::names_in_scratch();
+  const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
+    words.insert(words.begin(), "convert");
+    EXPECT_TRUE(bad_input(graspmap(words), parts));
+  };
+  // A scan stays a scan, and never becomes a bag.
+  says({"scan.db", "-o", "out"}, {"scan.db"});
+  says({"scan.db", "-o", "out.bag"}, {"out.bag", "not of a scan"});
+  says({"folder", "-o", "out"}, {"folder"});
+  says({"folder", "-o", "out.mcap"}, {"folder: a bag is made of", "rig.yaml"});
+  for (const char* other : {"rig.yaml", "recording.mcap"}) {
+    fs::create_directory(scratch("both"));
+    write_text(scratch("both/depth.txt"), "");
+    write_text(scratch("both") / other, "");
+    says({"both", "-o", "out"}, {"both: is a scan by its depth.txt"});
+    fs::remove_all(scratch("both"));
+  }
+  // The folder of a rig becomes a bag alone.
+  says({"rig", "-o", "out"}, {"rig/rig.yaml", "cameras"});
+  says({"rig", "-o", "out.pcd"}, {"out.pcd", "is no format of a bag"});
+  // Without an extension: one map becomes a bag; several files and poses do not.
+  says({"cloud.csv", "-o", "out"}, {"cloud.csv: score", "an output without an extension is a bag"});
+  says({"map.csv", "map.ply", "-o", "out"}, {"error: out: extension is missing"});
+  says({"map.csv", "-o", "out", "--encoding", "ascii"}, {"error: out: "});
+  says({"poses.csv", "-o", "out", "--poses-format", "tum"}, {"out", "poses"});
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "viz.mcap", "map.csv", "-o", "out"}),
+                          {"one argument too many"}));
+  EXPECT_EQ(graspmap_test::names_in_scratch(), before);
 }
 
 // A map in the terrain's frame and the panorama in the robot's: RViz needs to know how they lie.
@@ -379,8 +441,8 @@ TEST(BagCommand, FramesAreTiedTogether) {
   for (const char* frame : {"terrain", "input"}) {
     ASSERT_TRUE(succeeded(
         graspmap({"score", "p.pcd", "-o", "map.pcd", "--up", "0,0,1", "--frame", frame})));
-    ASSERT_TRUE(succeeded(graspmap({"bag", "map.pcd", "-o", "map.bag", "--terrain", "p.pcd"})));
-    const auto listing = graspmap({"bag", "map.bag", "--list"}).standard_output;
+    ASSERT_TRUE(succeeded(graspmap({"convert", "map.pcd", "-o", "map.bag", "--terrain", "p.pcd"})));
+    const auto listing = graspmap({"info", "map.bag"}).standard_output;
     EXPECT_EQ(listing.find("/tf_static") != std::string::npos, std::string(frame) == "terrain");
     // The panorama's own stamp.
     EXPECT_EQ(json_of("map.bag.json")["results"]["stamp_s"],
@@ -397,9 +459,10 @@ TEST(BagCommand, LeavesNothingInTheUsersFolder) {
   fs::create_directory(scratch("temporary"));
   const std::map<std::string, std::string> environment = {
       {"HOME", scratch("home").string()}, {"TMPDIR", scratch("temporary").string()}};
-  const ProgramResult written = graspmap({"bag", "map.csv", "-o", "map.bag"}, environment);
-  EXPECT_EQ(written.standard_error, "graspmap bag: info: 2 clouds and 0 footholds at 1.000000 s\n");
-  EXPECT_TRUE(succeeded(graspmap({"bag", "map.bag", "--list"}, environment)));
+  const ProgramResult written = graspmap({"convert", "map.csv", "-o", "map.bag"}, environment);
+  EXPECT_EQ(written.standard_error,
+            "graspmap convert: info: 2 clouds and 0 footholds at 1.000000 s\n");
+  EXPECT_TRUE(succeeded(graspmap({"info", "map.bag"}, environment)));
   EXPECT_TRUE(fs::is_empty(scratch("home")));
   EXPECT_TRUE(fs::is_empty(scratch("temporary")));
 }
@@ -409,15 +472,16 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   graspmap_test::write_terrain();
   write_text(scratch("map.csv"), "x,y,z,score\n0,0,0,0.9\n");
   write_text(scratch("f.csv"), "x,y,z,score,approach_x,approach_y,approach_z\n0,0,0,0.9,0,0,0\n");
-  ASSERT_TRUE(succeeded(graspmap({"bag", "map.csv", "-o", "good.bag"})));
+  ASSERT_TRUE(succeeded(graspmap({"convert", "map.csv", "-o", "good.bag"})));
   const std::vector<std::string> before = graspmap_test::names_in_scratch();
   const auto says = [](std::vector<std::string> words, const std::vector<std::string>& parts) {
-    words.insert(words.begin(), "bag");
+    words.insert(words.begin(), "convert");
     EXPECT_TRUE(bad_input(graspmap(words), parts));
   };
-  says({"none.bag", "--list"}, {"none.bag: no such file"});
+  EXPECT_TRUE(bad_input(graspmap({"info", "none.bag"}), {"none.bag: no such file"}));
+  says({"none.bag", "-o", "out"}, {"none.bag: no such file"});
   says({"none", "-o", "out.bag"}, {"none: no such file"});
-  EXPECT_TRUE(wrong_usage(graspmap({"bag", "good.bag"}), {"--output", "is missing"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"convert", "good.bag"}), {"--output is required"}));
   says({"good.bag", "-o", "out"}, {"good.bag: topics of images is none"});
   says({"good.bag", "-o", "out.pcd"}, {"/graspability_map, /curvature_map", "named as the topic"});
   says({"good.bag", "-o", "out.pcd", "--topic", "/graspabilty_map"},
@@ -427,8 +491,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"good.bag", "-o", "out.xyz"}, {"out.xyz"});
   says({"good.bag", "-o", "out.bag"}, {"something else than a bag"});
   says({"good.bag", "-o", "out", "--stamp", "noon"}, {"noon"});
-  says({"terrain.pcd", "--list"}, {"terrain.pcd", "is no bag"});
-  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: no such field"});
+  says({"terrain.pcd", "-o", "out"}, {"terrain.pcd: score: no such field", "bag of ROS 2"});
   says({"terrain.pcd", "-o", "out.bag"}, {"terrain.pcd: score: no such field"});
   says({"map.csv", "-o", "out.bag", "--footholds", "map.csv"}, {"approach_x"});
   says({"map.csv", "-o", "out.bag", "--footholds", "f.csv"}, {"approach of foothold 1"});
@@ -443,7 +506,7 @@ TEST(BagCommand, BadInputIsOneLineAndLeavesNothing) {
   says({"rig", "-o", "out.bag", "--terrain", "t"}, {"--terrain", "not for a rig's folder"});
   fs::remove(scratch("rig"));
   write_text(scratch("cut.bag"), content("good.bag").substr(0, 5000));
-  says({"cut.bag", "--list"}, {"cut.bag: is broken or cut off"});
+  says({"cut.bag", "-o", "out"}, {"cut.bag: is broken or cut off"});
   EXPECT_TRUE(bad_input(graspmap({"info", "cut.bag"}), {"cut.bag: is broken or cut off"}));
   fs::remove(scratch("cut.bag"));
   EXPECT_EQ(graspmap_test::names_in_scratch(), before);

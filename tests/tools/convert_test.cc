@@ -177,7 +177,7 @@ TEST(Convert, VtpIsWrittenOnly) {
                              {"footholds", "a.vtp", "-o", "b.csv"},
                              {"crop", "a.vtp", "--size", "1x1", "-o", "b.ply"},
                              {"compare", "a.vtp", "terrain.pcd"},
-                             {"bag", "a.vtp", "-o", "b.bag"}})
+                             {"convert", "a.vtp", "-o", "b.mcap"}})
     EXPECT_TRUE(
         bad_input(graspmap(words), {"a.vtp: .vtp is written only, for ParaView",
                                     ".pcd, .ply, .csv or .tif", ".obj, .off, .stl, .glb or .tif"}))
@@ -185,13 +185,13 @@ TEST(Convert, VtpIsWrittenOnly) {
 }
 
 TEST(Convert, BadInputLeavesNothing) {
-  libmap::write_cloud(scratch("a.pcd"), sample_map());
+  libmap::write_cloud(scratch("a.pcd"), graspmap_test::bumpy_terrain(0.1));
   graspmap_test::write_text(scratch("foreign.ply"), "precious");
   const Words before = graspmap_test::names_in_scratch();
   EXPECT_TRUE(
       bad_input(graspmap({"convert", "none.pcd", "-o", "b.ply"}), {"none.pcd: no such file"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b.xyz"}), {"b.xyz"}));
-  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b"}), {"error: b: "}));
+  EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b"}), {"a.pcd: score", "is a bag"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "a.pcd", "-o", "b.stl"}), {"b.stl", "no faces"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "a.xyz", "-o", "b.pcd"}), {"a.xyz"}));
   EXPECT_TRUE(bad_input(graspmap({"convert", "foreign.ply", "-o", "b.pcd"}), {"foreign.ply"}));

@@ -1,34 +1,14 @@
-// graspmap bag IN: what a bag holds, its depth images as a rig's folder, one of its clouds.
-#include <iostream>
-
+// graspmap convert BAG: its depth images as a rig's folder, or one of its clouds.
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
-#include "tools/support/bag_commands.h"
-#include "tools/support/info_json.h"
+#include "tools/support/convert_bag.h"
 
 namespace graspmap_tools {
 
 namespace {
 
 namespace fs = std::filesystem;
-
-void print_text(const libmap::BagListing& listing) {
-  std::size_t name = 5;
-  std::size_t type = 4;
-  for (const libmap::BagTopic& topic : listing.topics) {
-    name = std::max(name, topic.name.size());
-    type = std::max(type, topic.type.size());
-  }
-  std::cout << fmt::format("{:<{}}  {:<{}}  {:>8}\n", "topic", name, "type", type, "messages");
-  for (const libmap::BagTopic& topic : listing.topics)
-    std::cout << fmt::format("{:<{}}  {:<{}}  {:>8}{}\n", topic.name, name, topic.type, type,
-                             topic.messages, topic.latching ? "  latched" : "");
-  std::cout << fmt::format("{} messages from {} to {} s ({:.3f} s)\n", listing.messages,
-                           libmap::to_fixed_text(listing.start_s, 6),
-                           libmap::to_fixed_text(listing.end_s, 6),
-                           listing.end_s - listing.start_s);
-}
 
 void add_bag_input(const BagCommandOptions& options, Run& run) {
   for (const fs::path& file : libmap::files_of_bag(options.input)) run.add_input(file);
@@ -64,14 +44,6 @@ void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
 }
 
 }  // namespace
-
-void list_bag_topics(const BagCommandOptions& options) {
-  const libmap::BagListing listing = libmap::list_bag(options.input);
-  if (options.json)
-    print_json(bag_json(listing));
-  else
-    print_text(listing);
-}
 
 void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
   libmap::BagRigOptions depth = options.depth;

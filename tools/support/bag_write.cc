@@ -1,4 +1,4 @@
-// graspmap bag ... -o BAG: a map and what belongs to it, or a rig's images, as a bag.
+// graspmap convert ... -o BAG: a map and what belongs to it, or a rig's images, as a bag.
 #include <variant>
 
 #include "libgtd/shape/convexity.h"
@@ -6,7 +6,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/score_color.h"
 #include "libmap/view/color_map.h"
-#include "tools/support/bag_commands.h"
+#include "tools/support/convert_bag.h"
 #include "tools/support/map_frame.h"
 
 namespace graspmap_tools {
@@ -212,7 +212,11 @@ void write_map_bag(const BagCommandOptions& options, Run& run) {
   claim_bag(options, {options.input, options.terrain, options.curvature, options.footholds}, run);
   const CloudFile map = read(options.input, run);
   if (!map.cloud.find_field("score"))
-    throw libmap::Error("no such field: is this a map?", {.file = options.input, .field = "score"});
+    throw libmap::Error(fs::path(options.output).has_extension()
+                            ? "no such field: is this a map?"
+                            : "no such field: an output without an extension is a bag of ROS 2, "
+                              "which is made of a map",
+                        {.file = options.input, .field = "score"});
   std::optional<CloudFile> terrain;
   if (!options.terrain.empty()) terrain = read(options.terrain, run);
   std::optional<CloudFile> footholds;

@@ -320,14 +320,17 @@ int Command::run(int argc, char** argv, const std::function<void(Run&)>& body) {
   }
 }
 
-int run_usage(int argc, char** argv, bool is_special, Usage& usual, Usage& special) {
-  if (is_special) return special(argc, argv);
-  const int exit_code = usual(argc, argv);
+int run_usage(int argc, char** argv, std::initializer_list<Usage*> usages, Usage* chosen) {
+  int exit_code = chosen(argc, argv);
   const bool asks_for_help = std::any_of(
       argv, argv + argc, [](const std::string& word) { return word == "--help" || word == "-h"; });
-  if (!asks_for_help || exit_code != 0) return exit_code;
-  std::cout << "\n";
-  return special(argc, argv);
+  if (!asks_for_help || chosen != *usages.begin()) return exit_code;
+  for (Usage* const other : usages) {
+    if (other == chosen || exit_code != 0) continue;
+    std::cout << "\n";
+    exit_code = other(argc, argv);
+  }
+  return exit_code;
 }
 
 }  // namespace graspmap_tools

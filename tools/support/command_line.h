@@ -69,9 +69,9 @@ class Command {
   std::unique_ptr<Parts> parts_;
 };
 
-// A command of two usages, each with a Command and options of its own: runs `special` if it was
-// chosen, else `usual`. --help shows both.
+// A command of several usages, each with a Command and options of its own: runs the one that was
+// chosen. --help of the first shows all.
 using Usage = int(int argc, char** argv);
-int run_usage(int argc, char** argv, bool is_special, Usage& usual, Usage& special);
+int run_usage(int argc, char** argv, std::initializer_list<Usage*> usages, Usage* chosen);
 
 }  // namespace graspmap_tools

@@ -18,7 +18,6 @@ constexpr CommandEntry commands[] = {
     {"Scan", "calibrate", "calibrate a camera from pictures of a chessboard"},
     {"Scan", "refine", "refine the poses of a scan: loop closures, pose graph, bundle adjustment"},
     {"Scan", "fuse", "fuse the depth images of a scan or a camera rig into one cloud"},
-    {"Scan", "bag", "read and write ROS bags without ROS"},
     {"Surface", "mesh", "reconstruct a surface from a cloud"},
     {"Surface", "texture", "texture a mesh with the photographs of its scan"},
     {"Surface", "crop", "level a cloud or mesh and crop it to the test site"},
@@ -35,7 +34,8 @@ constexpr CommandEntry commands[] = {
     {"Pictures and files", "render", "draw clouds, meshes and maps, one or several side by side"},
     {"Pictures and files", "report", "write one HTML report of a whole run"},
     {"Pictures and files", "info", "describe a scan, camera, cloud, mesh, map, tile store or bag"},
-    {"Pictures and files", "convert", "convert scans, poses, clouds, meshes and maps; merge tiles"},
+    {"Pictures and files", "convert",
+     "convert scans, poses, clouds, meshes, maps and ROS bags; merge tiles"},
 };
 
 // The command's summary; empty if there is none of this name.

@@ -2,6 +2,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/image_codec.h"
+#include "libmap/ros/bag_reader.h"
 #include "libmap/scan/frame_batch.h"
 #include "libmap/scan/frame_folder_writer.h"
 #include "libmap/scan/rtabmap_reader.h"
@@ -157,6 +158,9 @@ void write_folder(const ExtractOptions& options, const libmap::ScanSource& scan,
 }
 
 void extract(ExtractOptions& options, Run& run) {
+  if (libmap::has_bag_extension(options.output))
+    throw libmap::Error("a bag is made of a map or of the folder of a camera rig, not of a scan",
+                        {.file = options.output});
   const bool pictures = options.pictures.wanted();
   const PictureOptions unset;
   if (!pictures)

@@ -6,6 +6,7 @@
 namespace graspmap_tools {
 
 int compare_edges(int argc, char** argv);  // compare SITE --edges
+int convert_bag(int argc, char** argv);    // convert BAG, and ... -o BAG
 int convert_scan(int argc, char** argv);   // convert SCAN
 int fuse_rig(int argc, char** argv);       // fuse RIG_FOLDER
 

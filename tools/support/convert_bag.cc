@@ -1,11 +1,14 @@
-// graspmap bag: bags of ROS 1 and ROS 2 in and out, offline.
+// graspmap convert BAG, and ... -o BAG: bags of ROS 1 and ROS 2 in and out, offline.
+#include "tools/support/convert_bag.h"
+
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/ros/bag_reader.h"
+#include "libmap/scan/frame_folder_files.h"
 #include "libmap/scan/rig_io.h"
-#include "tools/support/bag_commands.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
+#include "tools/support/usages.h"
 
 using namespace graspmap_tools;
 
@@ -45,6 +48,9 @@ void write_bag(const BagCommandOptions& options, Run& run) {
     refuse_map_options(options, "is not for a rig's folder");
     refuse_given({{"--stamp", options.stamp != "auto"}},
                  "is not for a rig's folder: --stamp-offset moves its stamps");
+    if (options.rig.empty() && !fs::exists(fs::path(options.input) / libmap::rig_file_name))
+      throw libmap::Error("a bag is made of a map's file, or of a folder with rig.yaml (--rig)",
+                          {.file = options.input});
   } else {
     refuse_given({{"--rig", !options.rig.empty()}}, "is not for a map");
     libmap::require_readable_file(options.input);
@@ -57,12 +63,20 @@ void write_bag(const BagCommandOptions& options, Run& run) {
   }
 }
 
+// A folder may be a bag or a rig and a scan at once, such as a data set beside its recording.
+void require_no_scan(const fs::path& input) {
+  namespace files = libmap::frame_folder_files;
+  for (const char* name : {files::nodes, files::associations, files::depth_list})
+    if (fs::exists(input / name))
+      throw libmap::Error(
+          fmt::format("is a scan by its {}, but also the folder of a rig or a bag", name),
+          {.file = input.string()});
+}
+
 void run_bag(const BagCommandOptions& options, Run& run) {
-  if (options.list) return list_bag_topics(options);
-  if (options.output.empty()) throw UsageError("is missing (or --list)", {.field = "--output"});
+  require_no_scan(options.input);
   if (!libmap::is_bag_path(options.input)) return write_bag(options, run);
-  const std::string extension = libmap::format_of(options.output);
-  if (extension == ".bag" || extension == ".mcap")
+  if (libmap::has_bag_extension(options.output))
     throw libmap::Error("one of the two must be something else than a bag",
                         {.file = options.input});
   refuse_map_options(options, "is for a bag that is written");
@@ -88,21 +102,20 @@ libmap::CameraRig graspmap_tools::read_named_rig(const std::string& name, Run& r
   return rig;
 }
 
-int main(int argc, char** argv) {
+int graspmap_tools::convert_bag(int argc, char** argv) {
   BagCommandOptions options;
-  Command command("bag");
+  Command command("convert",
+                  "With a ROS bag: depth images or a cloud out of it, or a map or a rig's images "
+                  "into it.");
   command.input(
       "IN", options.input,
       "out of a bag: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); into one: a map (.pcd, "
-      ".ply, .vtp, .csv), or a rig's folder as `fuse` reads it");
+      ".ply, .csv, .tif), or a rig's folder as `fuse` reads it");
   command.output(
       options.output,
       "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
       "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
-      "extension) of .db3 (ROS 2)",
-      false);
-  command.flag("--list", options.list, "print what the bag contains and do nothing else");
-  command.flag("--json", options.json, "print it as JSON");
+      "extension) of .db3 (ROS 2)");
   command.option("--topic", "[NAME=]TOPIC", options.topics,
                  "topics of depth images, or of the cloud (repeatable); else all that are found");
   command.option("--rig", "FILE|NAME", options.rig,

@@ -1,4 +1,4 @@
-// The parts of `graspmap bag`.
+// The parts of `graspmap convert` that read and write bags.
 #pragma once
 
 #include "libmap/ros/bag_rig.h"
@@ -10,8 +10,6 @@ namespace graspmap_tools {
 struct BagCommandOptions {
   std::string input;
   std::string output;
-  bool list = false;
-  bool json = false;
   // Out of a bag.
   std::vector<std::string> topics;
   std::string rig;
@@ -29,8 +27,6 @@ struct BagCommandOptions {
   libmap::BagCompression compression = libmap::BagCompression::none;
 };
 
-// What a bag holds, to standard output.
-void list_bag_topics(const BagCommandOptions& options);
 // A rig's folder, or a cloud, out of a bag.
 void read_bag_into_folder(const BagCommandOptions& options, Run& run);
 void read_bag_into_cloud(const BagCommandOptions& options, Run& run);
