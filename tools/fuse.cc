@@ -5,8 +5,11 @@
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
+#include "tools/support/fusion_facts.h"
 #include "tools/support/piece_folder.h"
+#include "tools/support/piece_progress.h"
 #include "tools/support/scan_poses.h"
+#include "tools/support/store_filling.h"
 #include "tools/support/usages.h"
 
 using namespace graspmap_tools;
@@ -27,6 +30,7 @@ struct FuseOptions {
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
   double tile_m = 5.0;
+  std::string tile = "1/1";
 };
 
 // On scans where nothing moves 2 to 4 % are dropped, at the edges of surfaces.
@@ -89,15 +93,7 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
     run.warn("nothing was measured within the limits: the cloud is empty");
 }
 
-void claim_outputs(FuseOptions& options, Run& run) {
-  auto inputs = scan_inputs(options.scan, options.poses);
-  inputs.push_back(options.calibration);
-  if (is_piece_folder(options.output)) {
-    run.claim_output_tree(options.output, piece_folder_names(options.output), inputs);
-  } else {
-    libmap::require_cloud_format(options.output);
-    run.claim_output(options.output, inputs);
-  }
+void claim_poses(const FuseOptions& options, const std::vector<std::string>& inputs, Run& run) {
   if (options.corrected_poses.empty()) return;
   if (!libmap::is_trajectory_path(options.corrected_poses))
     throw libmap::Error("not a format of poses", {.field = "--corrected-poses",
@@ -106,66 +102,103 @@ void claim_outputs(FuseOptions& options, Run& run) {
   run.claim_output(options.corrected_poses, inputs);
 }
 
-using UseCloud = std::function<void(const libmap::PlanTile& tile, libmap::PointCloud cloud)>;
+// What carries the cloud into the frame that is wanted, by the poses that it is made with.
+libmap::Pose wanted_from_cloud(const FuseOptions& options, const libmap::ScanSource& scan,
+                               const libmap::DepthFusionResult& result, Run& run) {
+  if (options.frame != CloudFrame::ground_truth) return libmap::Pose::Identity();
+  return truth_from_poses(scan, result.poses, options.poses, run);
+}
 
-// In the frame that is wanted; without tiles, all at once.
-libmap::DepthFusionResult fused(FuseOptions& options, double tile_m, Run& run,
-                                const UseCloud& use) {
+libmap::PointCloud carried(libmap::PointCloud cloud, const FuseOptions& options,
+                           const libmap::Pose& wanted_from_cloud) {
+  if (options.frame != CloudFrame::ground_truth) return cloud;
+  return libmap::transform_cloud(cloud, wanted_from_cloud);
+}
+
+void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& result, Run& run) {
+  if (options.corrected_poses.empty()) return;
+  const std::string frame = std::exchange(run.manifest().frame, "poses");
+  run.write_output(options.corrected_poses, [&](const auto& temporary) {
+    libmap::write_trajectory(temporary, {result.poses, {}});
+  });
+  run.manifest().frame = frame;
+}
+
+void fuse_whole(const FuseOptions& options, const libmap::ScanSource& scan,
+                const libmap::Trajectory& poses, Run& run) {
+  libmap::DepthFusionResult result = in_file(options.scan, [&] {
+    return libmap::fuse_depth(scan, poses, options.fusion, run.progress());
+  });
+  const libmap::PointCloud cloud =
+      carried(std::move(result.cloud), options, wanted_from_cloud(options, scan, result, run));
+  tell_results(result, options, run);
+  run.write_output(options.output,
+                   [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
+  write_poses(options, result, run);
+}
+
+// Each tile is made, written and forgotten.
+void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
+                const libmap::Trajectory& poses, PieceProgress& progress, Run& run) {
+  std::optional<libmap::TileFusion> fusion;
+  const PieceProgress::Facts found = progress.common_facts([&] {
+    fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress());
+    return facts_of(fusion->survey());
+  });
+  if (!fusion) {
+    const libmap::FusionSurvey survey = fusion_survey_of(found);
+    fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress(), &survey);
+  }
+  libmap::DepthFusionResult result = fusion->report();
+  const libmap::Pose wanted_from_tile = wanted_from_cloud(options, scan, result, run);
+  std::vector<std::string> pieces;
+  for (const libmap::PlanTile& tile : fusion->tiles())
+    pieces.push_back(libmap::piece_file_name(tile, ""));
+  const auto make = [&](std::size_t n, const fs::path& to) {
+    libmap::TileFusion::Tile tile = fusion->make(n);
+    if (!tile.cloud.empty())
+      libmap::write_cloud(to, carried(std::move(tile.cloud), options, wanted_from_tile));
+    return facts_of(tile.counts);
+  };
+  const auto finish = [&](const fs::path& folder) {
+    std::size_t written = 0;
+    for (const std::string& piece : pieces) {
+      const libmap::FusionCounts counts = fusion_counts_of(progress.facts(piece));
+      result += counts;
+      if (counts.points_made == 0) continue;
+      ++written;
+      const fs::path file = progress.file(piece, ".pcd");
+      PieceProgress::link_file(file, folder / file.filename());
+    }
+    result.timings_s = fusion->report().timings_s;
+    run.add_results({{"pieces", written}});
+    tell_results(result, options, run);
+    write_poses(options, result, run);
+  };
+  progress.make({pieces, ".pcd", make, finish});
+}
+
+void fuse(FuseOptions options, Run& run) {
+  std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
+  inputs.push_back(options.calibration);
+  const bool in_pieces = is_piece_folder(options.output);
+  if (!in_pieces) {
+    libmap::require_cloud_format(options.output);
+    run.claim_output(options.output, inputs);
+  }
+  claim_poses(options, inputs, run);
   const bool strict = options.fusion.strict;
   const auto scan = open_scan(options.scan, strict, run, options.calibration);
   const libmap::Trajectory poses = find_poses(*scan, options.poses, strict, run);
   const bool in_true_frame = options.frame == CloudFrame::ground_truth;
   if (in_true_frame) require_truth(*scan);
-  std::optional<libmap::Pose> truth_from_cloud;
-  std::size_t pieces = 0;
-  libmap::DepthFusionResult result = in_file(options.scan, [&] {
-    return libmap::fuse_depth_in_tiles(
-        *scan, poses, options.fusion, tile_m,
-        [&](const libmap::PlanTile& tile, libmap::PointCloud cloud,
-            const libmap::DepthFusionResult& so_far) {
-          pieces += cloud.empty() ? 0 : 1;
-          if (!in_true_frame) return use(tile, std::move(cloud));
-          // By the poses that the cloud was made with.
-          if (!truth_from_cloud)
-            truth_from_cloud = truth_from_poses(
-                *scan, so_far.registration_rounds > 0 ? so_far.poses : poses, options.poses, run);
-          use(tile, libmap::transform_cloud(cloud, *truth_from_cloud));
-        },
-        run.progress());
-  });
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   run.manifest().frame = in_true_frame ? "ground truth" : "poses";
-  if (tile_m > 0.0) run.add_results({{"pieces", pieces}});
-  tell_results(result, options, run);
-  return result;
-}
-
-void fuse(FuseOptions options, Run& run) {
-  claim_outputs(options, run);
-  libmap::DepthFusionResult result;
-  if (is_piece_folder(options.output)) {
-    run.write_output_tree(
-        options.output, piece_folder_names(options.output), [&](const fs::path& folder) {
-          result =
-              fused(options, options.tile_m, run,
-                    [&](const libmap::PlanTile& tile, const libmap::PointCloud& cloud) {
-                      if (!folder.empty() && !cloud.empty())
-                        libmap::write_cloud(folder / libmap::piece_file_name(tile, ".pcd"), cloud);
-                    });
-        });
-  } else {
-    libmap::PointCloud whole;
-    result = fused(options, 0.0, run, [&](const libmap::PlanTile&, libmap::PointCloud cloud) {
-      whole = std::move(cloud);
-    });
-    run.write_output(options.output,
-                     [&](const auto& temporary) { libmap::write_cloud(temporary, whole); });
-  }
-  if (options.corrected_poses.empty()) return;
-  run.manifest().frame = "poses";
-  run.write_output(options.corrected_poses, [&](const auto& temporary) {
-    libmap::write_trajectory(temporary, {result.poses, {}});
-  });
+  if (!in_pieces) return fuse_whole(options, *scan, poses, run);
+  PieceProgress progress(options.output, piece_folder_names(options.output), inputs,
+                         parse_share(options.tile), run);
+  if (progress.is_complete()) return;
+  in_file(options.scan, [&] { make_tiles(options, *scan, poses, progress, run); });
 }
 
 // A folder of a camera rig, or --rig, which names the rig.
@@ -182,6 +215,8 @@ int fuse_scan(int argc, char** argv) {
   Command command("fuse");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, std::string("cloud (.pcd, .ply, .vtp, .csv)") + or_piece_folder);
+  command.option("--tile", "K/N", options.tile,
+                 "make only share K of N of the pieces; the last share completes the folder");
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   command.option("--corrected-poses", "FILE", options.corrected_poses,
@@ -194,7 +229,11 @@ int fuse_scan(int argc, char** argv) {
   command.parameters().add("tile_size_m", options.tile_m, libmap::positive,
                            "side of a piece, m, where the output is a folder");
   libmap::bind(command.parameters(), options.fusion);
-  return command.run(argc, argv, [&](Run& run) { fuse(options, run); });
+  return command.run(argc, argv, [&](Run& run) {
+    if (!is_piece_folder(options.output))
+      refuse_given({{"--tile", options.tile != FuseOptions{}.tile}}, "is for a folder of pieces");
+    fuse(options, run);
+  });
 }
 
 }  // namespace

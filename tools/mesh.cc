@@ -238,11 +238,13 @@ struct Totals {
 };
 
 // The pieces that are done, without islands that go across them.
+std::string piece_of(const libmap::PlanTile& tile) { return libmap::piece_file_name(tile, ""); }
+
 Totals put_together(const MeshOptions& options, const PieceProgress& progress,
                     const std::vector<libmap::PlanTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
   for (const libmap::PlanTile& tile : tiles) {
-    const PieceProgress::Facts facts = progress.facts(tile);
+    const PieceProgress::Facts facts = progress.facts(piece_of(tile));
     libmap::SurfaceTile made;
     facts.at("component_areas_m2").get_to(made.component_areas_m2);
     facts.at("seams").get_to(made.seams);
@@ -251,17 +253,17 @@ Totals put_together(const MeshOptions& options, const PieceProgress& progress,
   const libmap::SurfaceIslands::Dropped dropped = islands.dropped(options.surface.cleaning);
   Totals totals;
   for (const libmap::PlanTile& tile : tiles) {
-    const PieceProgress::Facts facts = progress.facts(tile);
+    const PieceProgress::Facts facts = progress.facts(piece_of(tile));
     const fs::path to = folder / libmap::piece_file_name(tile, ".ply");
     const auto components = dropped.find(tile);
     if (components != dropped.end()) {
       const libmap::TriangleMesh kept = libmap::without_components(
-          libmap::read_mesh(progress.file(tile, ".ply")).mesh, components->second);
+          libmap::read_mesh(progress.file(piece_of(tile), ".ply")).mesh, components->second);
       totals.add(kept);
       if (!kept.triangles.empty()) libmap::write_mesh(to, kept);
     } else if (facts.at("triangles") > 0) {
       totals.add(facts);
-      PieceProgress::link_file(progress.file(tile, ".ply"), to);
+      PieceProgress::link_file(progress.file(piece_of(tile), ".ply"), to);
     }
   }
   if (totals.triangles == 0)
@@ -294,12 +296,16 @@ void make_tiles(const MeshOptions& options, PieceProgress& progress, Run& run) {
                    {"dropped_points", survey.dropped_points()},
                    {"cell_size_m", options.surface.reconstruction.cell_size_m}});
   std::vector<libmap::PlanTile> tiles;
-  for (const auto& [tile, points] : points_in_tiles) tiles.push_back(tile);
-  const auto make = [&](const libmap::PlanTile& tile, const fs::path& to) {
+  std::vector<std::string> pieces;
+  for (const auto& [tile, points] : points_in_tiles) {
+    tiles.push_back(tile);
+    pieces.push_back(piece_of(tile));
+  }
+  const auto make = [&](std::size_t n, const fs::path& to) {
     const libmap::PlanBox box =
-        libmap::plan_box_of(tile, options.surface.tile_m, options.surface.margin_m());
+        libmap::plan_box_of(tiles[n], options.surface.tile_m, options.surface.margin_m());
     const libmap::SurfaceTile made = libmap::make_surface_tile(
-        index.points_in(box.min(), box.max()), survey, tile, options.surface);
+        index.points_in(box.min(), box.max()), survey, tiles[n], options.surface);
     if (!made.mesh.triangles.empty()) libmap::write_mesh(to, made.mesh);
     return facts_of(made);
   };
@@ -308,7 +314,7 @@ void make_tiles(const MeshOptions& options, PieceProgress& progress, Run& run) {
     run.say("{} points -> {} triangles in {} pieces", index.points(), totals.triangles,
             totals.pieces);
   };
-  progress.make({tiles, ".ply", make, finish});
+  progress.make({pieces, ".ply", make, finish});
 }
 
 void mesh_in_tiles(const MeshOptions& options, Run& run) {

@@ -1,6 +1,8 @@
 // graspmap texture: a mesh and the photographs of a scan -> a textured mesh.
 #include <malloc.h>
 
+#include <nlohmann/json.hpp>
+
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_model.h"
@@ -8,13 +10,17 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/piece_folder.h"
+#include "tools/support/piece_progress.h"
 #include "tools/support/scan_poses.h"
+#include "tools/support/store_filling.h"
 
 using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr const char* model_extension = ".glb";  // of pieces
 
 // Frame of the mesh: as its manifest says, that of the poses, or ground truth's.
 enum class MeshFrame { automatic, poses, ground_truth };
@@ -27,6 +33,7 @@ struct TextureCommandOptions {
   std::string calibration;
   MeshFrame frame = MeshFrame::automatic;
   double margin_m = 2.0;
+  std::string tile = "1/1";
   libmap::TextureOptions texture;
   libmap::TexturedMeshWriteOptions writing;
 };
@@ -96,7 +103,7 @@ void add_results(const libmap::TextureReport& result, Run& run) {
                    {"split_charts", result.split_charts},
                    {"shrunk_charts", result.shrunk_charts},
                    {"pages", result.pages},
-                   {"texel_size_m", result.texel_size_m},
+                   {"texel_size_m", result.texel_size_m()},
                    {"atlas_scale", result.atlas_scale},
                    {"seams_before_m", result.seams_before_m},
                    {"seams_m", result.seams_m},
@@ -115,7 +122,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
       "{} photographs, {} charts on {} page{}, texels of {:.1f} mm; {} of {} triangles ({:.3f} m2) "
       "are seen by none and gray",
       result.photos, result.charts, result.pages, result.pages == 1 ? "" : "s",
-      1e3 * result.texel_size_m, result.unseen_triangles, triangles, result.unseen_m2);
+      1e3 * result.texel_size_m(), result.unseen_triangles, triangles, result.unseen_m2);
   // More than what lies behind the rocks: the poses are of another frame, or see another part.
   if (5 * result.unseen_triangles > triangles)
     run.warn("a fifth of the triangles or more is seen by no photograph: see --frame and --poses");
@@ -126,6 +133,41 @@ void say_result(const libmap::TextureReport& result, Run& run) {
   if (result.atlas_scale < 1.0)
     run.warn("texels are {:.2f} times as large as wanted, for the number of pages",
              1.0 / result.atlas_scale);
+}
+
+// Facts on pieces, as files between shares.
+PieceProgress::Facts facts_of(const libmap::TextureExposure& exposure) {
+  std::vector<std::array<float, 3>> gains;
+  for (const Eigen::Vector3f& gain : exposure.gains) gains.push_back({gain[0], gain[1], gain[2]});
+  return {{"gains", gains},
+          {"vignetting", exposure.vignetting},
+          {"observations", exposure.observations},
+          {"spread_before", exposure.spread_before},
+          {"spread", exposure.spread}};
+}
+
+libmap::TextureExposure exposure_of(const PieceProgress::Facts& facts) {
+  libmap::TextureExposure exposure;
+  for (const auto& [r, g, b] : facts.at("gains").get<std::vector<std::array<float, 3>>>())
+    exposure.gains.emplace_back(r, g, b);
+  facts.at("vignetting").get_to(exposure.vignetting);
+  facts.at("observations").get_to(exposure.observations);
+  facts.at("spread_before").get_to(exposure.spread_before);
+  facts.at("spread").get_to(exposure.spread);
+  return exposure;
+}
+
+PieceProgress::Facts facts_of(const libmap::TextureCounts& counts) {
+  PieceProgress::Facts facts;
+  libmap::for_each_count(counts, [&](const char* name, const auto& value) { facts[name] = value; });
+  return facts;
+}
+
+libmap::TextureCounts counts_of(const PieceProgress::Facts& facts) {
+  libmap::TextureCounts counts;
+  libmap::for_each_count(counts,
+                         [&](const char* name, auto& value) { facts.at(name).get_to(value); });
+  return counts;
 }
 
 // Pages of an earlier run that this one has not written anew.
@@ -162,9 +204,12 @@ std::vector<std::string> inputs_of(const TextureCommandOptions& options) {
   return inputs;
 }
 
-void report(const TextureCommandOptions& options, const libmap::TextureReport& result, Run& run) {
+void add_inputs(const TextureCommandOptions& options, Run& run) {
   run.add_input(options.mesh);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
+}
+
+void report(const libmap::TextureReport& result, Run& run) {
   add_results(result, run);
   say_result(result, run);
 }
@@ -178,7 +223,8 @@ void texture(TextureCommandOptions options, Run& run) {
   const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
-  report(options, result, run);
+  add_inputs(options, run);
+  report(result, run);
   const std::vector<fs::path> old_pages = pages_of_earlier_run(options.output);
   const std::vector<libmap::ModelFile> files =
       libmap::textured_mesh_files(options.output, result.model, options.writing);
@@ -188,33 +234,65 @@ void texture(TextureCommandOptions options, Run& run) {
   if (!run.options().dry_run) remove_old_pages(old_pages, files);
 }
 
+std::vector<std::string> stems_of(const std::vector<fs::path>& pieces) {
+  std::vector<std::string> stems;
+  for (const fs::path& piece : pieces) stems.push_back(piece.stem().string());
+  const auto twice = std::adjacent_find(stems.begin(), stems.end());
+  if (twice != stems.end())
+    throw libmap::Error(
+        "two pieces have this name",
+        {.file = pieces.front().parent_path().string(), .field = "name", .value = *twice});
+  return stems;
+}
+
 // Each piece's model is made, written and forgotten.
-void texture_in_pieces(TextureCommandOptions options, Run& run) {
+void make_models(const TextureCommandOptions& options, const libmap::ScanSource& scan,
+                 const libmap::Trajectory& poses, const std::vector<fs::path>& pieces,
+                 PieceProgress& progress, Run& run) {
   // Arrays of a piece go back to the system: the heap would keep what the next does not fit into.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
+  const std::vector<std::string> names = stems_of(pieces);
+  libmap::MeshPieceIndex index(pieces);
+  libmap::PieceTexturing texturing(index, options.margin_m, scan, poses, options.texture,
+                                   run.progress());
+  std::optional<libmap::TextureExposure> exposure;
+  const auto find_exposure = [&] {
+    if (!exposure)
+      exposure =
+          exposure_of(progress.common_facts([&] { return facts_of(texturing.find_exposure()); }));
+  };
+  const auto make = [&](std::size_t n, const fs::path& to) {
+    find_exposure();
+    const libmap::PieceTexturing::Piece piece = texturing.make(n, *exposure);
+    libmap::textured_mesh_files(to, piece.model, options.writing).front().write(to);
+    return facts_of(piece.counts);
+  };
+  const auto finish = [&](const fs::path& folder) {
+    libmap::TextureReport whole = texturing.report();
+    find_exposure();
+    whole.exposure = *exposure;
+    for (const std::string& name : names) {
+      whole += counts_of(progress.facts(name));
+      PieceProgress::link_file(progress.file(name, model_extension),
+                               folder / (name + model_extension));
+    }
+    libmap::require_seen(whole);
+    report(whole, run);
+    run.add_results({{"pieces", names.size()}});
+  };
+  progress.make({names, model_extension, make, finish});
+}
+
+void texture_in_pieces(TextureCommandOptions options, Run& run) {
   const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
-  const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".glb");
-  run.claim_output_tree(options.output, names, inputs_of(options));
+  const std::vector<std::string> names =
+      piece_folder_names(options.output, pieces, model_extension);
   const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
-  run.write_output_tree(options.output, names, [&](const fs::path& folder) {
-    if (folder.empty()) return;
-    libmap::MeshPieceIndex index(pieces);
-    const auto write = [&](std::size_t piece, const libmap::TexturedMesh& model) {
-      const fs::path file = folder / (index.path(piece).stem().string() + ".glb");
-      for (const libmap::ModelFile& part :
-           libmap::textured_mesh_files(file, model, options.writing))
-        part.write(part.path);
-    };
-    report(options,
-           in_file(options.mesh,
-                   [&] {
-                     return libmap::texture_pieces(index, options.margin_m, *scan, poses,
-                                                   options.texture, write, run.progress());
-                   }),
-           run);
-    run.add_results({{"pieces", pieces.size()}});
-  });
+  add_inputs(options, run);
+  PieceProgress progress(options.output, names, inputs_of(options), parse_share(options.tile), run);
+  if (progress.is_complete()) return;
+  in_file(options.mesh, [&] { make_models(options, *scan, poses, pieces, progress, run); });
 }
 
 }  // namespace
@@ -231,10 +309,15 @@ int main(int argc, char** argv) {
           or_piece_folder);
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
+  command.option("--tile", "K/N", options.tile,
+                 "make only share K of N of the pieces; the last share completes the folder");
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
-    is_piece_folder(options.output) ? texture_in_pieces(options, run) : texture(options, run);
+    if (is_piece_folder(options.output)) return texture_in_pieces(options, run);
+    refuse_given({{"--tile", options.tile != TextureCommandOptions{}.tile}},
+                 "is for a folder of pieces");
+    texture(options, run);
   });
 }

@@ -60,52 +60,66 @@ struct CoarseFrame {
 
 class Fusion {
  public:
-  Fusion(const ScanSource& scan, const DepthFusionOptions& options, Progress& progress)
+  Fusion(const ScanSource& scan, const Trajectory& world_from_base,
+         const DepthFusionOptions& options, Progress& progress, const FusionSurvey* known)
       : options_(options),
-        progress_(progress),
-        images_(scan, {.stereo = options.stereo, .strict = options.strict}) {}
-
-  // 0: all in one tile.
-  DepthFusionResult run(const Trajectory& world_from_base, double tile_m, const UseFusedTile& use) {
-    const std::vector<FusionFrame> given = place_frames(world_from_base);
-    timed("survey", [&] { survey(given); });
-    timed("registration", [&] { register_frames(); });
-    if (frames_.empty()) throw no_frames(world_from_base.size());
-    note_frames(world_from_base);
-    fuse_tiles(tile_m, use);
-    return std::move(result_);
+        progress_(&progress),
+        world_from_base_(world_from_base),
+        images_(scan, {.stereo = options.stereo, .strict = options.strict}) {
+    check(options);
+    if (known != nullptr) {
+      survey_ = *known;
+    } else {
+      const std::vector<FusionFrame> given = place_frames();
+      timed("survey", [&] { survey(given); });
+      timed("registration", [&] { register_frames(); });
+    }
+    if (frames().empty()) throw no_frames(world_from_base.size());
   }
+
+  const FusionSurvey& survey() const { return survey_; }
+  const std::vector<PlanTile>& tiles() const { return tiles_; }
+  void make_tiles(double tile_m);
+  TileFusion::Tile make(std::size_t tile);
+  // All in one tile.
+  TileFusion::Tile make_whole() {
+    Members all;
+    for (std::size_t n = 0; n < frames().size(); ++n) all.frames.push_back(n);
+    all.counted = all.frames;
+    progress_->begin("fusion", 2 * all.frames.size());
+    return fuse_tile({}, 0, all);
+  }
+  DepthFusionResult report() const;
 
  private:
-  // Adds to the time of an earlier step of that name.
+  // The frames that matter to a tile, and those that are counted in it, by their numbers.
+  struct Members {
+    std::vector<std::size_t> frames;
+    std::vector<std::size_t> counted;
+  };
+
   template <typename Step>
   void timed(const char* name, const Step& step) {
-    StageTimings one;
-    libmap::timed(one, name, step);
-    for (auto& [known, seconds] : result_.timings_s)
-      if (known == name) {
-        seconds += one.front().second;
-        return;
-      }
-    result_.timings_s.push_back(one.front());
+    libmap::timed(timings_s_, name, step);
   }
+  const std::vector<FusionFrame>& frames() const { return survey_.frames; }
 
   Error no_frames(std::size_t poses) const {
-    if (result_.skipped.empty())
+    if (survey_.skipped.empty())
       return Error(poses == 0 ? "no poses to fuse by" : "no frame has depth");
     return Error("none of " + std::to_string(poses) + " frames can be used, the first because " +
-                 result_.skipped.front().second.what());
+                 survey_.skipped.front().second.what());
   }
 
   void skip(int node, const Error& fault) {
     if (options_.strict) throw fault;
-    result_.skipped.emplace_back(node, fault);
+    survey_.skipped.emplace_back(node, fault);
   }
 
-  std::vector<FusionFrame> place_frames(const Trajectory& world_from_base) {
+  std::vector<FusionFrame> place_frames() {
     std::vector<FusionFrame> frames;
     bool has_origin = false;
-    for (const TrajectoryPose& pose : world_from_base) {
+    for (const TrajectoryPose& pose : world_from_base_) {
       if (!pose.world_from_base.matrix().allFinite()) {
         skip(pose.node, Error("its pose is not finite", {.field = node_name(pose.node)}));
         continue;
@@ -114,10 +128,11 @@ class Fusion {
       frame.node = pose.node;
       frame.grid_from_base = pose.world_from_base;
       if (!has_origin)
-        origin_ = (frame.grid_from_base.translation() / options_.voxel_size_m).array().floor() *
-                  options_.voxel_size_m;
+        survey_.grid_origin =
+            (frame.grid_from_base.translation() / options_.voxel_size_m).array().floor() *
+            options_.voxel_size_m;
       has_origin = true;
-      frame.grid_from_base.translation() -= origin_;
+      frame.grid_from_base.translation() -= survey_.grid_origin;
       const double reach = frame.grid_from_base.translation().cwiseAbs().maxCoeff();
       const double bound = 0.9 * voxel_cell_limit * options_.voxel_size_m;
       const double needed = reach + options_.planes.max_depth_m;
@@ -151,7 +166,7 @@ class Fusion {
       parallel_each(now + 1, [&](std::size_t task) {
         if (task > 0) {
           parts[task - 1] = make(first + task - 1, as_they_are);
-          progress_.advance(1);
+          progress_->advance(1);
           return;
         }
         for (const CoarseFrame& part : before) merge(part);
@@ -185,7 +200,7 @@ class Fusion {
   }
 
   void survey(const std::vector<FusionFrame>& given) {
-    progress_.begin("survey", given.size());
+    progress_->begin("survey", given.size());
     const std::size_t max_voxels = voxels_per_element * wanted_elements(given.size());
     const auto make = [&](std::size_t n, const PlanCells& wanted) {
       CoarseFrame coarse;
@@ -200,7 +215,7 @@ class Fusion {
     };
     each_frame(given.size(), sampled_, make, [&](const CoarseFrame& coarse) {
       if (coarse.fault) return skip(coarse.frame.node, *coarse.fault);
-      frames_.push_back(coarse.frame);
+      survey_.frames.push_back(coarse.frame);
       sample_.merge_frame(coarse.voxels, sampled_);
       while (sample_.size() > max_voxels && sampled_.thinning < max_thinning) {
         ++sampled_.thinning;
@@ -213,10 +228,11 @@ class Fusion {
   void sample_again() {
     sample_ = {};
     each_frame(
-        frames_.size(), sampled_,
+        frames().size(), sampled_,
         [&](std::size_t n, const PlanCells& wanted) {
           CoarseFrame coarse;
-          add_frame(*images_.depth_of(frames_[n].node), frames_[n].grid_from_base, wanted, coarse);
+          add_frame(*images_.depth_of(frames()[n].node), frames()[n].grid_from_base, wanted,
+                    coarse);
           return coarse;
         },
         [&](const CoarseFrame& coarse) { sample_.merge_frame(coarse.voxels, sampled_); });
@@ -239,7 +255,7 @@ class Fusion {
     std::vector<SurfaceElement> elements = surface_elements(sample_, false);
     sample_ = {};
     const std::size_t step =
-        std::max<std::size_t>(1, elements.size() / wanted_elements(frames_.size()));
+        std::max<std::size_t>(1, elements.size() / wanted_elements(frames().size()));
     for (std::size_t n = 0; n * step < elements.size(); ++n) {
       elements[n] = elements[n * step];
       elements[n].position *= static_cast<float>(options_.voxel_size_m);
@@ -254,57 +270,34 @@ class Fusion {
     SurfaceRefinementOptions options = refinement_options();
     options.search_m = first_search_voxels * options_.voxel_size_m / round;
     std::vector<SurfaceObservation> observations;
-    images_.each_view_group(frames_, false,
+    images_.each_view_group(frames(), false,
                             [&](std::span<const RefinementView> views, std::size_t frames) {
                               const auto more = observe_surface(elements, views, options);
                               observations.insert(observations.end(), more.begin(), more.end());
-                              progress_.advance(frames);
+                              progress_->advance(frames);
                             });
     std::stable_sort(observations.begin(), observations.end(),
                      [](const auto& a, const auto& b) { return a.element < b.element; });
     std::vector<Eigen::Vector3d> centers;
-    for (const FusionFrame& frame : frames_) centers.push_back(frame.grid_from_base.translation());
+    for (const FusionFrame& frame : frames()) centers.push_back(frame.grid_from_base.translation());
     return libmap::register_frames(elements, observations, centers);
   }
 
   void register_frames() {
-    if (frames_.size() < 2) return;
+    if (frames().size() < 2) return;
     for (int round = 1; round <= options_.registration_rounds; ++round) {
-      progress_.begin("registration", (round == 1 ? 1 : 2) * frames_.size());
+      progress_->begin("registration", (round == 1 ? 1 : 2) * frames().size());
       if (round > 1) sample_again();
       const FrameRegistration found = registration(round);
-      if (round == 1) result_.disagreement_before_m = found.disagreement_before_m;
-      result_.disagreement_after_m = found.disagreement_before_m;
+      if (round == 1) survey_.disagreement_before_m = found.disagreement_before_m;
+      survey_.disagreement_after_m = found.disagreement_before_m;
       // Poses that are right stay as they are.
       if (!(found.correction_m > min_correction_voxels * options_.voxel_size_m)) break;
-      for (std::size_t n = 0; n < frames_.size(); ++n)
-        move(frames_[n], found.corrected_from_given[n]);
-      result_.disagreement_after_m = found.disagreement_after_m;
-      ++result_.registration_rounds;
+      for (std::size_t n = 0; n < frames().size(); ++n)
+        move(survey_.frames[n], found.corrected_from_given[n]);
+      survey_.disagreement_after_m = found.disagreement_after_m;
+      ++survey_.registration_rounds;
     }
-  }
-
-  void note_frames(const Trajectory& world_from_base) {
-    double turns = 0.0;
-    double shifts = 0.0;
-    for (const FusionFrame& frame : frames_) {
-      const auto given =
-          std::find_if(world_from_base.begin(), world_from_base.end(),
-                       [&](const TrajectoryPose& pose) { return pose.node == frame.node; });
-      TrajectoryPose pose = *given;
-      if (result_.registration_rounds > 0) {
-        pose.world_from_base = Eigen::Translation3d(origin_) * frame.grid_from_base;
-        const Pose given_from_used = given->world_from_base.inverse() * pose.world_from_base;
-        const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
-        turns += turn * turn;
-        shifts += given_from_used.translation().squaredNorm();
-      }
-      result_.poses.push_back(pose);
-    }
-    const auto count = static_cast<double>(frames_.size());
-    result_.registration_turn_deg = std::sqrt(turns / count) * 180.0 / std::numbers::pi;
-    result_.registration_shift_m = std::sqrt(shifts / count);
-    result_.frames = frames_.size();
   }
 
   FusionTiling tiling_of(double tile_m) const {
@@ -312,142 +305,207 @@ class Fusion {
     const SurfaceRefinementOptions options = refinement_options();
     double shift_m = 0.0;
     double disc_m = options.disc_radius_m;
-    for (const FusionFrame& frame : frames_) {
+    for (const FusionFrame& frame : frames()) {
       shift_m = std::max(shift_m, frame.max_ray_length * max_gate_m(options));
       disc_m = std::max(disc_m, frame.max_pixel_pitch * min_disc_pixels * options.max_depth_m);
     }
     const double far = 1e15;
-    if (!((origin_.cwiseAbs() / std::min(tile_m, options_.voxel_size_m)).maxCoeff() < far))
+    if (!((survey_.grid_origin.cwiseAbs() / std::min(tile_m, options_.voxel_size_m)).maxCoeff() <
+          far))
       throw Error("poses are too far from the origin for tiles",
-                  {.field = node_name(frames_.front().node)});
-    return {tile_m, options_.voxel_size_m, origin_, shift_m, disc_m};
+                  {.field = node_name(frames().front().node)});
+    return {tile_m, options_.voxel_size_m, survey_.grid_origin, shift_m, disc_m};
   }
 
-  void fuse_tiles(double tile_m, const UseFusedTile& use) {
-    is_counted_.assign(frames_.size(), 0);
-    std::map<PlanTile, std::vector<std::size_t>> members;
-    if (!(tile_m > 0.0)) {
-      std::vector<std::size_t>& all = members[{}];
-      for (std::size_t n = 0; n < frames_.size(); ++n) all.push_back(n);
-      progress_.begin("fusion", 2 * all.size());
-      return fuse_tile({}, {}, 0, all, use);
-    }
-    const FusionTiling tiling = tiling_of(tile_m);
-    std::size_t visits = 0;
-    for (std::size_t n = 0; n < frames_.size(); ++n)
-      tiling.each_tile(frames_[n].reach, [&](const PlanTile& tile) {
-        members[tile].push_back(n);
-        ++visits;
-      });
-    progress_.begin("fusion", 2 * visits);
-    for (const auto& [tile, frames] : members)
-      fuse_tile(tile, tiling.points(tile), tiling.element_margin(), frames, use);
-  }
+  TileFusion::Tile fuse_tile(const PlanCells& cells, int element_margin, const Members& members);
+  SurfaceVoxels coarse_surface(const Members& members, const PlanCells& around,
+                               const PlanCells& cells, FusionCounts& counts);
+  PointCloud make_cloud(const PlanCells& cells, const RefinedSurface& surface,
+                        FusionCounts& counts) const;
 
-  void fuse_tile(const PlanTile& tile, const PlanCells& cells, int element_margin,
-                 const std::vector<std::size_t>& members, const UseFusedTile& use) {
-    std::vector<FusionFrame> frames;
-    for (const std::size_t n : members) frames.push_back(frames_[n]);
-    images_.keep_only(frames);
-    const PlanCells around = cells.grown(element_margin);
-    std::vector<SurfaceElement> elements;
-    timed("coarse surface", [&] {
-      const SurfaceVoxels voxels =
-          coarse_surface(members, around.grown(element_neighborhood), cells);
-      elements = surface_elements(voxels, options_.extend_edges);
-    });
-    std::erase_if(elements, [&](const SurfaceElement& element) {
-      return !around.has_place(element.position.head<2>());
-    });
-    const auto voxel = static_cast<float>(options_.voxel_size_m);
-    for (SurfaceElement& element : elements) {
-      if (cells.has_place(element.position.head<2>())) ++result_.elements;
-      element.position *= voxel;
-    }
-    if (elements.empty()) {
-      progress_.advance(frames.size());
-      return make_cloud(tile, cells, {}, use);
-    }
-    RefinedSurface surface;
-    timed("refinement", [&] {
-      surface = refine_surface(std::move(elements), refinement_options(), [&](const AddViews& add) {
-        images_.each_view_group(frames, options_.color,
-                                [&](std::span<const RefinementView> views, std::size_t count) {
-                                  add(views);
-                                  progress_.advance(count);
-                                });
-      });
-    });
-    timed("cloud", [&] { make_cloud(tile, cells, surface, use); });
-  }
-
-  SurfaceVoxels coarse_surface(const std::vector<std::size_t>& members, const PlanCells& around,
-                               const PlanCells& cells) {
-    SurfaceVoxels voxels;
-    const auto make = [&](std::size_t n, const PlanCells& wanted) {
-      CoarseFrame coarse;
-      coarse.number = members[n];
-      const FusionFrame& frame = frames_[members[n]];
-      add_frame(*images_.depth_of(frame.node), frame.grid_from_base, wanted, coarse);
-      return coarse;
-    };
-    each_frame(members.size(), around, make, [&](const CoarseFrame& coarse) {
-      voxels.merge_frame(coarse.voxels, around);
-      if (is_counted_[coarse.number] == 0) result_.pixels += coarse.pixels;
-      is_counted_[coarse.number] = 1;
-    });
-    for (const std::uint64_t key : voxels.index().keys())
-      if (cells.has_cell(unpack(key).cell.head<2>())) ++result_.occupied_voxels;
-    return voxels;
-  }
-
-  void make_cloud(const PlanTile& tile, const PlanCells& cells, const RefinedSurface& surface,
-                  const UseFusedTile& use) {
-    SurfacePointOptions options;
-    options.voxel_size_m = options_.voxel_size_m;
-    options.min_views = options_.min_views;
-    options.max_seen_through = options_.max_seen_through;
-    options.max_missed = options_.max_missed;
-    options.cells = cells;
-    SurfacePoints points = make_surface_points(surface, options);
-    result_.points += points.counts;
-    result_.points_made += points.cloud.size();
-    for (Eigen::Vector3d& position : points.cloud.positions) position += origin_;
-    use(tile, std::move(points.cloud), result_);
-  }
-
-  const DepthFusionOptions& options_;
-  Progress& progress_;
+  DepthFusionOptions options_;
+  Progress* progress_;  // of a tile: none
+  Trajectory world_from_base_;
   FusionFrames images_;
   MemoryBudget memory_;
-  // The grid's origin is a corner of the world's own voxels near the first camera: single precision
-  // is enough about it, wherever the scan lies.
-  Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
-  std::vector<FusionFrame> frames_;  // that can be used
-  PlanCells sampled_;                // the part of the coarse surface that frames are registered by
+  FusionSurvey survey_;
+  PlanCells sampled_;  // the part of the coarse surface that frames are registered by
   SurfaceVoxels sample_;
-  std::vector<char> is_counted_;  // of the frames: their pixels
-  DepthFusionResult result_;
+  std::optional<FusionTiling> tiling_;
+  std::vector<PlanTile> tiles_;
+  std::vector<Members> members_;  // of the tiles
+  StageTimings timings_s_;
 };
 
-}  // namespace
-
-DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
-                             const DepthFusionOptions& options, Progress& progress) {
-  PointCloud cloud;
-  DepthFusionResult result = fuse_depth_in_tiles(
-      scan, world_from_base, options, 0.0,
-      [&](const PlanTile&, PointCloud made, const DepthFusionResult&) { cloud = std::move(made); },
-      progress);
-  result.cloud = std::move(cloud);
+// The frames with the poses that they are fused by.
+DepthFusionResult Fusion::report() const {
+  DepthFusionResult result;
+  result.frames = frames().size();
+  result.registration_rounds = survey_.registration_rounds;
+  result.disagreement_before_m = survey_.disagreement_before_m;
+  result.disagreement_after_m = survey_.disagreement_after_m;
+  result.skipped = survey_.skipped;
+  result.timings_s = timings_s_;
+  double turns = 0.0;
+  double shifts = 0.0;
+  for (const FusionFrame& frame : frames()) {
+    const auto given =
+        std::find_if(world_from_base_.begin(), world_from_base_.end(),
+                     [&](const TrajectoryPose& pose) { return pose.node == frame.node; });
+    if (given == world_from_base_.end()) throw Error("no pose", {.field = node_name(frame.node)});
+    TrajectoryPose pose = *given;
+    if (survey_.registration_rounds > 0) {
+      pose.world_from_base = Eigen::Translation3d(survey_.grid_origin) * frame.grid_from_base;
+      const Pose given_from_used = given->world_from_base.inverse() * pose.world_from_base;
+      const double turn = Eigen::AngleAxisd(given_from_used.linear()).angle();
+      turns += turn * turn;
+      shifts += given_from_used.translation().squaredNorm();
+    }
+    result.poses.push_back(pose);
+  }
+  const auto count = static_cast<double>(frames().size());
+  result.registration_turn_deg = std::sqrt(turns / count) * 180.0 / std::numbers::pi;
+  result.registration_shift_m = std::sqrt(shifts / count);
   return result;
 }
 
-DepthFusionResult fuse_depth_in_tiles(const ScanSource& scan, const Trajectory& world_from_base,
-                                      const DepthFusionOptions& options, double tile_m,
-                                      const UseFusedTile& use, Progress& progress) {
-  check(options);
-  return Fusion(scan, options, progress).run(world_from_base, tile_m, use);
+void Fusion::make_tiles(double tile_m) {
+  progress_ = &no_progress();
+  tiling_ = tiling_of(tile_m);
+  std::map<PlanTile, Members> members;
+  for (std::size_t n = 0; n < frames().size(); ++n) {
+    std::optional<PlanTile> first;
+    tiling_->each_tile(frames()[n].reach, [&](const PlanTile& tile) {
+      members[tile].frames.push_back(n);
+      first = std::min(first.value_or(tile), tile);
+    });
+    if (first) members[*first].counted.push_back(n);
+  }
+  for (auto& [tile, its] : members) {
+    tiles_.push_back(tile);
+    members_.push_back(std::move(its));
+  }
 }
+
+TileFusion::Tile Fusion::make(std::size_t tile) {
+  return fuse_tile(tiling_->points(tiles_[tile]), tiling_->element_margin(), members_[tile]);
+}
+
+TileFusion::Tile Fusion::fuse_tile(const PlanCells& cells, int element_margin,
+                                   const Members& members) {
+  TileFusion::Tile tile;
+  std::vector<FusionFrame> of_tile;
+  for (const std::size_t n : members.frames) of_tile.push_back(frames()[n]);
+  images_.keep_only(of_tile);
+  const PlanCells around = cells.grown(element_margin);
+  std::vector<SurfaceElement> elements;
+  timed("coarse surface", [&] {
+    const SurfaceVoxels voxels =
+        coarse_surface(members, around.grown(element_neighborhood), cells, tile.counts);
+    elements = surface_elements(voxels, options_.extend_edges);
+  });
+  std::erase_if(elements, [&](const SurfaceElement& element) {
+    return !around.has_place(element.position.head<2>());
+  });
+  const auto voxel = static_cast<float>(options_.voxel_size_m);
+  for (SurfaceElement& element : elements) {
+    if (cells.has_place(element.position.head<2>())) ++tile.counts.elements;
+    element.position *= voxel;
+  }
+  RefinedSurface surface;
+  if (elements.empty()) {
+    progress_->advance(of_tile.size());
+  } else {
+    timed("refinement", [&] {
+      surface = refine_surface(std::move(elements), refinement_options(), [&](const AddViews& add) {
+        images_.each_view_group(of_tile, options_.color,
+                                [&](std::span<const RefinementView> views, std::size_t count) {
+                                  add(views);
+                                  progress_->advance(count);
+                                });
+      });
+    });
+  }
+  timed("cloud", [&] { tile.cloud = make_cloud(cells, surface, tile.counts); });
+  return tile;
+}
+
+SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& around,
+                                     const PlanCells& cells, FusionCounts& counts) {
+  SurfaceVoxels voxels;
+  const auto make = [&](std::size_t n, const PlanCells& wanted) {
+    CoarseFrame coarse;
+    coarse.number = members.frames[n];
+    const FusionFrame& frame = frames()[coarse.number];
+    add_frame(*images_.depth_of(frame.node), frame.grid_from_base, wanted, coarse);
+    return coarse;
+  };
+  each_frame(members.frames.size(), around, make, [&](const CoarseFrame& coarse) {
+    voxels.merge_frame(coarse.voxels, around);
+    if (std::binary_search(members.counted.begin(), members.counted.end(), coarse.number))
+      counts.pixels += coarse.pixels;
+  });
+  for (const std::uint64_t key : voxels.index().keys())
+    if (cells.has_cell(unpack(key).cell.head<2>())) ++counts.occupied_voxels;
+  return voxels;
+}
+
+PointCloud Fusion::make_cloud(const PlanCells& cells, const RefinedSurface& surface,
+                              FusionCounts& counts) const {
+  SurfacePointOptions options;
+  options.voxel_size_m = options_.voxel_size_m;
+  options.min_views = options_.min_views;
+  options.max_seen_through = options_.max_seen_through;
+  options.max_missed = options_.max_missed;
+  options.cells = cells;
+  SurfacePoints points = make_surface_points(surface, options);
+  counts.points += points.counts;
+  counts.points_made += points.cloud.size();
+  for (Eigen::Vector3d& position : points.cloud.positions) position += survey_.grid_origin;
+  return std::move(points.cloud);
+}
+
+}  // namespace
+
+FusionCounts& FusionCounts::operator+=(const FusionCounts& more) {
+  pixels += more.pixels;
+  occupied_voxels += more.occupied_voxels;
+  elements += more.elements;
+  points += more.points;
+  points_made += more.points_made;
+  return *this;
+}
+
+DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
+                             const DepthFusionOptions& options, Progress& progress) {
+  Fusion fusion(scan, world_from_base, options, progress, nullptr);
+  TileFusion::Tile whole = fusion.make_whole();
+  DepthFusionResult result = fusion.report();
+  static_cast<FusionCounts&>(result) = whole.counts;
+  result.cloud = std::move(whole.cloud);
+  return result;
+}
+
+class TileFusion::Work : public Fusion {
+ public:
+  using Fusion::Fusion;
+};
+
+TileFusion::TileFusion(const ScanSource& scan, const Trajectory& world_from_base,
+                       const DepthFusionOptions& options, double tile_m, Progress& progress,
+                       const FusionSurvey* known)
+    : work_(std::make_unique<Work>(scan, world_from_base, options, progress, known)) {
+  work_->make_tiles(tile_m);
+}
+
+TileFusion::~TileFusion() = default;
+
+const FusionSurvey& TileFusion::survey() const { return work_->survey(); }
+
+const std::vector<PlanTile>& TileFusion::tiles() const { return work_->tiles(); }
+
+TileFusion::Tile TileFusion::make(std::size_t tile) { return work_->make(tile); }
+
+DepthFusionResult TileFusion::report() const { return work_->report(); }
 
 }  // namespace libmap

@@ -12,12 +12,13 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "libmap/cloud/depth_planes.h"
+#include "libmap/cloud/fusion_frames.h"
 #include "libmap/cloud/surface_points.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
@@ -55,29 +56,47 @@ struct DepthFusionOptions {
 };
 void bind(ParameterTable& table, DepthFusionOptions& options);
 
-struct DepthFusionResult {
-  // Empty where tiles were made. World frame; unit normals towards the cameras; colors if any frame
-  // has them. Fields: `views`, distinct frames; `expected_error` of the position along the normal,
-  // m, one standard deviation: from the noise, from how far frames disagree, and from how far the
-  // two passes do, as they do where the surface bends within a disc.
-  PointCloud cloud;
-  DepthPixelCounts pixels;
-  std::size_t frames = 0;  // used
-  // The frames that were used, by ascending node, with the poses that they were fused by.
-  Trajectory poses;
+// Of one tile, or of several together.
+struct FusionCounts {
+  DepthPixelCounts pixels;  // of each frame once
+  std::size_t occupied_voxels = 0;
+  std::size_t elements = 0;  // of the surface, before points were made of them
+  SurfacePointCounts points;
+  std::size_t points_made = 0;
+
+  FusionCounts& operator+=(const FusionCounts& more);
+};
+
+// The frames that can be used, where they are fused: what all tiles have in common.
+struct FusionSurvey {
+  // The grid's origin is a corner of the world's own voxels near the first camera: single precision
+  // is enough about it, wherever the scan lies.
+  Eigen::Vector3d grid_origin = Eigen::Vector3d::Zero();
+  std::vector<FusionFrame> frames;               // by ascending node
+  std::vector<std::pair<int, Error>> skipped{};  // node and what it lacks
   int registration_rounds = 0;  // that moved frames; 0: the poses are those that were given
-  // Root mean squares over the frames, against the poses that were given.
-  double registration_shift_m = 0.0;
-  double registration_turn_deg = 0.0;
   // Of heights that frames measured of a place, about their mean: by the poses given, and in the
   // end.
   double disagreement_before_m = 0.0;
   double disagreement_after_m = 0.0;
-  std::vector<std::pair<int, Error>> skipped;  // node and what it lacks
-  std::size_t occupied_voxels = 0;
-  std::size_t elements = 0;  // of the surface, before points were made of them
-  SurfacePointCounts points;
-  std::size_t points_made = 0;  // of the cloud, or all tiles
+};
+
+struct DepthFusionResult : FusionCounts {
+  // World frame; unit normals towards the cameras; colors if any frame has them. Fields: `views`,
+  // distinct frames; `expected_error` of the position along the normal, m, one standard deviation:
+  // from the noise, from how far frames disagree, and from how far the two passes do, as they do
+  // where the surface bends within a disc.
+  PointCloud cloud;
+  std::size_t frames = 0;  // used
+  // The frames that were used, by ascending node, with the poses that they were fused by.
+  Trajectory poses;
+  // Of FusionSurvey, and root mean squares over the frames against the poses that were given.
+  int registration_rounds = 0;
+  double registration_shift_m = 0.0;
+  double registration_turn_deg = 0.0;
+  double disagreement_before_m = 0.0;
+  double disagreement_after_m = 0.0;
+  std::vector<std::pair<int, Error>> skipped;
   StageTimings timings_s;
 };
 
@@ -89,14 +108,32 @@ DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_fro
                              const DepthFusionOptions& options = {},
                              Progress& progress = no_progress());
 
-// Takes the cloud of one tile; of `so_far`, frames, poses and registration are final.
-using UseFusedTile =
-    std::function<void(const PlanTile& tile, PointCloud cloud, const DepthFusionResult& so_far)>;
 // The same in square tiles of the world's x-y plane, with the side `tile_m`, rounded to whole
-// voxels; 0: one tile. Memory depends on the size of a tile, and each frame adds 4 kB. Each point
-// is in one tile only. It is the same point, bit for bit, as without tiles.
-DepthFusionResult fuse_depth_in_tiles(const ScanSource& scan, const Trajectory& world_from_base,
-                                      const DepthFusionOptions& options, double tile_m,
-                                      const UseFusedTile& use, Progress& progress = no_progress());
+// voxels. Memory depends on the size of a tile, and each frame adds 4 kB. Each point is in one tile
+// only. It is the same point, bit for bit, as without tiles.
+class TileFusion {
+ public:
+  // Surveys and registers the frames, unless `known` is what that has found before. `scan`
+  // and `progress` must outlive this. Throws Error as fuse_depth, or for poses too far from the
+  // origin for tiles.
+  TileFusion(const ScanSource& scan, const Trajectory& world_from_base,
+             const DepthFusionOptions& options, double tile_m, Progress& progress = no_progress(),
+             const FusionSurvey* known = nullptr);
+  ~TileFusion();
+
+  const FusionSurvey& survey() const;
+  const std::vector<PlanTile>& tiles() const;
+  struct Tile {
+    PointCloud cloud;
+    FusionCounts counts;
+  };
+  Tile make(std::size_t tile);  // of tiles()
+  // But for cloud and counts; the times are those until now.
+  DepthFusionResult report() const;
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
 
 }  // namespace libmap

@@ -382,13 +382,9 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
   }
 }
 
-std::string exported(const aiScene& scene, const char* format) {
-  Assimp::Exporter exporter;
-  const aiExportDataBlob* const blob = exporter.ExportToBlob(&scene, format);
-  if (blob == nullptr)
-    throw Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
-                ErrorKind::failed);
-  return std::string(static_cast<const char*>(blob->data), blob->size);
+Error not_written(const Assimp::Exporter& exporter) {
+  return Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
+               ErrorKind::failed);
 }
 
 }  // namespace
@@ -439,24 +435,42 @@ std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format
   std::vector<std::unique_ptr<aiMaterial>> materials;
   materials.push_back(std::make_unique<aiMaterial>());
   const auto scene = scene_of(std::move(meshes), std::move(materials), is_glb);
-  return exported(*scene, is_glb ? "glb2" : ascii ? "stl" : "stlb");
+  Assimp::Exporter exporter;
+  const aiExportDataBlob* const blob = exporter.ExportToBlob(scene.get(), is_glb  ? "glb2"
+                                                                          : ascii ? "stl"
+                                                                                  : "stlb");
+  if (blob == nullptr) throw not_written(exporter);
+  return std::string(static_cast<const char*>(blob->data), blob->size);
 }
 
-std::string encode_model_by_assimp(const std::vector<ModelPart>& parts,
-                                   const std::vector<EncodedPicture>& pictures) {
+void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
+                           std::vector<EncodedPicture> pictures) {
   std::vector<std::unique_ptr<aiMesh>> meshes;
   std::vector<std::unique_ptr<aiMaterial>> materials;
   std::vector<std::unique_ptr<aiTexture>> textures;
-  for (const ModelPart& part : parts) {
+  // The exporter copies the scene: what it replaces is given back at once.
+  for (ModelPart& part : parts) {
     meshes.push_back(mesh_of(part.mesh, static_cast<unsigned>(materials.size())));
     copy_coordinates(part.texture_coordinates, *meshes.back());
     materials.push_back(make_material(part.page));
+    part = {};
   }
-  textures.reserve(pictures.size());
-  for (const EncodedPicture& picture : pictures) textures.push_back(make_texture(picture));
+  for (EncodedPicture& picture : pictures) {
+    textures.push_back(make_texture(picture));
+    picture = {};
+  }
   const auto scene = scene_of(std::move(meshes), std::move(materials), true);
   scene->mTextures = hang(textures, scene->mNumTextures);
-  return exported(*scene, "glb2");
+  Assimp::Exporter exporter;
+  if (exporter.Export(scene.get(), "glb2", path.string()) != aiReturn_SUCCESS)
+    throw not_written(exporter);
+  // The second number of the header (glTF 2.0, 4.4.2) is the file's length; assimp does not see
+  // what fails when the file is closed.
+  std::ifstream file(path, std::ios::binary);
+  std::array<std::uint32_t, 3> header{};
+  file.read(reinterpret_cast<char*>(header.data()), sizeof header);
+  if (!file || header[2] != std::filesystem::file_size(path))
+    throw Error("cannot be written: it is truncated", {.file = path.string()}, ErrorKind::failed);
 }
 
 }  // namespace libmap

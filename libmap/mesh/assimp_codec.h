@@ -1,4 +1,4 @@
-// OBJ, STL and GLB through assimp, in memory.
+// OBJ, STL and GLB through assimp.
 #pragma once
 
 #include <cstdint>
@@ -53,7 +53,7 @@ struct EncodedPicture {
 };
 
 // .glb with the pictures within, unlit (KHR_materials_unlit). Throws Error.
-std::string encode_model_by_assimp(const std::vector<ModelPart>& parts,
-                                   const std::vector<EncodedPicture>& pictures);
+void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
+                           std::vector<EncodedPicture> pictures);
 
 }  // namespace libmap

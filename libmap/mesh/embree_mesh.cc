@@ -42,14 +42,11 @@ EmbreeMesh::EmbreeMesh(const TriangleMesh& mesh, bool robust) : triangles_(mesh.
   const RTCGeometry geometry = rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE);
   auto* corners = static_cast<float*>(rtcSetNewGeometryBuffer(
       geometry, RTC_BUFFER_TYPE_VERTEX, 0, RTC_FORMAT_FLOAT3, 3 * sizeof(float), vertices_.size()));
-  auto* indices = static_cast<unsigned*>(
-      rtcSetNewGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
-                              3 * sizeof(unsigned), triangles_.size()));
+  rtcSetSharedGeometryBuffer(geometry, RTC_BUFFER_TYPE_INDEX, 0, RTC_FORMAT_UINT3,
+                             triangles_.data(), 0, sizeof(Triangle), triangles_.size());
   require_success(device);
   for (const Eigen::Vector3d& vertex : vertices_)
     for (int axis = 0; axis < 3; ++axis) *corners++ = static_cast<float>(vertex[axis]);
-  for (const Triangle& triangle : triangles_)
-    for (const std::uint32_t index : triangle) *indices++ = index;
   rtcCommitGeometry(geometry);
   rtcAttachGeometry(scene(), geometry);
   rtcReleaseGeometry(geometry);

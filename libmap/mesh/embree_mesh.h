@@ -19,6 +19,8 @@ class EmbreeMesh {
   // Throws Error if the mesh has no triangle, an index out of range or a vertex that is not finite.
   // `robust`: rays do not slip through shared edges.
   EmbreeMesh(const TriangleMesh& mesh, bool robust);
+  EmbreeMesh(EmbreeMesh&&) = default;
+  EmbreeMesh& operator=(EmbreeMesh&&) = default;
 
   RTCSceneTy* scene() const { return scene_.get(); }  // coordinates less center()
   const Eigen::Vector3d& center() const { return center_; }
@@ -34,7 +36,7 @@ class EmbreeMesh {
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   Eigen::Vector3d size_ = Eigen::Vector3d::Zero();
   std::vector<Eigen::Vector3d> vertices_;
-  std::vector<Triangle> triangles_;
+  std::vector<Triangle> triangles_;  // the scene reads them too
 };
 
 }  // namespace libmap

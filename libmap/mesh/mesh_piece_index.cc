@@ -10,7 +10,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t max_kept_triangles = 2'000'000;
+constexpr std::size_t max_kept_triangles = 1'000'000;
 
 bool is_before(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
   return std::lexicographical_compare(a.begin(), a.end(), b.begin(), b.end());

@@ -37,7 +37,7 @@ class MeshPieceIndex {
   const Eigen::AlignedBox2d& box(std::size_t piece) const { return pieces_[piece].box; }
 
   // The piece, and of the others the triangles with a corner within `margin_m` of its bounding box
-  // in x and y. The pieces read last are kept, up to 2 million triangles.
+  // in x and y. The pieces read last are kept, up to 1 million triangles.
   MeshWithMargin with_margin(std::size_t piece, double margin_m);
 
  private:

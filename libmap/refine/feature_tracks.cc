@@ -18,7 +18,7 @@ class FeatureSets {
  public:
   explicit FeatureSets(const std::vector<FrameFeatures>& frames) {
     for (std::size_t f = 0; f < frames.size(); ++f) {
-      begin_.push_back(frame_of_.size());
+      begin_.push_back(static_cast<std::uint32_t>(frame_of_.size()));
       frame_of_.insert(frame_of_.end(), frames[f].features.size(), static_cast<std::uint32_t>(f));
     }
     sets_ = DisjointSets<std::uint32_t>(frame_of_.size());
@@ -64,7 +64,7 @@ class FeatureSets {
 
  private:
   std::uint32_t number_of(const Observation& seen) const {
-    return static_cast<std::uint32_t>(begin_[seen.frame] + seen.feature);
+    return begin_[seen.frame] + seen.feature;
   }
   std::vector<std::uint32_t> members(std::uint32_t first) const {
     std::vector<std::uint32_t> ring = {first};
@@ -72,11 +72,15 @@ class FeatureSets {
     return ring;
   }
 
-  std::vector<std::size_t> begin_;
+  std::vector<std::uint32_t> begin_;
   std::vector<std::uint32_t> frame_of_;
   std::vector<std::uint32_t> next_;
   DisjointSets<std::uint32_t> sets_{0};
 };
+
+Observation observation(std::size_t frame, int feature) {
+  return {static_cast<std::uint32_t>(frame), static_cast<std::uint32_t>(feature)};
+}
 
 struct RankedMatch {
   double chi_square = 0.0;
@@ -105,10 +109,9 @@ FeatureTracks build_tracks(const std::vector<FrameFeatures>& frames,
   FeatureTracks result;
   for (const auto& [chi_square, n, m] : order) {
     const FeatureMatch& match = links[n].matches[m];
-    const FeatureSets::Join join =
-        sets.join({links[n].frames.first, static_cast<std::size_t>(match.a)},
-                  {links[n].frames.second, static_cast<std::size_t>(match.b)},
-                  together == TrackFrames::linked ? &linked : nullptr);
+    const FeatureSets::Join join = sets.join(observation(links[n].frames.first, match.a),
+                                             observation(links[n].frames.second, match.b),
+                                             together == TrackFrames::linked ? &linked : nullptr);
     result.conflicts += join == FeatureSets::Join::conflict ? 1 : 0;
     result.split += join == FeatureSets::Join::unlinked ? 1 : 0;
   }

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <vector>
 
 #include "libmap/refine/loop_closure.h"
@@ -9,8 +10,8 @@
 namespace libmap {
 
 struct Observation {
-  std::size_t frame = 0;
-  std::size_t feature = 0;
+  std::uint32_t frame = 0;
+  std::uint32_t feature = 0;
   bool operator==(const Observation&) const = default;
 };
 

@@ -10,6 +10,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/icp_pairs.h"
@@ -26,8 +27,16 @@ constexpr double settled_step = 2e-6;
 constexpr double farthest_step = 0.2;  // m and rad
 constexpr double cell_m = 0.25;        // residuals of one cell of the map depend on each other
 constexpr std::size_t max_cells = 400;
+constexpr std::size_t frames_per_cell_share = 100;
 
 using Cell = std::array<int, 3>;
+
+// One cell in `share`, by chance, but always the same.
+bool is_drawn(const Cell& cell, std::uint64_t share) {
+  std::uint64_t bits = 0;
+  for (const int number : cell) bits = mix_bits(bits, static_cast<std::uint64_t>(number));
+  return bits % share == 0;
+}
 
 // Normal equations of one pair in steps of a_from_b.
 struct PairEquations {
@@ -75,8 +84,8 @@ class Alignment {
   }
   PairEquations half_of(const std::vector<BaseElement>& samples, std::size_t onto,
                         const Pose& onto_from_from, bool from_is_a, double max_distance_m,
-                        bool by_cells) const;
-  std::vector<PairEquations> all_equations(double max_distance_m, bool by_cells) const;
+                        std::uint64_t cell_share) const;
+  std::vector<PairEquations> all_equations(double max_distance_m, std::uint64_t cell_share) const;
   void drop_degenerate(PairEquations& equations) const;
   void add_prior(BlockSystem& system) const;
   double add_pairs(double max_distance_m, BlockSystem& system);
@@ -97,7 +106,7 @@ class Alignment {
 // where the frame is b: p -> p + t + r x p before a_from_b; and where it is a, the inverse.
 PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::size_t onto,
                                  const Pose& onto_from_from, bool from_is_a, double max_distance_m,
-                                 bool by_cells) const {
+                                 std::uint64_t cell_share) const {
   PairEquations equations;
   const double min_cosine = std::cos(options_.max_normal_angle_deg * std::numbers::pi / 180.0);
   for (const BaseElement& sample : samples) {
@@ -133,13 +142,14 @@ PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::s
     equations.information +=
         (0.5 * weight) * (by_sample * by_plane.transpose() + by_plane * by_sample.transpose());
     equations.side -= weight * distance * by_sample;
-    if (by_cells) {
+    if (cell_share > 0) {
       const Eigen::Vector3d place = *pose_of(onto) * point / cell_m;
       const Cell cell = {static_cast<int>(std::floor(place.x())),
                          static_cast<int>(std::floor(place.y())),
                          static_cast<int>(std::floor(place.z()))};
-      equations.side_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
-          weight * distance * by_sample;
+      if (is_drawn(cell, cell_share))
+        equations.side_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
+            weight * distance * by_sample;
     }
     equations.squares_m2 += distance * distance / (root * root);
     equations.weight += 1.0 / (root * root);
@@ -181,7 +191,9 @@ void Alignment::add_prior(BlockSystem& system) const {
 }
 
 // Frame by frame, so that the samples of few are in memory; both halves of a pair are then added.
-std::vector<PairEquations> Alignment::all_equations(double max_distance_m, bool by_cells) const {
+// Sides by cells: of one cell in cell_share; 0: of none.
+std::vector<PairEquations> Alignment::all_equations(double max_distance_m,
+                                                    std::uint64_t cell_share) const {
   std::vector<std::vector<std::size_t>> pairs_of_frame(frames_.size());
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
     pairs_of_frame[pairs_[n].first].push_back(n);
@@ -198,7 +210,7 @@ std::vector<PairEquations> Alignment::all_equations(double max_distance_m, bool 
       const std::size_t other = is_a ? pairs_[n].second : pairs_[n].first;
       (is_a ? of_first : of_second)[n] =
           half_of(samples, other, pose_of(other)->inverse() * *pose_of(frame), is_a, max_distance_m,
-                  by_cells);
+                  cell_share);
     }
   });
   parallel_each(pairs_.size(), [&](std::size_t n) {
@@ -210,7 +222,7 @@ std::vector<PairEquations> Alignment::all_equations(double max_distance_m, bool 
 
 // What the surfaces of the pairs ask; their root mean square distance.
 double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
-  const std::vector<PairEquations> equations = all_equations(max_distance_m, false);
+  const std::vector<PairEquations> equations = all_equations(max_distance_m, 0);
   double squares = 0.0;
   double weight = 0.0;
   result_.samples = 0;
@@ -268,7 +280,9 @@ double Alignment::deviation_scale(double max_distance_m) const {
   BlockSystem system(place_.size());
   add_prior(system);
   std::map<Cell, std::map<std::size_t, Vector6d>> sides;
-  const std::vector<PairEquations> equations = all_equations(max_distance_m, true);
+  // Of a long scan few cells are in memory; about max_cells of them are enough.
+  const std::uint64_t share = 1 + frames_.size() / frames_per_cell_share;
+  const std::vector<PairEquations> equations = all_equations(max_distance_m, share);
   for (std::size_t n = 0; n < pairs_.size(); ++n) {
     const std::size_t a = place_.at(frames_[pairs_[n].first].node);
     const std::size_t b = place_.at(frames_[pairs_[n].second].node);
@@ -300,7 +314,7 @@ double Alignment::deviation_scale(double max_distance_m) const {
     for (const auto& [place, part] : of_cell) side[place] = part;
     squares += square(side);
   }
-  squares *= static_cast<double>(sides.size()) / static_cast<double>(used);
+  squares *= static_cast<double>(share * sides.size()) / static_cast<double>(used);
   const double unknowns = 6.0 * static_cast<double>(place_.size() - components_.size());
   if (!(unknowns > 0.0)) return 1.0;
   double way = 0.0;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <ctime>
+#include <iterator>
 #include <set>
 #include <utility>
 
@@ -226,12 +227,12 @@ std::vector<GraphLink> Refinement::with_features(const std::vector<FeatureLink>&
   return all;
 }
 
-// Parts that closures connect get into one frame before the graph is optimized.
-void Refinement::join_new(const std::vector<FeatureLink>& links) {
+// Parts that closures connect get into one frame before the graph is optimized; the links before
+// `first` are not new.
+void Refinement::join_new(std::size_t first) {
   if (parts_.size() < 2) return;
   std::vector<PoseLink> between;
-  between.reserve(links.size());
-  for (const FeatureLink& link : links) between.push_back(link.link);
+  for (std::size_t n = first; n < links_.size(); ++n) between.push_back(links_[n].link);
   parts_ = join_parts(poses_, parts_, between);
 }
 
@@ -248,8 +249,10 @@ bool Refinement::round(int number) {
   const std::size_t before = links_.size();
   const std::map<int, Pose> poses_before = poses_;
   const auto parts_before = parts_;
-  links_.insert(links_.end(), verified.links.begin(), verified.links.end());
-  join_new(verified.links);
+  const std::size_t fresh = verified.links.size();
+  links_.insert(links_.end(), std::make_move_iterator(verified.links.begin()),
+                std::make_move_iterator(verified.links.end()));
+  join_new(before);
   progress_.begin("pose graph", 0);
   PoseGraphResult graph = optimize_pose_graph(poses_, with_features(links_), options_.graph);
   progress_.end();
@@ -260,22 +263,20 @@ bool Refinement::round(int number) {
     parts_ = parts_before;
   } else {
     // Those that the optimization has rejected do not come back.
-    std::vector<FeatureLink> kept;
-    for (std::size_t n = 0; n < links_.size(); ++n)
-      if (!graph.links[stored_.size() + n].rejected) kept.push_back(links_[n]);
-    stage.figures.emplace_back("rejected_by_optimization",
-                               static_cast<double>(links_.size() - kept.size()));
+    std::size_t place = stored_.size();
+    const std::size_t rejected =
+        std::erase_if(links_, [&](const FeatureLink&) { return graph.links[place++].rejected; });
+    stage.figures.emplace_back("rejected_by_optimization", static_cast<double>(rejected));
     std::vector<GraphLinkResult> results(
         graph.links.begin(), graph.links.begin() + static_cast<std::ptrdiff_t>(stored_.size()));
     for (std::size_t n = stored_.size(); n < graph.links.size(); ++n)
       if (!graph.links[n].rejected) results.push_back(graph.links[n]);
     graph.links = std::move(results);
-    links_ = std::move(kept);
     poses_ = graph.map_from_base;
     graph_ = std::move(graph);
   }
   close(std::move(stage));
-  return static_cast<double>(verified.links.size()) > settled_share * static_cast<double>(before);
+  return static_cast<double>(fresh) > settled_share * static_cast<double>(before);
 }
 
 void Refinement::bundle() {

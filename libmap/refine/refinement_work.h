@@ -44,7 +44,7 @@ class Refinement {
   bool round(int number);
   std::vector<FramePair> candidates(int number);
   std::vector<GraphLink> with_features(const std::vector<FeatureLink>& links) const;
-  void join_new(const std::vector<FeatureLink>& links);
+  void join_new(std::size_t first);
   void bundle();
   bool calibrate_sensor(const std::string& name);
   void match_again();

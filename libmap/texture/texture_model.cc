@@ -56,7 +56,10 @@ class Texturing {
             const TextureOptions& options, Progress& progress, std::size_t max_image_bytes);
 
   TextureResult whole(const TriangleMesh& mesh);
-  TextureReport pieces(MeshPieceIndex& index, double margin_m, const UseModel& use);
+  std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
+  void even_out(const std::vector<ColorObservation>& observations);
+  PieceTexturing::Piece piece(MeshWithMargin part);
+  TextureReport& report() { return report_; }
 
  private:
   template <typename Step>
@@ -64,10 +67,6 @@ class Texturing {
     return libmap::timed(report_.timings_s, name, step);
   }
   MeshWithMargin cut_finely(MeshWithMargin part) const;
-  std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
-  void even_out(const std::vector<ColorObservation>& observations) {
-    report_.exposure = even_out_exposure(observations, photos_->size(), options_.exposure);
-  }
   TextureViewRequest views_of(const MeshWithMargin& part) const {
     return {part.triangles, views_a_triangle, static_cast<std::size_t>(options_.blend_views) + 1,
             0};
@@ -76,13 +75,11 @@ class Texturing {
   TexturedMesh paint(MeshWithMargin part, TextureViews views, Progress& progress);
   void count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label);
   void count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh);
-  TextureReport finished();
 
-  const TextureOptions& options_;
+  TextureOptions options_;
   Progress& progress_;
   std::unique_ptr<TexturePhotos> photos_;
   TextureReport report_;
-  double texels_ = 0.0;
 };
 
 Texturing::Texturing(const ScanSource& scan, const Trajectory& world_from_base,
@@ -107,6 +104,12 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
   return {std::move(fine.mesh), static_cast<std::size_t>(own - fine.source.begin())};
 }
 
+void Texturing::even_out(const std::vector<ColorObservation>& observations) {
+  timed("exposure", [&] {
+    report_.exposure = even_out_exposure(observations, photos_->size(), options_.exposure);
+  });
+}
+
 void Texturing::count_seen(const TriangleMesh& mesh, const std::vector<std::uint32_t>& label) {
   for (std::size_t t = 0; t < label.size(); ++t) {
     const double area = 0.5 * area_normal(mesh, mesh.triangles[t]).norm();
@@ -128,7 +131,7 @@ void Texturing::count_charts(const TextureAtlas& atlas, const TriangleMesh& mesh
       const Eigen::Vector2d a = place_on_page(chart, projector, mesh.vertices[corners[0]]);
       const Eigen::Vector2d ab = place_on_page(chart, projector, mesh.vertices[corners[1]]) - a;
       const Eigen::Vector2d ac = place_on_page(chart, projector, mesh.vertices[corners[2]]) - a;
-      texels_ += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
+      report_.texels += 0.5 * std::abs(ab.x() * ac.y() - ab.y() * ac.x());
     }
 }
 
@@ -158,14 +161,6 @@ TexturedMesh Texturing::paint(MeshWithMargin part, TextureViews views, Progress&
   });
 }
 
-TextureReport Texturing::finished() {
-  if (report_.seen_triangles == 0)
-    throw Error("none of its triangles is seen by any of " + std::to_string(report_.photos) +
-                " photographs: mesh and poses may lie in different frames");
-  report_.texel_size_m = texels_ > 0.0 ? std::sqrt(report_.seen_m2 / texels_) : 0.0;
-  return std::move(report_);
-}
-
 TextureResult Texturing::whole(const TriangleMesh& mesh) {
   mesh.check();
   if (mesh.triangles.empty()) throw Error("the mesh has no triangles");
@@ -178,9 +173,10 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
   TextureViews views = timed("views", [&] {
     return find_texture_views(part.mesh, *photos_, options_.views, request, progress_);
   });
-  timed("exposure", [&] { even_out(views.observations); });
+  even_out(views.observations);
   TexturedMesh model = paint(std::move(part), std::move(views), progress_);
-  return {finished(), std::move(model)};
+  require_seen(report_);
+  return {std::move(report_), std::move(model)};
 }
 
 // Of all pieces together.
@@ -204,24 +200,17 @@ std::vector<ColorObservation> Texturing::observe(MeshPieceIndex& index, double m
   return all;
 }
 
-TextureReport Texturing::pieces(MeshPieceIndex& index, double margin_m, const UseModel& use) {
-  timed("exposure", [&] { even_out(observe(index, margin_m)); });
-  progress_.begin("texture", index.size());
-  for (std::size_t piece = 0; piece < index.size(); ++piece) {
-    MeshWithMargin part = index.with_margin(piece, margin_m);
-    const std::size_t uncut = part.triangles;
-    part = timed("cutting", [&] { return cut_finely(std::move(part)); });
-    report_.cut_triangles += part.triangles - uncut;
-    const TextureViews views = timed("views", [&] {
-      return find_texture_views(part.mesh, *photos_, options_.views, views_of(part), no_progress());
-    });
-    TexturedMesh model = paint(std::move(part), views, no_progress());
-    model.mesh = select_triangles(model.mesh, std::vector<bool>(model.mesh.triangles.size(), true));
-    use(piece, model);
-    progress_.advance(1);
-  }
-  progress_.end();
-  return finished();
+PieceTexturing::Piece Texturing::piece(MeshWithMargin part) {
+  static_cast<TextureCounts&>(report_) = {};
+  const std::size_t uncut = part.triangles;
+  part = timed("cutting", [&] { return cut_finely(std::move(part)); });
+  report_.cut_triangles = part.triangles - uncut;
+  TextureViews views = timed("views", [&] {
+    return find_texture_views(part.mesh, *photos_, options_.views, views_of(part), no_progress());
+  });
+  TexturedMesh model = paint(std::move(part), std::move(views), no_progress());
+  model.mesh = select_triangles(model.mesh, std::vector<bool>(model.mesh.triangles.size(), true));
+  return {std::move(model), report_};
 }
 
 }  // namespace
@@ -264,15 +253,63 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
   return Texturing(scan, world_from_base, options, progress, max_image_bytes).whole(mesh);
 }
 
-TextureReport texture_pieces(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
-                             const Trajectory& world_from_base, const TextureOptions& options,
-                             const UseModel& use, Progress& progress) {
-  Texturing texturing(scan, world_from_base, options, progress,
-                      pieces.size() > 1 ? max_image_bytes_in_pieces : max_image_bytes);
-  if (pieces.size() > 1) return texturing.pieces(pieces, margin_m, use);
-  TextureResult result = texturing.whole(pieces.with_margin(0, 0.0).mesh);
-  use(0, result.model);
-  return result;
+class PieceTexturing::Work {
+ public:
+  MeshPieceIndex& index;
+  double margin_m;
+  Texturing texturing;
+};
+
+PieceTexturing::PieceTexturing(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
+                               const Trajectory& world_from_base, const TextureOptions& options,
+                               Progress& progress)
+    : work_(new Work{
+          pieces, margin_m,
+          Texturing(scan, world_from_base, options, progress, max_image_bytes_in_pieces)}) {}
+
+PieceTexturing::~PieceTexturing() = default;
+
+TextureExposure PieceTexturing::find_exposure() {
+  work_->texturing.even_out(work_->texturing.observe(work_->index, work_->margin_m));
+  return work_->texturing.report().exposure;
+}
+
+PieceTexturing::Piece PieceTexturing::make(std::size_t piece, const TextureExposure& exposure) {
+  work_->texturing.report().exposure = exposure;
+  return work_->texturing.piece(work_->index.with_margin(piece, work_->margin_m));
+}
+
+TextureReport PieceTexturing::report() const {
+  TextureReport report = work_->texturing.report();
+  static_cast<TextureCounts&>(report) = {};
+  return report;
+}
+
+TextureCounts& TextureCounts::operator+=(const TextureCounts& more) {
+  cut_triangles += more.cut_triangles;
+  seen_triangles += more.seen_triangles;
+  unseen_triangles += more.unseen_triangles;
+  seen_m2 += more.seen_m2;
+  unseen_m2 += more.unseen_m2;
+  charts += more.charts;
+  split_charts += more.split_charts;
+  shrunk_charts += more.shrunk_charts;
+  pages += more.pages;
+  atlas_scale = std::min(atlas_scale, more.atlas_scale);
+  texels += more.texels;
+  seams_before_m += more.seams_before_m;
+  seams_m += more.seams_m;
+  return *this;
+}
+
+double TextureCounts::texel_size_m() const {
+  return texels > 0.0 ? std::sqrt(seen_m2 / texels) : 0.0;
+}
+
+void require_seen(const TextureReport& report) {
+  if (report.seen_triangles == 0)
+    throw Error("none of its triangles is seen by any of " + std::to_string(report.photos) +
+                " photographs: mesh and poses may lie in different frames");
 }
 
 }  // namespace libmap

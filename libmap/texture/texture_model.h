@@ -7,7 +7,7 @@
 #pragma once
 
 #include <cstddef>
-#include <functional>
+#include <memory>
 #include <utility>
 #include <vector>
 
@@ -44,11 +44,9 @@ struct TextureOptions {
 };
 void bind(ParameterTable& table, TextureOptions& options);
 
-// Of one model, or of all pieces together.
-struct TextureReport {
-  std::size_t photos = 0;
-  std::vector<std::pair<int, Error>> skipped;  // frames, and what they lack
-  std::size_t cut_triangles = 0;               // more triangles than the mesh had
+// Of one model, or of several pieces together.
+struct TextureCounts {
+  std::size_t cut_triangles = 0;  // more triangles than the mesh had
   std::size_t seen_triangles = 0;
   std::size_t unseen_triangles = 0;
   double seen_m2 = 0.0;
@@ -58,9 +56,36 @@ struct TextureReport {
   std::size_t shrunk_charts = 0;
   std::size_t pages = 0;
   double atlas_scale = 1.0;     // below 1 where charts were made smaller for max_pages; the least
-  double texel_size_m = 0.0;    // root of the mean area of a texel on the surface
+  double texels = 0.0;          // on triangles
   double seams_before_m = 0.0;  // with the best photograph for every triangle
   double seams_m = 0.0;
+
+  TextureCounts& operator+=(const TextureCounts& more);
+  // Root of the mean area of a texel on the surface.
+  double texel_size_m() const;
+};
+
+// use(name, value) for each of them.
+template <typename Counts, typename Use>
+void for_each_count(Counts& counts, const Use& use) {
+  use("cut_triangles", counts.cut_triangles);
+  use("seen_triangles", counts.seen_triangles);
+  use("unseen_triangles", counts.unseen_triangles);
+  use("seen_m2", counts.seen_m2);
+  use("unseen_m2", counts.unseen_m2);
+  use("charts", counts.charts);
+  use("split_charts", counts.split_charts);
+  use("shrunk_charts", counts.shrunk_charts);
+  use("pages", counts.pages);
+  use("atlas_scale", counts.atlas_scale);
+  use("texels", counts.texels);
+  use("seams_before_m", counts.seams_before_m);
+  use("seams_m", counts.seams_m);
+}
+
+struct TextureReport : TextureCounts {
+  std::size_t photos = 0;
+  std::vector<std::pair<int, Error>> skipped;  // frames, and what they lack
   TextureExposure exposure;
   StageTimings timings_s;
 };
@@ -76,14 +101,34 @@ TextureResult texture_mesh(const TriangleMesh& mesh, const ScanSource& scan,
                            const Trajectory& world_from_base, const TextureOptions& options = {},
                            Progress& progress = no_progress());
 
-using UseModel = std::function<void(std::size_t piece, const TexturedMesh& model)>;
+// The pieces of a mesh one by one, so that memory depends on the size of a piece. Errors as of
+// texture_mesh, but that no photograph may see a triangle of a piece.
+class PieceTexturing {
+ public:
+  // What is up to `margin_m` around a piece may hide it; what stands further away does not.
+  // `pieces`, `scan` and `progress` must outlive this.
+  PieceTexturing(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
+                 const Trajectory& world_from_base, const TextureOptions& options,
+                 Progress& progress = no_progress());
+  ~PieceTexturing();
 
-// Calls use(piece, model) for each piece of a mesh, so that memory depends on the size of a piece:
-// each is looked at once for the exposure, which is one for all, and once for its colors. What is
-// up to `margin_m` around a piece may hide it; what stands further away does not. A single piece
-// becomes the model of texture_mesh. Throws Error as texture_mesh.
-TextureReport texture_pieces(MeshPieceIndex& pieces, double margin_m, const ScanSource& scan,
-                             const Trajectory& world_from_base, const TextureOptions& options,
-                             const UseModel& use, Progress& progress = no_progress());
+  // One for all pieces: looks at each of them.
+  TextureExposure find_exposure();
+  struct Piece {
+    TexturedMesh model;
+    TextureCounts counts;
+  };
+  // With this exposure, of find_exposure.
+  Piece make(std::size_t piece, const TextureExposure& exposure);
+  // Of the photographs, with the times until now.
+  TextureReport report() const;
+
+ private:
+  class Work;
+  std::unique_ptr<Work> work_;
+};
+
+// Throws Error if no triangle was seen by any of the photographs.
+void require_seen(const TextureReport& report);
 
 }  // namespace libmap

@@ -56,9 +56,6 @@ class ViewFinder {
         min_cos_(std::cos(options.max_incidence_deg * std::numbers::pi / 180.0)),
         vertices_(mesh.vertices.size()),
         qualities_(mesh.triangles.size()) {
-    normals_.reserve(mesh.triangles.size());
-    for (const Triangle& triangle : mesh.triangles)
-      normals_.push_back(area_normal(mesh, triangle).normalized());
     choose_vertices();
   }
 
@@ -97,6 +94,7 @@ class ViewFinder {
            static_cast<std::size_t>((vertex.x + 0.5F) / side);
   }
   std::vector<bool> hidden(const std::vector<Eigen::Vector3d>& points) const;
+  const Eigen::Vector3d& normal_of(std::size_t rated) const { return normals_[place_of_[rated]]; }
   float rate(std::size_t triangle, double sharpness) const;
   float quality_at(std::uint32_t vertex) const;
   float longest_side_px(const Triangle& triangle) const;
@@ -109,7 +107,6 @@ class ViewFinder {
   RayCaster caster_;
   VertexTriangles around_;
   double min_cos_;
-  std::vector<Eigen::Vector3d> normals_;
   // Vertices whose views are asked for, a ball around them, and the triangles that decide on them.
   std::vector<std::uint32_t> asked_;
   std::vector<std::uint32_t> others_;
@@ -117,7 +114,9 @@ class ViewFinder {
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_m_ = 0.0;
   std::vector<std::uint32_t> rated_;
-  std::vector<std::uint32_t> corners_;  // of these
+  std::vector<std::uint32_t> corners_;    // of these
+  std::vector<Eigen::Vector3d> normals_;  // of these
+  std::vector<std::uint32_t> place_of_;   // of a triangle, among the rated ones
   // Of the photograph at hand.
   const PhotoProjector* projector_ = nullptr;
   std::vector<SeenVertex> vertices_;
@@ -160,8 +159,13 @@ void ViewFinder::choose_vertices() {
     numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
   };
   make_unique(rated_);
-  for (const std::uint32_t t : rated_)
+  place_of_.resize(mesh_.triangles.size());
+  normals_.reserve(rated_.size());
+  for (const std::uint32_t t : rated_) {
     corners_.insert(corners_.end(), mesh_.triangles[t].begin(), mesh_.triangles[t].end());
+    place_of_[t] = static_cast<std::uint32_t>(normals_.size());
+    normals_.push_back(area_normal(mesh_, mesh_.triangles[t]).normalized());
+  }
   make_unique(corners_);
   if (box.isEmpty()) return;
   center_ = box.center();
@@ -215,7 +219,7 @@ void ViewFinder::fill_cells() {
 // Whether something seen in the squares around the triangle stands before its plane.
 bool ViewFinder::is_beside_occluder(std::size_t t) const {
   const Triangle& triangle = mesh_.triangles[t];
-  const Eigen::Vector3d& normal = normals_[t];
+  const Eigen::Vector3d& normal = normal_of(t);
   const double height = normal.dot(mesh_.vertices[triangle[0]] - projector_->position());
   const double gap = occluder_tolerances * options_.occlusion_tolerance_m;
   const auto cell = static_cast<int>(cell_at(vertices_[triangle[0]]));
@@ -250,7 +254,7 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
   const Eigen::Vector3d center = center_of(mesh_, triangle);
   const Eigen::Vector3d toward = projector_->position() - center;
   const double distance2 = toward.squaredNorm();
-  const double cosine = normals_[t].dot(toward) / std::sqrt(distance2);
+  const double cosine = normal_of(t).dot(toward) / std::sqrt(distance2);
   if (!(cosine > min_cos_)) return 0.0F;
   const Camera& camera = projector_->camera();
   const SeenVertex& a = vertices_[triangle[0]];
@@ -340,7 +344,7 @@ float ViewFinder::quality_at(std::uint32_t v) const {
   if (!vertices_[v].visible) return 0.0F;
   float least = std::numeric_limits<float>::infinity();
   for (const std::uint32_t t : around_.of(v))
-    if (!normals_[t].isZero()) least = std::min(least, qualities_[t]);
+    if (!normal_of(t).isZero()) least = std::min(least, qualities_[t]);
   return std::isfinite(least) ? least : 0.0F;
 }
 
@@ -397,7 +401,11 @@ TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& p
                                 const TextureViewRequest& request, Progress& progress) {
   TextureViews views;
   views.of_triangles = ViewTable(request.triangles, request.views_a_triangle);
-  views.of_vertices = ViewTable(mesh.vertices.size(), request.views_a_vertex);
+  std::size_t vertices = 0;
+  for (std::size_t t = 0; t < request.triangles; ++t)
+    for (const std::uint32_t v : mesh.triangles[t])
+      vertices = std::max<std::size_t>(vertices, v + 1);
+  views.of_vertices = ViewTable(vertices, request.views_a_vertex);
   ViewFinder finder(mesh, photos, options, request, views);
   progress.begin("views", photos.size());
   for (std::size_t photo = 0; photo < photos.size(); ++photo) {

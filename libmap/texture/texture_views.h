@@ -74,7 +74,7 @@ struct TextureViews {
   // Of triangles that a photograph sees whole.
   ViewTable of_triangles;
   // Of vertices of which a photograph sees all triangles whole: the least of their qualities. One
-  // row for each vertex of the mesh, empty for those of other triangles alone.
+  // row for each vertex up to the last one of the part, empty for those of other triangles alone.
   ViewTable of_vertices;
   // All views of some of the vertices, spread over the part.
   std::vector<ColorObservation> observations;

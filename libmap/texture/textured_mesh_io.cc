@@ -168,19 +168,25 @@ void require_room_in_glb(const std::vector<ModelPart>& parts,
                 {.field = "size", .value = std::to_string(bytes) + " bytes", .bound = "< 4 GB"});
 }
 
-std::string textured_glb(const TexturedMesh& model, const TexturedMeshWriteOptions& options) {
+std::vector<ModelPart> parts_of(const TexturedMesh& model) {
   const UnitedCorners united = unite_corners(model);
   std::vector<ModelPart> parts;
   for (std::int32_t page = no_page; page < static_cast<std::int32_t>(model.pages.size()); ++page) {
     ModelPart part = part_of(model, united, page);
     if (!part.mesh.triangles.empty()) parts.push_back(std::move(part));
   }
+  return parts;
+}
+
+void write_textured_glb(const fs::path& path, const TexturedMesh& model,
+                        const TexturedMeshWriteOptions& options) {
+  std::vector<ModelPart> parts = parts_of(model);
   std::vector<EncodedPicture> pictures;
   for (const ColorImage& page : model.pages)
     pictures.push_back(
         {encode_page(page, options), file_extension(options.image_format).substr(1)});
   require_room_in_glb(parts, pictures);
-  return encode_model_by_assimp(parts, pictures);
+  write_model_by_assimp(path, std::move(parts), std::move(pictures));
 }
 
 ColorImage read_picture(const TexturePicture& picture, const fs::path& model) {
@@ -228,7 +234,7 @@ std::vector<ModelFile> textured_mesh_files(const fs::path& path, const TexturedM
   std::vector<ModelFile> files;
   if (format_of(path) == ".glb") {
     files.push_back({path, [&model, options](const fs::path& temporary) {
-                       write_text(temporary, textured_glb(model, options));
+                       write_textured_glb(temporary, model, options);
                      }});
     return files;
   }

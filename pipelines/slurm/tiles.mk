@@ -5,15 +5,17 @@
 #        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
 #   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... MESH=mesh.ply [GRASP="..."] held [held_map]
 #   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... SURFACE="--cell-size 0.01" mesh
+#   make -f pipelines/slurm/tiles.mk MESH=folder SCAN=scan.db [POSES=poses.tum] OUT=... [TEXTURE="..."] model
 #
 # TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
 # render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. `held` tests the gripper
 # at every voxel of the map on MESH, in the frame of TERRAIN: $(OUT)/held.tiles, merged by `held_map`
 # to $(OUT)/held.pcd. `mesh` makes the surface of TERRAIN, a cloud with normals, in a folder of pieces,
-# $(OUT)/mesh; SURFACE holds the flags of graspmap mesh, among them --cell-size. TERRAIN, MESH, OUT and graspmap itself must be reached by the same path on all
-# nodes. SBATCH holds further flags of sbatch, among them --cpus-per-task and --array=1-100%10 to run
+# $(OUT)/mesh; SURFACE holds the flags of graspmap mesh, among them --cell-size. `model` textures the
+# pieces of MESH with the photographs of SCAN, $(OUT)/model. All of these files and graspmap itself
+# must be reached by the same path on all nodes. SBATCH holds further flags of sbatch, among them --cpus-per-task and --array=1-100%10 to run
 # ten at a time. A second run does nothing; after a run that failed, the next makes what is missing.
-# Logs: $(OUT)/logs, $(OUT)/held_logs, $(OUT)/mesh_logs.
+# Logs: $(OUT)/logs, $(OUT)/held_logs, $(OUT)/mesh_logs, $(OUT)/model_logs.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../../build/release/graspmap) graspmap)
@@ -23,13 +25,20 @@ SCORE ?=
 MESH ?=
 GRASP ?=
 SURFACE ?=
+SCAN ?=
+POSES ?= optimized
+TEXTURE ?=
 SBATCH ?=
 TRIES ?= 3
 
 one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
-$(foreach name,TERRAIN OUT SCENARIO SHARES MESH,$(call one_word,$(name)))
-ifeq ($(wildcard $(TERRAIN)),)
-  $(error TERRAIN is '$(TERRAIN)': it must be a cloud or a folder of clouds)
+$(foreach name,TERRAIN OUT SCENARIO SHARES MESH SCAN POSES,$(call one_word,$(name)))
+ifneq ($(MAKECMDGOALS),model)
+  ifeq ($(wildcard $(TERRAIN)),)
+    $(error TERRAIN is '$(TERRAIN)': it must be a cloud or a folder of clouds)
+  endif
+else
+  $(foreach name,MESH SCAN,$(if $(wildcard $($(name))),,$(error $(name) is '$($(name))': there is no such file)))
 endif
 ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
@@ -51,16 +60,19 @@ logs := $(abspath $(OUT))/logs
 held_logs := $(abspath $(OUT))/held_logs
 surface := $(abspath $(OUT))/mesh
 mesh_logs := $(abspath $(OUT))/mesh_logs
+model := $(abspath $(OUT))/model
+model_logs := $(abspath $(OUT))/model_logs
 score_flags := --config $(SCENARIO) $(SCORE)
 
-.PHONY: tiles map held held_map mesh FORCE
+.PHONY: tiles map held held_map mesh model FORCE
 tiles: $(store)/index.json
 map: $(OUT)/map.pcd
 held: $(held)/index.json
 held_map: $(OUT)/held.pcd
 mesh: $(surface)
+model: $(model)
 
-$(OUT) $(logs) $(held_logs) $(mesh_logs):
+$(OUT) $(logs) $(held_logs) $(mesh_logs) $(model_logs):
 	@mkdir -p $@
 
 # A stamp of what the tiles depend on: written anew only if it changes, and then tiles of another
@@ -79,6 +91,11 @@ export meshed_with := $(TERRAIN) $(SURFACE)
 $(OUT)/meshed_with: FORCE | $(OUT)
 	@printf '%s\n' "$$meshed_with" | cmp -s - $@ || \
 	  { rm -rf $(surface) $(surface).json $(surface).progress && printf '%s\n' "$$meshed_with" > $@; }
+
+export textured_with := $(MESH) $(SCAN) $(POSES) $(TEXTURE)
+$(OUT)/textured_with: FORCE | $(OUT)
+	@printf '%s\n' "$$textured_with" | cmp -s - $@ || \
+	  { rm -rf $(model) $(model).json $(model).progress && printf '%s\n' "$$textured_with" > $@; }
 
 # $(call in_shares,LOGS,STORE,COMMAND WORDS). sbatch --wait ends when the last task has, with the
 # largest of their exit codes. A task that has been put back into the queue is not at its end.
@@ -99,6 +116,10 @@ $(held)/index.json: $(MESH) $(store)/index.json $(OUT)/grasped_with | $(held_log
 
 $(surface): $(TERRAIN) $(OUT)/meshed_with | $(mesh_logs)
 	$(call in_shares,$(mesh_logs),$@,mesh $(terrain) $(SURFACE))
+
+$(model): $(MESH) $(SCAN) $(wildcard $(POSES)) $(OUT)/textured_with | $(model_logs)
+	$(call in_shares,$(model_logs),$@,texture $(mesh) --scan $(abspath $(SCAN)) \
+	  --poses $(or $(abspath $(wildcard $(POSES))),$(POSES)) $(TEXTURE))
 
 $(OUT)/map.pcd: $(store)/index.json
 	@exec $(program) convert $(store) -o $@

@@ -19,12 +19,11 @@ SLURM_LOCAL=$scratch/slurm
 export SLURM_LOCAL
 slurm_local=$source/scripts/slurm-local
 
-# The first try of share 2 of a map is killed after 0.15 s. Even if it has ended before, its task
+# The first try of share 2 is killed after 0.15 s. Even if it has ended before, its task
 # reports the exit code of SIGKILL.
 cat >"$scratch/graspmap" <<END
 #!/bin/sh
-if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ] &&
-    [ "\$1" != mesh ]; then
+if [ "\${SLURM_ARRAY_TASK_ID:-}" = 2 ] && [ "\${SLURM_RESTART_COUNT:-0}" = 0 ]; then
   timeout -s KILL 0.15 "$graspmap" "\$@" || true
   exit 137
 fi
@@ -91,10 +90,21 @@ cmp "$scratch/held.pcd" "$scratch/held/held.pcd" || fail "the test by Slurm diff
 "$graspmap" mesh "$scratch/site.pcd" --cell-size 0.05 --tile-size 0.7 -o "$scratch/mesh" --quiet
 diff -r "$scratch/mesh" "$scratch/held/mesh" || fail "the mesh by Slurm differs from the local one"
 [ "$(cat "$scratch"/held/mesh_logs/*.log | grep -c ', try 1, ')" -eq 3 ] || fail "not three shares"
+grep -q 'share 2 of 3, try 2,' "$scratch/held/mesh_logs/2.log" || fail "no second try of a killed mesh"
 [ ! -e "$scratch/held/mesh.progress" ] || fail "the pieces were left"
+"$graspmap" simulate scan "$scratch/site/mesh.ply" --frames 6 --loops 1 -o "$scratch/scan.db" --quiet
+model() {
+  run model OUT="$scratch/held" SHARES=2 MESH="$scratch/mesh" SCAN="$scratch/scan.db" \
+    POSES=ground-truth TEXTURE="--texel-size 0.02"
+}
+model
+"$graspmap" texture "$scratch/mesh" --scan "$scratch/scan.db" --poses ground-truth \
+  --texel-size 0.02 -o "$scratch/model" --quiet
+diff -r "$scratch/model" "$scratch/held/model" || fail "the texture by Slurm differs from the local one"
 
 jobs=$(scontrol --oneliner show jobs | wc -l)
 held -j2 held_map mesh
+model
 before=$(listing "$out")
 run map TERRAIN="$site" SHARES=4
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"

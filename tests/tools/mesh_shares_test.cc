@@ -16,9 +16,10 @@ namespace mesh_shares_test {
 namespace fs = std::filesystem;
 
 using graspmap_test::bad_input;
-using graspmap_test::content;
+using graspmap_test::expect_same_pieces;
 using graspmap_test::graspmap;
 using graspmap_test::json_of;
+using graspmap_test::pieces_in;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using Words = std::vector<std::string>;
@@ -45,23 +46,6 @@ Words mesh_words(const std::string& output, const Words& more = {}) {
   return words;
 }
 
-std::map<std::string, std::string> files_of(const std::string& folder) {
-  std::map<std::string, std::string> files;
-  for (const fs::directory_entry& entry : fs::directory_iterator(scratch(folder)))
-    files[entry.path().filename()] = content(folder + "/" + entry.path().filename().string());
-  return files;
-}
-
-void expect_same(const std::string& folder, const std::string& whole) {
-  EXPECT_TRUE(files_of(folder) == files_of(whole));
-  nlohmann::json own = json_of(folder + ".json");
-  nlohmann::json other = json_of(whole + ".json");
-  own.erase("run");
-  other.erase("run");
-  EXPECT_EQ(own, other);
-  EXPECT_FALSE(fs::exists(scratch(folder + ".progress")));
-}
-
 TEST(MeshShares, TogetherAreTheFolderOfOneRun) {
   write_cloud();
   ASSERT_TRUE(succeeded(graspmap(mesh_words("whole"))));
@@ -76,16 +60,16 @@ TEST(MeshShares, TogetherAreTheFolderOfOneRun) {
   EXPECT_TRUE(bad_input(graspmap(mesh_words("shared", {"--tile", "2/3", "--force"})), {"--force"}));
   EXPECT_TRUE(bad_input(graspmap(mesh_words("shared", {"--tile", "4/3"})), {"--tile", "4/3"}));
   ASSERT_TRUE(succeeded(graspmap(mesh_words("shared", {"--tile", "2/3"}))));
-  expect_same("shared", "whole");
+  expect_same_pieces("shared", "whole");
   // Again, as a queue does that lost sight of a task.
   const auto again = graspmap(mesh_words("shared", {"--tile", "1/3"}));
   ASSERT_TRUE(succeeded(again));
   EXPECT_NE(again.standard_error.find("all pieces are there"), std::string::npos);
-  expect_same("shared", "whole");
+  expect_same_pieces("shared", "whole");
   // A run of all pieces begins anew with other parameters.
   ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--tile", "1/2"}))));
   ASSERT_TRUE(succeeded(graspmap(mesh_words("other", {"--smoothing-iterations", "1"}))));
-  EXPECT_FALSE(files_of("other") == files_of("whole"));
+  EXPECT_FALSE(pieces_in("other") == pieces_in("whole"));
   EXPECT_FALSE(fs::exists(scratch("other.progress")));
 }
 
@@ -125,7 +109,7 @@ TEST(MeshShares, AKilledRunIsResumed) {
     before[piece.filename()] = inode_of(piece);
   ASSERT_GE(before.size(), 2U);
   ASSERT_TRUE(succeeded(graspmap(mesh_words("killed"))));
-  expect_same("killed", "whole");
+  expect_same_pieces("killed", "whole");
   std::size_t kept = 0;
   for (const auto& [name, inode] : before)
     kept += inode_of(scratch("killed") / name) == inode ? 1 : 0;

@@ -135,6 +135,14 @@ TEST(Pieces, OneModelPerPiece) {
   EXPECT_EQ(json_of("mesh.json").at("results").at("triangles").get<std::size_t>() +
                 results.at("triangles_by_cutting").get<std::size_t>(),
             triangles);
+  texture.back() = "shared";
+  for (const std::string share : {"2/3", "3/3", "1/3"}) {
+    EXPECT_FALSE(fs::exists(scratch("shared")));
+    Words words = texture;
+    words.insert(words.end(), {"--tile", share});
+    ASSERT_TRUE(succeeded(graspmap(words)));
+  }
+  graspmap_test::expect_same_pieces("shared", "model");
   // In one picture, as the model in one file.
   texture.back() = "model.glb";
   ASSERT_TRUE(succeeded(graspmap(texture)));

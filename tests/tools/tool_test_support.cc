@@ -67,6 +67,23 @@ std::string content(const std::string& name) { return read_text(scratch(name)); 
 
 nlohmann::json json_of(const std::string& name) { return nlohmann::json::parse(content(name)); }
 
+std::map<std::string, std::string> pieces_in(const std::string& folder) {
+  std::map<std::string, std::string> files;
+  for (const auto& entry : std::filesystem::directory_iterator(scratch(folder)))
+    files[entry.path().filename()] = content(folder + "/" + entry.path().filename().string());
+  return files;
+}
+
+void expect_same_pieces(const std::string& folder, const std::string& whole) {
+  EXPECT_TRUE(pieces_in(folder) == pieces_in(whole));
+  nlohmann::json own = json_of(folder + ".json");
+  nlohmann::json other = json_of(whole + ".json");
+  own.erase("run");
+  other.erase("run");
+  EXPECT_EQ(own, other);
+  EXPECT_FALSE(std::filesystem::exists(scratch(folder + ".progress")));
+}
+
 libmap::PointCloud bumpy_terrain(double size_m) {
   // Always the same, whatever the test drew before.
   random_engine().seed(1);

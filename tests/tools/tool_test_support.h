@@ -37,6 +37,11 @@ std::vector<std::string> names_in_scratch();
 std::string content(const std::string& name);
 nlohmann::json json_of(const std::string& name);
 
+// The files of a folder in the scratch folder, by their names.
+std::map<std::string, std::string> pieces_in(const std::string& folder);
+// Expects the same pieces and results in both, and nothing left of their making.
+void expect_same_pieces(const std::string& folder, const std::string& whole);
+
 // Gently bumpy ground of 0.6 x 0.6 m about (0, 0), z up, a point each 5 mm and the same for every
 // call. Coordinates are multiples of 2^-20 m: any format holds them exactly.
 libmap::PointCloud bumpy_terrain(double size_m = 0.6);

@@ -11,6 +11,8 @@ namespace {
 
 // Digits of a key's hash that name a folder.
 constexpr std::size_t key_digits = 16;
+// Hidden: it is no name of a piece.
+constexpr const char* common = ".common";
 
 std::vector<fs::path> entries_of(const fs::path& folder) {
   std::vector<fs::path> paths;
@@ -91,16 +93,24 @@ fs::path PieceProgress::lock_path() const {
          (std::to_string(share_.number) + "_of_" + std::to_string(share_.count) + ".lock");
 }
 
-fs::path PieceProgress::file(const libmap::PlanTile& tile, const std::string& extension) const {
-  return folder_ / libmap::piece_file_name(tile, extension);
+fs::path PieceProgress::file(const std::string& piece, const std::string& extension) const {
+  return folder_ / (piece + extension);
 }
 
-bool PieceProgress::is_done(const libmap::PlanTile& tile) const {
-  return fs::exists(file(tile, ".json"));
+bool PieceProgress::is_done(const std::string& piece) const {
+  return fs::exists(file(piece, ".json"));
 }
 
-PieceProgress::Facts PieceProgress::facts(const libmap::PlanTile& tile) const {
-  const fs::path path = file(tile, ".json");
+PieceProgress::Facts PieceProgress::common_facts(const std::function<Facts()>& find) {
+  if (run_.options().dry_run) return find();
+  make_folder();
+  const libmap::FileLock lock(file(common, ".lock"));
+  if (!is_done(common)) libmap::write_whole_file(file(common, ".json"), find().dump());
+  return facts(common);
+}
+
+PieceProgress::Facts PieceProgress::facts(const std::string& piece) const {
+  const fs::path path = file(piece, ".json");
   try {
     return libmap::parse_json<Facts>(libmap::read_whole_file(path));
   } catch (const nlohmann::json::exception& error) {
@@ -120,10 +130,14 @@ void PieceProgress::make(const Work& work) {
   }
 }
 
-void PieceProgress::make_missing(const Work& work) {
+void PieceProgress::make_folder() const {
   std::error_code code;
   fs::create_directories(folder_, code);
   if (code) throw libmap::system_failure(folder_, "cannot be made", code.value());
+}
+
+void PieceProgress::make_missing(const Work& work) {
+  make_folder();
   const std::string share = std::to_string(share_.number) + "/" + std::to_string(share_.count);
   lock_ = libmap::FileLock::try_lock(lock_path());
   if (!lock_)
@@ -131,16 +145,16 @@ void PieceProgress::make_missing(const Work& work) {
                         libmap::ErrorKind::failed);
   const auto number = static_cast<std::size_t>(share_.number);
   const auto count = static_cast<std::size_t>(share_.count);
-  std::vector<libmap::PlanTile> missing;
-  for (std::size_t n = work.tiles.size() * (number - 1) / count;
-       n < work.tiles.size() * number / count; ++n)
-    if (!is_done(work.tiles[n])) missing.push_back(work.tiles[n]);
+  std::vector<std::size_t> missing;
+  for (std::size_t n = work.pieces.size() * (number - 1) / count;
+       n < work.pieces.size() * number / count; ++n)
+    if (!is_done(work.pieces[n])) missing.push_back(n);
   run_.progress().begin("tiles", missing.size());
-  for (const libmap::PlanTile& tile : missing) {
-    libmap::OutputFile piece(file(tile, work.extension));
-    const Facts facts = work.make(tile, piece.temporary_path());
+  for (const std::size_t n : missing) {
+    libmap::OutputFile piece(file(work.pieces[n], work.extension));
+    const Facts facts = work.make(n, piece.temporary_path());
     if (fs::file_size(piece.temporary_path()) > 0) piece.commit();
-    libmap::write_whole_file(file(tile, ".json"), facts.dump());
+    libmap::write_whole_file(file(work.pieces[n], ".json"), facts.dump());
     run_.progress().advance(1);
   }
   run_.progress().end();
@@ -148,11 +162,11 @@ void PieceProgress::make_missing(const Work& work) {
 
 void PieceProgress::put_together(const Work& work) {
   const auto done = static_cast<std::size_t>(
-      std::count_if(work.tiles.begin(), work.tiles.end(),
-                    [this](const libmap::PlanTile& tile) { return is_done(tile); }));
+      std::count_if(work.pieces.begin(), work.pieces.end(),
+                    [this](const std::string& piece) { return is_done(piece); }));
   // The run of another share may have been the last as well, and have removed them since.
-  if (done < work.tiles.size() && !is_put_together())
-    return run_.say("{} of {} pieces are done", done, work.tiles.size());
+  if (done < work.pieces.size() && !is_put_together())
+    return run_.say("{} of {} pieces are done", done, work.pieces.size());
   if (share_.count > 1) {
     try {
       run_.claim_output_tree(output_, names_, inputs_);

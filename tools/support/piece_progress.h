@@ -1,9 +1,10 @@
 // Folders of pieces that are made piece by piece, so that a run that was killed at any moment is
 // resumed by the same command, and so that several runs make shares of one folder:
 //
-//   FOLDER.progress/KEY/piece_I_J.json   facts on a piece that is done
-//   FOLDER.progress/KEY/piece_I_J.*      its file, there before its facts; none if it is empty
-//   FOLDER.progress/KEY/K_of_N.lock      held by the run of share K/N
+//   FOLDER.progress/KEY/PIECE.json    facts on a piece that is done
+//   FOLDER.progress/KEY/PIECE.*       its file, there before its facts; none if it is empty
+//   FOLDER.progress/KEY/.common.json  what all pieces need (PieceProgress::common_facts)
+//   FOLDER.progress/KEY/K_of_N.lock   held by the run of share K/N
 //
 // KEY hashes the version, the parameters and the contents of the inputs.
 #pragma once
@@ -17,7 +18,6 @@
 
 #include "libgtd/score/tiling.h"
 #include "libmap/core/output_lock.h"
-#include "libmap/core/plan_tiles.h"
 #include "tools/support/run.h"
 
 namespace graspmap_tools {
@@ -37,10 +37,10 @@ class PieceProgress {
   bool is_complete() const;
 
   struct Work {
-    std::vector<libmap::PlanTile> tiles;  // of all shares
-    std::string extension;                // of their files
-    // Writes a piece to `to`, unless it is empty, and returns facts on it.
-    std::function<Facts(const libmap::PlanTile& tile, const std::filesystem::path& to)> make;
+    std::vector<std::string> pieces;  // of all shares: names without an extension
+    std::string extension;            // of their files
+    // Writes the n-th piece to `to`, unless it is empty, and returns facts on it.
+    std::function<Facts(std::size_t n, const std::filesystem::path& to)> make;
     // Fills the output with the pieces that are done.
     std::function<void(const std::filesystem::path& folder)> finish;
   };
@@ -49,17 +49,22 @@ class PieceProgress {
   // process works on this share.
   void make(const Work& work);
 
+  // What all pieces need: found once, by the share that asks first, while the others wait; with
+  // --dry-run each time. Throws what `find` throws.
+  Facts common_facts(const std::function<Facts()>& find);
+
   // Of a piece that is done. file() may not exist: the piece is empty.
-  Facts facts(const libmap::PlanTile& tile) const;
-  std::filesystem::path file(const libmap::PlanTile& tile, const std::string& extension) const;
+  Facts facts(const std::string& piece) const;
+  std::filesystem::path file(const std::string& piece, const std::string& extension) const;
   // The file of a piece once more at `to`: a link where the file system has them, else a copy.
   static void link_file(const std::filesystem::path& file, const std::filesystem::path& to);
 
  private:
-  bool is_done(const libmap::PlanTile& tile) const;
+  bool is_done(const std::string& piece) const;
   bool is_put_together() const;
   void remove_other_keys(bool all) const;
   void remove_pieces() const;
+  void make_folder() const;
   void make_missing(const Work& work);
   void put_together(const Work& work);
   std::filesystem::path lock_path() const;

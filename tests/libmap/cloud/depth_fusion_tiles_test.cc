@@ -65,27 +65,32 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
       joined.fields = {{"views", ScalarType::uint16, {}},
                        {"expected_error", ScalarType::float32, {}}};
       std::size_t tiles = 0;
-      const DepthFusionResult parts = fuse_depth_in_tiles(
-          scan, scan.poses, {}, tile_m,
-          [&](const PlanTile& tile, const PointCloud& cloud, const DepthFusionResult& so_far) {
-            EXPECT_EQ(so_far.poses.size(), 10U);
-            cloud.check();
-            tiles += cloud.empty() ? 0 : 1;
-            for (const Eigen::Vector3d& place : cloud.positions) {
-              // Rounding may put a point on its voxel's border.
-              const Eigen::Vector2d in_tile = place.head<2>() / tile_m;
-              EXPECT_NEAR(in_tile.x(), static_cast<double>(tile.i) + 0.5, 0.50001);
-              EXPECT_NEAR(in_tile.y(), static_cast<double>(tile.j) + 0.5, 0.50001);
-            }
-            const auto add = [](auto& to, const auto& from) {
-              to.insert(to.end(), from.begin(), from.end());
-            };
-            add(joined.positions, cloud.positions);
-            add(joined.normals, cloud.normals);
-            add(joined.colors, cloud.colors);
-            for (ScalarField& field : joined.fields)
-              if (!cloud.empty()) add(field.values, cloud.find_field(field.name)->values);
-          });
+      TileFusion fusion(scan, scan.poses, {}, tile_m);
+      // As another process goes on: with what the first has found.
+      TileFusion again(scan, scan.poses, {}, tile_m, no_progress(), &fusion.survey());
+      DepthFusionResult parts = again.report();
+      EXPECT_EQ(parts.poses.size(), 10U);
+      for (std::size_t n = 0; n < again.tiles().size(); ++n) {
+        const PlanTile& tile = again.tiles()[n];
+        const auto [cloud, of_tile] = (n % 2 == 0 ? again : fusion).make(n);
+        parts += of_tile;
+        cloud.check();
+        tiles += cloud.empty() ? 0 : 1;
+        for (const Eigen::Vector3d& place : cloud.positions) {
+          // Rounding may put a point on its voxel's border.
+          const Eigen::Vector2d in_tile = place.head<2>() / tile_m;
+          EXPECT_NEAR(in_tile.x(), static_cast<double>(tile.i) + 0.5, 0.50001);
+          EXPECT_NEAR(in_tile.y(), static_cast<double>(tile.j) + 0.5, 0.50001);
+        }
+        const auto add = [](auto& to, const auto& from) {
+          to.insert(to.end(), from.begin(), from.end());
+        };
+        add(joined.positions, cloud.positions);
+        add(joined.normals, cloud.normals);
+        add(joined.colors, cloud.colors);
+        for (ScalarField& field : joined.fields)
+          if (!cloud.empty()) add(field.values, cloud.find_field(field.name)->values);
+      }
       EXPECT_GT(tiles, 6U);
       EXPECT_TRUE(parts.cloud.empty());
       const std::vector<Row> found = rows_of(joined);
@@ -110,14 +115,15 @@ TEST(DepthFusionTiles, FramesThatCannotBeUsedAreNamedOnce) {
   scan.broken[3] = true;
   DepthFusionOptions options;
   options.registration_rounds = 0;
-  const auto ignore = [](const PlanTile&, const PointCloud&, const DepthFusionResult&) {};
-  const DepthFusionResult result = fuse_depth_in_tiles(scan, scan.poses, options, 0.3, ignore);
+  TileFusion fusion(scan, scan.poses, options, 0.3);
+  DepthFusionResult result = fusion.report();
+  for (std::size_t n = 0; n < fusion.tiles().size(); ++n) result += fusion.make(n).counts;
   ASSERT_EQ(result.skipped.size(), 1U);
   EXPECT_EQ(result.skipped.front().first, 3);
   EXPECT_EQ(result.frames, 9U);
   EXPECT_EQ(result.pixels.pixels, 9U * 128 * 96) << "each once, in however many tiles it is seen";
   for (TrajectoryPose& pose : scan.poses) pose.world_from_base.translation().x() += 1e18;
-  EXPECT_EQ(error_of([&] { fuse_depth_in_tiles(scan, scan.poses, options, 0.3, ignore); }).kind(),
+  EXPECT_EQ(error_of([&] { TileFusion(scan, scan.poses, options, 0.3); }).kind(),
             ErrorKind::bad_input);
 }
 

@@ -103,7 +103,7 @@ TEST(TextureModel, TexelsOfTheWantedSize) {
     TextureOptions options;
     options.atlas.texel_size_m = size;
     const TextureResult result = libmap::texture_mesh(mesh, scan, scan.poses(), options);
-    EXPECT_NEAR(result.texel_size_m, size, 0.03 * size);
+    EXPECT_NEAR(result.texel_size_m(), size, 0.03 * size);
     const ColorErrors errors = errors_of(result.model, marks, within(result.model.mesh, 0.37));
     EXPECT_LT(errors.mean, size < 0.009 ? 1.0 : 2.0) << size;
   }
@@ -293,7 +293,7 @@ TEST(TextureModel, GroundThatNoPhotographShowsStaysInLargeTriangles) {
   const TextureResult wide = libmap::texture_mesh(grid_mesh(2, 2000.0, 0.0), scan, scan.poses());
   EXPECT_LT(wide.cut_triangles, 100000U) << "10^9 and more of 5 cm";
   EXPECT_GT(wide.seen_m2, 0.95 * seen_m2);
-  EXPECT_LT(wide.texel_size_m, 0.01);
+  EXPECT_LT(wide.texel_size_m(), 0.01);
 }
 
 TEST(TextureModel, SameForAnyThreadsAndOrderOfFrames) {

@@ -47,14 +47,17 @@ std::vector<TexturedMesh> textured(const TriangleMesh& mesh, const PaintedScan& 
                                    const TextureOptions& options, double margin_m,
                                    TextureReport& report) {
   MeshPieceIndex index = pieces_of(mesh);
+  libmap::PieceTexturing texturing(index, margin_m, scan, scan.poses(), options);
+  const libmap::TextureExposure exposure = texturing.find_exposure();
+  report = texturing.report();
   std::vector<TexturedMesh> models;
-  report = libmap::texture_pieces(index, margin_m, scan, scan.poses(), options,
-                                  [&](std::size_t piece, const TexturedMesh& made) {
-                                    EXPECT_EQ(piece, models.size());
-                                    made.check();
-                                    models.push_back(made);
-                                  });
-  EXPECT_EQ(models.size(), index.size());
+  for (std::size_t n = 0; n < index.size(); ++n) {
+    libmap::PieceTexturing::Piece piece = texturing.make(n, exposure);
+    piece.model.check();
+    report += piece.counts;
+    models.push_back(std::move(piece.model));
+  }
+  libmap::require_seen(report);
   return models;
 }
 
@@ -123,7 +126,7 @@ TEST(TexturePieces, ColorsAreThoseOfTheWholeMeshAndMeetAtSeams) {
   ASSERT_EQ(models.size(), 4U);
   EXPECT_EQ(report.seen_triangles, whole.seen_triangles);
   EXPECT_NEAR(report.seen_m2, 0.64, 1e-6);
-  EXPECT_NEAR(report.texel_size_m, whole.texel_size_m, 0.05 * whole.texel_size_m);
+  EXPECT_NEAR(report.texel_size_m(), whole.texel_size_m(), 0.05 * whole.texel_size_m());
   // Photographs differ by up to half of their brightness: pieces of their own exposure would show.
   const SeamErrors seams = errors_at_seams(models);
   EXPECT_GE(seams.count, 4 * 20);
@@ -159,7 +162,7 @@ TEST(TexturePieces, VerticesOnSeamsAreSeenAlikeByBothPieces) {
         libmap::find_texture_views(part.mesh, photos, {}, {part.triangles, 1, 4, 0},
                                    libmap::no_progress())
             .of_vertices;
-    for (std::uint32_t v = 0; v < part.mesh.vertices.size(); ++v) {
+    for (std::uint32_t v = 0; v < views.rows(); ++v) {
       if (views[v].empty()) continue;
       const auto [other, is_new] =
           seen.try_emplace(position_of(part.mesh.vertices[v]), views[v].begin(), views[v].end());
@@ -210,17 +213,13 @@ TEST(TexturePieces, OnePieceIsTheWholeMesh) {
   const libmap::TextureResult whole = libmap::texture_mesh(
       libmap::read_mesh(graspmap_test::scratch_folder() / "piece_0_0.ply").mesh, scan,
       scan.poses());
-  int calls = 0;
-  const TextureReport report = libmap::texture_pieces(
-      index, 2.0, scan, scan.poses(), {}, [&](std::size_t, const TexturedMesh& model) {
-        ++calls;
-        EXPECT_EQ(model.texture_coordinates, whole.model.texture_coordinates);
-        ASSERT_EQ(model.pages.size(), whole.model.pages.size());
-        for (std::size_t page = 0; page < model.pages.size(); ++page)
-          EXPECT_EQ(model.pages[page].pixels, whole.model.pages[page].pixels);
-      });
-  EXPECT_EQ(calls, 1);
-  EXPECT_EQ(report.charts, whole.charts);
+  libmap::PieceTexturing texturing(index, 2.0, scan, scan.poses(), {});
+  const libmap::PieceTexturing::Piece piece = texturing.make(0, texturing.find_exposure());
+  EXPECT_EQ(piece.model.texture_coordinates, whole.model.texture_coordinates);
+  ASSERT_EQ(piece.model.pages.size(), whole.model.pages.size());
+  for (std::size_t page = 0; page < whole.model.pages.size(); ++page)
+    EXPECT_EQ(piece.model.pages[page].pixels, whole.model.pages[page].pixels);
+  EXPECT_EQ(piece.counts.charts, whole.charts);
 }
 
 TEST(TexturePieces, APieceThatNobodySeesIsGray) {
