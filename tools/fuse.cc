@@ -93,13 +93,16 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
     run.warn("nothing was measured within the limits: the cloud is empty");
 }
 
+// Of several shares the last one claims them, when it writes them.
+bool is_share(const FuseOptions& options) { return parse_share(options.tile).count > 1; }
+
 void claim_poses(const FuseOptions& options, const std::vector<std::string>& inputs, Run& run) {
   if (options.corrected_poses.empty()) return;
   if (!libmap::is_trajectory_path(options.corrected_poses))
     throw libmap::Error("not a format of poses", {.field = "--corrected-poses",
                                                   .value = options.corrected_poses,
                                                   .bound = ".tum, .kitti, .g2o or .toro"});
-  run.claim_output(options.corrected_poses, inputs);
+  if (!is_share(options)) run.claim_output(options.corrected_poses, inputs);
 }
 
 // What carries the cloud into the frame that is wanted, by the poses that it is made with.
@@ -117,6 +120,7 @@ libmap::PointCloud carried(libmap::PointCloud cloud, const FuseOptions& options,
 
 void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& result, Run& run) {
   if (options.corrected_poses.empty()) return;
+  if (is_share(options)) run.claim_output(options.corrected_poses, {options.scan});
   const std::string frame = std::exchange(run.manifest().frame, "poses");
   run.write_output(options.corrected_poses, [&](const auto& temporary) {
     libmap::write_trajectory(temporary, {result.poses, {}});

@@ -5,17 +5,20 @@
 #        [SCORE="..."] [SBATCH="--mem=2G --time=1:00:00"] [map]
 #   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... MESH=mesh.ply [GRASP="..."] held [held_map]
 #   make -f pipelines/slurm/tiles.mk TERRAIN=... OUT=... SURFACE="--cell-size 0.01" mesh
+#   make -f pipelines/slurm/tiles.mk SCAN=scan.db [POSES=poses.tum] OUT=... [FUSE="..."] cloud
 #   make -f pipelines/slurm/tiles.mk MESH=folder SCAN=scan.db [POSES=poses.tum] OUT=... [TEXTURE="..."] model
 #
 # TERRAIN is a cloud or a folder of clouds. The default goal makes $(OUT)/map.tiles, which lookup,
 # render, info and convert read; `map` merges it to $(OUT)/map.pcd as well. `held` tests the gripper
 # at every voxel of the map on MESH, in the frame of TERRAIN: $(OUT)/held.tiles, merged by `held_map`
 # to $(OUT)/held.pcd. `mesh` makes the surface of TERRAIN, a cloud with normals, in a folder of pieces,
-# $(OUT)/mesh; SURFACE holds the flags of graspmap mesh, among them --cell-size. `model` textures the
-# pieces of MESH with the photographs of SCAN, $(OUT)/model. All of these files and graspmap itself
+# $(OUT)/mesh; SURFACE holds the flags of graspmap mesh, among them --cell-size. `cloud` fuses the depth
+# images of SCAN to a folder of pieces, $(OUT)/cloud, and writes the poses that it was fused by,
+# $(OUT)/fused_poses.tum. `model` textures the pieces of MESH with the photographs of SCAN,
+# $(OUT)/model. All of these files and graspmap itself
 # must be reached by the same path on all nodes. SBATCH holds further flags of sbatch, among them --cpus-per-task and --array=1-100%10 to run
 # ten at a time. A second run does nothing; after a run that failed, the next makes what is missing.
-# Logs: $(OUT)/logs, $(OUT)/held_logs, $(OUT)/mesh_logs, $(OUT)/model_logs.
+# Logs: $(OUT)/logs, $(OUT)/held_logs, $(OUT)/mesh_logs and so on.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../../build/release/graspmap) graspmap)
@@ -28,17 +31,18 @@ SURFACE ?=
 SCAN ?=
 POSES ?= optimized
 TEXTURE ?=
+FUSE ?=
 SBATCH ?=
 TRIES ?= 3
 
 one_word = $(if $(word 2,$($(1))),$(error $(1) holds a space, which make cannot handle: $($(1))))
 $(foreach name,TERRAIN OUT SCENARIO SHARES MESH SCAN POSES,$(call one_word,$(name)))
-ifneq ($(MAKECMDGOALS),model)
+ifeq ($(filter cloud model,$(MAKECMDGOALS)),)
   ifeq ($(wildcard $(TERRAIN)),)
     $(error TERRAIN is '$(TERRAIN)': it must be a cloud or a folder of clouds)
   endif
 else
-  $(foreach name,MESH SCAN,$(if $(wildcard $($(name))),,$(error $(name) is '$($(name))': there is no such file)))
+  $(foreach name,SCAN $(if $(filter model,$(MAKECMDGOALS)),MESH),$(if $(wildcard $($(name))),,$(error $(name) is '$($(name))': there is no such file)))
 endif
 ifeq ($(OUT),)
   $(error OUT is not set: the folder of the results, e.g. OUT=results)
@@ -60,19 +64,22 @@ logs := $(abspath $(OUT))/logs
 held_logs := $(abspath $(OUT))/held_logs
 surface := $(abspath $(OUT))/mesh
 mesh_logs := $(abspath $(OUT))/mesh_logs
+cloud := $(abspath $(OUT))/cloud
+cloud_logs := $(abspath $(OUT))/cloud_logs
 model := $(abspath $(OUT))/model
 model_logs := $(abspath $(OUT))/model_logs
 score_flags := --config $(SCENARIO) $(SCORE)
 
-.PHONY: tiles map held held_map mesh model FORCE
+.PHONY: tiles map held held_map cloud mesh model FORCE
 tiles: $(store)/index.json
 map: $(OUT)/map.pcd
 held: $(held)/index.json
 held_map: $(OUT)/held.pcd
 mesh: $(surface)
+cloud: $(cloud)
 model: $(model)
 
-$(OUT) $(logs) $(held_logs) $(mesh_logs) $(model_logs):
+$(OUT) $(logs) $(held_logs) $(cloud_logs) $(mesh_logs) $(model_logs):
 	@mkdir -p $@
 
 # A stamp of what the tiles depend on: written anew only if it changes, and then tiles of another
@@ -91,6 +98,11 @@ export meshed_with := $(TERRAIN) $(SURFACE)
 $(OUT)/meshed_with: FORCE | $(OUT)
 	@printf '%s\n' "$$meshed_with" | cmp -s - $@ || \
 	  { rm -rf $(surface) $(surface).json $(surface).progress && printf '%s\n' "$$meshed_with" > $@; }
+
+export fused_with := $(SCAN) $(POSES) $(FUSE)
+$(OUT)/fused_with: FORCE | $(OUT)
+	@printf '%s\n' "$$fused_with" | cmp -s - $@ || \
+	  { rm -rf $(cloud) $(cloud).json $(cloud).progress && printf '%s\n' "$$fused_with" > $@; }
 
 export textured_with := $(MESH) $(SCAN) $(POSES) $(TEXTURE)
 $(OUT)/textured_with: FORCE | $(OUT)
@@ -117,9 +129,15 @@ $(held)/index.json: $(MESH) $(store)/index.json $(OUT)/grasped_with | $(held_log
 $(surface): $(TERRAIN) $(OUT)/meshed_with | $(mesh_logs)
 	$(call in_shares,$(mesh_logs),$@,mesh $(terrain) $(SURFACE))
 
+poses := $(or $(abspath $(wildcard $(POSES))),$(POSES))
+
+$(cloud): $(SCAN) $(wildcard $(POSES)) $(OUT)/fused_with | $(cloud_logs)
+	$(call in_shares,$(cloud_logs),$@,fuse $(abspath $(SCAN)) --poses $(poses) \
+	  --corrected-poses $(abspath $(OUT))/fused_poses.tum $(FUSE))
+
 $(model): $(MESH) $(SCAN) $(wildcard $(POSES)) $(OUT)/textured_with | $(model_logs)
 	$(call in_shares,$(model_logs),$@,texture $(mesh) --scan $(abspath $(SCAN)) \
-	  --poses $(or $(abspath $(wildcard $(POSES))),$(POSES)) $(TEXTURE))
+	  --poses $(poses) $(TEXTURE))
 
 $(OUT)/map.pcd: $(store)/index.json
 	@exec $(program) convert $(store) -o $@

@@ -93,18 +93,22 @@ diff -r "$scratch/mesh" "$scratch/held/mesh" || fail "the mesh by Slurm differs 
 grep -q 'share 2 of 3, try 2,' "$scratch/held/mesh_logs/2.log" || fail "no second try of a killed mesh"
 [ ! -e "$scratch/held/mesh.progress" ] || fail "the pieces were left"
 "$graspmap" simulate scan "$scratch/site/mesh.ply" --frames 6 --loops 1 -o "$scratch/scan.db" --quiet
-model() {
-  run model OUT="$scratch/held" SHARES=2 MESH="$scratch/mesh" SCAN="$scratch/scan.db" \
-    POSES=ground-truth TEXTURE="--texel-size 0.02"
+scan() {
+  run "$@" OUT="$scratch/held" SHARES=2 MESH="$scratch/mesh" SCAN="$scratch/scan.db" \
+    POSES=odometry FUSE="--tile-size 1.5 --voxel-size 0.03" TEXTURE="--texel-size 0.02"
 }
-model
-"$graspmap" texture "$scratch/mesh" --scan "$scratch/scan.db" --poses ground-truth \
+scan -j2 cloud model
+"$graspmap" fuse "$scratch/scan.db" --poses odometry --tile-size 1.5 --voxel-size 0.03 \
+  --corrected-poses "$scratch/fused.tum" -o "$scratch/cloud" --quiet
+diff -r "$scratch/cloud" "$scratch/held/cloud" || fail "the cloud by Slurm differs from the local one"
+cmp "$scratch/fused.tum" "$scratch/held/fused_poses.tum" || fail "the poses by Slurm differ"
+"$graspmap" texture "$scratch/mesh" --scan "$scratch/scan.db" --poses odometry \
   --texel-size 0.02 -o "$scratch/model" --quiet
 diff -r "$scratch/model" "$scratch/held/model" || fail "the texture by Slurm differs from the local one"
 
 jobs=$(scontrol --oneliner show jobs | wc -l)
 held -j2 held_map mesh
-model
+scan -j2 cloud model
 before=$(listing "$out")
 run map TERRAIN="$site" SHARES=4
 [ "$before" = "$(listing "$out")" ] || fail "the second run changed files"

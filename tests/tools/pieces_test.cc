@@ -135,6 +135,11 @@ TEST(Pieces, OneModelPerPiece) {
   EXPECT_EQ(json_of("mesh.json").at("results").at("triangles").get<std::size_t>() +
                 results.at("triangles_by_cutting").get<std::size_t>(),
             triangles);
+  for (const std::string share : {"2/2", "1/2"})
+    ASSERT_TRUE(succeeded(graspmap({"fuse", scan, "-o", "cloud_in_shares", "--tile-size", "2",
+                                    "--tile", share, "--corrected-poses", "again.tum"})));
+  graspmap_test::expect_same_pieces("cloud_in_shares", "cloud");
+  EXPECT_EQ(content("again.tum"), content("poses.tum"));
   texture.back() = "shared";
   for (const std::string share : {"2/3", "3/3", "1/3"}) {
     EXPECT_FALSE(fs::exists(scratch("shared")));

@@ -155,9 +155,9 @@ Scene scene_of(int frames, const graspmap_test::FeatureNoise& noise,
     scene.frames.push_back(see_points(node, pose, points, noise, camera));
     scene.components[0].nodes.push_back(node);
   }
-  for (std::size_t n = 0; n < points.size(); ++n) {
+  for (std::uint32_t n = 0; n < points.size(); ++n) {
     libmap::FeatureTrack track;
-    for (std::size_t f = 0; f < scene.frames.size(); ++f)
+    for (std::uint32_t f = 0; f < scene.frames.size(); ++f)
       if ((n + f) % 3 != 0) track.observations.push_back({f, n});
     scene.tracks.push_back(track);
   }

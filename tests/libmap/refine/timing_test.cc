@@ -124,9 +124,9 @@ Way way_with_rows(const std::vector<Eigen::Vector3d>& points, double rolling_shu
     way.components[0].nodes.push_back(node);
     way.frames.push_back(std::move(frame));
   }
-  for (std::size_t n = 0; n < points.size(); ++n) {
+  for (std::uint32_t n = 0; n < points.size(); ++n) {
     libmap::FeatureTrack track;
-    for (std::size_t f = 0; f < way.frames.size(); ++f) track.observations.push_back({f, n});
+    for (std::uint32_t f = 0; f < way.frames.size(); ++f) track.observations.push_back({f, n});
     way.tracks.push_back(track);
   }
   return way;
