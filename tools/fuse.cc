@@ -30,7 +30,7 @@ struct FuseOptions {
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
   double tile_m = 5.0;
-  std::string tile = "1/1";
+  std::string tile = whole_share;
 };
 
 // On scans where nothing moves 2 to 4 % are dropped, at the edges of surfaces.
@@ -107,9 +107,11 @@ void claim_poses(const FuseOptions& options, const std::vector<std::string>& inp
 
 // What carries the cloud into the frame that is wanted, by the poses that it is made with.
 libmap::Pose wanted_from_cloud(const FuseOptions& options, const libmap::ScanSource& scan,
+                               const libmap::Trajectory& poses,
                                const libmap::DepthFusionResult& result, Run& run) {
   if (options.frame != CloudFrame::ground_truth) return libmap::Pose::Identity();
-  return truth_from_poses(scan, result.poses, options.poses, run);
+  return truth_from_poses(scan, result.registration_rounds > 0 ? result.poses : poses,
+                          options.poses, run);
 }
 
 libmap::PointCloud carried(libmap::PointCloud cloud, const FuseOptions& options,
@@ -133,8 +135,8 @@ void fuse_whole(const FuseOptions& options, const libmap::ScanSource& scan,
   libmap::DepthFusionResult result = in_file(options.scan, [&] {
     return libmap::fuse_depth(scan, poses, options.fusion, run.progress());
   });
-  const libmap::PointCloud cloud =
-      carried(std::move(result.cloud), options, wanted_from_cloud(options, scan, result, run));
+  const libmap::PointCloud cloud = carried(std::move(result.cloud), options,
+                                           wanted_from_cloud(options, scan, poses, result, run));
   tell_results(result, options, run);
   run.write_output(options.output,
                    [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
@@ -154,7 +156,7 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
     fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress(), &survey);
   }
   libmap::DepthFusionResult result = fusion->report();
-  const libmap::Pose wanted_from_tile = wanted_from_cloud(options, scan, result, run);
+  const libmap::Pose wanted_from_tile = wanted_from_cloud(options, scan, poses, result, run);
   std::vector<std::string> pieces;
   for (const libmap::PlanTile& tile : fusion->tiles())
     pieces.push_back(libmap::piece_file_name(tile, ""));
@@ -219,8 +221,7 @@ int fuse_scan(int argc, char** argv) {
   Command command("fuse");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
   command.output(options.output, std::string("cloud (.pcd, .ply, .vtp, .csv)") + or_piece_folder);
-  command.option("--tile", "K/N", options.tile,
-                 "make only share K of N of the pieces; the last share completes the folder");
+  add_share_option(command, options.tile);
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   command.option("--corrected-poses", "FILE", options.corrected_poses,
@@ -234,8 +235,7 @@ int fuse_scan(int argc, char** argv) {
                            "side of a piece, m, where the output is a folder");
   libmap::bind(command.parameters(), options.fusion);
   return command.run(argc, argv, [&](Run& run) {
-    if (!is_piece_folder(options.output))
-      refuse_given({{"--tile", options.tile != FuseOptions{}.tile}}, "is for a folder of pieces");
+    require_folder_of_share(options.output, options.tile);
     fuse(options, run);
   });
 }

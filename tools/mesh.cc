@@ -32,7 +32,7 @@ struct MeshOptions {
   std::string cloud;
   std::string output;
   NormalSource normals = NormalSource::automatic;
-  std::string tile = "1/1";
+  std::string tile = whole_share;
   bool report = false;
   bool json = false;
   libmap::NormalEstimationOptions estimation;
@@ -342,15 +342,14 @@ int main(int argc, char** argv) {
   command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv), or a folder of pieces");
   command.output(options.output,
                  std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_piece_folder);
-  command.option("--tile", "K/N", options.tile,
-                 "make only share K of N of the pieces; the last share completes the folder");
+  add_share_option(command, options.tile);
   command.flag("--report", options.report,
                "print what the mesh is as a surface, and how far the points lie from it");
   command.flag("--json", options.json, "that report as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
     if (is_piece_folder(options.output)) return mesh_in_tiles(options, run);
-    refuse_given({{"--tile", options.tile != MeshOptions{}.tile}}, "is for a folder of pieces");
+    require_folder_of_share(options.output, options.tile);
     mesh(options, run);
   });
 }

@@ -33,7 +33,7 @@ struct TextureCommandOptions {
   std::string calibration;
   MeshFrame frame = MeshFrame::automatic;
   double margin_m = 2.0;
-  std::string tile = "1/1";
+  std::string tile = whole_share;
   libmap::TextureOptions texture;
   libmap::TexturedMeshWriteOptions writing;
 };
@@ -309,15 +309,13 @@ int main(int argc, char** argv) {
           or_piece_folder);
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
-  command.option("--tile", "K/N", options.tile,
-                 "make only share K of N of the pieces; the last share completes the folder");
+  add_share_option(command, options.tile);
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
     if (is_piece_folder(options.output)) return texture_in_pieces(options, run);
-    refuse_given({{"--tile", options.tile != TextureCommandOptions{}.tile}},
-                 "is for a folder of pieces");
+    require_folder_of_share(options.output, options.tile);
     texture(options, run);
   });
 }

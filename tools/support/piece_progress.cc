@@ -2,6 +2,7 @@
 
 #include "libgtd/score/tile_progress_io.h"
 #include "libmap/core/json_input.h"
+#include "tools/support/piece_folder.h"
 
 namespace graspmap_tools {
 
@@ -28,6 +29,16 @@ bool is_key(const std::string& name) {
 }
 
 }  // namespace
+
+void add_share_option(Command& command, std::string& share) {
+  command.option("--tile", "K/N", share,
+                 "make only share K of N of the pieces; the last share completes the folder");
+}
+
+void require_folder_of_share(const std::string& output, const std::string& share) {
+  if (is_piece_folder(output)) return;
+  refuse_given({{"--tile", share != whole_share}}, "is for a folder of pieces");
+}
 
 PieceProgress::PieceProgress(const std::string& output, const std::vector<std::string>& names,
                              const std::vector<std::string>& inputs, const libgtd::TileShare& share,

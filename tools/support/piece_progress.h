@@ -18,9 +18,15 @@
 
 #include "libgtd/score/tiling.h"
 #include "libmap/core/output_lock.h"
-#include "tools/support/run.h"
+#include "tools/support/command_line.h"
 
 namespace graspmap_tools {
+
+// --tile K/N: the share of the pieces that a run makes.
+inline constexpr const char* whole_share = "1/1";
+void add_share_option(Command& command, std::string& share);
+// Throws Error if a share is asked for of an output that is one file.
+void require_folder_of_share(const std::string& output, const std::string& share);
 
 class PieceProgress {
  public:
