@@ -7,6 +7,7 @@
 #include <assimp/Exporter.hpp>
 #include <assimp/Importer.hpp>
 #include <bit>
+#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <fstream>
@@ -22,6 +23,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/output_lock.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/guarded_model.h"
 
@@ -462,15 +464,19 @@ void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelP
   const auto scene = scene_of(std::move(meshes), std::move(materials), true);
   scene->mTextures = hang(textures, scene->mNumTextures);
   Assimp::Exporter exporter;
-  if (exporter.Export(scene.get(), "glb2", path.string()) != aiReturn_SUCCESS)
+  errno = 0;
+  if (exporter.Export(scene.get(), "glb2", path.string()) != aiReturn_SUCCESS) {
+    if (errno != 0) throw system_failure(path, "cannot be written", errno);
     throw not_written(exporter);
+  }
+  const int failure = errno;
   // The second number of the header (glTF 2.0, 4.4.2) is the file's length; assimp does not see
   // what fails when the file is closed.
   std::ifstream file(path, std::ios::binary);
   std::array<std::uint32_t, 3> header{};
   file.read(reinterpret_cast<char*>(header.data()), sizeof header);
   if (!file || header[2] != std::filesystem::file_size(path))
-    throw Error("cannot be written: it is truncated", {.file = path.string()}, ErrorKind::failed);
+    throw system_failure(path, "cannot be written", failure != 0 ? failure : EIO);
 }
 
 }  // namespace libmap

@@ -1,5 +1,7 @@
 #include "libmap/refine/calibration_uncertainty.h"
 
+#include <ceres/ceres.h>
+
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>

@@ -1,11 +1,13 @@
 // How uncertain the calibration of a bundle adjustment is. Inner part of libmap/refine.
 #pragma once
 
-#include <ceres/ceres.h>
-
 #include <Eigen/Core>
 #include <cstddef>
 #include <vector>
+
+namespace ceres {
+class Problem;
+}
 
 namespace libmap {
 

@@ -30,12 +30,12 @@ PICTURES = {"exposure-drift": 0.4, "vignetting": 0.35, "exposure": 0.05, "blurre
 # Options of `simulate scan` at full size.
 FAULTS = {
     "none": {},
-    "focal length 1 %, cx 4 px": INTRINSICS,
-    "depth x 1.008, wave 4 mm, corners 6 mm, holes": DEPTH,
-    "both and bad pictures": {**INTRINSICS, **DEPTH, **PICTURES},
-    "depth 10 ms late": {"depth-delay": 0.010},
-    "depth registered 5 mm, 0.5° off": {"registration-shift": 5.0, "registration-turn": 0.5},
-    "rolling shutter 20 ms": {"rolling-shutter": 0.020},
+    "intrinsics": INTRINSICS,
+    "depth": DEPTH,
+    "both, pictures": {**INTRINSICS, **DEPTH, **PICTURES},
+    "delay": {"depth-delay": 0.010},
+    "registration": {"registration-shift": 5.0, "registration-turn": 0.5},
+    "rolling shutter": {"rolling-shutter": 0.020},
 }
 SIZES = (0.5, 1.0, 2.0)
 FIXED = ("vignetting", "blurred-frames", "jpeg-quality")  # are not larger or smaller
@@ -140,33 +140,36 @@ def run(graspmap, folder, site, seed, fault, size, threads):
     return found
 
 
-def median_and_worst(values, digits):
-    values = [abs(value) for value in values]
-    return f"{statistics.median(values):.{digits}f} ({max(values):.{digits}f})"
+def median_and_worst(values):
+    values = list(values)
+    return f"{statistics.median(values):.2f} ({max(values):.2f})"
 
 
 def shares(runs, scaled):
     """Of the errors within one and two stated deviations, percent."""
     errors = numpy.abs(numpy.concatenate([run["errors"][scaled] for run in runs]))
-    return f"{100 * (errors < 1).mean():.0f} / {100 * (errors < 2).mean():.0f}"
+    return f"{100 * (errors < 1).mean():.0f}/{100 * (errors < 2).mean():.0f}"
 
 
 def table_of(runs):
-    lines = ["| fault | start mm | RMSE mm | scale aligned | focal % | time, memory | within 1 / 2 σ |"
-             " scale aligned |", "|---|---|---|---|---|---|---|---|"]
+    lines = ["| fault | RMSE mm | aligned | σ % | aligned | time |", "|---|---|---|---|---|---|"]
     full = [run for run in runs if run["size"] == 1]
     clean = {(run["site"], run["seed"]): run for run in full if run["fault"] == "none"}
+
+    def ratios(key, some):
+        return [run[key] / clean[run["site"], run["seed"]][key] for run in some]
+
     for fault in FAULTS:
         some = [run for run in full if run["fault"] == fault]
-        ratios = (statistics.median(run[key] / clean[run["site"], run["seed"]][key] for run in some)
-                  for key in ("processor_s", "mib"))
         lines.append(f"| {fault} | " + " | ".join((
-            median_and_worst((run["start_mm"] for run in some), 1),
-            median_and_worst((run["rmse_mm"] for run in some), 2),
-            median_and_worst((run["scaled_mm"] for run in some), 2),
-            median_and_worst((run["focal_percent"] for run in some), 2),
-            "x {:.1f}, x {:.1f}".format(*ratios), shares(some, 0), shares(some, 1))) + " |")
-    return "\n".join(lines)
+            *(median_and_worst(run[key] for run in some) for key in ("rmse_mm", "scaled_mm")),
+            shares(some, 0), shares(some, 1),
+            f"{statistics.median(ratios('processor_s', some)):.1f}")) + " |")
+    starts = [run["start_mm"] for run in full]
+    focal = max(abs(run["focal_percent"]) for run in full)
+    return "\n".join(lines) + (
+        f"\n\nOdometry: {min(starts):.0f} to {max(starts):.0f} mm. Largest focal error {focal:.2f} %, "
+        f"memory x {max(ratios('mib', full)):.1f}.")
 
 
 def draw(runs, path):
@@ -177,11 +180,12 @@ def draw(runs, path):
     for fault in list(FAULTS)[1:]:
         medians = [statistics.median(run["scaled_mm"] for run in runs if run["site"] == SITES[0] and
                                      run["fault"] == fault and run["size"] == size) for size in SIZES]
-        axis.loglog(SIZES, medians, "o-", label=fault)
+        axis.semilogx(SIZES, medians, "o-", label=fault)
     axis.axhline(statistics.median(run["scaled_mm"] for run in runs if run["fault"] == "none"), color="gray",
                  linestyle=":", label="none")
     axis.set(xlabel="size of the fault", ylabel="RMSE, scale aligned, mm", xticks=SIZES,
              xticklabels=["half", "full", "double"])
+    axis.set_ylim(bottom=0)
     axis.minorticks_off()
     axis.grid(True, alpha=0.3)
     axis.legend(fontsize=7)
