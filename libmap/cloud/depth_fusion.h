@@ -121,6 +121,7 @@ class TileFusion {
              const FusionSurvey* known = nullptr);
   ~TileFusion();
 
+  // For a later TileFusion; the tiles to which a frame matters, in their order.
   const FusionSurvey& survey() const;
   const std::vector<PlanTile>& tiles() const;
   struct Tile {
