@@ -121,9 +121,8 @@ class TileFusion {
              const FusionSurvey* known = nullptr);
   ~TileFusion();
 
-  // For a later TileFusion; the tiles to which a frame matters, in their order.
-  const FusionSurvey& survey() const;
-  const std::vector<PlanTile>& tiles() const;
+  const FusionSurvey& survey() const;          // for a later TileFusion
+  const std::vector<PlanTile>& tiles() const;  // to which a frame matters, in their order
   struct Tile {
     PointCloud cloud;
     FusionCounts counts;
