@@ -109,19 +109,19 @@ struct Candidate {
 };
 
 Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOptions options,
-                    SensorCalibration start) {
+                    SensorCalibration start, std::map<int, Pose> poses, int rounds) {
   options.refine_intrinsics = model.intrinsics;
   options.refine_depth = model.depth;
   options.refine_registration = model.registration;
   options.refine_timing = model.timing;
   Candidate candidate;
   candidate.model = model;
-  std::map<int, Pose> poses = part.poses;
   // Other planes are met when depth is taken from elsewhere: once more from there.
-  for (int round = 0; round < max_rounds; ++round) {
+  for (int round = 0; round < rounds; ++round) {
     candidate.adjustment = adjust_bundle(part.frames, part.links, poses, part.graph_links,
                                          part.components, options, start);
     const SensorCalibration& found = candidate.adjustment.calibration;
+    if (!model.registration && !model.timing) break;
     if (takes_depth_from_near(start, found, 1e-4, 5e-5, 3e-4)) break;
     poses = candidate.adjustment.map_from_base;
     start = found;
@@ -152,8 +152,9 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   const HeldOutCosts before = held_out_costs(part.frames, part.links, part.poses);
   CalibrationEstimate estimate;
   estimate.frames = part.frames.size();
-  const auto attempt = [&](const Model& model, const SensorCalibration& start) {
-    Candidate candidate = try_model(model, part, options, start);
+  const auto attempt = [&](const Model& model, const SensorCalibration& start,
+                           const std::map<int, Pose>& poses, int rounds) {
+    Candidate candidate = try_model(model, part, options, start, poses, rounds);
     estimate.tried.emplace_back(model.name(), evaluate_held_out(before, candidate.costs));
     return candidate;
   };
@@ -164,11 +165,16 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   };
   Model all{choice.intrinsics, choice.depth, choice.registration};
   all.timing = choice.timing && !choice.start.timing.empty();
-  Candidate best = attempt(all, choice.start);
+  Candidate best = attempt(all, choice.start, part.poses, max_rounds);
   // Too much freedom for little data may hide what intrinsics alone explain.
   if (!is_good(best) && choice.leave_out && choice.intrinsics &&
       (choice.depth || choice.registration))
-    best = attempt({.intrinsics = true}, {});
+    best = attempt({.intrinsics = true}, {}, part.poses, 1);
+  // One round is enough for a comparison: planes are met where the best meets them.
+  const auto attempt_from_best = [&](const Model& model, int rounds) {
+    const BundleAdjustmentResult from = best.adjustment;
+    return attempt(model, from.calibration, from.map_from_base, rounds);
+  };
   const auto leave_out = [&](std::initializer_list<bool Model::*> parts) {
     for (bool Model::*const part_of : parts) {
       Model simpler = best.model;
@@ -176,7 +182,7 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
       if (!is_good(best) || !choice.only_if_better || !choice.leave_out || !(best.model.*part_of) ||
           simpler.name().empty())
         continue;
-      Candidate candidate = attempt(simpler, best.adjustment.calibration);
+      Candidate candidate = attempt_from_best(simpler, 1);
       if (is_good(candidate) && !is_needed(candidate.costs, best.costs))
         best = std::move(candidate);
     }
@@ -187,9 +193,10 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
     Model timed = was_good ? best.model : Model{};
     timed.timing = true;
     Candidate candidate =
-        attempt(timed, was_good ? best.adjustment.calibration : SensorCalibration{});
+        was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part.poses, 1);
     if (is_good(candidate) && (!was_good || is_needed(best.costs, candidate.costs))) {
       best = std::move(candidate);
+      best = attempt_from_best(timed, max_rounds - 1);  // motions need more rounds
       leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
     }
   }
