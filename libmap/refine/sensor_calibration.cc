@@ -172,8 +172,7 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
     best = attempt({.intrinsics = true}, {}, part.poses, 1);
   // One round is enough for a comparison: planes are met where the best meets them.
   const auto attempt_from_best = [&](const Model& model, int rounds) {
-    const BundleAdjustmentResult from = best.adjustment;
-    return attempt(model, from.calibration, from.map_from_base, rounds);
+    return attempt(model, best.adjustment.calibration, best.adjustment.map_from_base, rounds);
   };
   const auto leave_out = [&](std::initializer_list<bool Model::*> parts) {
     for (bool Model::*const part_of : parts) {
@@ -196,7 +195,8 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
         was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part.poses, 1);
     if (is_good(candidate) && (!was_good || is_needed(best.costs, candidate.costs))) {
       best = std::move(candidate);
-      best = attempt_from_best(timed, max_rounds - 1);  // motions need more rounds
+      Candidate settled = attempt_from_best(timed, max_rounds - 1);  // motions need more rounds
+      if (is_good(settled)) best = std::move(settled);
       leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
     }
   }
