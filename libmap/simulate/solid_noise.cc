@@ -1,6 +1,7 @@
 #include "libmap/simulate/solid_noise.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 
@@ -31,12 +32,24 @@ std::uint64_t lattice_bits(std::int64_t x, std::int64_t y, std::int64_t z, std::
   return bits ^ (bits >> 29);
 }
 
-// One of the twelve directions to the middles of a cube's edges, times `offset`.
+// The directions to the middles of a cube's edges.
+constexpr std::array<std::array<double, 3>, 12> directions = {{{1, 1, 0},
+                                                               {-1, 1, 0},
+                                                               {1, -1, 0},
+                                                               {-1, -1, 0},
+                                                               {1, 0, 1},
+                                                               {-1, 0, 1},
+                                                               {1, 0, -1},
+                                                               {-1, 0, -1},
+                                                               {0, 1, 1},
+                                                               {0, -1, 1},
+                                                               {0, 1, -1},
+                                                               {0, -1, -1}}};
+
+// One of them by chance, times the offset. By a table: branches would be guessed wrong.
 double directional(std::uint64_t bits, double x, double y, double z) {
-  const std::uint64_t choice = (bits >> 32) % 12;
-  const double first = choice < 8 ? x : y;
-  const double second = choice < 4 ? y : z;
-  return ((choice & 1U) == 0 ? first : -first) + ((choice & 2U) == 0 ? second : -second);
+  const auto& direction = directions[(bits >> 32) % 12];
+  return direction[0] * x + direction[1] * y + direction[2] * z;
 }
 
 double fade(double t) { return t * t * t * (t * (t * 6.0 - 15.0) + 10.0); }

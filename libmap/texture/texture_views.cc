@@ -2,20 +2,26 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
+#include <map>
 #include <memory>
 #include <numbers>
+#include <numeric>
 
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_adjacency.h"
+#include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/ray_caster.h"
 
 namespace libmap {
 
 namespace {
 
-constexpr std::size_t vertices_per_chunk = 4096;
+constexpr std::size_t points_per_chunk = 4096;
+// Side of the cubes in which what no photograph shows is passed over.
+constexpr double block_m = 0.5;
 // Of a photograph's smaller side: within it, towards the border, a view counts less and less.
 constexpr double border_band = 0.15;
 constexpr double min_border_share = 0.05;
@@ -57,16 +63,17 @@ class ViewFinder {
         vertices_(mesh.vertices.size()),
         qualities_(mesh.triangles.size()) {
     choose_vertices();
+    make_blocks();
   }
 
   void look_from(std::size_t photo) {
     projector_ = &photos_[photo].projector;
     if (projector_->max_pixels(center_, radius_m_, 1.0) == 0.0) return;
-    project(asked_);
-    if (std::none_of(asked_.begin(), asked_.end(),
-                     [this](std::uint32_t v) { return vertices_[v].in_image; }))
+    find_blocks_in_view();
+    project();
+    if (std::none_of(in_view_.begin(), in_view_.end(),
+                     [](const Block* block) { return block->any_asked_in_image; }))
       return;
-    project(others_);
     fill_cells();
     rate_triangles(photos_[photo].sharpness);
     cast_to_vertices();
@@ -77,11 +84,27 @@ class ViewFinder {
   }
 
  private:
+  // Vertices in a cube, and the rated triangles whose first corner is one of them.
+  struct Block {
+    Eigen::AlignedBox3d box{};  // of the vertices
+    std::span<const std::uint32_t> vertices{};
+    std::span<const std::uint32_t> rated{};
+    bool any_asked_in_image = false;  // of the photograph at hand
+  };
+
   void choose_vertices();
-  void project(const std::vector<std::uint32_t>& vertices);
+  void make_blocks();
+  void find_blocks_in_view();
+  void project();
   void fill_cells();
   bool is_beside_occluder(std::size_t triangle) const;
   void devalue_occluded_edges();
+  template <typename Use>
+  void each_rated(const Use& use) const {
+    parallel_each(in_view_.size(), [&](std::size_t n) {
+      for (const std::uint32_t t : in_view_[n]->rated) use(t);
+    });
+  }
   void rate_triangles(double sharpness);
   void cast_to_vertices();
   void test_triangles();
@@ -108,17 +131,18 @@ class ViewFinder {
   VertexTriangles around_;
   double min_cos_;
   // Vertices whose views are asked for, a ball around them, and the triangles that decide on them.
-  std::vector<std::uint32_t> asked_;
-  std::vector<std::uint32_t> others_;
+  std::vector<bool> is_asked_;
   std::vector<std::uint32_t> observed_;
   Eigen::Vector3d center_ = Eigen::Vector3d::Zero();
   double radius_m_ = 0.0;
   std::vector<std::uint32_t> rated_;
-  std::vector<std::uint32_t> corners_;    // of these
   std::vector<Eigen::Vector3d> normals_;  // of these
   std::vector<std::uint32_t> place_of_;   // of a triangle, among the rated ones
-  // Of the photograph at hand.
+  std::vector<std::uint32_t> order_;      // of all vertices, by blocks
+  std::vector<Block> blocks_;
+  // Of the photograph at hand; in other blocks nothing is in the image.
   const PhotoProjector* projector_ = nullptr;
+  std::vector<Block*> in_view_;
   std::vector<SeenVertex> vertices_;
   std::vector<float> qualities_;  // 0: not seen
   // Squares of occlusion_margin_px pixels: the least z of vertices in each, and the ray through its
@@ -130,60 +154,101 @@ class ViewFinder {
 };
 
 void ViewFinder::choose_vertices() {
-  std::vector<std::uint8_t> is_asked(mesh_.vertices.size(), 0);
+  is_asked_.assign(mesh_.vertices.size(), false);
   for (std::size_t t = 0; t < request_.triangles; ++t)
-    for (const std::uint32_t v : mesh_.triangles[t]) is_asked[v] = 1;
-  const auto collect = [&](std::vector<std::uint32_t>& vertices, std::uint8_t wanted) {
-    for (std::uint32_t v = 0; v < is_asked.size(); ++v)
-      if (is_asked[v] == wanted) vertices.push_back(v);
-  };
-  collect(asked_, 1);
+    for (const std::uint32_t v : mesh_.triangles[t]) is_asked_[v] = true;
   if (request_.observed_vertices > 0) {
-    const std::size_t step = std::max<std::size_t>(1, asked_.size() / request_.observed_vertices);
-    for (std::size_t i = 0; i < asked_.size(); i += step) observed_.push_back(asked_[i]);
+    const std::size_t step =
+        std::max<std::size_t>(1, count_of(is_asked_) / request_.observed_vertices);
+    std::size_t number = 0;
+    for (std::uint32_t v = 0; v < is_asked_.size(); ++v)
+      if (is_asked_[v] && number++ % step == 0) observed_.push_back(v);
     views_.observed_vertices = observed_.size();
   }
   if (request_.views_a_vertex == 0 && request_.views_a_triangle == 0) {
-    std::fill(is_asked.begin(), is_asked.end(), std::uint8_t{0});
-    for (const std::uint32_t v : observed_) is_asked[v] = 1;
-    asked_ = observed_;
+    is_asked_.assign(mesh_.vertices.size(), false);
+    for (const std::uint32_t v : observed_) is_asked_[v] = true;
   }
-  collect(others_, 0);
   Eigen::AlignedBox3d box;
-  for (const std::uint32_t v : asked_) {
+  std::vector<bool> is_rated(mesh_.triangles.size(), false);
+  for (std::uint32_t v = 0; v < is_asked_.size(); ++v) {
+    if (!is_asked_[v]) continue;
     box.extend(mesh_.vertices[v]);
-    for (const std::uint32_t t : around_.of(v)) rated_.push_back(t);
+    for (const std::uint32_t t : around_.of(v)) is_rated[t] = true;
   }
-  const auto make_unique = [](std::vector<std::uint32_t>& numbers) {
-    std::sort(numbers.begin(), numbers.end());
-    numbers.erase(std::unique(numbers.begin(), numbers.end()), numbers.end());
-  };
-  make_unique(rated_);
-  place_of_.resize(mesh_.triangles.size());
-  normals_.reserve(rated_.size());
-  for (const std::uint32_t t : rated_) {
-    corners_.insert(corners_.end(), mesh_.triangles[t].begin(), mesh_.triangles[t].end());
-    place_of_[t] = static_cast<std::uint32_t>(normals_.size());
-    normals_.push_back(area_normal(mesh_, mesh_.triangles[t]).normalized());
-  }
-  make_unique(corners_);
+  for (std::uint32_t t = 0; t < is_rated.size(); ++t)
+    if (is_rated[t]) rated_.push_back(t);
   if (box.isEmpty()) return;
   center_ = box.center();
   radius_m_ = box.diagonal().norm() / 2.0;
 }
 
-void ViewFinder::project(const std::vector<std::uint32_t>& vertices) {
+void ViewFinder::make_blocks() {
+  using Cube = std::array<std::int64_t, 3>;
+  std::map<Cube, std::size_t> cubes;
+  std::vector<std::uint32_t> block_of(mesh_.vertices.size());
+  for (std::size_t v = 0; v < block_of.size(); ++v) {
+    Cube cube;
+    for (std::size_t k = 0; k < 3; ++k)
+      cube[k] = std::llround(mesh_.vertices[v][static_cast<Eigen::Index>(k)] / block_m);
+    const auto found = cubes.try_emplace(cube, cubes.size()).first;
+    block_of[v] = static_cast<std::uint32_t>(found->second);
+  }
+  blocks_.resize(cubes.size());
+  // Numbers by their block, those of one block in their order.
+  const auto sort = [&](std::vector<std::uint32_t>& numbers, const auto& vertex_of, auto member) {
+    std::vector<std::size_t> first(blocks_.size() + 1, 0);
+    for (const std::uint32_t n : numbers) ++first[block_of[vertex_of(n)] + 1];
+    std::partial_sum(first.begin(), first.end(), first.begin());
+    std::vector<std::uint32_t> sorted(numbers.size());
+    std::vector<std::size_t> next(first.begin(), first.end() - 1);
+    for (const std::uint32_t n : numbers) sorted[next[block_of[vertex_of(n)]]++] = n;
+    numbers.swap(sorted);
+    for (std::size_t b = 0; b < blocks_.size(); ++b)
+      blocks_[b].*member = std::span(numbers).subspan(first[b], first[b + 1] - first[b]);
+  };
+  order_.resize(mesh_.vertices.size());
+  std::iota(order_.begin(), order_.end(), 0U);
+  sort(
+      order_, [](std::uint32_t v) { return v; }, &Block::vertices);
+  sort(
+      rated_, [this](std::uint32_t t) { return mesh_.triangles[t][0]; }, &Block::rated);
+  for (Block& block : blocks_)
+    for (const std::uint32_t v : block.vertices) block.box.extend(mesh_.vertices[v]);
+  place_of_.resize(mesh_.triangles.size());
+  normals_.reserve(rated_.size());
+  for (const std::uint32_t t : rated_) {
+    place_of_[t] = static_cast<std::uint32_t>(normals_.size());
+    normals_.push_back(area_normal(mesh_, mesh_.triangles[t]).normalized());
+  }
+}
+
+void ViewFinder::find_blocks_in_view() {
+  for (const Block* block : in_view_) {
+    for (const std::uint32_t v : block->vertices) vertices_[v] = {};
+    for (const std::uint32_t t : block->rated) qualities_[t] = 0.0F;
+  }
+  in_view_.clear();
+  for (Block& block : blocks_)
+    if (projector_->max_pixels(block.box.center(), block.box.diagonal().norm() / 2.0, 1.0) > 0.0)
+      in_view_.push_back(&block);
+}
+
+void ViewFinder::project() {
   const Camera& camera = projector_->camera();
   const double border = options_.border_px;
-  parallel_for(vertices.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector3d seen = projector_->project(mesh_.vertices[vertices[i]]);
-      SeenVertex& vertex = vertices_[vertices[i]];
+  parallel_each(in_view_.size(), [&](std::size_t n) {
+    Block& block = *in_view_[n];
+    block.any_asked_in_image = false;
+    for (const std::uint32_t v : block.vertices) {
+      const Eigen::Vector3d seen = projector_->project(mesh_.vertices[v]);
+      SeenVertex& vertex = vertices_[v];
       vertex = {static_cast<float>(seen.x()), static_cast<float>(seen.y()),
                 static_cast<float>(seen.z()), false, false};
       vertex.in_image = seen.z() > 0.0 && seen.x() >= border && seen.y() >= border &&
                         seen.x() <= camera.width - 1 - border &&
                         seen.y() <= camera.height - 1 - border;
+      if (vertex.in_image && is_asked_[v]) block.any_asked_in_image = true;
     }
   });
 }
@@ -196,15 +261,17 @@ void ViewFinder::fill_cells() {
   cell_rows_ = (camera.height - 1) / side + 1;
   const auto count = static_cast<std::size_t>(cell_columns_) * static_cast<std::size_t>(cell_rows_);
   cell_z_.assign(count, std::numeric_limits<float>::infinity());
-  for (const SeenVertex& vertex : vertices_) {
-    if (!(vertex.z > 0.0F) || !(vertex.x > -0.5F) || !(vertex.y > -0.5F)) continue;
-    if (!(vertex.x < static_cast<float>(camera.width) - 0.5F)) continue;
-    if (!(vertex.y < static_cast<float>(camera.height) - 0.5F)) continue;
-    float& z = cell_z_[cell_at(vertex)];
-    z = std::min(z, vertex.z);
-  }
+  for (const Block* block : in_view_)
+    for (const std::uint32_t v : block->vertices) {
+      const SeenVertex& vertex = vertices_[v];
+      if (!(vertex.z > 0.0F) || !(vertex.x > -0.5F) || !(vertex.y > -0.5F)) continue;
+      if (!(vertex.x < static_cast<float>(camera.width) - 0.5F)) continue;
+      if (!(vertex.y < static_cast<float>(camera.height) - 0.5F)) continue;
+      float& z = cell_z_[cell_at(vertex)];
+      z = std::min(z, vertex.z);
+    }
   cell_rays_.resize(count);
-  parallel_for(count, vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+  parallel_for(count, points_per_chunk, [&](std::size_t begin, std::size_t end) {
     const auto columns = static_cast<std::size_t>(cell_columns_);
     for (std::size_t i = begin; i < end; ++i) {
       const std::size_t column = i % columns;
@@ -238,11 +305,8 @@ bool ViewFinder::is_beside_occluder(std::size_t t) const {
 
 void ViewFinder::devalue_occluded_edges() {
   if (options_.occlusion_margin_px == 0) return;
-  parallel_for(rated_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      float& quality = qualities_[rated_[i]];
-      if (quality > 0.0F && is_beside_occluder(rated_[i])) quality *= beside_occluder;
-    }
+  each_rated([this](std::uint32_t t) {
+    if (qualities_[t] > 0.0F && is_beside_occluder(t)) qualities_[t] *= beside_occluder;
   });
 }
 
@@ -270,15 +334,13 @@ float ViewFinder::rate(std::size_t t, double sharpness) const {
 }
 
 void ViewFinder::rate_triangles(double sharpness) {
-  parallel_for(rated_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) qualities_[rated_[i]] = rate(rated_[i], sharpness);
-  });
+  each_rated([&](std::uint32_t t) { qualities_[t] = rate(t, sharpness); });
 }
 
 std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points) const {
   const Eigen::Vector3d& origin = projector_->position();
   std::vector<std::uint8_t> flags(points.size(), 0);
-  parallel_for(points.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
+  parallel_for(points.size(), points_per_chunk, [&](std::size_t begin, std::size_t end) {
     std::vector<Eigen::Vector3d> directions;
     directions.reserve(end - begin);
     // Rays end before the surface itself.
@@ -297,15 +359,16 @@ std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points)
 void ViewFinder::cast_to_vertices() {
   std::vector<std::uint32_t> wanted;
   std::vector<Eigen::Vector3d> points;
-  for (const std::uint32_t v : corners_) {
-    if (!vertices_[v].in_image) continue;
-    const auto around = around_.of(v);
-    if (std::none_of(around.begin(), around.end(),
-                     [this](std::uint32_t t) { return qualities_[t] > 0.0F; }))
-      continue;
-    wanted.push_back(v);
-    points.push_back(mesh_.vertices[v]);
-  }
+  for (const Block* block : in_view_)
+    for (const std::uint32_t v : block->vertices) {
+      if (!vertices_[v].in_image) continue;
+      const auto around = around_.of(v);
+      if (std::none_of(around.begin(), around.end(),
+                       [this](std::uint32_t t) { return qualities_[t] > 0.0F; }))
+        continue;
+      wanted.push_back(v);
+      points.push_back(mesh_.vertices[v]);
+    }
   const std::vector<bool> blocked = hidden(points);
   for (std::size_t i = 0; i < wanted.size(); ++i) vertices_[wanted[i]].visible = !blocked[i];
 }
@@ -323,17 +386,18 @@ float ViewFinder::longest_side_px(const Triangle& triangle) const {
 void ViewFinder::test_triangles() {
   std::vector<std::uint32_t> wanted;
   std::vector<Eigen::Vector3d> centers;
-  for (const std::uint32_t t : rated_) {
-    if (!(qualities_[t] > 0.0F)) continue;
-    const Triangle& triangle = mesh_.triangles[t];
-    if (!vertices_[triangle[0]].visible || !vertices_[triangle[1]].visible ||
-        !vertices_[triangle[2]].visible) {
-      qualities_[t] = 0.0F;
-    } else if (longest_side_px(triangle) > center_test_px) {
-      wanted.push_back(t);
-      centers.push_back(center_of(mesh_, triangle));
+  for (const Block* block : in_view_)
+    for (const std::uint32_t t : block->rated) {
+      if (!(qualities_[t] > 0.0F)) continue;
+      const Triangle& triangle = mesh_.triangles[t];
+      if (!vertices_[triangle[0]].visible || !vertices_[triangle[1]].visible ||
+          !vertices_[triangle[2]].visible) {
+        qualities_[t] = 0.0F;
+      } else if (longest_side_px(triangle) > center_test_px) {
+        wanted.push_back(t);
+        centers.push_back(center_of(mesh_, triangle));
+      }
     }
-  }
   const std::vector<bool> blocked = hidden(centers);
   for (std::size_t i = 0; i < wanted.size(); ++i)
     if (blocked[i]) qualities_[wanted[i]] = 0.0F;
@@ -350,15 +414,15 @@ float ViewFinder::quality_at(std::uint32_t v) const {
 
 void ViewFinder::keep(std::uint32_t photo) {
   if (request_.views_a_triangle > 0)
-    parallel_for(request_.triangles, vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t t = begin; t < end; ++t)
-        if (qualities_[t] > 0.0F) views_.of_triangles.insert(t, {photo, qualities_[t]});
+    each_rated([&](std::uint32_t t) {
+      if (t < request_.triangles && qualities_[t] > 0.0F)
+        views_.of_triangles.insert(t, {photo, qualities_[t]});
     });
   if (request_.views_a_vertex > 0)
-    parallel_for(asked_.size(), vertices_per_chunk, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const float quality = quality_at(asked_[i]);
-        if (quality > 0.0F) views_.of_vertices.insert(asked_[i], {photo, quality});
+    parallel_each(in_view_.size(), [&](std::size_t n) {
+      for (const std::uint32_t v : in_view_[n]->vertices) {
+        const float quality = is_asked_[v] ? quality_at(v) : 0.0F;
+        if (quality > 0.0F) views_.of_vertices.insert(v, {photo, quality});
       }
     });
 }
