@@ -1,6 +1,8 @@
 #include "libmap/cloud/coarse_surface.h"
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -26,6 +28,21 @@ std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& ra
     are_in[n] = cells.has_place(rotation * (ray * (z * scale)) + translation) ? 1 : 0;
   }
   return are_in;
+}
+
+// Marks all pixels whose planes may be in `cells`, and those that these planes depend on.
+std::vector<std::uint8_t> pixels_around(const DepthImage& depth, const PixelRays& rays,
+                                        const Pose& grid_from_camera,
+                                        const DepthPlaneOptions& options, double voxel_size_m,
+                                        const PlanCells& cells) {
+  const double ray_length = rays.min.cwiseAbs().cwiseMax(rays.max.cwiseAbs()).homogeneous().norm();
+  const double moved = max_plane_distance_m(options) * ray_length / voxel_size_m;
+  const int margin = 1 + static_cast<int>(std::min(moved, static_cast<double>(voxel_cell_limit)));
+  const std::vector<std::uint8_t> are_in = pixels_in(
+      depth, rays, grid_from_camera, options.max_depth_m, voxel_size_m, cells.grown(margin));
+  if (std::none_of(are_in.begin(), are_in.end(), [](std::uint8_t mark) { return mark != 0; }))
+    return {};
+  return grown_marks(are_in, depth.width, depth.height);
 }
 
 void add_planes(const DepthPlanes& planes, const PixelRays& rays, const Pose& grid_from_camera,
@@ -54,13 +71,16 @@ void add_planes(const DepthPlanes& planes, const PixelRays& rays, const Pose& gr
 
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
-                                  double voxel_size_m, const PlanCells& cells,
+                                  double voxel_size_m, const PlanCells& cells, FittedPixels fitted,
                                   SurfaceVoxels& voxels) {
-  const DepthPlanes planes = fit_depth_planes(
-      depth, rays, options,
-      cells.thinning > 0
-          ? pixels_in(depth, rays, grid_from_camera, options.max_depth_m, voxel_size_m, cells)
-          : std::vector<std::uint8_t>{});
+  std::vector<std::uint8_t> only;
+  if (fitted == FittedPixels::in_cells) {
+    only = cells.thinning > 0
+               ? pixels_in(depth, rays, grid_from_camera, options.max_depth_m, voxel_size_m, cells)
+               : pixels_around(depth, rays, grid_from_camera, options, voxel_size_m, cells);
+    if (only.empty()) return {};
+  }
+  const DepthPlanes planes = fit_depth_planes(depth, rays, options, only);
   add_planes(planes, rays, grid_from_camera, options.noise, voxel_size_m, cells, voxels);
   return planes.counts;
 }

@@ -11,12 +11,17 @@
 
 namespace libmap {
 
+// Which pixels planes are fitted to: all, and the counts are those of the image; or those that may
+// be in the cells, and the counts say nothing.
+enum class FittedPixels { all, in_cells };
+
 // Fits planes to the pixels of one depth image (m) and adds those in `cells` to the voxels of the
-// grid, each weighted by its cosine, its support and the noise of its depth. What became of the
-// pixels; with downsampled cells the counts say nothing.
+// grid, each weighted by its cosine, its support and the noise of its depth. Both kinds of fitted
+// pixels give the same voxels; but of downsampled cells the edges are fitted roughly. What became
+// of the pixels.
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
-                                  double voxel_size_m, const PlanCells& cells,
+                                  double voxel_size_m, const PlanCells& cells, FittedPixels fitted,
                                   SurfaceVoxels& voxels);
 
 }  // namespace libmap

@@ -32,8 +32,9 @@ constexpr std::uint64_t coarse_pixel_bytes = 60;
 // Elements, about, by which frames are registered: so many, or so many for each frame.
 constexpr std::size_t registration_elements = 20000;
 constexpr std::size_t registration_elements_per_frame = 40;
-// Voxels that are kept for one such element, at most.
-constexpr std::size_t voxels_per_element = 12;
+// Voxels that are kept for one such element, at most: noise spreads a surface over more than one,
+// and after each downsampling half of them are left.
+constexpr std::size_t voxels_per_element = 4;
 constexpr unsigned max_thinning = 32;
 // By which frames may lie off the coarse surface when they are first registered.
 constexpr double first_search_voxels = 3.0;
@@ -177,13 +178,13 @@ class Fusion {
 
   // Adds the planes through the pixels of one frame; of pixels and planes those in `cells`.
   void add_frame(const RgbdFrame& depth, const Pose& grid_from_base, const PlanCells& cells,
-                 CoarseFrame& coarse) {
+                 FittedPixels fitted, CoarseFrame& coarse) {
     const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * depth.depth.pixels.size());
     for (const CameraView& view : camera_views(depth)) {
       const auto rays = images_.rays_of(view.depth_camera);
       const Pose grid_from_camera = grid_from_base * view.depth_camera.base_from_camera;
       coarse.pixels += add_depth_planes(view.depth, *rays, grid_from_camera, options_.planes,
-                                        options_.voxel_size_m, cells, coarse.voxels);
+                                        options_.voxel_size_m, cells, fitted, coarse.voxels);
     }
   }
 
@@ -192,7 +193,8 @@ class Fusion {
     FusionFrame& frame = coarse.frame;
     const std::shared_ptr<const RgbdFrame> depth = images_.depth_of(frame.node);
     images_.measure_reach(*depth, options_.planes.max_depth_m, frame);
-    if (options_.registration_rounds > 0) add_frame(*depth, frame.grid_from_base, cells, coarse);
+    if (options_.registration_rounds > 0)
+      add_frame(*depth, frame.grid_from_base, cells, FittedPixels::in_cells, coarse);
   }
 
   std::size_t wanted_elements(std::size_t frames) const {
@@ -232,7 +234,7 @@ class Fusion {
         [&](std::size_t n, const PlanCells& wanted) {
           CoarseFrame coarse;
           add_frame(*images_.depth_of(frames()[n].node), frames()[n].grid_from_base, wanted,
-                    coarse);
+                    FittedPixels::in_cells, coarse);
           return coarse;
         },
         [&](const CoarseFrame& coarse) { sample_.merge_frame(coarse.voxels, sampled_); });
@@ -437,13 +439,16 @@ SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& ar
     CoarseFrame coarse;
     coarse.number = members.frames[n];
     const FusionFrame& frame = frames()[coarse.number];
-    add_frame(*images_.depth_of(frame.node), frame.grid_from_base, wanted, coarse);
+    const bool is_counted =
+        std::binary_search(members.counted.begin(), members.counted.end(), coarse.number);
+    add_frame(*images_.depth_of(frame.node), frame.grid_from_base, wanted,
+              is_counted ? FittedPixels::all : FittedPixels::in_cells, coarse);
+    if (!is_counted) coarse.pixels = {};
     return coarse;
   };
   each_frame(members.frames.size(), around, make, [&](const CoarseFrame& coarse) {
     voxels.merge_frame(coarse.voxels, around);
-    if (std::binary_search(members.counted.begin(), members.counted.end(), coarse.number))
-      counts.pixels += coarse.pixels;
+    counts.pixels += coarse.pixels;
   });
   for (const std::uint64_t key : voxels.index().keys())
     if (cells.has_cell(unpack(key).cell.head<2>())) ++counts.occupied_voxels;

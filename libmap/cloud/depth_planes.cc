@@ -2,6 +2,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
+#include <limits>
 #include <numbers>
 #include <utility>
 
@@ -311,6 +313,31 @@ DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
   grazing += more.grazing;
   used += more.used;
   return *this;
+}
+
+// The gate g s(z) / z^2 is of inverse depth: with d = g s(z) / z a plane is at most z d / (1 - d)
+// farther than its pixel, and less nearer.
+double max_plane_distance_m(const DepthPlaneOptions& options) {
+  const double gate = gate_sigmas * std::sqrt(1.5);
+  const double nearest = gate * options.noise.axial_at(options.min_depth_m) / options.min_depth_m;
+  if (!(nearest < 1.0)) return std::numeric_limits<double>::infinity();
+  return gate * options.noise.axial_at(options.max_depth_m) / (1.0 - nearest);
+}
+
+std::vector<std::uint8_t> grown_marks(const std::vector<std::uint8_t>& marks, int width,
+                                      int height) {
+  std::vector<std::uint8_t> grown(marks.size(), 0);
+  const auto columns = static_cast<std::ptrdiff_t>(width);
+  for (std::ptrdiff_t y = 0; y < height; ++y)
+    for (std::ptrdiff_t x = 0; x < columns; ++x) {
+      if (marks[static_cast<std::size_t>(y * columns + x)] == 0) continue;
+      const std::ptrdiff_t left = std::max<std::ptrdiff_t>(0, x - edge_reach_px);
+      const std::ptrdiff_t right = std::min<std::ptrdiff_t>(columns - 1, x + edge_reach_px);
+      for (std::ptrdiff_t row = std::max<std::ptrdiff_t>(0, y - edge_reach_px);
+           row <= std::min<std::ptrdiff_t>(height - 1, y + edge_reach_px); ++row)
+        std::fill_n(grown.begin() + row * columns + left, right - left + 1, std::uint8_t{1});
+    }
+  return grown;
 }
 
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,

@@ -58,4 +58,12 @@ DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {},
                              const std::vector<std::uint8_t>& only = {});
 
+// No plane is further than this from the depth of its pixel, along the axis, m.
+double max_plane_distance_m(const DepthPlaneOptions& options);
+
+// The marked pixels, not 0, and those that decide on their planes: with these as `only`, the planes
+// of the marked pixels are those of the whole image.
+std::vector<std::uint8_t> grown_marks(const std::vector<std::uint8_t>& marks, int width,
+                                      int height);
+
 }  // namespace libmap

@@ -7,6 +7,9 @@
 #include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <utility>
+
+#include "libmap/core/parallel.h"
 
 namespace libmap {
 
@@ -18,6 +21,8 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 constexpr int robust_rounds = 3;
 constexpr int max_iterations = 200;
 constexpr double tolerance = 1e-8;
+// Ranges of elements whose sums are made side by side and joined in their order.
+constexpr std::size_t sum_ranges = 16;
 
 struct Equation {
   std::uint32_t frame = 0;
@@ -134,9 +139,10 @@ class Adjustment {
   const std::vector<Vector6d>& corrections() const { return corrections_; }
 
  private:
+  std::size_t elements() const { return starts_.size() - 1; }
   template <typename Use>
   void each_element(const Use& use) const {
-    for (std::size_t n = 0; n + 1 < starts_.size(); ++n) use(starts_[n], starts_[n + 1]);
+    for (std::size_t n = 0; n < elements(); ++n) use(starts_[n], starts_[n + 1]);
   }
   template <typename Value>
   double mean_of(std::size_t begin, std::size_t end, const Value& value) const {
@@ -154,13 +160,28 @@ class Adjustment {
   // Adds J' W (value - its mean on the element): the elements' heights are eliminated.
   template <typename Value>
   void accumulate(const Value& value, std::vector<Vector6d>& sums) const {
-    each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_of(begin, end, value);
-      for (std::size_t n = begin; n < end; ++n) {
-        const Equation& equation = equations_[n];
-        sums[equation.frame] += equation.weight * (value(equation) - mean) * equation.slope;
-      }
-    });
+    using Sums = std::vector<Vector6d>;
+    const std::size_t grain = (elements() + sum_ranges - 1) / sum_ranges;
+    const Sums zero(sums.size(), Vector6d::Zero());
+    sums = parallel_reduce(
+        elements(), grain, std::move(sums),
+        [&](std::size_t first, std::size_t last) {
+          Sums part = zero;
+          for (std::size_t element = first; element < last; ++element) {
+            const std::size_t begin = starts_[element];
+            const std::size_t end = starts_[element + 1];
+            const double mean = mean_of(begin, end, value);
+            for (std::size_t n = begin; n < end; ++n) {
+              const Equation& equation = equations_[n];
+              part[equation.frame] += equation.weight * (value(equation) - mean) * equation.slope;
+            }
+          }
+          return part;
+        },
+        [](Sums all, const Sums& part) {
+          for (std::size_t f = 0; f < all.size(); ++f) all[f] += part[f];
+          return all;
+        });
   }
   std::vector<Matrix6d> block_inverses() const {
     std::vector<Matrix6d> blocks(corrections_.size(), prior_.asDiagonal());

@@ -344,7 +344,7 @@ RefinedElement result_of(const ElementSum& sum) {
   return refined;
 }
 
-std::vector<Chunk> chunks_of(const std::vector<SurfaceElement>& elements, double margin_m) {
+std::vector<Chunk> chunks_of(std::span<const SurfaceElement> elements, double margin_m) {
   std::vector<Chunk> chunks;
   for (std::size_t begin = 0; begin < elements.size(); begin += chunk_size) {
     Chunk chunk{begin, std::min(begin + chunk_size, elements.size()), {}, 0.0};
@@ -414,12 +414,15 @@ std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> 
   std::vector<ViewGather> gathers;
   gathers.reserve(views.size());
   for (const RefinementView& view : views) gathers.emplace_back(view, options);
-  const std::size_t chunks = (elements.size() + chunk_size - 1) / chunk_size;
-  std::vector<std::vector<SurfaceObservation>> found(chunks);
-  parallel_for(chunks, 4, [&](std::size_t first, std::size_t last) {
-    for (std::size_t c = first; c < last; ++c)
-      for (std::size_t n = c * chunk_size; n < std::min((c + 1) * chunk_size, elements.size()); ++n)
-        for (std::size_t v = 0; v < views.size(); ++v) {
+  const std::vector<Chunk> chunks = chunks_of(elements, options.disc_radius_m);
+  std::vector<std::vector<SurfaceObservation>> found(chunks.size());
+  parallel_for(chunks.size(), 4, [&](std::size_t first, std::size_t last) {
+    for (std::size_t c = first; c < last; ++c) {
+      std::vector<std::size_t> seen_by;
+      for (std::size_t v = 0; v < views.size(); ++v)
+        if (gathers[v].may_see(chunks[c])) seen_by.push_back(v);
+      for (std::size_t n = chunks[c].begin; n < chunks[c].end; ++n)
+        for (const std::size_t v : seen_by) {
           ElementSum sum;
           gathers[v].gather(elements[n], sum);
           const HeightSum& one = sum.current;
@@ -427,6 +430,7 @@ std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> 
           found[c].push_back({static_cast<std::uint32_t>(n), views[v].frame,
                               one.height / one.weight, one.squares / (one.weight * one.weight)});
         }
+    }
   });
   std::vector<SurfaceObservation> observations;
   for (const auto& part : found) observations.insert(observations.end(), part.begin(), part.end());
