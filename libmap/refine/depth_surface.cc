@@ -47,7 +47,7 @@ DepthSurface::DepthSurface(const DepthPlanes& planes, const Camera& depth_camera
       const double along_normal =
           std::hypot(axial, surface_noise_m) * static_cast<double>(planes.cos_incidence[pixel]);
       Cell& kept = cells_[cell];
-      kept.depth_m = planes.depth_m[pixel];
+      kept.set_depth_m(planes.depth_m[pixel]);
       set_normal(kept, static_cast<double>(planes.normals[pixel].x()),
                  static_cast<double>(planes.normals[pixel].y()));
       kept.noise =
@@ -134,7 +134,7 @@ void DepthSurface::correct(const DepthCorrection& correction) {
                                      by_pixel.cwiseProduct(Eigen::Vector2d(camera_.fx, camera_.fy));
       const Eigen::Vector3d normal =
           Eigen::Vector3d(by_ray.x(), by_ray.y(), -corrected - ray.dot(by_ray)).normalized();
-      cell.depth_m = static_cast<float>(corrected);
+      cell.set_depth_m(static_cast<float>(corrected));
       set_normal(cell, normal.x(), normal.y());
     }
 }
@@ -159,8 +159,9 @@ Eigen::Vector2d DepthSurface::ray_at(int column, int row) const {
 
 bool DepthSurface::at(int column, int row, SurfacePatch& element) const {
   const Cell& cell = cells_[index(column, row)];
-  if (cell.depth_m <= 0.0F) return false;
-  element.point = static_cast<double>(cell.depth_m) * ray_at(column, row).homogeneous();
+  const float depth_m = cell.depth_m();
+  if (depth_m <= 0.0F) return false;
+  element.point = static_cast<double>(depth_m) * ray_at(column, row).homogeneous();
   const double x = cell.normal_x / normal_scale;
   const double y = cell.normal_y / normal_scale;
   // Nearly all normals look back at the camera (z < 0); a wide lens may see others, by a little.

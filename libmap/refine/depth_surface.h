@@ -2,6 +2,8 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -21,12 +23,17 @@ struct SurfacePatch {
 
 class DepthSurface {
  public:
+  // 10 bytes: the cells of all frames are what a long scan keeps in memory most of.
   struct Cell {
-    float depth_m = 0.0F;       // 0: none
-    std::int16_t normal_x = 0;  // of 32767
+    std::array<std::uint16_t, 2> depth_bits{};  // of a float, m; 0: none
+    std::int16_t normal_x = 0;                  // of 32767
     std::int16_t normal_y = 0;
     std::uint16_t noise = 0;  // of 1e-6 m
-    std::uint16_t unused = 0;
+
+    float depth_m() const { return std::bit_cast<float>(depth_bits); }
+    void set_depth_m(float depth_m) {
+      depth_bits = std::bit_cast<std::array<std::uint16_t, 2>>(depth_m);
+    }
   };
 
   DepthSurface() = default;

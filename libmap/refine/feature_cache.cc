@@ -20,7 +20,7 @@ namespace {
 using Json = nlohmann::json;
 
 // Another one for each change of what a frame's features are or how they are written.
-constexpr const char* format_version = "graspmap features 2";
+constexpr const char* format_version = "graspmap features 3";
 constexpr std::size_t digest_digits = 64;
 constexpr std::uint64_t max_file_bytes = std::uint64_t{1} << 28;
 

@@ -39,7 +39,7 @@ struct FeatureOptions {
   DepthPlaneOptions planes{};     // of the depth images
   // Not bound, for long scans: of all frames' surfaces; and frames whose descriptors are in memory,
   // those of more are on disk beside the cache.
-  std::size_t max_surface_bytes = std::size_t{320} << 20U;
+  std::size_t max_surface_bytes = std::size_t{256} << 20U;
   std::size_t max_frames_in_memory = 300;
 };
 void bind(ParameterTable& table, FeatureOptions& options);
