@@ -23,7 +23,7 @@ constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
 // Of decoded photographs that are kept; a piece needs those near it alone.
 constexpr std::size_t max_image_bytes = std::size_t{400} << 20;
-constexpr std::size_t max_image_bytes_in_pieces = std::size_t{128} << 20;
+constexpr std::size_t max_image_bytes_in_pieces = std::size_t{96} << 20;
 // Triangles that all photographs show smaller are not cut; nor are any where more would come out.
 constexpr double min_cut_px = 16.0;
 constexpr std::uint64_t max_cut_triangles = 2'500'000;

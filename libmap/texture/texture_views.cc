@@ -99,10 +99,15 @@ class ViewFinder {
   void fill_cells();
   bool is_beside_occluder(std::size_t triangle) const;
   void devalue_occluded_edges();
+  // Of the blocks in view, in parallel.
+  template <typename Use>
+  void each_block(const Use& use) const {
+    parallel_each(in_view_.size(), [&](std::size_t n) { use(*in_view_[n]); });
+  }
   template <typename Use>
   void each_rated(const Use& use) const {
-    parallel_each(in_view_.size(), [&](std::size_t n) {
-      for (const std::uint32_t t : in_view_[n]->rated) use(t);
+    each_block([&](const Block& block) {
+      for (const std::uint32_t t : block.rated) use(t);
     });
   }
   void rate_triangles(double sharpness);
@@ -237,8 +242,7 @@ void ViewFinder::find_blocks_in_view() {
 void ViewFinder::project() {
   const Camera& camera = projector_->camera();
   const double border = options_.border_px;
-  parallel_each(in_view_.size(), [&](std::size_t n) {
-    Block& block = *in_view_[n];
+  each_block([&](Block& block) {
     block.any_asked_in_image = false;
     for (const std::uint32_t v : block.vertices) {
       const Eigen::Vector3d seen = projector_->project(mesh_.vertices[v]);
@@ -337,30 +341,28 @@ void ViewFinder::rate_triangles(double sharpness) {
   each_rated([&](std::uint32_t t) { qualities_[t] = rate(t, sharpness); });
 }
 
+// In the order of the points.
 std::vector<bool> ViewFinder::hidden(const std::vector<Eigen::Vector3d>& points) const {
   const Eigen::Vector3d& origin = projector_->position();
-  std::vector<std::uint8_t> flags(points.size(), 0);
-  parallel_for(points.size(), points_per_chunk, [&](std::size_t begin, std::size_t end) {
-    std::vector<Eigen::Vector3d> directions;
-    directions.reserve(end - begin);
-    // Rays end before the surface itself.
-    for (std::size_t i = begin; i < end; ++i) {
-      const Eigen::Vector3d way = points[i] - origin;
-      directions.push_back(way * std::max(0.0, 1.0 - options_.occlusion_tolerance_m / way.norm()));
-    }
-    std::vector<RayHit> hits(directions.size());
-    caster_.cast_bundle(origin, directions, hits, 0.0, 1.0);
-    for (std::size_t i = 0; i < hits.size(); ++i)
-      flags[begin + i] = hits[i].triangle != RayHit::no_triangle;
-  });
-  return {flags.begin(), flags.end()};
+  std::vector<Eigen::Vector3d> directions;
+  directions.reserve(points.size());
+  // Rays end before the surface itself.
+  for (const Eigen::Vector3d& point : points) {
+    const Eigen::Vector3d way = point - origin;
+    directions.push_back(way * std::max(0.0, 1.0 - options_.occlusion_tolerance_m / way.norm()));
+  }
+  std::vector<RayHit> hits(directions.size());
+  caster_.cast_bundle(origin, directions, hits, 0.0, 1.0);
+  std::vector<bool> flags(hits.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) flags[i] = hits[i].triangle != RayHit::no_triangle;
+  return flags;
 }
 
 void ViewFinder::cast_to_vertices() {
-  std::vector<std::uint32_t> wanted;
-  std::vector<Eigen::Vector3d> points;
-  for (const Block* block : in_view_)
-    for (const std::uint32_t v : block->vertices) {
+  each_block([this](const Block& block) {
+    std::vector<std::uint32_t> wanted;
+    std::vector<Eigen::Vector3d> points;
+    for (const std::uint32_t v : block.vertices) {
       if (!vertices_[v].in_image) continue;
       const auto around = around_.of(v);
       if (std::none_of(around.begin(), around.end(),
@@ -369,8 +371,9 @@ void ViewFinder::cast_to_vertices() {
       wanted.push_back(v);
       points.push_back(mesh_.vertices[v]);
     }
-  const std::vector<bool> blocked = hidden(points);
-  for (std::size_t i = 0; i < wanted.size(); ++i) vertices_[wanted[i]].visible = !blocked[i];
+    const std::vector<bool> blocked = hidden(points);
+    for (std::size_t i = 0; i < wanted.size(); ++i) vertices_[wanted[i]].visible = !blocked[i];
+  });
 }
 
 float ViewFinder::longest_side_px(const Triangle& triangle) const {
@@ -384,10 +387,10 @@ float ViewFinder::longest_side_px(const Triangle& triangle) const {
 }
 
 void ViewFinder::test_triangles() {
-  std::vector<std::uint32_t> wanted;
-  std::vector<Eigen::Vector3d> centers;
-  for (const Block* block : in_view_)
-    for (const std::uint32_t t : block->rated) {
+  each_block([this](const Block& block) {
+    std::vector<std::uint32_t> wanted;
+    std::vector<Eigen::Vector3d> centers;
+    for (const std::uint32_t t : block.rated) {
       if (!(qualities_[t] > 0.0F)) continue;
       const Triangle& triangle = mesh_.triangles[t];
       if (!vertices_[triangle[0]].visible || !vertices_[triangle[1]].visible ||
@@ -398,9 +401,10 @@ void ViewFinder::test_triangles() {
         centers.push_back(center_of(mesh_, triangle));
       }
     }
-  const std::vector<bool> blocked = hidden(centers);
-  for (std::size_t i = 0; i < wanted.size(); ++i)
-    if (blocked[i]) qualities_[wanted[i]] = 0.0F;
+    const std::vector<bool> blocked = hidden(centers);
+    for (std::size_t i = 0; i < wanted.size(); ++i)
+      if (blocked[i]) qualities_[wanted[i]] = 0.0F;
+  });
 }
 
 // The least of its triangles; 0 where one is not seen. Triangles without area do not count.
@@ -419,8 +423,8 @@ void ViewFinder::keep(std::uint32_t photo) {
         views_.of_triangles.insert(t, {photo, qualities_[t]});
     });
   if (request_.views_a_vertex > 0)
-    parallel_each(in_view_.size(), [&](std::size_t n) {
-      for (const std::uint32_t v : in_view_[n]->vertices) {
+    each_block([&](const Block& block) {
+      for (const std::uint32_t v : block.vertices) {
         const float quality = is_asked_[v] ? quality_at(v) : 0.0F;
         if (quality > 0.0F) views_.of_vertices.insert(v, {photo, quality});
       }
