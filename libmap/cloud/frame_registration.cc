@@ -24,53 +24,40 @@ constexpr double tolerance = 1e-8;
 // Ranges of elements whose sums are made side by side and joined in their order.
 constexpr std::size_t sum_ranges = 16;
 
-struct Equation {
-  std::uint32_t frame = 0;
-  double height = 0.0;
-  double information = 0.0;  // inverse variance
-  double weight = 0.0;       // the same, made robust
-  Vector6d slope;            // of the height: by a turn, by a shift
-};
-
 // Sums over the frames' corrections; heights about the mean of each element.
 class Adjustment {
  public:
   Adjustment(std::span<const SurfaceElement> elements,
              std::span<const SurfaceObservation> observations,
              std::span<const Eigen::Vector3d> centers, const FrameRegistrationOptions& options)
-      : options_(options), corrections_(centers.size(), Vector6d::Zero()) {
+      : elements_(elements),
+        observations_(observations),
+        centers_(centers),
+        scatter2_(options.scatter_m * options.scatter_m),
+        share_(
+            std::min(1.0, options.independent_heights * static_cast<double>(centers.size()) /
+                              static_cast<double>(std::max<std::size_t>(1, observations.size())))),
+        weights_(observations.size()),
+        corrections_(centers.size(), Vector6d::Zero()) {
     const double turn = options.rotation_error_deg * std::numbers::pi / 180.0;
     prior_.head<3>().setConstant(1.0 / (turn * turn));
     prior_.tail<3>().setConstant(1.0 / (options.place_error_m * options.place_error_m));
-    const double scatter = options.scatter_m * options.scatter_m;
-    const double share =
-        std::min(1.0, options.independent_heights * static_cast<double>(centers.size()) /
-                          static_cast<double>(std::max<std::size_t>(1, observations.size())));
-    for (const SurfaceObservation& one : observations) {
-      const SurfaceElement& element = elements[one.element];
-      Equation equation;
-      equation.frame = one.frame;
-      equation.height = static_cast<double>(one.height_m);
-      equation.information = share / (static_cast<double>(one.variance_m2) + scatter);
-      const Eigen::Vector3d normal = element.normal.cast<double>();
-      const Eigen::Vector3d arm = element.position.cast<double>() - centers[one.frame];
-      equation.slope << arm.cross(normal), normal;
-      if (starts_.empty() || one.element != last_element_) starts_.push_back(equations_.size());
-      last_element_ = one.element;
-      equations_.push_back(equation);
+    for (std::size_t n = 0; n < observations.size(); ++n) {
+      weights_[n] = information(observations[n]);
+      if (n == 0 || observations[n].element != observations[n - 1].element) starts_.push_back(n);
     }
-    starts_.push_back(equations_.size());
+    starts_.push_back(observations.size());
   }
 
   double disagreement() const {
     double squares = 0.0;
     double weights = 0.0;
     each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_of(begin, end, [&](const Equation& e) { return residual(e); });
+      const double mean = mean_of(begin, end, [&](const auto& one) { return residual(one); });
       for (std::size_t n = begin; n < end; ++n) {
-        const double off = residual(equations_[n]) - mean;
-        squares += equations_[n].weight * off * off;
-        weights += equations_[n].weight;
+        const double off = residual(observations_[n]) - mean;
+        squares += weights_[n] * off * off;
+        weights += weights_[n];
       }
     });
     return weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
@@ -79,24 +66,21 @@ class Adjustment {
   double correction() const {
     double squares = 0.0;
     double weights = 0.0;
-    for (const Equation& equation : equations_) {
-      const double change = equation.slope.dot(corrections_[equation.frame]);
-      squares += equation.weight * change * change;
-      weights += equation.weight;
+    for (std::size_t n = 0; n < observations_.size(); ++n) {
+      const double change = slope(observations_[n]).dot(corrections_[observations_[n].frame]);
+      squares += weights_[n] * change * change;
+      weights += weights_[n];
     }
     return weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
   }
 
   void weigh() {
-    const double scale = options_.scatter_m * options_.scatter_m;
-    for (Equation& equation : equations_)
-      if (!(equation.weight > 0.0)) equation.weight = equation.information;
     each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_of(begin, end, [&](const Equation& e) { return residual(e); });
+      const double mean = mean_of(begin, end, [&](const auto& one) { return residual(one); });
       for (std::size_t n = begin; n < end; ++n) {
-        const double off = residual(equations_[n]) - mean;
-        const double share = scale / (scale + off * off);
-        equations_[n].weight = equations_[n].information * share * share;
+        const double off = residual(observations_[n]) - mean;
+        const double share = scatter2_ / (scatter2_ + off * off);
+        weights_[n] = information(observations_[n]) * share * share;
       }
     });
   }
@@ -106,7 +90,7 @@ class Adjustment {
     std::vector<Vector6d> gradient(corrections_.size());
     for (std::size_t f = 0; f < gradient.size(); ++f)
       gradient[f] = -prior_.cwiseProduct(corrections_[f]);
-    accumulate([&](const Equation& e) { return -residual(e); }, gradient);
+    accumulate([&](const auto& one) { return -residual(one); }, gradient);
     const std::vector<Matrix6d> inverses = block_inverses();
     std::vector<Vector6d> residuals = gradient;
     std::vector<Vector6d> direction(residuals.size(), Vector6d::Zero());
@@ -125,7 +109,7 @@ class Adjustment {
       before = rho;
       for (std::size_t f = 0; f < residuals.size(); ++f)
         product[f] = prior_.cwiseProduct(direction[f]);
-      accumulate([&](const Equation& e) { return e.slope.dot(direction[e.frame]); }, product);
+      accumulate([&](const auto& one) { return slope(one).dot(direction[one.frame]); }, product);
       double curvature = 0.0;
       for (std::size_t f = 0; f < residuals.size(); ++f) curvature += direction[f].dot(product[f]);
       const double alpha = rho / curvature;
@@ -149,13 +133,26 @@ class Adjustment {
     double sum = 0.0;
     double weights = 0.0;
     for (std::size_t n = begin; n < end; ++n) {
-      sum += equations_[n].weight * value(equations_[n]);
-      weights += equations_[n].weight;
+      sum += weights_[n] * value(observations_[n]);
+      weights += weights_[n];
     }
     return weights > 0.0 ? sum / weights : 0.0;
   }
-  double residual(const Equation& equation) const {
-    return equation.height + equation.slope.dot(corrections_[equation.frame]);
+  double information(const SurfaceObservation& one) const {  // inverse variance
+    return share_ / (static_cast<double>(one.variance_m2) + scatter2_);
+  }
+  // Of the height: by a turn, by a shift of its frame. Computed anew each time: kept, it would be
+  // most of the memory of a long scan's fusion.
+  Vector6d slope(const SurfaceObservation& one) const {
+    const Eigen::Vector3d normal = elements_[one.element].normal.cast<double>();
+    const Eigen::Vector3d arm =
+        elements_[one.element].position.cast<double>() - centers_[one.frame];
+    Vector6d slope;
+    slope << arm.cross(normal), normal;
+    return slope;
+  }
+  double residual(const SurfaceObservation& one) const {
+    return static_cast<double>(one.height_m) + slope(one).dot(corrections_[one.frame]);
   }
   // Adds J' W (value - its mean on the element): the elements' heights are eliminated.
   template <typename Value>
@@ -172,8 +169,8 @@ class Adjustment {
             const std::size_t end = starts_[element + 1];
             const double mean = mean_of(begin, end, value);
             for (std::size_t n = begin; n < end; ++n) {
-              const Equation& equation = equations_[n];
-              part[equation.frame] += equation.weight * (value(equation) - mean) * equation.slope;
+              const SurfaceObservation& one = observations_[n];
+              part[one.frame] += weights_[n] * (value(one) - mean) * slope(one);
             }
           }
           return part;
@@ -185,17 +182,22 @@ class Adjustment {
   }
   std::vector<Matrix6d> block_inverses() const {
     std::vector<Matrix6d> blocks(corrections_.size(), prior_.asDiagonal());
-    for (const Equation& equation : equations_)
-      blocks[equation.frame] += equation.weight * equation.slope * equation.slope.transpose();
+    for (std::size_t n = 0; n < observations_.size(); ++n) {
+      const Vector6d by_step = slope(observations_[n]);
+      blocks[observations_[n].frame] += weights_[n] * by_step * by_step.transpose();
+    }
     for (Matrix6d& block : blocks) block = block.llt().solve(Matrix6d::Identity());
     return blocks;
   }
 
-  const FrameRegistrationOptions& options_;
+  std::span<const SurfaceElement> elements_;
+  std::span<const SurfaceObservation> observations_;
+  std::span<const Eigen::Vector3d> centers_;
+  double scatter2_;  // m2
+  double share_;     // of its information that an observation counts with
   Vector6d prior_;
-  std::vector<Equation> equations_;
-  std::vector<std::size_t> starts_;  // of each element's equations
-  std::uint32_t last_element_ = 0;
+  std::vector<double> weights_;      // of the observations: their information, made robust
+  std::vector<std::size_t> starts_;  // of each element's observations
   std::vector<Vector6d> corrections_;
 };
 
