@@ -24,6 +24,7 @@ struct RefineOptions {
   std::string calibration;
   std::string new_calibration;
   std::vector<std::string> known_lengths;
+  std::string board;
   bool nodes = false;
   bool strict = false;
   libmap::RefinementOptions refinement;
@@ -269,6 +270,7 @@ void refine(RefineOptions& options, Run& run) {
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
   const bool is_depth_scale = options.refinement.known_lengths.empty() &&
+                              !options.refinement.board &&
                               options.refinement.scale_from == libmap::ScaleSource::depth;
   if (is_depth_scale && result.findings.empty())
     run.detail("{}", result.scale);
@@ -304,6 +306,9 @@ int main(int argc, char** argv) {
   command.option("--known-length", "NODE:X:Y-NODE:X:Y=METERS", options.known_lengths,
                  "measured distance between what two pixels of pictures show; repeatable; "
                  "determines the scale");
+  command.option("--board", "COLUMNSxROWS:METERS", options.board,
+                 "inner corners, and side of a square, of a chessboard that lies still in the "
+                 "scene; determines the scale");
   command.option("--report", "FILE.json|FILE.txt", options.reports,
                  "what each stage did, and how certain the poses are");
   command.option("--feature-cache", "FOLDER|off", options.feature_cache,
@@ -315,6 +320,7 @@ int main(int argc, char** argv) {
   return command.run(argc, argv, [&](Run& run) {
     for (const std::string& text : options.known_lengths)
       options.refinement.known_lengths.push_back(libmap::parse_known_length(text));
+    if (!options.board.empty()) options.refinement.board = libmap::parse_known_board(options.board);
     // Of a folder .colmap, beside which other files lie.
     options.output = without_trailing_slash(options.output);
     refine(options, run);

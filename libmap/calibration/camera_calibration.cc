@@ -30,14 +30,6 @@ std::size_t corner_count(const Chessboard& board) {
   return static_cast<std::size_t>(board.columns) * static_cast<std::size_t>(board.rows);
 }
 
-Eigen::Vector3d corner_on_board(const Chessboard& board, std::size_t n) {
-  const auto columns = static_cast<std::size_t>(board.columns);
-  const std::size_t row = n / columns;
-  const std::size_t column = n % columns;
-  return {static_cast<double>(column) * board.square_mm * 1e-3,
-          static_cast<double>(row) * board.square_mm * 1e-3, 0.0};
-}
-
 std::size_t lens_terms(LensModel lens) {
   constexpr std::array<std::size_t, 4> terms = {0, 5, 8, 4};
   return terms[static_cast<std::size_t>(lens)];
@@ -70,21 +62,20 @@ DistortionModel distortion_of(LensModel lens) {
 
 BoardCorners corners_of(const std::vector<BoardPicture>& pictures, const Chessboard& board) {
   BoardCorners corners;
-  for (std::size_t n = 0; n < corner_count(board); ++n)
-    corners.in_board.push_back(corner_on_board(board, n));
+  corners.in_board = corners_on_board(board);
   for (const BoardPicture& picture : pictures) corners.in_images.push_back(picture.corners);
   return corners;
 }
 
-Points3 board_points(const BoardCorners& corners) {
+Points3 board_points(const std::vector<Eigen::Vector3d>& in_board) {
   Points3 points;
-  for (const Eigen::Vector3d& corner : corners.in_board)
+  for (const Eigen::Vector3d& corner : in_board)
     points.emplace_back(static_cast<float>(corner.x()), static_cast<float>(corner.y()), 0.0F);
   return points;
 }
 
 BoardFit fit_by_opencv(const BoardCorners& corners, int width, int height, LensModel lens) {
-  const std::vector<Points3> boards(corners.in_images.size(), board_points(corners));
+  const std::vector<Points3> boards(corners.in_images.size(), board_points(corners.in_board));
   std::vector<Points2> images;
   for (const auto& in_image : corners.in_images) {
     images.emplace_back();
@@ -117,23 +108,32 @@ BoardFit fit_by_opencv(const BoardCorners& corners, int width, int height, LensM
   return fit;
 }
 
+std::optional<Pose> pose_by_rays(const std::vector<Eigen::Vector3d>& in_board,
+                                 const std::vector<Eigen::Vector2d>& rays) {
+  Points2 points;
+  for (const Eigen::Vector2d& ray : rays)
+    points.emplace_back(static_cast<float>(ray.x()), static_cast<float>(ray.y()));
+  cv::Mat rotation;
+  cv::Mat translation;
+  if (!cv::solvePnP(board_points(in_board), points, cv::Mat::eye(3, 3, CV_64F), cv::noArray(),
+                    rotation, translation, false, cv::SOLVEPNP_IPPE))
+    return std::nullopt;
+  return pose_of(rotation, translation);
+}
+
 // Every board by itself, the camera as it is. Nothing if a corner has no ray.
 std::optional<BoardFit> with_poses(const Camera& camera, const BoardCorners& corners) {
   BoardFit fit{camera, {}};
-  const Points3 board = board_points(corners);
   for (const auto& in_image : corners.in_images) {
-    Points2 rays;
+    std::vector<Eigen::Vector2d> rays;
     for (const Eigen::Vector2d& corner : in_image) {
       const auto ray = pixel_to_ray(camera, corner);
       if (!ray) return std::nullopt;
-      rays.emplace_back(static_cast<float>(ray->x()), static_cast<float>(ray->y()));
+      rays.push_back(*ray);
     }
-    cv::Mat rotation;
-    cv::Mat translation;
-    if (!cv::solvePnP(board, rays, cv::Mat::eye(3, 3, CV_64F), cv::noArray(), rotation, translation,
-                      false, cv::SOLVEPNP_IPPE))
-      return std::nullopt;
-    fit.camera_from_board.push_back(pose_of(rotation, translation));
+    const auto pose = pose_by_rays(corners.in_board, rays);
+    if (!pose) return std::nullopt;
+    fit.camera_from_board.push_back(*pose);
   }
   return fit;
 }
@@ -202,10 +202,10 @@ CalibratedPicture calibrated(const BoardPicture& picture, const Camera& camera, 
   result.name = picture.name;
   result.camera_from_board = pose;
   result.corners = picture.corners;
+  const std::vector<Eigen::Vector3d> in_board = corners_on_board(board);
   double sum = 0.0;
   for (std::size_t n = 0; n < picture.corners.size(); ++n) {
-    const Eigen::Vector2d residual =
-        picture.corners[n] - board_pixel(camera, pose, corner_on_board(board, n));
+    const Eigen::Vector2d residual = picture.corners[n] - board_pixel(camera, pose, in_board[n]);
     result.residuals_px.push_back(residual);
     sum += residual.squaredNorm();
     result.max_px = std::max(result.max_px, residual.norm());
@@ -376,6 +376,24 @@ std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& ima
   }
   if (corners.empty()) return std::nullopt;
   return corners;
+}
+
+std::vector<Eigen::Vector3d> corners_on_board(const Chessboard& board) {
+  std::vector<Eigen::Vector3d> corners;
+  for (int row = 0; row < board.rows; ++row)
+    for (int column = 0; column < board.columns; ++column)
+      corners.emplace_back(column * board.square_mm * 1e-3, row * board.square_mm * 1e-3, 0.0);
+  return corners;
+}
+
+std::optional<Pose> locate_chessboard(const std::vector<Eigen::Vector2d>& rays,
+                                      const Chessboard& board) {
+  if (rays.size() != corner_count(board)) return std::nullopt;
+  try {
+    return pose_by_rays(corners_on_board(board), rays);
+  } catch (const cv::Exception&) {
+    return std::nullopt;
+  }
 }
 
 GrayImage stretch_contrast(const Image<std::uint16_t>& image) {

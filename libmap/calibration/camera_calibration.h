@@ -33,6 +33,15 @@ std::vector<std::pair<std::string, LensModel>> lens_model_names();
 std::optional<std::vector<Eigen::Vector2d>> find_chessboard(const GrayImage& image,
                                                             const Chessboard& board);
 
+// The corners in the board's frame, m, in the order of find_chessboard: x along the rows, y along
+// the columns, from the first corner on.
+std::vector<Eigen::Vector3d> corners_on_board(const Chessboard& board);
+
+// Where the board is to a camera (optical frame) that sees its corners along these rays, x/z and
+// y/z: camera_from_board by IPPE (Collins and Bartoli 2014). Nothing if no pose explains them.
+std::optional<Pose> locate_chessboard(const std::vector<Eigen::Vector2d>& rays,
+                                      const Chessboard& board);
+
 // Infrared pictures use few of their 16 bits: from the 1st to the 99th percentile, stretched.
 GrayImage stretch_contrast(const Image<std::uint16_t>& image);
 
@@ -52,7 +61,7 @@ void bind(ParameterTable& table, CameraCalibrationOptions& options);  // all but
 
 struct CalibratedPicture {
   std::string name{};
-  Pose camera_from_board = Pose::Identity();  // board: x along its rows, y along its columns, m
+  Pose camera_from_board = Pose::Identity();  // board: as corners_on_board
   double rms_px = 0.0;                        // of the distances in the image
   double max_px = 0.0;
   double tilt_deg = 0.0;  // between the board's normal and the optical axis

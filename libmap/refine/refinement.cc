@@ -112,6 +112,8 @@ void Refinement::start() {
 }
 
 void Refinement::find_frames() {
+  if (options_.board && !options_.known_lengths.empty())
+    throw Error("known lengths determine the scale already", {.field = "board"});
   std::vector<int> nodes;
   for (const auto& [node, pose] : poses_) nodes.push_back(node);
   nodes.insert(nodes.end(), tracked_.begin(), tracked_.end());
@@ -131,6 +133,12 @@ void Refinement::find_frames() {
   stage.figures = {{"frames", static_cast<double>(frames_.size())},
                    {"features", static_cast<double>(result_.features)},
                    {"without_depth", static_cast<double>(without_depth)}};
+  close(std::move(stage));
+  if (!options_.board) return;
+  board_views_ = find_boards(scan_, frames_, *options_.board, progress_);
+  stage = {};
+  stage.name = "board";
+  stage.figures = {{"pictures", static_cast<double>(board_views_.size())}};
   close(std::move(stage));
 }
 
@@ -344,6 +352,14 @@ void Refinement::finish() {
   result_.findings = findings(result_.calibration, result_.cameras);
   result_.components = graph_.components;
   result_.without_links = graph_.without_links;
+  if (result_.components.size() > 1)
+    result_.warnings.push_back(
+        "the scan is in " + std::to_string(result_.components.size()) +
+        " parts that no link joins: their poses say nothing about each other");
+}
+
+// In units of the depth camera.
+void Refinement::find_covariances() {
   progress_.begin("covariances", 0);
   const GraphCovariance covariance(poses_, information_, graph_.components);
   progress_.end();
@@ -357,10 +373,6 @@ void Refinement::finish() {
         for (const Vector6d& move : moves->second) of_node += move * move.transpose();
       result_.covariance[node] = scale * scale * of_node;
     }
-  if (result_.components.size() > 1)
-    result_.warnings.push_back(
-        "the scan is in " + std::to_string(result_.components.size()) +
-        " parts that no link joins: their poses say nothing about each other");
 }
 
 RefinementResult Refinement::run() {
@@ -390,6 +402,7 @@ RefinementResult Refinement::run() {
     keep_start_if_better();
     vary_calibration();
   }
+  find_covariances();
   find_scale();
   finish();
   leave_out_unjoined();

@@ -14,6 +14,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
+#include "libmap/refine/board_scale.h"
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/feature_cache.h"
 #include "libmap/refine/features.h"
@@ -33,7 +34,7 @@ namespace libmap {
 // automatic: if what was held out fits better then, by more than chance explains.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
-// What determines the scale where no lengths are known.
+// What determines the scale where neither lengths nor a board are known.
 enum class ScaleSource { depth, odometry };
 
 struct RefinementOptions {
@@ -50,6 +51,7 @@ struct RefinementOptions {
   IcpOptions icp{};
   ScaleSource scale_from = ScaleSource::depth;
   std::vector<KnownLength> known_lengths{};  // not bound; they determine the scale
+  std::optional<Chessboard> board{};         // not bound; at rest in the scene, does so too
   bool one_map = false;  // not bound: parts that nothing joins to the largest get no poses
   std::uint64_t seed = 1;
 };
@@ -100,7 +102,7 @@ struct RefinementResult {
 // visual); those of its parts that nothing joins to the largest one are left out of the poses, for
 // they would lie anywhere. The same bytes for any number of threads. Throws Error: options out of
 // their ranges, poses asked for that the scan has not, no two frames that could be matched where
-// nothing else gives poses.
+// nothing else gives poses, a board that does not determine the scale.
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options = {},
                               Progress& progress = no_progress(), const FeatureCache& cache = {});
 

@@ -198,15 +198,23 @@ void Refinement::find_scale() {
   const auto times = [](const ScaleEstimate& scale) {
     return "x " + to_fixed_text(scale.factor, 5) + " +- " + to_fixed_text(scale.deviation, 5);
   };
+  const std::vector<FrameFeatures>& frames = stored_frames_.empty() ? frames_ : stored_frames_;
+  const auto warn_if_apart = [&](const std::string& what, double chi_square) {
+    if (chi_square > 9.0)
+      result_.warnings.push_back(what + " disagree by " + to_fixed_text(std::sqrt(chi_square), 1) +
+                                 " times their noise");
+  };
   std::optional<ScaleEstimate> scale;
   if (!options_.known_lengths.empty()) {
-    scale = scale_by_lengths(stored_frames_.empty() ? frames_ : stored_frames_, result_.calibration,
-                             poses_, options_.known_lengths);
+    scale = scale_by_lengths(frames, result_.calibration, poses_, options_.known_lengths);
     result_.scale = "scale " + times(*scale) + " by known lengths: corrected";
-    if (scale->chi_square > 9.0)
-      result_.warnings.push_back("known lengths disagree by " +
-                                 to_fixed_text(std::sqrt(scale->chi_square), 1) +
-                                 " times their noise");
+    warn_if_apart("known lengths", scale->chi_square);
+  } else if (options_.board) {
+    scale = scale_by_board(frames, result_.calibration, poses_, result_.covariance, board_views_,
+                           *options_.board);
+    result_.scale = "scale " + times(*scale) + " by the board in " +
+                    std::to_string(scale->lengths) + " pictures: corrected";
+    warn_if_apart("pictures of the board", scale->chi_square);
   } else if (options_.scale_from == ScaleSource::odometry) {
     if (!odometry)
       throw Error("the scan has no links of odometry",

@@ -28,7 +28,7 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "then");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "what determines the scale where no lengths are known");
+            "what determines the scale where neither lengths nor a board are known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "of all that is random");

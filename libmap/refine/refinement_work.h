@@ -52,6 +52,7 @@ class Refinement {
   void icp();
   void vary_calibration();
   void keep_start_if_better();
+  void find_covariances();
   void find_scale();
   void finish();
   Trajectory trajectory(const std::map<int, Pose>& poses) const;
@@ -74,6 +75,7 @@ class Refinement {
   std::vector<std::vector<int>> parts_;
   std::vector<FrameFeatures> frames_;
   std::vector<FrameFeatures> stored_frames_;  // before an accepted calibration
+  std::vector<BoardView> board_views_;
   std::vector<GraphLink> stored_;
   std::set<int> tracked_;  // nodes whose poses are by visual odometry
   std::vector<FeatureLink> links_;

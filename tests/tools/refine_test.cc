@@ -357,6 +357,21 @@ TEST(RefineScans, OverlappingOnesAreJoinedAndOthersAreReported) {
   EXPECT_TRUE(bad_input(graspmap({"refine", "a.db", "a.db", "-o", "p.tum"}), {"a.db"}));
 }
 
+TEST(RefineScans, BoardsThatAreNotThereAreBadInput) {
+  write_scan("a.db", "1", "0", "1");
+  const auto refined = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words = {"refine", "a.db", "-o", "p.tum"};
+    words.insert(words.end(), options.begin(), options.end());
+    return graspmap(words);
+  };
+  EXPECT_TRUE(bad_input(refined({"--board", "8x6"}), {"board is 8x6", "METERS > 0"}));
+  EXPECT_TRUE(bad_input(refined({"--board", "8x6:0.03"}),
+                        {"a.db", "board is 8x6:0.03", "pictures of 0 nodes"}));
+  EXPECT_TRUE(bad_input(refined({"--board", "8x6:0.03", "--known-length", "1:20:60-1:100:60.5=1"}),
+                        {"board", "known lengths determine the scale already"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
+}
+
 TEST(Refine, BadInputIsOneLine) {
   GRASPMAP_REQUIRE_DATA();
   const std::string scan = scan_file("site_tiny_q.db");

@@ -260,10 +260,12 @@ py::dict report_of(const libmap::StageReport& stage) {
 }
 
 py::dict refine(const ScanSource& scan, const std::vector<std::string>& known_lengths,
-                const py::dict& values, const py::object& progress, unsigned threads) {
+                const std::optional<std::string>& board, const py::dict& values,
+                const py::object& progress, unsigned threads) {
   auto options = options_from<libmap::RefinementOptions>(values);
   for (const std::string& text : known_lengths)
     options.known_lengths.push_back(libmap::parse_known_length(text));
+  if (board) options.board = libmap::parse_known_board(*board);
   libmap::RefinementResult result = run(threads, progress, [&](libmap::Progress& bar) {
     return in_file(scan.path(), [&] { return libmap::refine_poses(scan, options, bar); });
   });

@@ -107,15 +107,17 @@ def read_manifest(path: _Path) -> dict[str, Any] | None:
     return None if text is None else _json.loads(text)
 
 
-def refine(scan: Scan, *, known_lengths: Sequence[str] = (), options: _Options = None,
-           progress: _Progress = None, threads: int = 0,
+def refine(scan: Scan, *, known_lengths: Sequence[str] = (), board: str | None = None,
+           options: _Options = None, progress: _Progress = None, threads: int = 0,
            **values: "Unpack[_options.RefineOptions]") -> RefineResult:
     """Refines the poses of a scan: loop closures, pose graph, bundle adjustment, depth.
 
-    known_lengths: "NODE:X,Y-NODE:X,Y=METERS" each, as --known-length.
+    known_lengths: "NODE:X:Y-NODE:X:Y=METERS" each, as --known-length.
+    board: "COLUMNSxROWS:METERS", as --board.
     """
     return RefineResult(
-        **_core.refine(scan, list(known_lengths), _merged(options, values), progress, threads))
+        **_core.refine(scan, list(known_lengths), board, _merged(options, values), progress,
+                       threads))
 
 
 def fuse(scan: Scan, poses: Poses | None = None, *, options: _Options = None,
