@@ -20,7 +20,7 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 constexpr int robust_rounds = 3;
 constexpr int max_iterations = 200;
-constexpr double tolerance = 1e-8;
+constexpr double tolerance = 1e-6;  // of the gradient at the start
 // Ranges of elements whose sums are made side by side and joined in their order.
 constexpr std::size_t sum_ranges = 16;
 
@@ -53,7 +53,7 @@ class Adjustment {
     double squares = 0.0;
     double weights = 0.0;
     each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_of(begin, end, [&](const auto& one) { return residual(one); });
+      const double mean = mean_residual(begin, end);
       for (std::size_t n = begin; n < end; ++n) {
         const double off = residual(observations_[n]) - mean;
         squares += weights_[n] * off * off;
@@ -76,7 +76,7 @@ class Adjustment {
 
   void weigh() {
     each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_of(begin, end, [&](const auto& one) { return residual(one); });
+      const double mean = mean_residual(begin, end);
       for (std::size_t n = begin; n < end; ++n) {
         const double off = residual(observations_[n]) - mean;
         const double share = scatter2_ / (scatter2_ + off * off);
@@ -90,26 +90,28 @@ class Adjustment {
     std::vector<Vector6d> gradient(corrections_.size());
     for (std::size_t f = 0; f < gradient.size(); ++f)
       gradient[f] = -prior_.cwiseProduct(corrections_[f]);
-    accumulate([&](const auto& one) { return -residual(one); }, gradient);
+    accumulate([&](const auto& one, const Vector6d& slope) { return -residual(one, slope); },
+               gradient);
     const std::vector<Matrix6d> inverses = block_inverses();
     std::vector<Vector6d> residuals = gradient;
     std::vector<Vector6d> direction(residuals.size(), Vector6d::Zero());
     std::vector<Vector6d> product(residuals.size());
     double before = 0.0;
-    double first = 0.0;
     for (int iteration = 0; iteration < max_iterations; ++iteration) {
       double rho = 0.0;
       for (std::size_t f = 0; f < residuals.size(); ++f)
         rho += residuals[f].dot(inverses[f] * residuals[f]);
-      if (iteration == 0) first = rho;
-      if (!(rho > tolerance * tolerance * first)) break;
+      if (first_rho_ == 0.0) first_rho_ = rho;
+      if (!(rho > tolerance * tolerance * first_rho_)) break;
       for (std::size_t f = 0; f < residuals.size(); ++f)
         direction[f] =
             inverses[f] * residuals[f] + (iteration == 0 ? 0.0 : rho / before) * direction[f];
       before = rho;
       for (std::size_t f = 0; f < residuals.size(); ++f)
         product[f] = prior_.cwiseProduct(direction[f]);
-      accumulate([&](const auto& one) { return slope(one).dot(direction[one.frame]); }, product);
+      accumulate(
+          [&](const auto& one, const Vector6d& slope) { return slope.dot(direction[one.frame]); },
+          product);
       double curvature = 0.0;
       for (std::size_t f = 0; f < residuals.size(); ++f) curvature += direction[f].dot(product[f]);
       const double alpha = rho / curvature;
@@ -128,12 +130,11 @@ class Adjustment {
   void each_element(const Use& use) const {
     for (std::size_t n = 0; n < elements(); ++n) use(starts_[n], starts_[n + 1]);
   }
-  template <typename Value>
-  double mean_of(std::size_t begin, std::size_t end, const Value& value) const {
+  double mean_residual(std::size_t begin, std::size_t end) const {
     double sum = 0.0;
     double weights = 0.0;
     for (std::size_t n = begin; n < end; ++n) {
-      sum += weights_[n] * value(observations_[n]);
+      sum += weights_[n] * residual(observations_[n]);
       weights += weights_[n];
     }
     return weights > 0.0 ? sum / weights : 0.0;
@@ -151,10 +152,12 @@ class Adjustment {
     slope << arm.cross(normal), normal;
     return slope;
   }
-  double residual(const SurfaceObservation& one) const {
-    return static_cast<double>(one.height_m) + slope(one).dot(corrections_[one.frame]);
+  double residual(const SurfaceObservation& one, const Vector6d& slope) const {
+    return static_cast<double>(one.height_m) + slope.dot(corrections_[one.frame]);
   }
-  // Adds J' W (value - its mean on the element): the elements' heights are eliminated.
+  double residual(const SurfaceObservation& one) const { return residual(one, slope(one)); }
+  // Adds J' W (value - its mean on the element): the elements' heights are eliminated. `value` is
+  // of an observation and its slope.
   template <typename Value>
   void accumulate(const Value& value, std::vector<Vector6d>& sums) const {
     using Sums = std::vector<Vector6d>;
@@ -164,14 +167,25 @@ class Adjustment {
         elements(), grain, std::move(sums),
         [&](std::size_t first, std::size_t last) {
           Sums part = zero;
+          std::vector<Vector6d> slopes;
+          std::vector<double> values;
           for (std::size_t element = first; element < last; ++element) {
             const std::size_t begin = starts_[element];
             const std::size_t end = starts_[element + 1];
-            const double mean = mean_of(begin, end, value);
+            slopes.clear();
+            values.clear();
+            double sum = 0.0;
+            double weights = 0.0;
             for (std::size_t n = begin; n < end; ++n) {
-              const SurfaceObservation& one = observations_[n];
-              part[one.frame] += weights_[n] * (value(one) - mean) * slope(one);
+              slopes.push_back(slope(observations_[n]));
+              values.push_back(value(observations_[n], slopes.back()));
+              sum += weights_[n] * values.back();
+              weights += weights_[n];
             }
+            const double mean = weights > 0.0 ? sum / weights : 0.0;
+            for (std::size_t n = begin; n < end; ++n)
+              part[observations_[n].frame] +=
+                  weights_[n] * (values[n - begin] - mean) * slopes[n - begin];
           }
           return part;
         },
@@ -199,6 +213,7 @@ class Adjustment {
   std::vector<double> weights_;      // of the observations: their information, made robust
   std::vector<std::size_t> starts_;  // of each element's observations
   std::vector<Vector6d> corrections_;
+  double first_rho_ = 0.0;  // preconditioned square of the gradient at the start
 };
 
 }  // namespace
