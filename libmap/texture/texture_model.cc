@@ -57,7 +57,7 @@ class Texturing {
 
   TextureResult whole(const TriangleMesh& mesh);
   std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
-  void even_out(const std::vector<ColorObservation>& observations);
+  void even_out(std::vector<ColorObservation> observations);
   PieceTexturing::Piece piece(MeshWithMargin part);
   TextureReport& report() { return report_; }
 
@@ -104,8 +104,9 @@ MeshWithMargin Texturing::cut_finely(MeshWithMargin part) const {
   return {std::move(fine.mesh), static_cast<std::size_t>(own - fine.source.begin())};
 }
 
-void Texturing::even_out(const std::vector<ColorObservation>& observations) {
+void Texturing::even_out(std::vector<ColorObservation> observations) {
   timed("exposure", [&] {
+    look_up_colors(*photos_, observations);
     report_.exposure = even_out_exposure(observations, photos_->size(), options_.exposure);
   });
 }
@@ -173,7 +174,7 @@ TextureResult Texturing::whole(const TriangleMesh& mesh) {
   TextureViews views = timed("views", [&] {
     return find_texture_views(part.mesh, *photos_, options_.views, request, progress_);
   });
-  even_out(views.observations);
+  even_out(std::move(views.observations));
   TexturedMesh model = paint(std::move(part), std::move(views), progress_);
   require_seen(report_);
   return {std::move(report_), std::move(model)};

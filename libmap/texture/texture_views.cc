@@ -74,12 +74,14 @@ class ViewFinder {
     if (std::none_of(in_view_.begin(), in_view_.end(),
                      [](const Block* block) { return block->any_asked_in_image; }))
       return;
-    fill_cells();
     rate_triangles(photos_[photo].sharpness);
     cast_to_vertices();
     test_triangles();
-    devalue_occluded_edges();
-    keep(static_cast<std::uint32_t>(photo));
+    if (wants_views()) {
+      fill_cells();
+      devalue_occluded_edges();
+      keep(static_cast<std::uint32_t>(photo));
+    }
     observe(static_cast<std::uint32_t>(photo));
   }
 
@@ -92,6 +94,7 @@ class ViewFinder {
     bool any_asked_in_image = false;  // of the photograph at hand
   };
 
+  bool wants_views() const { return request_.views_a_vertex > 0 || request_.views_a_triangle > 0; }
   void choose_vertices();
   void make_blocks();
   void find_blocks_in_view();
@@ -143,7 +146,7 @@ class ViewFinder {
   std::vector<std::uint32_t> rated_;
   std::vector<Eigen::Vector3d> normals_;  // of these
   std::vector<std::uint32_t> place_of_;   // of a triangle, among the rated ones
-  std::vector<std::uint32_t> order_;      // of all vertices, by blocks
+  std::vector<std::uint32_t> order_;      // of vertices, by blocks
   std::vector<Block> blocks_;
   // Of the photograph at hand; in other blocks nothing is in the image.
   const PhotoProjector* projector_ = nullptr;
@@ -170,7 +173,7 @@ void ViewFinder::choose_vertices() {
       if (is_asked_[v] && number++ % step == 0) observed_.push_back(v);
     views_.observed_vertices = observed_.size();
   }
-  if (request_.views_a_vertex == 0 && request_.views_a_triangle == 0) {
+  if (!wants_views()) {
     is_asked_.assign(mesh_.vertices.size(), false);
     for (const std::uint32_t v : observed_) is_asked_[v] = true;
   }
@@ -212,14 +215,20 @@ void ViewFinder::make_blocks() {
     for (std::size_t b = 0; b < blocks_.size(); ++b)
       blocks_[b].*member = std::span(numbers).subspan(first[b], first[b + 1] - first[b]);
   };
-  order_.resize(mesh_.vertices.size());
-  std::iota(order_.begin(), order_.end(), 0U);
+  // All that may stand before a surface; for observations, which only ask whether it is hidden, the
+  // corners of the triangles.
+  std::vector<bool> is_needed(mesh_.vertices.size(), wants_views());
+  for (const std::uint32_t t : rated_)
+    for (const std::uint32_t v : mesh_.triangles[t]) is_needed[v] = true;
+  for (std::uint32_t v = 0; v < is_needed.size(); ++v)
+    if (is_needed[v]) order_.push_back(v);
   sort(
       order_, [](std::uint32_t v) { return v; }, &Block::vertices);
   sort(
       rated_, [this](std::uint32_t t) { return mesh_.triangles[t][0]; }, &Block::rated);
   for (Block& block : blocks_)
     for (const std::uint32_t v : block.vertices) block.box.extend(mesh_.vertices[v]);
+  std::erase_if(blocks_, [](const Block& block) { return block.vertices.empty(); });
   place_of_.resize(mesh_.triangles.size());
   normals_.reserve(rated_.size());
   for (const std::uint32_t t : rated_) {
@@ -432,17 +441,10 @@ void ViewFinder::keep(std::uint32_t photo) {
 }
 
 void ViewFinder::observe(std::uint32_t photo) {
-  const Camera& camera = projector_->camera();
-  std::shared_ptr<const ColorImage> image;  // decoded only where it shows any
-  const Eigen::Vector2d middle((camera.width - 1) / 2.0, (camera.height - 1) / 2.0);
   for (std::uint32_t i = 0; i < observed_.size(); ++i) {
     const SeenVertex& vertex = vertices_[observed_[i]];
-    if (!(quality_at(observed_[i]) > 0.0F)) continue;
-    if (!image) image = photos_.image(photo);
-    const Eigen::Vector2d pixel(static_cast<double>(vertex.x), static_cast<double>(vertex.y));
-    views_.observations.push_back(
-        {i, photo, static_cast<float>((pixel - middle).squaredNorm() / middle.squaredNorm()),
-         sample_bilinear(*image, pixel.x(), pixel.y())});
+    if (quality_at(observed_[i]) > 0.0F)
+      views_.observations.push_back({.vertex = i, .photo = photo, .x = vertex.x, .y = vertex.y});
   }
 }
 
@@ -462,6 +464,24 @@ void ViewTable::insert(std::size_t row, ViewQuality view) {
   place = std::min(place, capacity_ - 1);
   for (; place > 0 && before(view, first[place - 1]); --place) first[place] = first[place - 1];
   first[place] = view;
+}
+
+void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations) {
+  std::vector<std::vector<std::size_t>> of_photo(photos.size());
+  for (std::size_t n = 0; n < observations.size(); ++n)
+    of_photo[observations[n].photo].push_back(n);
+  parallel_each(photos.size(), [&](std::size_t photo) {
+    if (of_photo[photo].empty()) return;
+    const Camera& camera = photos[photo].projector.camera();
+    const Eigen::Vector2d middle((camera.width - 1) / 2.0, (camera.height - 1) / 2.0);
+    const std::shared_ptr<const ColorImage> image = photos.image(photo);
+    for (const std::size_t n : of_photo[photo]) {
+      ColorObservation& seen = observations[n];
+      const Eigen::Vector2d pixel(static_cast<double>(seen.x), static_cast<double>(seen.y));
+      seen.radius2 = static_cast<float>((pixel - middle).squaredNorm() / middle.squaredNorm());
+      seen.color = sample_bilinear(*image, pixel.x(), pixel.y());
+    }
+  });
 }
 
 TextureViews find_texture_views(const TriangleMesh& mesh, const TexturePhotos& photos,

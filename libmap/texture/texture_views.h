@@ -55,6 +55,8 @@ class ViewTable {
 struct ColorObservation {
   std::uint32_t vertex = 0;  // of those that are observed
   std::uint32_t photo = 0;
+  float x = 0.0F;  // of its pixel
+  float y = 0.0F;
   float radius2 = 0.0F;  // squared distance from the image's middle, 1 in its corners
   Eigen::Vector3f color = Eigen::Vector3f::Zero();  // 0 to 255
 };
@@ -76,10 +78,13 @@ struct TextureViews {
   // Of vertices of which a photograph sees all triangles whole: the least of their qualities. One
   // row for each vertex up to the last one of the part, empty for those of other triangles alone.
   ViewTable of_vertices;
-  // All views of some of the vertices, spread over the part.
+  // All views of some of the vertices, spread over the part; colors are not looked up yet.
   std::vector<ColorObservation> observations;
   std::size_t observed_vertices = 0;
 };
+
+// Sets radius2 and color of all observations. Decodes each photograph once.
+void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& observations);
 
 // Corners and center of a triangle must be in the photograph and not be hidden (one ray each,
 // Embree). The same for any number of threads. The mesh must have a triangle, and no triangle large

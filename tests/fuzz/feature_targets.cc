@@ -38,8 +38,9 @@ Seeds features_seeds() {
   libmap::FrameFeatures frame;
   frame.features = {{{0.1F, 0.2F}, 1.5F, 0.01F, 0.2F, 0}, {{-0.1F, 0.0F}, 2.5F, 0.01F, 0.2F, 0}};
   frame.descriptors.assign(std::size_t{2} * 128, 7);
-  frame.surfaces.emplace_back(small_cameras().front(), 4,
-                              std::vector<libmap::DepthSurface::Cell>(4, {1.5F, 10, 20, 5, 0}));
+  libmap::DepthSurface::Cell cell{.normal_x = 10, .normal_y = 20, .noise = 5};
+  cell.set_depth_m(1.5F);
+  frame.surfaces.emplace_back(small_cameras().front(), 4, std::vector(4, cell));
   const std::string text = written("cache/seed.features", [&](const std::filesystem::path& path) {
     libmap::FeatureCache(path.parent_path()).write("seed", frame);
   });

@@ -301,8 +301,10 @@ TEST(Exposure, GainsOfPhotographsThatDifferAndLeftOversThatDoNotFit) {
       const double shade = std::exp(-0.3 * static_cast<double>(r2));
       // One of twenty shows something else.
       const double wrong = uniform(0, 1) < 0.05 ? 1.5 : 1.0;
-      observations.push_back(
-          {vertex, photo, r2, (wrong * shade * gains[photo] * color).cast<float>()});
+      observations.push_back({.vertex = vertex,
+                              .photo = photo,
+                              .radius2 = r2,
+                              .color = (wrong * shade * gains[photo] * color).cast<float>()});
     }
   }
   std::shuffle(observations.begin(), observations.end(), random_engine());
