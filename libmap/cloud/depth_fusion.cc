@@ -31,7 +31,7 @@ constexpr std::size_t frames_in_flight = 8;
 constexpr std::uint64_t coarse_pixel_bytes = 60;
 // Elements, about, by which frames are registered: so many, or so many for each frame.
 constexpr std::size_t registration_elements = 20000;
-constexpr std::size_t registration_elements_per_frame = 12;
+constexpr std::size_t registration_elements_per_frame = 40;
 // Voxels that are kept for one such element, at most: noise spreads a surface over more than one,
 // and after each downsampling half of them are left.
 constexpr std::size_t voxels_per_element = 8;

@@ -49,25 +49,26 @@ def run_chain(graspmap, folder, side, frames):
     return found
 
 
-def exponent(first, last, value):
-    """Of a power law of the area through both."""
+def exponent(runs, name, key):
+    """Of a power law of the area through the first and the last run of the stage."""
+    ran = [run for run in runs if name in run["stages"]]
+    first, last = ran[0], ran[-1]
     areas = last["side_m"] ** 2 / first["side_m"] ** 2
-    if areas <= 1 or not value(first) > 0:
+    if areas <= 1:
         return float("nan")
-    return math.log(value(last) / value(first)) / math.log(areas)
+    return math.log(last["stages"][name][key] / first["stages"][name][key]) / math.log(areas)
 
 
 def table_of(runs):
     lines = ["| side m, frames | " + " | ".join(STAGES) + " |", "|---|" + "---|" * len(STAGES)]
     for run in runs:
         lines.append(f"| {run['side_m']}, {run['frames']} | " + " | ".join(
-            f"{run['stages'][name]['processor_s']:.1f} s, {run['stages'][name]['peak_mib']:.0f} MiB"
-            for name in STAGES) + " |")
+            "{processor_s:.1f} s, {peak_mib:.0f} MiB".format(**run["stages"][name])
+            if name in run["stages"] else "not run" for name in STAGES) + " |")
     if len(runs) > 1:
         lines.append("| exponents of area | " + " | ".join(
-            "{:.2f}, {:.2f}".format(*(
-                exponent(runs[0], runs[-1], lambda run, key=key, name=name: run["stages"][name][key])
-                for key in ("processor_s", "peak_mib"))) for name in STAGES) + " |")
+            "{:.2f}, {:.2f}".format(*(exponent(runs, name, key) for key in ("processor_s", "peak_mib")))
+            for name in STAGES) + " |")
     errors = ", ".join(f"{run['rmse_mm'][0]:.1f} -> {run['rmse_mm'][1]:.2f} mm at {run['side_m']} m"
                        for run in runs)
     return "\n".join(lines) + f"\n\nRMSE of the poses, odometry -> refined: {errors}."
@@ -78,10 +79,11 @@ def draw(runs, path):
     matplotlib.use("Agg")
     from matplotlib import pyplot
     figure, axes = pyplot.subplots(1, 2, figsize=(9, 3.6))
-    areas = [run["side_m"] ** 2 for run in runs]
     for axis, key, label in zip(axes, ("processor_s", "peak_mib"), ("processor time, s", "peak memory, MiB")):
         for name in STAGES:
-            axis.loglog(areas, [run["stages"][name][key] for run in runs], "o-", label=name)
+            ran = [run for run in runs if name in run["stages"]]
+            axis.loglog([run["side_m"] ** 2 for run in ran], [run["stages"][name][key] for run in ran],
+                        "o-", label=name)
         axis.set(xlabel="area, m2", ylabel=label)
         axis.grid(True, which="both", alpha=0.3)
     axes[1].legend(fontsize=7)
