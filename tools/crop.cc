@@ -26,6 +26,7 @@ struct CropCommandOptions {
   std::string polygon;
   std::string size;
   bool border = false;
+  std::string border_size;
   std::string up = "auto";
   std::string yaw = "auto";
   bool level = true;
@@ -58,11 +59,11 @@ libmap::Bounds3d box_of(const std::string& text) {
   return box;
 }
 
-Eigen::Vector2d size_of(const std::string& text) {
+Eigen::Vector2d size_of(const std::string& text, const std::string& field) {
   if (const auto size = split_size(text)) return *size;
   throw libmap::Error(
       "no such size",
-      {.field = "--size", .value = text, .bound = "WIDTHxHEIGHT in meters, each > 0, e.g. 3x3"});
+      {.field = field, .value = text, .bound = "WIDTHxHEIGHT in meters, each > 0, e.g. 3x3"});
 }
 
 std::vector<Eigen::Vector2d> polygon_of(const std::string& file) {
@@ -91,9 +92,16 @@ void read_region(CropCommandOptions& options) {
     crop.polygon = polygon_of(options.polygon);
   } else if (!options.size.empty()) {
     crop.region = CropRegion::size;
-    crop.size_m = size_of(options.size);
+    crop.size_m = size_of(options.size, "--size");
   } else if (options.border) {
     crop.region = CropRegion::border;
+  }
+  if (!options.border_size.empty()) {
+    if (!options.border)
+      throw libmap::Error(
+          "is the size of a border, which is not looked for",
+          {.field = "--border-size", .value = options.border_size, .bound = "only with --border"});
+    crop.border_size_m = size_of(options.border_size, "--border-size");
   }
   crop.level = options.level;
   if (options.up != "auto" && !crop.level)
@@ -137,6 +145,17 @@ void tell_ground(const libmap::CropReport& report, bool up_by_normals, Run& run)
              tilt);
 }
 
+void tell_scale(const libmap::BorderBand& band, const libmap::BorderScale& scale, Run& run) {
+  run.add_results(
+      {{"border_sides_m", std::vector<double>(band.sides_m.begin(), band.sides_m.end())},
+       {"border_scale", scale.factor},
+       {"border_scale_deviation", scale.deviation}});
+  run.say(
+      "border: sides of {:.4f} m give the scale x {:.5f} +- {:.5f}: true lengths are those of the "
+      "map multiplied by it",
+      fmt::join(band.sides_m, ", "), scale.factor, scale.deviation);
+}
+
 void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds, Run& run) {
   const Eigen::Vector3d size = bounds.max - bounds.min;
   run.add_results({{"size_m", size}});
@@ -151,6 +170,7 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
     run.say("border: white (>= {:.0f}) along {:.0f} % of the least seen side",
             report.band->white_level, 1e2 * report.band->seen);
   }
+  if (report.border_scale) tell_scale(*report.band, *report.border_scale, run);
   if (!report.outline.empty()) {
     std::vector<double> corners;
     for (const Eigen::Vector2d& corner : report.outline)
@@ -248,6 +268,7 @@ void note_region(const CropCommandOptions& options, Run& run) {
   run.manifest().parameters.emplace_back("polygon", options.polygon);
   run.manifest().parameters.emplace_back("size", options.size);
   run.manifest().parameters.emplace_back("border", options.border);
+  run.manifest().parameters.emplace_back("border_size", options.border_size);
 }
 
 void crop_file(const CropCommandOptions& options, Run& run) {
@@ -287,6 +308,8 @@ int main(int argc, char** argv) {
   command.option("--size", "WIDTHxHEIGHT", options.size,
                  "keep the rectangle of this size that lies best centered in the data, m");
   command.flag("--border", options.border, "keep what a white band on the ground frames");
+  command.option("--border-size", "WIDTHxHEIGHT", options.border_size,
+                 "true size of the area inside the band, m: determines the map's scale");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { crop(options, run); });
 }

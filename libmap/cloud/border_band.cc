@@ -25,6 +25,7 @@ constexpr double unseen = -1.0;
 constexpr double max_band_cells = 4e6;
 constexpr double min_contrast = 40.0;  // of 255, of white from what is usual
 constexpr std::size_t max_lines = 10;  // white lines in one direction
+constexpr double max_size_error = 0.05;
 
 // What is white, seen from above.
 struct Picture {
@@ -383,7 +384,9 @@ BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
     corners = corners_of(sides);
   }
   band.seen = 1.0;
-  for (Side& side : sides) {
+  for (std::size_t n = 0; n < 4; ++n) {
+    Side& side = sides[n];
+    band.sides_m[n] = (corners[(n + 1) % 4] - corners[n]).norm();
     const Vector2d inward = side.inward();
     side.from += margin_m * inward;
     side.to += margin_m * inward;
@@ -400,6 +403,28 @@ BorderBand find_border_band(const PointCloud& level_cloud, double margin_m,
   }
   band.corners.assign(corners.begin(), corners.end());
   return band;
+}
+
+BorderScale scale_by_border(const BorderBand& band, const Vector2d& inner_size_m) {
+  Eigen::Vector4d measured;
+  std::copy(band.sides_m.begin(), band.sides_m.end(), measured.begin());
+  Eigen::Vector4d size;
+  size << inner_size_m, inner_size_m;
+  if (const Eigen::Vector4d turned = size.reverse(); turned.dot(measured) > size.dot(measured))
+    size = turned;
+  if ((measured.cwiseQuotient(size).array() - 1.0).abs().maxCoeff() > max_size_error) {
+    std::string sides;
+    for (const double side : measured)
+      sides += (sides.empty() ? "" : ", ") + to_fixed_text(side, 3);
+    throw Error("the white band has another size",
+                {.field = "border_size",
+                 .value = to_text(inner_size_m.x()) + "x" + to_text(inner_size_m.y()),
+                 .bound = "within " + to_text(100.0 * max_size_error) +
+                          " % of the sides found: " + sides + " m"});
+  }
+  const double ratio = size.dot(measured) / size.squaredNorm();
+  const double variance = (measured - ratio * size).squaredNorm() / 3.0;  // of a side, m^2
+  return {1.0 / ratio, std::sqrt(2.0 * variance / size.squaredNorm()) / (ratio * ratio)};
 }
 
 }  // namespace libmap

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <vector>
 
 #include "libmap/core/parameters.h"
@@ -24,6 +25,7 @@ void bind(ParameterTable& table, BorderBandOptions& options);
 
 struct BorderBand {
   std::vector<Eigen::Vector2d> corners;  // of the area inside the band, counter-clockwise
+  std::array<double, 4> sides_m{};       // the same without the margin: of the band's inner edge
   double seen = 0.0;                     // least share of a side along which white was found
   double white_level = 0.0;
 };
@@ -36,5 +38,17 @@ struct BorderBand {
 // `margin_m` inside the edge found. Throws Error: no colors, no white, no band.
 BorderBand find_border_band(const PointCloud& level_cloud, double margin_m = 0.0,
                             const BorderBandOptions& options = {});
+
+// What lengths are to be multiplied by.
+struct BorderScale {
+  double factor = 1.0;
+  // Standard deviation of the factor, by the scatter of the sides. Opposite sides end at the same
+  // two edges: the four count as two. An error that all edges share is not in it.
+  double deviation = 0.0;
+};
+
+// By least squares, from the true lengths of the band's inner edge in either order. Throws Error if
+// a side differs from its length by more than 5 %: the band is another one.
+BorderScale scale_by_border(const BorderBand& band, const Eigen::Vector2d& inner_size_m);
 
 }  // namespace libmap

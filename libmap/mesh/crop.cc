@@ -113,6 +113,8 @@ void lay_rectangle(const Source& source, const CropOptions& options, const Pose&
 void lay_border(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
   const PointCloud view = source.view(level, options.band.cell_m);
   plan.report.band = find_border_band(view, options.rectangle.margin_m, options.band);
+  if (options.border_size_m)
+    plan.report.border_scale = scale_by_border(*plan.report.band, *options.border_size_m);
   const std::vector<Vector2d>& corners = plan.report.band->corners;
   Vector2d center = Vector2d::Zero();
   for (const Vector2d& corner : corners) center += corner / static_cast<double>(corners.size());

@@ -35,6 +35,8 @@ struct CropOptions {
   Eigen::Vector2d size_m = Eigen::Vector2d::Zero();
   SiteRectangleOptions rectangle{};  // its margin_m counts for the border too
   BorderBandOptions band{};
+  // Not bound. True size of the area inside the band, without the margin: determines the scale.
+  std::optional<Eigen::Vector2d> border_size_m = std::nullopt;
   // Turn about z. None: with size and border, that which lays the rectangle's sides along x and y
   // by the least turn, else none.
   std::optional<double> yaw_deg = std::nullopt;
@@ -50,6 +52,7 @@ struct CropReport {
   std::vector<Eigen::Vector2d> outline{};         // in the site, counter-clockwise; may be empty
   std::optional<SiteRectangle> rectangle{};       // in the level frame
   std::optional<BorderBand> band{};               // in the level frame
+  std::optional<BorderScale> border_scale{};      // of the map; it is not applied
 };
 
 struct CropCloudResult {

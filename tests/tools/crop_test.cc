@@ -222,6 +222,40 @@ TEST(Crop, BadInput) {
   EXPECT_TRUE(succeeded(with({})));
 }
 
+// A white band around 1.2 x 1 m that is measured too large by 0.8 %.
+TEST(Crop, BorderOfKnownSizeGivesTheScale) {
+  libmap::PointCloud map;
+  for (double x = -1; x <= 1; x += 0.008)
+    for (double y = -1; y <= 1; y += 0.008) {
+      const double off = std::max(std::abs(x) - 1.008 * 0.6, std::abs(y) - 1.008 * 0.5);
+      map.positions.push_back(map_from_ground * Vector3d(x, y, 0));
+      map.colors.push_back(off > 0 && off < 0.08 ? libmap::Color{230, 228, 225}
+                                                 : libmap::Color{120, 110, 90});
+    }
+  libmap::write_cloud(scratch("map.pcd"), map);
+  const auto with = [](const std::string& output, const Words& more) {
+    Words words = {"crop", "map.pcd", "-o", output};
+    words.insert(words.end(), more.begin(), more.end());
+    return graspmap(words);
+  };
+  const auto result = with("site.ply", {"--border", "--border-size", "1x1.2", "--margin", "0.05"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("m give the scale x 0.99"), std::string::npos)
+      << result.standard_error;
+  const nlohmann::json results = json_of("site.ply.json").at("results");
+  EXPECT_NEAR(results.at("border_scale"), 1 / 1.008, 0.004);
+  EXPECT_LT(results.at("border_scale_deviation"), 0.004);
+  EXPECT_EQ(results.at("border_sides_m").size(), 4U);
+  EXPECT_NEAR(results.at("outline_area_m2"), (1.2096 - 0.1) * (1.008 - 0.1), 0.01) << "not scaled";
+  EXPECT_TRUE(bad_input(with("new.ply", {"--border", "--border-size", "3x3"}),
+                        {"map.pcd", "border_size is 3x3", "within 5 %"}));
+  EXPECT_TRUE(bad_input(with("new.ply", {"--border", "--border-size", "0x3"}),
+                        {"--border-size is 0x3", "WIDTHxHEIGHT"}));
+  EXPECT_TRUE(bad_input(with("new.ply", {"--border-size", "1x1.2"}),
+                        {"--border-size is 1x1.2", "only with --border"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("new.ply")));
+}
+
 TEST(Crop, PointsOfTheMapAreFoundOnTheScoredSite) {
   libmap::write_cloud(scratch("map.pcd"),
                       libmap::transform_cloud(graspmap_test::bumpy_terrain(), map_from_ground));

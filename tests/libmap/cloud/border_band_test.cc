@@ -133,6 +133,46 @@ TEST(BorderBand, MarginMovesEverySideInwards) {
   EXPECT_LT(corner_error(band, smaller), 0.006);
 }
 
+// The floor is measured too large by 0.8 %.
+TEST(BorderScale, SidesOfAKnownSizeGiveTheFactor) {
+  for (const Vector2d& size : {Vector2d(3, 3), Vector2d(4, 2)}) {
+    FloorOptions o;
+    o.half_x = 1.008 * size.x() / 2;
+    o.half_y = 1.008 * size.y() / 2;
+    o.yaw_deg = 70;
+    const BorderBand band = find_border_band(floor_with_band(o), 0.1);
+    const BorderScale scale = scale_by_border(band, size);
+    EXPECT_NEAR(scale.factor, 1 / 1.008, 0.002);
+    EXPECT_LT(scale.deviation, 0.002);
+    EXPECT_EQ(scale_by_border(band, size.reverse()).factor, scale.factor);
+  }
+}
+
+TEST(BorderScale, LeastSquaresOfTheSides) {
+  BorderBand band;
+  band.sides_m = {2.02, 1.02, 2.02, 1.0};
+  for (const Vector2d& size : {Vector2d(2, 1), Vector2d(1, 2)}) {
+    const BorderScale scale = scale_by_border(band, size);
+    // Sides s of size t are r t: r = sum(s t) / sum(t t), and three degrees of freedom are left.
+    const double ratio = 10.1 / 10;
+    EXPECT_NEAR(scale.factor, 1 / ratio, 1e-12);
+    const double squares = 2 * 0.01 * 0.01;
+    EXPECT_NEAR(scale.deviation, std::sqrt(squares / 3 / 5) / (ratio * ratio), 1e-12);
+  }
+}
+
+TEST(BorderScale, AnotherBandIsRejected) {
+  BorderBand band;
+  band.sides_m = {3.1, 3.0, 3.1, 3.0};
+  EXPECT_NEAR(scale_by_border(band, {3, 3}).factor, 3 / 3.05, 1e-3);
+  band.sides_m[0] = 3.16;
+  const Error error = error_of([&] { scale_by_border(band, {3, 3}); });
+  EXPECT_EQ(error.context().field, "border_size");
+  EXPECT_EQ(error.context().value, "3x3");
+  EXPECT_EQ(error.context().bound, "within 5 % of the sides found: 3.160, 3.000, 3.100, 3.000 m");
+  EXPECT_THROW(scale_by_border(band, {1, 3}), Error);
+}
+
 TEST(BorderBand, MarginThatLeavesNothing) {
   const Error error = error_of([] { find_border_band(floor_with_band({}), 1.4); });
   EXPECT_EQ(error.reason(), "the area inside the white band is too small");
