@@ -151,9 +151,9 @@ void tell_scale(const libmap::BorderBand& band, const libmap::BorderScale& scale
        {"border_scale", scale.factor},
        {"border_scale_deviation", scale.deviation}});
   run.say(
-      "border: sides of {:.4f} m give the scale x {:.5f} +- {:.5f}: true lengths are those of the "
-      "map multiplied by it",
-      fmt::join(band.sides_m, ", "), scale.factor, scale.deviation);
+      "border: sides of {:.4f} m give the scale x {:.5f} +- {:.5f}, which refine --scale {:.5f} "
+      "applies to poses and depth",
+      fmt::join(band.sides_m, ", "), scale.factor, scale.deviation, scale.factor);
 }
 
 void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds, Run& run) {

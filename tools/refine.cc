@@ -270,7 +270,7 @@ void refine(RefineOptions& options, Run& run) {
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
   const bool is_depth_scale = options.refinement.known_lengths.empty() &&
-                              !options.refinement.board &&
+                              !options.refinement.board && options.refinement.scale == 1.0 &&
                               options.refinement.scale_from == libmap::ScaleSource::depth;
   if (is_depth_scale && result.findings.empty())
     run.detail("{}", result.scale);

@@ -114,6 +114,12 @@ void Refinement::start() {
 void Refinement::find_frames() {
   if (options_.board && !options_.known_lengths.empty())
     throw Error("known lengths determine the scale already", {.field = "board"});
+  if (options_.scale != 1.0 && (options_.board || !options_.known_lengths.empty() ||
+                                options_.scale_from == ScaleSource::odometry))
+    throw Error("the scale is determined in two ways",
+                {.field = "scale",
+                 .value = to_text(options_.scale),
+                 .bound = "1 with known lengths, a board or the scale from odometry"});
   std::vector<int> nodes;
   for (const auto& [node, pose] : poses_) nodes.push_back(node);
   nodes.insert(nodes.end(), tracked_.begin(), tracked_.end());

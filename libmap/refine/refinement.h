@@ -34,7 +34,7 @@ namespace libmap {
 // automatic: if what was held out fits better then, by more than chance explains.
 enum class IntrinsicsMode { fixed, refined, automatic };
 
-// What determines the scale where neither lengths nor a board are known.
+// What determines the scale where neither a factor, lengths nor a board are known.
 enum class ScaleSource { depth, odometry };
 
 struct RefinementOptions {
@@ -50,6 +50,7 @@ struct RefinementOptions {
   BundleAdjustmentOptions bundle_adjustment{};
   IcpOptions icp{};
   ScaleSource scale_from = ScaleSource::depth;
+  double scale = 1.0;  // 0.5..2: known factor of poses and depth; 1: none is known
   std::vector<KnownLength> known_lengths{};  // not bound; they determine the scale
   std::optional<Chessboard> board{};         // not bound; at rest in the scene, does so too
   bool one_map = false;  // not bound: parts that nothing joins to the largest get no poses

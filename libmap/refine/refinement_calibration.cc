@@ -215,6 +215,9 @@ void Refinement::find_scale() {
     result_.scale = "scale " + times(*scale) + " by the board in " +
                     std::to_string(scale->lengths) + " pictures: corrected";
     warn_if_apart("pictures of the board", scale->chi_square);
+  } else if (options_.scale != 1.0) {
+    scale = ScaleEstimate{.factor = options_.scale};
+    result_.scale = "scale x " + to_text(options_.scale) + " as given: corrected";
   } else if (options_.scale_from == ScaleSource::odometry) {
     if (!odometry)
       throw Error("the scan has no links of odometry",

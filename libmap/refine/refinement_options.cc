@@ -28,7 +28,9 @@ void bind(ParameterTable& table, RefinementOptions& options) {
             "then");
   table.add("scale_from", options.scale_from,
             {{"depth", ScaleSource::depth}, {"odometry", ScaleSource::odometry}},
-            "what determines the scale where neither lengths nor a board are known");
+            "what determines the scale where neither a factor, lengths nor a board are known");
+  table.add("scale", options.scale, {0.5, 2.0},
+            "known factor of the scale, that of crop --border-size for one; 1: none is known");
   bind(table, options.bundle_adjustment);
   bind(table, options.icp);
   table.add("seed", options.seed, not_negative, "of all that is random");

@@ -240,7 +240,7 @@ TEST(Crop, BorderOfKnownSizeGivesTheScale) {
   };
   const auto result = with("site.ply", {"--border", "--border-size", "1x1.2", "--margin", "0.05"});
   ASSERT_TRUE(succeeded(result));
-  EXPECT_NE(result.standard_error.find("m give the scale x 0.99"), std::string::npos)
+  EXPECT_NE(result.standard_error.find("refine --scale 0.99"), std::string::npos)
       << result.standard_error;
   const nlohmann::json results = json_of("site.ply.json").at("results");
   EXPECT_NEAR(results.at("border_scale"), 1 / 1.008, 0.004);

@@ -372,6 +372,24 @@ TEST(RefineScans, BoardsThatAreNotThereAreBadInput) {
   EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
 }
 
+TEST(RefineScans, GivenScaleIsAppliedAndReported) {
+  write_scan("a.db", "1", "0", "1");
+  const auto refined = [&](const std::vector<std::string>& options) {
+    std::vector<std::string> words = {"refine", "a.db", "-o", "p.tum"};
+    words.insert(words.end(), options.begin(), options.end());
+    return graspmap(words);
+  };
+  EXPECT_TRUE(bad_input(refined({"--scale", "3"}), {"--scale is 3", "0.5", "2"}));
+  EXPECT_TRUE(bad_input(refined({"--scale", "0.99", "--scale-from", "odometry"}),
+                        {"scale is 0.99", "1 with known lengths, a board"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("p.tum")));
+  const auto result = refined({"--scale", "0.99"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("scale x 0.99 as given: corrected"), std::string::npos)
+      << result.standard_error;
+  EXPECT_EQ(json_of("p.tum.json").at("results").at("scale"), "scale x 0.99 as given: corrected");
+}
+
 TEST(Refine, BadInputIsOneLine) {
   GRASPMAP_REQUIRE_DATA();
   const std::string scan = scan_file("site_tiny_q.db");

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "libmap/core/error.h"
+#include "tests/libmap/refine/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
 #include "tests/support/test_support.h"
 
@@ -113,6 +114,54 @@ TEST(ScanScale, AppliedScaleMovesPosesAndDepthAlike) {
                 .norm(),
             1e-12);
   EXPECT_NEAR(1.2 + calibration.depth[0].at(1.2, 0.3), 1.05 * corrected, 1e-12);
+}
+
+// Depth is too large by 0.8 %, which is known.
+TEST(ScanScale, GivenFactorCorrectsPosesAndDepth) {
+  TexturedScan scan;
+  for (int n = 0; n < 8; ++n) {
+    scan.see(boulders(), around(18.0 * n), graspmap_test::random_step(0.015, 0.012));
+    for (float& depth : scan.frames.at(n + 1).depth.pixels) depth *= 1.008F;
+  }
+  libmap::RefinementOptions options = graspmap_test::small_options();
+  const libmap::RefinementResult before = libmap::refine_poses(scan, options);
+  options.scale = 1.0 / 1.008;
+  const libmap::RefinementResult after = libmap::refine_poses(scan, options);
+  EXPECT_GT(before.stages.back().error->absolute.rmse_m, 0.003);
+  EXPECT_LT(after.stages.back().error->absolute.rmse_m, 0.002);
+  EXPECT_EQ(after.stages.back().name, "scale");
+  EXPECT_EQ(after.scale, "scale x " + libmap::to_text(options.scale) + " as given: corrected");
+  ASSERT_EQ(after.poses.size(), 8U);
+  const auto moved = [](const libmap::RefinementResult& result) -> Eigen::Vector3d {
+    return result.poses.back().world_from_base.translation() -
+           result.poses.front().world_from_base.translation();
+  };
+  EXPECT_LT((1.008 * moved(after) - moved(before)).norm(), 1e-9);
+  ASSERT_EQ(after.calibration.depth.size(), 1U);
+  const auto corrected = [](const libmap::RefinementResult& result) {
+    const auto& depth = result.calibration.depth;
+    return 1.2 + (depth.empty() ? 0.0 : depth[0].at(1.2, 0.1));
+  };
+  EXPECT_NEAR(1.008 * corrected(after), corrected(before), 1e-9);
+}
+
+TEST(ScanScale, GivenFactorIsTheOnlySourceOfTheScale) {
+  TexturedScan scan;
+  for (int n = 0; n < 2; ++n)
+    scan.see(boulders(), around(20.0 * n), libmap::Vector6d::Zero(), false);
+  libmap::RefinementOptions lengths = graspmap_test::small_options();
+  lengths.scale = 0.99;
+  libmap::RefinementOptions board = lengths;
+  libmap::RefinementOptions odometry = lengths;
+  lengths.known_lengths = {{{1, {60, 100}}, {2, {90, 110}}, 1.0}};
+  board.board = libmap::parse_known_board("8x6:0.06");
+  odometry.scale_from = libmap::ScaleSource::odometry;
+  for (const libmap::RefinementOptions& options : {lengths, board, odometry}) {
+    const auto error = error_of([&] { libmap::refine_poses(scan, options); });
+    EXPECT_EQ(error.context().field, "scale");
+    EXPECT_EQ(error.context().value, "0.99");
+    EXPECT_EQ(error.context().bound, "1 with known lengths, a board or the scale from odometry");
+  }
 }
 
 TEST(ScanScale, OdometryWeighsItsLinks) {
