@@ -13,9 +13,9 @@
 # further flags of their commands; without CROP the map is levelled and kept whole. TEXTURE= leaves
 # the texture out. With TILES, the side of a square in meters, cloud, mesh, site and terrain are
 # folders of pieces and the map is a tile store, so that memory does not depend on the area; then
-# there is no texture unless TEXTURE=model asks for a folder of models, and CROP cannot be --size or
-# --border of a site too large for memory. A second run does nothing; other variables or changed files make again what
-# depends on them.
+# there is no texture unless TEXTURE=model asks for a folder of models, of which there is no picture,
+# and CROP cannot be --size or --border of a site too large for memory. A second run does nothing;
+# other variables or changed files make again what depends on them.
 
 here := $(dir $(lastword $(MAKEFILE_LIST)))
 GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
@@ -59,7 +59,7 @@ tile_flag := $(if $(TILES),--tile-size $(TILES))
 # A site that is not cropped has no straight edges to check.
 pictures := $(OUT)/cloud.png $(OUT)/site.png $(if $(CROP),$(OUT)/spot_check.txt) \
   $(if $(TEXTURE),$(OUT)/texture.png)
-results := $(OUT)/scan.txt $(if $(TILES),$(filter %/texture.png,$(pictures)),$(pictures)) \
+results := $(OUT)/scan.txt $(if $(TILES),$(addprefix $(OUT)/,$(TEXTURE)),$(pictures)) \
   $(if $(TRUTH),$(OUT)/accuracy.txt)
 
 .DELETE_ON_ERROR:

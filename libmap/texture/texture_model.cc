@@ -23,7 +23,7 @@ constexpr std::size_t observed_vertices = 20000;
 constexpr std::size_t min_observed_vertices = 200;
 // Of decoded photographs that are kept; a piece needs those near it alone.
 constexpr std::size_t max_image_bytes = std::size_t{400} << 20;
-constexpr std::size_t max_image_bytes_in_pieces = std::size_t{96} << 20;
+constexpr std::size_t max_image_bytes_in_pieces = std::size_t{64} << 20;
 // Triangles that all photographs show smaller are not cut; nor are any where more would come out.
 constexpr double min_cut_px = 16.0;
 constexpr std::uint64_t max_cut_triangles = 2'500'000;
@@ -210,6 +210,8 @@ PieceTexturing::Piece Texturing::piece(MeshWithMargin part) {
     return find_texture_views(part.mesh, *photos_, options_.views, views_of(part), no_progress());
   });
   TexturedMesh model = paint(std::move(part), std::move(views), no_progress());
+  // Makes room: a model takes most memory while it is encoded.
+  photos_->forget_images();
   model.mesh = select_triangles(model.mesh, std::vector<bool>(model.mesh.triangles.size(), true));
   return {std::move(model), report_};
 }

@@ -206,6 +206,13 @@ void TexturePhotos::keep(std::size_t photo, std::shared_ptr<const ColorImage> im
   }
 }
 
+void TexturePhotos::forget_images() const {
+  const std::scoped_lock lock(mutex_);
+  for (const std::size_t photo : order_) images_[photo].reset();
+  order_.clear();
+  kept_bytes_ = 0;
+}
+
 std::shared_ptr<const ColorImage> TexturePhotos::image(std::size_t photo) const {
   {
     const std::scoped_lock lock(mutex_);

@@ -75,6 +75,8 @@ class TexturePhotos {
 
   // Decoded anew where memory did not allow to keep it. May be called from several threads.
   std::shared_ptr<const ColorImage> image(std::size_t photo) const;
+  // Frees the images that are kept.
+  void forget_images() const;
 
  private:
   struct Frame;
