@@ -20,7 +20,9 @@ using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 constexpr int robust_rounds = 3;
 constexpr int max_iterations = 200;
-constexpr double tolerance = 1e-6;  // of the gradient at the start
+constexpr double tolerance = 1e-4;  // of the gradient at the start
+// Of a long scan slopes would be most of the memory of fusion: 48 bytes each.
+constexpr std::size_t max_kept_slopes = 600'000;
 // Ranges of elements whose sums are made side by side and joined in their order.
 constexpr std::size_t sum_ranges = 16;
 
@@ -47,6 +49,10 @@ class Adjustment {
       if (n == 0 || observations[n].element != observations[n - 1].element) starts_.push_back(n);
     }
     starts_.push_back(observations.size());
+    if (observations.size() > max_kept_slopes) return;
+    std::vector<Vector6d> slopes;
+    for (const SurfaceObservation& one : observations) slopes.push_back(slope(one));
+    slopes_ = std::move(slopes);
   }
 
   double disagreement() const {
@@ -142,9 +148,9 @@ class Adjustment {
   double information(const SurfaceObservation& one) const {  // inverse variance
     return share_ / (static_cast<double>(one.variance_m2) + scatter2_);
   }
-  // Of the height: by a turn, by a shift of its frame. Computed anew each time: kept, it would be
-  // most of the memory of a long scan's fusion.
+  // Of the height: by a turn, by a shift of its frame.
   Vector6d slope(const SurfaceObservation& one) const {
+    if (!slopes_.empty()) return slopes_[static_cast<std::size_t>(&one - observations_.data())];
     const Eigen::Vector3d normal = elements_[one.element].normal.cast<double>();
     const Eigen::Vector3d arm =
         elements_[one.element].position.cast<double>() - centers_[one.frame];
@@ -210,6 +216,7 @@ class Adjustment {
   double scatter2_;  // m2
   double share_;     // of its information that an observation counts with
   Vector6d prior_;
+  std::vector<Vector6d> slopes_;     // of the observations; empty: computed anew each time
   std::vector<double> weights_;      // of the observations: their information, made robust
   std::vector<std::size_t> starts_;  // of each element's observations
   std::vector<Vector6d> corrections_;
