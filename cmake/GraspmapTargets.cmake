@@ -98,6 +98,12 @@ function(graspmap_count_lines target)
   endif()
 endfunction()
 
+# GCC's pragmas choose the instruction set of single functions; other compilers get the portable
+# loops, whose results are the same (libmap/core/instruction_set_loops.h).
+if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(x86_64|AMD64)$")
+  set(graspmap_x86_loops GRASPMAP_X86_LOOPS)
+endif()
+
 # graspmap_library(NAME SOURCES FILE... [LINK TARGET...] [PUBLIC_LINK TARGET...]
 #                  [INCLUDE DIR...] [DEFINE NAME...])
 # A shared library graspmap_NAME. LINK and INCLUDE stay inside it: public headers show the standard

@@ -8,7 +8,7 @@ namespace libgtd {
 
 namespace {
 #define GRASPMAP_LOOPS "libgtd/score/tilted_cells_body.h"
-#include "libgtd/shape/instruction_set_loops.h"
+#include "libmap/core/instruction_set_loops.h"
 }  // namespace
 
 const TiltedLoops& tilted_loops_of(InstructionSet instructions) { return all_of(instructions); }

@@ -1,6 +1,8 @@
-#include "libgtd/shape/instruction_set.h"
+#include "libmap/core/instruction_set.h"
 
-namespace libgtd {
+#include <initializer_list>
+
+namespace libmap {
 
 bool has_instruction_set([[maybe_unused]] InstructionSet set) {
 #if defined(GRASPMAP_X86_LOOPS)
@@ -19,4 +21,4 @@ InstructionSet best_instruction_set() {
   return InstructionSet::portable;
 }
 
-}  // namespace libgtd
+}  // namespace libmap
