@@ -8,9 +8,11 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <vector>
 
 #include "libmap/cloud/depth_noise.h"
+#include "libmap/cloud/depth_plane_loops.h"
 #include "libmap/cloud/depth_projection.h"
 #include "libmap/core/image.h"
 
@@ -52,11 +54,16 @@ struct DepthPlanes {
 // For each pixel those pairs of opposite neighbors whose mean agrees with it within the noise:
 // their mean inverse depth and its least-squares slopes. A pixel with too few such pairs, at the
 // edge of a surface, takes the plane next to it that predicts its depth within the noise; if there
-// is none, it is flying. Image and rays have one size. `only`, if it is not empty, marks the pixels
-// whose planes are wanted, not 0; others have none, and the counts say nothing.
+// is none, it is flying. Image and rays have one size.
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
-                             const DepthPlaneOptions& options = {},
-                             const std::vector<std::uint8_t>& only = {});
+                             const DepthPlaneOptions& options = {});
+
+// The same, use(y, planes) for each row in which there are planes. `only`, if it is not empty,
+// marks the pixels whose planes are wanted, not 0; others have none, and the counts say nothing.
+using UsePlaneRow = std::function<void(int y, const DepthPlaneLoops::Planes& planes)>;
+DepthPixelCounts each_plane_row(const DepthImage& depth, const PixelRays& rays,
+                                const DepthPlaneOptions& options,
+                                const std::vector<std::uint8_t>& only, const UsePlaneRow& use);
 
 // No plane is further than this from the depth of its pixel, along the axis, m.
 double max_plane_distance_m(const DepthPlaneOptions& options);

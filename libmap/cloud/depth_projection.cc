@@ -23,8 +23,8 @@ PixelRays pixel_rays(const Camera& camera) {
   PixelRays rays;
   rays.width = camera.width;
   rays.height = camera.height;
-  rays.x.assign(table.size() + 4, 0.0F);
-  rays.y.assign(table.size() + 4, 0.0F);
+  rays.x.assign(table.size() + PixelRays::padding, 0.0F);
+  rays.y.assign(table.size() + PixelRays::padding, 0.0F);
   rays.min.setConstant(std::numeric_limits<double>::infinity());
   rays.max = -rays.min;
   for (std::size_t n = 0; n < table.size(); ++n) {

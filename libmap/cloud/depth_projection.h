@@ -13,9 +13,10 @@
 
 namespace libmap {
 
-// x/z and y/z of each pixel's ray in single precision, row by row, lens distortion undone. Four
-// entries more than pixels, so that four may be read at once anywhere.
+// x/z and y/z of each pixel's ray in single precision, row by row, lens distortion undone. Some
+// entries more than pixels, so that as many may be read at once anywhere.
 struct PixelRays {
+  static constexpr std::size_t padding = 16;
   int width = 0;
   int height = 0;
   std::vector<float> x;

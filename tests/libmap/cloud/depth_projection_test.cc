@@ -57,7 +57,7 @@ TEST(DepthProjection, EachLensIsWorkedOutOnce) {
 
 TEST(DepthProjection, ManyLensesAreNotAllKept) {
   const Camera camera = small_camera();
-  const auto pixels = static_cast<std::size_t>(camera.width * camera.height) + 4;
+  const auto pixels = static_cast<std::size_t>(camera.width * camera.height) + PixelRays::padding;
   PixelRayCache cache(3 * pixels);
   std::vector<std::weak_ptr<const PixelRays>> rays;
   for (int n = 0; n < 5; ++n) {
