@@ -52,7 +52,7 @@ std::string node_name(int node) { return "node " + std::to_string(node); }
 
 // What one frame gives to a coarse surface.
 struct CoarseFrame {
-  SurfaceVoxels voxels;
+  SurfaceVoxels::Frame voxels;
   DepthPixelCounts pixels;
   std::size_t number = 0;      // among the frames
   FusionFrame frame;           // of the survey
@@ -119,36 +119,17 @@ class Fusion {
 
   std::vector<FusionFrame> place_frames() {
     std::vector<FusionFrame> frames;
-    bool has_origin = false;
     for (const TrajectoryPose& pose : world_from_base_) {
       if (!pose.world_from_base.matrix().allFinite()) {
         skip(pose.node, Error("its pose is not finite", {.field = node_name(pose.node)}));
         continue;
       }
-      FusionFrame frame;
-      frame.node = pose.node;
-      frame.grid_from_base = pose.world_from_base;
-      if (!has_origin)
+      if (frames.empty())
         survey_.grid_origin =
-            (frame.grid_from_base.translation() / options_.voxel_size_m).array().floor() *
+            (pose.world_from_base.translation() / options_.voxel_size_m).array().floor() *
             options_.voxel_size_m;
-      has_origin = true;
-      frame.grid_from_base.translation() -= survey_.grid_origin;
-      const double reach = frame.grid_from_base.translation().cwiseAbs().maxCoeff();
-      const double bound = 0.9 * voxel_cell_limit * options_.voxel_size_m;
-      const double needed = reach + options_.planes.max_depth_m;
-      if (needed > bound && reach <= options_.planes.max_depth_m)
-        throw Error(
-            "voxels too small for the reach of the depth images",
-            {.field = "voxel_size_m",
-             .value = to_text(options_.voxel_size_m),
-             .bound = "> " + to_text(static_cast<float>(options_.voxel_size_m * needed / bound))});
-      if (needed > bound)
-        throw Error("poses are too far apart for the voxel size",
-                    {.field = node_name(pose.node),
-                     .value = to_text(static_cast<float>(reach)) + " m from the first",
-                     .bound = "< " + to_text(static_cast<float>(bound)) + " m"});
-      frames.push_back(frame);
+      frames.push_back(
+          frame_at(pose, survey_.grid_origin, options_.voxel_size_m, options_.planes.max_depth_m));
     }
     std::stable_sort(frames.begin(), frames.end(),
                      [](const FusionFrame& a, const FusionFrame& b) { return a.node < b.node; });
@@ -180,12 +161,14 @@ class Fusion {
   void add_frame(const RgbdFrame& depth, const Pose& grid_from_base, const PlanCells& cells,
                  FittedPixels fitted, CoarseFrame& coarse) {
     const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * depth.depth.pixels.size());
+    SurfaceVoxels voxels;
     for (const CameraView& view : camera_views(depth)) {
       const auto rays = images_.rays_of(view.depth_camera);
       const Pose grid_from_camera = grid_from_base * view.depth_camera.base_from_camera;
       coarse.pixels += add_depth_planes(view.depth, *rays, grid_from_camera, options_.planes,
-                                        options_.voxel_size_m, cells, fitted, coarse.voxels);
+                                        options_.voxel_size_m, cells, fitted, voxels);
     }
+    coarse.voxels = std::move(voxels).take_frame();
   }
 
   // What the frame can be used for, and how far it reaches.
@@ -218,7 +201,7 @@ class Fusion {
     each_frame(given.size(), sampled_, make, [&](const CoarseFrame& coarse) {
       if (coarse.fault) return skip(coarse.frame.node, *coarse.fault);
       survey_.frames.push_back(coarse.frame);
-      sample_.merge_frame(coarse.voxels, sampled_);
+      sample_.merge(coarse.voxels, sampled_);
       while (sample_.size() > max_voxels && sampled_.thinning < max_thinning) {
         ++sampled_.thinning;
         sample_ = sample_.in(sampled_);
@@ -237,7 +220,7 @@ class Fusion {
                     FittedPixels::in_cells, coarse);
           return coarse;
         },
-        [&](const CoarseFrame& coarse) { sample_.merge_frame(coarse.voxels, sampled_); });
+        [&](const CoarseFrame& coarse) { sample_.merge(coarse.voxels, sampled_); });
   }
 
   SurfaceRefinementOptions refinement_options() const {
@@ -447,7 +430,7 @@ SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& ar
     return coarse;
   };
   each_frame(members.frames.size(), around, make, [&](const CoarseFrame& coarse) {
-    voxels.merge_frame(coarse.voxels, around);
+    voxels.merge(coarse.voxels, around);
     counts.pixels += coarse.pixels;
   });
   for (const std::uint64_t key : voxels.index().keys())

@@ -7,6 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/text.h"
 #include "libmap/scan/frame_batch.h"
 #include "libmap/scan/stereo_depth.h"
 
@@ -20,6 +21,28 @@ constexpr std::size_t max_kept_bytes = std::size_t{128} << 20;
 std::size_t bytes_of(const RgbdFrame& frame) { return sizeof(float) * frame.depth.pixels.size(); }
 
 }  // namespace
+
+FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_origin,
+                     double voxel_size_m, double max_depth_m) {
+  FusionFrame frame;
+  frame.node = pose.node;
+  frame.grid_from_base = pose.world_from_base;
+  frame.grid_from_base.translation() -= grid_origin;
+  const double reach = frame.grid_from_base.translation().cwiseAbs().maxCoeff();
+  const double bound = 0.9 * voxel_cell_limit * voxel_size_m;
+  const double needed = reach + max_depth_m;
+  if (needed > bound && reach <= max_depth_m)
+    throw Error("voxels too small for the reach of the depth images",
+                {.field = "voxel_size_m",
+                 .value = to_text(voxel_size_m),
+                 .bound = "> " + to_text(static_cast<float>(voxel_size_m * needed / bound))});
+  if (needed > bound)
+    throw Error("poses are too far apart for the voxel size",
+                {.field = "node " + std::to_string(pose.node),
+                 .value = to_text(static_cast<float>(reach)) + " m from the first",
+                 .bound = "< " + to_text(static_cast<float>(bound)) + " m"});
+  return frame;
+}
 
 void move(FusionFrame& frame, const Pose& moved_from_grid) {
   frame.grid_from_base = moved_from_grid * frame.grid_from_base;

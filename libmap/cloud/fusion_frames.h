@@ -15,6 +15,7 @@
 #include "libmap/cloud/depth_projection.h"
 #include "libmap/cloud/surface_refinement.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/pose_graph.h"
 #include "libmap/scan/rgbd_frame.h"
 #include "libmap/scan/scan_source.h"
 
@@ -29,6 +30,11 @@ struct FusionFrame {
   double max_ray_length = 1.0;   // in depths
   double max_pixel_pitch = 0.0;  // the same
 };
+
+// The frame at its pose, without a reach. Throws Error where that lies too far from the grid's
+// origin for the voxel size.
+FusionFrame frame_at(const TrajectoryPose& pose, const Eigen::Vector3d& grid_origin,
+                     double voxel_size_m, double max_depth_m);
 
 // The frame where its pose is moved to, with its reach.
 void move(FusionFrame& frame, const Pose& moved_from_grid);

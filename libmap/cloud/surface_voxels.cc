@@ -13,26 +13,9 @@ namespace libmap {
 
 namespace {
 
-constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
-
-std::uint64_t axis_bits(int cell) {
-  return static_cast<std::uint64_t>(cell + voxel_cell_limit) & axis_mask;
-}
-
-// Of a key: those of its place in a block.
-constexpr std::uint64_t block_bits =
-    std::uint64_t{3} << 43U | std::uint64_t{3} << 22U | std::uint64_t{3};
-
-// The finaliser of SplitMix64 (Steele, Lea and Flood 2014).
-std::uint64_t scramble(std::uint64_t key) {
-  key = (key ^ (key >> 30U)) * 0xbf58476d1ce4e5b9U;
-  key = (key ^ (key >> 27U)) * 0x94d049bb133111ebU;
-  return key ^ (key >> 31U);
-}
-
 // Two zeros before each bit of a 21-bit number.
 std::uint64_t spread_bits(std::uint64_t bits) {
-  bits &= axis_mask;
+  bits &= voxel_key::axis_mask;
   bits = (bits | bits << 32U) & 0x1f00000000ffffU;
   bits = (bits | bits << 16U) & 0x1f0000ff0000ffU;
   bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
@@ -48,50 +31,6 @@ std::uint64_t curve_place(std::uint64_t key) {
 }
 
 }  // namespace
-
-std::uint64_t pack(const VoxelPlace& place) {
-  return axis_bits(place.cell.x()) << 43U | axis_bits(place.cell.y()) << 22U |
-         axis_bits(place.cell.z()) << 1U | static_cast<std::uint64_t>(place.side);
-}
-
-VoxelPlace unpack(std::uint64_t key) {
-  const auto cell = [](std::uint64_t bits) {
-    return static_cast<int>(bits & axis_mask) - voxel_cell_limit;
-  };
-  return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
-}
-
-VoxelIndex::VoxelIndex() : slots_(1U << 10U, none) {}
-
-std::size_t VoxelIndex::slot_of(std::uint64_t key) const {
-  const std::size_t mask = slots_.size() - 1;
-  // Voxels of one block of 4 x 4 x 2 are side by side: neighbors come one after the other.
-  const std::uint64_t in_block = (key & 3U) | (key >> 22U & 3U) << 2U | (key >> 43U & 3U) << 4U;
-  const std::uint64_t block = key & ~block_bits;
-  std::size_t slot = static_cast<std::size_t>((scramble(block) << 6U) + in_block) & mask;
-  while (slots_[slot] != none && keys_[slots_[slot]] != key) slot = (slot + 1) & mask;
-  return slot;
-}
-
-std::uint32_t VoxelIndex::find(std::uint64_t key) const { return slots_[slot_of(key)]; }
-
-std::uint32_t VoxelIndex::find_or_add(std::uint64_t key) {
-  if (last_ < keys_.size() && keys_[last_] == key) return last_;
-  const std::size_t slot = slot_of(key);
-  if (slots_[slot] != none) return last_ = slots_[slot];
-  const auto number = static_cast<std::uint32_t>(keys_.size());
-  last_ = number;
-  slots_[slot] = number;
-  keys_.push_back(key);
-  if (2 * keys_.size() > slots_.size()) grow();
-  return number;
-}
-
-void VoxelIndex::grow() {
-  slots_.assign(2 * slots_.size(), none);
-  for (std::size_t n = 0; n < keys_.size(); ++n)
-    slots_[slot_of(keys_[n])] = static_cast<std::uint32_t>(n);
-}
 
 SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelPlace& place, const Eigen::Vector3f& normal) {
   std::uint32_t number = index_.find_or_add(pack({place.cell, 0}));
@@ -122,11 +61,11 @@ SurfaceVoxels SurfaceVoxels::in(const PlanCells& cells) const {
   return found;
 }
 
-void SurfaceVoxels::merge_frame(const SurfaceVoxels& frame, const PlanCells& cells) {
-  for (std::size_t n = 0; n < frame.sums_.size(); ++n) {
-    const VoxelPlace place = unpack(frame.index_.keys()[n]);
+void SurfaceVoxels::merge(const Frame& frame, const PlanCells& cells) {
+  for (std::size_t n = 0; n < frame.sums.size(); ++n) {
+    const VoxelPlace place = unpack(frame.keys[n]);
     if (!cells.has_cell(place.cell.head<2>())) continue;
-    const Sum& more = frame.sums_[n];
+    const Sum& more = frame.sums[n];
     Sum& sum = side_of(place, more.normal);
     sum.weight += more.weight;
     sum.offset += more.offset;

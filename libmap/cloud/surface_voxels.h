@@ -5,42 +5,12 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <utility>
 #include <vector>
 
+#include "libmap/cloud/voxel_index.h"
+
 namespace libmap {
-
-// Where a voxel lies in its grid, and which of the two sides of a thin sheet it holds.
-struct VoxelPlace {
-  Eigen::Vector3i cell = Eigen::Vector3i::Zero();
-  int side = 0;  // 0 or 1
-};
-
-// Cells -limit..limit-1 along each axis.
-inline constexpr int voxel_cell_limit = 1 << 20;
-
-// 21 bits an axis and one of the side.
-std::uint64_t pack(const VoxelPlace& place);
-VoxelPlace unpack(std::uint64_t key);
-
-// Keys to consecutive numbers, in the order in which they come (open addressing).
-class VoxelIndex {
- public:
-  static constexpr std::uint32_t none = 0xffffffff;
-
-  VoxelIndex();                                  // no key yet
-  std::uint32_t find(std::uint64_t key) const;   // the key's number, or `none`
-  std::uint32_t find_or_add(std::uint64_t key);  // the key's number, the next one if it is new
-  std::size_t size() const { return keys_.size(); }
-  const std::vector<std::uint64_t>& keys() const { return keys_; }
-
- private:
-  std::size_t slot_of(std::uint64_t key) const;
-  void grow();
-
-  std::vector<std::uint64_t> keys_;
-  std::vector<std::uint32_t> slots_;  // numbers of keys; a power of 2
-  std::uint32_t last_ = 0;            // asked for: pixels side by side share a voxel
-};
 
 struct PlanCells;  // plan_cells.h
 
@@ -57,8 +27,14 @@ class SurfaceVoxels {
   // One measurement, its place in voxels; places beyond voxel_cell_limit are left out. A
   // measurement whose normal points away from the first side's mean belongs to the other side.
   void add(const Eigen::Vector3f& place, const Eigen::Vector3f& normal, float weight);
-  // All that one frame measured in the columns `cells`.
-  void merge_frame(const SurfaceVoxels& frame, const PlanCells& cells);
+  // What one frame measured, without what finds a voxel: that would be most of the memory.
+  struct Frame {
+    std::vector<std::uint64_t> keys;
+    std::vector<Sum> sums;
+  };
+  Frame take_frame() && { return {std::move(index_).take_keys(), std::move(sums_)}; }
+  // All of it that is in the columns `cells`.
+  void merge(const Frame& frame, const PlanCells& cells);
   // Those in the columns `cells`, in their order.
   SurfaceVoxels in(const PlanCells& cells) const;
 

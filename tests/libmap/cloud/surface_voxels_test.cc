@@ -5,6 +5,7 @@
 #include <map>
 #include <set>
 
+#include "libmap/cloud/plan_cells.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -28,11 +29,18 @@ TEST(SurfaceVoxels, KeysRoundTrip) {
 TEST(SurfaceVoxels, IndexAgreesWithAMap) {
   VoxelIndex index;
   std::map<std::uint64_t, std::uint32_t> truth;
+  const auto random_key = [](double reach) {
+    VoxelPlace place;
+    for (int axis = 0; axis < 3; ++axis)
+      place.cell[axis] = static_cast<int>(uniform(-reach, reach));
+    place.side = uniform(0, 1) < 0.5 ? 0 : 1;
+    return pack(place);
+  };
   for (int n = 0; n < 20000; ++n) {
-    const std::uint64_t key = random_engine()() % 6000;
+    const std::uint64_t key = random_key(9);
     const auto [at, is_new] = truth.try_emplace(key, static_cast<std::uint32_t>(truth.size()));
     ASSERT_EQ(index.find_or_add(key), at->second);
-    const std::uint64_t asked = random_engine()() % 12000;
+    const std::uint64_t asked = random_key(12);
     const auto known = truth.find(asked);
     ASSERT_EQ(index.find(asked), known == truth.end() ? VoxelIndex::none : known->second);
   }
@@ -56,7 +64,7 @@ TEST(SurfaceVoxels, SidesOfASheetStayApart) {
     SurfaceVoxels one;
     const float side = frame % 2 == 0 ? 1.0F : -1.0F;
     one.add({0.5F, 0.5F, 0.5F + 0.2F * side}, {0, 0, side}, 1.0F);
-    all.merge_frame(one, {});
+    all.merge(std::move(one).take_frame(), {});
   }
   ASSERT_EQ(all.size(), 2U);
   for (const SurfaceVoxels::Sum& sum : all.sums()) {

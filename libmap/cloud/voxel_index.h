@@ -1,0 +1,131 @@
+// Voxels by number. Inline, for the innermost loops of fusion.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <utility>
+#include <vector>
+
+namespace libmap {
+
+// Where a voxel lies in its grid, and which of the two sides of a thin sheet it holds.
+struct VoxelPlace {
+  Eigen::Vector3i cell = Eigen::Vector3i::Zero();
+  int side = 0;  // 0 or 1
+};
+
+// Cells -limit..limit-1 along each axis.
+inline constexpr int voxel_cell_limit = 1 << 20;
+
+// Of a voxel: 21 bits an axis and one of the side.
+namespace voxel_key {
+
+inline constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
+// Of the voxel's place in a block of 4 x 4 x 2.
+inline constexpr std::uint64_t block_bits =
+    std::uint64_t{3} << 43U | std::uint64_t{3} << 22U | std::uint64_t{1} << 1U;
+
+inline std::uint64_t axis_bits(int cell) {
+  return static_cast<std::uint64_t>(cell + voxel_cell_limit) & axis_mask;
+}
+
+inline std::size_t place_in_block(std::uint64_t key) {
+  return static_cast<std::size_t>((key >> 1U & 1U) | (key >> 22U & 3U) << 1U |
+                                  (key >> 43U & 3U) << 3U);
+}
+
+// The finaliser of SplitMix64 (Steele, Lea and Flood 2014).
+inline std::uint64_t scramble(std::uint64_t key) {
+  key = (key ^ (key >> 30U)) * 0xbf58476d1ce4e5b9U;
+  key = (key ^ (key >> 27U)) * 0x94d049bb133111ebU;
+  return key ^ (key >> 31U);
+}
+
+}  // namespace voxel_key
+
+inline std::uint64_t pack(const VoxelPlace& place) {
+  using voxel_key::axis_bits;
+  return axis_bits(place.cell.x()) << 43U | axis_bits(place.cell.y()) << 22U |
+         axis_bits(place.cell.z()) << 1U | static_cast<std::uint64_t>(place.side);
+}
+
+inline VoxelPlace unpack(std::uint64_t key) {
+  const auto cell = [](std::uint64_t bits) {
+    return static_cast<int>(bits & voxel_key::axis_mask) - voxel_cell_limit;
+  };
+  return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
+}
+
+// Keys to consecutive numbers, in the order in which they come. A hash table (open addressing)
+// holds blocks of 4 x 4 x 2 voxels of one side: neighbors are in one block mostly.
+class VoxelIndex {
+ public:
+  static constexpr std::uint32_t none = 0xffffffff;
+
+  VoxelIndex() : slots_(1U << 6U) {}  // no key yet
+
+  // The key's number, or `none`.
+  std::uint32_t find(std::uint64_t key) const {
+    const Slot& slot = slots_[slot_of(key & ~voxel_key::block_bits)];
+    return slot.block == none ? none : blocks_[slot.block][voxel_key::place_in_block(key)];
+  }
+
+  // The key's number, the next one if it is new.
+  std::uint32_t find_or_add(std::uint64_t key) {
+    const std::uint64_t block_key = key & ~voxel_key::block_bits;
+    if (block_key != last_key_ || last_block_ == none) {
+      last_block_ = block_of(block_key);
+      last_key_ = block_key;
+    }
+    std::uint32_t& number = blocks_[last_block_][voxel_key::place_in_block(key)];
+    if (number != none) return number;
+    keys_.push_back(key);
+    return number = static_cast<std::uint32_t>(keys_.size() - 1);
+  }
+
+  std::size_t size() const { return keys_.size(); }
+  const std::vector<std::uint64_t>& keys() const { return keys_; }
+  std::vector<std::uint64_t> take_keys() && { return std::move(keys_); }
+
+ private:
+  using Block = std::array<std::uint32_t, 32>;  // numbers of its keys
+  struct Slot {
+    std::uint64_t key = 0;  // of a block
+    std::uint32_t block = none;
+  };
+
+  std::size_t slot_of(std::uint64_t block_key) const {
+    const std::size_t mask = slots_.size() - 1;
+    std::size_t slot = static_cast<std::size_t>(voxel_key::scramble(block_key)) & mask;
+    while (slots_[slot].block != none && slots_[slot].key != block_key) slot = (slot + 1) & mask;
+    return slot;
+  }
+
+  // The block's number; a new one if it is not known.
+  std::uint32_t block_of(std::uint64_t block_key) {
+    Slot& slot = slots_[slot_of(block_key)];
+    if (slot.block != none) return slot.block;
+    const auto number = static_cast<std::uint32_t>(blocks_.size());
+    slot = {block_key, number};
+    blocks_.emplace_back().fill(none);
+    if (2 * blocks_.size() > slots_.size()) grow();
+    return number;
+  }
+
+  void grow() {
+    std::vector<Slot> before(2 * slots_.size());
+    before.swap(slots_);
+    for (const Slot& slot : before)
+      if (slot.block != none) slots_[slot_of(slot.key)] = slot;
+  }
+
+  std::vector<std::uint64_t> keys_;
+  std::vector<Block> blocks_;
+  std::vector<Slot> slots_;     // a power of 2
+  std::uint64_t last_key_ = 0;  // of the block that was asked for: pixels side by side share it
+  std::uint32_t last_block_ = none;
+};
+
+}  // namespace libmap
