@@ -49,23 +49,21 @@ class Adjustment {
       if (n == 0 || observations[n].element != observations[n - 1].element) starts_.push_back(n);
     }
     starts_.push_back(observations.size());
-    if (observations.size() > max_kept_slopes) return;
-    std::vector<Vector6d> slopes;
-    for (const SurfaceObservation& one : observations) slopes.push_back(slope(one));
-    slopes_ = std::move(slopes);
+    if (observations.size() <= max_kept_slopes) find_slopes(0, observations.size(), slopes_);
   }
 
   double disagreement() const {
     double squares = 0.0;
     double weights = 0.0;
-    each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_residual(begin, end);
-      for (std::size_t n = begin; n < end; ++n) {
-        const double off = residual(observations_[n]) - mean;
-        squares += weights_[n] * off * off;
+    std::vector<double> off;
+    for (std::size_t element = 0; element < elements(); ++element) {
+      find_offsets(element, off);
+      for (std::size_t n = starts_[element]; n < starts_[element + 1]; ++n) {
+        const double here = off[n - starts_[element]];
+        squares += weights_[n] * here * here;
         weights += weights_[n];
       }
-    });
+    }
     return weights > 0.0 ? std::sqrt(squares / weights) : 0.0;
   }
 
@@ -73,7 +71,7 @@ class Adjustment {
     double squares = 0.0;
     double weights = 0.0;
     for (std::size_t n = 0; n < observations_.size(); ++n) {
-      const double change = slope(observations_[n]).dot(corrections_[observations_[n].frame]);
+      const double change = slope(n).dot(corrections_[observations_[n].frame]);
       squares += weights_[n] * change * change;
       weights += weights_[n];
     }
@@ -81,12 +79,15 @@ class Adjustment {
   }
 
   void weigh() {
-    each_element([&](std::size_t begin, std::size_t end) {
-      const double mean = mean_residual(begin, end);
-      for (std::size_t n = begin; n < end; ++n) {
-        const double off = residual(observations_[n]) - mean;
-        const double share = scatter2_ / (scatter2_ + off * off);
-        weights_[n] = information(observations_[n]) * share * share;
+    parallel_for(elements(), 1024, [&](std::size_t first, std::size_t last) {
+      std::vector<double> off;
+      for (std::size_t element = first; element < last; ++element) {
+        find_offsets(element, off);
+        for (std::size_t n = starts_[element]; n < starts_[element + 1]; ++n) {
+          const double here = off[n - starts_[element]];
+          const double share = scatter2_ / (scatter2_ + here * here);
+          weights_[n] = information(observations_[n]) * share * share;
+        }
       }
     });
   }
@@ -132,36 +133,46 @@ class Adjustment {
 
  private:
   std::size_t elements() const { return starts_.size() - 1; }
-  template <typename Use>
-  void each_element(const Use& use) const {
-    for (std::size_t n = 0; n < elements(); ++n) use(starts_[n], starts_[n + 1]);
-  }
-  double mean_residual(std::size_t begin, std::size_t end) const {
+  // Of an element's observations, each one's residual about their mean.
+  void find_offsets(std::size_t element, std::vector<double>& offsets) const {
+    offsets.clear();
     double sum = 0.0;
     double weights = 0.0;
-    for (std::size_t n = begin; n < end; ++n) {
-      sum += weights_[n] * residual(observations_[n]);
+    for (std::size_t n = starts_[element]; n < starts_[element + 1]; ++n) {
+      offsets.push_back(residual(observations_[n], slope(n)));
+      sum += weights_[n] * offsets.back();
       weights += weights_[n];
     }
-    return weights > 0.0 ? sum / weights : 0.0;
+    const double mean = weights > 0.0 ? sum / weights : 0.0;
+    for (double& offset : offsets) offset -= mean;
   }
   double information(const SurfaceObservation& one) const {  // inverse variance
     return share_ / (static_cast<double>(one.variance_m2) + scatter2_);
   }
   // Of the height: by a turn, by a shift of its frame.
-  Vector6d slope(const SurfaceObservation& one) const {
-    if (!slopes_.empty()) return slopes_[static_cast<std::size_t>(&one - observations_.data())];
-    const Eigen::Vector3d normal = elements_[one.element].normal.cast<double>();
+  Vector6d slope(std::size_t number) const {
+    if (!slopes_.empty()) return slopes_[number];
+    return slope_of(observations_[number]);
+  }
+  Vector6d slope_of(const SurfaceObservation& one) const {
+    const Eigen::Vector3d n = elements_[one.element].normal.cast<double>();
     const Eigen::Vector3d arm =
         elements_[one.element].position.cast<double>() - centers_[one.frame];
-    Vector6d slope;
-    slope << arm.cross(normal), normal;
-    return slope;
+    return {arm.y() * n.z() - arm.z() * n.y(),
+            arm.z() * n.x() - arm.x() * n.z(),
+            arm.x() * n.y() - arm.y() * n.x(),
+            n.x(),
+            n.y(),
+            n.z()};
+  }
+  void find_slopes(std::size_t begin, std::size_t end, std::vector<Vector6d>& slopes) const {
+    slopes.clear();
+    slopes.reserve(end - begin);
+    for (std::size_t n = begin; n < end; ++n) slopes.push_back(slope_of(observations_[n]));
   }
   double residual(const SurfaceObservation& one, const Vector6d& slope) const {
     return static_cast<double>(one.height_m) + slope.dot(corrections_[one.frame]);
   }
-  double residual(const SurfaceObservation& one) const { return residual(one, slope(one)); }
   // Adds J' W (value - its mean on the element): the elements' heights are eliminated. `value` is
   // of an observation and its slope.
   template <typename Value>
@@ -173,19 +184,19 @@ class Adjustment {
         elements(), grain, std::move(sums),
         [&](std::size_t first, std::size_t last) {
           Sums part = zero;
-          std::vector<Vector6d> slopes;
+          std::vector<Vector6d> computed;
           std::vector<double> values;
           for (std::size_t element = first; element < last; ++element) {
             const std::size_t begin = starts_[element];
             const std::size_t end = starts_[element + 1];
-            slopes.clear();
-            values.clear();
+            if (slopes_.empty()) find_slopes(begin, end, computed);
+            const Vector6d* slopes = slopes_.empty() ? computed.data() : &slopes_[begin];
+            values.resize(std::max(values.size(), end - begin));
             double sum = 0.0;
             double weights = 0.0;
             for (std::size_t n = begin; n < end; ++n) {
-              slopes.push_back(slope(observations_[n]));
-              values.push_back(value(observations_[n], slopes.back()));
-              sum += weights_[n] * values.back();
+              values[n - begin] = value(observations_[n], slopes[n - begin]);
+              sum += weights_[n] * values[n - begin];
               weights += weights_[n];
             }
             const double mean = weights > 0.0 ? sum / weights : 0.0;
@@ -203,7 +214,7 @@ class Adjustment {
   std::vector<Matrix6d> block_inverses() const {
     std::vector<Matrix6d> blocks(corrections_.size(), prior_.asDiagonal());
     for (std::size_t n = 0; n < observations_.size(); ++n) {
-      const Vector6d by_step = slope(observations_[n]);
+      const Vector6d by_step = slope(n);
       blocks[observations_[n].frame] += weights_[n] * by_step * by_step.transpose();
     }
     for (Matrix6d& block : blocks) block = block.llt().solve(Matrix6d::Identity());
