@@ -51,13 +51,16 @@ double with_margin(double square_m2) {
 // It keeps no list: from far off all points are nearly as near.
 struct FirstOfNearest {
   NeighborPoint neighbor{0, HUGE_VAL};
+  double worst = HUGE_VAL;
 
   bool full() const { return true; }
-  double worstDist() const { return with_margin(neighbor.square_m2); }
+  double worstDist() const { return worst; }
   bool addPoint(double square_m2, std::size_t index) {
     if (square_m2 < neighbor.square_m2 ||
-        (square_m2 == neighbor.square_m2 && index < neighbor.index))
+        (square_m2 == neighbor.square_m2 && index < neighbor.index)) {
       neighbor = {index, square_m2};
+      worst = with_margin(square_m2);
+    }
     return true;
   }
 };
@@ -66,11 +69,10 @@ struct FirstOfNearest {
 struct FirstOfNearestPoints {
   std::size_t count;
   std::vector<NeighborPoint> neighbors{};  // the nearest first
+  double worst = std::numeric_limits<double>::max();
 
   bool full() const { return neighbors.size() == count; }
-  double worstDist() const {
-    return full() ? with_margin(neighbors.back().square_m2) : std::numeric_limits<double>::max();
-  }
+  double worstDist() const { return worst; }
   bool addPoint(double square_m2, std::size_t index) {
     const NeighborPoint point{index, square_m2};
     const auto before = [](const NeighborPoint& a, const NeighborPoint& b) {
@@ -79,6 +81,7 @@ struct FirstOfNearestPoints {
     if (full() && !before(point, neighbors.back())) return true;
     if (full()) neighbors.pop_back();
     neighbors.insert(std::upper_bound(neighbors.begin(), neighbors.end(), point, before), point);
+    if (full()) worst = with_margin(neighbors.back().square_m2);
     return true;
   }
 };
