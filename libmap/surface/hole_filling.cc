@@ -9,6 +9,7 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/surface/hole_patch.h"
+#include "libmap/surface/mesh_components.h"
 #include "libmap/surface/self_intersections.h"
 #include "libmap/surface/triangle_repair.h"
 
@@ -46,9 +47,9 @@ struct Reach {
 };
 
 // Whether each loop is its component's outer boundary.
-std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const std::vector<BoundaryLoop>& loops,
+std::vector<bool> outer_boundaries(const TriangleMesh& mesh, const MeshComponents& components,
+                                   const std::vector<BoundaryLoop>& loops,
                                    const std::optional<PlanBox>& known) {
-  const MeshComponents components = connected_components(mesh);
   constexpr std::size_t none = std::numeric_limits<std::size_t>::max();
   std::vector<std::size_t> longest(components.areas_m2.size(), none);
   std::vector<double> length(components.areas_m2.size(), -1.0);
@@ -271,9 +272,11 @@ std::vector<bool> components_beyond(const TriangleMesh& mesh, const MeshComponen
 
 std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m,
                                      const std::optional<PlanBox>& known) {
-  std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposites_of(mesh));
+  const std::vector<HalfEdge> opposite = opposites_of(mesh);
+  std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposite);
   if (loops.empty()) return {};
-  const std::vector<bool> is_outer = outer_boundaries(mesh, loops, known);
+  const std::vector<bool> is_outer =
+      outer_boundaries(mesh, components_of(mesh, opposite), loops, known);
   std::vector<BoundaryLoop> holes;
   for (std::size_t n = 0; n < loops.size(); ++n) {
     if (is_outer[n]) continue;

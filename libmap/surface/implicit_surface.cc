@@ -44,6 +44,8 @@ constexpr std::array<std::array<int, 2>, 12> edge_corners = {{{0, 1},
                                                               {2, 6},
                                                               {3, 7}}};
 
+constexpr std::uint32_t none = 0xffffffff;
+
 // 21 bits an axis.
 std::uint64_t pack(const Vector3i& place) {
   constexpr int middle = 1 << 20;
@@ -87,10 +89,29 @@ struct Block {
   std::vector<std::uint32_t> samples;  // whose support reaches it, ascending
 };
 
+// The corners of one block's cubes.
+struct BlockGrid {
+  std::vector<Corner> corners = std::vector<Corner>(corners_per_block);
+  std::vector<double> values;
+  // Of the block's part: on the edges from each corner along the axes.
+  std::vector<std::uint32_t> vertex_on = std::vector<std::uint32_t>(3 * corners_per_block, none);
+};
+
+struct Cube {
+  Vector3i place;                   // in its block
+  std::array<std::size_t, 8> at{};  // its corners
+  unsigned inside = 0;              // a bit a corner
+};
+
+// What one block adds to the surface.
 struct Part {
-  // Along each edge with a vertex: three times the packed lower corner, and the axis.
-  std::vector<std::pair<std::uint64_t, Vector3d>> vertices;
-  std::vector<std::array<std::uint64_t, 3>> triangles;
+  struct Vertex {
+    Vector3d position;
+    std::uint64_t edge = 0;  // that it lies on: three times the packed lower corner, and the axis
+    bool is_shared = false;  // the edge is one of other blocks, too
+  };
+  std::vector<Vertex> vertices;
+  std::vector<Triangle> triangles;  // of these vertices
 };
 
 class ImplicitSurface {
@@ -120,6 +141,10 @@ class ImplicitSurface {
   void add_sample(const SurfaceSample& sample, const Block& block,
                   std::vector<Corner>& corners) const;
   void march(const Block& block, Part& part) const;
+  static bool is_crossed(const BlockGrid& grid, Cube& cube);
+  void add_cube(const Block& block, const Cube& cube, BlockGrid& grid, Part& part) const;
+  Part::Vertex vertex_of(const Block& block, const Vector3i& in_block, int axis,
+                         double share) const;
   TriangleMesh joined() const;
 
   static std::size_t corner_index(const Vector3i& corner) {
@@ -181,60 +206,89 @@ void ImplicitSurface::add_sample(const SurfaceSample& sample, const Block& block
 }
 
 void ImplicitSurface::march(const Block& block, Part& part) const {
-  std::vector<Corner> corners(corners_per_block);
-  for (const std::uint32_t n : block.samples) add_sample(samples_[n], block, corners);
-  std::vector<double> values;
-  values.reserve(corners_per_block);
-  for (const Corner& corner : corners) values.push_back(corner.weight > 0.0 ? corner.value() : 0.0);
-  std::array<std::size_t, 8> at{};
+  BlockGrid grid;
+  for (const std::uint32_t n : block.samples) add_sample(samples_[n], block, grid.corners);
+  grid.values.reserve(corners_per_block);
+  for (const Corner& corner : grid.corners)
+    grid.values.push_back(corner.weight > 0.0 ? corner.value() : 0.0);
   for (int z = 0; z < block_cells; ++z)
     for (int y = 0; y < block_cells; ++y)
       for (int x = 0; x < block_cells; ++x) {
-        unsigned inside = 0;
-        bool is_known = true;
-        for (std::size_t c = 0; c < at.size() && is_known; ++c) {
-          const auto& offset = corner_offsets[c];
-          at[c] = corner_index({x + offset[0], y + offset[1], z + offset[2]});
-          is_known = corners[at[c]].weight > 0.0;
-          if (values[at[c]] < 0.0) inside |= 1U << c;
-        }
-        if (!is_known || pcl::edgeTable[inside] == 0) continue;
-        is_known =
-            std::all_of(at.begin(), at.end(), [&](std::size_t n) { return corners[n].is_known(); });
-        if (!is_known) continue;
-        std::array<std::uint64_t, 12> keys{};
-        for (std::size_t e = 0; e < edge_corners.size(); ++e) {
-          if ((pcl::edgeTable[inside] & (1U << e)) == 0) continue;
-          const auto& [a, b] = edge_corners[e];
-          const auto& low = corner_offsets[static_cast<std::size_t>(a)];
-          const auto& high = corner_offsets[static_cast<std::size_t>(b)];
-          const Vector3i corner = block.begin + Vector3i(x + low[0], y + low[1], z + low[2]);
-          const Vector3i along(high[0] - low[0], high[1] - low[1], high[2] - low[2]);
-          const double from = values[at[static_cast<std::size_t>(a)]];
-          const double to = values[at[static_cast<std::size_t>(b)]];
-          const double share = std::clamp(from / (from - to), min_share, 1.0 - min_share);
-          keys[e] = 3 * pack(corner) + static_cast<std::uint64_t>(along.y() + 2 * along.z());
-          part.vertices.emplace_back(
-              keys[e], cell_m_ * (corner.cast<double>() + share * along.cast<double>()));
-        }
-        // PCL's table turns triangles toward the inside.
-        for (const int* edge = pcl::triTable[inside]; *edge >= 0; edge += 3)
-          part.triangles.push_back({keys[static_cast<std::size_t>(edge[0])],
-                                    keys[static_cast<std::size_t>(edge[1])],
-                                    keys[static_cast<std::size_t>(edge[2])]});
+        Cube cube{.place = {x, y, z}};
+        if (is_crossed(grid, cube)) add_cube(block, cube, grid, part);
       }
+}
+
+// Whether the surface passes through the cube, with samples all around; finds its corners.
+bool ImplicitSurface::is_crossed(const BlockGrid& grid, Cube& cube) {
+  for (std::size_t c = 0; c < cube.at.size(); ++c) {
+    const auto& offset = corner_offsets[c];
+    cube.at[c] = corner_index(cube.place + Vector3i(offset[0], offset[1], offset[2]));
+    if (!(grid.corners[cube.at[c]].weight > 0.0)) return false;
+    if (grid.values[cube.at[c]] < 0.0) cube.inside |= 1U << c;
+  }
+  return pcl::edgeTable[cube.inside] != 0 &&
+         std::all_of(cube.at.begin(), cube.at.end(),
+                     [&](std::size_t n) { return grid.corners[n].is_known(); });
+}
+
+void ImplicitSurface::add_cube(const Block& block, const Cube& cube, BlockGrid& grid,
+                               Part& part) const {
+  std::array<std::uint32_t, 12> numbers{};
+  for (std::size_t e = 0; e < edge_corners.size(); ++e) {
+    if ((pcl::edgeTable[cube.inside] & (1U << e)) == 0) continue;
+    const auto a = static_cast<std::size_t>(edge_corners[e][0]);
+    const auto b = static_cast<std::size_t>(edge_corners[e][1]);
+    const auto& low = corner_offsets[a];
+    const auto& high = corner_offsets[b];
+    const int axis = high[1] - low[1] + 2 * (high[2] - low[2]);
+    std::uint32_t& known = grid.vertex_on[3 * cube.at[a] + static_cast<std::size_t>(axis)];
+    if (known == none) {
+      known = static_cast<std::uint32_t>(part.vertices.size());
+      const double from = grid.values[cube.at[a]];
+      const double to = grid.values[cube.at[b]];
+      const double share = std::clamp(from / (from - to), min_share, 1.0 - min_share);
+      part.vertices.push_back(
+          vertex_of(block, cube.place + Vector3i(low[0], low[1], low[2]), axis, share));
+    }
+    numbers[e] = known;
+  }
+  // PCL's table turns triangles toward the inside.
+  for (const int* edge = pcl::triTable[cube.inside]; *edge >= 0; edge += 3)
+    part.triangles.push_back({numbers[static_cast<std::size_t>(edge[0])],
+                              numbers[static_cast<std::size_t>(edge[1])],
+                              numbers[static_cast<std::size_t>(edge[2])]});
+}
+
+// A share of the way along the edge from a corner of the block.
+Part::Vertex ImplicitSurface::vertex_of(const Block& block, const Vector3i& in_block, int axis,
+                                        double share) const {
+  const Vector3i corner = block.begin + in_block;
+  Part::Vertex vertex;
+  vertex.position = cell_m_ * (corner.cast<double>() + share * Vector3d::Unit(axis));
+  vertex.edge = 3 * pack(corner) + static_cast<std::uint64_t>(axis);
+  for (int other = 0; other < 3; ++other)
+    if (other != axis && in_block[other] % block_cells == 0) vertex.is_shared = true;
+  return vertex;
 }
 
 TriangleMesh ImplicitSurface::joined() const {
   TriangleMesh mesh;
-  std::unordered_map<std::uint64_t, std::uint32_t> numbers;
+  std::size_t triangles = 0;
+  for (const Part& part : parts_) triangles += part.triangles.size();
+  mesh.triangles.reserve(triangles);
+  std::unordered_map<std::uint64_t, std::uint32_t> shared;
+  std::vector<std::uint32_t> numbers;
   for (const Part& part : parts_) {
-    for (const auto& [key, position] : part.vertices)
-      if (numbers.try_emplace(key, static_cast<std::uint32_t>(mesh.vertices.size())).second)
-        mesh.vertices.push_back(position);
-    for (const auto& triangle : part.triangles)
-      mesh.triangles.push_back(
-          {numbers.at(triangle[0]), numbers.at(triangle[1]), numbers.at(triangle[2])});
+    numbers.clear();
+    for (const Part::Vertex& vertex : part.vertices) {
+      const auto next = static_cast<std::uint32_t>(mesh.vertices.size());
+      numbers.push_back(vertex.is_shared ? shared.try_emplace(vertex.edge, next).first->second
+                                         : next);
+      if (numbers.back() == next) mesh.vertices.push_back(vertex.position);
+    }
+    for (const Triangle& triangle : part.triangles)
+      mesh.triangles.push_back({numbers[triangle[0]], numbers[triangle[1]], numbers[triangle[2]]});
   }
   return mesh;
 }

@@ -6,7 +6,9 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstddef>
+#include <limits>
 
 #include "libmap/core/parallel.h"
 
@@ -18,7 +20,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 
 constexpr std::size_t leaf_size = 8;
-constexpr std::size_t leaves_grain = 64;
+constexpr std::size_t triangles_grain = 1024;
 
 Point point_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
 
@@ -90,94 +92,157 @@ class PairTest {
   const TriangleMesh& mesh_;
 };
 
-// Bounding boxes of triangles, halved by the median along their longest side. Nodes stand in
-// preorder, so that a walk needs no stack.
+// Of triangles, in single precision: no smaller than they are.
+struct Box {
+  std::array<float, 3> low{};
+  std::array<float, 3> high{};
+
+  bool meets(const Box& other) const {
+    return low[0] <= other.high[0] && other.low[0] <= high[0] && low[1] <= other.high[1] &&
+           other.low[1] <= high[1] && low[2] <= other.high[2] && other.low[2] <= high[2];
+  }
+  void extend(const Box& other) {
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], other.low[axis]);
+      high[axis] = std::max(high[axis], other.high[axis]);
+    }
+  }
+};
+
+Box box_of(const TriangleMesh& mesh, std::uint32_t triangle) {
+  Box box;
+  box.low.fill(HUGE_VALF);
+  box.high.fill(-HUGE_VALF);
+  for (const std::uint32_t v : mesh.triangles[triangle])
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const auto value = static_cast<float>(mesh.vertices[v][static_cast<Eigen::Index>(axis)]);
+      // More than what was rounded.
+      const float margin = std::numeric_limits<float>::epsilon() * std::abs(value) +
+                           std::numeric_limits<float>::min();
+      box.low[axis] = std::min(box.low[axis], value - margin);
+      box.high[axis] = std::max(box.high[axis], value + margin);
+    }
+  return box;
+}
+
+// Boxes of triangles, halved by the median along their longest side. Nodes stand in preorder, so
+// that a walk needs no stack.
 class BoxTree {
  public:
-  struct Node {
-    Eigen::AlignedBox3d box;
-    std::uint32_t begin = 0;  // of its triangles in order()
-    std::uint32_t end = 0;
-    std::uint32_t after = 0;  // the first node that is not below this one
-    bool marked = false;      // one of its triangles has a mark
-    bool is_leaf() const { return end - begin <= leaf_size; }
-  };
-
-  BoxTree(const TriangleMesh& mesh, std::vector<std::uint32_t> triangles,
-          const std::vector<bool>& only)
-      : only_(only), order_(std::move(triangles)) {
-    boxes_.resize(mesh.triangles.size());
-    for (const std::uint32_t t : order_)
-      for (const std::uint32_t v : mesh.triangles[t]) boxes_[t].extend(mesh.vertices[v]);
-    if (!order_.empty()) build(0, static_cast<std::uint32_t>(order_.size()));
-    for (std::uint32_t n = 0; n < nodes_.size(); ++n)
-      if (nodes_[n].is_leaf() && nodes_[n].marked) marked_leaves_.push_back(n);
+  BoxTree(const TriangleMesh& mesh, const std::vector<std::uint32_t>& triangles)
+      : items_(triangles.size()), boxes_(triangles.size()) {
+    if (triangles.empty()) return;
+    parallel_for(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) {
+        const Box box = box_of(mesh, triangles[n]);
+        for (std::size_t axis = 0; axis < 3; ++axis)
+          items_[n].center[axis] = 0.5F * box.low[axis] + 0.5F * box.high[axis];
+        items_[n].triangle = triangles[n];
+      }
+    });
+    const auto count = static_cast<std::uint32_t>(triangles.size());
+    nodes_.resize(node_count(count));
+    std::vector<Range> parts;
+    split(0, {0, count}, split_levels, parts);
+    parallel_each(parts.size(), [&](std::size_t n) {
+      std::vector<Range> whole;
+      split(parts[n].node, parts[n], std::numeric_limits<int>::max(), whole);
+    });
+    parallel_for(items_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) boxes_[n] = box_of(mesh, items_[n].triangle);
+    });
+    for (std::size_t n = nodes_.size(); n-- > 0;) find_box(n);
   }
 
-  const std::vector<std::uint32_t>& marked_leaves() const { return marked_leaves_; }
-
-  // visit(a, b) for pairs of triangles whose boxes meet, one in the leaf, at least one marked; of
-  // all marked leaves together, each pair once.
+  // visit(triangle) for those whose boxes meet this one.
   template <typename Visit>
-  void for_each_pair(std::uint32_t leaf, const Visit& visit) const {
-    const Node& own = nodes_[leaf];
+  void each_near(const Box& box, const Visit& visit) const {
     for (std::uint32_t n = 0; n < nodes_.size();) {
-      const Node& other = nodes_[n];
-      if (!other.box.intersects(own.box)) {
-        n = other.after;
-      } else if (!other.is_leaf()) {
-        ++n;
-      } else {
-        if (n >= leaf || !other.marked) visit_pairs(own, other, visit);
-        n = other.after;
+      const Node& node = nodes_[n];
+      if (!node.box.meets(box)) {
+        n = node.after;
+        continue;
       }
+      if (node.is_leaf())
+        for (std::uint32_t i = node.begin; i < node.end; ++i)
+          if (boxes_[i].meets(box)) visit(items_[i].triangle);
+      ++n;
     }
   }
 
  private:
-  bool is_marked(std::uint32_t t) const { return only_.empty() || only_[t]; }
+  // Levels of the tree that are made one after the other, before threads share the rest.
+  static constexpr int split_levels = 5;
 
-  template <typename Visit>
-  void visit_pairs(const Node& own, const Node& other, const Visit& visit) const {
-    for (std::uint32_t i = own.begin; i < own.end; ++i) {
-      const std::uint32_t a = order_[i];
-      for (std::uint32_t j = &own == &other ? i + 1 : other.begin; j < other.end; ++j) {
-        const std::uint32_t b = order_[j];
-        if (boxes_[a].intersects(boxes_[b]) && (is_marked(a) || is_marked(b))) visit(a, b);
-      }
+  struct Item {
+    std::array<float, 3> center{};
+    std::uint32_t triangle = 0;
+  };
+  struct Node {
+    Box box;
+    std::uint32_t begin = 0;  // of its items
+    std::uint32_t end = 0;
+    std::uint32_t after = 0;  // the first node that is not below this one
+    bool is_leaf() const { return end - begin <= leaf_size; }
+  };
+  struct Range {
+    std::uint32_t begin = 0;
+    std::uint32_t end = 0;
+    std::uint32_t node = 0;
+  };
+
+  static std::uint32_t node_count(std::uint32_t items) {
+    return items <= leaf_size ? 1 : 1 + node_count(items / 2) + node_count(items - items / 2);
+  }
+
+  // Makes the nodes of a range, `levels` of them; of the ranges below, which are left, none is
+  // made. Returns the node after them.
+  std::uint32_t split(std::uint32_t number, Range range, int levels, std::vector<Range>& left) {
+    range.node = number;
+    if (levels == 0) {
+      left.push_back(range);
+      return number + node_count(range.end - range.begin);
+    }
+    Node& node = nodes_[number];
+    node.begin = range.begin;
+    node.end = range.end;
+    if (node.is_leaf()) return node.after = number + 1;
+    const std::uint32_t middle = range.begin + (range.end - range.begin) / 2;
+    halve(range, middle);
+    const std::uint32_t second = split(number + 1, {range.begin, middle}, levels - 1, left);
+    return node.after = split(second, {middle, range.end}, levels - 1, left);
+  }
+
+  void halve(const Range& range, std::uint32_t middle) {
+    Box centers{items_[range.begin].center, items_[range.begin].center};
+    for (std::uint32_t n = range.begin + 1; n < range.end; ++n)
+      centers.extend({items_[n].center, items_[n].center});
+    std::size_t axis = 0;
+    for (std::size_t a = 1; a < 3; ++a)
+      if (centers.high[a] - centers.low[a] > centers.high[axis] - centers.low[axis]) axis = a;
+    const auto first = items_.begin();
+    std::nth_element(first + range.begin, first + middle, first + range.end,
+                     [axis](const Item& a, const Item& b) {
+                       return std::pair(a.center[axis], a.triangle) <
+                              std::pair(b.center[axis], b.triangle);
+                     });
+  }
+
+  // Of those below it.
+  void find_box(std::size_t number) {
+    Node& node = nodes_[number];
+    if (node.is_leaf()) {
+      node.box = boxes_[node.begin];
+      for (std::uint32_t n = node.begin + 1; n < node.end; ++n) node.box.extend(boxes_[n]);
+    } else {
+      node.box = nodes_[number + 1].box;
+      node.box.extend(nodes_[nodes_[number + 1].after].box);
     }
   }
 
-  void build(std::uint32_t begin, std::uint32_t end) {
-    const std::size_t index = nodes_.size();
-    Node node;
-    node.begin = begin;
-    node.end = end;
-    for (std::uint32_t n = begin; n < end; ++n) {
-      node.box.extend(boxes_[order_[n]]);
-      node.marked = node.marked || is_marked(order_[n]);
-    }
-    nodes_.push_back(node);
-    if (!node.is_leaf()) {
-      Eigen::Index axis = 0;
-      node.box.sizes().maxCoeff(&axis);
-      const auto key = [&](std::uint32_t t) {
-        return std::pair(boxes_[t].min()[axis] + boxes_[t].max()[axis], t);
-      };
-      const std::uint32_t middle = begin + (end - begin) / 2;
-      std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
-                       [&](std::uint32_t a, std::uint32_t b) { return key(a) < key(b); });
-      build(begin, middle);
-      build(middle, end);
-    }
-    nodes_[index].after = static_cast<std::uint32_t>(nodes_.size());
-  }
-
-  const std::vector<bool>& only_;
-  std::vector<std::uint32_t> order_;
-  std::vector<Eigen::AlignedBox3d> boxes_;
+  std::vector<Item> items_;
+  std::vector<Box> boxes_;  // of the items
   std::vector<Node> nodes_;
-  std::vector<std::uint32_t> marked_leaves_;
 };
 
 bool is_collinear(const TriangleMesh& mesh, const Triangle& t) {
@@ -189,26 +254,35 @@ bool is_collinear(const TriangleMesh& mesh, const Triangle& t) {
   return CGAL::collinear(point_of(a), point_of(mesh.vertices[t[1]]), point_of(mesh.vertices[t[2]]));
 }
 
-std::vector<std::uint32_t> triangles_with_area(const TriangleMesh& mesh) {
-  std::vector<std::uint32_t> kept;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    if (!is_collinear(mesh, mesh.triangles[t])) kept.push_back(t);
-  return kept;
+// 1 for triangles with an area, of those that `only` marks.
+std::vector<char> find_marked(const TriangleMesh& mesh, const std::vector<bool>& only) {
+  std::vector<char> marks(mesh.triangles.size(), 0);
+  parallel_for(marks.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t t = begin; t < end; ++t)
+      if ((only.empty() || only[t]) && !is_collinear(mesh, mesh.triangles[t])) marks[t] = 1;
+  });
+  return marks;
 }
 
 }  // namespace
 
 std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
                                                   const std::vector<bool>& only) {
-  const BoxTree tree(mesh, triangles_with_area(mesh), only);
+  const std::vector<char> marks = find_marked(mesh, only);
+  std::vector<std::uint32_t> marked;
+  for (std::uint32_t t = 0; t < marks.size(); ++t)
+    if (marks[t] != 0) marked.push_back(t);
+  const BoxTree tree(mesh, marked);
   const PairTest test(mesh);
   std::vector<TrianglePair> found = parallel_reduce(
-      tree.marked_leaves().size(), leaves_grain, std::vector<TrianglePair>(),
+      marks.size(), triangles_grain, std::vector<TrianglePair>(),
       [&](std::size_t begin, std::size_t end) {
         std::vector<TrianglePair> part;
-        for (std::size_t n = begin; n < end; ++n)
-          tree.for_each_pair(tree.marked_leaves()[n], [&](std::uint32_t a, std::uint32_t b) {
-            const TrianglePair pair = std::minmax(a, b);
+        for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t)
+          tree.each_near(box_of(mesh, t), [&](std::uint32_t other) {
+            // Two that are both marked meet twice.
+            if (marks[t] != 0 ? other <= t : is_collinear(mesh, mesh.triangles[t])) return;
+            const TrianglePair pair = std::minmax(t, other);
             if (test(pair)) part.push_back(pair);
           });
         return part;

@@ -163,7 +163,6 @@ class Reconstruction {
   void add_cell(const UsedPoint* begin, const UsedPoint* end);
   void find_spacings();
   void trim(TriangleMesh& surface);
-  bool is_near(const TriangleMesh& mesh, const Triangle& triangle, const PointTree& tree) const;
 
   const PointCloud& cloud_;
   const SurfaceReconstructionOptions& options_;
@@ -342,27 +341,30 @@ void Reconstruction::find_spacings() {
         static_cast<float>(std::min(spacings_m_[n], max_spacing_cells * result_.cell_size_m));
 }
 
-// Whether the triangle lies near samples, and on their side.
-bool Reconstruction::is_near(const TriangleMesh& mesh, const Triangle& triangle,
-                             const PointTree& tree) const {
-  const Eigen::Vector3d normal = area_normal(mesh, triangle);
-  for (const std::uint32_t corner : triangle) {
-    const NeighborPoint nearest = tree.first_of_nearest(mesh.vertices[corner]);
-    const double reach =
-        options_.trim_distance_cells * std::max(result_.cell_size_m, spacings_m_[nearest.index]);
-    if (nearest.square_m2 > reach * reach ||
-        samples_[nearest.index].normal.cast<double>().dot(normal) < 0.0)
-      return false;
-  }
-  return true;
-}
-
+// Triangles that lie near samples, and on their side.
 void Reconstruction::trim(TriangleMesh& surface) {
   const PointTree tree(places_);
+  std::vector<std::uint32_t> sample_of(surface.vertices.size());  // that is near a vertex; or none
+  constexpr std::uint32_t none = 0xffffffff;
+  parallel_for(sample_of.size(), 1024, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const NeighborPoint nearest = tree.first_of_nearest(surface.vertices[v]);
+      const double reach =
+          options_.trim_distance_cells * std::max(result_.cell_size_m, spacings_m_[nearest.index]);
+      const bool is_far = nearest.square_m2 > reach * reach;
+      sample_of[v] = is_far ? none : static_cast<std::uint32_t>(nearest.index);
+    }
+  });
   std::vector<char> near(surface.triangles.size());
-  parallel_for(near.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      near[n] = is_near(surface, surface.triangles[n], tree);
+  parallel_for(near.size(), 4096, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n) {
+      const Triangle& triangle = surface.triangles[n];
+      const Eigen::Vector3d normal = area_normal(surface, triangle);
+      near[n] = std::none_of(triangle.begin(), triangle.end(), [&](std::uint32_t corner) {
+        const std::uint32_t sample = sample_of[corner];
+        return sample == none || samples_[sample].normal.cast<double>().dot(normal) < 0.0;
+      });
+    }
   });
   result_.trimmed_triangles = static_cast<std::size_t>(std::count(near.begin(), near.end(), 0));
   result_.mesh = select_triangles(surface, {near.begin(), near.end()});
