@@ -20,6 +20,7 @@ using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 
 constexpr std::size_t leaf_size = 8;
+constexpr std::size_t leaves_grain = 64;
 constexpr std::size_t triangles_grain = 1024;
 
 Point point_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -152,22 +153,31 @@ class BoxTree {
       for (std::size_t n = begin; n < end; ++n) boxes_[n] = box_of(mesh, items_[n].triangle);
     });
     for (std::size_t n = nodes_.size(); n-- > 0;) find_box(n);
+    for (std::uint32_t n = 0; n < nodes_.size(); ++n)
+      if (nodes_[n].is_leaf()) leaves_.push_back(n);
   }
 
   // visit(triangle) for those whose boxes meet this one.
   template <typename Visit>
   void each_near(const Box& box, const Visit& visit) const {
-    for (std::uint32_t n = 0; n < nodes_.size();) {
-      const Node& node = nodes_[n];
-      if (!node.box.meets(box)) {
-        n = node.after;
-        continue;
-      }
-      if (node.is_leaf())
-        for (std::uint32_t i = node.begin; i < node.end; ++i)
-          if (boxes_[i].meets(box)) visit(items_[i].triangle);
-      ++n;
-    }
+    each_leaf_near(box, 0, [&](const Node& leaf) {
+      for (std::uint32_t n = leaf.begin; n < leaf.end; ++n)
+        if (boxes_[n].meets(box)) visit(items_[n].triangle);
+    });
+  }
+
+  // Of the leaves.
+  const std::vector<std::uint32_t>& leaves() const { return leaves_; }
+  // visit(a, b) for pairs whose boxes meet, one in the leaf; of all leaves together, each pair
+  // once.
+  template <typename Visit>
+  void each_pair(std::uint32_t leaf, const Visit& visit) const {
+    const Node& own = nodes_[leaf];
+    each_leaf_near(own.box, leaf, [&](const Node& other) {
+      for (std::uint32_t i = own.begin; i < own.end; ++i)
+        for (std::uint32_t j = &own == &other ? i + 1 : other.begin; j < other.end; ++j)
+          if (boxes_[i].meets(boxes_[j])) visit(items_[i].triangle, items_[j].triangle);
+    });
   }
 
  private:
@@ -190,6 +200,20 @@ class BoxTree {
     std::uint32_t end = 0;
     std::uint32_t node = 0;
   };
+
+  // From a node on.
+  template <typename Visit>
+  void each_leaf_near(const Box& box, std::uint32_t first, const Visit& visit) const {
+    for (std::uint32_t n = first; n < nodes_.size();) {
+      const Node& node = nodes_[n];
+      if (!node.box.meets(box)) {
+        n = node.after;
+        continue;
+      }
+      if (node.is_leaf()) visit(node);
+      ++n;
+    }
+  }
 
   static std::uint32_t node_count(std::uint32_t items) {
     return items <= leaf_size ? 1 : 1 + node_count(items / 2) + node_count(items - items / 2);
@@ -243,6 +267,7 @@ class BoxTree {
   std::vector<Item> items_;
   std::vector<Box> boxes_;  // of the items
   std::vector<Node> nodes_;
+  std::vector<std::uint32_t> leaves_;
 };
 
 bool is_collinear(const TriangleMesh& mesh, const Triangle& t) {
@@ -264,6 +289,22 @@ std::vector<char> find_marked(const TriangleMesh& mesh, const std::vector<bool>&
   return marks;
 }
 
+// find(n, part) for each number below `count`, the parts joined.
+template <typename Find>
+std::vector<TrianglePair> found_in_ranges(std::size_t count, std::size_t grain, const Find& find) {
+  return parallel_reduce(
+      count, grain, std::vector<TrianglePair>(),
+      [&](std::size_t begin, std::size_t end) {
+        std::vector<TrianglePair> part;
+        for (std::size_t n = begin; n < end; ++n) find(n, part);
+        return part;
+      },
+      [](std::vector<TrianglePair> a, const std::vector<TrianglePair>& b) {
+        a.insert(a.end(), b.begin(), b.end());
+        return a;
+      });
+}
+
 }  // namespace
 
 std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
@@ -274,23 +315,26 @@ std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
     if (marks[t] != 0) marked.push_back(t);
   const BoxTree tree(mesh, marked);
   const PairTest test(mesh);
-  std::vector<TrianglePair> found = parallel_reduce(
-      marks.size(), triangles_grain, std::vector<TrianglePair>(),
-      [&](std::size_t begin, std::size_t end) {
-        std::vector<TrianglePair> part;
-        for (auto t = static_cast<std::uint32_t>(begin); t < end; ++t)
-          tree.each_near(box_of(mesh, t), [&](std::uint32_t other) {
-            // Two that are both marked meet twice.
-            if (marks[t] != 0 ? other <= t : is_collinear(mesh, mesh.triangles[t])) return;
-            const TrianglePair pair = std::minmax(t, other);
-            if (test(pair)) part.push_back(pair);
-          });
-        return part;
-      },
-      [](std::vector<TrianglePair> a, const std::vector<TrianglePair>& b) {
-        a.insert(a.end(), b.begin(), b.end());
-        return a;
+  std::vector<TrianglePair> found = found_in_ranges(
+      tree.leaves().size(), leaves_grain, [&](std::size_t n, std::vector<TrianglePair>& part) {
+        tree.each_pair(tree.leaves()[n], [&](std::uint32_t a, std::uint32_t b) {
+          const TrianglePair pair = std::minmax(a, b);
+          if (test(pair)) part.push_back(pair);
+        });
       });
+  if (marked.size() < marks.size()) {
+    const auto more = found_in_ranges(marks.size(), triangles_grain,
+                                      [&](std::size_t n, std::vector<TrianglePair>& part) {
+                                        if (marks[n] != 0) return;
+                                        const auto t = static_cast<std::uint32_t>(n);
+                                        tree.each_near(box_of(mesh, t), [&](std::uint32_t other) {
+                                          const TrianglePair pair = std::minmax(t, other);
+                                          if (!is_collinear(mesh, mesh.triangles[t]) && test(pair))
+                                            part.push_back(pair);
+                                        });
+                                      });
+    found.insert(found.end(), more.begin(), more.end());
+  }
   std::sort(found.begin(), found.end());
   return found;
 }

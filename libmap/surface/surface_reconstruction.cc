@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <optional>
 #include <tuple>
 
 #include "libmap/core/error.h"
@@ -176,6 +177,7 @@ class Reconstruction {
   PoissonProblem problem_;
   std::vector<SurfaceSample> samples_;   // about the origin
   std::vector<Eigen::Vector3d> places_;  // of the samples, so too
+  std::optional<PointTree> tree_;        // of these places
   std::vector<double> spacings_m_;       // around the samples
   SurfaceReconstructionResult result_;
 };
@@ -324,7 +326,8 @@ void Reconstruction::find_spacings() {
   const double max_m = options_.method == SurfaceMethod::poisson
                            ? std::numeric_limits<double>::infinity()
                            : max_known_spacing(options_) * result_.cell_size_m;
-  const PointTree tree(places_);
+  tree_.emplace(places_);
+  const PointTree& tree = *tree_;
   parallel_for(samples_.size(), 1024, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
@@ -343,7 +346,7 @@ void Reconstruction::find_spacings() {
 
 // Triangles that lie near samples, and on their side.
 void Reconstruction::trim(TriangleMesh& surface) {
-  const PointTree tree(places_);
+  const PointTree& tree = *tree_;
   std::vector<std::uint32_t> sample_of(surface.vertices.size());  // that is near a vertex; or none
   constexpr std::uint32_t none = 0xffffffff;
   parallel_for(sample_of.size(), 1024, [&](std::size_t begin, std::size_t end) {
@@ -355,6 +358,7 @@ void Reconstruction::trim(TriangleMesh& surface) {
       sample_of[v] = is_far ? none : static_cast<std::uint32_t>(nearest.index);
     }
   });
+  tree_.reset();
   std::vector<char> near(surface.triangles.size());
   parallel_for(near.size(), 4096, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
