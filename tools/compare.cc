@@ -393,7 +393,7 @@ libmap::ColorImage picture_of(const Comparison& comparison, const CompareOptions
   view.title = fmt::format(
       "{} to {}: RMSE {:.2f} mm", std::filesystem::path(options.a).filename().string(),
       std::filesystem::path(options.b).filename().string(), 1e3 * comparison.statistics.rmse_m);
-  return libmap::render_scene(scene, view);
+  return libmap::render_scene(std::move(scene), view);
 }
 
 void write_outputs(Comparison& comparison, const CompareOptions& options, Run& run) {

@@ -227,7 +227,7 @@ std::string to_picture(const GripperMask& mask, const MaskOptions& options) {
   view.title = title_of(mask, options);
   libmap::Scene scene;
   scene.layers.push_back(layer);
-  return libmap::to_png(libmap::render_scene(scene, view));
+  return libmap::to_png(libmap::render_scene(std::move(scene), view));
 }
 
 void mask(const MaskOptions& options, Run& run) {

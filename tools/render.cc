@@ -70,7 +70,8 @@ libmap::ColorImage draw_one(RenderOptions& options, Run& run) {
   libmap::ColorImage image;
   try {
     shown = run.timed("read", [&] { return read_scene(file, options.scene, run); });
-    image = run.timed("render", [&] { return libmap::render_scene(shown.scene, options.view); });
+    image = run.timed("render",
+                      [&] { return libmap::render_scene(std::move(shown.scene), options.view); });
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(file) : error;
   }

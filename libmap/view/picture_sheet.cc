@@ -305,7 +305,9 @@ DrawnCell draw_cell(const SheetCell& cell, const PixelRect& rect,
   view.background = options.background;
   view.extent = extent;
   view.font_px = font_px;
-  DrawnCell drawn{render_scene(scene, view), camera_of(scene, view)};
+  DrawnCell drawn;
+  drawn.camera = camera_of(scene, view);
+  drawn.image = render_scene(std::move(scene), view);
   if (drawn.camera->perspective) drawn.camera.reset();
   return drawn;
 }

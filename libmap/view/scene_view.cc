@@ -15,13 +15,14 @@
 #include <vtkRenderer.h>
 #include <vtkSmartPointer.h>
 #include <vtkTexture.h>
-#include <vtkTypeInt64Array.h>
+#include <vtkTypeInt32Array.h>
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
 #include <cmath>
 #include <cstring>
 #include <numbers>
+#include <variant>
 
 #include "libmap/core/error.h"
 #include "libmap/view/offscreen.h"
@@ -162,15 +163,15 @@ vtkSmartPointer<vtkActor> actor_of(const ColoredTriangles& triangles) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) *coordinate++ = triangles.vertices[i][axis];
     for (const std::uint8_t channel : triangles.colors[i]) *color++ = channel;
   }
-  vtkNew<vtkTypeInt64Array> offsets;
-  vtkNew<vtkTypeInt64Array> corners;
+  vtkNew<vtkTypeInt32Array> offsets;
+  vtkNew<vtkTypeInt32Array> corners;
   const auto count = static_cast<vtkIdType>(triangles.triangles.size());
   offsets->SetNumberOfValues(count + 1);
   corners->SetNumberOfValues(3 * count);
-  for (vtkIdType t = 0; t <= count; ++t) offsets->SetValue(t, 3 * t);
-  vtkTypeInt64* corner = corners->GetPointer(0);
+  for (vtkIdType t = 0; t <= count; ++t) offsets->SetValue(t, static_cast<vtkTypeInt32>(3 * t));
+  vtkTypeInt32* corner = corners->GetPointer(0);
   for (const Triangle& triangle : triangles.triangles)
-    for (const std::uint32_t index : triangle) *corner++ = index;
+    for (const std::uint32_t index : triangle) *corner++ = static_cast<vtkTypeInt32>(index);
 
   vtkNew<vtkPoints> points;
   points->SetData(coordinates);
@@ -305,8 +306,11 @@ void bind_single(ParameterTable& table, SceneViewOptions& options) {
   table.add("axes", options.axes, "show the axes");
 }
 
-ColorImage render_scene(const Scene& scene, const SceneViewOptions& options) {
+ColorImage render_scene(Scene scene, const SceneViewOptions& options) {
   const Setup setup = set_up(scene, options);
+  // Only the pages of textures are not copied; drawing takes hundreds of bytes per point itself.
+  for (SceneLayer& layer : scene.layers)
+    if (!std::holds_alternative<TexturedMesh>(layer.shape)) layer.shape = PointCloud();
   return draw_offscreen(options.width, options.height,
                         [&](vtkRenderWindow& window) { fill(window, setup, options); });
 }

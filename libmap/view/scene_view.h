@@ -91,12 +91,13 @@ struct SceneViewOptions {
 void bind(ParameterTable& table, SceneViewOptions& options);
 void bind_single(ParameterTable& table, SceneViewOptions& options);
 
-// The picture of `scene`; the same scene and options give the same bytes on the same machine.
-// Starts a VirtualDisplay of its own if no display answers: hold one around several calls to start
-// only one. Calls from several threads are run one after the other.
-// Throws Error: no point to draw, a size or color or camera that cannot be, a layer whose arrays
-// do not fit each other, and what color_points throws; (failed) if no picture can be drawn here.
-ColorImage render_scene(const Scene& scene, const SceneViewOptions& options);
+// The picture of `scene`, whose clouds and meshes are freed before they are drawn; the same scene
+// and options give the same bytes on the same machine. Starts a VirtualDisplay of its own if no
+// display answers: hold one around several calls to start only one. Calls from several threads are
+// run one after the other. Throws Error: no point to draw, a size or color or camera that cannot
+// be, a layer whose arrays do not fit each other, and what color_points throws; (failed) if no
+// picture can be drawn here.
+ColorImage render_scene(Scene scene, const SceneViewOptions& options);
 
 // Of a scene, before it is drawn: the box in the terrain frame that its view is fitted to, with the
 // widths of its points, and the legends of its layers, each once. Throws as render_scene does.

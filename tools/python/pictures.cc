@@ -51,7 +51,7 @@ py::array render(const Shown& shown, const py::object& markers,
     scene.terrain_from_scene = pose_from(terrain_from_scene, "terrain_from_scene");
   scene.layers.push_back(std::move(options.layer));
   auto image = std::make_unique<libmap::ColorImage>(
-      without_lock([&] { return libmap::render_scene(scene, options.view); }));
+      without_lock([&] { return libmap::render_scene(std::move(scene), options.view); }));
   const std::uint8_t* const pixels = image->pixels.front().data();
   const Shape shape = {image->height, image->width, 3};
   const py::capsule owner(image.release(),

@@ -74,7 +74,7 @@ libmap::ColorImage draw(libmap::PointCloud cloud, libmap::Coloring coloring,
   scene.markers = std::move(markers);
   libmap::SceneViewOptions view;
   view.title = title;
-  return libmap::render_scene(scene, view);
+  return libmap::render_scene(std::move(scene), view);
 }
 
 Color change_color(ChangeClass change, const Color& ground) {
