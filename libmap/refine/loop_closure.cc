@@ -60,11 +60,11 @@ struct Verified {
 };
 
 Verified verify_pair(const FrameFeatures& a, const FrameFeatures& b, FramePair pair,
+                     const std::vector<FeatureMatch>& matches,
                      const LoopClosureDetectionOptions& options, std::uint64_t seed) {
   std::vector<FeatureMatch> used;
   std::vector<FeatureMatch> kept;
-  for (const FeatureMatch& match :
-       match_features(descriptor_vectors(a), descriptor_vectors(b), options.max_ratio))
+  for (const FeatureMatch& match : matches)
     (is_held_out(match.a, pair.first, options.held_out) ? kept : used).push_back(match);
   RelativePose pose = estimate_relative_pose(a, b, used, options.estimate, seed);
   Verified result{pose.outcome, std::nullopt};
@@ -82,6 +82,12 @@ Verified verify_pair(const FrameFeatures& a, const FrameFeatures& b, FramePair p
   }
   result.link = std::move(link);
   return result;
+}
+
+const std::vector<FeatureMatch>* known_matches(const KnownMatches* known, const FramePair& pair) {
+  if (known == nullptr) return nullptr;
+  const auto found = known->find(pair);
+  return found == known->end() ? nullptr : &found->second;
 }
 
 // In the order of RelativePoseOutcome.
@@ -223,19 +229,29 @@ std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,
 PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs,
                               const LoopClosureDetectionOptions& options, std::uint64_t seed,
-                              Progress& progress) {
+                              Progress& progress, KnownMatches* known) {
   std::vector<Verified> verified(pairs.size());
+  std::vector<std::vector<FeatureMatch>> fresh(pairs.size());
   progress.begin("matching", pairs.size());
   parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
       const auto [a, b] = pairs[n];
       const std::uint64_t own = mix_bits(mix_bits(seed, static_cast<std::uint64_t>(frames[a].node)),
                                          static_cast<std::uint64_t>(frames[b].node));
-      verified[n] = verify_pair(frames[a], frames[b], pairs[n], options, own);
+      const std::vector<FeatureMatch>* matches = known_matches(known, pairs[n]);
+      if (matches == nullptr) {
+        fresh[n] = match_features(descriptor_vectors(frames[a]), descriptor_vectors(frames[b]),
+                                  options.max_ratio);
+        matches = &fresh[n];
+      }
+      verified[n] = verify_pair(frames[a], frames[b], pairs[n], *matches, options, own);
+      if (known == nullptr) fresh[n] = {};
       progress.advance(1);
     }
   });
   progress.end();
+  for (std::size_t n = 0; known != nullptr && n < pairs.size(); ++n)
+    known->emplace(pairs[n], std::move(fresh[n]));
   PairVerification result;
   for (Verified& pair : verified) {
     count(pair.outcome, result.counts);

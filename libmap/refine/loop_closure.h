@@ -73,11 +73,15 @@ struct PairVerification {
   RejectionCounts counts;
 };
 
+// Of pairs of frames whose descriptors have been compared: that does not depend on their cameras.
+using KnownMatches = std::map<FramePair, std::vector<FeatureMatch>>;
+
 // Matches the features of each pair and estimates its motion. The same for any number of threads.
+// With `known`, matches of pairs that are not in it are added.
 PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs,
                               const LoopClosureDetectionOptions& options, std::uint64_t seed,
-                              Progress& progress = no_progress());
+                              Progress& progress = no_progress(), KnownMatches* known = nullptr);
 
 // Drops links that contradict the graph: by chi-square against the covariance of the relative pose
 // where the graph connects their nodes; where it does not, unless another link between the same two

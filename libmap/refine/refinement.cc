@@ -257,7 +257,7 @@ bool Refinement::round(int number) {
   StageReport stage;
   stage.name = number == 0 ? "neighbors" : "closures " + std::to_string(number);
   PairVerification verified =
-      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_);
+      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_, matches_to_keep());
   stage.closures = verified.counts;
   check_against_graph(verified.links, graph_, options_.closures, stage.closures);
   const std::size_t before = links_.size();
@@ -404,6 +404,7 @@ RefinementResult Refinement::run() {
     if (options_.bundle && (options_.intrinsics != IntrinsicsMode::fixed || options_.correct_depth))
       calibrate_sensor();
     for (FrameFeatures& frame : frames_) frame.descriptors = {};
+    known_matches_.clear();
     if (options_.icp.mode != IcpMode::off) icp();
     keep_start_if_better();
     vary_calibration();

@@ -107,7 +107,7 @@ void Refinement::match_again() {
   for (const FeatureLink& link : links_)
     if (types.emplace(link.frames, link.link.type).second) pairs.push_back(link.frames);
   PairVerification verified =
-      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_);
+      verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_, matches_to_keep());
   if (verified.links.size() < static_cast<std::size_t>(0.9 * static_cast<double>(pairs.size())))
     return;
   for (FeatureLink& link : verified.links) link.link.type = types.at(link.frames);

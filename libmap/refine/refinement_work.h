@@ -44,6 +44,10 @@ class Refinement {
   bool round(int number);
   std::vector<FramePair> candidates(int number);
   std::vector<GraphLink> with_features(const std::vector<FeatureLink>& links) const;
+  // Of long scans none: they are compared again.
+  KnownMatches* matches_to_keep() {
+    return frames_.size() <= options_.features.max_frames_in_memory ? &known_matches_ : nullptr;
+  }
   void join_new(std::size_t first);
   void bundle();
   bool calibrate_sensor(const std::string& name);
@@ -80,6 +84,7 @@ class Refinement {
   std::set<int> tracked_;  // nodes whose poses are by visual odometry
   std::vector<FeatureLink> links_;
   std::set<FramePair> tried_;
+  KnownMatches known_matches_;  // for the calibration
   PoseGraphResult graph_;
   BlockSystem information_{0};
   std::vector<FramePair> surface_pairs_;  // that have moved the poses
