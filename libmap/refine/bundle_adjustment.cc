@@ -1,18 +1,14 @@
 #include "libmap/refine/bundle_adjustment.h"
 
-#include <ceres/ceres.h>
-
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <functional>
 #include <iterator>
 #include <utility>
 
 #include "libmap/refine/bundle_residuals.h"
 #include "libmap/refine/calibration_uncertainty.h"
 #include "libmap/refine/graph_covariance.h"
-#include "libmap/refine/pose_residuals.h"
+#include "libmap/refine/joint_adjustment.h"
 #include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/sparse_adjustment.h"
 
@@ -28,12 +24,6 @@ constexpr double timing_prior_s = 0.03;
 constexpr double motion_prior_m_per_s = 0.15;
 constexpr double motion_prior_rad_per_s = 0.25;
 constexpr double max_motion_gap_s = 3.0;
-
-std::size_t count_numbers(const std::vector<DepthCorrection>& corrections) {
-  std::size_t count = 0;
-  for (const DepthCorrection& correction : corrections) count += 3 + correction.spline_m.size();
-  return count;
-}
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   std::size_t cameras = 0;
@@ -70,115 +60,161 @@ std::map<int, Vector6d> motion_between(const std::vector<FrameFeatures>& frames,
   return motions;
 }
 
+// Of the cameras' numbers, as residuals a x - b.
+class Priors {
+ public:
+  explicit Priors(Eigen::Index numbers) : numbers_(numbers) {}
+
+  // Returns a row, to be filled.
+  Eigen::VectorXd& add(double mean = 0.0) {
+    means_.push_back(mean);
+    return rows_.emplace_back(Eigen::VectorXd::Zero(numbers_));
+  }
+  void add_near(Eigen::Index first, const Eigen::VectorXd& means,
+                const Eigen::VectorXd& deviations) {
+    for (Eigen::Index n = 0; n < means.size(); ++n)
+      add(means[n] / deviations[n])[first + n] = 1.0 / deviations[n];
+  }
+  void give(JointProblem& problem) const {
+    problem.prior.resize(static_cast<Eigen::Index>(rows_.size()), numbers_);
+    for (std::size_t n = 0; n < rows_.size(); ++n)
+      problem.prior.row(static_cast<Eigen::Index>(n)) = rows_[n];
+    problem.prior_mean =
+        Eigen::Map<const Eigen::VectorXd>(means_.data(), static_cast<Eigen::Index>(means_.size()));
+  }
+
+ private:
+  Eigen::Index numbers_;
+  std::vector<Eigen::VectorXd> rows_;
+  std::vector<double> means_;
+};
+
 class Adjustment {
  public:
   Adjustment(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
              const std::map<int, Pose>& poses, const BundleAdjustmentOptions& options,
-             const SensorCalibration& start)
-      : frames_(frames),
-        tracks_(tracks),
-        options_(options),
-        cameras_(options.refine_intrinsics || options.refine_depth || options.refine_registration ||
-                         options.refine_timing
-                     ? max_cameras(frames)
-                     : 0),
-        corrections_(
-            corrections_for(frames, options.refine_depth ? cameras_ : 0, options.depth_knot_m)),
-        motions_(options.refine_timing ? motion_between(frames, poses) : std::map<int, Vector6d>{}),
-        blocks_(poses,
-                camera_numbers * cameras_ + count_numbers(corrections_) + 6 * motions_.size()) {
-    result_.map_from_base = poses;
-    if (options.refine_registration) start_.color_from_depth = start.color_from_depth;
-    if (options.refine_timing) {
-      start_.timing = start.timing;
-      start_.motion = start.motion;
-    }
-    start_.color_from_depth.resize(cameras_, Pose::Identity());
-    start_.timing.resize(cameras_);
-    for (std::size_t n = 0; n < cameras_; ++n) {
-      timing(n)[0] = start_.timing[n].depth_delay_s;
-      timing(n)[1] = start_.timing[n].rolling_shutter_s;
-    }
-    for (const auto& [node, between] : motions_) {
-      const auto known = start_.motion.emplace(node, between).first;
-      Eigen::Map<Vector6d>(motion(node)) = known->second;
-    }
-    for (const FeatureTrack& track : tracks_) {
-      const Eigen::Vector3d point = place_of(track);
-      points_.push_back({point.x(), point.y(), point.z()});
-    }
-  }
+             const SensorCalibration& start);
 
   BundleAdjustmentResult run(const std::vector<GraphLinkResult>& links,
-                             const std::vector<GraphComponent>& components,
-                             const std::vector<FeatureTrack>& system_tracks);
+                             const std::vector<GraphComponent>& components);
 
  private:
   const Feature& feature(const Observation& seen) const {
     return frames_[seen.frame].features[seen.feature];
   }
-  bool has_pose(const Observation& seen) const {
-    return blocks_.contains(frames_[seen.frame].node);
-  }
-  double* intrinsics(std::size_t camera) const { return blocks_.rest() + camera_numbers * camera; }
-  double* registration(std::size_t camera) const { return intrinsics(camera) + 4; }
-  double* timing(std::size_t camera) const { return intrinsics(camera) + 10; }
-  double* depth_numbers(std::size_t camera) const {
-    double* numbers = intrinsics(cameras_);
-    for (std::size_t n = 0; n < camera; ++n) numbers += 3 + corrections_[n].spline_m.size();
-    return numbers;
-  }
-  double* motion(int node) const {
-    return depth_numbers(corrections_.size()) +
-           6 * std::distance(motions_.begin(), motions_.find(node));
-  }
-  // Blocks of a camera and of a node, in the order of ObservationCost.
-  std::vector<double*> calibration_blocks(const Feature& its, int node,
-                                          const CalibratedObservation& calibrated) const;
-  Eigen::Vector3d place_of(const FeatureTrack& track) const;
+  bool has_pose(const Observation& seen) const { return place_.contains(frames_[seen.frame].node); }
+  void start_numbers(const SensorCalibration& start);
+  void add_observations();
   CalibratedObservation calibrated(const Observation& seen) const;
-  void add_observation(ceres::Problem& problem, const Observation& seen, double* point);
-  void add_observations(ceres::Problem& problem);
-  void add_camera_priors(ceres::Problem& problem, std::size_t camera);
-  void add_depth_priors(ceres::Problem& problem, std::size_t camera);
+  void add_camera_priors(std::size_t camera, Priors& priors);
+  void add_depth_priors(std::size_t camera, Priors& priors);
   double motion_scale() const;
-  SensorCalibration calibration(double motion_scale) const;
-  void take_calibration();
-  void find_alternatives(ceres::Problem& problem);
-  void add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links);
-  void solve(ceres::Problem& problem);
-  void eliminate_points(const std::vector<GraphLinkResult>& links,
-                        const std::vector<FeatureTrack>& system_tracks);
-
-  static constexpr std::size_t camera_numbers = 12;
+  SensorCalibration calibration(const JointState& state, double motion_scale) const;
+  void find_alternatives();
 
   const std::vector<FrameFeatures>& frames_;
-  std::vector<FrameFeatures> calibrated_frames_;  // at the end
   const std::vector<FeatureTrack>& tracks_;
   const BundleAdjustmentOptions& options_;
   BundleAdjustmentResult result_;
   std::size_t cameras_ = 0;                   // with something to refine
   std::vector<DepthCorrection> corrections_;  // of 0: their knots
-  std::map<int, Vector6d> motions_;           // between poses
   SensorCalibration start_;
-  // Then, of each camera: a step of the intrinsics (4), of the registration (6), its timing (2); a
-  // correction of depth, its radial numbers first; of each node its motion (6). In one place, since
-  // Ceres orders blocks by address.
-  PoseBlocks blocks_;
-  std::vector<std::array<double, 3>> points_;
+  std::map<int, std::size_t> place_;  // of each node among the poses
+  std::vector<Eigen::Index> first_;   // number of each camera
+  std::vector<bool> sees_;            // of each camera, anything
+  std::vector<Eigen::Index> free_;    // numbers
+  std::vector<std::size_t> points_;   // their tracks
+  JointProblem problem_;
+  JointState state_;
 };
 
-// In the middle of where the frames see it.
-Eigen::Vector3d Adjustment::place_of(const FeatureTrack& track) const {
-  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  double count = 0.0;
-  for (const Observation& seen : track.observations) {
-    if (!has_pose(seen)) continue;
-    sum += result_.map_from_base.at(frames_[seen.frame].node) *
-           frames_[seen.frame].point_in_base(seen.feature);
-    count += 1.0;
+Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
+                       const std::vector<FeatureTrack>& tracks, const std::map<int, Pose>& poses,
+                       const BundleAdjustmentOptions& options, const SensorCalibration& start)
+    : frames_(frames),
+      tracks_(tracks),
+      options_(options),
+      cameras_(options.refines_cameras() ? max_cameras(frames) : 0),
+      corrections_(
+          corrections_for(frames, options.refine_depth ? cameras_ : 0, options.depth_knot_m)),
+      sees_(cameras_, false) {
+  state_.poses = poses;
+  for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
+  problem_.robust_scale = options.robust_scale;
+  start_numbers(start);
+  add_observations();
+  Priors priors(state_.numbers.size());
+  for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(n, priors);
+  priors.give(problem_);
+}
+
+void Adjustment::start_numbers(const SensorCalibration& start) {
+  if (options_.refine_registration) start_.color_from_depth = start.color_from_depth;
+  if (options_.refine_timing) {
+    start_.timing = start.timing;
+    start_.motion = start.motion;
   }
-  return count > 0.0 ? Eigen::Vector3d(sum / count) : sum;
+  start_.color_from_depth.resize(cameras_, Pose::Identity());
+  start_.timing.resize(cameras_);
+  Eigen::Index numbers = 0;
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    first_.push_back(numbers);
+    numbers += spline_at;
+    if (n < corrections_.size())
+      numbers += static_cast<Eigen::Index>(corrections_[n].spline_m.size());
+  }
+  state_.numbers = Eigen::VectorXd::Zero(numbers);
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    double* const own = state_.numbers.data() + first_[n];
+    own[timing_at] = start_.timing[n].depth_delay_s;
+    own[timing_at + 1] = start_.timing[n].rolling_shutter_s;
+    if (options_.refine_intrinsics && n < start.intrinsics.size()) {
+      const IntrinsicsStep& step = start.intrinsics[n];
+      Eigen::Map<Eigen::Vector4d>(own + intrinsics_at) << step.fx_share, step.fy_share, step.cx_px,
+          step.cy_px;
+    }
+    if (n >= corrections_.size() || n >= start.depth.size() ||
+        !has_same_knots(corrections_[n], start.depth[n]))
+      continue;
+    std::copy(start.depth[n].radial.begin(), start.depth[n].radial.end(), own + radial_at);
+    std::copy(start.depth[n].spline_m.begin(), start.depth[n].spline_m.end(), own + spline_at);
+  }
+  if (!options_.refine_timing) return;
+  problem_.moving = true;
+  problem_.motion_deviation << Eigen::Vector3d::Constant(motion_prior_m_per_s),
+      Eigen::Vector3d::Constant(motion_prior_rad_per_s);
+  const std::map<int, Vector6d> between = motion_between(frames_, state_.poses);
+  for (const auto& [node, pose] : state_.poses) {
+    const auto known = between.find(node);
+    problem_.motion_mean.push_back(known == between.end() ? Vector6d::Zero() : known->second);
+    state_.motions.push_back(
+        start_.motion.emplace(node, problem_.motion_mean.back()).first->second);
+  }
+}
+
+// In the middle of where the frames see them.
+void Adjustment::add_observations() {
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    const std::vector<Observation>& all = tracks_[t].observations;
+    const auto views = std::count_if(all.begin(), all.end(),
+                                     [&](const Observation& seen) { return has_pose(seen); });
+    if (views < 2) continue;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Observation& seen : all) {
+      if (!has_pose(seen)) continue;
+      const FrameFeatures& frame = frames_[seen.frame];
+      const Feature& its = feature(seen);
+      sum += state_.poses.at(frame.node) * frame.point_in_base(seen.feature);
+      problem_.observations.push_back(
+          {place_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
+           CalibratedFeature(its, frame.cameras[its.camera], calibrated(seen))});
+      if (cameras_ > 0) sees_[its.camera] = true;
+    }
+    points_.push_back(t);
+    problem_.begin.push_back(problem_.observations.size());
+    state_.points.emplace_back(sum / static_cast<double>(views));
+  }
+  result_.observations = problem_.observations.size();
 }
 
 CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
@@ -211,92 +247,39 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
   return calibrated;
 }
 
-std::vector<double*> Adjustment::calibration_blocks(const Feature& its, int node,
-                                                    const CalibratedObservation& calibrated) const {
-  std::vector<double*> blocks;
-  if (calibrated.intrinsics) blocks.push_back(intrinsics(its.camera));
-  if (calibrated.depth) {
-    double* const numbers = depth_numbers(its.camera);
-    for (std::size_t n = 0; n < 4; ++n) blocks.push_back(numbers + 3 + calibrated.terms.first + n);
-    blocks.push_back(numbers);
-  }
-  if (calibrated.registration) blocks.push_back(registration(its.camera));
-  if (calibrated.timing) blocks.insert(blocks.end(), {motion(node), timing(its.camera)});
-  return blocks;
-}
-
-void Adjustment::add_observation(ceres::Problem& problem, const Observation& seen, double* point) {
-  const FrameFeatures& frame = frames_[seen.frame];
-  const Feature& its = feature(seen);
-  const CalibratedObservation calibrated = this->calibrated(seen);
-  std::vector<double*> blocks = {blocks_.at(frame.node), point};
-  const std::vector<double*> more = calibration_blocks(its, frame.node, calibrated);
-  blocks.insert(blocks.end(), more.begin(), more.end());
-  problem.AddResidualBlock(new ObservationCost(its, frame.cameras[its.camera], calibrated),
-                           new ceres::CauchyLoss(options_.robust_scale), blocks);
-}
-
-void Adjustment::add_observations(ceres::Problem& problem) {
-  for (std::size_t t = 0; t < tracks_.size(); ++t) {
-    std::size_t views = 0;
-    for (const Observation& seen : tracks_[t].observations) views += has_pose(seen) ? 1 : 0;
-    if (views < 2) continue;
-    for (const Observation& seen : tracks_[t].observations) {
-      if (!has_pose(seen)) continue;
-      ++result_.observations;
-      add_observation(problem, seen, points_[t].data());
-    }
-  }
-  for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(problem, n);
-  for (const auto& [node, between] : motions_)
-    if (problem.HasParameterBlock(motion(node)))
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearResidual, 6, 6>(new NearResidual(
-                                   between, motion_prior_m_per_s, motion_prior_rad_per_s)),
-                               nullptr, motion(node));
-}
-
-void Adjustment::add_camera_priors(ceres::Problem& problem, std::size_t camera) {
-  if (problem.HasParameterBlock(intrinsics(camera)))
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<IntrinsicsPrior, 4, 4>(
-            new IntrinsicsPrior(options_.focal_prior, options_.center_prior_px)),
-        nullptr, intrinsics(camera));
-  if (options_.refine_depth && !corrections_[camera].empty()) add_depth_priors(problem, camera);
-  if (problem.HasParameterBlock(registration(camera)))
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<NearResidual, 6, 6>(new NearResidual(
-                                 step_between(start_.color_from_depth[camera], Pose::Identity()),
-                                 registration_prior_m, registration_prior_rad)),
-                             nullptr, registration(camera));
-  if (problem.HasParameterBlock(timing(camera)))
-    problem.AddResidualBlock(
-        new ceres::AutoDiffCostFunction<TimingPrior, 2, 2>(new TimingPrior(timing_prior_s)),
-        nullptr, timing(camera));
+void Adjustment::add_camera_priors(std::size_t camera, Priors& priors) {
+  const auto add = [&](bool wanted, Eigen::Index at, const Eigen::VectorXd& means,
+                       const Eigen::VectorXd& deviations) {
+    if (!wanted || !sees_[camera]) return;
+    priors.add_near(first_[camera] + at, means, deviations);
+    for (Eigen::Index n = 0; n < means.size(); ++n) free_.push_back(first_[camera] + at + n);
+  };
+  add(options_.refine_intrinsics, intrinsics_at, Eigen::Vector4d::Zero(),
+      Eigen::Vector4d(options_.focal_prior, options_.focal_prior, options_.center_prior_px,
+                      options_.center_prior_px));
+  Vector6d registration;
+  registration << Eigen::Vector3d::Constant(registration_prior_m),
+      Eigen::Vector3d::Constant(registration_prior_rad);
+  add(options_.refine_registration, registration_at,
+      step_between(start_.color_from_depth[camera], Pose::Identity()), registration);
+  add(options_.refine_timing, timing_at, Eigen::Vector2d::Zero(),
+      Eigen::Vector2d::Constant(timing_prior_s));
+  if (options_.refine_depth && !corrections_[camera].empty()) add_depth_priors(camera, priors);
 }
 
 // Each number is small, the spline bends little, and depths keep their mean (depth_gauge).
-void Adjustment::add_depth_priors(ceres::Problem& problem, std::size_t camera) {
+void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
   const DepthCorrection& depth = corrections_[camera];
-  double* const radial = depth_numbers(camera);
-  const auto add = [&](std::size_t first, const std::vector<double>& factors,
-                       const std::array<double, 3>& of_radial) {
-    std::vector<double*> blocks;
-    for (std::size_t n = 0; n < factors.size(); ++n) blocks.push_back(radial + 3 + first + n);
-    blocks.push_back(radial);
-    problem.AddResidualBlock(new LinearResidual(factors, of_radial), nullptr, blocks);
-  };
-  const double small = 1.0 / options_.depth_prior_m;
-  const double bend = 1.0 / options_.depth_bend_m;
-  for (std::size_t n = 0; n < depth.spline_m.size(); ++n) {
-    add(n, {small}, {});
-    if (n + 2 < depth.spline_m.size()) add(n, {bend, -2.0 * bend, bend}, {});
-  }
-  for (std::size_t n = 0; n < 3; ++n) {
-    std::array<double, 3> one{};
-    one[n] = small;
-    add(0, {}, one);
-  }
-  std::vector<double> spline(depth.spline_m.size(), 0.0);
-  std::array<double, 3> radii{};
+  const auto knots = static_cast<Eigen::Index>(depth.spline_m.size());
+  const Eigen::Index radial = first_[camera] + radial_at;
+  const Eigen::Index spline = first_[camera] + spline_at;
+  static_assert(radial_at + 3 == spline_at);
+  priors.add_near(radial, Eigen::VectorXd::Zero(3 + knots),
+                  Eigen::VectorXd::Constant(3 + knots, options_.depth_prior_m));
+  for (Eigen::Index n = 0; n < 3 + knots; ++n) free_.push_back(radial + n);
+  for (Eigen::Index n = 0; n + 2 < knots; ++n)
+    priors.add().segment<3>(spline + n) = Eigen::Vector3d(1.0, -2.0, 1.0) / options_.depth_bend_m;
+  Eigen::VectorXd& gauge = priors.add();
   double count = 0.0;
   for (const FrameFeatures& frame : frames_)
     for (const Feature& its : frame.features) {
@@ -304,66 +287,12 @@ void Adjustment::add_depth_priors(ceres::Problem& problem, std::size_t camera) {
       const auto z = static_cast<double>(its.depth_m);
       const DepthCorrection::Terms terms =
           depth.terms(z, squared_radius_of(its, frame.cameras[camera]));
-      for (std::size_t n = 0; n < 4; ++n) spline[terms.first + n] += terms.spline[n] / z;
-      for (std::size_t n = 0; n < 3; ++n) radii[n] += terms.radial[n] / z;
+      gauge.segment<4>(spline + static_cast<Eigen::Index>(terms.first)) +=
+          Eigen::Map<const Eigen::Vector4d>(terms.spline.data()) / z;
+      gauge.segment<3>(radial) += Eigen::Map<const Eigen::Vector3d>(terms.radial.data()) / z;
       count += 1.0;
     }
-  for (double& factor : spline) factor /= count * depth_gauge;
-  for (double& factor : radii) factor /= count * depth_gauge;
-  add(0, spline, radii);
-}
-
-void Adjustment::add_links(ceres::Problem& problem, const std::vector<GraphLinkResult>& links) {
-  for (const GraphLinkResult& kept : links) {
-    const PoseLink& link = kept.link;
-    if (kept.rejected || !blocks_.contains(link.from)) continue;
-    if (is_absolute(link))
-      add_link(problem, blocks_, link, link.information, nullptr);
-    else if (blocks_.contains(link.to))
-      add_link(problem, blocks_, link, kept.weight * link.information, nullptr);
-  }
-}
-
-void Adjustment::solve(ceres::Problem& problem) {
-  ceres::Solver::Options settings;
-  settings.linear_solver_type =
-      blocks_.all().size() < dense_below ? ceres::DENSE_SCHUR : ceres::ITERATIVE_SCHUR;
-  settings.preconditioner_type = ceres::SCHUR_JACOBI;
-  settings.dense_linear_algebra_library_type = ceres::EIGEN;
-  settings.num_threads = 1;
-  settings.max_num_iterations = options_.max_iterations;
-  settings.function_tolerance = 1e-6;
-  settings.gradient_tolerance = 1e-12;
-  settings.parameter_tolerance = 1e-10;
-  settings.logging_type = ceres::SILENT;
-  // Points first: they are eliminated.
-  auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
-  for (auto& point : points_)
-    if (problem.HasParameterBlock(point.data())) ordering->AddElementToGroup(point.data(), 0);
-  std::vector<double*> others;
-  problem.GetParameterBlocks(&others);
-  for (double* const block : others)
-    if (!ordering->IsMember(block)) ordering->AddElementToGroup(block, 1);
-  settings.linear_solver_ordering = ordering;
-  ceres::Solver::Summary summary;
-  ceres::Solve(settings, &problem, &summary);
-  result_.initial_cost = summary.initial_cost;
-  result_.final_cost = summary.final_cost;
-  result_.iterations = static_cast<int>(summary.iterations.size());
-  result_.converged = summary.IsSolutionUsable();
-}
-
-void Adjustment::eliminate_points(const std::vector<GraphLinkResult>& links,
-                                  const std::vector<FeatureTrack>& system_tracks) {
-  const TrackSystem observed(calibrated_frames_.empty() ? frames_ : calibrated_frames_,
-                             system_tracks.empty() ? tracks_ : system_tracks,
-                             options_.robust_scale);
-  const std::vector<Eigen::Vector3d> points =
-      system_tracks.empty() ? result_.points : observed.points_at(result_.map_from_base);
-  observed.totals(result_.map_from_base, points).add_to(result_);
-  result_.information = observed.system(result_.map_from_base, points);
-  result_.information.add(link_system(result_.map_from_base, links));
-  result_.information.clear_side();
+  gauge /= count * depth_gauge;
 }
 
 // Only the product of time and motion is seen: the motions are right on average if their regression
@@ -372,98 +301,111 @@ void Adjustment::eliminate_points(const std::vector<GraphLinkResult>& links,
 double Adjustment::motion_scale() const {
   double mixed = 0.0;
   double squares = 0.0;
-  for (const auto& [node, between] : motions_) {
-    Vector6d weight;
-    weight << Eigen::Vector3d::Constant(std::pow(motion_prior_m_per_s, -2)),
-        Eigen::Vector3d::Constant(std::pow(motion_prior_rad_per_s, -2));
-    const Eigen::Map<const Vector6d> estimated(motion(node));
-    mixed += between.dot(weight.cwiseProduct(estimated));
+  const Vector6d weight = problem_.motion_deviation.array().square().inverse();
+  for (std::size_t n = 0; n < state_.motions.size(); ++n) {
+    const Vector6d& between = problem_.motion_mean[n];
+    mixed += between.dot(weight.cwiseProduct(state_.motions[n]));
     squares += between.dot(weight.cwiseProduct(between));
   }
   return mixed > 0.0 && squares > 0.0 ? mixed / squares : 1.0;
 }
 
-SensorCalibration Adjustment::calibration(double motion_scale) const {
+SensorCalibration Adjustment::calibration(const JointState& state, double motion_scale) const {
   SensorCalibration found;
   for (std::size_t n = 0; n < cameras_; ++n) {
-    const double* step = intrinsics(n);
+    const double* own = state.numbers.data() + first_[n];
+    const double* step = own + intrinsics_at;
     if (options_.refine_intrinsics)
       found.intrinsics.push_back({step[0], step[1], step[2], step[3]});
     if (options_.refine_registration)
       found.color_from_depth.push_back(
-          moved(Pose::Identity(), Eigen::Map<const Vector6d>(registration(n))) *
+          moved(Pose::Identity(), Eigen::Map<const Vector6d>(own + registration_at)) *
           start_.color_from_depth[n]);
     if (options_.refine_timing)
-      found.timing.push_back({motion_scale * timing(n)[0], motion_scale * timing(n)[1]});
+      found.timing.push_back({motion_scale * own[timing_at], motion_scale * own[timing_at + 1]});
     if (options_.refine_depth) {
-      const double* numbers = depth_numbers(n);
       found.depth.push_back(corrections_[n]);
-      std::copy_n(numbers, 3, found.depth[n].radial.begin());
-      std::copy_n(numbers + 3, corrections_[n].spline_m.size(), found.depth[n].spline_m.begin());
+      std::copy_n(own + radial_at, 3, found.depth[n].radial.begin());
+      std::copy_n(own + spline_at, corrections_[n].spline_m.size(),
+                  found.depth[n].spline_m.begin());
     }
   }
-  for (const auto& [node, between] : motions_)
-    found.motion.emplace(node, Eigen::Map<const Vector6d>(motion(node)) / motion_scale);
+  for (const FrameFeatures& frame : frames_)
+    if (const auto place = place_.find(frame.node); problem_.moving && place != place_.end())
+      found.motion.emplace(frame.node, state.motions[place->second] / motion_scale);
   return found;
 }
 
-void Adjustment::take_calibration() {
-  if (cameras_ == 0) return;
-  result_.calibration = calibration(options_.refine_timing ? motion_scale() : 1.0);
-  calibrated_frames_ = frames_;
-  for (FrameFeatures& frame : calibrated_frames_) calibrate(frame, result_.calibration);
-}
-
-void Adjustment::find_alternatives(ceres::Problem& problem) {
-  FreeBlocks blocks;
-  for (auto& point : points_)
-    if (problem.HasParameterBlock(point.data())) blocks.points.push_back(point.data());
-  for (const auto& [node, block] : blocks_.all())
-    if (problem.HasParameterBlock(block) && !problem.IsParameterBlockConstant(block))
-      blocks.poses.push_back(block);
-  std::vector<double*> all;
-  problem.GetParameterBlocks(&all);
-  std::copy_if(all.begin(), all.end(), std::back_inserter(blocks.cameras),
-               [&](const double* block) {
-                 return std::greater_equal<>()(block, static_cast<const double*>(blocks_.rest())) &&
-                        std::less<>()(block, static_cast<const double*>(blocks_.end()));
-               });
-  std::sort(blocks.cameras.begin(), blocks.cameras.end());
-  const double scale = options_.refine_timing ? motion_scale() : 1.0;
-  for (const Eigen::VectorXd& change : likely_changes(problem, blocks, options_.alternatives)) {
-    const std::vector<double> best(static_cast<const double*>(blocks_.rest()), blocks_.end());
-    Eigen::Index first = 0;
-    for (double* const block : blocks.cameras) {
-      const int size = problem.ParameterBlockSize(block);
-      Eigen::Map<Eigen::VectorXd>(block, size) += change.segment(first, size);
-      first += size;
+void Adjustment::find_alternatives() {
+  const Eigen::Index size = problem_.moving ? 12 : 6;
+  const auto poses = static_cast<Eigen::Index>(state_.poses.size());
+  FreeRows rows;
+  for (Eigen::Index n = 0; n < poses; ++n) {
+    if (!problem_.held[static_cast<std::size_t>(n)]) rows.poses.push_back(size * n);
+    for (Eigen::Index k = 6; k < size; ++k) rows.numbers.push_back(size * n + k);
+  }
+  for (const Eigen::Index number : free_) rows.numbers.push_back(size * poses + number);
+  const double scale = problem_.moving ? motion_scale() : 1.0;
+  const Eigen::MatrixXd information =
+      joint_system(problem_, state_).matrix.selfadjointView<Eigen::Lower>();
+  for (const Eigen::VectorXd& change : likely_changes(information, rows, options_.alternatives)) {
+    JointState other = state_;
+    for (std::size_t n = 0; n < rows.numbers.size(); ++n) {
+      const Eigen::Index row = rows.numbers[n];
+      const double by = change[static_cast<Eigen::Index>(n)];
+      if (row < size * poses)
+        other.motions[static_cast<std::size_t>(row / size)][row % size - 6] += by;
+      else
+        other.numbers[row - size * poses] += by;
     }
-    result_.alternatives.push_back(calibration(scale));
-    std::copy(best.begin(), best.end(), blocks_.rest());
+    result_.alternatives.push_back(calibration(other, scale));
   }
 }
 
 BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links,
-                                       const std::vector<GraphComponent>& components,
-                                       const std::vector<FeatureTrack>& system_tracks) {
-  ceres::Problem problem;
-  add_observations(problem);
-  add_links(problem, links);
-  set_pose_manifolds(problem, blocks_);
-  for (const GraphComponent& component : components) {
-    double* block = blocks_.at(component.gauge_node);
-    if (problem.HasParameterBlock(block)) problem.SetParameterBlockConstant(block);
+                                       const std::vector<GraphComponent>& components) {
+  problem_.links = links;
+  problem_.held.assign(place_.size(), false);
+  for (const GraphComponent& component : components)
+    if (const auto place = place_.find(component.gauge_node); place != place_.end())
+      problem_.held[place->second] = true;
+  if (result_.observations > 0) {
+    const JointSummary summary =
+        adjust_jointly(problem_, state_, options_.max_iterations, options_.tolerance);
+    result_.initial_cost = summary.initial_cost;
+    result_.final_cost = summary.final_cost;
+    result_.iterations = summary.iterations;
+    result_.converged = summary.converged;
   }
-  if (result_.observations > 0) solve(problem);
-  take_poses(problem, blocks_, result_.map_from_base);
-  for (const auto& point : points_) result_.points.emplace_back(point[0], point[1], point[2]);
-  take_calibration();
-  if (options_.alternatives > 0 && cameras_ > 0) find_alternatives(problem);
-  eliminate_points(links, system_tracks);
+  result_.map_from_base = state_.poses;
+  result_.points.assign(tracks_.size(), Eigen::Vector3d::Zero());
+  for (std::size_t n = 0; n < points_.size(); ++n) result_.points[points_[n]] = state_.points[n];
+  if (cameras_ > 0)
+    result_.calibration = calibration(state_, problem_.moving ? motion_scale() : 1.0);
+  if (options_.alternatives > 0 && cameras_ > 0) find_alternatives();
   return std::move(result_);
 }
 
 }  // namespace
+
+void add_information(const std::vector<FrameFeatures>& frames,
+                     const std::vector<FeatureTrack>& tracks,
+                     const std::vector<GraphLinkResult>& links,
+                     const BundleAdjustmentOptions& options, BundleAdjustmentResult& result,
+                     const std::vector<Eigen::Vector3d>& points) {
+  std::vector<FrameFeatures> calibrated;
+  if (!result.calibration.empty())
+    for (const FrameFeatures& frame : frames)
+      calibrated.push_back(calibrated_features(frame, result.calibration));
+  const TrackSystem observed(calibrated.empty() ? frames : calibrated, tracks,
+                             options.robust_scale);
+  const std::vector<Eigen::Vector3d> at =
+      points.empty() ? observed.points_at(result.map_from_base) : points;
+  observed.totals(result.map_from_base, at).add_to(result);
+  result.information = observed.system(result.map_from_base, at);
+  result.information.add(link_system(result.map_from_base, links));
+  result.information.clear_side();
+}
 
 void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
   table.add("observation_scale", options.robust_scale, positive,
@@ -487,8 +429,14 @@ BundleAdjustmentResult adjust_bundle(
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
     const std::vector<FeatureTrack>& system_tracks, const SensorCalibration& start) {
   check_parameters(options);
-  return Adjustment(frames, tracks, map_from_base, options, start)
-      .run(links, components, system_tracks);
+  BundleAdjustmentResult result =
+      Adjustment(frames, tracks, map_from_base, options, start).run(links, components);
+  if (!options.with_information) return result;
+  if (system_tracks.empty())
+    add_information(frames, tracks, links, options, result, result.points);
+  else
+    add_information(frames, system_tracks, links, options, result);
+  return result;
 }
 
 FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,
@@ -505,15 +453,10 @@ BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
                                      const BundleAdjustmentOptions& options,
                                      const SensorCalibration& start, Progress& progress) {
   check_parameters(options);
-  const bool refines = options.refine_intrinsics || options.refine_depth ||
-                       options.refine_registration || options.refine_timing;
-  const bool between_nodes =
-      std::none_of(links.begin(), links.end(),
-                   [](const GraphLinkResult& link) { return is_absolute(link.link); });
   FeatureTracks sparse;
   if (map_from_base.size() >= dense_below)
     sparse = build_tracks(frames, feature_links, TrackFrames::linked);
-  if (map_from_base.size() >= dense_below && !refines && between_nodes) {
+  if (map_from_base.size() >= dense_below && !options.refines_cameras()) {
     BundleAdjustmentResult result =
         adjust_sparse(frames, sparse.tracks, map_from_base, links, components, options, progress);
     result.conflicts = sparse.conflicts;

@@ -1,6 +1,6 @@
 // Poses, points and, if wanted, intrinsics and a correction of depth that agree best with all
-// observations of the points, in the pictures and in depth (Triggs et al. 2000), by Ceres with the
-// points eliminated.
+// observations of the points, in the pictures and in depth (Triggs et al. 2000), the points
+// eliminated.
 #pragma once
 
 #include <cstddef>
@@ -29,7 +29,14 @@ struct BundleAdjustmentOptions {
   double depth_prior_m = 0.03;       // > 0: ... and of a correction of depth
   double depth_bend_m = 0.005;       // > 0: ... and of its second difference from knot to knot
   double depth_knot_m = 0.2;         // >= 0.02: between the knots of its spline
-  std::size_t alternatives = 0;      // not bound: of the result's calibration
+  // Not bound.
+  double tolerance = 1e-6;       // steps end when one lowers the cost by less than this share
+  std::size_t alternatives = 0;  // of the result's calibration
+  bool with_information = true;  // of the result
+
+  bool refines_cameras() const {
+    return refine_intrinsics || refine_depth || refine_registration || refine_timing;
+  }
 };
 void bind(ParameterTable& table, BundleAdjustmentOptions& options);
 
@@ -64,8 +71,9 @@ struct BundleAdjustmentResult {
 // The poses fit frames that are calibrated by the result's calibration. `links` are those of the
 // graph at its optimum (odometry, closures of other sources, priors); the gauge nodes of the
 // components stay where they are. The information is that of `system_tracks` where there are any:
-// of TrackFrames::linked it is a little less, and sparse. `start` is where registration, timing and
-// motion begin, if they are free; without it, at the stored ones and the motion between poses.
+// of TrackFrames::linked it is a little less, and sparse. `start` is where what is free begins;
+// without it, at the stored cameras and the motion between poses. Memory grows with the square of
+// the poses.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
@@ -73,13 +81,20 @@ BundleAdjustmentResult adjust_bundle(
     const std::vector<FeatureTrack>& system_tracks = {}, const SensorCalibration& start = {});
 
 // The same of all that links of features say. More than a hundred frames or so are adjusted in the
-// sparse system of the links (sparse_adjustment.h); with calibration free, or with links that place
-// a node by itself, with conjugate gradients and a sparse information.
+// sparse system of the links (sparse_adjustment.h), unless calibration is free.
 BundleAdjustmentResult adjust_bundle(
     const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& feature_links,
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options = {},
     const SensorCalibration& start = {}, Progress& progress = no_progress());
+
+// What a result without information lacks: the information, and the counts and residuals of
+// observations. Without points of the tracks, they are where their observations agree best.
+void add_information(const std::vector<FrameFeatures>& frames,
+                     const std::vector<FeatureTrack>& tracks,
+                     const std::vector<GraphLinkResult>& links,
+                     const BundleAdjustmentOptions& options, BundleAdjustmentResult& result,
+                     const std::vector<Eigen::Vector3d>& points = {});
 
 // The tracks whose system is the information of a result with so many poses.
 FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,

@@ -1,18 +1,10 @@
-// Residuals of observations and what is known beforehand of a camera, for Ceres. Inner part of
-// libmap/refine.
+// Residuals of observations by poses, points and cameras. Inner part of libmap/refine.
 #pragma once
 
-#include <ceres/ceres.h>
-
 #include <Eigen/Core>
-#include <algorithm>
-#include <array>
-#include <utility>
-#include <vector>
 
 #include "libmap/image/depth_correction.h"
 #include "libmap/refine/frame_calibration.h"
-#include "libmap/refine/pose_residuals.h"
 #include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
@@ -31,15 +23,30 @@ struct CalibratedObservation {
   double row_share = 0.0;                  // row_share_of
 };
 
-// x, y in the picture and depth, in standard deviations, by pose (7), point (3) and then, those
-// that are unknown: intrinsics (4), four numbers of the depth's spline (1 each) and the radial ones
-// (3), registration (6), motion of the base (6) and timing (2). The intrinsics are steps away from
-// those by which the feature's ray was made: of fx and fy in parts, of cx and cy in pixels; the
-// registration is a step from the known one.
-class ObservationCost : public ceres::CostFunction {
+// Numbers of a camera: a step of the intrinsics (4), one of the registration (6), its timing (2),
+// the radial ones of its depth correction (3), and then those of its spline.
+inline constexpr Eigen::Index intrinsics_at = 0;
+inline constexpr Eigen::Index registration_at = 4;
+inline constexpr Eigen::Index timing_at = 10;
+inline constexpr Eigen::Index radial_at = 12;
+inline constexpr Eigen::Index spline_at = 15;
+
+// x, y in the picture and depth, in standard deviations, with their derivatives.
+struct CalibratedResidual {
+  Eigen::Vector3d residual = Eigen::Vector3d::Zero();
+  Eigen::Matrix<double, 3, 6> by_pose;    // by a step of it (rigid_motion.h)
+  Eigen::Matrix<double, 3, 6> by_motion;  // with timing only
+  Eigen::Matrix3d by_point;
+  Eigen::Matrix<double, 3, spline_at> by_camera;  // 0 where a number is known
+  Eigen::RowVector4d depth_by_spline;             // from spline_at + terms.first on
+};
+
+// One observation. The intrinsics are steps away from those by which the feature's ray was made: of
+// fx and fy in parts, of cx and cy in pixels; the registration is a step from the known one.
+class CalibratedFeature {
  public:
-  ObservationCost(const Feature& feature, const Camera& camera,
-                  const CalibratedObservation& calibrated)
+  CalibratedFeature(const Feature& feature, const Camera& camera,
+                    const CalibratedObservation& calibrated)
       : camera_from_base_(camera.base_from_camera.linear().transpose()),
         base_from_camera_(camera.base_from_camera.translation()),
         ray_(feature.ray.cast<double>()),
@@ -48,18 +55,14 @@ class ObservationCost : public ceres::CostFunction {
         weight_(1.0 / static_cast<double>(feature.pixel_noise_px),
                 1.0 / static_cast<double>(feature.pixel_noise_px),
                 1.0 / static_cast<double>(feature.depth_noise_m)),
-        calibrated_(calibrated) {
-    set_num_residuals(3);
-    std::vector<int>& sizes = *mutable_parameter_block_sizes();
-    sizes = {7, 3};
-    if (calibrated.intrinsics) sizes.push_back(4);
-    if (calibrated.depth) sizes.insert(sizes.end(), {1, 1, 1, 1, 3});
-    if (calibrated.registration) sizes.push_back(6);
-    if (calibrated.timing) sizes.insert(sizes.end(), {6, 2});
-  }
+        calibrated_(calibrated) {}
 
-  // As Ceres calls it; false for a point that is not in front of the camera.
-  bool Evaluate(const double* const* blocks, double* residual, double** jacobians) const override;
+  const CalibratedObservation& calibrated() const { return calibrated_; }
+  // Seen from the pose, the base moving there by `motion`, by the numbers of its camera. False for
+  // a point that is not in front of the camera. The derivatives only if asked for.
+  bool evaluate(const Pose& map_from_base, const Vector6d& motion, const double* numbers,
+                const Eigen::Vector3d& point, CalibratedResidual& result,
+                bool with_derivatives) const;
 
  private:
   Eigen::Matrix3d camera_from_base_;
@@ -69,83 +72,6 @@ class ObservationCost : public ceres::CostFunction {
   Eigen::Vector2d focal_;
   Eigen::Vector3d weight_;
   CalibratedObservation calibrated_;
-};
-
-// A step or a motion is near `mean`: three numbers by one standard deviation, three by another.
-class NearResidual {
- public:
-  NearResidual(const Vector6d& mean, double shift_m, double turn_rad)
-      : mean_(mean), shift_m_(shift_m), turn_rad_(turn_rad) {}
-  template <typename T>
-  bool operator()(const T* step, T* residual) const {
-    for (int n = 0; n < 6; ++n)
-      residual[n] = (step[n] - T(mean_[n])) / T(n < 3 ? shift_m_ : turn_rad_);
-    return true;
-  }
-
- private:
-  Vector6d mean_;
-  double shift_m_;
-  double turn_rad_;
-};
-
-// Linear in single numbers and one block of three: prior, smoothness and gauge of a correction.
-class LinearResidual : public ceres::CostFunction {
- public:
-  LinearResidual(std::vector<double> of_numbers, const std::array<double, 3>& of_radial)
-      : of_numbers_(std::move(of_numbers)), of_radial_(of_radial) {
-    set_num_residuals(1);
-    mutable_parameter_block_sizes()->assign(of_numbers_.size(), 1);
-    mutable_parameter_block_sizes()->push_back(3);
-  }
-  bool Evaluate(const double* const* blocks, double* residual, double** jacobians) const override {
-    const std::size_t numbers = of_numbers_.size();
-    residual[0] = 0.0;
-    for (std::size_t n = 0; n < numbers; ++n) residual[0] += of_numbers_[n] * blocks[n][0];
-    for (std::size_t n = 0; n < 3; ++n) residual[0] += of_radial_[n] * blocks[numbers][n];
-    if (jacobians == nullptr) return true;
-    for (std::size_t n = 0; n < numbers; ++n)
-      if (jacobians[n] != nullptr) jacobians[n][0] = of_numbers_[n];
-    if (jacobians[numbers] != nullptr)
-      std::copy(of_radial_.begin(), of_radial_.end(), jacobians[numbers]);
-    return true;
-  }
-
- private:
-  std::vector<double> of_numbers_;
-  std::array<double, 3> of_radial_;
-};
-
-// Of a step of the intrinsics.
-class IntrinsicsPrior {
- public:
-  IntrinsicsPrior(double focal, double center_px) : focal_(focal), center_(center_px) {}
-  template <typename T>
-  bool operator()(const T* intrinsics, T* residual) const {
-    residual[0] = intrinsics[0] / T(focal_);
-    residual[1] = intrinsics[1] / T(focal_);
-    residual[2] = intrinsics[2] / T(center_);
-    residual[3] = intrinsics[3] / T(center_);
-    return true;
-  }
-
- private:
-  double focal_;
-  double center_;
-};
-
-// Delay of depth and time of the rows are short.
-class TimingPrior {
- public:
-  explicit TimingPrior(double short_s) : short_s_(short_s) {}
-  template <typename T>
-  bool operator()(const T* timing, T* residual) const {
-    for (int n = 0; n < 2; ++n) residual[n] = timing[n] / T(short_s_);
-    return true;
-  }
-
- private:
-  double short_s_;
 };
 
 // Residual of an observation with its derivatives by a step of the pose and by the point.

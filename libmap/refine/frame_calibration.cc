@@ -17,11 +17,12 @@ bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& co
   const Pose seen_from = color_from_depth *
                          frame.cameras[feature.camera].base_from_camera.inverse() *
                          surface.camera().base_from_camera;
+  const Pose from_seen = seen_from.inverse();
   const Eigen::Vector3d ray = feature.ray.cast<double>().homogeneous();
   double depth = static_cast<double>(feature.depth_m);
   // Where the ray meets the plane is where the plane is to be looked for.
   for (int round = 0; round < 4; ++round) {
-    if (!surface.seen_at(seen_from.inverse() * (depth * ray), element)) return false;
+    if (!surface.seen_at(from_seen * (depth * ray), element)) return false;
     element.point = seen_from * element.point;
     element.normal = seen_from.linear() * element.normal;
     const double facing = element.normal.dot(ray);
@@ -62,10 +63,7 @@ Eigen::Vector2f moved_ray(const Feature& feature, const Camera& camera,
       .cast<float>();
 }
 
-void register_depth(FrameFeatures& frame, const SensorCalibration& calibration) {
-  for (Feature& feature : frame.features)
-    feature.depth_m += static_cast<float>(
-        registered_depth(frame, feature, color_from_depth_of(frame, feature, calibration)).added_m);
+void register_surfaces(FrameFeatures& frame, const SensorCalibration& calibration) {
   for (std::size_t n = 0; n < frame.surfaces.size(); ++n) {
     Camera camera = frame.surfaces[n].camera();
     if (n < calibration.color_from_depth.size())
@@ -86,7 +84,6 @@ void correct_depth(FrameFeatures& frame, const std::vector<DepthCorrection>& cor
     const double corrected = z + corrections[feature.camera].at(z, radius2);
     if (corrected > 0.0) feature.depth_m = static_cast<float>(corrected);
   }
-  for (std::size_t n = 0; n < frame.surfaces.size(); ++n) frame.surfaces[n].correct(corrections[n]);
 }
 
 // Of each feature: how far the camera moves from the frame's time to that of the feature's row.
@@ -103,9 +100,7 @@ std::vector<Pose> row_motions(const FrameFeatures& frame, const SensorCalibratio
   return motions;
 }
 
-void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps) {
-  for (Feature& feature : frame.features)
-    feature.ray = moved_ray(feature, frame.cameras[feature.camera], steps[feature.camera]);
+void move_surfaces(FrameFeatures& frame, const std::vector<IntrinsicsStep>& steps) {
   for (std::size_t n = 0; n < frame.surfaces.size(); ++n) {
     // The depth image may have another size than the picture.
     const Camera& depth_camera = frame.surfaces[n].camera();
@@ -114,8 +109,6 @@ void move_intrinsics(FrameFeatures& frame, const std::vector<IntrinsicsStep>& st
     step.cy_px *= static_cast<double>(depth_camera.height) / frame.cameras[n].height;
     frame.surfaces[n].set_camera(moved(depth_camera, step));
   }
-  for (std::size_t n = 0; n < frame.cameras.size(); ++n)
-    frame.cameras[n] = moved(frame.cameras[n], steps[n]);
 }
 
 }  // namespace
@@ -128,20 +121,47 @@ Camera moved(Camera camera, const IntrinsicsStep& step) {
   return camera;
 }
 
-void calibrate(FrameFeatures& frame, const SensorCalibration& calibration) {
+FrameFeatures calibrated_features(const FrameFeatures& frame,
+                                  const SensorCalibration& calibration) {
+  FrameFeatures result;
+  result.node = frame.node;
+  result.stamp_s = frame.stamp_s;
+  result.cameras = frame.cameras;
+  result.features = frame.features;
   // By pixels, which the stored camera made of the features' rays.
   const std::vector<Pose> motions = row_motions(frame, calibration);
-  if (!calibration.color_from_depth.empty() || !motions.empty()) register_depth(frame, calibration);
-  if (!calibration.depth.empty()) correct_depth(frame, calibration.depth);
-  if (!calibration.intrinsics.empty()) move_intrinsics(frame, calibration.intrinsics);
+  if (!calibration.color_from_depth.empty() || !motions.empty())
+    for (Feature& its : result.features)
+      its.depth_m += static_cast<float>(
+          registered_depth(frame, its, color_from_depth_of(frame, its, calibration)).added_m);
+  if (!calibration.depth.empty()) correct_depth(result, calibration.depth);
+  if (!calibration.intrinsics.empty()) {
+    for (Feature& its : result.features)
+      its.ray = moved_ray(its, frame.cameras[its.camera], calibration.intrinsics[its.camera]);
+    for (std::size_t n = 0; n < frame.cameras.size(); ++n)
+      result.cameras[n] = moved(frame.cameras[n], calibration.intrinsics[n]);
+  }
   for (std::size_t n = 0; n < motions.size(); ++n) {
-    Feature& feature = frame.features[n];
+    Feature& feature = result.features[n];
     const Eigen::Vector3d point =
         motions[n] * Eigen::Vector3d(static_cast<double>(feature.depth_m) *
                                      feature.ray.cast<double>().homogeneous());
     feature.ray = point.hnormalized().cast<float>();
     feature.depth_m = static_cast<float>(point.z());
   }
+  return result;
+}
+
+void calibrate(FrameFeatures& frame, const SensorCalibration& calibration) {
+  FrameFeatures calibrated = calibrated_features(frame, calibration);
+  if (!calibration.color_from_depth.empty() || !calibration.timing.empty())
+    register_surfaces(frame, calibration);
+  for (std::size_t n = 0; n < std::min(frame.surfaces.size(), calibration.depth.size()); ++n)
+    frame.surfaces[n].correct(calibration.depth[n]);
+  if (!calibration.intrinsics.empty()) move_surfaces(frame, calibration.intrinsics);
+  // In their places: callers keep references to them.
+  std::copy(calibrated.features.begin(), calibrated.features.end(), frame.features.begin());
+  std::copy(calibrated.cameras.begin(), calibrated.cameras.end(), frame.cameras.begin());
 }
 
 double squared_radius_of(const Feature& feature, const Camera& camera) {
@@ -196,6 +216,10 @@ RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feat
   const double facing = element.normal.dot(ray);
   depth.by_step << element.normal / facing, -element.point.z() / facing * element.normal.cross(ray);
   return depth;
+}
+
+bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b) {
+  return a.first_m == b.first_m && a.step_m == b.step_m && a.spline_m.size() == b.spline_m.size();
 }
 
 std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,

@@ -45,6 +45,9 @@ struct SensorCalibration {
 // The frame as if it had been recorded with the calibration: features and surfaces.
 void calibrate(FrameFeatures& frame, const SensorCalibration& calibration);
 
+// Its cameras and features alone, without surfaces and descriptors.
+FrameFeatures calibrated_features(const FrameFeatures& frame, const SensorCalibration& calibration);
+
 // The camera with the step.
 Camera moved(Camera camera, const IntrinsicsStep& step);
 
@@ -68,6 +71,9 @@ struct RegisteredDepth {
 };
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
+
+// Whether coefficients of the one are those of the other.
+bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b);
 
 // No correction yet: knots for the depths of the features of each camera.
 std::vector<DepthCorrection> corrections_for(const std::vector<FrameFeatures>& frames,

@@ -58,6 +58,7 @@ bool Refinement::calibrate_sensor(const std::string& name) {
   choice.intrinsics = options_.intrinsics != IntrinsicsMode::fixed;
   choice.depth = choice.registration = choice.timing = options_.correct_depth;
   choice.only_if_better = options_.intrinsics != IntrinsicsMode::refined;
+  choice.settle = !result_.calibration.empty();  // the first one begins the next
   if (const SensorCalibration& known = result_.calibration; !known.empty()) {
     choice.intrinsics = !known.intrinsics.empty();
     choice.depth = !known.depth.empty();
@@ -73,15 +74,16 @@ bool Refinement::calibrate_sensor(const std::string& name) {
   stage.rejected = estimate.calibration.empty();
   BundleAdjustmentResult& adjusted = estimate.adjustment;
   if (!stage.rejected) {
-    const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
     std::vector<FrameFeatures> as_stored = frames_;
     for (FrameFeatures& frame : frames_) calibrate(frame, estimate.calibration);
-    if (estimate.frames < frames_.size())
-      adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components,
-                               options_.bundle_adjustment);
-    stage.held_out =
-        evaluate_held_out(before, held_out_costs(frames_, links_, adjusted.map_from_base));
-    stage.rejected = stage.held_out.is_worse();
+    if (estimate.frames < frames_.size()) {
+      BundleAdjustmentOptions options = options_.bundle_adjustment;
+      options.with_information = false;
+      adjusted = adjust_bundle(frames_, links_, poses_, others, graph_.components, options);
+      stage.held_out = evaluate_held_out(held_out_costs(as_stored, links_, poses_),
+                                         held_out_costs(frames_, links_, adjusted.map_from_base));
+      stage.rejected = stage.held_out.is_worse();
+    }
     if (stage.rejected)
       frames_ = std::move(as_stored);
     else
@@ -90,8 +92,6 @@ bool Refinement::calibrate_sensor(const std::string& name) {
   const bool accepted = !stage.rejected;
   if (accepted) {
     poses_ = std::move(adjusted.map_from_base);
-    information_ = std::move(adjusted.information);
-    by_observations_ = true;
     result_.calibration = std::move(estimate.calibration);
   } else {
     stage.rejected_error = error_of(adjusted.map_from_base);
@@ -135,6 +135,13 @@ void Refinement::calibrate_sensor() {
     frames_ = std::exchange(stored_frames_, {});
   }
   for (FrameFeatures& frame : stored_frames_) frame.descriptors = {};
+  BundleAdjustmentResult found;
+  found.map_from_base = poses_;
+  add_information(frames_, information_tracks(frames_, links_, poses_.size()).tracks,
+                  without_features(graph_.links, stored_.size()), options_.bundle_adjustment,
+                  found);
+  information_ = std::move(found.information);
+  by_observations_ = true;
 }
 
 // The poses rest on a calibration that is uncertain itself: what a standard deviation of it asks of

@@ -19,6 +19,7 @@ namespace {
 struct Excerpt {
   std::vector<FrameFeatures> frames;
   std::vector<FeatureLink> links;
+  FeatureTracks tracks;
   std::map<int, Pose> poses;
   std::vector<GraphLinkResult> graph_links;
   std::vector<GraphComponent> components;
@@ -67,6 +68,7 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
     part.links.push_back(link);
     part.links.back().frames = {a->second, b->second};
   }
+  part.tracks = build_tracks(part.frames, part.links);
   for (const GraphLinkResult& link : graph_links)
     if (part.poses.contains(link.link.from) && part.poses.contains(link.link.to))
       part.graph_links.push_back(link);
@@ -83,6 +85,9 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
 }
 
 constexpr int max_rounds = 4;
+// Of adjustments that are compared or begin the next one. Standard errors of the held-out data are
+// larger than what the last steps change.
+constexpr double rough_tolerance = 1e-4;
 
 // What is free in an adjustment.
 struct Model {
@@ -114,12 +119,13 @@ Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOpt
   options.refine_depth = model.depth;
   options.refine_registration = model.registration;
   options.refine_timing = model.timing;
+  options.with_information = false;
   Candidate candidate;
   candidate.model = model;
   // Other planes are met when depth is taken from elsewhere: once more from there.
   for (int round = 0; round < rounds; ++round) {
-    candidate.adjustment = adjust_bundle(part.frames, part.links, poses, part.graph_links,
-                                         part.components, options, start);
+    candidate.adjustment = adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links,
+                                         part.components, options, {}, start);
     const SensorCalibration& found = candidate.adjustment.calibration;
     if (!model.registration && !model.timing) break;
     if (takes_depth_from_near(start, found, 1e-4, 5e-5, 3e-4)) break;
@@ -152,9 +158,11 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   const HeldOutCosts before = held_out_costs(part.frames, part.links, part.poses);
   CalibrationEstimate estimate;
   estimate.frames = part.frames.size();
+  BundleAdjustmentOptions rough = options;
+  rough.tolerance = rough_tolerance;
   const auto attempt = [&](const Model& model, const SensorCalibration& start,
                            const std::map<int, Pose>& poses, int rounds) {
-    Candidate candidate = try_model(model, part, options, start, poses, rounds);
+    Candidate candidate = try_model(model, part, rough, start, poses, rounds);
     estimate.tried.emplace_back(model.name(), evaluate_held_out(before, candidate.costs));
     return candidate;
   };
@@ -200,6 +208,11 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
       leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
     }
   }
+  if (is_good(best) && choice.settle) {
+    Candidate settled = try_model(best.model, part, options, best.adjustment.calibration,
+                                  best.adjustment.map_from_base, 1);
+    if (is_good(settled)) best = std::move(settled);
+  }
   if (is_good(best)) estimate.calibration = best.adjustment.calibration;
   estimate.held_out = evaluate_held_out(before, best.costs);
   estimate.adjustment = std::move(best.adjustment);
@@ -219,8 +232,10 @@ BundleAdjustmentResult vary_calibration(
   varied.refine_registration = !known.color_from_depth.empty();
   varied.refine_timing = !known.timing.empty();
   varied.alternatives = count;
-  return adjust_bundle(part.frames, part.links, part.poses, part.graph_links, part.components,
-                       varied, known);
+  varied.tolerance = rough_tolerance;
+  varied.with_information = false;
+  return adjust_bundle(part.frames, part.tracks.tracks, part.poses, part.graph_links,
+                       part.components, varied, {}, known);
 }
 
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,

@@ -23,13 +23,15 @@ struct CalibrationChoice {
   bool timing = true;
   bool only_if_better = true;
   bool leave_out = true;    // what is not needed
+  bool settle = true;       // the best to the tolerance of the options, not only as far as models
+                            // are compared
   SensorCalibration start;  // where the search for registration and timing begins
 };
 
 struct CalibrationEstimate {
   std::size_t frames = 0;             // that it rests on
   SensorCalibration calibration;      // empty: what is stored stays
-  BundleAdjustmentResult adjustment;  // of those frames, with the best that was tried
+  BundleAdjustmentResult adjustment;  // of those frames, with the best tried; without information
   HeldOutEvaluation held_out;         // of those frames: as they were, and with the best model
   std::vector<std::pair<std::string, HeldOutEvaluation>> tried;  // the same of each model
 };

@@ -9,6 +9,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/refine/bundle_residuals.h"
 #include "libmap/refine/graph_covariance.h"
+#include "libmap/refine/link_terms.h"
 
 namespace libmap {
 
@@ -108,18 +109,6 @@ void add_track(const std::vector<Seen>& all, const Eigen::Vector3d& point, doubl
     for (std::size_t b = a; b < mixed.size(); ++b)
       system.add(mixed[a].first, mixed[b].first, -reduced * mixed[b].second.transpose());
   }
-}
-
-double cost_of(const std::map<int, Pose>& poses, const std::vector<GraphLinkResult>& links) {
-  double cost = 0.0;
-  for (const GraphLinkResult& kept : links) {
-    const PoseLink& link = kept.link;
-    if (kept.rejected || !poses.contains(link.from) || !poses.contains(link.to)) continue;
-    const Vector6d residual =
-        step_between(link.from_from_to, poses.at(link.from).inverse() * poses.at(link.to));
-    cost += 0.5 * kept.weight * residual.dot(link.information * residual);
-  }
-  return cost;
 }
 
 }  // namespace
@@ -259,11 +248,11 @@ class SparseAdjustment {
  private:
   double cost_at(const std::map<int, Pose>& poses,
                  const std::vector<Eigen::Vector3d>& points) const {
-    return observed_.totals(poses, points).cost + cost_of(poses, links_);
+    return observed_.totals(poses, points).cost + link_cost(poses, links_);
   }
   BlockSystem system() const {
     BlockSystem system = observed_.system(result_.map_from_base, result_.points);
-    system.add(link_system(result_.map_from_base, links_));
+    system.add(all_link_system(result_.map_from_base, links_));
     return system;
   }
   bool step();
@@ -313,6 +302,11 @@ BundleAdjustmentResult adjust_sparse(const std::vector<FrameFeatures>& frames,
   const TrackSystem observed(frames, tracks, options.robust_scale);
   SparseAdjustment(observed, links, components, result).run(options.max_iterations, progress);
   observed.totals(result.map_from_base, result.points).add_to(result);
+  if (std::any_of(links.begin(), links.end(),
+                  [](const GraphLinkResult& link) { return is_absolute(link.link); })) {
+    result.information = observed.system(result.map_from_base, result.points);
+    result.information.add(link_system(result.map_from_base, links));
+  }
   result.information.clear_side();
   return result;
 }

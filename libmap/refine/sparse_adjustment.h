@@ -46,8 +46,8 @@ class TrackSystem {
   double robust_scale_;
 };
 
-// As adjust_bundle with TrackFrames::linked tracks and nothing to refine; links must be between two
-// nodes each. The same for any number of threads.
+// As adjust_bundle with TrackFrames::linked tracks and nothing to refine. The same for any number
+// of threads.
 BundleAdjustmentResult adjust_sparse(const std::vector<FrameFeatures>& frames,
                                      const std::vector<FeatureTrack>& tracks,
                                      const std::map<int, Pose>& map_from_base,

@@ -5,6 +5,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/feature_tracks.h"
+#include "libmap/refine/link_terms.h"
 #include "libmap/refine/sparse_adjustment.h"
 #include "tests/libmap/refine/synthetic_features.h"
 #include "tests/support/test_support.h"
@@ -217,6 +218,41 @@ TEST(SparseAdjustment, FindsTheOptimumOfTheGeneralSolver) {
     for (const auto& [node, pose] : sparse.map_from_base)
       EXPECT_EQ(again.map_from_base.at(node).matrix(), pose.matrix());
   }
+}
+
+// Gravity and priors of single nodes: their normal equations are those of differences of the cost,
+// which both solvers minimize.
+TEST(LinkTerms, AbsoluteLinksBindTheirNodes) {
+  const Scene scene = scene_of(4, {.apply = true});
+  std::vector<libmap::GraphLinkResult> links;
+  for (const libmap::LinkType type : {libmap::LinkType::gravity, libmap::LinkType::pose_prior}) {
+    libmap::PoseLink link{.from = 2, .to = 2, .type = type};
+    link.from_from_to = libmap::moved(scene.start.at(2), random_step(0.02, 0.02));
+    link.information = 1e6 * libmap::Matrix6d::Identity();
+    links.push_back({link, false, 1.0, 0.0});
+    const std::vector<libmap::GraphLinkResult> own = {links.back()};
+    const libmap::BlockSystem system = libmap::all_link_system(scene.start, own);
+    constexpr double step = 1e-6;
+    for (Eigen::Index n = 0; n < 6; ++n) {
+      const auto cost_after = [&](double by) {
+        std::map<int, Pose> poses = scene.start;
+        poses.at(2) = libmap::moved(poses.at(2), by * libmap::Vector6d::Unit(n));
+        return libmap::link_cost(poses, own);
+      };
+      const double slope = (cost_after(step) - cost_after(-step)) / (2.0 * step);
+      EXPECT_NEAR(-system.side()[1][n], slope, 0.02 * system.side()[1].norm()) << n;
+    }
+  }
+  const auto dense =
+      libmap::adjust_bundle(scene.frames, scene.tracks, scene.start, links, scene.components);
+  const auto sparse =
+      libmap::adjust_sparse(scene.frames, scene.tracks, scene.start, links, scene.components, {});
+  const auto without =
+      libmap::adjust_bundle(scene.frames, scene.tracks, scene.start, {}, scene.components);
+  EXPECT_LT(libmap::step_between(dense.map_from_base.at(2), sparse.map_from_base.at(2)).norm(),
+            1e-4);
+  EXPECT_GT(libmap::step_between(dense.map_from_base.at(2), without.map_from_base.at(2)).norm(),
+            1e-3);
 }
 
 TEST(SparseAdjustment, RecoversAnExactSceneAndNeverWorsens) {

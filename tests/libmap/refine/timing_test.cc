@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include "libmap/core/parallel.h"
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/bundle_residuals.h"
 #include "libmap/refine/feature_tracks.h"
@@ -26,25 +27,24 @@ Vector6d random_six() {
   return six;
 }
 
-// Numbers of an observation's blocks, all of them unknown.
-struct Blocks {
-  std::vector<std::vector<double>> numbers;
+// What an observation depends on, in one row: a step of the pose, the motion, the point, and the
+// camera's numbers with four of the spline.
+constexpr Eigen::Index motion_at = 6;
+constexpr Eigen::Index point_at = 12;
+constexpr Eigen::Index camera_at = 15;
+constexpr Eigen::Index spline_at = camera_at + libmap::spline_at;
+using Unknowns = Eigen::Matrix<double, spline_at + 4, 1>;
 
-  std::vector<const double*> pointers() const {
-    std::vector<const double*> all;
-    for (const auto& block : numbers) all.push_back(block.data());
-    return all;
-  }
-};
-
-Eigen::Vector3d residual_of(const libmap::ObservationCost& cost, const Blocks& blocks) {
-  Eigen::Vector3d residual;
-  EXPECT_TRUE(cost.Evaluate(blocks.pointers().data(), residual.data(), nullptr));
-  return residual;
+libmap::CalibratedResidual seen_at(const libmap::CalibratedFeature& feature, const Pose& pose,
+                                   const Unknowns& at) {
+  libmap::CalibratedResidual seen;
+  EXPECT_TRUE(feature.evaluate(libmap::moved(pose, at.head<6>()), at.segment<6>(motion_at),
+                               at.data() + camera_at, at.segment<3>(point_at), seen, true));
+  return seen;
 }
 
-// By central differences; the quaternion stays a unit one.
-TEST(ObservationCost, DerivativesAreThoseOfDifferences) {
+// By central differences.
+TEST(CalibratedFeature, DerivativesAreThoseOfDifferences) {
   const libmap::Camera camera = graspmap_test::feature_camera();
   const FrameFeatures frame = see_points(1, Pose::Identity(), {{1.6, 0.3, -0.2}});
   CalibratedObservation calibrated{true, true, true, true};
@@ -52,48 +52,26 @@ TEST(ObservationCost, DerivativesAreThoseOfDifferences) {
   calibrated.by_step = random_six();
   calibrated.known_step = 0.01 * random_six();
   calibrated.row_share = 0.37;
-  const libmap::ObservationCost cost(frame.features[0], camera, calibrated);
-  const Eigen::Quaterniond q = libmap::rotation_of({0.05, -0.08, 0.1});
-  Blocks blocks{{{q.x(), q.y(), q.z(), q.w(), 0.02, -0.01, 0.03},
-                 {1.61, 0.28, -0.19},
-                 {0.01, -0.02, 3.0, -2.0},
-                 {0.001},
-                 {0.002},
-                 {-0.001},
-                 {0.003},
-                 {0.004, -0.002, 0.001},
-                 {0.002, -0.001, 0.003, 0.004, 0.001, -0.002},
-                 {0.5, -0.3, 0.2, 0.4, -0.6, 0.3},
-                 {0.012, 0.02}}};
-  std::vector<std::vector<double>> derivatives;
-  std::vector<double*> pointers;
-  for (const auto& block : blocks.numbers) derivatives.emplace_back(3 * block.size());
-  for (auto& block : derivatives) pointers.push_back(block.data());
-  Eigen::Vector3d residual;
-  ASSERT_TRUE(cost.Evaluate(blocks.pointers().data(), residual.data(), pointers.data()));
+  const libmap::CalibratedFeature feature(frame.features[0], camera, calibrated);
+  const Pose pose = libmap::make_pose({0.02, -0.01, 0.03}, libmap::rotation_of({0.05, -0.08, 0.1}));
+  Unknowns at = Unknowns::Zero();
+  at.segment<6>(motion_at) << 0.5, -0.3, 0.2, 0.4, -0.6, 0.3;
+  at.segment<3>(point_at) << 1.61, 0.28, -0.19;
+  at.segment<libmap::spline_at>(camera_at) << 0.01, -0.02, 3.0, -2.0, 0.002, -0.001, 0.003, 0.004,
+      0.001, -0.002, 0.012, 0.02, 0.004, -0.002, 0.001;
+  at.tail<4>() << 0.001, 0.002, -0.001, 0.003;
+  const libmap::CalibratedResidual seen = seen_at(feature, pose, at);
+  Eigen::Matrix<double, 3, Unknowns::SizeAtCompileTime> found;
+  found << seen.by_pose, seen.by_motion, seen.by_point, seen.by_camera,
+      Eigen::Matrix<double, 3, 4>::Zero();
+  found.bottomRightCorner<1, 4>() = seen.depth_by_spline;
   constexpr double step = 1e-6;
-  for (std::size_t b = 0; b < blocks.numbers.size(); ++b) {
-    const std::size_t size = blocks.numbers[b].size();
-    for (std::size_t n = 0; n < size; ++n) {
-      std::vector<double> direction(size, 0.0);
-      direction[n] = 1.0;
-      if (b == 0 && n < 4)  // tangent to the unit sphere
-        for (std::size_t k = 0; k < 4; ++k)
-          direction[k] -= blocks.numbers[0][k] * blocks.numbers[0][n];
-      Eigen::Vector3d expected = Eigen::Vector3d::Zero();
-      for (std::size_t k = 0; k < size; ++k)
-        for (std::size_t row = 0; row < 3; ++row)
-          expected[static_cast<Eigen::Index>(row)] += derivatives[b][row * size + k] * direction[k];
-      Blocks after = blocks;
-      Blocks before = blocks;
-      for (std::size_t k = 0; k < size; ++k) {
-        after.numbers[b][k] += step * direction[k];
-        before.numbers[b][k] -= step * direction[k];
-      }
-      const Eigen::Vector3d found =
-          (residual_of(cost, after) - residual_of(cost, before)) / (2.0 * step);
-      EXPECT_LT((found - expected).norm(), 1e-5 * std::max(1.0, expected.norm())) << b << " " << n;
-    }
+  for (Eigen::Index n = 0; n < at.size(); ++n) {
+    const Unknowns by = step * Unknowns::Unit(n);
+    const Eigen::Vector3d expected =
+        (seen_at(feature, pose, at + by).residual - seen_at(feature, pose, at - by).residual) /
+        (2.0 * step);
+    EXPECT_LT((found.col(n) - expected).norm(), 1e-5 * std::max(1.0, expected.norm())) << n;
   }
 }
 
@@ -160,6 +138,32 @@ TEST(BundleAdjustment, FindsTheTimeOfThePicturesRows) {
     after += (calibrated.features[n].ray - wanted).norm();
   }
   EXPECT_LT(after, 0.5 * before);
+}
+
+// From a start that is far off, with motions and times free.
+TEST(BundleAdjustment, IsTheSameForAnyNumberOfThreadsAndNeverWorse) {
+  const Way way = way_with_rows(random_points(700), 0.06);
+  std::map<int, Pose> start = way.truth;
+  for (auto& [node, pose] : start) pose = libmap::moved(pose, random_step(0.03, 0.02));
+  const auto adjusted = [&](unsigned threads, int steps) {
+    const libmap::ThreadLimit limit(threads);
+    libmap::BundleAdjustmentOptions options;
+    options.refine_timing = options.refine_intrinsics = true;
+    options.max_iterations = steps;
+    return libmap::adjust_bundle(way.frames, way.tracks, start, {}, way.components, options);
+  };
+  double cost = adjusted(1, 1).initial_cost;
+  for (int steps = 1; steps < 8; ++steps) {
+    const auto one = adjusted(1, steps);
+    const auto three = adjusted(3, steps);
+    EXPECT_LE(one.final_cost, cost) << steps;
+    cost = one.final_cost;
+    EXPECT_EQ(one.final_cost, three.final_cost);
+    EXPECT_EQ(one.calibration.timing[0].rolling_shutter_s,
+              three.calibration.timing[0].rolling_shutter_s);
+    for (const auto& [node, pose] : one.map_from_base)
+      EXPECT_EQ(pose.matrix(), three.map_from_base.at(node).matrix());
+  }
 }
 
 TEST(BundleAdjustment, FindsNoTimeWhereRowsAreExposedAtOnce) {
