@@ -44,7 +44,7 @@ constexpr std::array<std::array<int, 2>, 12> edge_corners = {{{0, 1},
                                                               {2, 6},
                                                               {3, 7}}};
 
-constexpr std::uint32_t no_vertex = 0xffffffff;
+constexpr std::uint32_t unnumbered = 0xffffffff;
 
 // 21 bits an axis.
 std::uint64_t pack(const Vector3i& place) {
@@ -95,7 +95,7 @@ struct BlockGrid {
   std::vector<double> values;
   // Of the block's part: on the edges from each corner along the axes.
   std::vector<std::uint32_t> vertex_on =
-      std::vector<std::uint32_t>(3 * corners_per_block, no_vertex);
+      std::vector<std::uint32_t>(3 * corners_per_block, unnumbered);
 };
 
 struct Cube {
@@ -244,7 +244,7 @@ void ImplicitSurface::add_cube(const Block& block, const Cube& cube, BlockGrid& 
     const auto& high = corner_offsets[b];
     const int axis = high[1] - low[1] + 2 * (high[2] - low[2]);
     std::uint32_t& known = grid.vertex_on[3 * cube.at[a] + static_cast<std::size_t>(axis)];
-    if (known == no_vertex) {
+    if (known == unnumbered) {
       known = static_cast<std::uint32_t>(part.vertices.size());
       const double from = grid.values[cube.at[a]];
       const double to = grid.values[cube.at[b]];
