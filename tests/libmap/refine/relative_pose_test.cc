@@ -6,6 +6,7 @@
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/feature_tracks.h"
 #include "libmap/refine/link_terms.h"
+#include "libmap/refine/loop_closure.h"
 #include "libmap/refine/sparse_adjustment.h"
 #include "tests/libmap/refine/synthetic_features.h"
 #include "tests/support/test_support.h"
@@ -39,6 +40,29 @@ TEST(MatchFeatures, FindsEachOnesBestAndLeavesDoubtfulOnesOut) {
   EXPECT_EQ(matches.size(), 48U);
   EXPECT_EQ(matches.front(), (FeatureMatch{2, 2}));
   EXPECT_TRUE(libmap::match_features(vectors, Eigen::MatrixXf(128, 0), 0.8).empty());
+}
+
+// What descriptors say does not depend on the cameras: the second time it is not asked for.
+TEST(VerifyPairs, KnownMatchesStandForDescriptors) {
+  const auto points = random_points(80);
+  std::vector<FrameFeatures> frames = {see_points(1, Pose::Identity(), points),
+                                       see_points(2, some_motion(), points)};
+  const auto links = [&](libmap::KnownMatches* known) {
+    return libmap::verify_pairs(frames, {{0, 1}}, {}, 1, libmap::no_progress(), known).links;
+  };
+  const auto expected = links(nullptr);
+  ASSERT_EQ(expected.size(), 1U);
+  libmap::KnownMatches known;
+  for (int time = 0; time < 2; ++time) {
+    const auto found = links(&known);
+    ASSERT_EQ(found.size(), 1U) << time;
+    EXPECT_EQ(found[0].matches, expected[0].matches);
+    EXPECT_EQ(found[0].held_out, expected[0].held_out);
+    EXPECT_EQ(found[0].link.from_from_to.matrix(), expected[0].link.from_from_to.matrix());
+    for (FrameFeatures& frame : frames)
+      std::fill(frame.descriptors.begin(), frame.descriptors.end(), 1);
+  }
+  EXPECT_TRUE(links(nullptr).empty()) << "descriptors that say nothing";
 }
 
 TEST(RelativePose, ExactMatchesGiveTheExactMotionDespiteOutliers) {
