@@ -231,6 +231,9 @@ void bind(ParameterTable& table, TextureOptions& options) {
             "texels around each chart that continue its colors");
   table.add("max_incidence_deg", options.views.max_incidence_deg, {0, 90, true, true},
             "views that are more aslant are not used");
+  table.add(
+      "max_depth_m", options.views.max_depth_m, not_negative,
+      "photographs that see a surface from farther (z) are not used for it, m; 0: from anywhere");
   table.add("occlusion_tolerance_m", options.views.occlusion_tolerance_m, not_negative,
             "a surface is hidden that lies further behind another, m");
   table.add("occlusion_margin_px", options.views.occlusion_margin_px, not_negative,

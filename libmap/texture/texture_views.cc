@@ -14,12 +14,12 @@
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/ray_caster.h"
+#include "libmap/texture/occluder_cells.h"
 
 namespace libmap {
 
 namespace {
 
-constexpr std::size_t points_per_chunk = 4096;
 // Side of the cubes in which what no photograph shows is passed over.
 constexpr double block_m = 0.5;
 // Of a photograph's smaller side: within it, towards the border, a view counts less and less.
@@ -60,15 +60,18 @@ class ViewFinder {
         caster_(mesh),
         around_(triangles_at_vertices(mesh.triangles, mesh.vertices.size())),
         min_cos_(std::cos(options.max_incidence_deg * std::numbers::pi / 180.0)),
+        max_depth_m_(options.max_depth_m > 0.0 ? options.max_depth_m
+                                               : std::numeric_limits<double>::infinity()),
         vertices_(mesh.vertices.size()),
-        qualities_(mesh.triangles.size()) {
+        qualities_(mesh.triangles.size()),
+        cells_(options.occlusion_margin_px) {
     choose_vertices();
     make_blocks();
   }
 
   void look_from(std::size_t photo) {
     projector_ = &photos_[photo].projector;
-    if (projector_->max_pixels(center_, radius_m_, 1.0) == 0.0) return;
+    if (!may_show(center_, radius_m_)) return;
     find_blocks_in_view();
     project();
     if (std::none_of(in_view_.begin(), in_view_.end(),
@@ -78,7 +81,6 @@ class ViewFinder {
     cast_to_vertices();
     test_triangles();
     if (wants_views()) {
-      fill_cells();
       devalue_occluded_edges();
       keep(static_cast<std::uint32_t>(photo));
     }
@@ -95,11 +97,17 @@ class ViewFinder {
   };
 
   bool wants_views() const { return request_.views_a_vertex > 0 || request_.views_a_triangle > 0; }
+  // Whether the photograph at hand may show anything of the ball, and near enough.
+  bool may_show(const Eigen::Vector3d& center, double radius_m) const {
+    const double z =
+        projector_->to_world(Eigen::Vector3d::UnitZ()).dot(center - projector_->position());
+    return z <= max_depth_m_ + longest_side_m_ + radius_m &&
+           projector_->max_pixels(center, radius_m, 1.0) > 0.0;
+  }
   void choose_vertices();
   void make_blocks();
   void find_blocks_in_view();
   void project();
-  void fill_cells();
   bool is_beside_occluder(std::size_t triangle) const;
   void devalue_occluded_edges();
   // Of the blocks in view, in parallel.
@@ -118,13 +126,10 @@ class ViewFinder {
   void test_triangles();
   void keep(std::uint32_t photo);
   void observe(std::uint32_t photo);
-  std::size_t cell_at(const SeenVertex& vertex) const {
-    const auto side = static_cast<float>(options_.occlusion_margin_px);
-    return static_cast<std::size_t>((vertex.y + 0.5F) / side) *
-               static_cast<std::size_t>(cell_columns_) +
-           static_cast<std::size_t>((vertex.x + 0.5F) / side);
-  }
   std::vector<bool> hidden(const std::vector<Eigen::Vector3d>& points) const;
+  Eigen::Vector3d side_of(const Triangle& t, std::size_t k) const {
+    return mesh_.vertices[t[(k + 1) % 3]] - mesh_.vertices[t[k]];
+  }
   const Eigen::Vector3d& normal_of(std::size_t rated) const { return normals_[place_of_[rated]]; }
   float rate(std::size_t triangle, double sharpness) const;
   float quality_at(std::uint32_t vertex) const;
@@ -138,6 +143,8 @@ class ViewFinder {
   RayCaster caster_;
   VertexTriangles around_;
   double min_cos_;
+  double max_depth_m_;
+  double longest_side_m_ = 0.0;  // of the triangles that decide on the vertices that are asked for
   // Vertices whose views are asked for, a ball around them, and the triangles that decide on them.
   std::vector<bool> is_asked_;
   std::vector<std::uint32_t> observed_;
@@ -153,12 +160,7 @@ class ViewFinder {
   std::vector<Block*> in_view_;
   std::vector<SeenVertex> vertices_;
   std::vector<float> qualities_;  // 0: not seen
-  // Squares of occlusion_margin_px pixels: the least z of vertices in each, and the ray through its
-  // middle in the world's axes (zero where there is none).
-  int cell_columns_ = 0;
-  int cell_rows_ = 0;
-  std::vector<float> cell_z_;
-  std::vector<Eigen::Vector3d> cell_rays_;
+  OccluderCells cells_;
 };
 
 void ViewFinder::choose_vertices() {
@@ -186,6 +188,9 @@ void ViewFinder::choose_vertices() {
   }
   for (std::uint32_t t = 0; t < is_rated.size(); ++t)
     if (is_rated[t]) rated_.push_back(t);
+  for (const std::uint32_t t : rated_)
+    for (std::size_t k = 0; k < 3; ++k)
+      longest_side_m_ = std::max(longest_side_m_, side_of(mesh_.triangles[t], k).norm());
   if (box.isEmpty()) return;
   center_ = box.center();
   radius_m_ = box.diagonal().norm() / 2.0;
@@ -244,8 +249,7 @@ void ViewFinder::find_blocks_in_view() {
   }
   in_view_.clear();
   for (Block& block : blocks_)
-    if (projector_->max_pixels(block.box.center(), block.box.diagonal().norm() / 2.0, 1.0) > 0.0)
-      in_view_.push_back(&block);
+    if (may_show(block.box.center(), block.box.diagonal().norm() / 2.0)) in_view_.push_back(&block);
 }
 
 void ViewFinder::project() {
@@ -266,58 +270,22 @@ void ViewFinder::project() {
   });
 }
 
-void ViewFinder::fill_cells() {
-  const int side = options_.occlusion_margin_px;
-  if (side == 0) return;
-  const Camera& camera = projector_->camera();
-  cell_columns_ = (camera.width - 1) / side + 1;
-  cell_rows_ = (camera.height - 1) / side + 1;
-  const auto count = static_cast<std::size_t>(cell_columns_) * static_cast<std::size_t>(cell_rows_);
-  cell_z_.assign(count, std::numeric_limits<float>::infinity());
-  for (const Block* block : in_view_)
-    for (const std::uint32_t v : block->vertices) {
-      const SeenVertex& vertex = vertices_[v];
-      if (!(vertex.z > 0.0F) || !(vertex.x > -0.5F) || !(vertex.y > -0.5F)) continue;
-      if (!(vertex.x < static_cast<float>(camera.width) - 0.5F)) continue;
-      if (!(vertex.y < static_cast<float>(camera.height) - 0.5F)) continue;
-      float& z = cell_z_[cell_at(vertex)];
-      z = std::min(z, vertex.z);
-    }
-  cell_rays_.resize(count);
-  parallel_for(count, points_per_chunk, [&](std::size_t begin, std::size_t end) {
-    const auto columns = static_cast<std::size_t>(cell_columns_);
-    for (std::size_t i = begin; i < end; ++i) {
-      const std::size_t column = i % columns;
-      const std::size_t row = i / columns;
-      const Eigen::Vector2d cell(static_cast<double>(column), static_cast<double>(row));
-      const auto ray = pixel_to_ray(camera, (side * cell).array() + (side - 1) / 2.0);
-      cell_rays_[i] = ray ? projector_->to_world(ray->homogeneous()) : Eigen::Vector3d::Zero();
-    }
-  });
-}
-
 // Whether something seen in the squares around the triangle stands before its plane.
 bool ViewFinder::is_beside_occluder(std::size_t t) const {
-  const Triangle& triangle = mesh_.triangles[t];
+  const SeenVertex& corner = vertices_[mesh_.triangles[t][0]];
   const Eigen::Vector3d& normal = normal_of(t);
-  const double height = normal.dot(mesh_.vertices[triangle[0]] - projector_->position());
-  const double gap = occluder_tolerances * options_.occlusion_tolerance_m;
-  const auto cell = static_cast<int>(cell_at(vertices_[triangle[0]]));
-  for (int row = std::max(0, cell / cell_columns_ - 1);
-       row <= std::min(cell_rows_ - 1, cell / cell_columns_ + 1); ++row)
-    for (int column = std::max(0, cell % cell_columns_ - 1);
-         column <= std::min(cell_columns_ - 1, cell % cell_columns_ + 1); ++column) {
-      const int index = row * cell_columns_ + column;
-      const auto i = static_cast<std::size_t>(index);
-      if (!std::isfinite(cell_z_[i])) continue;
-      // Both are negative below the camera.
-      if (normal.dot(cell_rays_[i]) * static_cast<double>(cell_z_[i]) - height > gap) return true;
-    }
-  return false;
+  const double height_m =
+      normal.dot(mesh_.vertices[mesh_.triangles[t][0]] - projector_->position());
+  return cells_.has_any_above(corner.x, corner.y, normal, height_m,
+                              occluder_tolerances * options_.occlusion_tolerance_m);
 }
 
 void ViewFinder::devalue_occluded_edges() {
   if (options_.occlusion_margin_px == 0) return;
+  cells_.begin(*projector_);
+  for (const Block* block : in_view_)
+    for (const std::uint32_t v : block->vertices)
+      cells_.add(vertices_[v].x, vertices_[v].y, vertices_[v].z);
   each_rated([this](std::uint32_t t) {
     if (qualities_[t] > 0.0F && is_beside_occluder(t)) qualities_[t] *= beside_occluder;
   });
@@ -326,8 +294,12 @@ void ViewFinder::devalue_occluded_edges() {
 // How well the photograph would show the triangle if nothing were before it.
 float ViewFinder::rate(std::size_t t, double sharpness) const {
   const Triangle& triangle = mesh_.triangles[t];
-  for (const std::uint32_t corner : triangle)
+  double sum_z = 0.0;
+  for (const std::uint32_t corner : triangle) {
     if (!vertices_[corner].in_image) return 0.0F;
+    sum_z += static_cast<double>(vertices_[corner].z);
+  }
+  if (sum_z > 3.0 * max_depth_m_) return 0.0F;
   const Eigen::Vector3d center = center_of(mesh_, triangle);
   const Eigen::Vector3d toward = projector_->position() - center;
   const double distance2 = toward.squaredNorm();

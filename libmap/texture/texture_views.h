@@ -15,6 +15,9 @@ namespace libmap {
 
 struct TextureViewOptions {
   double max_incidence_deg = 85.0;  // between the ray and the normal; > 0, < 90
+  // Photographs in which a triangle's center has a larger z are not used for it: as far as depth is
+  // fused by default, so that what was measured has a photograph that is near enough. 0: any z.
+  double max_depth_m = 4.0;
   // A surface is hidden that lies further behind another than this: the mesh's own error, and that
   // of the poses.
   double occlusion_tolerance_m = 0.01;

@@ -62,7 +62,7 @@ std::vector<TexturedMesh> textured(const TriangleMesh& mesh, const PaintedScan& 
   return models;
 }
 
-// The vertices all of whose triangles are in the picture.
+// The vertices all of whose triangles are in the picture and near enough.
 std::vector<bool> shown_vertices(const TriangleMesh& mesh, const libmap::PhotoProjector& projector,
                                  const libmap::TextureViewOptions& options) {
   const auto is_shown = [&](std::uint32_t v) {
@@ -72,9 +72,13 @@ std::vector<bool> shown_vertices(const TriangleMesh& mesh, const libmap::PhotoPr
            pixel.x() <= projector.camera().width - 1 - border &&
            pixel.y() <= projector.camera().height - 1 - border;
   };
+  const auto is_near = [&](const libmap::Triangle& triangle) {
+    return options.max_depth_m == 0.0 ||
+           projector.project(center_of(mesh, triangle)).z() <= options.max_depth_m;
+  };
   std::vector<bool> shown(mesh.vertices.size(), true);
   for (const libmap::Triangle& triangle : mesh.triangles)
-    if (!std::all_of(triangle.begin(), triangle.end(), is_shown))
+    if (!std::all_of(triangle.begin(), triangle.end(), is_shown) || !is_near(triangle))
       for (const std::uint32_t v : triangle) shown[v] = false;
   return shown;
 }
@@ -196,11 +200,13 @@ TEST(TexturePieces, VerticesOnSeamsAreSeenAlikeByBothPieces) {
   EXPECT_GE(common, 4 * 20);
 }
 
-// On open ground nothing hides a vertex: it is seen where the photograph shows its triangles. Each
-// camera shows another part, so that nothing of the photographs before may be left; large triangles
-// reach from what it shows to where nothing is looked at.
+// On open ground nothing hides a vertex: it is seen where the photograph shows its triangles from
+// near enough. Each camera shows another part, so that nothing of the photographs before may be
+// left; large triangles reach from what it shows to where nothing is looked at.
 TEST(TextureViews, VerticesAreSeenWhereThePhotographShowsAllTheirTriangles) {
-  for (const int cells : {60, 10}) {
+  std::map<std::pair<int, double>, std::size_t> seen;
+  for (const auto& [cells, max_depth_m] :
+       {std::pair(60, 0.0), std::pair(10, 0.0), std::pair(60, 0.8), std::pair(10, 1.35)}) {
     const TriangleMesh mesh = ground(cells, 3.0);
     const double height = 0.35 + 9.0 / cells;
     std::vector<libmap::Pose> cameras;
@@ -209,25 +215,28 @@ TEST(TextureViews, VerticesAreSeenWhereThePhotographShowsAllTheirTriangles) {
         cameras.push_back(graspmap_test::looking_at({x, y, height}, {0.8 * x, 0.7 * y + 0.1, 0.0}));
     const PaintedScan scan(mesh, marks, small_camera(), cameras);
     const libmap::TexturePhotos photos(scan, scan.poses(), true, libmap::no_progress(), 1 << 24);
-    const libmap::TextureViewOptions options;
+    libmap::TextureViewOptions options;
+    options.max_depth_m = max_depth_m;
     const libmap::ViewTable views =
         libmap::find_texture_views(mesh, photos, options,
                                    {mesh.triangles.size(), 1, cameras.size(), 0},
                                    libmap::no_progress())
             .of_vertices;
-    std::size_t seen = 0;
+    std::size_t& count = seen[{cells, max_depth_m}];
     for (std::uint32_t photo = 0; photo < photos.size(); ++photo) {
       const std::vector<bool> expected = shown_vertices(mesh, photos[photo].projector, options);
       for (std::uint32_t v = 0; v < mesh.vertices.size(); ++v) {
         const bool found = std::any_of(views[v].begin(), views[v].end(),
                                        [&](const auto& view) { return view.photo == photo; });
         ASSERT_EQ(found, expected[v]) << photo << ", vertex " << v;
-        seen += found ? 1 : 0;
+        count += found ? 1 : 0;
       }
     }
-    EXPECT_GT(seen, cameras.size());
-    EXPECT_LT(seen, mesh.vertices.size() * cameras.size() / 2);
+    EXPECT_GT(count, cameras.size());
+    EXPECT_LT(count, mesh.vertices.size() * cameras.size() / 2);
   }
+  EXPECT_LT((seen[{60, 0.8}]), (seen[{60, 0.0}]));
+  EXPECT_LT((seen[{10, 1.35}]), (seen[{10, 0.0}]));
 }
 
 // A red plate, in pieces of its own, stands before the ground of others.
