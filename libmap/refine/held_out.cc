@@ -132,14 +132,16 @@ double HeldOutEvaluation::deviation() const {
                     weight_of(*this, surfaces) * surfaces.deviation);
 }
 
+double HeldOutEvaluation::before() const {
+  return weight_of(*this, matches) * matches.before + weight_of(*this, surfaces) * surfaces.before;
+}
+
 bool HeldOutEvaluation::is_worse() const {
-  const double before =
-      weight_of(*this, matches) * matches.before + weight_of(*this, surfaces) * surfaces.before;
   const auto is_clearly_worse = [](const HeldOutChange& kind) {
     const double rise = kind.after - kind.before;
     return rise > 2.0 * kind.deviation && rise > clear_rise * kind.before;
   };
-  return change() > rounding * before || is_clearly_worse(matches) || is_clearly_worse(surfaces);
+  return change() > rounding * before() || is_clearly_worse(matches) || is_clearly_worse(surfaces);
 }
 
 bool HeldOutEvaluation::is_clearly_better() const {

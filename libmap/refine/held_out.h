@@ -48,6 +48,7 @@ struct HeldOutEvaluation {
   HeldOutChange matches;
   HeldOutChange surfaces;
 
+  double before() const;     // mean of all, weighted
   double change() const;     // of the mean of all, weighted; below 0: they fit better
   double deviation() const;  // its standard error
   bool any() const { return matches.count + surfaces.count > 0; }

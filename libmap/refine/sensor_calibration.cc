@@ -85,6 +85,9 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
 }
 
 constexpr int max_rounds = 4;
+// Of the costs of what was held out: faults of a sensor change them by tens of percent. A part that
+// gains less absorbs what others leave, and what it is correlated with drifts.
+constexpr double min_gain = 0.002;
 // Of adjustments that are compared or begin the next one. Standard errors of the held-out data are
 // larger than what the last steps change.
 constexpr double rough_tolerance = 1e-4;
@@ -141,7 +144,8 @@ Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOpt
 // Whether what is free in the one model more is clearly worth it.
 bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with) {
   const HeldOutEvaluation change = evaluate_held_out(without, with);
-  return !change.is_worse() && change.change() < -2.0 * change.deviation();
+  return !change.is_worse() &&
+         change.change() < -std::max(2.0 * change.deviation(), min_gain * change.before());
 }
 
 }  // namespace
