@@ -41,7 +41,8 @@ std::map<int, Vector6d> motion_between(const std::vector<FrameFeatures>& frames,
   std::sort(nodes.begin(), nodes.end());
   std::map<int, Vector6d> motions;
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    const auto [time_s, node] = nodes[n];
+    const double time_s = nodes[n].first;
+    const int node = nodes[n].second;
     const auto is_near = [&](const std::pair<double, int>& other) {
       return std::abs(other.first - time_s) <= max_motion_gap_s;
     };
