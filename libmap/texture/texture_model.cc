@@ -53,7 +53,7 @@ bool has_longer_side(const TriangleMesh& mesh, double side_m) {
 class Texturing {
  public:
   Texturing(const ScanSource& scan, const Trajectory& world_from_base,
-            const TextureOptions& options, Progress& progress, std::size_t max_image_bytes);
+            const TextureOptions& options, Progress& progress, std::size_t max_kept_bytes);
 
   TextureResult whole(const TriangleMesh& mesh);
   std::vector<ColorObservation> observe(MeshPieceIndex& index, double margin_m);
@@ -83,12 +83,12 @@ class Texturing {
 };
 
 Texturing::Texturing(const ScanSource& scan, const Trajectory& world_from_base,
-                     const TextureOptions& options, Progress& progress, std::size_t max_image_bytes)
+                     const TextureOptions& options, Progress& progress, std::size_t max_kept_bytes)
     : options_(options), progress_(progress) {
   check_parameters(options);
   photos_ = timed("photographs", [&] {
     return std::make_unique<TexturePhotos>(scan, world_from_base, options.strict, progress,
-                                           max_image_bytes);
+                                           max_kept_bytes);
   });
   report_.photos = photos_->size();
   report_.skipped = photos_->skipped();
