@@ -15,6 +15,7 @@
 #include "libmap/core/text.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/image/depth_codec.h"
+#include "libmap/image/depth_registration.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/frame_folder_files.h"
 #include "libmap/scan/stamp_pairing.h"
@@ -139,6 +140,24 @@ DepthImage read_depth(const std::string& bytes, double depth_unit_m) {
   return depth;
 }
 
+// At the size of the depth image.
+void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
+  if (frame.cameras.size() != 1 || !frame.stereo.empty())
+    throw Error("a depth camera belongs to one color camera",
+                {.value = std::to_string(frame.cameras.size()) + " cameras"});
+  if (frame.depth.width != depth_camera.width || frame.depth.height != depth_camera.height)
+    throw Error("has another size than its camera",
+                {.value = size_text(frame.depth.width, frame.depth.height),
+                 .bound = size_text(depth_camera.width, depth_camera.height)});
+  RgbdFrame only_depth;
+  only_depth.cameras = frame.cameras;
+  only_depth.depth = std::move(frame.depth);
+  const Camera target = camera_views(only_depth).front().depth_camera;
+  frame.depth =
+      register_depth(only_depth.depth, depth_camera, target,
+                     target.base_from_camera.inverse() * depth_camera.base_from_camera);
+}
+
 std::string count_of(std::size_t count, const std::string& what) {
   return std::to_string(count) + " " + what + (count == 1 ? "" : "s");
 }
@@ -176,6 +195,8 @@ void bind(ParameterTable& table, FrameFolderOptions& options) {
   table.add("depth_unit_m", options.depth_unit_m, positive,
             "meters a unit of the depth images; 0.0002: TUM RGB-D, 0.001: millimeters");
   table.add("calibration", options.calibration, "the camera's intrinsics");
+  table.add("depth_calibration", options.depth_calibration,
+            "camera file of a separate depth camera; empty: depth is registered to color");
   table.add("pose_frame", options.pose_frame, pose_frame_names(),
             "whose poses the files contain: the camera's optical frame, or the base");
   table.add("pairing_tolerance_s", options.pairing_tolerance_s, not_negative,
@@ -191,6 +212,8 @@ FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& default
     const fs::path file = path / files::options;
     set_from_yaml(table, read_whole_file(file), file.string());
   }
+  if (!options_.depth_calibration.empty())
+    depth_camera_ = read_camera(calibration_file(options_.depth_calibration)).camera;
   if (fs::exists(path / files::nodes))
     read_nodes();
   else
@@ -199,17 +222,21 @@ FrameFolder::FrameFolder(const fs::path& path, const FrameFolderOptions& default
   read_links();
 }
 
-std::size_t FrameFolder::add_camera(const std::string& name) {
-  const auto known = camera_of_name_.find(name);
-  if (known != camera_of_name_.end()) return known->second;
-  const fs::path file = path_ / name;
+fs::path FrameFolder::calibration_file(const std::string& name) const {
+  fs::path file = path_ / name;
   std::error_code code;  // a list may hold names that no file can have
   if (!fs::exists(file, code))
     throw Error(
         "no such file: the scan needs its camera's intrinsics, as a calibration "
         "writes them; the key calibration of scan.yaml names another file",
         {.file = file.string()});
-  cameras_.push_back(read_camera(file).camera);
+  return file;
+}
+
+std::size_t FrameFolder::add_camera(const std::string& name) {
+  const auto known = camera_of_name_.find(name);
+  if (known != camera_of_name_.end()) return known->second;
+  cameras_.push_back(read_camera(calibration_file(name)).camera);
   camera_of_name_.emplace(name, cameras_.size() - 1);
   return cameras_.size() - 1;
 }
@@ -417,6 +444,14 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   }
   if (frame.stereo.empty())
     for (const std::size_t camera : of_node.cameras) frame.cameras.push_back(cameras_[camera]);
+  if (depth_camera_ && !frame.depth.empty()) {
+    try {
+      register_to_color(frame, *depth_camera_);
+    } catch (const Error& error) {
+      throw error.in_field("node " + std::to_string(node) + ": depth")
+          .in_file((path_ / of_node.depth).string());
+    }
+  }
   return frame;
 }
 

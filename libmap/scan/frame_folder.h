@@ -23,6 +23,7 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -40,6 +41,9 @@ const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names();
 struct FrameFolderOptions {
   double depth_unit_m = 0.0002;  // meters a unit of the 16-bit depth images
   std::string calibration = "calibration.yaml";
+  // Of a depth camera at another place, whose images are registered to color when they are read;
+  // its local_transform is base_from_depth. Empty: they are registered.
+  std::string depth_calibration{};
   PoseFrame pose_frame = PoseFrame::camera;  // whose poses the files hold: the optical frame's
   double pairing_tolerance_s = 0.02;
 };
@@ -71,6 +75,7 @@ class FrameFolder : public ScanSource {
   };
   struct Listing;
 
+  std::filesystem::path calibration_file(const std::string& name) const;
   std::size_t add_camera(const std::string& name);
   void read_nodes();
   void read_images();
@@ -83,6 +88,7 @@ class FrameFolder : public ScanSource {
   FrameFolderOptions options_;
   PoseGraph graph_;
   std::vector<Camera> cameras_;
+  std::optional<Camera> depth_camera_;
   std::map<std::string, std::size_t> camera_of_name_;
   std::map<int, Files> files_;  // by node
   std::vector<std::string> warnings_;

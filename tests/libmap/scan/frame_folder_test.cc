@@ -281,6 +281,49 @@ TEST_F(TumFolder, FollowsItsOptions) {
   EXPECT_NE(std::string(error.what()).find("depth_unit_m"), std::string::npos);
 }
 
+// A wall at 2 m before a depth camera of half the size, 40 cm to the right: the left of the picture
+// has no depth.
+TEST_F(TumFolder, RegistersADepthCameraToColor) {
+  write_color("1.png");
+  const libmap::MillimeterImage wall(20, 15, 10000);
+  write_text(folder_ / "depth/1.png", libmap::encode_png(wall));
+  write_text(folder_ / "associations.txt", "3.5 rgb/1.png 3.5 depth/1.png\n");
+  libmap::Camera depth_camera{.width = 20, .height = 15, .fx = 20, .fy = 20, .cx = 9.5, .cy = 7};
+  depth_camera.base_from_camera = camera_.base_from_camera * Eigen::Translation3d(0.4, 0, 0);
+  write_text(folder_ / "infrared.yaml", to_yaml(libmap::CameraFile{.camera = depth_camera}));
+  write_text(folder_ / "scan.yaml", "depth_calibration: infrared.yaml\n");
+  const libmap::RgbdFrame frame = FrameFolder(folder_).read_frame(1);
+  const libmap::Camera seen_by = libmap::camera_views(frame).front().depth_camera;
+  ASSERT_EQ(frame.depth.width, 20);
+  ASSERT_EQ(frame.depth.height, 15);
+  std::size_t seen = 0;
+  for (int x = 0; x < 20; ++x) {
+    const auto ray = libmap::pixel_to_ray(seen_by, Eigen::Vector2d(x, 7));
+    const auto pixel =
+        libmap::project_point(depth_camera, 2.0 * ray->homogeneous() - Eigen::Vector3d(0.4, 0, 0));
+    // But for a pixel of rounding.
+    const bool inside = pixel->x() > 0.5 && pixel->x() < 18.5;
+    const bool outside = pixel->x() < -1.5 || pixel->x() > 20.5;
+    if (inside || outside) {
+      EXPECT_FLOAT_EQ(frame.depth.at(x, 7), inside ? 2.0F : 0.0F) << x;
+    }
+    seen += frame.depth.at(x, 7) > 0.0F;
+  }
+  EXPECT_GT(seen, 5U);
+  EXPECT_LT(seen, 20U);
+
+  depth_camera.width = 40;
+  write_text(folder_ / "infrared.yaml", to_yaml(libmap::CameraFile{.camera = depth_camera}));
+  const FrameFolder other_size(folder_);
+  libmap::Error error = graspmap_test::error_of([&] { other_size.read_frame(1); });
+  EXPECT_EQ(error.context().file, (folder_ / "depth/1.png").string());
+  EXPECT_EQ(error.context().field, "node 1: depth");
+  EXPECT_EQ(error.context().bound, "40 x 15");
+  fs::remove(folder_ / "infrared.yaml");
+  error = graspmap_test::error_of([&] { FrameFolder missing(folder_); });
+  EXPECT_EQ(error.context().file, (folder_ / "infrared.yaml").string());
+}
+
 TEST_F(TumFolder, NamesTheCalibrationThatItMisses) {
   write_pair();
   write_text(folder_ / "depth.txt", "3.51 depth/1.png\n");

@@ -1,4 +1,4 @@
-#include "libmap/simulate/depth_registration.h"
+#include "libmap/image/depth_registration.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

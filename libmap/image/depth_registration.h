@@ -1,4 +1,4 @@
-// Depth images of one camera as another one would have taken them. Inner part of scan_simulation.
+// Depth images of one camera as another one would have taken them.
 #pragma once
 
 #include "libmap/core/camera.h"
