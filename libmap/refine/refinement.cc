@@ -53,8 +53,10 @@ Trajectory Refinement::trajectory(const std::map<int, Pose>& poses) const {
 
 std::optional<StageError> Refinement::error_of(const std::map<int, Pose>& poses) const {
   if (truth_.empty()) return std::nullopt;
+  std::map<int, Pose> joined = poses;
+  for (const int node : unjoined(parts_)) joined.erase(node);
   try {
-    const Trajectory estimate = trajectory(poses);
+    const Trajectory estimate = trajectory(joined);
     return StageError{absolute_trajectory_error(estimate, truth_),
                       relative_trajectory_error(estimate, truth_)};
   } catch (const Error&) {
@@ -183,17 +185,34 @@ void Refinement::odometry() {
 
 // Parts that visual odometry has begun and nothing has joined lie anywhere; so do all but the
 // largest, where one map is wanted.
-void Refinement::leave_out_unjoined() {
-  if (tracked_.empty() && !options_.one_map) return;
-  const bool nothing_known = is_all_tracked();
+std::vector<int> Refinement::unjoined(const std::vector<std::vector<int>>& parts) const {
   std::vector<int> left;
-  for (std::size_t n = 0; n < result_.components.size(); ++n) {
-    const std::vector<int>& nodes = result_.components[n].nodes;
-    const bool alone = std::all_of(nodes.begin(), nodes.end(),
+  if (tracked_.empty() && !options_.one_map) return left;
+  const bool nothing_known = is_all_tracked();
+  const auto largest =
+      std::max_element(parts.begin(), parts.end(),
+                       [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  for (auto part = parts.begin(); part != parts.end(); ++part) {
+    const bool alone = std::all_of(part->begin(), part->end(),
                                    [&](int node) { return node < 0 || tracked_.contains(node); });
-    if (options_.one_map ? n > 0 : alone && !(n == 0 && nothing_known))
-      left.insert(left.end(), nodes.begin(), nodes.end());
+    if (options_.one_map ? part != largest : alone && !(part == largest && nothing_known))
+      left.insert(left.end(), part->begin(), part->end());
   }
+  return left;
+}
+
+void Refinement::leave_out_unjoined() {
+  std::vector<std::vector<int>> parts;
+  for (const GraphComponent& component : result_.components) parts.push_back(component.nodes);
+  std::vector<int> left = unjoined(parts);
+  const auto kept = std::count_if(parts.begin(), parts.end(), [&](const auto& part) {
+    return std::find(left.begin(), left.end(), part.front()) == left.end();
+  });
+  if (kept > 1)
+    result_.warnings.push_back(
+        "the scan is in " + std::to_string(kept) +
+        " parts that no link joins: their poses say nothing about each other");
+  if (tracked_.empty() && !options_.one_map) return;
   for (const int node : left) result_.covariance.erase(node);
   std::sort(left.begin(), left.end());
   std::erase_if(left, [](int node) { return node < 0; });
@@ -358,10 +377,6 @@ void Refinement::finish() {
   result_.findings = findings(result_.calibration, result_.cameras);
   result_.components = graph_.components;
   result_.without_links = graph_.without_links;
-  if (result_.components.size() > 1)
-    result_.warnings.push_back(
-        "the scan is in " + std::to_string(result_.components.size()) +
-        " parts that no link joins: their poses say nothing about each other");
 }
 
 // In units of the depth camera.

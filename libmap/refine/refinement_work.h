@@ -40,6 +40,7 @@ class Refinement {
     });
   }
   void odometry();
+  std::vector<int> unjoined(const std::vector<std::vector<int>>& parts) const;
   void leave_out_unjoined();
   bool round(int number);
   std::vector<FramePair> candidates(int number);
@@ -57,6 +58,7 @@ class Refinement {
   void vary_calibration();
   void keep_start_if_better();
   void find_covariances();
+  double scale_deviation() const;
   void find_scale();
   void finish();
   Trajectory trajectory(const std::map<int, Pose>& poses) const;

@@ -7,6 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/refine/lost_frames.h"
 #include "libmap/refine/pair_alignment.h"
 #include "libmap/refine/place_recognition.h"
 #include "libmap/refine/rigid_motion.h"
@@ -446,7 +447,9 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const VisualOdometryOptions& options, std::uint64_t seed,
                                   Progress& progress) {
   check_parameters(options);
-  return Tracker(frames, start, matching, options, seed).run(progress);
+  VisualOdometryResult result = Tracker(frames, start, matching, options, seed).run(progress);
+  place_lost_frames(frames, start, result);
+  return result;
 }
 
 LinkConsistency link_consistency(const std::vector<FeatureLink>& links, const Trajectory& truth) {
