@@ -25,7 +25,8 @@ struct FuseOptions {
   std::string scan;
   std::string output;
   PosesOption poses;
-  std::string calibration;
+  CalibrationOption calibration;
+  std::optional<libmap::CameraFile> camera;
   std::string corrected_poses;
   CloudFrame frame = CloudFrame::poses;
   libmap::DepthFusionOptions fusion;
@@ -124,10 +125,13 @@ void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& re
   if (options.corrected_poses.empty()) return;
   if (is_share(options)) run.claim_output(options.corrected_poses, {options.scan});
   const std::string frame = std::exchange(run.manifest().frame, "poses");
+  const auto results = run.manifest().results;
+  if (options.camera) add_camera(*options.camera, run);
   run.write_output(options.corrected_poses, [&](const auto& temporary) {
     libmap::write_trajectory(temporary, {result.poses, {}});
   });
   run.manifest().frame = frame;
+  run.manifest().results = results;
 }
 
 void fuse_whole(const FuseOptions& options, const libmap::ScanSource& scan,
@@ -186,7 +190,7 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
 
 void fuse(FuseOptions options, Run& run) {
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
-  inputs.push_back(options.calibration);
+  inputs.push_back(options.calibration.source);
   const bool in_pieces = is_piece_folder(options.output);
   if (!in_pieces) {
     libmap::require_cloud_format(options.output);
@@ -194,7 +198,8 @@ void fuse(FuseOptions options, Run& run) {
   }
   claim_poses(options, inputs, run);
   const bool strict = options.fusion.strict;
-  const auto scan = open_scan(options.scan, strict, run, options.calibration);
+  options.camera = known_camera(options.calibration, options.scan, options.poses, run);
+  const auto scan = open_scan(options.scan, strict, run, options.camera);
   const libmap::Trajectory poses = find_poses(*scan, options.poses, strict, run);
   const bool in_true_frame = options.frame == CloudFrame::ground_truth;
   if (in_true_frame) require_truth(*scan);

@@ -21,7 +21,7 @@ struct RefineOptions {
   std::string database;
   std::vector<std::string> reports;
   std::string feature_cache;
-  std::string calibration;
+  CalibrationOption calibration{.source = "stored"};
   std::string new_calibration;
   std::vector<std::string> known_lengths;
   std::string board;
@@ -165,7 +165,8 @@ libmap::CameraFile camera_of(const libmap::RefinementResult& result,
 }
 
 void write_outputs(const RefineOptions& options, const libmap::RefinementResult& result,
-                   const libmap::ScanSource& scan, Run& run) {
+                   const libmap::ScanSource& scan, const std::optional<libmap::CameraFile>& known,
+                   Run& run) {
   // First: a database whose rest is broken cannot be copied.
   if (!options.database.empty())
     run.write_output(options.database, [&](const auto& temporary) {
@@ -187,6 +188,10 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
     run.write_output(options.links, [&](const auto& temporary) {
       libmap::write_trajectory(temporary, {result.poses, result.links});
     });
+  if (known)
+    add_camera(*known, run);
+  else if (!result.calibration.empty() && result.cameras.size() == 1)
+    add_camera(camera_of(result, scan), run);
   write_poses_output(options.output, {result.poses, result.links}, scan, options.nodes, run);
 }
 
@@ -235,10 +240,11 @@ void refine(RefineOptions& options, Run& run) {
   }
   if (!options.new_calibration.empty()) {
     std::vector<std::string> inputs = options.scans;
-    inputs.push_back(options.calibration);
+    inputs.push_back(options.calibration.source);
     run.claim_output(options.new_calibration, inputs);
   }
-  if (!options.calibration.empty())
+  const auto camera = known_camera(options.calibration, first, {}, run);
+  if (camera)
     refuse_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
                  "starts from the stored camera, not from --calibration");
@@ -257,7 +263,7 @@ void refine(RefineOptions& options, Run& run) {
                           {.field = "--report", .value = report, .bound = "a file .json or .txt"});
     run.claim_output(report, options.scans);
   }
-  const auto scan = open_scan(options.scans, options.strict, run, options.calibration);
+  const auto scan = open_scan(options.scans, options.strict, run, camera);
   // Nodes of several scans may have the same stamps.
   if (count_by_scan({}, *scan).size() > 1) options.refinement.one_map = options.nodes = true;
   const libmap::RefinementResult result = in_file(first, [&] {
@@ -269,6 +275,11 @@ void refine(RefineOptions& options, Run& run) {
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
+  if (!result.calibration.empty() && (camera || result.cameras.size() > 1) &&
+      options.database.empty())
+    run.warn(
+        "{}: what was corrected is in the poses alone: {}", first,
+        camera ? "begin with the stored camera" : "--write-database keeps it of several cameras");
   const bool is_depth_scale = options.refinement.known_lengths.empty() &&
                               !options.refinement.board && options.refinement.scale == 1.0 &&
                               options.refinement.scale_from == libmap::ScaleSource::depth;
@@ -283,7 +294,7 @@ void refine(RefineOptions& options, Run& run) {
     if (fs::is_regular_file(path)) run.add_input(path);
   run.manifest().frame = "poses";
   add_results(result, run);
-  write_outputs(options, result, *scan, run);
+  write_outputs(options, result, *scan, camera, run);
 }
 
 }  // namespace

@@ -30,7 +30,7 @@ struct TextureCommandOptions {
   std::string output;
   std::string scan;
   PosesOption poses;
-  std::string calibration;
+  CalibrationOption calibration;
   MeshFrame frame = MeshFrame::automatic;
   double margin_m = 2.0;
   std::string tile = whole_share;
@@ -60,6 +60,11 @@ bool in_true_frame(const TextureCommandOptions& options) {
 }
 
 // The poses in the frame of the mesh.
+std::unique_ptr<libmap::ScanSource> scan_of(const TextureCommandOptions& options, Run& run) {
+  return open_scan(options.scan, options.texture.strict, run,
+                   known_camera(options.calibration, options.scan, options.poses, run));
+}
+
 libmap::Trajectory poses_of(TextureCommandOptions& options, const libmap::ScanSource& scan,
                             Run& run) {
   libmap::Trajectory poses = find_poses(scan, options.poses, options.texture.strict, run);
@@ -200,7 +205,7 @@ std::vector<fs::path> pages_of_earlier_run(const fs::path& output) {
 std::vector<std::string> inputs_of(const TextureCommandOptions& options) {
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.mesh);
-  inputs.push_back(options.calibration);
+  inputs.push_back(options.calibration.source);
   return inputs;
 }
 
@@ -220,7 +225,7 @@ void texture(TextureCommandOptions options, Run& run) {
   run.claim_output(options.output, inputs_of(options));
   run.require_own_companions(options.output,
                              libmap::companions_of_model(options.output, options.writing));
-  const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
+  const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   const libmap::TextureResult result = textured(options, *scan, poses, run);
   add_inputs(options, run);
@@ -287,7 +292,7 @@ void texture_in_pieces(TextureCommandOptions options, Run& run) {
   const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
   const std::vector<std::string> names =
       piece_folder_names(options.output, pieces, model_extension);
-  const auto scan = open_scan(options.scan, options.texture.strict, run, options.calibration);
+  const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   add_inputs(options, run);
   PieceProgress progress(options.output, names, inputs_of(options), parse_share(options.tile), run);

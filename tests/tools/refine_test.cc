@@ -268,6 +268,30 @@ TEST(RefineCalibration, IsWrittenAndApplied) {
     for (const std::string words :
          {"stored focal length 1.", "depth bends by ", "scale comes from the depth camera alone"})
       EXPECT_NE(output.find(words), std::string::npos) << words << output;
+  // The poses name their camera, and so do those that fuse corrects.
+  const auto fuse = [&](const std::string& scan, const std::string& calibration,
+                        const std::string& output) {
+    return graspmap({"fuse", scan, "--poses", "poses.tum", "--calibration", calibration,
+                     "--voxel-size", "0.05", "--corrected-poses", output + ".tum", "-o", output});
+  };
+  ASSERT_TRUE(succeeded(fuse("scan.db", "auto", "auto.ply")));
+  EXPECT_EQ(graspmap_test::read_text(scratch("auto.ply")),
+            graspmap_test::read_text(scratch("cloud.ply")));
+  const auto camera_of = [&](const std::string& poses) {
+    return json_of(poses + ".json").at("results").value("camera", "");
+  };
+  EXPECT_EQ(camera_of("poses.tum"), libmap::to_yaml(found));
+  EXPECT_EQ(camera_of("auto.ply.tum"), libmap::to_yaml(found));
+  EXPECT_FALSE(json_of("auto.ply.json").at("results").contains("camera"));
+  ASSERT_TRUE(succeeded(fuse("scan.db", "stored", "stored.ply")));
+  EXPECT_NE(graspmap_test::read_text(scratch("stored.ply")),
+            graspmap_test::read_text(scratch("cloud.ply")));
+  EXPECT_EQ(camera_of("stored.ply.tum"), "");
+  // The copy has it already.
+  ASSERT_TRUE(succeeded(fuse("found.db", "auto", "copy.ply")));
+  ASSERT_TRUE(succeeded(fuse("found.db", "stored", "same.ply")));
+  EXPECT_EQ(graspmap_test::read_text(scratch("copy.ply")),
+            graspmap_test::read_text(scratch("same.ply")));
   EXPECT_TRUE(
       bad_input(graspmap({"fuse", "scan.db", "--calibration", "camera.yaml2", "-o", "c.ply"}),
                 {"camera.yaml2"}));

@@ -23,7 +23,7 @@ namespace fs = std::filesystem;
 struct ExtractOptions {
   std::string scan;
   std::string output;
-  std::string calibration;
+  CalibrationOption calibration;
   bool strict = false;
   PictureOptions pictures;
 };
@@ -172,9 +172,11 @@ void extract(ExtractOptions& options, Run& run) {
     throw UsageError("nothing to write: -o, --bundler or --colmap names a folder");
   if (!options.output.empty())
     run.claim_output_tree(options.output, libmap::frame_folder_names(),
-                          {options.scan, options.calibration});
+                          {options.scan, options.calibration.source});
   if (pictures) claim_picture_folders(options.pictures, options.scan, run);
-  const auto scan = open_scan(options.scan, options.strict, run, options.calibration);
+  const auto scan =
+      open_scan(options.scan, options.strict, run,
+                known_camera(options.calibration, options.scan, options.pictures.poses, run));
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   // Each folder's manifest holds what was done for it alone.
   const libmap::Manifest start = run.manifest();

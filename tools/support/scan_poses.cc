@@ -27,6 +27,14 @@ std::optional<PoseSource> source_named(const std::string& name) {
   return std::nullopt;
 }
 
+constexpr const char* camera_result = "camera";
+
+bool is_input_of(const libmap::Manifest& manifest, const std::string& file) {
+  const std::string hash = libmap::sha256_of_file(file);
+  return std::any_of(manifest.inputs.begin(), manifest.inputs.end(),
+                     [&](const libmap::ManifestInput& input) { return input.sha256 == hash; });
+}
+
 std::string sources_in(const libmap::PoseGraph& graph) {
   std::string names;
   for (const PoseSource source : sources)
@@ -124,18 +132,52 @@ std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption&
   return inputs;
 }
 
-void add_calibration_option(Command& command, std::string& calibration) {
-  command.option("--calibration", "FILE.yaml", calibration,
-                 "the camera as refine --write-calibration found it, instead of the stored one");
+void add_calibration_option(Command& command, CalibrationOption& calibration) {
+  command.option("--calibration", "auto|stored|FILE.yaml", calibration.source,
+                 "the camera as the scan stores it, or as refine --write-calibration found it; "
+                 "auto: as the file of poses was estimated with, else as stored");
+}
+
+std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
+                                               const std::string& scan, const PosesOption& poses,
+                                               Run& run) {
+  if (calibration.source == "stored") return std::nullopt;
+  std::string name = calibration.source;
+  libmap::CameraFile camera;
+  if (calibration.source != "auto") {
+    camera = libmap::read_camera(name);
+    run.add_input(name);
+  } else {
+    if (poses.source == "auto" || source_named(poses.source)) return std::nullopt;
+    name = poses.source;
+    const std::optional<libmap::Manifest> made = libmap::read_manifest_of(name);
+    const auto* text = made ? std::get_if<std::string>(made->find_result(camera_result)) : nullptr;
+    if (text == nullptr) return std::nullopt;
+    if (fs::is_regular_file(scan) && !is_input_of(*made, scan)) {
+      run.say("camera of {}: not applied, for it was estimated of another scan", name);
+      return std::nullopt;
+    }
+    camera = libmap::parse_camera(*text, libmap::manifest_path(name).string());
+  }
+  run.say("camera of {}: {}", name,
+          !camera.findings.empty() ? fmt::format("{}", fmt::join(camera.findings, "; "))
+          : camera.depth.empty()   ? "intrinsics"
+                                   : "intrinsics and depth correction");
+  return camera;
+}
+
+void add_camera(const libmap::CameraFile& camera, Run& run) {
+  run.add_results({{camera_result, libmap::to_yaml(camera)}});
 }
 
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& path, bool strict, Run& run,
-                                              const std::string& calibration) {
-  return open_scan(std::vector<std::string>{path}, strict, run, calibration);
+                                              const std::optional<libmap::CameraFile>& camera) {
+  return open_scan(std::vector<std::string>{path}, strict, run, camera);
 }
 
 std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& scans, bool strict,
-                                              Run& run, const std::string& calibration) {
+                                              Run& run,
+                                              const std::optional<libmap::CameraFile>& camera) {
   const std::string& path = scans.front();
   auto scan = run.timed("open", [&] { return libmap::open_scans({scans.begin(), scans.end()}); });
   for (const std::string& warning : scan->warnings()) {
@@ -143,14 +185,7 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
       throw libmap::Error(warning).in_file(path);
     run.warn("{}: {}", path, warning);
   }
-  if (calibration.empty()) return scan;
-  const libmap::CameraFile camera = libmap::read_camera(calibration);
-  run.add_input(calibration);
-  run.say("camera of {}: {}", calibration,
-          !camera.findings.empty() ? fmt::format("{}", fmt::join(camera.findings, "; "))
-          : camera.depth.empty()   ? "intrinsics"
-                                   : "intrinsics and depth correction");
-  return libmap::with_calibration(std::move(scan), camera);
+  return camera ? libmap::with_calibration(std::move(scan), *camera) : std::move(scan);
 }
 
 libmap::Trajectory find_poses(const libmap::ScanSource& scan, PosesOption& poses, bool strict,

@@ -1,7 +1,10 @@
 // A scan and the poses at which its frames were, as commands take them: SCAN and `--poses`.
 #pragma once
 
+#include <optional>
+
 #include "libmap/core/pose_graph.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/pose_import.h"
 #include "tools/support/command_line.h"
@@ -22,16 +25,28 @@ std::size_t count_valid_nodes(const libmap::PoseGraph& graph);
 // The files among the two, for Run::claim_output.
 std::vector<std::string> scan_inputs(const std::string& scan, const PosesOption& poses);
 
-// --calibration FILE: the scan's camera as it is known now, its depth correction included.
-void add_calibration_option(Command& command, std::string& calibration);
+// --calibration auto|stored|FILE: the scan's camera as it is known now, its depth correction
+// included. auto: as `poses`, if a file, were estimated with, by their manifest, of the same scan.
+struct CalibrationOption {
+  std::string source = "auto";
+};
+void add_calibration_option(Command& command, CalibrationOption& calibration);
+
+// That camera; nothing for the stored one. Says what is known of it. Throws Error: no such file.
+std::optional<libmap::CameraFile> known_camera(const CalibrationOption& calibration,
+                                               const std::string& scan, const PosesOption& poses,
+                                               Run& run);
+// Names the camera in the manifests of outputs from here on: of the poses that go with it.
+void add_camera(const libmap::CameraFile& camera, Run& run);
 
 // Opens a scan; what it had to leave out is a warning, an Error if `strict`. Its frames are those
-// of the calibration, if there is one.
+// of the camera, if there is one.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
-                                              const std::string& calibration = {});
+                                              const std::optional<libmap::CameraFile>& camera = {});
 // The same of several scans, joined (joined_scan.h).
 std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& scans, bool strict,
-                                              Run& run, const std::string& calibration = {});
+                                              Run& run,
+                                              const std::optional<libmap::CameraFile>& camera = {});
 
 // The poses that `poses` names, by ascending node; "auto" becomes the source that was taken. Says
 // so, and keeps it in the manifest. Nodes without a pose are a warning, an Error if `strict`.
