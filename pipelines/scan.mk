@@ -9,9 +9,9 @@
 #
 # SCAN is an RTAB-Map database or a folder of images. POSES is refined (by graspmap refine), odometry,
 # optimized, ground-truth or a file of poses (optimized). With TRUTH, a mesh in the frame of the
-# scan's true poses, the cloud is carried into that frame. POINTS lie in the cloud's frame. FUSE, MESH, CROP, RESAMPLE and SCORE hold
-# further flags of their commands; without CROP the map is levelled and kept whole. TEXTURE= leaves
-# the texture out. With TILES, the side of a square in meters, cloud, mesh, site and terrain are
+# scan's true poses, the cloud is carried into that frame. POINTS lie in the cloud's frame. REFINE,
+# FUSE, MESH, CROP, RESAMPLE and SCORE hold further flags of their commands; without CROP the map is
+# levelled and kept whole. TEXTURE= leaves the texture out. With TILES, the side of a square in meters, cloud, mesh, site and terrain are
 # folders of pieces and the map is a tile store, so that memory does not depend on the area; then
 # there is no texture unless TEXTURE=model asks for a folder of models, of which there is no picture,
 # and CROP cannot be --size or --border of a site too large for memory. A second run does nothing;
@@ -25,6 +25,7 @@ POINTS ?=
 SCENARIO ?= artificial_rocks_prescan
 METHOD ?=
 SHARES ?= 8
+REFINE ?=
 FUSE ?=
 MESH ?= --cell-size 0.01
 CROP ?=
@@ -71,7 +72,7 @@ $(OUT):
 
 # Stamps of the variables that a result depends on: written anew only if they change.
 export fused_with := $(SCAN) $(poses_flags) $(tile_flag) $(FUSE)
-export refined_with := $(SCAN)
+export refined_with := $(SCAN) $(REFINE)
 export checked_with := $(TRUTH)
 export meshed_with := $(tile_flag) $(MESH)
 export cropped_with := $(CROP)
@@ -88,7 +89,8 @@ $(OUT)/scan.txt: $(SCAN) $(OUT)/refined_with
 	@mv $@.partial $@
 
 $(OUT)/poses.tum $(OUT)/refinement.json &: $(SCAN) $(OUT)/refined_with
-	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json
+	@exec $(GRASPMAP) refine $< -o $(OUT)/poses.tum --report $(OUT)/refinement.json \
+	  $(REFINE)
 
 # fuse corrects the poses; photographs match its cloud by the corrected ones alone.
 $(cloud) $(OUT)/fused_poses.tum &: $(SCAN) $(or $(refined),$(wildcard $(POSES))) \

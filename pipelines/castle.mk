@@ -1,0 +1,43 @@
+# A RealSense sequence of others, from its images to a map: 30 frames of an SR300 carried by hand around
+# a model castle, of ViSP's test data, with the planes that were measured on the castle.
+#
+#   sudo apt install visp-images-data netpbm
+#   make -f pipelines/castle.mk OUT=folder -j2
+#
+# Depth is registered to color by the scan's two cameras, there are no poses, and the noise is that of a
+# short range. planes.txt compares the mesh with the planes, a part of which the camera did not see. The
+# results are those of scan.mk, whose variables are passed on.
+
+here := $(dir $(lastword $(MAKEFILE_LIST)))
+GRASPMAP ?= $(firstword $(wildcard $(here)../build/release/graspmap) graspmap)
+CASTEL ?= /usr/share/visp-images-data/ViSP-images/mbt-depth/castel
+noise := --axial-noise 0.0005 --range-noise 0.002
+
+ifeq ($(OUT),)
+  $(error OUT is not set: the folder of the results, e.g. OUT=results)
+endif
+ifeq ($(wildcard $(CASTEL)/chateau.cao),)
+  $(error $(CASTEL) has no castle: apt install visp-images-data)
+endif
+
+.DELETE_ON_ERROR:
+.PHONY: all chain
+all: chain
+	@exec $(MAKE) --no-print-directory -f $(here)castle.mk $(OUT)/planes.txt
+
+# The last of its files.
+$(OUT)/map_from_planes.txt: $(here)castle.py
+	@mkdir -p $(OUT)
+	@$(here)castle.py $(CASTEL) $(OUT)
+
+chain: $(OUT)/map_from_planes.txt
+	@$(MAKE) --no-print-directory -f $(here)scan.mk SCAN=$(OUT)/scan OUT=$(OUT) POSES=refined \
+	  REFINE="$(noise)" FUSE="--voxel-size 0.001 --max-depth 0.6 $(noise)" \
+	  MESH="--cell-size 0.001" CROP="--up=-0.39,0,0.92" RESAMPLE="--radius 0.0012" \
+	  SCORE="--gripper hubrobo --voxel-size 0.001" TITLE="castle"
+
+$(OUT)/planes.txt: $(OUT)/mesh.ply $(OUT)/map_from_planes.txt
+	@exec $(GRASPMAP) compare $(OUT)/planes.obj $(OUT)/mesh.ply --transform $(OUT)/map_from_planes.txt \
+	  --icp --icp-max-distance 0.01 --within 0.002 --samples-per-m2 1000000 > $@.partial
+	@cat $@.partial
+	@mv $@.partial $@
