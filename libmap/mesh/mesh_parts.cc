@@ -65,6 +65,24 @@ double blended(const ScalarField& field, const std::array<std::uint32_t, N>& ver
   return sum;
 }
 
+// A set is represented by its first triangle.
+MeshComponents numbered(const TriangleMesh& mesh, DisjointSets<std::uint32_t>& sets) {
+  MeshComponents components;
+  components.of_triangle.resize(mesh.triangles.size());
+  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t root = sets.find(t);
+    if (root == t) {
+      components.of_triangle[t] = static_cast<std::uint32_t>(components.areas_m2.size());
+      components.areas_m2.push_back(0.0);
+    } else {
+      components.of_triangle[t] = components.of_triangle[root];
+    }
+    components.areas_m2[components.of_triangle[t]] +=
+        area_normal(mesh, mesh.triangles[t]).norm() / 2.0;
+  }
+  return components;
+}
+
 }  // namespace
 
 std::size_t count_of(const std::vector<bool>& marks) {
@@ -116,20 +134,18 @@ MeshComponents connected_components(const TriangleMesh& mesh) {
       if (!is_new) sets.join(place->second, t);
     }
   }
-  MeshComponents components;
-  components.of_triangle.resize(mesh.triangles.size());
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    const std::uint32_t root = sets.find(t);
-    if (root == t) {
-      components.of_triangle[t] = static_cast<std::uint32_t>(components.areas_m2.size());
-      components.areas_m2.push_back(0.0);
-    } else {
-      components.of_triangle[t] = components.of_triangle[root];
-    }
-    components.areas_m2[components.of_triangle[t]] +=
-        area_normal(mesh, mesh.triangles[t]).norm() / 2.0;
-  }
-  return components;
+  return numbered(mesh, sets);
+}
+
+MeshComponents connected_components(const TriangleMesh& mesh,
+                                    const std::vector<HalfEdge>& opposite) {
+  const auto is_manifold = [](HalfEdge other) { return is_joined(other) || other == open_edge; };
+  if (!std::all_of(opposite.begin(), opposite.end(), is_manifold))
+    return connected_components(mesh);
+  DisjointSets<std::uint32_t> sets(mesh.triangles.size());
+  for (HalfEdge h = 0; h < opposite.size(); ++h)
+    if (is_joined(opposite[h]) && opposite[h] < h) sets.join(opposite[h] / 3, h / 3);
+  return numbered(mesh, sets);
 }
 
 std::uint32_t append_vertex_between(TriangleMesh& mesh, std::uint32_t a, std::uint32_t b,

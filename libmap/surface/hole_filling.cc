@@ -9,7 +9,6 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/surface/hole_patch.h"
-#include "libmap/surface/mesh_components.h"
 #include "libmap/surface/self_intersections.h"
 #include "libmap/surface/triangle_repair.h"
 
@@ -276,7 +275,7 @@ std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m
   std::vector<BoundaryLoop> loops = boundary_loops(mesh.triangles, opposite);
   if (loops.empty()) return {};
   const std::vector<bool> is_outer =
-      outer_boundaries(mesh, components_of(mesh, opposite), loops, known);
+      outer_boundaries(mesh, connected_components(mesh, opposite), loops, known);
   std::vector<BoundaryLoop> holes;
   for (std::size_t n = 0; n < loops.size(); ++n) {
     if (is_outer[n]) continue;

@@ -10,7 +10,6 @@
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/intersection_repair.h"
-#include "libmap/surface/mesh_components.h"
 #include "libmap/surface/mesh_manifold.h"
 #include "libmap/surface/mesh_smoothing.h"
 #include "libmap/surface/triangle_repair.h"
@@ -123,7 +122,7 @@ class Cleaning {
   }
 
   void drop_islands() {
-    const MeshComponents components = components_of(mesh_(), opposites_of(mesh_()));
+    const MeshComponents components = connected_components(mesh_(), opposites_of(mesh_()));
     double largest = 0.0;
     for (const double area : components.areas_m2) largest = std::max(largest, area);
     const double smallest =

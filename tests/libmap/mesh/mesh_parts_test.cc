@@ -7,14 +7,17 @@
 #include <numeric>
 
 #include "tests/libmap/mesh/mesh_samples.h"
+#include "tests/libmap/mesh/surface_samples.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
 namespace mesh_parts_test {
 
 using graspmap_test::ball_mesh;
+using graspmap_test::cubes_mesh;
 using graspmap_test::error_of;
 using graspmap_test::square_mesh;
+using graspmap_test::terrain_mesh;
 using graspmap_test::uniform;
 
 // A ball whose every value is a linear function of the place, so that interpolation has a truth.
@@ -96,6 +99,35 @@ TEST(MeshParts, ComponentsByEdgesNotByCorners) {
   EXPECT_DOUBLE_EQ(components.areas_m2[0], 4.0);
   EXPECT_DOUBLE_EQ(components.areas_m2[1], 1.0);
   EXPECT_TRUE(connected_components(TriangleMesh{}).areas_m2.empty());
+}
+
+TriangleMesh with_gaps(const TriangleMesh& mesh) {
+  std::vector<bool> keep(mesh.triangles.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) keep[t] = uniform(0, 1) < 0.6;
+  return select_triangles(mesh, keep);
+}
+
+void expect_those_of_a_hash_table(const TriangleMesh& mesh, std::size_t least) {
+  const MeshComponents truth = connected_components(mesh);
+  const MeshComponents found = connected_components(mesh, opposites_of(mesh));
+  EXPECT_GE(truth.areas_m2.size(), least);
+  EXPECT_EQ(found.of_triangle, truth.of_triangle);
+  EXPECT_EQ(found.areas_m2, truth.areas_m2);
+}
+
+TEST(MeshParts, ComponentsByHalfEdgesAreThoseByEdges) {
+  expect_those_of_a_hash_table({}, 0);
+  expect_those_of_a_hash_table(
+      with_gaps(terrain_mesh(40, 1.0, [](double x, double y) { return x * y; })), 20);
+}
+
+TEST(MeshParts, EdgesOfComponentsMayHaveManyTriangles) {
+  // Two pairs of cubes with an edge in common, and a triangle that names a vertex twice.
+  TriangleMesh mesh = cubes_mesh({{0, 0, 0}, {1, 1, 0}, {5, 0, 0}, {6, 1, 0}});
+  mesh.triangles.push_back({0, 0, 1});
+  expect_those_of_a_hash_table(mesh, 2);
+  mesh.triangles.pop_back();
+  expect_those_of_a_hash_table(mesh, 2);
 }
 
 TEST(MeshParts, ComponentsDoNotDependOnHowTrianglesAreOrdered) {
