@@ -235,6 +235,7 @@ CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
   if (options_.refine_registration || options_.refine_timing) {
     const RegisteredDepth depth =
         registered_depth(frame, its, color_from_depth_of(frame, its, start_));
+    calibrated.knows_depth = depth.known;
     calibrated.added_m = depth.added_m;
     calibrated.by_step = depth.by_step;
   }

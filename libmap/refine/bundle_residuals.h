@@ -17,6 +17,7 @@ struct CalibratedObservation {
   bool registration = false;
   bool timing = false;
   DepthCorrection::Terms terms{};
+  bool knows_depth = true;
   double added_m = 0.0;                    // to the depth, by the known registration and timing
   Vector6d by_step = Vector6d::Zero();     // of the depth, by a step of the registration
   Vector6d known_step = Vector6d::Zero();  // of the known timing
@@ -54,7 +55,8 @@ class CalibratedFeature {
         focal_(camera.fx, camera.fy),
         weight_(1.0 / static_cast<double>(feature.pixel_noise_px),
                 1.0 / static_cast<double>(feature.pixel_noise_px),
-                1.0 / static_cast<double>(feature.depth_noise_m)),
+                1.0 / static_cast<double>(calibrated.knows_depth ? feature.depth_noise_m
+                                                                 : unknown_depth_m)),
         calibrated_(calibrated) {}
 
   const CalibratedObservation& calibrated() const { return calibrated_; }

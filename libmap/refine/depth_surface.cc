@@ -13,6 +13,8 @@ namespace libmap {
 
 namespace {
 
+constexpr double most_step = 0.03;  // of depth, between elements of one surface
+
 constexpr double normal_scale = 32767.0;
 constexpr double noise_unit_m = 1e-6;
 
@@ -170,21 +172,62 @@ bool DepthSurface::at(int column, int row, SurfacePatch& element) const {
   return true;
 }
 
-bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
-  if (columns_ == 0 || !(point_in_camera.z() > 0.0)) return false;
-  Eigen::Vector2d pixel;
-  if (rays_.empty()) {
-    pixel = {camera_.fx * point_in_camera.x() / point_in_camera.z() + camera_.cx,
-             camera_.fy * point_in_camera.y() / point_in_camera.z() + camera_.cy};
-  } else {
-    const auto projected = project_point(camera_, point_in_camera);
-    if (!projected) return false;
-    pixel = *projected;
+std::optional<Eigen::Vector2d> DepthSurface::place_of(
+    const Eigen::Vector3d& point_in_camera) const {
+  if (columns_ == 0 || !(point_in_camera.z() > 0.0)) return std::nullopt;
+  if (!rays_.empty()) {
+    const auto pixel = project_point(camera_, point_in_camera);
+    if (!pixel) return std::nullopt;
+    return *pixel / step_px_;
   }
-  const double column = std::round(pixel.x() / step_px_);
-  const double row = std::round(pixel.y() / step_px_);
+  return Eigen::Vector2d(
+      (camera_.fx * point_in_camera.x() / point_in_camera.z() + camera_.cx) / step_px_,
+      (camera_.fy * point_in_camera.y() / point_in_camera.z() + camera_.cy) / step_px_);
+}
+
+bool DepthSurface::seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+  const auto place = place_of(point_in_camera);
+  if (!place) return false;
+  const double column = std::round(place->x());
+  const double row = std::round(place->y());
   if (!(column >= 0.0 && column < columns_ && row >= 0.0 && row < rows_)) return false;
   return at(static_cast<int>(column), static_cast<int>(row), element);
+}
+
+bool DepthSurface::met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const {
+  const auto place = place_of(point_in_camera);
+  if (!place) return false;
+  const double left = std::floor(place->x());
+  const double top = std::floor(place->y());
+  if (!(left >= 0.0 && left < columns_ - 1 && top >= 0.0 && top < rows_ - 1))
+    return seen_at(point_in_camera, element);
+  const double u = place->x() - left;
+  const double v = place->y() - top;
+  const Eigen::Vector3d ray = point_in_camera / point_in_camera.z();
+  SurfacePatch blend;
+  double depth_m = 0.0;
+  double least_m = std::numeric_limits<double>::infinity();
+  double most_m = 0.0;
+  for (const int corner : {0, 1, 2, 3}) {
+    const int right = corner & 1;
+    const int down = corner >> 1;
+    SurfacePatch plane;
+    if (!at(static_cast<int>(left) + right, static_cast<int>(top) + down, plane))
+      return seen_at(point_in_camera, element);
+    const double weight = (right == 1 ? u : 1.0 - u) * (down == 1 ? v : 1.0 - v);
+    const double met_m = plane.normal.dot(plane.point) / plane.normal.dot(ray);
+    least_m = std::min(least_m, met_m);
+    most_m = std::max(most_m, met_m);
+    depth_m += weight * met_m;
+    blend.normal += weight * plane.normal;
+    blend.noise_m += weight * plane.noise_m;
+  }
+  if (!(least_m > 0.0 && most_m - least_m < most_step * most_m))
+    return seen_at(point_in_camera, element);
+  element = blend;
+  element.point = depth_m * ray;
+  element.normal.normalize();
+  return true;
 }
 
 }  // namespace libmap

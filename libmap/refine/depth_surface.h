@@ -6,6 +6,7 @@
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "libmap/cloud/depth_planes.h"
@@ -58,6 +59,9 @@ class DepthSurface {
   bool at(int column, int row, SurfacePatch& element) const;
   // The element whose pixel lies nearest to where the camera sees `point_in_camera`.
   bool seen_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
+  // The surface on the ray of that point: the planes of the four elements around it, weighted
+  // bilinearly, where all were measured on one surface; else that of the nearest.
+  bool met_at(const Eigen::Vector3d& point_in_camera, SurfacePatch& element) const;
 
  private:
   Camera camera_{};
@@ -69,6 +73,8 @@ class DepthSurface {
 
   void find_rays();
   Eigen::Vector2d ray_at(int column, int row) const;
+  // Where the camera sees a point, in steps of the grid.
+  std::optional<Eigen::Vector2d> place_of(const Eigen::Vector3d& point_in_camera) const;
   std::size_t index(int column, int row) const {
     return static_cast<std::size_t>(row) * static_cast<std::size_t>(columns_) +
            static_cast<std::size_t>(column);

@@ -8,6 +8,8 @@ namespace libmap {
 
 namespace {
 
+constexpr double plane_radius_px = 3.0;  // of the disc that it is fitted to
+
 // The plane of depth that a feature's ray meets if the depth's camera is at `color_from_depth`;
 // false where there is none.
 bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& color_from_depth,
@@ -22,7 +24,7 @@ bool plane_at(const FrameFeatures& frame, const Feature& feature, const Pose& co
   double depth = static_cast<double>(feature.depth_m);
   // Where the ray meets the plane is where the plane is to be looked for.
   for (int round = 0; round < 4; ++round) {
-    if (!surface.seen_at(from_seen * (depth * ray), element)) return false;
+    if (!surface.met_at(from_seen * (depth * ray), element)) return false;
     element.point = seen_from * element.point;
     element.normal = seen_from.linear() * element.normal;
     const double facing = element.normal.dot(ray);
@@ -131,9 +133,12 @@ FrameFeatures calibrated_features(const FrameFeatures& frame,
   // By pixels, which the stored camera made of the features' rays.
   const std::vector<Pose> motions = row_motions(frame, calibration);
   if (!calibration.color_from_depth.empty() || !motions.empty())
-    for (Feature& its : result.features)
-      its.depth_m += static_cast<float>(
-          registered_depth(frame, its, color_from_depth_of(frame, its, calibration)).added_m);
+    for (Feature& its : result.features) {
+      const RegisteredDepth depth =
+          registered_depth(frame, its, color_from_depth_of(frame, its, calibration));
+      its.depth_m += static_cast<float>(depth.added_m);
+      if (!depth.known) its.depth_noise_m = unknown_depth_m;
+    }
   if (!calibration.depth.empty()) correct_depth(result, calibration.depth);
   if (!calibration.intrinsics.empty()) {
     for (Feature& its : result.features)
@@ -209,9 +214,16 @@ RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feat
   if (!plane_at(frame, feature, Pose::Identity(), before) ||
       !plane_at(frame, feature, color_from_depth, element))
     return depth;
-  // By how much the plane that the ray meets changes: features know their depth better than the
-  // grid of planes does.
-  depth.added_m = element.point.z() - before.point.z();
+  // Of a small shift in the depth image, by how much the plane that the ray meets changes: features
+  // know their depth a little better than the grid of planes does. Planes further apart are of
+  // other pixels, and the noise of both would add up.
+  const Camera& camera = frame.cameras[feature.camera];
+  const Eigen::Vector2d shift =
+      (color_from_depth.inverse() * element.point).hnormalized() - before.point.hnormalized();
+  const double common = std::max(0.0, 1.0 - camera.fx * shift.norm() / plane_radius_px);
+  const auto depth_m = static_cast<double>(feature.depth_m);
+  depth.known = true;
+  depth.added_m = element.point.z() - depth_m + common * (depth_m - before.point.z());
   const Eigen::Vector3d ray = feature.ray.cast<double>().homogeneous();
   const double facing = element.normal.dot(ray);
   depth.by_step << element.normal / facing, -element.point.z() / facing * element.normal.cross(ray);

@@ -63,12 +63,14 @@ Pose color_from_depth_of(const FrameFeatures& frame, const Feature& feature,
                          const SensorCalibration& calibration);
 
 // The depth of a feature if depth is taken from `color_from_depth`: what is added to that of the
-// stored registration, and by a small step (rigid_motion.h) of the color camera's view of it. 0
-// where there is no plane behind it.
+// stored registration, and by a small step (rigid_motion.h) of the color camera's view of it. Not
+// known, and 0, where there is no plane behind it: its depth is then of something else.
 struct RegisteredDepth {
+  bool known = false;
   double added_m = 0.0;
   Vector6d by_step = Vector6d::Zero();
 };
+inline constexpr float unknown_depth_m = 1.0F;  // standard deviation then
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
 

@@ -189,9 +189,8 @@ std::vector<int> Refinement::unjoined(const std::vector<std::vector<int>>& parts
   std::vector<int> left;
   if (tracked_.empty() && !options_.one_map) return left;
   const bool nothing_known = is_all_tracked();
-  const auto largest =
-      std::max_element(parts.begin(), parts.end(),
-                       [](const auto& a, const auto& b) { return a.size() < b.size(); });
+  const auto largest = std::max_element(
+      parts.begin(), parts.end(), [](const auto& a, const auto& b) { return a.size() < b.size(); });
   for (auto part = parts.begin(); part != parts.end(); ++part) {
     const bool alone = std::all_of(part->begin(), part->end(),
                                    [&](int node) { return node < 0 || tracked_.contains(node); });

@@ -15,8 +15,8 @@ namespace {
 
 constexpr int max_calibrations = 3;
 // A calibration that changes less does not let other features match.
-constexpr double settled_m = 1e-4;
-constexpr double settled_rad = 1e-4;
+constexpr double settled_m = 5e-4;
+constexpr double settled_rad = 3e-4;
 constexpr double settled_s = 1e-3;
 constexpr std::size_t max_alternatives = 10;
 // Of a calibration: matches are chosen by the camera that they correct, and what a model does not

@@ -88,6 +88,8 @@ constexpr int max_rounds = 4;
 // Of the costs of what was held out: faults of a sensor change them by tens of percent. A part that
 // gains less absorbs what others leave, and what it is correlated with drifts.
 constexpr double min_gain = 0.002;
+// A late depth image of a steady motion is a shifted one.
+constexpr double min_timing_gain = 0.02;
 // Of adjustments that are compared or begin the next one. Standard errors of the held-out data are
 // larger than what the last steps change.
 constexpr double rough_tolerance = 1e-4;
@@ -142,10 +144,10 @@ Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOpt
 }
 
 // Whether what is free in the one model more is clearly worth it.
-bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with) {
+bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with, double gain = min_gain) {
   const HeldOutEvaluation change = evaluate_held_out(without, with);
   return !change.is_worse() &&
-         change.change() < -std::max(2.0 * change.deviation(), min_gain * change.before());
+         change.change() < -std::max(2.0 * change.deviation(), gain * change.before());
 }
 
 }  // namespace
@@ -205,7 +207,8 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
     timed.timing = true;
     Candidate candidate =
         was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part.poses, 1);
-    if (is_good(candidate) && (!was_good || is_needed(best.costs, candidate.costs))) {
+    if (is_good(candidate) &&
+        (!was_good || is_needed(best.costs, candidate.costs, min_timing_gain))) {
       best = std::move(candidate);
       Candidate settled = attempt_from_best(timed, max_rounds - 1);  // motions need more rounds
       if (is_good(settled)) best = std::move(settled);
