@@ -408,6 +408,8 @@ RefinementResult Refinement::run() {
     if (!round(number) && number > 0) break;
   information_ = link_system(poses_, graph_.links);
   if (links_.empty()) {
+    if (is_all_tracked() && stored_.empty() && frames_.empty() && !result_.skipped.empty())
+      throw result_.skipped.front().second;
     if (is_all_tracked() && stored_.empty())
       throw Error("its pictures give no poses: no two of them could be matched",
                   {.field = "frames", .value = std::to_string(frames_.size())});

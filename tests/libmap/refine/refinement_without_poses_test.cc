@@ -186,6 +186,19 @@ TEST(RefinementWithoutPoses, APartIsCarriedToWhereItsDepthFits) {
   EXPECT_TRUE(kept.depth_links.empty());
 }
 
+// A scan without poses whose frames are all broken says how.
+TEST(RefinementWithoutPoses, TheFirstBrokenFrameIsNamed) {
+  TexturedScan scan = loop_of(2);
+  forget_poses(scan);
+  for (auto& [node, frame] : scan.frames) frame.cameras.clear();
+  try {
+    libmap::refine_poses(scan, small_options());
+    FAIL();
+  } catch (const libmap::Error& error) {
+    EXPECT_NE(std::string(error.what()).find("calibration"), std::string::npos) << error.what();
+  }
+}
+
 // Frames far apart that show nothing but bare ground: neither pictures nor depth tell.
 TEST(RefinementWithoutPoses, WithoutTextureAndReliefThereIsNoWay) {
   TexturedScan scan;
