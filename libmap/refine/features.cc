@@ -9,6 +9,7 @@
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/refine/feature_cache.h"
+#include "libmap/refine/frame_calibration.h"
 
 namespace libmap {
 
@@ -189,6 +190,8 @@ FoundFeatures features_of(const ScanSource& scan, int node, const FeatureOptions
     if (!view.color.empty()) add_features(view, planes, options, frame);
   }
   if (!result.from_cache) cache.write(key, frame);
+  for (Feature& feature : frame.features)
+    if (!has_plane(frame, feature)) feature.depth_noise_m = unknown_depth_m;
   frame.stamp_s = read.stamp_s;
   return result;
 }

@@ -230,6 +230,11 @@ RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feat
   return depth;
 }
 
+bool has_plane(const FrameFeatures& frame, const Feature& feature) {
+  SurfacePatch element;
+  return plane_at(frame, feature, Pose::Identity(), element);
+}
+
 bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b) {
   return a.first_m == b.first_m && a.step_m == b.step_m && a.spline_m.size() == b.spline_m.size();
 }

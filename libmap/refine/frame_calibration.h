@@ -73,6 +73,8 @@ struct RegisteredDepth {
 inline constexpr float unknown_depth_m = 1.0F;  // standard deviation then
 RegisteredDepth registered_depth(const FrameFeatures& frame, const Feature& feature,
                                  const Pose& color_from_depth);
+// Whether there is a plane behind it by the stored registration; at edges there is none.
+bool has_plane(const FrameFeatures& frame, const Feature& feature);
 
 // Whether coefficients of the one are those of the other.
 bool has_same_knots(const DepthCorrection& a, const DepthCorrection& b);

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "libmap/core/parallel.h"
+#include "libmap/refine/frame_calibration.h"
 #include "libmap/refine/surface_samples.h"
 
 namespace libmap {
@@ -86,6 +87,9 @@ std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
     for (const FeatureMatch& match : link.held_out) {
       costs.push_back(std::numeric_limits<double>::quiet_NaN());
       if (of_a == nullptr || of_b == nullptr) continue;
+      if (a.features[match.a].depth_noise_m >= unknown_depth_m ||
+          b.features[match.b].depth_noise_m >= unknown_depth_m)
+        continue;
       const MatchResidual residual = match_residual(a, b, match, of_a->inverse() * *of_b);
       costs.back() = cost_of(residual.in_front ? residual.chi_square() : behind);
     }

@@ -22,7 +22,7 @@ struct HeldOutChange {
 HeldOutChange compare_held_out(const std::vector<double>& before, const std::vector<double>& after);
 
 // Features that were matched and kept back, in the order of the links; NaN where a node has no
-// pose.
+// pose or a feature no known depth.
 std::vector<double> match_costs(const std::vector<FrameFeatures>& frames,
                                 const std::vector<FeatureLink>& links,
                                 const std::map<int, Pose>& map_from_base);

@@ -24,7 +24,7 @@ constexpr std::size_t max_alternatives = 10;
 constexpr double calibration_deviation_scale = 1.4;
 // Of a registration's shift along the optical axis, which hardly differs from a scale, beyond what
 // the observations say. Measured on simulated scans.
-constexpr double axial_deviation_m = 1.3e-3;
+constexpr double axial_deviation_m = 4e-4;
 constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
 
 void add_figures(const CalibrationEstimate& estimate, StageReport& stage) {

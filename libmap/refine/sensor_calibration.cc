@@ -88,6 +88,7 @@ constexpr int max_rounds = 4;
 // Of the costs of what was held out: faults of a sensor change them by tens of percent. A part that
 // gains less absorbs what others leave, and what it is correlated with drifts.
 constexpr double min_gain = 0.002;
+constexpr double min_whole_gain = 0.005;  // of all parts together
 // A late depth image of a steady motion is a shifted one.
 constexpr double min_timing_gain = 0.02;
 // Of adjustments that are compared or begin the next one. Standard errors of the held-out data are
@@ -175,7 +176,9 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   const auto is_good = [&](const Candidate& candidate) {
     const HeldOutEvaluation change = evaluate_held_out(before, candidate.costs);
     return candidate.adjustment.converged &&
-           (choice.only_if_better ? change.is_clearly_better() : !change.is_worse());
+           (choice.only_if_better
+                ? change.is_clearly_better() && change.change() < -min_whole_gain * change.before()
+                : !change.is_worse());
   };
   Model all{choice.intrinsics, choice.depth, choice.registration};
   all.timing = choice.timing && !choice.start.timing.empty();
