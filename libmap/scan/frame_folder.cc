@@ -153,9 +153,8 @@ void register_to_color(RgbdFrame& frame, const Camera& depth_camera) {
   only_depth.cameras = frame.cameras;
   only_depth.depth = std::move(frame.depth);
   const Camera target = camera_views(only_depth).front().depth_camera;
-  frame.depth =
-      register_depth(only_depth.depth, depth_camera, target,
-                     target.base_from_camera.inverse() * depth_camera.base_from_camera);
+  frame.depth = register_depth(only_depth.depth, depth_camera, target,
+                               target.base_from_camera.inverse() * depth_camera.base_from_camera);
 }
 
 std::string count_of(std::size_t count, const std::string& what) {
