@@ -4,8 +4,10 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <vector>
 
+#include "libmap/refine/frame_calibration.h"
 #include "libmap/refine/icp_refinement.h"
 #include "libmap/refine/sensor_calibration.h"
 #include "libmap/refine/surface_samples.h"
@@ -39,6 +41,21 @@ TEST(HeldOut, MeansAreOfWhatBothSetsOfPosesSay) {
   // Differences 0.5, 1, 0: a deviation of sqrt(1/6), of three.
   EXPECT_NEAR(change.deviation, std::sqrt(1.0 / 18.0), 1e-12);
   EXPECT_EQ(libmap::compare_held_out({none}, {1.0}).count, 0U);
+}
+
+TEST(HeldOut, AFeatureOfUnknownDepthSaysNothing) {
+  std::vector<libmap::FrameFeatures> frames = {
+      graspmap_test::see_points(1, Pose::Identity(), {{1.5, 0.1, 0.1}, {1.4, -0.2, 0.1}}),
+      graspmap_test::see_points(2, Pose::Identity(), {{1.5, 0.1, 0.1}, {1.4, -0.2, 0.1}})};
+  libmap::FeatureLink link;
+  link.frames = {0, 1};
+  link.held_out = {{0, 0}, {1, 1}};
+  const std::map<int, Pose> poses = {{1, Pose::Identity()}, {2, Pose::Identity()}};
+  frames[1].features[0].depth_noise_m = libmap::unknown_depth_m;
+  const std::vector<double> costs = libmap::match_costs(frames, {link}, poses);
+  ASSERT_EQ(costs.size(), 2U);
+  EXPECT_TRUE(std::isnan(costs[0]));
+  EXPECT_TRUE(std::isfinite(costs[1]));
 }
 
 HeldOutEvaluation evaluation(double matches, double surfaces) {
