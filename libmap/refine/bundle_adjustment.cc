@@ -20,10 +20,21 @@ constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
 constexpr double timing_prior_s = 0.03;
-// How a hand's motion differs from that between poses of a second or less.
+// How a hand's motion differs from that between poses a third of a second or more apart; of nearer
+// ones it differs less.
 constexpr double motion_prior_m_per_s = 0.15;
 constexpr double motion_prior_rad_per_s = 0.25;
+constexpr double unsteady_after_s = 0.33;
+constexpr double close_s = 0.15;
 constexpr double max_motion_gap_s = 3.0;
+
+// How the base moves at a frame, in its own frame (m/s, rad/s), and how uncertain that is.
+struct KnownMotion {
+  Vector6d mean = Vector6d::Zero();
+  Vector6d deviation = (Vector6d() << Eigen::Vector3d::Constant(motion_prior_m_per_s),
+                        Eigen::Vector3d::Constant(motion_prior_rad_per_s))
+                           .finished();
+};
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   std::size_t cameras = 0;
@@ -31,32 +42,82 @@ std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   return cameras;
 }
 
-// How the base moves at each frame, in its own frame (m/s, rad/s): from the frame before to the one
-// after. Where there is none within max_motion_gap_s, it does not move.
-std::map<int, Vector6d> motion_between(const std::vector<FrameFeatures>& frames,
-                                       const std::map<int, Pose>& poses) {
-  std::vector<std::pair<double, int>> nodes;
-  for (const FrameFeatures& frame : frames)
-    if (poses.contains(frame.node)) nodes.emplace_back(frame.stamp_s, frame.node);
+// The slope at 0 of the polynomial through values at these times (Lagrange).
+Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>& values) {
+  Vector6d slope = Vector6d::Zero();
+  for (std::size_t n = 0; n < times.size(); ++n) {
+    double share = 0.0;
+    for (std::size_t m = 0; m < times.size(); ++m) {
+      if (m == n) continue;
+      double product = 1.0 / (times[n] - times[m]);
+      for (std::size_t k = 0; k < times.size(); ++k)
+        if (k != n && k != m) product *= -times[k] / (times[n] - times[k]);
+      share += product;
+    }
+    slope += share * values[n];
+  }
+  return slope;
+}
+
+// By the poses before and after each frame: one on either side, two where they follow each other
+// closely. Without one on both sides within max_motion_gap_s, it moves as to the only one, or not
+// at all.
+void add_motion_between(std::vector<std::pair<double, int>> nodes, const std::map<int, Pose>& poses,
+                        std::map<int, KnownMotion>& motions) {
   std::sort(nodes.begin(), nodes.end());
-  std::map<int, Vector6d> motions;
   for (std::size_t n = 0; n < nodes.size(); ++n) {
-    const double time_s = nodes[n].first;
-    const int node = nodes[n].second;
-    const auto is_near = [&](const std::pair<double, int>& other) {
-      return std::abs(other.first - time_s) <= max_motion_gap_s;
+    const auto& [time_s, node] = nodes[n];
+    const auto has = [&](std::size_t other, double gap_s) {
+      return other < nodes.size() && std::abs(nodes[other].first - time_s) <= gap_s;
     };
-    const auto& before = n > 0 && is_near(nodes[n - 1]) ? nodes[n - 1] : nodes[n];
-    const auto& after = n + 1 < nodes.size() && is_near(nodes[n + 1]) ? nodes[n + 1] : nodes[n];
-    Vector6d& motion = motions[node] = Vector6d::Zero();
-    const double seconds = after.first - before.first;
-    if (!(seconds > 0.0)) continue;
-    const Pose& first = poses.at(before.second);
-    const Pose& last = poses.at(after.second);
-    const Eigen::Matrix3d base_from_map = poses.at(node).linear().transpose();
-    motion << base_from_map * (last.translation() - first.translation()),
-        base_from_map * rotation_vector_of(last.linear() * first.linear().transpose());
-    motion /= seconds;
+    std::size_t first = n > 0 && has(n - 1, max_motion_gap_s) ? n - 1 : n;
+    std::size_t last = has(n + 1, max_motion_gap_s) ? n + 1 : n;
+    const bool closely = n > 1 && has(n - 2, 2.0 * close_s) && has(n + 2, 2.0 * close_s);
+    std::vector<double> times;
+    std::vector<Vector6d> steps;
+    if (closely) {
+      --first;
+      ++last;
+    }
+    for (std::size_t k = first; k <= last; ++k) {
+      if (!times.empty() && nodes[k].first - time_s <= times.back()) continue;
+      times.push_back(nodes[k].first - time_s);
+      steps.push_back(step_between(poses.at(node), poses.at(nodes[k].second)));
+    }
+    // Of poses further apart, the way between them says more than a curve through three.
+    if (!closely && times.size() == 3) {
+      times.erase(times.begin() + 1);
+      steps.erase(steps.begin() + 1);
+    }
+    KnownMotion& motion = motions[node];
+    if (times.size() < 2) continue;
+    motion.mean = closely
+                      ? slope_of(times, steps)
+                      : Vector6d((steps.back() - steps.front()) / (times.back() - times.front()));
+    const double apart_s = std::max(times.back(), -times.front());
+    motion.deviation *= std::min(1.0, apart_s / unsteady_after_s);
+  }
+}
+
+// Poses of different components are in different frames.
+std::map<int, KnownMotion> motion_between(const std::vector<FrameFeatures>& frames,
+                                          const std::map<int, Pose>& poses,
+                                          const std::vector<GraphComponent>& components) {
+  std::map<int, double> stamp_s;
+  for (const FrameFeatures& frame : frames)
+    if (poses.contains(frame.node)) stamp_s.emplace(frame.node, frame.stamp_s);
+  std::map<int, KnownMotion> motions;
+  if (components.empty()) {
+    std::vector<std::pair<double, int>> nodes;
+    for (const auto& [node, seconds] : stamp_s) nodes.emplace_back(seconds, node);
+    add_motion_between(std::move(nodes), poses, motions);
+  }
+  for (const GraphComponent& component : components) {
+    std::vector<std::pair<double, int>> nodes;
+    for (const int node : component.nodes)
+      if (const auto stamp = stamp_s.find(node); stamp != stamp_s.end())
+        nodes.emplace_back(stamp->second, node);
+    add_motion_between(std::move(nodes), poses, motions);
   }
   return motions;
 }
@@ -93,18 +154,17 @@ class Priors {
 class Adjustment {
  public:
   Adjustment(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
-             const std::map<int, Pose>& poses, const BundleAdjustmentOptions& options,
-             const SensorCalibration& start);
+             const std::map<int, Pose>& poses, const std::vector<GraphComponent>& components,
+             const BundleAdjustmentOptions& options, const SensorCalibration& start);
 
-  BundleAdjustmentResult run(const std::vector<GraphLinkResult>& links,
-                             const std::vector<GraphComponent>& components);
+  BundleAdjustmentResult run(const std::vector<GraphLinkResult>& links);
 
  private:
   const Feature& feature(const Observation& seen) const {
     return frames_[seen.frame].features[seen.feature];
   }
   bool has_pose(const Observation& seen) const { return place_.contains(frames_[seen.frame].node); }
-  void start_numbers(const SensorCalibration& start);
+  void start_numbers(const SensorCalibration& start, const std::vector<GraphComponent>& components);
   void add_observations();
   CalibratedObservation calibrated(const Observation& seen) const;
   void add_camera_priors(std::size_t camera, Priors& priors);
@@ -131,6 +191,7 @@ class Adjustment {
 
 Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
                        const std::vector<FeatureTrack>& tracks, const std::map<int, Pose>& poses,
+                       const std::vector<GraphComponent>& components,
                        const BundleAdjustmentOptions& options, const SensorCalibration& start)
     : frames_(frames),
       tracks_(tracks),
@@ -142,14 +203,20 @@ Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
   state_.poses = poses;
   for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
   problem_.robust_scale = options.robust_scale;
-  start_numbers(start);
+  problem_.numbers_held = options.hold_cameras;
+  problem_.held.assign(place_.size(), options.hold_poses);
+  for (const GraphComponent& component : components)
+    if (const auto place = place_.find(component.gauge_node); place != place_.end())
+      problem_.held[place->second] = true;
+  start_numbers(start, components);
   add_observations();
   Priors priors(state_.numbers.size());
   for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(n, priors);
   priors.give(problem_);
 }
 
-void Adjustment::start_numbers(const SensorCalibration& start) {
+void Adjustment::start_numbers(const SensorCalibration& start,
+                               const std::vector<GraphComponent>& components) {
   if (options_.refine_registration) start_.color_from_depth = start.color_from_depth;
   if (options_.refine_timing) {
     start_.timing = start.timing;
@@ -182,14 +249,13 @@ void Adjustment::start_numbers(const SensorCalibration& start) {
   }
   if (!options_.refine_timing) return;
   problem_.moving = true;
-  problem_.motion_deviation << Eigen::Vector3d::Constant(motion_prior_m_per_s),
-      Eigen::Vector3d::Constant(motion_prior_rad_per_s);
-  const std::map<int, Vector6d> between = motion_between(frames_, state_.poses);
+  const std::map<int, KnownMotion> between = motion_between(frames_, state_.poses, components);
   for (const auto& [node, pose] : state_.poses) {
-    const auto known = between.find(node);
-    problem_.motion_mean.push_back(known == between.end() ? Vector6d::Zero() : known->second);
-    state_.motions.push_back(
-        start_.motion.emplace(node, problem_.motion_mean.back()).first->second);
+    const auto found = between.find(node);
+    const KnownMotion known = found == between.end() ? KnownMotion{} : found->second;
+    problem_.motion_mean.push_back(known.mean);
+    problem_.motion_deviation.push_back(known.deviation);
+    state_.motions.push_back(start_.motion.emplace(node, known.mean).first->second);
   }
 }
 
@@ -301,10 +367,11 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
 // squares with both as measurements makes times too long.
 double Adjustment::motion_scale() const {
+  if (!problem_.moving || problem_.numbers_held) return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
-  const Vector6d weight = problem_.motion_deviation.array().square().inverse();
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
+    const Vector6d weight = problem_.motion_deviation[n].array().square().inverse();
     const Vector6d& between = problem_.motion_mean[n];
     mixed += between.dot(weight.cwiseProduct(state_.motions[n]));
     squares += between.dot(weight.cwiseProduct(between));
@@ -347,7 +414,7 @@ void Adjustment::find_alternatives() {
     for (Eigen::Index k = 6; k < size; ++k) rows.numbers.push_back(size * n + k);
   }
   for (const Eigen::Index number : free_) rows.numbers.push_back(size * poses + number);
-  const double scale = problem_.moving ? motion_scale() : 1.0;
+  const double scale = motion_scale();
   const Eigen::MatrixXd information =
       joint_system(problem_, state_).matrix.selfadjointView<Eigen::Lower>();
   for (const Eigen::VectorXd& change : likely_changes(information, rows, options_.alternatives)) {
@@ -364,13 +431,8 @@ void Adjustment::find_alternatives() {
   }
 }
 
-BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links,
-                                       const std::vector<GraphComponent>& components) {
+BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links) {
   problem_.links = links;
-  problem_.held.assign(place_.size(), false);
-  for (const GraphComponent& component : components)
-    if (const auto place = place_.find(component.gauge_node); place != place_.end())
-      problem_.held[place->second] = true;
   if (result_.observations > 0) {
     const JointSummary summary =
         adjust_jointly(problem_, state_, options_.max_iterations, options_.tolerance);
@@ -382,8 +444,7 @@ BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links
   result_.map_from_base = state_.poses;
   result_.points.assign(tracks_.size(), Eigen::Vector3d::Zero());
   for (std::size_t n = 0; n < points_.size(); ++n) result_.points[points_[n]] = state_.points[n];
-  if (cameras_ > 0)
-    result_.calibration = calibration(state_, problem_.moving ? motion_scale() : 1.0);
+  if (cameras_ > 0) result_.calibration = calibration(state_, motion_scale());
   if (options_.alternatives > 0 && cameras_ > 0) find_alternatives();
   return std::move(result_);
 }
@@ -432,7 +493,7 @@ BundleAdjustmentResult adjust_bundle(
     const std::vector<FeatureTrack>& system_tracks, const SensorCalibration& start) {
   check_parameters(options);
   BundleAdjustmentResult result =
-      Adjustment(frames, tracks, map_from_base, options, start).run(links, components);
+      Adjustment(frames, tracks, map_from_base, components, options, start).run(links);
   if (!options.with_information) return result;
   if (system_tracks.empty())
     add_information(frames, tracks, links, options, result, result.points);

@@ -22,6 +22,11 @@ namespace libmap {
 namespace {
 
 constexpr double robust_scale = 2.5;  // of Geman and McClure's loss, standard deviations
+// Of a graduated alignment: width of the loss, of the distance; the distance's fall in a step; and
+// its least, in standard deviations.
+constexpr double graduation = 0.5;
+constexpr double graduated_fall = 0.8;
+constexpr double noise_reach = 4.0;
 constexpr double min_distance_m = 0.004;
 constexpr double settled_step = 2e-6;
 constexpr double farthest_step = 0.2;  // m and rad
@@ -116,10 +121,16 @@ PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::s
     const Eigen::Vector3d normal = onto_from_from.linear() * sample.normal;
     if (plane.normal.dot(normal) < min_cosine) continue;
     const double distance = plane.normal.dot(point - plane.point);
-    if (std::abs(distance) > max_distance_m) continue;
     const double variance = sample.noise_m * sample.noise_m + plane.noise_m * plane.noise_m;
+    const double deviation = std::sqrt(variance);
+    const double reach_m =
+        options_.graduated ? std::max(max_distance_m, noise_reach * deviation) : max_distance_m;
+    if (std::abs(distance) > reach_m) continue;
     const double square = distance * distance / variance;
-    const double root = 1.0 + square / (robust_scale * robust_scale);
+    const double width = options_.graduated
+                             ? std::max(robust_scale, graduation * max_distance_m / deviation)
+                             : robust_scale;
+    const double root = 1.0 + square / (width * width);
     const double weight = 1.0 / (root * root * variance * options_.correlation);
     const auto jacobian_by = [&](const Eigen::Vector3d& along) {
       Vector6d jacobian;
@@ -347,7 +358,8 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
     ++result_.iterations;
     progress.advance(1);
     const bool tight = max_distance_m <= min_distance_m + 4.0 * rms_m;
-    max_distance_m = std::max({0.6 * max_distance_m, min_distance_m, 4.0 * rms_m});
+    max_distance_m = std::max({(options_.graduated ? graduated_fall : 0.6) * max_distance_m,
+                               min_distance_m, options_.graduated ? 0.0 : 4.0 * rms_m});
     if (!(farthest < farthest_step)) {
       // What nothing binds runs away: not a refinement.
       result_.map_from_base = start_;

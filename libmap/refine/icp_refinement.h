@@ -29,6 +29,9 @@ struct IcpOptions {
   double correlation = 4.0;   // >= 1: samples that tell as much as one independent one
   double degenerate = 0.002;  // >= 0: share of the best-bound direction's information below
                               // which a pair says nothing about a direction
+  // Not bound: the loss is at first as wide as the distance, and narrows slowly (graduated
+  // non-convexity, Blake and Zisserman 1987), for starts that are far away.
+  bool graduated = false;
 };
 void bind(ParameterTable& table, IcpOptions& options);
 

@@ -193,7 +193,7 @@ double JointSolver::cost(const JointState& state) const {
   if (problem_.moving)
     for (std::size_t n = 0; n < state.motions.size(); ++n)
       cost += 0.5 * (state.motions[n] - problem_.motion_mean[n])
-                        .cwiseQuotient(problem_.motion_deviation)
+                        .cwiseQuotient(problem_.motion_deviation[n])
                         .squaredNorm();
   return cost + link_cost(state.poses, problem_.links);
 }
@@ -217,8 +217,8 @@ void JointSolver::add_priors(const JointState& state, JointSystem& system) const
   system.side.tail(numbers) -=
       problem_.prior.transpose() * (problem_.prior * state.numbers - problem_.prior_mean);
   if (!problem_.moving) return;
-  const Vector6d weight = problem_.motion_deviation.array().square().inverse();
   for (std::size_t n = 0; n < state.motions.size(); ++n) {
+    const Vector6d weight = problem_.motion_deviation[n].array().square().inverse();
     const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(n) + 6;
     system.matrix.diagonal().segment<6>(row) += weight;
     system.side.segment<6>(row) -= weight.cwiseProduct(state.motions[n] - problem_.motion_mean[n]);
@@ -236,13 +236,14 @@ void JointSolver::add_links(const JointState& state, JointSystem& system) const 
 
 void JointSolver::hold(const JointState& state, JointSystem& system) const {
   const Eigen::Index size = system.matrix.rows();
-  for (std::size_t n = 0; n < state.poses.size(); ++n) {
-    if (!problem_.held[n]) continue;
-    const Eigen::Index row = node_size_ * static_cast<Eigen::Index>(n);
-    system.matrix.block(row, 0, 6, size).setZero();
-    system.matrix.block(0, row, size, 6).setZero();
-    system.side.segment<6>(row).setZero();
-  }
+  const auto hold_rows = [&](Eigen::Index row, Eigen::Index rows) {
+    system.matrix.middleRows(row, rows).setZero();
+    system.matrix.middleCols(row, rows).setZero();
+    system.side.segment(row, rows).setZero();
+  };
+  for (std::size_t n = 0; n < state.poses.size(); ++n)
+    if (problem_.held[n]) hold_rows(node_size_ * static_cast<Eigen::Index>(n), 6);
+  if (problem_.numbers_held) hold_rows(cameras_at(state), state.numbers.size());
   for (Eigen::Index n = 0; n < size; ++n)
     if (!(system.matrix(n, n) > 0.0)) system.matrix(n, n) = 1.0;
 }

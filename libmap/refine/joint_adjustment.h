@@ -24,9 +24,10 @@ struct JointProblem {
   std::vector<std::size_t> begin = {0};        // of each point's; one more than points
   double robust_scale = 3.0;                   // of Cauchy's loss
   std::vector<bool> held;                      // of each pose
+  bool numbers_held = false;                   // those of the cameras
   bool moving = false;                         // motions are unknown
   std::vector<Vector6d> motion_mean;           // what is known of them beforehand
-  Vector6d motion_deviation = Vector6d::Ones();
+  std::vector<Vector6d> motion_deviation;
   // What is known of the cameras' numbers beforehand: residuals a x - b.
   Eigen::MatrixXd prior;
   Eigen::VectorXd prior_mean;

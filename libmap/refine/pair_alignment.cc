@@ -18,7 +18,7 @@ constexpr double min_pair_share = 0.3;  // of a pair's samples that must match
 constexpr double max_pair_rms_m = 0.012;
 constexpr int pair_agreement_samples = 300;
 constexpr double pair_agreement_m = 0.005;
-constexpr double min_pair_agreement = 0.9;
+constexpr double min_pair_agreement = 0.95;
 
 // Of what both frames see, the share that lies where both say; what lies behind a surface is
 // hidden.
@@ -45,7 +45,8 @@ std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& 
                                    const Pose& a_from_b) {
   IcpOptions options;
   options.mode = IcpMode::links;
-  options.iterations = 30;
+  options.iterations = 40;
+  options.graduated = true;
   options.max_distance_m = guess_m;
   options.degenerate = pair_degenerate;
   const std::size_t place_of_b = a.node < b.node ? 1 : 0;

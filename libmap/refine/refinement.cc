@@ -1,10 +1,12 @@
 #include "libmap/refine/refinement.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <ctime>
 #include <iterator>
 #include <set>
 #include <utility>
+#include "libmap/refine/rigid_motion.h"
 
 #include "libmap/core/error.h"
 #include "libmap/refine/graph_covariance.h"
@@ -17,7 +19,6 @@ namespace {
 constexpr const char* feature_group = "features";
 constexpr double settled_share = 0.01;  // new links of those before: with less, rounds end
 constexpr const char* odometry_group = "visual odometry";
-constexpr const char* depth_group = "depth odometry";
 // Features err alike in the pictures of one place, which no residual shows: measured on simulated
 // scans.
 constexpr double min_deviation_scale = 1.3;
@@ -91,9 +92,8 @@ void Refinement::start() {
     throw Error("the scan has no such node",
                 {.field = "gauge_node", .value = std::to_string(gauge)});
   InitialPoses initial = initial_poses(scan_.graph(), options_.start);
-  poses_ = std::move(initial.map_from_base);
-  start_ = poses_;
-  parts_ = std::move(initial.parts);
+  poses_ = start_ = std::move(initial.map_from_base);
+  parts_ = start_parts_ = std::move(initial.parts);
   result_.without_pose = std::move(initial.without_pose);
   stored_ = stored_links(scan_.graph());
   if (options_.start == StartPoses::visual)
@@ -167,7 +167,7 @@ void Refinement::odometry() {
   tried_ = std::move(tracked.tried);
   result_.losses = std::move(tracked.losses);
   StageReport stage;
-  stage.name = "odometry";
+  stage.name = "odometry" + again_;
   stage.figures = {{"frames", static_cast<double>(tracked_.size())},
                    {"key_frames", static_cast<double>(tracked.key_frames.size())},
                    {"links", static_cast<double>(links_.size())},
@@ -178,8 +178,6 @@ void Refinement::odometry() {
   const LinkConsistency consistency = link_consistency(links_, truth_);
   if (consistency.links > 0)
     stage.figures.emplace_back("squared_error_per_freedom", consistency.squared_error_per_freedom);
-  if (!result_.losses.empty())
-    result_.warnings.push_back("visual odometry lost its way: " + describe(result_.losses));
   close(std::move(stage));
 }
 
@@ -201,6 +199,8 @@ std::vector<int> Refinement::unjoined(const std::vector<std::vector<int>>& parts
 }
 
 void Refinement::leave_out_unjoined() {
+  if (!result_.losses.empty())
+    result_.warnings.push_back("visual odometry lost its way: " + describe(result_.losses));
   std::vector<std::vector<int>> parts;
   for (const GraphComponent& component : result_.components) parts.push_back(component.nodes);
   std::vector<int> left = unjoined(parts);
@@ -273,7 +273,7 @@ bool Refinement::round(int number) {
   const std::vector<FramePair> pairs = candidates(number);
   if (pairs.empty()) return false;
   StageReport stage;
-  stage.name = number == 0 ? "neighbors" : "closures " + std::to_string(number);
+  stage.name = (number == 0 ? "neighbors" : "closures " + std::to_string(number)) + again_;
   PairVerification verified =
       verify_pairs(frames_, pairs, options_.closures, options_.seed, progress_, matches_to_keep());
   stage.closures = verified.counts;
@@ -344,7 +344,16 @@ void Refinement::icp() {
     if (!link.rejected) links.push_back(link.link);
   IcpResult aligned = align_surfaces(frames_, poses_, information_, graph_.components, links,
                                      options_.icp, progress_);
-  evaluate(stage, poses_, aligned.map_from_base);
+  const HeldOutCosts before = held_out_costs(frames_, links_, poses_);
+  const SensorCalibration calibration = result_.calibration;
+  move_frames(aligned.map_from_base);
+  stage.held_out =
+      evaluate_held_out(before, held_out_costs(frames_, links_, aligned.map_from_base));
+  stage.rejected = stage.held_out.is_worse();
+  if (stage.rejected) {
+    stage.rejected_error = error_of(aligned.map_from_base);
+    calibrate_frames(calibration);
+  }
   stage.figures = {{"pairs", static_cast<double>(aligned.pairs)},
                    {"samples", static_cast<double>(aligned.samples)},
                    {"degenerate_directions", static_cast<double>(aligned.degenerate_directions)},
@@ -395,9 +404,8 @@ void Refinement::find_covariances() {
     }
 }
 
-RefinementResult Refinement::run() {
-  start();
-  find_frames();
+// From the start.
+void Refinement::find_poses() {
   // The parts of stored odometry and links, at the poses of the start: closures are checked
   // against it.
   odometry();
@@ -407,6 +415,12 @@ RefinementResult Refinement::run() {
   for (int number = 0; number <= options_.rounds; ++number)
     if (!round(number) && number > 0) break;
   information_ = link_system(poses_, graph_.links);
+}
+
+RefinementResult Refinement::run() {
+  start();
+  find_frames();
+  find_poses();
   if (links_.empty()) {
     if (is_all_tracked() && stored_.empty() && frames_.empty() && !result_.skipped.empty())
       throw result_.skipped.front().second;

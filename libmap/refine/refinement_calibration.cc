@@ -1,6 +1,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <tuple>
 #include <utility>
 
 #include "libmap/core/error.h"
@@ -68,7 +69,7 @@ bool Refinement::calibrate_sensor(const std::string& name) {
     choice.depth = !known.depth.empty();
     choice.registration = !known.color_from_depth.empty();
     choice.timing = !known.timing.empty();
-    choice.leave_out = false;
+    choice.leave_out = choice.timing;
     choice.start = known;
   }
   CalibrationEstimate estimate = estimate_calibration(
@@ -78,6 +79,9 @@ bool Refinement::calibrate_sensor(const std::string& name) {
   stage.rejected = estimate.calibration.empty();
   BundleAdjustmentResult& adjusted = estimate.adjustment;
   if (!stage.rejected) {
+    if (estimate.frames < frames_.size() && !estimate.calibration.timing.empty())
+      find_motions(frames_, links_, poses_, others, graph_.components, options_.bundle_adjustment,
+                   false, estimate.calibration);
     std::vector<FrameFeatures> as_stored = frames_;
     for (FrameFeatures& frame : frames_) calibrate(frame, estimate.calibration);
     if (estimate.frames < frames_.size()) {
@@ -104,6 +108,25 @@ bool Refinement::calibrate_sensor(const std::string& name) {
   return accepted;
 }
 
+// As if they had been recorded with the calibration.
+void Refinement::calibrate_frames(const SensorCalibration& calibration) {
+  if (calibration.timing.empty()) return;  // nothing depends on poses
+  for (std::size_t f = 0; f < frames_.size(); ++f) {
+    frames_[f] = stored_frames_[f];
+    calibrate(frames_[f], calibration);
+  }
+  result_.calibration = calibration;
+}
+
+// Motions have been estimated together with poses: with other poses they are others.
+void Refinement::move_frames(const std::map<int, Pose>& poses) {
+  SensorCalibration calibration = result_.calibration;
+  if (calibration.timing.empty()) return;
+  find_motions(stored_frames_, links_, poses, without_features(graph_.links, stored_.size()),
+               graph_.components, options_.bundle_adjustment, true, calibration);
+  calibrate_frames(calibration);
+}
+
 // Matches that a wrong camera hid come back with the right one, and those that it let pass go.
 void Refinement::match_again() {
   std::vector<FramePair> pairs;
@@ -116,6 +139,32 @@ void Refinement::match_again() {
     return;
   for (FeatureLink& link : verified.links) link.link.type = types.at(link.frames);
   links_ = std::move(verified.links);
+}
+
+// A rolling shutter distorts pictures so that few matches agree on a rigid motion, and frames are
+// lost: all of it again with what has been found of the sensor.
+void Refinement::track_again() {
+  auto state = std::tie(poses_, parts_, links_, stored_, tried_, graph_, result_.losses);
+  const auto before =
+      std::apply([](const auto&... values) { return std::make_tuple(values...); }, state);
+  const std::map<int, Pose> poses = poses_;
+  const std::size_t left = unjoined(parts_).size();
+  poses_ = start_;
+  parts_ = start_parts_;
+  links_.clear();
+  tried_.clear();
+  std::erase_if(stored_, [](const GraphLink& link) { return link.group == depth_group; });
+  again_ = " again";
+  find_poses();
+  again_.clear();
+  StageReport stage;
+  stage.name = "all again";
+  evaluate(stage, poses, poses_);
+  stage.rejected = stage.rejected || unjoined(parts_).size() > left;
+  const bool rejected = stage.rejected;
+  if (rejected) state = before;
+  close(std::move(stage));
+  if (rejected) match_again();
 }
 
 // Again with matches by what has been found: those of the first time are what the stored camera let
@@ -134,7 +183,10 @@ void Refinement::calibrate_sensor() {
         (pass > 1 &&
          takes_depth_from_near(before, result_.calibration, settled_m, settled_rad, settled_s)))
       break;
-    match_again();
+    if (pass == 1 && !result_.calibration.timing.empty() && !result_.losses.empty())
+      track_again();
+    else
+      match_again();
     calibrated = std::move(frames_);
     frames_ = std::exchange(stored_frames_, {});
   }

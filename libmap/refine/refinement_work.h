@@ -14,6 +14,8 @@
 
 namespace libmap {
 
+inline constexpr const char* depth_group = "depth odometry";  // of links
+
 class Refinement {
  public:
   Refinement(const ScanSource& scan, const RefinementOptions& options, Progress& progress,
@@ -39,6 +41,7 @@ class Refinement {
       return pose.first < 0 || tracked_.contains(pose.first);
     });
   }
+  void find_poses();
   void odometry();
   std::vector<int> unjoined(const std::vector<std::vector<int>>& parts) const;
   void leave_out_unjoined();
@@ -52,7 +55,10 @@ class Refinement {
   void join_new(std::size_t first);
   void bundle();
   bool calibrate_sensor(const std::string& name);
+  void calibrate_frames(const SensorCalibration& calibration);
+  void move_frames(const std::map<int, Pose>& poses);
   void match_again();
+  void track_again();
   void calibrate_sensor();
   void icp();
   void vary_calibration();
@@ -78,6 +84,8 @@ class Refinement {
   RefinementResult result_;
   std::map<int, Pose> poses_;
   std::map<int, Pose> start_;  // poses of the start
+  std::vector<std::vector<int>> start_parts_;
+  std::string again_;  // added to the names of stages
   std::vector<std::vector<int>> parts_;
   std::vector<FrameFeatures> frames_;
   std::vector<FrameFeatures> stored_frames_;  // before an accepted calibration

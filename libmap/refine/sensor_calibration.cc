@@ -4,6 +4,7 @@
 #include <cmath>
 #include <deque>
 #include <initializer_list>
+#include <iterator>
 #include <numbers>
 #include <set>
 #include <utility>
@@ -50,10 +51,11 @@ std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<Featur
 Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
                    const std::map<int, Pose>& map_from_base,
                    const std::vector<GraphLinkResult>& graph_links,
-                   const std::vector<GraphComponent>& components, std::size_t max_frames) {
+                   const std::vector<GraphComponent>& components,
+                   const std::set<std::size_t>& chosen) {
   Excerpt part;
   std::map<std::size_t, std::size_t> place;
-  for (const std::size_t f : joined_frames(frames.size(), links, max_frames)) {
+  for (const std::size_t f : chosen) {
     const auto pose = map_from_base.find(frames[f].node);
     if (pose == map_from_base.end()) continue;
     place.emplace(f, part.frames.size());
@@ -85,6 +87,11 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
 }
 
 constexpr int max_rounds = 4;
+// Motions are found in windows of frames that follow each other.
+constexpr std::size_t frames_a_window = 64;
+constexpr std::size_t frames_beside = 8;    // before and after: their motions are not taken
+constexpr double max_interpolated_s = 1.0;  // over which motions are interpolated
+constexpr int motion_rounds = 2;            // planes are met elsewhere with other motions
 // Of the costs of what was held out: faults of a sensor change them by tens of percent. A part that
 // gains less absorbs what others leave, and what it is correlated with drifts.
 constexpr double min_gain = 0.002;
@@ -144,6 +151,38 @@ Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOpt
   return candidate;
 }
 
+// Of frames without a motion, from those before and after.
+void interpolate_motions(const std::vector<FrameFeatures>& frames,
+                         std::map<int, Vector6d>& motions) {
+  std::map<double, Vector6d> known;
+  for (const FrameFeatures& frame : frames)
+    if (const auto motion = motions.find(frame.node); motion != motions.end())
+      known.emplace(frame.stamp_s, motion->second);
+  for (const FrameFeatures& frame : frames) {
+    const auto after = known.lower_bound(frame.stamp_s);
+    if (motions.contains(frame.node) || after == known.begin() || after == known.end()) continue;
+    const auto before = std::prev(after);
+    if (after->first - before->first > max_interpolated_s) continue;
+    const double share = (frame.stamp_s - before->first) / (after->first - before->first);
+    motions.emplace(frame.node, (1.0 - share) * before->second + share * after->second);
+  }
+}
+
+// Of frames that a calibration does not rest on, those of the known one. The product of motion and
+// time stays, since nothing else is seen of them.
+void add_other_motions(const SensorCalibration& known, SensorCalibration& calibration) {
+  if (calibration.timing.empty()) return;
+  const auto time_of = [&](const SensorCalibration& of) {
+    const CameraTiming& timing = known.timing.front();
+    return std::abs(timing.rolling_shutter_s) > std::abs(timing.depth_delay_s)
+               ? of.timing.front().rolling_shutter_s
+               : of.timing.front().depth_delay_s;
+  };
+  const double time_s = time_of(calibration);
+  const double share = time_s != 0.0 ? std::clamp(time_of(known) / time_s, 0.5, 2.0) : 1.0;
+  for (const auto& [node, motion] : known.motion) calibration.motion.emplace(node, share * motion);
+}
+
 // Whether what is free in the one model more is clearly worth it.
 bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with, double gain = min_gain) {
   const HeldOutEvaluation change = evaluate_held_out(without, with);
@@ -160,8 +199,8 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
                                          const std::vector<GraphComponent>& components,
                                          const BundleAdjustmentOptions& options,
                                          const CalibrationChoice& choice, std::size_t max_frames) {
-  const Excerpt part =
-      excerpt_of(frames, links, map_from_base, graph_links, components, max_frames);
+  const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components,
+                                  joined_frames(frames.size(), links, max_frames));
   const HeldOutCosts before = held_out_costs(part.frames, part.links, part.poses);
   CalibrationEstimate estimate;
   estimate.frames = part.frames.size();
@@ -199,12 +238,14 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
           simpler.name().empty())
         continue;
       Candidate candidate = attempt_from_best(simpler, 1);
-      if (is_good(candidate) && !is_needed(candidate.costs, best.costs))
+      // Motions leave errors that what is not at fault would absorb.
+      const double gain = best.model.timing ? min_timing_gain : min_gain;
+      if (is_good(candidate) && !is_needed(candidate.costs, best.costs, gain))
         best = std::move(candidate);
     }
   };
   leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
-  if (choice.timing && choice.leave_out) {
+  if (choice.timing && choice.leave_out && !all.timing) {
     const bool was_good = is_good(best);
     Model timed = was_good ? best.model : Model{};
     timed.timing = true;
@@ -234,8 +275,8 @@ BundleAdjustmentResult vary_calibration(
     const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
     const SensorCalibration& known, std::size_t count, std::size_t max_frames) {
-  const Excerpt part =
-      excerpt_of(frames, links, map_from_base, graph_links, components, max_frames);
+  const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components,
+                                  joined_frames(frames.size(), links, max_frames));
   BundleAdjustmentOptions varied = options;
   varied.refine_intrinsics = !known.intrinsics.empty();
   varied.refine_depth = !known.depth.empty();
@@ -244,8 +285,54 @@ BundleAdjustmentResult vary_calibration(
   varied.alternatives = count;
   varied.tolerance = rough_tolerance;
   varied.with_information = false;
-  return adjust_bundle(part.frames, part.tracks.tracks, part.poses, part.graph_links,
-                       part.components, varied, {}, known);
+  BundleAdjustmentResult result =
+      adjust_bundle(part.frames, part.tracks.tracks, part.poses, part.graph_links, part.components,
+                    varied, {}, known);
+  add_other_motions(known, result.calibration);
+  for (SensorCalibration& alternative : result.alternatives) add_other_motions(known, alternative);
+  return result;
+}
+
+void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
+                  const std::map<int, Pose>& map_from_base,
+                  const std::vector<GraphLinkResult>& graph_links,
+                  const std::vector<GraphComponent>& components,
+                  const BundleAdjustmentOptions& options, bool hold_poses,
+                  SensorCalibration& calibration) {
+  BundleAdjustmentOptions moving = options;
+  moving.hold_poses = hold_poses;
+  moving.refine_timing = moving.hold_cameras = true;
+  moving.refine_intrinsics = !calibration.intrinsics.empty();
+  moving.refine_depth = !calibration.depth.empty();
+  moving.refine_registration = !calibration.color_from_depth.empty();
+  moving.tolerance = rough_tolerance;
+  moving.with_information = false;
+  SensorCalibration start = calibration;
+  std::map<int, Vector6d> motions;
+  for (std::size_t first = 0; first < frames.size(); first += frames_a_window) {
+    std::set<std::size_t> window;
+    const std::size_t end = std::min(frames.size(), first + frames_a_window);
+    for (std::size_t f = first - std::min(first, frames_beside);
+         f < std::min(frames.size(), end + frames_beside); ++f)
+      window.insert(f);
+    const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components, window);
+    std::map<int, Pose> poses = part.poses;
+    start.motion = calibration.motion;
+    for (int round = 0; round < motion_rounds; ++round) {
+      BundleAdjustmentResult adjusted =
+          adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links, part.components,
+                        moving, {}, start);
+      poses = std::move(adjusted.map_from_base);
+      start.motion = std::move(adjusted.calibration.motion);
+    }
+    for (std::size_t f = first; f < end; ++f)
+      if (const auto motion = start.motion.find(frames[f].node); motion != start.motion.end())
+        motions.insert(*motion);
+  }
+  calibration.motion = std::move(motions);
+  for (const GraphComponent& component : components)
+    if (component.nodes.size() == 1) calibration.motion.erase(component.nodes.front());
+  interpolate_motions(frames, calibration.motion);
 }
 
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,

@@ -56,6 +56,15 @@ BundleAdjustmentResult vary_calibration(
     const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
     const SensorCalibration& known, std::size_t count, std::size_t max_frames = 80);
 
+// The motions of all frames with a pose at the timing of a calibration, in place of those of the
+// frames that it rests on. The rest of the calibration stays.
+void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
+                  const std::map<int, Pose>& map_from_base,
+                  const std::vector<GraphLinkResult>& graph_links,
+                  const std::vector<GraphComponent>& components,
+                  const BundleAdjustmentOptions& options, bool hold_poses,
+                  SensorCalibration& calibration);
+
 // Whether registrations and timings of all cameras differ by no more than this.
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s);

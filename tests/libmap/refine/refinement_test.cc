@@ -17,9 +17,11 @@ namespace refinement_test {
 using graspmap_test::around;
 using graspmap_test::boulders;
 using graspmap_test::looking;
+using graspmap_test::nearest_of;
 using graspmap_test::plane_z;
 using graspmap_test::random_step;
 using graspmap_test::small_options;
+using graspmap_test::sphere;
 using graspmap_test::TexturedScan;
 using libmap::Pose;
 using libmap::RefinementOptions;
@@ -277,6 +279,28 @@ TEST(IcpRefinement, DepthAloneTellsTheMotionOfAPair) {
   EXPECT_LT(std::abs(error[4]), 2e-3);
   EXPECT_LT(error.dot(link->information * error) / 6.0, 9.0);
   EXPECT_FALSE(libmap::align_pair(found.frames[0], found.frames[2], truth)) << "another place";
+}
+
+// From guesses that are 5 cm or 3 degrees away.
+TEST(IcpRefinement, DepthAloneTellsTheMotionOfAPairFromAfar) {
+  TexturedScan scan;
+  const auto rough = nearest_of({plane_z(0.0), sphere({0.1, 0.2, 0.05}, 0.2),
+                                 sphere({-0.3, -0.2, 0.0}, 0.15), sphere({0.4, -0.3, -0.05}, 0.25),
+                                 sphere({0.3, 0.5, 0.0}, 0.15), sphere({-0.2, 0.3, 0.0}, 0.2)});
+  scan.see(rough, around(0), Vector6d::Zero(), false);
+  scan.see(rough, around(8), Vector6d::Zero(), false);
+  const auto found = libmap::find_features(scan, {1, 2}, {});
+  const Pose truth = around(0).inverse() * around(8);
+  for (int axis = 0; axis < 6; ++axis)
+    for (const double sign : {-1.0, 1.0}) {
+      const Vector6d away = sign * 0.05 * Vector6d::Unit(axis);
+      const auto link =
+          libmap::align_pair(found.frames[0], found.frames[1], libmap::moved(truth, away));
+      ASSERT_TRUE(link) << axis;
+      const Vector6d error = libmap::step_between(truth, link->from_from_to);
+      EXPECT_LT(error.head<3>().norm(), 0.003) << axis << " " << sign;
+      EXPECT_LT(error.tail<3>().norm(), 0.003) << axis << " " << sign;
+    }
 }
 
 TEST(IcpRefinement, WantsABlockOfThePriorForEachPose) {

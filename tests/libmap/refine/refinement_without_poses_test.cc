@@ -95,7 +95,7 @@ TEST(RefinementWithoutPoses, WhatNothingJoinsIsLeftOutAndNamed) {
   for (int n = 0; n < 3; ++n)
     scan.see(plane_z(0.0), looking({50 + 0.2 * n, 0, 1.1}, {50.4 + 0.2 * n, 0, 0}),
              Vector6d::Zero());
-  scan.see(boulders(), around(70), Vector6d::Zero(), false);  // blank
+  scan.see(boulders(), around(200), Vector6d::Zero(), false);  // blank, far from the others
   forget_poses(scan);
   const RefinementResult result = libmap::refine_poses(scan, small_options());
   EXPECT_EQ(result.poses.size(), 5U);
@@ -216,6 +216,35 @@ TEST(RefinementWithoutPoses, WithoutTextureAndReliefThereIsNoWay) {
     EXPECT_EQ(error.context().field, "frames");
     EXPECT_EQ(error.context().value, "3");
   }
+}
+
+// A hand that turns by up to 100 degrees a second, fifteen frames a second, and rows of pictures
+// that are exposed over 20 ms: more frames than a calibration rests on.
+TEST(RefinementWithoutPoses, RollingShutterOfALongScan) {
+  TexturedScan scan;
+  scan.interval_s = 0.0667;
+  scan.rolling_shutter_s = 0.02;
+  scan.base_at = [](double time_s) {
+    const Pose turned = libmap::make_pose_from_rpy(
+        {0, 0, 0}, {5.0 * std::sin(9.0 * time_s), 6.0 * std::sin(11.0 * time_s + 1.0),
+                    5.0 * std::sin(7.0 * time_s + 2.0)});
+    return Pose(around(25.0 * time_s) * turned);
+  };
+  for (int n = 1; n <= 90; ++n)
+    scan.see(boulders(), scan.base_at(scan.interval_s * n), Vector6d::Zero());
+  forget_poses(scan);
+  RefinementOptions options = small_options();
+  options.features.max_features = 200;
+  const RefinementResult result = libmap::refine_poses(scan, options);
+  EXPECT_EQ(result.poses.size(), 90U);
+  ASSERT_EQ(result.calibration.timing.size(), 1U);
+  EXPECT_NEAR(result.calibration.timing[0].rolling_shutter_s, 0.02, 0.002);
+  EXPECT_EQ(result.calibration.motion.size(), 90U);
+  EXPECT_TRUE(result.calibration.intrinsics.empty()) << "nothing else is wrong";
+  EXPECT_TRUE(result.calibration.depth.empty());
+  // All frames are moved by their motions before surfaces are aligned.
+  EXPECT_LT(stage_of(result, "calibration").error->absolute.rmse_m, 0.0015);
+  EXPECT_LT(result.stages.back().error->absolute.rmse_m, 0.001);
 }
 
 TEST(RefinementWithoutPoses, SameBytesForAnyNumberOfThreads) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <random>
 
@@ -79,22 +80,27 @@ class TexturedScan : public libmap::ScanSource {
     const libmap::Pose eye = truth * camera.base_from_camera;
     libmap::RgbdFrame frame;
     frame.node = node;
-    frame.stamp_s = node;
+    frame.stamp_s = node * interval_s;
     frame.cameras = {camera};
     frame.depth = render_depth(surface, camera, eye, noise, engine_);
     frame.color = libmap::ColorImage(camera.width, camera.height, {90, 90, 90});
     const auto rays = libmap::ray_table(camera);
+    libmap::Pose row_eye = eye;
     for (std::size_t n = 0; textured && n < rays.size(); ++n) {
-      const Eigen::Vector3d direction = eye.linear() * rays[n].homogeneous();
-      const double z = surface(eye.translation(), direction);
+      const auto row = static_cast<int>(n) / camera.width;
+      if (base_at && static_cast<int>(n) % camera.width == 0)
+        row_eye = base_at(frame.stamp_s + rolling_shutter_s * (row / (camera.height - 1.0) - 0.5)) *
+                  camera.base_from_camera;
+      const Eigen::Vector3d direction = row_eye.linear() * rays[n].homogeneous();
+      const double z = surface(row_eye.translation(), direction);
       if (!std::isfinite(z)) continue;
-      const std::uint8_t gray = texture_at(eye.translation() + z * direction);
+      const std::uint8_t gray = texture_at(row_eye.translation() + z * direction);
       frame.color.pixels[n] = {gray, gray, gray};
     }
     frames[node] = std::move(frame);
     libmap::GraphNode added;
     added.id = node;
-    added.stamp_s = node;
+    added.stamp_s = frame.stamp_s;
     added.truth_from_base = truth;
     if (node == 1) {
       added.odometry_from_base = truth;
@@ -110,6 +116,10 @@ class TexturedScan : public libmap::ScanSource {
 
   std::map<int, libmap::RgbdFrame> frames;
   libmap::PoseGraph graph_;
+  double interval_s = 1.0;  // between frames
+  // Where the base is at a time, for rows of pictures that are exposed one after the other.
+  std::function<libmap::Pose(double)> base_at;
+  double rolling_shutter_s = 0.0;
 
  private:
   std::filesystem::path path_ = "textured.db";

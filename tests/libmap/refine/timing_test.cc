@@ -7,6 +7,7 @@
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/bundle_residuals.h"
 #include "libmap/refine/feature_tracks.h"
+#include "libmap/refine/sensor_calibration.h"
 #include "tests/libmap/refine/synthetic_features.h"
 
 namespace timing_test {
@@ -85,10 +86,11 @@ struct Way {
 // A camera that sways by up to 0.6 m/s in front of `points`, and whose pictures' rows are exposed
 // one after the other. At a steady speed nothing tells the rows' times from the places of the
 // points.
-Way way_with_rows(const std::vector<Eigen::Vector3d>& points, double rolling_shutter_s) {
+Way way_with_rows(const std::vector<Eigen::Vector3d>& points, double rolling_shutter_s,
+                  int frames = 10) {
   Way way;
   const auto pose_at = [](double time_s) { return beside(0.4 * std::sin(1.5 * time_s)); };
-  for (int node = 1; node <= 10; ++node) {
+  for (int node = 1; node <= frames; ++node) {
     const double stamp_s = 0.3 * node;
     FrameFeatures frame = see_points(node, pose_at(stamp_s), points);
     frame.stamp_s = stamp_s;
@@ -174,6 +176,38 @@ TEST(BundleAdjustment, FindsNoTimeWhereRowsAreExposedAtOnce) {
       libmap::adjust_bundle(way.frames, way.tracks, way.truth, {}, way.components, options);
   EXPECT_NEAR(found.calibration.timing.at(0).rolling_shutter_s, 0.0, 1e-4);
   EXPECT_NEAR(found.calibration.timing.at(0).depth_delay_s, 0.0, 1e-4);
+}
+
+// A calibration rests on a part of a long scan. The frames that it does not rest on have motions
+// too; one that nothing joins has that of its neighbors.
+TEST(SensorCalibration, AllFramesHaveMotions) {
+  constexpr int count = 90;
+  constexpr int alone = 50;
+  const auto points = random_points(60);
+  Way way = way_with_rows(points, 0.06, count);
+  std::vector<libmap::FeatureLink> links;
+  for (std::size_t n = 0; n + 1 < way.frames.size(); ++n) {
+    if (n + 1 == alone || n + 2 == alone) continue;
+    libmap::FeatureLink link;
+    link.frames = {n, n + 1};
+    link.link = {way.frames[n].node, way.frames[n + 1].node, libmap::LinkType::neighbor,
+                 way.truth.at(way.frames[n].node).inverse() * way.truth.at(way.frames[n + 1].node),
+                 libmap::Matrix6d::Identity()};
+    link.matches = graspmap_test::same_numbers(points.size());
+    links.push_back(link);
+  }
+  std::erase(way.components[0].nodes, alone);
+  way.components.push_back({{alone}, alone});
+  way.truth.at(alone) = Pose::Identity();  // anywhere
+  libmap::SensorCalibration calibration;
+  calibration.timing = {{0.0, 0.06}};
+  for (const bool hold_poses : {false, true}) {
+    libmap::find_motions(way.frames, links, way.truth, {}, way.components, {}, hold_poses,
+                         calibration);
+    ASSERT_EQ(calibration.motion.size(), way.frames.size());
+    for (const auto& [node, motion] : calibration.motion)
+      EXPECT_NEAR(motion.y(), 0.6 * std::cos(1.5 * 0.3 * node), node == alone ? 0.1 : 0.03) << node;
+  }
 }
 
 // A base that goes along x in front of a wall: depth that is late is nearer by the way it went.
