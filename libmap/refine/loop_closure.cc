@@ -17,6 +17,7 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
+constexpr int few_matches = 6;
 constexpr std::size_t considered_per_pair = 8;  // times as many as are taken, for their directions
 
 bool is_held_out(int feature, std::size_t frame, int every) {
@@ -258,6 +259,17 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
     if (pair.link) result.links.push_back(std::move(*pair.link));
   }
   return result;
+}
+
+std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
+                                 const LoopClosureDetectionOptions& options, std::uint64_t seed) {
+  LoopClosureDetectionOptions few = options;
+  few.estimate.min_inliers = few_matches;
+  few.estimate.min_inlier_share = 0.0;
+  few.estimate.min_spread = 0.0;
+  const PairVerification verified = verify_pairs(frames, {pair}, few, seed);
+  if (verified.links.empty()) return std::nullopt;
+  return verified.links.front().link.from_from_to;
 }
 
 void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,

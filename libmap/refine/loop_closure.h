@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <map>
+#include <optional>
 #include <set>
 #include <utility>
 #include <vector>
@@ -82,6 +83,10 @@ PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
                               const std::vector<FramePair>& pairs,
                               const LoopClosureDetectionOptions& options, std::uint64_t seed,
                               Progress& progress = no_progress(), KnownMatches* known = nullptr);
+
+// The motion that some matches of a pair agree on, be they too few for a link: a guess.
+std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
+                                 const LoopClosureDetectionOptions& options, std::uint64_t seed);
 
 // Drops links that contradict the graph: by chi-square against the covariance of the relative pose
 // where the graph connects their nodes; where it does not, unless another link between the same two

@@ -27,8 +27,9 @@ constexpr double sides_agree_rad = 2.0 * std::numbers::pi / 180.0;
 class LostFrames {
  public:
   LostFrames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
+             const LoopClosureDetectionOptions& matching, std::uint64_t seed,
              VisualOdometryResult& result)
-      : frames_(frames), start_(start), result_(result) {
+      : frames_(frames), start_(start), matching_(matching), seed_(seed), result_(result) {
     for (std::size_t part = 0; part < result.parts.size(); ++part)
       for (const int node : result.parts[part]) part_of_[node] = part;
   }
@@ -89,11 +90,10 @@ class LostFrames {
     std::vector<Pose> places;
     for (const std::size_t other : {before, after}) {
       if (other == no_frame || (!links.empty() && part(other) != part(before))) continue;
-      const std::optional<Pose> guess =
+      const auto link = align(
+          frame, other,
           inside ? inside
-                 : along(neighbor(other, other == before ? backward : forward), other, frame);
-      if (!guess) continue;
-      const auto link = align_pair(frames_[other], frames_[frame], pose(other).inverse() * *guess);
+                 : along(neighbor(other, other == before ? backward : forward), other, frame));
       if (!link) continue;
       links.push_back(*link);
       places.push_back(pose(other) * link->from_from_to);
@@ -105,6 +105,17 @@ class LostFrames {
     move_part(frame, links.front().from, places.front());
     result_.depth_links.insert(result_.depth_links.end(), links.begin(), links.end());
     return true;
+  }
+
+  // To the other, from `guess` or from where few matches lead.
+  std::optional<PoseLink> align(std::size_t frame, std::size_t other,
+                                const std::optional<Pose>& guess) {
+    std::optional<PoseLink> link;
+    if (guess) link = align_pair(frames_[other], frames_[frame], pose(other).inverse() * *guess);
+    if (link) return link;
+    if (auto few = guess_motion(frames_, std::minmax(other, frame), matching_, seed_))
+      link = align_pair(frames_[other], frames_[frame], other < frame ? *few : few->inverse());
+    return link;
   }
 
   // That of the frame, carried to where the frame lies at `place`.
@@ -127,16 +138,20 @@ class LostFrames {
 
   const std::vector<FrameFeatures>& frames_;
   const TrackingStart& start_;
+  const LoopClosureDetectionOptions& matching_;
+  std::uint64_t seed_;
   VisualOdometryResult& result_;
   std::map<int, std::size_t> part_of_;
+  std::size_t largest_ = 0;                     // part
   std::set<std::array<std::size_t, 3>> tried_;  // a frame with its neighbors
 };
 
 }  // namespace
 
 void place_lost_frames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
+                       const LoopClosureDetectionOptions& matching, std::uint64_t seed,
                        VisualOdometryResult& result) {
-  LostFrames(frames, start, result).run();
+  LostFrames(frames, start, matching, seed, result).run();
 }
 
 }  // namespace libmap

@@ -14,7 +14,8 @@ namespace {
 constexpr double guess_m = 0.15;  // standard deviations of a pair's guessed motion
 constexpr double guess_rad = 0.1;
 constexpr double pair_degenerate = 1e-4;
-constexpr double min_pair_share = 0.3;  // of a pair's samples that must match
+constexpr std::size_t min_pair_samples = 300;  // that must match
+constexpr double min_pair_share = 0.4;         // of a pair's samples
 constexpr double max_pair_rms_m = 0.012;
 constexpr int pair_agreement_samples = 300;
 constexpr double pair_agreement_m = 0.005;
@@ -59,8 +60,10 @@ std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& 
   const std::map<int, Pose> poses = {{a.node, Pose::Identity()}, {b.node, a_from_b}};
   const IcpResult aligned =
       align_surfaces({a, b}, poses, prior, {{{a.node, b.node}, a.node}}, {link}, options);
-  const double both = 2.0 * static_cast<double>(options.samples);
-  if (static_cast<double>(aligned.samples) < min_pair_share * both ||
+  const std::size_t all = surface_samples(a, options.samples, SampleUse::estimation).size() +
+                          surface_samples(b, options.samples, SampleUse::estimation).size();
+  if (aligned.samples < min_pair_samples ||
+      static_cast<double>(aligned.samples) < min_pair_share * static_cast<double>(all) ||
       aligned.final_rms_m > max_pair_rms_m)
     return std::nullopt;
   link.from_from_to = aligned.map_from_base.at(b.node);

@@ -28,6 +28,8 @@ constexpr double calibration_deviation_scale = 1.4;
 constexpr double axial_deviation_m = 4e-4;
 constexpr double explained_cost = 0.35;  // of held-out matches; of normal errors it is 0.26
 
+bool is_by_depth(const GraphLink& link) { return link.group == depth_group; }
+
 void add_figures(const CalibrationEstimate& estimate, StageReport& stage) {
   stage.figures.emplace_back("frames", static_cast<double>(estimate.frames));
   for (const auto& [name, change] : estimate.tried) {
@@ -153,7 +155,7 @@ void Refinement::track_again() {
   parts_ = start_parts_;
   links_.clear();
   tried_.clear();
-  std::erase_if(stored_, [](const GraphLink& link) { return link.group == depth_group; });
+  std::erase_if(stored_, is_by_depth);
   again_ = " again";
   find_poses();
   again_.clear();
@@ -183,7 +185,9 @@ void Refinement::calibrate_sensor() {
         (pass > 1 &&
          takes_depth_from_near(before, result_.calibration, settled_m, settled_rad, settled_s)))
       break;
-    if (pass == 1 && !result_.calibration.timing.empty() && !result_.losses.empty())
+    const bool was_lost =
+        !result_.losses.empty() || std::any_of(stored_.begin(), stored_.end(), is_by_depth);
+    if (pass == 1 && !result_.calibration.timing.empty() && was_lost)
       track_again();
     else
       match_again();

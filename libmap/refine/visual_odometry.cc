@@ -272,7 +272,10 @@ bool Tracker::track_by_depth(std::size_t frame) {
     guess = moved(guess,
                   steps * step_between(Pose::Identity(), pose_[before_].inverse() * pose_[last_]));
   }
-  const std::optional<PoseLink> link = align_pair(frames_[last_], frames_[frame], guess);
+  std::optional<PoseLink> link = align_pair(frames_[last_], frames_[frame], guess);
+  if (!link && is_usable(last_) && is_usable(frame))
+    if (const auto few = guess_motion(frames_, {last_, frame}, matching_, seed_))
+      link = align_pair(frames_[last_], frames_[frame], *few);
   if (!link) return false;
   pose_[frame] = pose_[last_] * link->from_from_to;
   part_[frame] = part_[last_];
@@ -448,7 +451,7 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   Progress& progress) {
   check_parameters(options);
   VisualOdometryResult result = Tracker(frames, start, matching, options, seed).run(progress);
-  place_lost_frames(frames, start, result);
+  place_lost_frames(frames, start, matching, seed, result);
   return result;
 }
 

@@ -60,11 +60,11 @@ struct VisualOdometryResult {
 };
 
 // Frames in the order of the list. A frame that neither its key frame nor the last frame explains
-// (verify_pairs) is tracked by depth alone from where a steady motion leads (align_pair). If that
-// fails too, it is lost; it is found again if the motions to two earlier frames agree, else it
-// begins a part. A later key frame of the part may still join it to another. Motions are those of
-// estimate_relative_pose, their covariances scaled by the residuals of each. The same for any
-// number of threads. Throws Error: options out of their ranges.
+// (verify_pairs) is tracked by depth alone (align_pair) from where a steady motion leads, or few
+// matches (guess_motion). If that fails too, it is lost; it is found again if the motions to two
+// earlier frames agree, else it begins a part. A later key frame of the part may still join it to
+// another. Motions are those of estimate_relative_pose, their covariances scaled by the residuals
+// of each. The same for any number of threads. Throws Error: options out of their ranges.
 VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const TrackingStart& start,
                                   const LoopClosureDetectionOptions& matching,

@@ -170,7 +170,7 @@ TEST(RefinementWithoutPoses, APartIsCarriedToWhereItsDepthFits) {
   lost.parts = {{1, 2, 3, 6, 7}, {4, 5}};
   lost.losses = {{.node = 4, .key_frame = 3}};
   libmap::VisualOdometryResult found = lost;
-  libmap::place_lost_frames(frames, {}, found);
+  libmap::place_lost_frames(frames, {}, {}, 1, found);
   EXPECT_EQ(found.parts, (std::vector<std::vector<int>>{{1, 2, 3, 4, 5, 6, 7}}));
   for (const auto& [node, pose] : truth)
     EXPECT_LT((found.map_from_base.at(node).translation() - pose.translation()).norm(), 0.005);
@@ -181,7 +181,7 @@ TEST(RefinementWithoutPoses, APartIsCarriedToWhereItsDepthFits) {
   libmap::VisualOdometryResult kept = lost;
   libmap::TrackingStart known;
   known.map_from_base[5] = Pose::Identity();
-  libmap::place_lost_frames(frames, known, kept);
+  libmap::place_lost_frames(frames, known, {}, 1, kept);
   EXPECT_EQ(kept.parts, lost.parts);
   EXPECT_TRUE(kept.depth_links.empty());
 }
