@@ -318,7 +318,7 @@ void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<Fe
     const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components, window);
     std::map<int, Pose> poses = part.poses;
     start.motion = calibration.motion;
-    for (int round = 0; round < motion_rounds; ++round) {
+    for (int round = 0; round < (hold_poses ? 1 : motion_rounds); ++round) {
       BundleAdjustmentResult adjusted =
           adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links, part.components,
                         moving, {}, start);
