@@ -31,7 +31,7 @@ struct BundleAdjustmentOptions {
   double depth_knot_m = 0.2;         // >= 0.02: between the knots of its spline
   // Not bound.
   double tolerance = 1e-6;    // steps end when one lowers the cost by less than this share
-  bool hold_cameras = false;  // what is free of them stays, but for the motions
+  bool hold_cameras = false;  // at the start's calibration: of what is free, motions alone change
   bool hold_poses = false;
   std::size_t alternatives = 0;  // of the result's calibration
   bool with_information = true;  // of the result

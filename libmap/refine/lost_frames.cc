@@ -142,7 +142,6 @@ class LostFrames {
   std::uint64_t seed_;
   VisualOdometryResult& result_;
   std::map<int, std::size_t> part_of_;
-  std::size_t largest_ = 0;                     // part
   std::set<std::array<std::size_t, 3>> tried_;  // a frame with its neighbors
 };
 

@@ -1,12 +1,10 @@
 #include "libmap/refine/refinement.h"
 
 #include <algorithm>
-#include <cstdio>
 #include <ctime>
 #include <iterator>
 #include <set>
 #include <utility>
-#include "libmap/refine/rigid_motion.h"
 
 #include "libmap/core/error.h"
 #include "libmap/refine/graph_covariance.h"
