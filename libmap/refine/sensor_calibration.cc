@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <deque>
-#include <initializer_list>
 #include <iterator>
 #include <numbers>
 #include <set>
@@ -109,6 +108,7 @@ struct Model {
   bool registration = false;
   bool timing = false;
 
+  bool operator==(const Model&) const = default;
   std::string name() const {
     std::string text;
     for (const auto& [free, part] :
@@ -230,21 +230,26 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
   const auto attempt_from_best = [&](const Model& model, int rounds) {
     return attempt(model, best.adjustment.calibration, best.adjustment.map_from_base, rounds);
   };
-  const auto leave_out = [&](std::initializer_list<bool Model::*> parts) {
-    for (bool Model::*const part_of : parts) {
+  // The simpler model, unless what it leaves out is needed.
+  const auto simplify = [&](const Model& simpler) {
+    if (!is_good(best) || !choice.only_if_better || !choice.leave_out || simpler.name().empty() ||
+        simpler == best.model)
+      return;
+    Candidate candidate = attempt_from_best(simpler, 1);
+    // Motions leave errors that what is not at fault would absorb.
+    const double gain = best.model.timing ? min_timing_gain : min_gain;
+    if (is_good(candidate) && !is_needed(candidate.costs, best.costs, gain))
+      best = std::move(candidate);
+  };
+  const auto leave_out = [&] {
+    if (best.model.timing) simplify({.timing = true});
+    for (bool Model::*const part_of : {&Model::registration, &Model::depth, &Model::intrinsics}) {
       Model simpler = best.model;
       simpler.*part_of = false;
-      if (!is_good(best) || !choice.only_if_better || !choice.leave_out || !(best.model.*part_of) ||
-          simpler.name().empty())
-        continue;
-      Candidate candidate = attempt_from_best(simpler, 1);
-      // Motions leave errors that what is not at fault would absorb.
-      const double gain = best.model.timing ? min_timing_gain : min_gain;
-      if (is_good(candidate) && !is_needed(candidate.costs, best.costs, gain))
-        best = std::move(candidate);
+      simplify(simpler);
     }
   };
-  leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
+  leave_out();
   if (choice.timing && choice.leave_out && !all.timing) {
     const bool was_good = is_good(best);
     Model timed = was_good ? best.model : Model{};
@@ -254,9 +259,10 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
     if (is_good(candidate) &&
         (!was_good || is_needed(best.costs, candidate.costs, min_timing_gain))) {
       best = std::move(candidate);
-      Candidate settled = attempt_from_best(timed, max_rounds - 1);  // motions need more rounds
+      leave_out();
+      Candidate settled =
+          attempt_from_best(best.model, max_rounds - 1);  // motions need more rounds
       if (is_good(settled)) best = std::move(settled);
-      leave_out({&Model::registration, &Model::depth, &Model::intrinsics});
     }
   }
   if (is_good(best) && choice.settle) {
