@@ -9,6 +9,7 @@
 #include "libmap/refine/calibration_uncertainty.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/joint_adjustment.h"
+#include "libmap/refine/motions_between.h"
 #include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/sparse_adjustment.h"
 
@@ -20,106 +21,11 @@ constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
 constexpr double timing_prior_s = 0.03;
-// How a hand's motion differs from that between poses a third of a second or more apart; of nearer
-// ones it differs less.
-constexpr double motion_prior_m_per_s = 0.15;
-constexpr double motion_prior_rad_per_s = 0.25;
-constexpr double unsteady_after_s = 0.33;
-constexpr double close_s = 0.15;
-constexpr double max_motion_gap_s = 3.0;
-
-// How the base moves at a frame, in its own frame (m/s, rad/s), and how uncertain that is.
-struct KnownMotion {
-  Vector6d mean = Vector6d::Zero();
-  Vector6d deviation = (Vector6d() << Eigen::Vector3d::Constant(motion_prior_m_per_s),
-                        Eigen::Vector3d::Constant(motion_prior_rad_per_s))
-                           .finished();
-};
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   std::size_t cameras = 0;
   for (const FrameFeatures& frame : frames) cameras = std::max(cameras, frame.cameras.size());
   return cameras;
-}
-
-// The slope at 0 of the polynomial through values at these times (Lagrange).
-Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>& values) {
-  Vector6d slope = Vector6d::Zero();
-  for (std::size_t n = 0; n < times.size(); ++n) {
-    double share = 0.0;
-    for (std::size_t m = 0; m < times.size(); ++m) {
-      if (m == n) continue;
-      double product = 1.0 / (times[n] - times[m]);
-      for (std::size_t k = 0; k < times.size(); ++k)
-        if (k != n && k != m) product *= -times[k] / (times[n] - times[k]);
-      share += product;
-    }
-    slope += share * values[n];
-  }
-  return slope;
-}
-
-// By the poses before and after each frame: one on either side, two where they follow each other
-// closely. Without one on both sides within max_motion_gap_s, it moves as to the only one, or not
-// at all.
-void add_motion_between(std::vector<std::pair<double, int>> nodes, const std::map<int, Pose>& poses,
-                        std::map<int, KnownMotion>& motions) {
-  std::sort(nodes.begin(), nodes.end());
-  for (std::size_t n = 0; n < nodes.size(); ++n) {
-    const auto& [time_s, node] = nodes[n];
-    const auto has = [&](std::size_t other, double gap_s) {
-      return other < nodes.size() && std::abs(nodes[other].first - time_s) <= gap_s;
-    };
-    std::size_t first = n > 0 && has(n - 1, max_motion_gap_s) ? n - 1 : n;
-    std::size_t last = has(n + 1, max_motion_gap_s) ? n + 1 : n;
-    const bool closely = n > 1 && has(n - 2, 2.0 * close_s) && has(n + 2, 2.0 * close_s);
-    std::vector<double> times;
-    std::vector<Vector6d> steps;
-    if (closely) {
-      --first;
-      ++last;
-    }
-    for (std::size_t k = first; k <= last; ++k) {
-      if (!times.empty() && nodes[k].first - time_s <= times.back()) continue;
-      times.push_back(nodes[k].first - time_s);
-      steps.push_back(step_between(poses.at(node), poses.at(nodes[k].second)));
-    }
-    // Of poses further apart, the way between them says more than a curve through three.
-    if (!closely && times.size() == 3) {
-      times.erase(times.begin() + 1);
-      steps.erase(steps.begin() + 1);
-    }
-    KnownMotion& motion = motions[node];
-    if (times.size() < 2) continue;
-    motion.mean = closely
-                      ? slope_of(times, steps)
-                      : Vector6d((steps.back() - steps.front()) / (times.back() - times.front()));
-    const double apart_s = std::max(times.back(), -times.front());
-    motion.deviation *= std::min(1.0, apart_s / unsteady_after_s);
-  }
-}
-
-// Poses of different components are in different frames.
-std::map<int, KnownMotion> motion_between(const std::vector<FrameFeatures>& frames,
-                                          const std::map<int, Pose>& poses,
-                                          const std::vector<GraphComponent>& components) {
-  std::map<int, double> stamp_s;
-  for (const FrameFeatures& frame : frames)
-    if (poses.contains(frame.node)) stamp_s.emplace(frame.node, frame.stamp_s);
-  std::map<int, KnownMotion> motions;
-  if (components.empty()) {
-    std::vector<std::pair<double, int>> nodes;
-    for (const auto& [node, seconds] : stamp_s) nodes.emplace_back(seconds, node);
-    add_motion_between(std::move(nodes), poses, motions);
-  }
-  for (const GraphComponent& component : components) {
-    std::vector<std::pair<double, int>> nodes;
-    for (const int node : component.nodes)
-      if (const auto stamp = stamp_s.find(node); stamp != stamp_s.end())
-        nodes.emplace_back(stamp->second, node);
-    add_motion_between(std::move(nodes), poses, motions);
-  }
-  return motions;
 }
 
 // Of the cameras' numbers, as residuals a x - b.
@@ -249,7 +155,7 @@ void Adjustment::start_numbers(const SensorCalibration& start,
   }
   if (!options_.refine_timing) return;
   problem_.moving = true;
-  const std::map<int, KnownMotion> between = motion_between(frames_, state_.poses, components);
+  const std::map<int, KnownMotion> between = motions_between(frames_, state_.poses, components);
   for (const auto& [node, pose] : state_.poses) {
     const auto found = between.find(node);
     const KnownMotion known = found == between.end() ? KnownMotion{} : found->second;

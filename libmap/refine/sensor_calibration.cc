@@ -190,6 +190,110 @@ bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with, double gai
          change.change() < -std::max(2.0 * change.deviation(), gain * change.before());
 }
 
+// The simplest model that fits.
+class ModelSearch {
+ public:
+  ModelSearch(const Excerpt& part, const BundleAdjustmentOptions& options,
+              const CalibrationChoice& choice)
+      : part_(part),
+        options_(options),
+        rough_(options),
+        choice_(choice),
+        before_(held_out_costs(part.frames, part.links, part.poses)) {
+    rough_.tolerance = rough_tolerance;
+    estimate_.frames = part.frames.size();
+  }
+
+  CalibrationEstimate run();
+
+ private:
+  Candidate attempt(const Model& model, const SensorCalibration& start,
+                    const std::map<int, Pose>& poses, int rounds) {
+    Candidate candidate = try_model(model, part_, rough_, start, poses, rounds);
+    estimate_.tried.emplace_back(model.name(), evaluate_held_out(before_, candidate.costs));
+    return candidate;
+  }
+  // One round is enough for a comparison: planes are met where the best meets them.
+  Candidate attempt_from_best(const Model& model, int rounds) {
+    return attempt(model, best_.adjustment.calibration, best_.adjustment.map_from_base, rounds);
+  }
+  bool is_good(const Candidate& candidate) const;
+  void simplify_to(const Model& simpler);
+  void leave_out();
+  void try_timing();
+
+  const Excerpt& part_;
+  const BundleAdjustmentOptions& options_;
+  BundleAdjustmentOptions rough_;
+  const CalibrationChoice& choice_;
+  HeldOutCosts before_;
+  Candidate best_;
+  CalibrationEstimate estimate_;
+};
+
+bool ModelSearch::is_good(const Candidate& candidate) const {
+  const HeldOutEvaluation change = evaluate_held_out(before_, candidate.costs);
+  return candidate.adjustment.converged &&
+         (choice_.only_if_better
+              ? change.is_clearly_better() && change.change() < -min_whole_gain * change.before()
+              : !change.is_worse());
+}
+
+// Unless what it leaves out is needed.
+void ModelSearch::simplify_to(const Model& simpler) {
+  if (!is_good(best_) || simpler.name().empty() || simpler == best_.model) return;
+  Candidate candidate = attempt_from_best(simpler, 1);
+  // Motions leave errors that what is not at fault would absorb.
+  const double gain = best_.model.timing ? min_timing_gain : min_gain;
+  if (is_good(candidate) && !is_needed(candidate.costs, best_.costs, gain))
+    best_ = std::move(candidate);
+}
+
+void ModelSearch::leave_out() {
+  if (!choice_.only_if_better || !choice_.leave_out) return;
+  if (best_.model.timing) simplify_to({.timing = true});
+  for (bool Model::*const part_of : {&Model::registration, &Model::depth, &Model::intrinsics}) {
+    Model simpler = best_.model;
+    simpler.*part_of = false;
+    simplify_to(simpler);
+  }
+}
+
+void ModelSearch::try_timing() {
+  const bool was_good = is_good(best_);
+  Model timed = was_good ? best_.model : Model{};
+  timed.timing = true;
+  Candidate candidate = was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part_.poses, 1);
+  if (!is_good(candidate) ||
+      (was_good && !is_needed(best_.costs, candidate.costs, min_timing_gain)))
+    return;
+  best_ = std::move(candidate);
+  leave_out();
+  Candidate settled = attempt_from_best(best_.model, max_rounds - 1);  // motions need more rounds
+  if (is_good(settled)) best_ = std::move(settled);
+}
+
+CalibrationEstimate ModelSearch::run() {
+  const Model all{choice_.intrinsics, choice_.depth, choice_.registration,
+                  choice_.timing && !choice_.start.timing.empty()};
+  best_ = attempt(all, choice_.start, part_.poses, max_rounds);
+  // Too much freedom for little data may hide what intrinsics alone explain.
+  if (!is_good(best_) && choice_.leave_out && choice_.intrinsics &&
+      (choice_.depth || choice_.registration))
+    best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
+  leave_out();
+  if (choice_.timing && choice_.leave_out && !all.timing) try_timing();
+  if (is_good(best_) && choice_.settle) {
+    Candidate settled = try_model(best_.model, part_, options_, best_.adjustment.calibration,
+                                  best_.adjustment.map_from_base, 1);
+    if (is_good(settled)) best_ = std::move(settled);
+  }
+  if (is_good(best_)) estimate_.calibration = best_.adjustment.calibration;
+  estimate_.held_out = evaluate_held_out(before_, best_.costs);
+  estimate_.adjustment = std::move(best_.adjustment);
+  return std::move(estimate_);
+}
+
 }  // namespace
 
 CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frames,
@@ -201,79 +305,7 @@ CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frame
                                          const CalibrationChoice& choice, std::size_t max_frames) {
   const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components,
                                   joined_frames(frames.size(), links, max_frames));
-  const HeldOutCosts before = held_out_costs(part.frames, part.links, part.poses);
-  CalibrationEstimate estimate;
-  estimate.frames = part.frames.size();
-  BundleAdjustmentOptions rough = options;
-  rough.tolerance = rough_tolerance;
-  const auto attempt = [&](const Model& model, const SensorCalibration& start,
-                           const std::map<int, Pose>& poses, int rounds) {
-    Candidate candidate = try_model(model, part, rough, start, poses, rounds);
-    estimate.tried.emplace_back(model.name(), evaluate_held_out(before, candidate.costs));
-    return candidate;
-  };
-  const auto is_good = [&](const Candidate& candidate) {
-    const HeldOutEvaluation change = evaluate_held_out(before, candidate.costs);
-    return candidate.adjustment.converged &&
-           (choice.only_if_better
-                ? change.is_clearly_better() && change.change() < -min_whole_gain * change.before()
-                : !change.is_worse());
-  };
-  Model all{choice.intrinsics, choice.depth, choice.registration};
-  all.timing = choice.timing && !choice.start.timing.empty();
-  Candidate best = attempt(all, choice.start, part.poses, max_rounds);
-  // Too much freedom for little data may hide what intrinsics alone explain.
-  if (!is_good(best) && choice.leave_out && choice.intrinsics &&
-      (choice.depth || choice.registration))
-    best = attempt({.intrinsics = true}, {}, part.poses, 1);
-  // One round is enough for a comparison: planes are met where the best meets them.
-  const auto attempt_from_best = [&](const Model& model, int rounds) {
-    return attempt(model, best.adjustment.calibration, best.adjustment.map_from_base, rounds);
-  };
-  // The simpler model, unless what it leaves out is needed.
-  const auto simplify = [&](const Model& simpler) {
-    if (!is_good(best) || !choice.only_if_better || !choice.leave_out || simpler.name().empty() ||
-        simpler == best.model)
-      return;
-    Candidate candidate = attempt_from_best(simpler, 1);
-    // Motions leave errors that what is not at fault would absorb.
-    const double gain = best.model.timing ? min_timing_gain : min_gain;
-    if (is_good(candidate) && !is_needed(candidate.costs, best.costs, gain))
-      best = std::move(candidate);
-  };
-  const auto leave_out = [&] {
-    if (best.model.timing) simplify({.timing = true});
-    for (bool Model::*const part_of : {&Model::registration, &Model::depth, &Model::intrinsics}) {
-      Model simpler = best.model;
-      simpler.*part_of = false;
-      simplify(simpler);
-    }
-  };
-  leave_out();
-  if (choice.timing && choice.leave_out && !all.timing) {
-    const bool was_good = is_good(best);
-    Model timed = was_good ? best.model : Model{};
-    timed.timing = true;
-    Candidate candidate =
-        was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part.poses, 1);
-    if (is_good(candidate) &&
-        (!was_good || is_needed(best.costs, candidate.costs, min_timing_gain))) {
-      best = std::move(candidate);
-      leave_out();
-      Candidate settled =
-          attempt_from_best(best.model, max_rounds - 1);  // motions need more rounds
-      if (is_good(settled)) best = std::move(settled);
-    }
-  }
-  if (is_good(best) && choice.settle) {
-    Candidate settled = try_model(best.model, part, options, best.adjustment.calibration,
-                                  best.adjustment.map_from_base, 1);
-    if (is_good(settled)) best = std::move(settled);
-  }
-  if (is_good(best)) estimate.calibration = best.adjustment.calibration;
-  estimate.held_out = evaluate_held_out(before, best.costs);
-  estimate.adjustment = std::move(best.adjustment);
-  return estimate;
+  return ModelSearch(part, options, choice).run();
 }
 
 BundleAdjustmentResult vary_calibration(
