@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <utility>
 #include <vector>
 
@@ -37,7 +38,7 @@ Vector6d slope_of(const std::vector<double>& times, const std::vector<Vector6d>&
 // closely. Without one on both sides within max_motion_gap_s, it moves as to the only one, or not
 // at all.
 void add_motions(std::vector<std::pair<double, int>> nodes, const std::map<int, Pose>& poses,
-                        std::map<int, KnownMotion>& motions) {
+                 std::map<int, KnownMotion>& motions) {
   std::sort(nodes.begin(), nodes.end());
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const double time_s = nodes[n].first;
@@ -74,24 +75,21 @@ void add_motions(std::vector<std::pair<double, int>> nodes, const std::map<int, 
 }  // namespace
 
 std::map<int, KnownMotion> motions_between(const std::vector<FrameFeatures>& frames,
-                                          const std::map<int, Pose>& poses,
-                                          const std::vector<GraphComponent>& components) {
-  std::map<int, double> stamp_s;
-  for (const FrameFeatures& frame : frames)
-    if (poses.contains(frame.node)) stamp_s.emplace(frame.node, frame.stamp_s);
+                                           const std::map<int, Pose>& poses,
+                                           const std::vector<GraphComponent>& components) {
+  std::map<int, std::size_t> component_of;
+  for (std::size_t n = 0; n < components.size(); ++n)
+    for (const int node : components[n].nodes) component_of.emplace(node, n);
+  std::map<std::size_t, std::vector<std::pair<double, int>>> nodes_of;
+  for (const FrameFeatures& frame : frames) {
+    const auto component = component_of.find(frame.node);
+    if (!poses.contains(frame.node) || (component == component_of.end() && !components.empty()))
+      continue;
+    nodes_of[component == component_of.end() ? 0 : component->second].emplace_back(frame.stamp_s,
+                                                                                   frame.node);
+  }
   std::map<int, KnownMotion> motions;
-  if (components.empty()) {
-    std::vector<std::pair<double, int>> nodes;
-    for (const auto& [node, seconds] : stamp_s) nodes.emplace_back(seconds, node);
-    add_motions(std::move(nodes), poses, motions);
-  }
-  for (const GraphComponent& component : components) {
-    std::vector<std::pair<double, int>> nodes;
-    for (const int node : component.nodes)
-      if (const auto stamp = stamp_s.find(node); stamp != stamp_s.end())
-        nodes.emplace_back(stamp->second, node);
-    add_motions(std::move(nodes), poses, motions);
-  }
+  for (const auto& [component, nodes] : nodes_of) add_motions(nodes, poses, motions);
   return motions;
 }
 

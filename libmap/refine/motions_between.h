@@ -10,8 +10,8 @@
 
 namespace libmap {
 
-// In the base's own frame (m/s, rad/s). The deviation is that of a hand's motion from the one between
-// poses a third of a second or more apart.
+// In the base's own frame (m/s, rad/s). The deviation is that of a hand's motion from the one
+// between poses a third of a second or more apart.
 struct KnownMotion {
   Vector6d mean = Vector6d::Zero();
   Vector6d deviation = (Vector6d() << 0.15, 0.15, 0.15, 0.25, 0.25, 0.25).finished();

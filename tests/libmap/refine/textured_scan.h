@@ -100,7 +100,7 @@ class TexturedScan : public libmap::ScanSource {
     frames[node] = std::move(frame);
     libmap::GraphNode added;
     added.id = node;
-    added.stamp_s = frame.stamp_s;
+    added.stamp_s = node * interval_s;
     added.truth_from_base = truth;
     if (node == 1) {
       added.odometry_from_base = truth;
