@@ -162,7 +162,7 @@ void Refinement::track_again() {
   find_poses();
   again_.clear();
   StageReport stage;
-  stage.name = "all again";
+  stage.name = "tracking again";
   evaluate(stage, poses, poses_);
   stage.rejected = stage.rejected || unjoined(parts_).size() > left;
   const bool rejected = stage.rejected;

@@ -1,6 +1,8 @@
 """What the benchmarks of whole commands share: figures of a run, and tables in a page."""
 
+import argparse
 import os
+import pathlib
 import subprocess
 import sys
 import time
@@ -16,6 +18,21 @@ def measure(words, folder=None):
     if process.returncode != 0:
         sys.exit(f"{' '.join(map(str, words))}: ended with {process.returncode}")
     return wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024
+
+
+def scan_options(description, seeds):
+    """Options of the benchmarks that simulate scans and refine them, from the command line."""
+    parser = argparse.ArgumentParser(description=description)
+    parser.add_argument("build", type=pathlib.Path)
+    parser.add_argument("--folder", type=pathlib.Path, required=True)
+    parser.add_argument("--seeds", default=seeds)
+    parser.add_argument("--threads", type=int, default=2)
+    parser.add_argument("--page", type=pathlib.Path)
+    options = parser.parse_args()
+    options.graspmap = (options.build / "graspmap").resolve()
+    options.seeds = list(map(int, options.seeds.split(",")))
+    options.folder.mkdir(parents=True, exist_ok=True)
+    return options
 
 
 def put_into_page(page, name, text):

@@ -9,16 +9,14 @@ pictures alone. What a run gave is kept in FOLDER; such runs are not repeated. P
 table of medians and worst seeds; with --page, puts it between the marks of that page.
 """
 
-import argparse
 import json
-import pathlib
 import statistics
 import subprocess
 import sys
 
 import numpy
 
-from benchmark_runs import measure, put_into_page
+from benchmark_runs import measure, put_into_page, scan_options
 from faults import align, read_poses, read_truth
 
 FRAMES = 193
@@ -74,17 +72,9 @@ def table_of(runs):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("build", type=pathlib.Path)
-    parser.add_argument("--folder", type=pathlib.Path, required=True)
-    parser.add_argument("--seeds", default="61,62,63")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--page", type=pathlib.Path)
-    options = parser.parse_args()
-    graspmap = (options.build / "graspmap").resolve()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    runs = [run(graspmap, options.folder, seed, blur, options.threads)
-            for seed in map(int, options.seeds.split(",")) for blur in BLURS]
+    options = scan_options(__doc__.splitlines()[0], "61,62,63")
+    runs = [run(options.graspmap, options.folder, seed, blur, options.threads)
+            for seed in options.seeds for blur in BLURS]
     text = table_of(runs)
     print(text)
     if options.page:

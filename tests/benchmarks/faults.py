@@ -9,9 +9,7 @@ file .json; such runs are not repeated. Prints a Markdown table of medians and w
 --page, puts it between the marks of that page and the chart faults.png beside it.
 """
 
-import argparse
 import json
-import pathlib
 import sqlite3
 import statistics
 import struct
@@ -20,7 +18,7 @@ import sys
 
 import numpy
 
-from benchmark_runs import measure, put_into_page
+from benchmark_runs import measure, put_into_page, scan_options
 
 SITES = ("rocks", "slopes_and_bumps")
 INTRINSICS = {"stored-focal-percent": 1.0, "stored-cx": 4.0}
@@ -194,20 +192,11 @@ def draw(runs, path):
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("build", type=pathlib.Path)
-    parser.add_argument("--folder", type=pathlib.Path, required=True)
-    parser.add_argument("--seeds", default="31,32,33")
-    parser.add_argument("--threads", type=int, default=2)
-    parser.add_argument("--page", type=pathlib.Path)
-    options = parser.parse_args()
-    graspmap = (options.build / "graspmap").resolve()
-    options.folder.mkdir(parents=True, exist_ok=True)
-    seeds = list(map(int, options.seeds.split(",")))
-    cases = [(site, seed, fault, 1.0) for seed in seeds for site in SITES for fault in FAULTS]
-    cases += [(SITES[0], seed, fault, size) for seed in seeds[:1] for fault in list(FAULTS)[1:]
+    options = scan_options(__doc__.splitlines()[0], "31,32,33")
+    cases = [(site, seed, fault, 1.0) for seed in options.seeds for site in SITES for fault in FAULTS]
+    cases += [(SITES[0], seed, fault, size) for seed in options.seeds[:1] for fault in list(FAULTS)[1:]
               for size in (SIZES[0], SIZES[2])]
-    runs = [run(graspmap, options.folder, *case, options.threads) for case in cases]
+    runs = [run(options.graspmap, options.folder, *case, options.threads) for case in cases]
     text = table_of(runs)
     print(text)
     if options.page:

@@ -423,4 +423,19 @@ TEST(BundleAdjustment, TellsBentDepthFromAFalseFocalLength) {
   EXPECT_NEAR(sum / count, 1.008, 5e-3);
 }
 
+// Ten matches are too few for a link, and enough to say where to look.
+TEST(GuessMotion, TakesFewMatches) {
+  const auto points = graspmap_test::random_points(10);
+  const Pose truth = graspmap_test::beside(0.0).inverse() * graspmap_test::beside(0.1);
+  const std::vector<FrameFeatures> frames = {
+      graspmap_test::see_points(1, graspmap_test::beside(0.0), points),
+      graspmap_test::see_points(2, graspmap_test::beside(0.1), points)};
+  EXPECT_TRUE(libmap::verify_pairs(frames, {{0, 1}}, {}, 1).links.empty());
+  const auto guess = libmap::guess_motion(frames, {0, 1}, {}, 1);
+  ASSERT_TRUE(guess);
+  EXPECT_LT(libmap::step_between(truth, *guess).norm(), 1e-3);
+  const std::vector<FrameFeatures> blank = {frames[0], graspmap_test::see_points(2, truth, {})};
+  EXPECT_FALSE(libmap::guess_motion(blank, {0, 1}, {}, 1));
+}
+
 }  // namespace relative_pose_test
