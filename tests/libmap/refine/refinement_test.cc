@@ -303,23 +303,6 @@ TEST(IcpRefinement, DepthAloneTellsTheMotionOfAPairFromAfar) {
     }
 }
 
-// A camera that measures less far than it sees has depth in a part of its picture.
-TEST(IcpRefinement, DepthInAPartOfTheViewIsEnough) {
-  TexturedScan scan;
-  for (const double angle : {0.0, 5.0}) {
-    scan.see(boulders(), around(angle), Vector6d::Zero(), false);
-    libmap::DepthImage& depth = scan.frames.at(static_cast<int>(scan.frames.size())).depth;
-    for (int y = 0; y < depth.height; ++y)
-      for (int x = 0; x < depth.width; ++x)
-        if (std::abs(x - 128) > 35) depth.pixels[static_cast<std::size_t>(y * depth.width + x)] = 0;
-  }
-  const auto found = libmap::find_features(scan, {1, 2}, {});
-  const Pose truth = around(0).inverse() * around(5);
-  const auto link = libmap::align_pair(found.frames[0], found.frames[1], truth);
-  ASSERT_TRUE(link);
-  EXPECT_LT(libmap::step_between(truth, link->from_from_to).head<3>().norm(), 0.01);
-}
-
 TEST(IcpRefinement, WantsABlockOfThePriorForEachPose) {
   const libmap::Error error = graspmap_test::error_of([] {
     libmap::align_surfaces({}, {{1, Pose::Identity()}}, libmap::BlockSystem(3), {}, {});
