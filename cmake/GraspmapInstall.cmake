@@ -1,7 +1,8 @@
-# cmake --install: the program, its commands, libraries, headers, data and the CMake package, so that
-# find_package(graspmap) gives graspmap::map and graspmap::gtd.
+# cmake --install: the program, its commands, libraries, the public headers, data and the CMake package,
+# so that find_package(graspmap) gives graspmap::map and graspmap::gtd. The component `development` is
+# what building against the libraries needs; the Python module has its own, in tools/python.
 include(CMakePackageConfigHelpers)
-# Of all that names no other; the Python module has its own, in tools/python.
+include(PublicHeaders)
 set(CMAKE_INSTALL_DEFAULT_COMPONENT_NAME graspmap)
 
 get_property(graspmap_libraries GLOBAL PROPERTY graspmap_libraries)
@@ -11,31 +12,17 @@ install(TARGETS graspmap RUNTIME DESTINATION ${CMAKE_INSTALL_BINDIR})
 install(TARGETS ${graspmap_commands}
   RUNTIME DESTINATION ${CMAKE_INSTALL_LIBEXECDIR}/graspmap)
 install(TARGETS ${graspmap_libraries} EXPORT graspmap_targets
-  LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  LIBRARY DESTINATION ${graspmap_library_folder} NAMELINK_COMPONENT development)
 # Loaded when they are needed; nothing links them.
 get_property(graspmap_modules GLOBAL PROPERTY graspmap_modules)
 if(graspmap_modules)
-  install(TARGETS ${graspmap_modules} LIBRARY DESTINATION ${CMAKE_INSTALL_LIBDIR})
+  install(TARGETS ${graspmap_modules} LIBRARY DESTINATION ${graspmap_library_folder})
 endif()
-# But for inner headers: of the .cc files beside them alone, and not whole or not free of other
-# libraries by themselves.
-install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
-  FILES_MATCHING PATTERN "*.h"
-  PATTERN *_body.h EXCLUDE
-  PATTERN instruction_set_loops.h EXCLUDE
-  PATTERN bag_storage.h EXCLUDE
-  PATTERN chunk_compression.h EXCLUDE
-  PATTERN mcap_records.h EXCLUDE
-  PATTERN message_codec.h EXCLUDE
-  PATTERN message_encoding.h EXCLUDE
-  PATTERN named_cells.h EXCLUDE
-  PATTERN pose_residuals.h EXCLUDE
-  PATTERN raster_module.h EXCLUDE
-  PATTERN refinement_work.h EXCLUDE
-  PATTERN ros_messages.h EXCLUDE
-  PATTERN rosbag2_metadata.h EXCLUDE
-  PATTERN rtabmap_rows.h EXCLUDE
-  PATTERN tile_store_json.h EXCLUDE)
+foreach(header IN LISTS graspmap_public_headers)
+  cmake_path(GET header PARENT_PATH folder)
+  install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap/${folder}
+    COMPONENT development)
+endforeach()
 install(DIRECTORY data/cameras data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
@@ -46,10 +33,12 @@ install(DIRECTORY ${PROJECT_BINARY_DIR}/man/ DESTINATION ${CMAKE_INSTALL_MANDIR}
 install(FILES LICENSE README.md CHANGELOG.md DESTINATION ${CMAKE_INSTALL_DOCDIR})
 
 set(graspmap_cmake_folder ${CMAKE_INSTALL_LIBDIR}/cmake/graspmap)
-install(EXPORT graspmap_targets NAMESPACE graspmap:: DESTINATION ${graspmap_cmake_folder})
+install(EXPORT graspmap_targets NAMESPACE graspmap:: DESTINATION ${graspmap_cmake_folder}
+  COMPONENT development)
 configure_package_config_file(cmake/graspmapConfig.cmake.in
   ${PROJECT_BINARY_DIR}/graspmapConfig.cmake INSTALL_DESTINATION ${graspmap_cmake_folder})
 write_basic_package_version_file(${PROJECT_BINARY_DIR}/graspmapConfigVersion.cmake
   COMPATIBILITY SameMinorVersion)
 install(FILES ${PROJECT_BINARY_DIR}/graspmapConfig.cmake
-  ${PROJECT_BINARY_DIR}/graspmapConfigVersion.cmake DESTINATION ${graspmap_cmake_folder})
+  ${PROJECT_BINARY_DIR}/graspmapConfigVersion.cmake DESTINATION ${graspmap_cmake_folder}
+  COMPONENT development)

@@ -1,28 +1,54 @@
-# cpack: a Debian package of the program, the library, its headers and data, and python3-graspmap, the
-# module. scripts/package makes the manual pages first.
+# cpack: Debian packages. graspmap has the program, its private libraries, data and pipelines,
+# libgraspmap-dev what building against the libraries needs, python3-graspmap the module. scripts/package
+# makes the manual pages and the compressed changelog first.
 set(CPACK_GENERATOR DEB)
 set(CPACK_PACKAGE_NAME graspmap)
-set(CPACK_PACKAGE_CONTACT "graspmap developers <graspmap@localhost>")
-set(CPACK_PACKAGE_DESCRIPTION_SUMMARY ${PROJECT_DESCRIPTION})
+# As dch does: who builds a package maintains it.
+if(DEFINED ENV{DEBEMAIL})
+  set(CPACK_PACKAGE_CONTACT "$ENV{DEBFULLNAME} <$ENV{DEBEMAIL}>")
+else()
+  cmake_host_system_information(RESULT host QUERY FQDN)
+  set(CPACK_PACKAGE_CONTACT "graspmap developers <root@${host}>")
+endif()
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
-set(CPACK_DEBIAN_PACKAGE_SECTION science)
+set(CPACK_DEB_COMPONENT_INSTALL ON)
+set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
+  OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
+
+set(package_text "graspmap turns a handheld RGB-D scan of rocky ground into a map of where a spined
+ gripper can hold, and checks that map. All stages run offline and without a screen.")
+set(CPACK_COMPONENTS_ALL graspmap development)
+
+set(CPACK_DEBIAN_GRASPMAP_PACKAGE_NAME graspmap)
+set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SECTION science)
+set(CPACK_COMPONENT_GRASPMAP_DESCRIPTION "graspability maps for robots that climb with spined grippers
+${package_text}")
 # Of what the programs link, by dpkg-shlibdeps; then what they start: VTK's pictures without a
 # screen, and the pipelines.
-set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
-set(CPACK_DEBIAN_GRASPMAP_PACKAGE_NAME graspmap)
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_DEPENDS "libgl1-mesa-dri, libjs-three, make, xvfb")
-# To build against the library.
-set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SUGGESTS "cmake, libeigen3-dev")
-set(CPACK_DEB_COMPONENT_INSTALL ON)
-set(CPACK_COMPONENTS_ALL graspmap)
+
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libgraspmap-dev)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "graspmap (= ${PROJECT_VERSION}), libeigen3-dev")
+set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS cmake)
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "graspability maps - C++ headers and CMake package
+${package_text}
+ .
+ This package has the public headers and the CMake package of its libraries.")
+
 if(TARGET graspmap_python)
   list(APPEND CPACK_COMPONENTS_ALL python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-graspmap)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
-  set(CPACK_DEBIAN_PYTHON_DESCRIPTION "Python module of graspmap\n${PROJECT_DESCRIPTION}.")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "graspability maps - Python module
+${package_text}
+ .
+ This package has the Python module, which runs the stages on NumPy arrays.")
   # The extension module is of one version of Python.
   get_target_property(minor graspmap_python python_minor_version)
   math(EXPR next_minor "${minor} + 1")
@@ -31,3 +57,12 @@ if(TARGET graspmap_python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-matplotlib")
 endif()
 include(CPack)
+
+# Each package has its copyright and its changelog, as Debian's policy demands (12.5, 12.7).
+foreach(component IN LISTS CPACK_COMPONENTS_ALL)
+  string(TOUPPER ${component} upper)
+  set(package_doc_folder share/doc/${CPACK_DEBIAN_${upper}_PACKAGE_NAME})
+  install(FILES cmake/debian/copyright DESTINATION ${package_doc_folder} COMPONENT ${component})
+  install(FILES ${PROJECT_BINARY_DIR}/changelog.gz DESTINATION ${package_doc_folder}
+    COMPONENT ${component} OPTIONAL)
+endforeach()

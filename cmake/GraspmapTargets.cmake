@@ -15,8 +15,10 @@ set(CMAKE_LINK_DEPENDS_NO_SHARED ON)
 set(CMAKE_LIBRARY_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR}/lib)
 set(CMAKE_RUNTIME_OUTPUT_DIRECTORY ${PROJECT_BINARY_DIR})
 # Installed files find their libraries beside them, wherever the prefix is moved to.
+# The libraries have a folder of their own: their ABI changes with every version.
+set(graspmap_library_folder ${CMAKE_INSTALL_LIBDIR}/graspmap)
 file(RELATIVE_PATH graspmap_lib_from_bin
-  /prefix/${CMAKE_INSTALL_LIBEXECDIR}/graspmap /prefix/${CMAKE_INSTALL_LIBDIR})
+  /prefix/${CMAKE_INSTALL_LIBEXECDIR}/graspmap /prefix/${graspmap_library_folder})
 
 set(graspmap_sanitizer_flags "")
 if(GRASPMAP_SANITIZE)

@@ -14,12 +14,12 @@ namespace libmap {
 namespace fs = std::filesystem;
 
 fs::path data_folder() {
-  // PREFIX/lib/.../libgraspmap_core.so: the number of folders below PREFIX differs between systems.
+  // PREFIX/lib/.../graspmap/libgraspmap_core.so: the number of folders below PREFIX differs between systems.
   Dl_info library;
   if (dladdr(reinterpret_cast<void*>(&data_folder), &library) != 0) {
     std::error_code code;
     fs::path prefix = fs::canonical(library.dli_fname, code).parent_path();
-    for (int up = 0; up < 3 && !code; ++up) {
+    for (int up = 0; up < 4 && !code; ++up) {
       prefix = prefix.parent_path();
       if (fs::is_directory(prefix / "share/graspmap", code)) return prefix / "share/graspmap";
       code.clear();
