@@ -10,6 +10,8 @@ else()
   cmake_host_system_information(RESULT host QUERY FQDN)
   set(CPACK_PACKAGE_CONTACT "graspmap developers <root@${host}>")
 endif()
+set(CPACK_PACKAGE_DESCRIPTION_SUMMARY
+  "graspability maps for robots that climb with spined grippers")
 set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
@@ -17,14 +19,15 @@ set(CPACK_DEB_COMPONENT_INSTALL ON)
 set(CPACK_INSTALL_DEFAULT_DIRECTORY_PERMISSIONS
   OWNER_READ OWNER_WRITE OWNER_EXECUTE GROUP_READ GROUP_EXECUTE WORLD_READ WORLD_EXECUTE)
 
-set(package_text "graspmap turns a handheld RGB-D scan of rocky ground into a map of where a spined
- gripper can hold, and checks that map. All stages run offline and without a screen.")
+set(package_text "graspmap turns a handheld RGB-D scan of rocky ground into a map of where a
+spined gripper can hold, and checks that map. All stages run offline and
+without a screen.
+")
 set(CPACK_COMPONENTS_ALL graspmap development)
 
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_NAME graspmap)
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SECTION science)
-set(CPACK_COMPONENT_GRASPMAP_DESCRIPTION "graspability maps for robots that climb with spined grippers
-${package_text}")
+set(CPACK_COMPONENT_GRASPMAP_DESCRIPTION "${package_text}")
 # Of what the programs link, by dpkg-shlibdeps; then what they start: VTK's pictures without a
 # screen, and the pipelines.
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SHLIBDEPS ON)
@@ -35,20 +38,17 @@ set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libgraspmap-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_DEPENDS "graspmap (= ${PROJECT_VERSION}), libeigen3-dev")
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SUGGESTS cmake)
-set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "graspability maps - C++ headers and CMake package
-${package_text}
- .
- This package has the public headers and the CMake package of its libraries.")
+set(CPACK_COMPONENT_DEVELOPMENT_DESCRIPTION "${package_text}
+This package has the public headers and the CMake package of the libraries.")
 
 if(TARGET graspmap_python)
   list(APPEND CPACK_COMPONENTS_ALL python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-graspmap)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
-  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "graspability maps - Python module
-${package_text}
- .
- This package has the Python module, which runs the stages on NumPy arrays.")
+  set(CPACK_COMPONENT_PYTHON_DESCRIPTION "${package_text}
+This package has the Python module, which runs the stages on NumPy
+arrays.")
   # The extension module is of one version of Python.
   get_target_property(minor graspmap_python python_minor_version)
   math(EXPR next_minor "${minor} + 1")

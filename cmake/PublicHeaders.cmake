@@ -1,3 +1,31 @@
 # The public API: the headers that are installed. All other headers are private to this project.
 set(graspmap_public_headers
-  libgtd/detect.h)
+  libgtd/detect.h
+  libgtd/gripper/closing_path.h
+  libgtd/gripper/gripper.h
+  libgtd/gripper/gripper_fingers.h
+  libgtd/gripper/gripper_mask.h
+  libgtd/gripper/hold_model.h
+  libgtd/scenario_io.h
+  libgtd/score/bit_count.h
+  libgtd/score/graspability_map.h
+  libgtd/score/obstacles.h
+  libgtd/score/scanned_area.h
+  libgtd/score/scenario.h
+  libgtd/score/tiling.h
+  libgtd/score/voxel_matching.h
+  libgtd/shape/instruction_set.h
+  libgtd/terrain/regression_plane.h
+  libgtd/terrain/voxel_grid.h
+  libgtd/terrain/voxel_lattice.h
+  libmap/cloud/cloud_io.h
+  libmap/cloud/geometry_file.h
+  libmap/core/error.h
+  libmap/core/instruction_set.h
+  libmap/core/parameters.h
+  libmap/core/point_cloud.h
+  libmap/core/point_stream.h
+  libmap/core/pose.h
+  libmap/core/progress.h
+  libmap/core/stage_timer.h
+  libmap/core/text.h)
