@@ -24,7 +24,6 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN *_body.h EXCLUDE
   PATTERN instruction_set_loops.h EXCLUDE
   PATTERN bag_storage.h EXCLUDE
-  PATTERN chunk_compression.h EXCLUDE
   PATTERN mcap_records.h EXCLUDE
   PATTERN message_codec.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
@@ -33,7 +32,6 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN raster_module.h EXCLUDE
   PATTERN refinement_work.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
-  PATTERN rosbag2_metadata.h EXCLUDE
   PATTERN rtabmap_rows.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
 install(DIRECTORY data/cameras data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test

@@ -87,4 +87,12 @@ class Record {
   std::string bytes_;
 };
 
+// Compressed chunks (https://mcap.dev/spec/registry#well-known-compression-formats): frames of LZ4
+// and Zstandard, by their libraries.
+// `size` is what they are said to expand to. Memory grows with what they do expand to. Throws
+// Error: another compression ("": none), broken, another size, more than 1 GiB.
+std::string decompress_chunk(const std::string& compression, std::string_view bytes,
+                             std::uint64_t size);
+std::string compress_chunk(const std::string& compression, const std::string& bytes);
+
 }  // namespace libmap::mcap

@@ -1,4 +1,4 @@
-#include "libmap/ros/chunk_compression.h"
+#include "libmap/ros/mcap_records.h"
 
 #include <lz4frame.h>
 #include <zstd.h>
@@ -8,7 +8,7 @@
 
 #include "libmap/core/error.h"
 
-namespace libmap {
+namespace libmap::mcap {
 
 namespace {
 
@@ -107,4 +107,4 @@ std::string compress_chunk(const std::string& compression, const std::string& by
   return result;
 }
 
-}  // namespace libmap
+}  // namespace libmap::mcap
