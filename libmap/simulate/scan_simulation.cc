@@ -11,7 +11,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/image/depth_registration.h"
-#include "libmap/simulate/multipath.h"
+#include "libmap/simulate/sensor_faults.h"
 
 namespace libmap {
 
