@@ -32,7 +32,6 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN raster_module.h EXCLUDE
   PATTERN refinement_work.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE
-  PATTERN rtabmap_rows.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
 install(DIRECTORY data/cameras data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)

@@ -3,6 +3,7 @@
 // sqlite_storage.cpp; written as its schema 3, of Humble).
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <limits>
 #include <map>

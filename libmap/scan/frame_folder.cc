@@ -17,7 +17,6 @@
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/depth_registration.h"
 #include "libmap/image/image_codec.h"
-#include "libmap/scan/frame_folder_files.h"
 #include "libmap/scan/stamp_pairing.h"
 #include "libmap/scan/text_lines.h"
 #include "libmap/scan/trajectory_text.h"

@@ -1,6 +1,7 @@
 #include "libmap/simulate/primitive_scene.h"
 
 #include <yaml-cpp/yaml.h>
+
 #include <algorithm>
 #include <array>
 #include <cmath>

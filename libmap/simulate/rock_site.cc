@@ -1,6 +1,7 @@
 #include "libmap/simulate/rock_site.h"
 
 #include <yaml-cpp/yaml.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>

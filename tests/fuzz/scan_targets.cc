@@ -9,7 +9,6 @@
 #include "libmap/scan/calibration_codec.h"
 #include "libmap/scan/colmap_io.h"
 #include "libmap/scan/frame_folder.h"
-#include "libmap/scan/laser_scan.h"
 #include "libmap/scan/rig_images.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_verification.h"

@@ -4,7 +4,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/ros/bag_reader.h"
-#include "libmap/scan/frame_folder_files.h"
+#include "libmap/scan/frame_folder.h"
 #include "libmap/scan/rig_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"

@@ -4,7 +4,6 @@
 #include "libmap/image/image_codec.h"
 #include "libmap/image/image_sharpness.h"
 #include "libmap/image/pinhole_image.h"
-#include "libmap/scan/bundler_io.h"
 #include "libmap/scan/picture_file.h"
 #include "tools/support/placement.h"
 

@@ -3,8 +3,8 @@
 #pragma once
 
 #include "libmap/scan/colmap_builder.h"
+#include "libmap/scan/picture_file.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/scan/view_selection.h"
 #include "tools/support/command_line.h"
 #include "tools/support/scan_poses.h"
 

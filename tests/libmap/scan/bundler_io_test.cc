@@ -1,5 +1,4 @@
 // Pictures and cameras for MeshLab: what is written, what the pictures show, which are chosen.
-#include "libmap/scan/bundler_io.h"
 
 #include <gmock/gmock.h>
 
@@ -9,7 +8,7 @@
 
 #include "libmap/image/image_sharpness.h"
 #include "libmap/image/pinhole_image.h"
-#include "libmap/scan/view_selection.h"
+#include "libmap/scan/picture_file.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
