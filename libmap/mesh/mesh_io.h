@@ -3,8 +3,8 @@
 //          read by         written by      kept
 //   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
 //   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
-//   .obj   assimp          mesh_text       doubles written, float32 read; normals, colors
-//   .off   mesh_text       mesh_text       doubles; geometry alone
+//   .obj   assimp          this file       doubles written, float32 read; normals, colors
+//   .off   this file       this file       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
 //   .glb   assimp          assimp          float32; normals, colors
 //   .tif   libmap/raster   not written     a DEM; geometry alone

@@ -5,7 +5,7 @@
 #include <limits>
 
 #include "libmap/core/error.h"
-#include "libmap/core/file_size.h"
+#include "libmap/core/memory_budget.h"
 #include "libmap/raster/dem_reader.h"
 
 namespace libmap {
