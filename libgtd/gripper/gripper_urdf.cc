@@ -13,7 +13,7 @@
 
 #include "libmap/core/angle.h"
 #include "libmap/core/error.h"
-#include "libmap/core/guarded_arrays.h"
+#include "libmap/core/guarded_process.h"
 #include "libmap/core/pose.h"
 
 namespace libgtd {

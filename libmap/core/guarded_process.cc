@@ -102,4 +102,25 @@ std::string GuardedProcess::end() {
   return WIFSIGNALED(status) ? " (signal " + std::to_string(WTERMSIG(status)) + ")" : "";
 }
 
+void send_error(const GuardedProcess::Write& write, const Error* error) {
+  send_array(write, error == nullptr ? std::string() : error->reason());
+  if (error == nullptr) return;
+  for (const std::string& text :
+       {error->context().field, error->context().value, error->context().bound})
+    send_array(write, text);
+  send_value(write, error->kind());
+}
+
+void receive_error(GuardedProcess& process, std::string_view broken) {
+  std::string reason;
+  receive_array(process, broken, reason);
+  if (reason.empty()) return;
+  ErrorContext context;
+  for (std::string* text : {&context.field, &context.value, &context.bound})
+    receive_array(process, broken, *text);
+  ErrorKind kind = ErrorKind::bad_input;
+  receive_value(process, broken, kind);
+  throw Error(reason, context, kind);
+}
+
 }  // namespace libmap

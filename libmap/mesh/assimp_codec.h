@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "libmap/cloud/geometry_file.h"
-#include "libmap/core/textured_mesh.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {

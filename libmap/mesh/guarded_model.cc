@@ -3,7 +3,7 @@
 #include <string>
 #include <vector>
 
-#include "libmap/core/guarded_arrays.h"
+#include "libmap/core/guarded_process.h"
 
 namespace libmap {
 

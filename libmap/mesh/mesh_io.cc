@@ -19,7 +19,6 @@
 #include "libmap/core/text.h"
 #include "libmap/core/text_lines.h"
 #include "libmap/mesh/assimp_codec.h"
-#include "libmap/raster/dem_mesh.h"
 #include "libmap/raster/dem_reader.h"
 
 namespace libmap {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "libmap/core/parameters.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 
 namespace libmap {
 

@@ -9,7 +9,7 @@
 
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 
 namespace libmap {
 

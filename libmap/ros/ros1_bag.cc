@@ -88,12 +88,13 @@ using ros_message::printable;
 
 constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 30;
 
-// What comes through the pipe: one head, then `bytes` of text or message.
+constexpr const char* broken = "is broken: ROS's bag library crashed on it";
+
+// What comes through the pipe: one head, then a text or a message.
 struct Parcel {
   enum class Kind : std::uint32_t { topic, message, error, end };
   Kind kind = Kind::end;
   std::uint32_t topic = 0;     // index
-  std::uint64_t bytes = 0;     // that follow
   std::uint64_t size = 0;      // of a topic: how many messages
   std::int64_t stamp_ns = 0;   // of a message; of a topic: of its first one
   std::int64_t last_ns = 0;    // of a topic's last message
@@ -105,10 +106,9 @@ class Sender {
  public:
   explicit Sender(const GuardedProcess::Write& write) : write_(write) {}
 
-  void send(Parcel parcel, std::string_view bytes) {
-    parcel.bytes = bytes.size();
-    write_({reinterpret_cast<const char*>(&parcel), sizeof parcel});
-    write_(bytes);
+  void send(const Parcel& parcel, std::string_view bytes) {
+    send_value(write_, parcel);
+    send_array(write_, bytes);
   }
   void send_error(const std::string& text) { send({.kind = Parcel::Kind::error}, text); }
 
@@ -154,20 +154,18 @@ class GuardedBag {
   // The next topic or message and its bytes; nothing after the last.
   std::optional<Parcel> receive(std::string& bytes) {
     Parcel parcel;
-    if (!process_.read(&parcel, sizeof parcel)) throw_fallen();
-    bytes.resize(parcel.bytes);
-    if (!process_.read(bytes.data(), bytes.size())) throw_fallen();
-    if (parcel.kind == Parcel::Kind::error) throw Error(bytes, {.file = path_.string()});
+    try {
+      receive_value(process_, broken, parcel);
+      receive_array(process_, broken, bytes);
+      if (parcel.kind == Parcel::Kind::error) throw Error(bytes);
+    } catch (const Error& error) {
+      throw error.in_file(path_.string());
+    }
     if (parcel.kind == Parcel::Kind::end) return std::nullopt;
     return parcel;
   }
 
  private:
-  [[noreturn]] void throw_fallen() {
-    throw Error("is broken: ROS's bag library crashed on it" + process_.end(),
-                {.file = path_.string()});
-  }
-
   fs::path path_;
   GuardedProcess process_;
 };

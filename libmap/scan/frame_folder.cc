@@ -16,7 +16,7 @@
 #include "libmap/core/text_lines.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/image/depth_codec.h"
-#include "libmap/image/depth_registration.h"
+#include "libmap/image/depth_correction.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/stamp_pairing.h"
 #include "libmap/scan/trajectory_text.h"

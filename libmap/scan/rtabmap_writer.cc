@@ -13,11 +13,11 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/image/matrix_codec.h"
-#include "libmap/scan/calibrated_scan.h"
 #include "libmap/scan/calibration_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_schema.h"
+#include "libmap/scan/scan_source.h"
 #include "libmap/scan/sqlite_file.h"
 
 namespace libmap {

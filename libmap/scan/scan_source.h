@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
@@ -62,5 +63,16 @@ std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> 
 
 // Opens and joins all; of one path as open_scan does.
 std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>& paths);
+
+// The frame with the focal lengths, principal point and distortion of `calibration`, and its depth
+// corrected and registered; where the camera is mounted stays, and pictures keep their rolling
+// shutter. Throws Error for a frame of several cameras, of a
+// stereo pair, or of another size than the calibration's.
+void apply_calibration(RgbdFrame& frame, const CameraFile& calibration);
+
+// `scan` with the calibration applied to each frame; read_frame throws Error naming the node where
+// that is not possible.
+std::unique_ptr<ScanSource> with_calibration(std::unique_ptr<ScanSource> scan,
+                                             const CameraFile& calibration);
 
 }  // namespace libmap

@@ -9,7 +9,7 @@
 #include "libmap/scan/calibration_codec.h"
 #include "libmap/scan/colmap_io.h"
 #include "libmap/scan/frame_folder.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_verification.h"
 #include "libmap/scan/trajectory_text.h"

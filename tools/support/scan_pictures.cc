@@ -1,9 +1,8 @@
 #include "tools/support/scan_pictures.h"
 
 #include "libmap/core/parallel.h"
+#include "libmap/image/color_image.h"
 #include "libmap/image/image_codec.h"
-#include "libmap/image/image_sharpness.h"
-#include "libmap/image/pinhole_image.h"
 #include "libmap/scan/picture_file.h"
 #include "tools/support/placement.h"
 

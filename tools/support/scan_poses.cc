@@ -2,7 +2,6 @@
 
 #include <set>
 
-#include "libmap/scan/calibrated_scan.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_error.h"

@@ -6,8 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "libmap/image/image_sharpness.h"
-#include "libmap/image/pinhole_image.h"
+#include "libmap/image/color_image.h"
 #include "libmap/scan/picture_file.h"
 #include "tests/support/test_support.h"
 
