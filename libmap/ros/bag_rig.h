@@ -1,5 +1,4 @@
-// The depth images of a robot's cameras out of a bag, as a rig and a folder of images
-// (rig_images.h).
+// The depth images of a robot's cameras out of a bag, as a rig and a folder of images (rig_io.h).
 #pragma once
 
 #include <cstddef>

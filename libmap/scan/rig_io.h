@@ -1,4 +1,4 @@
-// Several depth cameras on one robot, as YAML (rig_images.h: where their images lie):
+// Several depth cameras on one robot, as YAML:
 //
 //   depth_scale_m: 0.001       # meters a unit of the depth images
 //   near_m: 0.28               # measurements outside near..far are dropped
@@ -17,6 +17,13 @@
 //
 // robot_from_camera is that of the optical frame (z forward). A camera without any of these has the
 // local_transform of its calibration.
+//
+// The folder of their images, and which of them belong together:
+//
+//   FOLDER/rig.yaml            or given apart
+//   FOLDER/NAME/STAMP.png      16-bit gray, one folder per camera; STAMP in seconds, e.g. 12.340000
+//   FOLDER/images.csv          instead of names that are stamps: columns camera, stamp_s, file
+//                              (relative to FOLDER); where it exists, it alone counts
 #pragma once
 
 #include <cstddef>
