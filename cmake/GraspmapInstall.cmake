@@ -24,7 +24,6 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN *_body.h EXCLUDE
   PATTERN instruction_set_loops.h EXCLUDE
   PATTERN bag_storage.h EXCLUDE
-  PATTERN mcap_records.h EXCLUDE
   PATTERN message_codec.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
   PATTERN named_cells.h EXCLUDE

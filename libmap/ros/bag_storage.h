@@ -92,4 +92,12 @@ std::unique_ptr<BagSink> new_ros1_bag(const std::filesystem::path& path,
 std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);
 std::unique_ptr<BagSink> new_mcap(const std::filesystem::path& path, BagCompression compression);
 
+// Compressed chunks of MCAP (https://mcap.dev/spec/registry#well-known-compression-formats): frames
+// of LZ4 and Zstandard, by their libraries. `size` is what they are said to expand to. Memory grows
+// with what they do expand to. Throws Error: another compression ("": none), broken, another size,
+// more than 1 GiB.
+std::string decompress_chunk(const std::string& compression, std::string_view bytes,
+                             std::uint64_t size);
+std::string compress_chunk(const std::string& compression, const std::string& bytes);
+
 }  // namespace libmap

@@ -1,18 +1,25 @@
-// Reads MCAP record by record, in the order of the file: its index is not needed, and need not be
+// MCAP (https://mcap.dev/spec) consists of records: an opcode, the length of the content as uint64,
+// the content; little-endian.
+//
+// Reads record by record, in the order of the file: its index is not needed, and need not be
 // believed. Writes it with the profile ros2: chunks of messages, then the index by which readers
 // seek.
+#include <lz4frame.h>
 #include <zlib.h>
+#include <zstd.h>
 #include <algorithm>
+#include <array>
 #include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <map>
+#include <memory>
 #include <utility>
 
+#include "libmap/core/bytes.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/ros/bag_storage.h"
-#include "libmap/ros/mcap_records.h"
 #include "libmap/ros/ros_messages.h"
 
 namespace libmap {
@@ -20,10 +27,84 @@ namespace libmap {
 namespace {
 
 namespace fs = std::filesystem;
-using mcap::Fields;
-using mcap::Opcode;
-using mcap::Record;
 using ros_message::printable;
+
+constexpr std::string_view magic("\x89MCAP0\r\n", 8);
+
+// The kinds of records that are read or written.
+enum class Opcode : std::uint8_t {
+  header = 1,
+  footer,
+  schema,
+  channel,
+  message,
+  chunk,
+  message_index,
+  chunk_index,
+  statistics = 0x0B,
+  summary_offset = 0x0E,
+  data_end = 0x0F
+};
+
+// The record as bytes: its opcode, the length of its content, the content.
+std::string as_record(Opcode opcode, const ByteWriter& content) {
+  return ByteWriter().number(opcode).text<std::uint64_t>(content.content()).content();
+}
+
+constexpr std::uint64_t max_chunk_bytes = std::uint64_t{1} << 30;
+
+Error broken_chunk(const std::string& compression) {
+  return Error("is broken", {.field = "chunk of " + compression});
+}
+
+// Calls step(input, input size, output, output size), which sets both sizes to what it has used and
+// made and returns whether more is to come, until nothing is.
+template <typename Step>
+std::string expand(const std::string& compression, std::string_view bytes, std::uint64_t size,
+                   const Step& step) {
+  std::string result;
+  auto piece = std::make_unique<std::array<char, 1U << 17U>>();
+  bool more = true;
+  while (more) {
+    std::size_t used = bytes.size();
+    std::size_t made = piece->size();
+    more = step(bytes.data(), used, piece->data(), made);
+    bytes.remove_prefix(used);
+    if (made > size - result.size() || (more && used == 0 && made == 0))
+      throw broken_chunk(compression);
+    result.append(piece->data(), made);
+  }
+  return result;
+}
+
+std::string expand_lz4(std::string_view bytes, std::uint64_t size) {
+  LZ4F_dctx* opened = nullptr;
+  if (LZ4F_isError(LZ4F_createDecompressionContext(&opened, LZ4F_VERSION))) throw std::bad_alloc();
+  const std::unique_ptr<LZ4F_dctx, decltype(&LZ4F_freeDecompressionContext)> context(
+      opened, LZ4F_freeDecompressionContext);
+  return expand("lz4", bytes, size,
+                [&](const char* input, std::size_t& used, char* output, std::size_t& made) {
+                  const std::size_t left =
+                      LZ4F_decompress(context.get(), output, &made, input, &used, nullptr);
+                  if (LZ4F_isError(left)) throw broken_chunk("lz4");
+                  return left != 0;
+                });
+}
+
+std::string expand_zstd(std::string_view bytes, std::uint64_t size) {
+  const std::unique_ptr<ZSTD_DCtx, decltype(&ZSTD_freeDCtx)> context(ZSTD_createDCtx(),
+                                                                     ZSTD_freeDCtx);
+  return expand("zstd", bytes, size,
+                [&](const char* input, std::size_t& used, char* output, std::size_t& made) {
+                  ZSTD_inBuffer in = {input, used, 0};
+                  ZSTD_outBuffer out = {output, made, 0};
+                  const std::size_t left = ZSTD_decompressStream(context.get(), &out, &in);
+                  if (ZSTD_isError(left)) throw broken_chunk("zstd");
+                  used = in.pos;
+                  made = out.pos;
+                  return left != 0;
+                });
+}
 
 MessageEncoding encoding_named(std::string_view name) {
   return name == "cdr"    ? MessageEncoding::cdr
@@ -40,12 +121,12 @@ class McapReader {
       : path_(path), take_(take), file_(path, std::ios::binary) {
     require_readable_file(path);
     left_ = fs::file_size(path);
-    file_.seekg(-static_cast<std::streamoff>(mcap::magic.size()), std::ios::end);
-    if (read_bytes(mcap::magic.size()) != mcap::magic)
+    file_.seekg(-static_cast<std::streamoff>(magic.size()), std::ios::end);
+    if (read_bytes(magic.size()) != magic)
       throw Error("is cut off: its recording was not ended (`mcap recover` mends it)",
                   {.file = path_.string()});
-    file_.seekg(static_cast<std::streamoff>(mcap::magic.size()));
-    left_ -= std::min<std::uint64_t>(left_, mcap::magic.size());
+    file_.seekg(static_cast<std::streamoff>(magic.size()));
+    left_ -= std::min<std::uint64_t>(left_, magic.size());
   }
 
   void read_all() {
@@ -73,35 +154,34 @@ class McapReader {
 
   // False behind the last message: what follows is the index.
   bool read_record(Opcode opcode) {
-    const auto length = Fields(read_bytes(8)).number<std::uint64_t>();
+    const auto length = ByteReader(read_bytes(8)).number<std::uint64_t>();
     const std::string_view content = read_bytes(length);
     if (opcode == Opcode::data_end || opcode == Opcode::footer) return false;
     if (opcode == Opcode::chunk)
-      take_chunk(Fields(content));
+      take_chunk(ByteReader(content));
     else
-      take_record(opcode, Fields(content));
+      take_record(opcode, ByteReader(content));
     return true;
   }
 
-  void take_chunk(Fields chunk) {
+  void take_chunk(ByteReader chunk) {
     chunk.take(16);  // the first and the last stamp
     const auto size = chunk.number<std::uint64_t>();
     const auto checksum = chunk.number<std::uint32_t>();
     const std::string compression = printable(std::string(chunk.text()));
-    const std::string records =
-        mcap::decompress_chunk(compression, chunk.text<std::uint64_t>(), size);
+    const std::string records = decompress_chunk(compression, chunk.text<std::uint64_t>(), size);
     // 0: it was not calculated.
     if (checksum != 0 &&
         checksum != crc32_z(0, reinterpret_cast<const Bytef*>(records.data()), records.size()))
       throw Error("does not fit its checksum", {.field = "chunk"});
-    Fields rest(records);
+    ByteReader rest(records);
     while (!rest.empty()) {
       const auto opcode = rest.number<Opcode>();
-      take_record(opcode, Fields(rest.text<std::uint64_t>()));
+      take_record(opcode, ByteReader(rest.text<std::uint64_t>()));
     }
   }
 
-  void take_record(Opcode opcode, Fields record) {
+  void take_record(Opcode opcode, ByteReader record) {
     if (opcode == Opcode::schema) {
       const auto id = record.number<std::uint16_t>();
       types_[id] = printable(std::string(record.text()));
@@ -119,14 +199,14 @@ class McapReader {
     }
   }
 
-  void take_channel(Fields record) {
+  void take_channel(ByteReader record) {
     const auto id = record.number<std::uint16_t>();
     const auto type = types_.find(record.number<std::uint16_t>());
     BagTopic topic;
     if (type != types_.end()) topic.type = type->second;
     topic.name = printable(std::string(record.text()));
     topic.encoding = encoding_named(record.text());
-    Fields notes(record.text());
+    ByteReader notes(record.text());
     while (!notes.empty()) {
       const std::string_view key = notes.text();
       const std::string_view value = notes.text();
@@ -198,21 +278,20 @@ class McapSink : public BagSink {
  public:
   McapSink(const fs::path& path, BagCompression compression)
       : path_(path), compression_(compression_name(compression)), file_(path, std::ios::binary) {
-    put(mcap::magic);
-    put(Record().text("ros2").text("graspmap").as(Opcode::header));
+    put(magic);
+    put(as_record(Opcode::header, ByteWriter().text("ros2").text("graspmap")));
   }
 
   void write(const StoredMessage& message) override {
     const std::uint16_t channel = channel_of(message);
     const auto stamp = static_cast<std::uint64_t>(message.stamp_ns);
     entries_[channel].number(stamp).number(static_cast<std::uint64_t>(chunk_.size()));
-    chunk_ += Record()
-                  .number(channel)
-                  .number(std::uint32_t{0})
-                  .number(stamp)
-                  .number(stamp)
-                  .bytes(message.bytes)
-                  .as(Opcode::message);
+    chunk_ += as_record(Opcode::message, ByteWriter()
+                                             .number(channel)
+                                             .number(std::uint32_t{0})
+                                             .number(stamp)
+                                             .number(stamp)
+                                             .bytes(message.bytes));
     first_ns_ = std::min(first_ns_, stamp);
     last_ns_ = std::max(last_ns_, stamp);
     topics_.add(channel, 1, message.stamp_ns, message.stamp_ns);
@@ -221,9 +300,9 @@ class McapSink : public BagSink {
 
   void close() override {
     if (!chunk_.empty()) put_chunk();
-    put(Record().number(std::uint32_t{0}).as(Opcode::data_end));
+    put(as_record(Opcode::data_end, ByteWriter().number(std::uint32_t{0})));
     put_summary();
-    put(mcap::magic);
+    put(magic);
     file_.close();
     require_written();
   }
@@ -254,21 +333,17 @@ class McapSink : public BagSink {
     const auto next = static_cast<std::uint16_t>(types_.size() + 1);
     const auto [known, is_new] = types_.emplace(type, next);
     if (is_new)
-      add_definition(schemas_, Record()
-                                   .number(next)
-                                   .text(type)
-                                   .text("ros2msg")
-                                   .text(message.definition())
-                                   .as(Opcode::schema));
-    Record notes;
+      add_definition(schemas_, as_record(Opcode::schema,
+                                         ByteWriter().number(next).text(type).text("ros2msg").text(
+                                             message.definition())));
+    ByteWriter notes;
     notes.text("offered_qos_profiles").text(quality_of_service(message.latching));
-    add_definition(channels_, Record()
-                                  .number(channel)
-                                  .number(known->second)
-                                  .text(message.topic)
-                                  .text("cdr")
-                                  .text(notes.content())
-                                  .as(Opcode::channel));
+    add_definition(channels_, as_record(Opcode::channel, ByteWriter()
+                                                             .number(channel)
+                                                             .number(known->second)
+                                                             .text(message.topic)
+                                                             .text("cdr")
+                                                             .text(notes.content())));
     return channel;
   }
 
@@ -279,34 +354,34 @@ class McapSink : public BagSink {
   }
 
   void put_chunk() {
-    const std::string records = mcap::compress_chunk(compression_, chunk_);
+    const std::string records = compress_chunk(compression_, chunk_);
     const std::uint64_t begin = position_;
-    put(Record()
-            .number(first_ns_)
-            .number(last_ns_)
-            .number(static_cast<std::uint64_t>(chunk_.size()))
-            .number(static_cast<std::uint32_t>(
-                crc32_z(0, reinterpret_cast<const Bytef*>(chunk_.data()), chunk_.size())))
-            .text(compression_)
-            .text<std::uint64_t>(records)
-            .as(Opcode::chunk));
+    put(as_record(Opcode::chunk,
+                  ByteWriter()
+                      .number(first_ns_)
+                      .number(last_ns_)
+                      .number(static_cast<std::uint64_t>(chunk_.size()))
+                      .number(static_cast<std::uint32_t>(
+                          crc32_z(0, reinterpret_cast<const Bytef*>(chunk_.data()), chunk_.size())))
+                      .text(compression_)
+                      .text<std::uint64_t>(records)));
     const std::uint64_t length = position_ - begin;
-    Record offsets;
+    ByteWriter offsets;
     for (const auto& [channel, entries] : entries_) {
       offsets.number(channel).number(position_);
-      put(Record().number(channel).text(entries.content()).as(Opcode::message_index));
+      put(as_record(Opcode::message_index, ByteWriter().number(channel).text(entries.content())));
     }
-    chunk_index_ += Record()
-                        .number(first_ns_)
-                        .number(last_ns_)
-                        .number(begin)
-                        .number(length)
-                        .text(offsets.content())
-                        .number(position_ - begin - length)
-                        .text(compression_)
-                        .number(static_cast<std::uint64_t>(records.size()))
-                        .number(static_cast<std::uint64_t>(chunk_.size()))
-                        .as(Opcode::chunk_index);
+    chunk_index_ +=
+        as_record(Opcode::chunk_index, ByteWriter()
+                                           .number(first_ns_)
+                                           .number(last_ns_)
+                                           .number(begin)
+                                           .number(length)
+                                           .text(offsets.content())
+                                           .number(position_ - begin - length)
+                                           .text(compression_)
+                                           .number(static_cast<std::uint64_t>(records.size()))
+                                           .number(static_cast<std::uint64_t>(chunk_.size())));
     ++chunks_;
     chunk_.clear();
     entries_.clear();
@@ -316,24 +391,25 @@ class McapSink : public BagSink {
 
   std::string statistics() const {
     std::uint64_t messages = 0;
-    Record counts;
+    ByteWriter counts;
     for (std::size_t n = 0; n < topics_.topics.size(); ++n) {
       messages += topics_.topics[n].messages;
       counts.number(static_cast<std::uint16_t>(n))
           .number(static_cast<std::uint64_t>(topics_.topics[n].messages));
     }
     const bool none = messages == 0;
-    return Record()
-        .number(messages)
-        .number(static_cast<std::uint16_t>(types_.size()))
-        .number(static_cast<std::uint32_t>(topics_.topics.size()))
-        .number(std::uint32_t{0})  // attachments
-        .number(std::uint32_t{0})  // metadata
-        .number(chunks_)
-        .number(none ? std::uint64_t{0} : static_cast<std::uint64_t>(topics_.first_ns))
-        .number(none ? std::uint64_t{0} : static_cast<std::uint64_t>(topics_.last_ns))
-        .text(counts.content())
-        .as(Opcode::statistics);
+    return as_record(
+        Opcode::statistics,
+        ByteWriter()
+            .number(messages)
+            .number(static_cast<std::uint16_t>(types_.size()))
+            .number(static_cast<std::uint32_t>(topics_.topics.size()))
+            .number(std::uint32_t{0})  // attachments
+            .number(std::uint32_t{0})  // metadata
+            .number(chunks_)
+            .number(none ? std::uint64_t{0} : static_cast<std::uint64_t>(topics_.first_ns))
+            .number(none ? std::uint64_t{0} : static_cast<std::uint64_t>(topics_.last_ns))
+            .text(counts.content()));
   }
 
   void put_summary() {
@@ -345,17 +421,16 @@ class McapSink : public BagSink {
                                                      {Opcode::chunk_index, chunk_index_}};
     for (const auto& [opcode, records] : groups) {
       if (records.empty()) continue;
-      offsets += Record()
-                     .number(opcode)
-                     .number(position_)
-                     .number(static_cast<std::uint64_t>(records.size()))
-                     .as(Opcode::summary_offset);
+      offsets +=
+          as_record(Opcode::summary_offset, ByteWriter().number(opcode).number(position_).number(
+                                                static_cast<std::uint64_t>(records.size())));
       put(records);
     }
     const std::uint64_t offsets_begin = position_;
     put(offsets);
     // 0: no checksum of the summary.
-    put(Record().number(begin).number(offsets_begin).number(std::uint32_t{0}).as(Opcode::footer));
+    put(as_record(Opcode::footer,
+                  ByteWriter().number(begin).number(offsets_begin).number(std::uint32_t{0})));
   }
 
   fs::path path_;
@@ -364,7 +439,7 @@ class McapSink : public BagSink {
   std::uint64_t position_ = 0;
 
   std::string chunk_;
-  std::map<std::uint16_t, Record> entries_;  // of the chunk's messages, by channel
+  std::map<std::uint16_t, ByteWriter> entries_;  // of the chunk's messages, by channel
   std::uint64_t first_ns_ = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t last_ns_ = 0;
 
@@ -380,6 +455,44 @@ class McapSink : public BagSink {
 
 std::unique_ptr<BagSink> new_mcap(const fs::path& path, BagCompression compression) {
   return std::make_unique<McapSink>(path, compression);
+}
+
+std::string decompress_chunk(const std::string& compression, std::string_view bytes,
+                             std::uint64_t size) {
+  if (size > max_chunk_bytes)
+    throw Error("is too large",
+                {.field = "size of a chunk", .value = std::to_string(size), .bound = "<= 1 GiB"});
+  std::string result;
+  if (compression == "lz4")
+    result = expand_lz4(bytes, size);
+  else if (compression == "zstd")
+    result = expand_zstd(bytes, size);
+  else if (compression.empty())
+    result = bytes;
+  else
+    throw Error(
+        "is not known",
+        {.field = "compression of a chunk", .value = compression, .bound = "lz4, zstd or none"});
+  if (result.size() != size)
+    throw Error("has another size", {.field = "chunk",
+                                     .value = std::to_string(result.size()) + " bytes",
+                                     .bound = std::to_string(size)});
+  return result;
+}
+
+std::string compress_chunk(const std::string& compression, const std::string& bytes) {
+  if (compression.empty()) return bytes;
+  const bool zstd = compression == "zstd";
+  std::string result(
+      zstd ? ZSTD_compressBound(bytes.size()) : LZ4F_compressFrameBound(bytes.size(), nullptr),
+      '\0');
+  const std::size_t size =
+      zstd ? ZSTD_compress(result.data(), result.size(), bytes.data(), bytes.size(), 3)
+           : LZ4F_compressFrame(result.data(), result.size(), bytes.data(), bytes.size(), nullptr);
+  if (zstd ? ZSTD_isError(size) : LZ4F_isError(size))
+    throw Error("a chunk cannot be compressed", {}, ErrorKind::failed);
+  result.resize(size);
+  return result;
 }
 
 }  // namespace libmap

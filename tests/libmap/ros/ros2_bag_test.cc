@@ -12,7 +12,6 @@
 #include "libmap/ros/bag_rig.h"
 #include "libmap/ros/bag_storage.h"
 #include "libmap/ros/bag_writer.h"
-#include "libmap/ros/mcap_records.h"
 #include "libmap/ros/message_codec.h"
 #include "libmap/ros/message_encoding.h"
 #include "libmap/ros/transform_tree.h"
@@ -386,14 +385,14 @@ TEST(Ros2Bag, ForeignDatabases) {
 TEST(Mcap, ChunksThatPromiseMore) {
   const std::string text(1000, 'x');
   for (const char* compression : {"", "lz4", "zstd"}) {
-    const std::string bytes = libmap::mcap::compress_chunk(compression, text);
-    EXPECT_EQ(libmap::mcap::decompress_chunk(compression, bytes, 1000), text);
+    const std::string bytes = libmap::compress_chunk(compression, text);
+    EXPECT_EQ(libmap::decompress_chunk(compression, bytes, 1000), text);
     for (const std::uint64_t size : {999UL, 1001UL, 1UL << 29, ~0UL})
-      EXPECT_THROW(libmap::mcap::decompress_chunk(compression, bytes, size), libmap::Error) << size;
+      EXPECT_THROW(libmap::decompress_chunk(compression, bytes, size), libmap::Error) << size;
     const std::string_view cut = std::string_view(bytes).substr(0, bytes.size() - 1);
-    EXPECT_THROW(libmap::mcap::decompress_chunk(compression, cut, 1000), libmap::Error);
+    EXPECT_THROW(libmap::decompress_chunk(compression, cut, 1000), libmap::Error);
   }
-  EXPECT_EQ(error_of([&] { libmap::mcap::decompress_chunk("bz2", text, 1000); }).context().value, "bz2");
+  EXPECT_EQ(error_of([&] { libmap::decompress_chunk("bz2", text, 1000); }).context().value, "bz2");
 }
 
 TEST(Ros2Bag, WhatTheFormatsCannotHold) {
