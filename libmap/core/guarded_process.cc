@@ -102,24 +102,23 @@ std::string GuardedProcess::end() {
   return WIFSIGNALED(status) ? " (signal " + std::to_string(WTERMSIG(status)) + ")" : "";
 }
 
-void send_error(const GuardedProcess::Write& write, const Error* error) {
-  send_array(write, error == nullptr ? std::string() : error->reason());
+void GuardedOutput::error(const Error* error) {
+  array(error == nullptr ? std::string() : error->reason());
   if (error == nullptr) return;
   for (const std::string& text :
        {error->context().field, error->context().value, error->context().bound})
-    send_array(write, text);
-  send_value(write, error->kind());
+    array(text);
+  value(error->kind());
 }
 
-void receive_error(GuardedProcess& process, std::string_view broken) {
+void GuardedInput::error() {
   std::string reason;
-  receive_array(process, broken, reason);
+  array(reason);
   if (reason.empty()) return;
   ErrorContext context;
-  for (std::string* text : {&context.field, &context.value, &context.bound})
-    receive_array(process, broken, *text);
+  for (std::string* text : {&context.field, &context.value, &context.bound}) array(*text);
   ErrorKind kind = ErrorKind::bad_input;
-  receive_value(process, broken, kind);
+  value(kind);
   throw Error(reason, context, kind);
 }
 

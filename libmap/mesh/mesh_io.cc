@@ -320,6 +320,17 @@ MeshReadResult read_mesh(const std::filesystem::path& path) {
   }
 }
 
+void require_single_precision(const TriangleMesh& mesh, const std::string& format) {
+  constexpr auto most = static_cast<double>(std::numeric_limits<float>::max());
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+    const double farthest = mesh.vertices[n].cwiseAbs().maxCoeff();
+    if (!(farthest <= most))
+      throw Error("too far away for " + format, {.field = "vertex " + std::to_string(n),
+                                                 .value = to_text(farthest) + " m",
+                                                 .bound = "<= " + to_text(most)});
+  }
+}
+
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
                 const MeshWriteOptions& options) {
   require_mesh_format(path);

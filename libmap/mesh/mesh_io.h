@@ -59,6 +59,10 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
 // Throws Error unless meshes are written in the format that the extension names.
 void require_mesh_format(const std::filesystem::path& path);
 
+// Throws Error if a vertex is no single-precision number, as which these formats keep or assimp
+// reads it: it would come back infinite.
+void require_single_precision(const TriangleMesh& mesh, const std::string& format);
+
 // Whether the file holds a mesh (it has faces), or a folder one that does, or a cloud: by its
 // extension, and for .ply by its content. Throws Error: an extension of neither, or a file that
 // cannot be read.

@@ -22,71 +22,49 @@ namespace {
 
 // A block of 2^24 pixels as GDAL and we hold it, its mask, and GDAL's tables.
 constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 29;
-constexpr const char* broken = "is broken: GDAL crashed on it";
 
 enum class Parcel : std::uint8_t { info, block, end };
 
-// The numbers of DemInfo.
-struct InfoNumbers {
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-  double unit_m = 1.0;
-  double origin_m[3] = {};
-  double local_from_pixel[6] = {};
-};
-struct Window {
-  std::int64_t column = 0;
-  std::int64_t row = 0;
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-};
-
-void send_info(const GuardedProcess::Write& write, const DemInfo& info) {
-  InfoNumbers numbers{
-      .columns = info.columns, .rows = info.rows, .unit_m = info.georeference.unit_m};
-  Eigen::Map<Eigen::Vector3d>(numbers.origin_m) = info.georeference.origin_m;
-  Eigen::Map<Eigen::Matrix<double, 2, 3>>(numbers.local_from_pixel) = info.local_from_pixel;
-  send_value(write, numbers);
-  send_array(write, info.georeference.crs_wkt);
-  send_array(write, info.band_type);
+void pass_info(auto& pipe, auto& info) {
+  pipe.value(info.columns);
+  pipe.value(info.rows);
+  pipe.array(info.band_type);
+  pipe.array(info.georeference.crs_wkt);
+  pipe.value(info.georeference.unit_m);
+  for (auto& number : info.georeference.origin_m) pipe.value(number);
+  for (auto& number : info.local_from_pixel.reshaped()) pipe.value(number);
 }
 
-DemInfo receive_info(GuardedProcess& process) {
-  InfoNumbers numbers;
-  DemInfo info;
-  receive_value(process, broken, numbers);
-  receive_array(process, broken, info.georeference.crs_wkt);
-  receive_array(process, broken, info.band_type);
-  info.columns = numbers.columns;
-  info.rows = numbers.rows;
-  info.georeference.unit_m = numbers.unit_m;
-  info.georeference.origin_m = Eigen::Vector3d(numbers.origin_m);
-  info.local_from_pixel = Eigen::Map<Eigen::Matrix<double, 2, 3>>(numbers.local_from_pixel);
-  return info;
+void pass_block(auto& pipe, auto& block) {
+  pipe.value(block.column);
+  pipe.value(block.row);
+  pipe.value(block.columns);
+  pipe.value(block.rows);
+  pipe.array(block.heights_m);
 }
 
 // What the process does: an Error or none before each parcel.
 void serve(const fs::path& path, const std::optional<Georeference>& frame,
            const GuardedProcess::Write& write) {
+  GuardedOutput output(write);
   const auto announce = [&](Parcel parcel) {
-    send_error(write, nullptr);
-    send_value(write, parcel);
+    output.error(nullptr);
+    output.value(parcel);
   };
   try {
     raster_module().read_dem(
         path, frame,
         [&](const DemInfo& info) {
           announce(Parcel::info);
-          send_info(write, info);
+          pass_info(output, info);
         },
         [&](const DemBlock& block) {
           announce(Parcel::block);
-          send_value(write, Window{block.column, block.row, block.columns, block.rows});
-          send_array(write, block.heights_m);
+          pass_block(output, block);
         });
     announce(Parcel::end);
   } catch (const Error& error) {
-    send_error(write, &error);
+    output.error(&error);
   }
 }
 
@@ -95,12 +73,13 @@ void serve(const fs::path& path, const std::optional<Georeference>& frame,
 class DemReader::Process {
  public:
   Process(fs::path path, const std::optional<Georeference>& frame)
-      : path_(std::move(path)), process_(max_data_bytes, [&](const GuardedProcess::Write& write) {
-          serve(path_, frame, write);
-        }) {
+      : path_(std::move(path)),
+        process_(max_data_bytes,
+                 [&](const GuardedProcess::Write& write) { serve(path_, frame, write); }),
+        input_(process_, "is broken: GDAL crashed on it") {
     in_file([&] {
       receive_parcel();
-      info_ = receive_info(process_);
+      pass_info(input_, info_);
     });
   }
 
@@ -110,23 +89,16 @@ class DemReader::Process {
     bool is_block = false;
     in_file([&] {
       is_block = receive_parcel() == Parcel::block;
-      if (!is_block) return;
-      Window window;
-      receive_value(process_, broken, window);
-      block.column = window.column;
-      block.row = window.row;
-      block.columns = window.columns;
-      block.rows = window.rows;
-      receive_array(process_, broken, block.heights_m);
+      if (is_block) pass_block(input_, block);
     });
     return is_block;
   }
 
  private:
   Parcel receive_parcel() {
-    receive_error(process_, broken);
+    input_.error();
     Parcel parcel = Parcel::end;
-    receive_value(process_, broken, parcel);
+    input_.value(parcel);
     return parcel;
   }
 
@@ -141,6 +113,7 @@ class DemReader::Process {
 
   fs::path path_;
   GuardedProcess process_;
+  GuardedInput input_;
   DemInfo info_;
 };
 

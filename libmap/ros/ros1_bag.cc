@@ -88,8 +88,6 @@ using ros_message::printable;
 
 constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 30;
 
-constexpr const char* broken = "is broken: ROS's bag library crashed on it";
-
 // What comes through the pipe: one head, then a text or a message.
 struct Parcel {
   enum class Kind : std::uint32_t { topic, message, error, end };
@@ -104,16 +102,16 @@ struct Parcel {
 // The end of the pipe at which librosbag works.
 class Sender {
  public:
-  explicit Sender(const GuardedProcess::Write& write) : write_(write) {}
+  explicit Sender(const GuardedProcess::Write& write) : output_(write) {}
 
   void send(const Parcel& parcel, std::string_view bytes) {
-    send_value(write_, parcel);
-    send_array(write_, bytes);
+    output_.value(parcel);
+    output_.array(bytes);
   }
   void send_error(const std::string& text) { send({.kind = Parcel::Kind::error}, text); }
 
  private:
-  const GuardedProcess::Write& write_;
+  GuardedOutput output_;
 };
 
 std::int64_t nanoseconds_of(const ros::Time& time) {
@@ -155,8 +153,8 @@ class GuardedBag {
   std::optional<Parcel> receive(std::string& bytes) {
     Parcel parcel;
     try {
-      receive_value(process_, broken, parcel);
-      receive_array(process_, broken, bytes);
+      input_.value(parcel);
+      input_.array(bytes);
       if (parcel.kind == Parcel::Kind::error) throw Error(bytes);
     } catch (const Error& error) {
       throw error.in_file(path_.string());
@@ -168,6 +166,7 @@ class GuardedBag {
  private:
   fs::path path_;
   GuardedProcess process_;
+  GuardedInput input_{process_, "is broken: ROS's bag library crashed on it"};
 };
 
 // The topics of a view, in the order of recording, and the one of each connection, by its header.
