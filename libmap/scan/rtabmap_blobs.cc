@@ -20,7 +20,6 @@ std::string to_bytes(const std::array<T, N>& numbers) {
   return bytes;
 }
 
-constexpr std::size_t pose_bytes = 48;
 // Of the nine numbers from the nearest rotation: float32 of old versions is off by 1e-4.
 constexpr double max_rotation_error = 0.05;
 

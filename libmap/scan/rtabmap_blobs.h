@@ -17,6 +17,7 @@ inline constexpr std::size_t absent_blob_bytes = 4;
 inline bool is_absent(std::string_view blob) { return blob.size() <= absent_blob_bytes; }
 
 // 12 float32, the rows of [R|t].
+inline constexpr std::size_t pose_bytes = 48;
 std::string to_blob(const Pose& pose);
 std::string null_pose_blob();
 // 36 float64, row by row: the symmetric part. g2o rejects a whole graph for one asymmetric bit.

@@ -18,7 +18,6 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t pose_bytes = 48;
 constexpr std::size_t max_warnings = 100;
 
 class Warnings {

@@ -54,7 +54,6 @@ std::size_t format_of(float number) {
 
 // Checks the description; the format that it states.
 std::size_t format_of_info(std::string_view info) {
-  constexpr std::size_t pose_bytes = 48;
   if (info.empty()) return unknown_format;
   if (info.size() != 76 && info.size() != 60 && info.size() != 56)
     throw Error("scan_info of an unknown length",
