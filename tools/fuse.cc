@@ -1,7 +1,7 @@
 // graspmap fuse: the depth images of a scan -> one oriented, colored cloud.
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/depth_fusion.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"

@@ -13,7 +13,7 @@
 
 #include "libmap/core/angle.h"
 #include "libmap/core/error.h"
-#include "libmap/core/guarded_arrays.h"
+#include "libmap/core/guarded_process.h"
 #include "libmap/core/pose.h"
 
 namespace libgtd {
@@ -394,29 +394,16 @@ void bind(libmap::ParameterTable& table, UrdfMapping& mapping) {
 }
 
 Measures measures_of_urdf(const std::string& xml, const UrdfMapping& mapping) {
-  constexpr const char* broken = "is broken: urdfdom crashed on it";
-  libmap::GuardedProcess process(max_data_bytes, [&](const libmap::GuardedProcess::Write& write) {
-    try {
-      const Measures measures = derive(Robot(xml), mapping);
-      libmap::send_error(write, nullptr);
-      libmap::send_value(write, std::uint64_t{measures.size()});
-      for (const auto& [key, value] : measures) {
-        libmap::send_array(write, key);
-        libmap::send_array(write, value);
-      }
-    } catch (const Error& error) {
-      libmap::send_error(write, &error);
-    }
-  });
-  libmap::receive_error(process, broken);
-  std::uint64_t count = 0;
-  libmap::receive_value(process, broken, count);
-  Measures measures(count);
-  for (auto& [key, value] : measures) {
-    libmap::receive_array(process, broken, key);
-    libmap::receive_array(process, broken, value);
-  }
-  return measures;
+  return libmap::run_guarded<Measures>(
+      max_data_bytes, "is broken: urdfdom crashed on it",
+      [&] { return derive(Robot(xml), mapping); },
+      [](auto& pipe, Measures& measures) {
+        pipe.size(measures);
+        for (auto& [key, value] : measures) {
+          pipe.array(key);
+          pipe.array(value);
+        }
+      });
 }
 
 }  // namespace libgtd

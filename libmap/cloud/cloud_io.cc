@@ -4,24 +4,92 @@
 #include <boost/interprocess/file_mapping.hpp>
 #include <boost/interprocess/mapped_region.hpp>
 #include <cerrno>
+#include <cmath>
 #include <cstring>
 #include <fstream>
+#include <limits>
+#include <sstream>
+#include <string>
 #include <utility>
 #include <vector>
 
 #include "libmap/cloud/cloud_columns.h"
-#include "libmap/cloud/csv_codec.h"
 #include "libmap/cloud/pcd_codec.h"
 #include "libmap/cloud/ply_codec.h"
 #include "libmap/cloud/vtp_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/file_size.h"
+#include "libmap/core/memory_budget.h"
+#include "libmap/core/output_lock.h"
+#include "libmap/core/table.h"
 #include "libmap/core/text.h"
 #include "libmap/raster/dem_reader.h"
 
 namespace libmap {
+
 namespace {
+
+bool is_coordinate(const std::string& name) {
+  return name.size() == 1 && std::string("xyzXYZ").find(name) != std::string::npos;
+}
+
+bool has_numbers(const Table& table, std::size_t column) {
+  return std::any_of(table.rows.begin(), table.rows.end(),
+                     [column](const auto& row) { return parse_double(row[column]).has_value(); });
+}
+
+// int32 if every cell is an integer of its range.
+ScalarType type_of(const std::vector<double>& values) {
+  const bool integers = std::all_of(values.begin(), values.end(), [](double value) {
+    return fits_type(value, ScalarType::int32) && !(value == 0.0 && std::signbit(value));
+  });
+  return integers ? ScalarType::int32 : ScalarType::float64;
+}
+
+std::vector<double> numbers_of(const Table& table, std::size_t column) {
+  const bool required = is_coordinate(table.columns[column]);
+  std::vector<double> values(table.rows.size());
+  for (std::size_t row = 0; row < values.size(); ++row)
+    values[row] =
+        required
+            ? table.number(row, column)
+            : table.optional_number(row, column).value_or(std::numeric_limits<double>::quiet_NaN());
+  return values;
+}
+
+// Columns without a single number are passed over and named in info.skipped. Throws Error: a cell
+// that is no number in a column of numbers, an empty cell in x, y or z.
+GeometryColumns decode_csv(std::string_view text, const std::string& file) {
+  const Table table = parse_csv(text, file);
+  GeometryColumns content;
+  content.info.format = "csv";
+  content.info.encoding = FileEncoding::ascii;
+  content.info.bytes = text.size();
+  content.info.points = table.rows.size();
+  content.vertices.rows = table.rows.size();
+  for (std::size_t column = 0; column < table.columns.size(); ++column) {
+    const std::string& name = table.columns[column];
+    if (!table.rows.empty() && !is_coordinate(name) && !has_numbers(table, column)) {
+      content.info.skipped.push_back("column " + name);
+      continue;
+    }
+    const std::vector<double> values = numbers_of(table, column);
+    const ScalarType type = is_coordinate(name) ? ScalarType::float64 : type_of(values);
+    std::copy(values.begin(), values.end(), content.vertices.add_numbers(name, type));
+    content.info.fields.push_back({name, type, 1});
+  }
+  return content;
+}
+
+// A header line and a row per point, each number as the shortest text that reads back the same.
+void encode_csv(const ColumnSet& columns, std::ostream& out) {
+  Table header;
+  for (const Column& column : columns.columns) header.columns.push_back(column.name);
+  out << to_csv(header);
+  write_rows(columns.rows, out, [&](std::size_t begin, std::size_t end, std::string& text) {
+    append_rows_of_text(columns.columns, begin, end, ',', text);
+  });
+}
 
 // `is_read`: the formats that clouds are read from, else those that they are written in.
 void require_format(const std::filesystem::path& path, bool is_read) {
@@ -208,6 +276,72 @@ void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
     else
       encode_csv(columns, out);
   });
+}
+
+namespace {
+
+std::string encoded(const PointCloud& part, bool float64_positions) {
+  ColumnSet set = columns_of_cloud(part, NormalNames::long_names);
+  for (Column& column : set.columns)
+    if (column.name == "x" || column.name == "y" || column.name == "z")
+      column.type = float64_positions ? ScalarType::float64 : ScalarType::float32;
+  std::ostringstream out;
+  encode_pcd(set, part.viewpoint, FileEncoding::binary, out);
+  return std::move(out).str();
+}
+
+// The header's end: behind the line DATA.
+std::size_t data_begin(const std::string& bytes) {
+  return bytes.find('\n', bytes.find("\nDATA ") + 1) + 1;
+}
+
+void replace(std::string& text, const std::string& word, const std::string& by) {
+  text.replace(text.find(word), word.size(), by);
+}
+
+}  // namespace
+
+PcdPartsWriter::PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options)
+    : path_(std::move(path)), options_(options), file_(path_, std::ios::binary | std::ios::trunc) {
+  require_good();
+}
+
+void PcdPartsWriter::write(const std::string& bytes) {
+  file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
+  require_good();
+}
+
+// An ofstream tells of a failed open, write or close by its state alone; the system's call that
+// failed was the last one.
+void PcdPartsWriter::require_good() const {
+  if (!file_) throw system_failure(path_, "cannot be written", errno);
+}
+
+void PcdPartsWriter::append(const PointCloud& part) {
+  if (part.empty()) return;  // it does not say whether the whole has normals and colors
+  written_ += part.size();
+  if (written_ > options_.points)
+    throw Error("contains more points than were promised", {.file = path_.string()});
+  const std::string bytes = encoded(part, options_.float64_positions);
+  const std::size_t begin = data_begin(bytes);
+  std::string header = bytes.substr(0, begin);
+  const std::string own = std::to_string(part.size());
+  replace(header, "\nWIDTH " + own + "\n", "\nWIDTH " + std::to_string(options_.points) + "\n");
+  replace(header, "\nPOINTS " + own + "\n", "\nPOINTS " + std::to_string(options_.points) + "\n");
+  if (header_.empty()) {
+    write(header);
+    header_ = header;
+  } else if (header != header_) {
+    throw Error("the parts have different fields", {.file = path_.string()});
+  }
+  write(bytes.substr(begin));
+}
+
+void PcdPartsWriter::finish() {
+  if (written_ != options_.points)
+    throw Error("contains fewer points than were promised", {.file = path_.string()});
+  file_.close();
+  require_good();
 }
 
 }  // namespace libmap

@@ -16,7 +16,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
+#include <fstream>
 #include <functional>
 #include <memory>
 #include <ostream>
@@ -79,5 +81,35 @@ std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::pa
 // Opens `path`, calls write(stream) and sees that all of it was written; names the file in Errors.
 void write_geometry_file(const std::filesystem::path& path,
                          const std::function<void(std::ostream&)>& write);
+
+struct PcdPartsOptions {
+  std::uint64_t points = 1;        // of all parts together, at least 1
+  bool float64_positions = false;  // else float32: what write_cloud would choose for the whole
+};
+
+// A binary PCD written part by part, so that no more than one part is in memory. The file is that
+// of write_cloud for all parts in one cloud, byte for byte.
+class PcdPartsWriter {
+ public:
+  // Writes straight to `path`, as write_cloud does. Throws Error (failed).
+  PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options);
+
+  // All parts have the fields of the first, and normals and colors if it has; empty ones are
+  // passed over. Throws Error: one has others, more points than promised, a failed write
+  // (ErrorKind::failed).
+  void append(const PointCloud& part);
+  // After the last part. Throws Error: fewer points than promised, a failed write.
+  void finish();
+
+ private:
+  void write(const std::string& bytes);
+  void require_good() const;
+
+  std::filesystem::path path_;
+  PcdPartsOptions options_;
+  std::ofstream file_;
+  std::string header_;  // once the first part is written
+  std::uint64_t written_ = 0;
+};
 
 }  // namespace libmap

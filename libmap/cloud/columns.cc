@@ -6,6 +6,7 @@
 #include <limits>
 #include <utility>
 
+#include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 
@@ -112,6 +113,20 @@ bool fits_type(double value, ScalarType type) {
   return is_float(type) || as_type(value, type) == value;
 }
 
+double number_of(const TextLine& line, std::size_t word, const std::string& field,
+                 ScalarType type) {
+  const std::string_view text = line.words[word];
+  const std::optional<double> value = parse_double(text);
+  const char* const fault = !value ? " contains no number there"
+                            : !fits_type(*value, type)
+                                ? " contains a number that its type cannot represent"
+                                : nullptr;
+  if (fault == nullptr) return *value;
+  throw Error(name_of(line) + fault, {.field = field,
+                                      .value = std::string(text.substr(0, 40)),
+                                      .bound = value ? "of type " + to_text(type) : std::string()});
+}
+
 std::size_t record_size(const std::vector<Column>& columns) {
   std::size_t size = 0;
   for (const Column& column : columns) size += size_of(stored_as(column.type));
@@ -171,6 +186,12 @@ std::string viewpoint_words(const Pose& viewpoint) {
   std::string words;
   for (const double number : viewpoint_numbers(viewpoint)) words += " " + to_text(number);
   return words;
+}
+
+std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers) {
+  const Eigen::Quaterniond rotation(numbers[3], numbers[4], numbers[5], numbers[6]);
+  if (!(rotation.norm() > 0.0)) return std::nullopt;
+  return make_pose({numbers[0], numbers[1], numbers[2]}, rotation);
 }
 
 }  // namespace libmap

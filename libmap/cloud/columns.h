@@ -20,6 +20,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/text_lines.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -79,6 +80,9 @@ double as_type(double value, ScalarType type);
 // Whether a file may say `value` for that type.
 bool fits_type(double value, ScalarType type);
 
+// Word `word` of a line as a number that fits `type`. Throws Error naming field and line.
+double number_of(const TextLine& line, std::size_t word, const std::string& field, ScalarType type);
+
 // Calls body(row, value) for each row.
 template <typename Body>
 void for_each_value(const Column& column, std::size_t rows, const Body& body);
@@ -102,6 +106,8 @@ void write_rows(
 // each.
 std::array<double, 7> viewpoint_numbers(const Pose& viewpoint);
 std::string viewpoint_words(const Pose& viewpoint);
+// Nothing if the quaternion is zero.
+std::optional<Pose> pose_of_viewpoint(const std::array<double, 7>& numbers);
 
 inline constexpr std::size_t rows_a_chunk = 16384;  // that one thread takes
 
@@ -160,5 +166,13 @@ void for_each_value_in_parallel(const Column& column, std::size_t rows, const Bo
                    [&](std::size_t row, double value) { body(begin + row, value); });
   });
 }
+
+struct BinaryRecords {
+  std::uint64_t begin = 0;  // of the first record in the file
+  std::size_t bytes = 0;    // of a record
+  std::uint64_t count = 0;
+  std::vector<Column> columns;  // on a block of records that the caller keeps
+  Pose viewpoint = Pose::Identity();
+};
 
 }  // namespace libmap

@@ -19,7 +19,7 @@
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/frame_batch.h"
+#include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
 

@@ -8,7 +8,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/frame_batch.h"
+#include "libmap/scan/rgbd_frame.h"
 #include "libmap/scan/stereo_depth.h"
 
 namespace libmap {

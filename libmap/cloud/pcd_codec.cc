@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "libmap/cloud/cloud_columns.h"
-#include "libmap/cloud/text_rows.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/core/text_lines.h"
 
 namespace libmap {
 namespace {
@@ -71,8 +71,8 @@ HeaderLines read_lines(std::string_view file, PcdHeader& header) {
     position = end + 1;
     ++header.data_line;
     if (line.empty() || line.front() == '#') continue;
-    std::vector<std::string_view> words;
-    if (!TextRows(line, 0, 1).next(words)) continue;
+    const std::vector<std::string_view> words = words_of(line);
+    if (words.empty()) continue;
     std::string key(words.front());
     const bool is_data = key == "DATA";
     if (!is_data && std::find(known.begin(), known.end(), key) == known.end())
@@ -179,10 +179,8 @@ Pose read_viewpoint(const HeaderLines& lines) {
       throw bad_header("not a number", "VIEWPOINT", found->second[i]);
     numbers[i] = *number;
   }
-  const Eigen::Quaterniond rotation(numbers[3], numbers[4], numbers[5], numbers[6]);
   // Some programs write 0 0 0 0 0 0 0 where they know none.
-  if (!(rotation.norm() > 0.0)) return Pose::Identity();
-  return make_pose({numbers[0], numbers[1], numbers[2]}, rotation);
+  return pose_of_viewpoint(numbers).value_or(Pose::Identity());
 }
 
 PcdHeader read_header(std::string_view text) {
@@ -328,21 +326,20 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
       }
       targets.push_back(target);
     }
-  TextRows rows(text, header.data_begin, header.data_line);
-  std::vector<std::string_view> words;
+  LineReader lines(text.substr(header.data_begin), header.data_line);
+  TextLine line;
   for (std::size_t row = 0; row < header.points; ++row) {
-    if (!rows.next(words))
+    if (!lines.next(line))
       throw Error("the header promises " + std::to_string(header.points) + " points, but only " +
                   std::to_string(row) + " lines of data follow");
-    if (words.size() != targets.size())
-      throw Error("line " + std::to_string(rows.line()) + " contains " +
-                  std::to_string(words.size()) + " of " + std::to_string(targets.size()) +
-                  " numbers");
-    for (std::size_t i = 0; i < words.size(); ++i) {
+    if (line.words.size() != targets.size())
+      throw Error(name_of(line) + " contains " + std::to_string(line.words.size()) + " of " +
+                  std::to_string(targets.size()) + " numbers");
+    for (std::size_t i = 0; i < targets.size(); ++i) {
       const Target& target = targets[i];
       if (target.values == nullptr && target.packed == nullptr) continue;
       const double value =
-          rows.number(words[i], target.field->name, scalar_type_of(target.field->type));
+          number_of(line, i, target.field->name, scalar_type_of(target.field->type));
       if (target.values != nullptr)
         target.values[row] = value;
       else if (target.field->type == StoredType::float32)

@@ -11,7 +11,6 @@
 #include <string>
 #include <string_view>
 
-#include "libmap/cloud/binary_records.h"
 #include "libmap/cloud/columns.h"
 
 namespace libmap {

@@ -1,41 +1,203 @@
 #include "libmap/cloud/ply_codec.h"
 
 #include <algorithm>
+#include <array>
+#include <cmath>
 #include <limits>
+#include <map>
 #include <utility>
 #include <vector>
 
-#include "libmap/cloud/ply_header.h"
-#include "libmap/cloud/text_rows.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/core/text_lines.h"
 
 namespace libmap {
+
 namespace {
+
+struct PlyProperty {
+  std::string name;
+  StoredType type = StoredType::float32;
+  bool is_list = false;
+  StoredType count_type = StoredType::uint8;  // of a list's length
+};
+
+struct PlyElement {
+  std::string name;
+  std::uint64_t count = 0;
+  std::vector<PlyProperty> properties;
+
+  // Whether a row's length depends on its content.
+  bool has_lists() const {
+    return std::any_of(properties.begin(), properties.end(),
+                       [](const PlyProperty& property) { return property.is_list; });
+  }
+  // Bytes of a row in a binary file, the least if it has lists.
+  std::size_t record_bytes() const {
+    std::size_t bytes = 0;
+    for (const PlyProperty& property : properties)
+      bytes += size_of(property.is_list ? property.count_type : property.type);
+    return bytes;
+  }
+};
+
+struct PlyHeader {
+  FileEncoding encoding = FileEncoding::ascii;
+  bool big_endian = false;
+  std::vector<PlyElement> elements;
+  std::optional<Pose>
+      viewpoint;  // "comment viewpoint tx ty tz qw qx qy qz", as this project writes
+  std::size_t data_begin = 0;
+  std::size_t data_line = 1;
+
+  // The element of that name, or nullptr.
+  const PlyElement* find(std::string_view name) const {
+    for (const PlyElement& element : elements)
+      if (element.name == name) return &element;
+    return nullptr;
+  }
+};
+
+using Words = std::vector<std::string_view>;
+
+constexpr std::array<const char*, 8> type_names = {"char", "uchar", "short", "ushort",
+                                                   "int",  "uint",  "float", "double"};
+
+Error bad_line(std::size_t line, const std::string& reason, std::string_view value = {}) {
+  return Error(reason, {.field = "PLY header line " + std::to_string(line),
+                        .value = std::string(value.substr(0, 60))});
+}
+
+StoredType type_of(std::string_view name, std::size_t line) {
+  for (std::size_t i = 0; i < type_names.size(); ++i) {
+    const auto type = static_cast<ScalarType>(i);
+    if (name == type_names[i] || name == to_text(type)) return stored_as(type);
+  }
+  throw bad_line(line, "unknown number type", name);
+}
+
+FileEncoding encoding_of(const Words& words, std::size_t line, PlyHeader& header) {
+  if (words.size() != 3 || words[2] != "1.0") throw bad_line(line, "not 'format ENCODING 1.0'");
+  header.big_endian = words[1] == "binary_big_endian";
+  if (words[1] == "ascii") return FileEncoding::ascii;
+  if (header.big_endian || words[1] == "binary_little_endian") return FileEncoding::binary;
+  throw bad_line(line, "unknown encoding", words[1]);
+}
+
+PlyElement element_of(const Words& words, std::size_t line) {
+  const std::optional<std::int64_t> count =
+      words.size() == 3 ? parse_integer(words[2]) : std::nullopt;
+  if (!count || *count < 0) throw bad_line(line, "not 'element NAME COUNT'");
+  return {std::string(words[1]), static_cast<std::uint64_t>(*count), {}};
+}
+
+PlyProperty property_of(const Words& words, std::size_t line) {
+  if (words.size() == 3)
+    return {std::string(words[2]), type_of(words[1], line), false, StoredType::uint8};
+  if (words.size() != 5 || words[1] != "list")
+    throw bad_line(line, "not 'property TYPE NAME' or 'property list TYPE TYPE NAME'");
+  const StoredType count_type = type_of(words[2], line);
+  if (count_type == StoredType::float32 || count_type == StoredType::float64)
+    throw bad_line(line, "a list's length is an integer", words[2]);
+  return {std::string(words[4]), type_of(words[3], line), true, count_type};
+}
+
+std::optional<Pose> viewpoint_of(const Words& words) {
+  if (words.size() != 9 || words[1] != "viewpoint") return std::nullopt;
+  std::array<double, 7> numbers{};
+  for (std::size_t i = 0; i < numbers.size(); ++i) {
+    const std::optional<double> number = parse_double(words[i + 2]);
+    if (!number || !std::isfinite(*number)) return std::nullopt;
+    numbers[i] = *number;
+  }
+  return pose_of_viewpoint(numbers);
+}
+
+void add_element(PlyElement element, std::size_t line, PlyHeader& header) {
+  if (header.find(element.name) != nullptr)
+    throw bad_line(line, "this element is a duplicate", element.name);
+  constexpr std::size_t max_elements = 1000;
+  if (header.elements.size() == max_elements) throw bad_line(line, "more than 1000 elements");
+  header.elements.push_back(std::move(element));
+}
+
+void add_property(PlyProperty property, std::size_t line, PlyHeader& header) {
+  if (header.elements.empty()) throw bad_line(line, "a property before the first element");
+  for (const PlyProperty& other : header.elements.back().properties)
+    if (other.name == property.name)
+      throw bad_line(line, "this property is a duplicate", property.name);
+  constexpr std::size_t max_properties = 10'000;
+  if (header.elements.back().properties.size() == max_properties)
+    throw bad_line(line, "more than 10000 properties");
+  header.elements.back().properties.push_back(std::move(property));
+}
+
+// Throws Error (without the file's name) naming the line.
+PlyHeader read_ply_header(std::string_view text) {
+  if (text.empty()) throw Error("is empty");
+  PlyHeader header;
+  bool has_format = false;
+  std::size_t position = 0;
+  for (std::size_t line = 1;; ++line) {
+    const std::size_t end = text.find('\n', position);
+    if (line == 1 && trim(text.substr(0, std::min<std::size_t>(end, 5))) != "ply")
+      throw Error("not a PLY file");
+    if (end == std::string_view::npos) throw Error("the PLY header has no line end_header");
+    const std::string_view content = text.substr(position, end - position);
+    position = end + 1;
+    const Words words = words_of(content);
+    if (line == 1 || words.empty() || words[0] == "obj_info") continue;
+    if (words[0] == "comment") {
+      if (const auto viewpoint = viewpoint_of(words)) header.viewpoint = viewpoint;
+    } else if (words[0] == "format") {
+      header.encoding = encoding_of(words, line, header);
+      has_format = true;
+    } else if (words[0] == "element") {
+      add_element(element_of(words, line), line, header);
+    } else if (words[0] == "property") {
+      add_property(property_of(words, line), line, header);
+    } else if (words[0] == "end_header") {
+      if (!has_format) throw Error("the PLY header has no line format");
+      header.data_begin = position;
+      header.data_line = line + 1;
+      return header;
+    } else {
+      throw bad_line(line, "unknown word", words[0]);
+    }
+  }
+}
+
+// "char", "uchar", ... "double".
+std::string ply_type_name(ScalarType type) { return type_names[static_cast<std::size_t>(type)]; }
 
 // Where in the file the next element's rows begin.
 struct Cursor {
   const std::shared_ptr<const std::string>& bytes;
   std::size_t position;
-  TextRows rows;
+  LineReader lines;
 };
 
+std::string quoted_name(const PlyElement& element) {
+  return "'" + element.name.substr(0, 40) + "'";
+}
+
 std::string ends_early(const PlyElement& element, std::uint64_t row) {
-  return "the header promises " + std::to_string(element.count) + " rows of '" +
-         element.name.substr(0, 40) + "', but the data end in row " + std::to_string(row);
+  return "the header promises " + std::to_string(element.count) + " rows of " +
+         quoted_name(element) + ", but the data end in row " + std::to_string(row);
 }
 
 // Throws unless the element can stand in what is left of the file.
 void require_room(const PlyElement& element, FileEncoding encoding, std::uint64_t bytes) {
   if (encoding == FileEncoding::ascii)
     return require_room_for_text(element.count, element.properties.size(), bytes,
-                                 "rows of '" + element.name.substr(0, 40) + "'");
+                                 "rows of " + quoted_name(element));
   const std::uint64_t record = element.record_bytes();
   if (record > 0 && element.count > bytes / record)
-    throw Error("the header promises " + std::to_string(element.count) + " rows of '" +
-                element.name.substr(0, 40) + "' of " + std::to_string(record) +
-                " bytes, but only " + std::to_string(bytes) + " bytes of data follow (" +
-                std::to_string(bytes / record) + " rows)");
+    throw Error("the header promises " + std::to_string(element.count) + " rows of " +
+                quoted_name(element) + " of " + std::to_string(record) + " bytes, but only " +
+                std::to_string(bytes) + " bytes of data follow (" + std::to_string(bytes / record) +
+                " rows)");
 }
 
 bool is_index_list(const PlyElement& element, const PlyProperty& property) {
@@ -56,7 +218,7 @@ class RowReader {
     row_ = row;
     if (!ascii_) return;
     word_ = 0;
-    if (!cursor_.rows.next(words_)) throw Error(ends_early(element_, row));
+    if (!cursor_.lines.next(line_)) throw Error(ends_early(element_, row));
   }
   double number(const PlyProperty& property, StoredType type) {
     return ascii_ ? text_number(property, type) : binary_number(type);
@@ -65,26 +227,24 @@ class RowReader {
   std::uint64_t length(const PlyProperty& property) {
     const double length = number(property, property.count_type);
     const std::uint64_t left =
-        ascii_ ? words_.size() - word_
+        ascii_ ? line_.words.size() - word_
                : (cursor_.bytes->size() - cursor_.position) / size_of(property.type);
     if (!(length >= 0.0) || length > static_cast<double>(left))
-      throw Error("row " + std::to_string(row_) + " of '" + element_.name.substr(0, 40) +
-                      "' has a list longer than the data",
+      throw Error("row " + std::to_string(row_) + " of " + quoted_name(element_) +
+                      " has a list longer than the data",
                   {.field = property.name, .value = to_text(length)});
     return static_cast<std::uint64_t>(length);
   }
   void end_row() {
-    if (ascii_ && word_ != words_.size())
-      throw Error("line " + std::to_string(cursor_.rows.line()) +
-                  " contains more than one row of '" + element_.name.substr(0, 40) + "'");
+    if (ascii_ && word_ != line_.words.size())
+      throw Error(name_of(line_) + " contains more than one row of " + quoted_name(element_));
   }
 
  private:
   double text_number(const PlyProperty& property, StoredType type) {
-    if (word_ >= words_.size())
-      throw Error("line " + std::to_string(cursor_.rows.line()) + " ends before the number",
-                  {.field = property.name});
-    return cursor_.rows.number(words_[word_++], property.name, scalar_type_of(type));
+    if (word_ >= line_.words.size())
+      throw Error(name_of(line_) + " ends before the number", {.field = property.name});
+    return number_of(line_, word_++, property.name, scalar_type_of(type));
   }
   double binary_number(StoredType type) {
     if (size_of(type) > cursor_.bytes->size() - cursor_.position)
@@ -101,7 +261,7 @@ class RowReader {
   bool ascii_;
   bool swapped_;
   Cursor& cursor_;
-  std::vector<std::string_view> words_;
+  TextLine line_;
   std::size_t word_ = 0;
   std::uint64_t row_ = 0;
 };
@@ -186,7 +346,7 @@ ColumnSet read_element(const PlyElement& element, const PlyHeader& header, Curso
                        GeometryColumns& content) {
   const bool ascii = header.encoding == FileEncoding::ascii;
   require_room(element, header.encoding,
-               ascii ? cursor.rows.remaining() : cursor.bytes->size() - cursor.position);
+               ascii ? cursor.lines.remaining() : cursor.bytes->size() - cursor.position);
   const bool swapped = is_swapped(header);
   if (element.properties.empty()) return {};
   if (!ascii && !element.has_lists()) return view_rows(element, swapped, cursor);
@@ -215,17 +375,20 @@ GeometryFileInfo info_of(const PlyHeader& header, std::uint64_t file_bytes) {
   return info;
 }
 
-// Throws unless all elements can stand in a file of that size.
-void require_rooms(const PlyHeader& header, std::uint64_t file_bytes) {
+void require_vertices(const PlyHeader& header) {
+  if (header.find("vertex") == nullptr) throw Error("the PLY header has no element vertex");
+}
+
+// Throws unless all elements fit into a file of that size.
+PlyHeader checked_header(std::string_view head, std::uint64_t file_bytes) {
+  PlyHeader header = read_ply_header(head);
+  require_vertices(header);
   std::uint64_t left = file_bytes - header.data_begin;
   for (const PlyElement& element : header.elements) {
     require_room(element, header.encoding, left);
     if (header.encoding == FileEncoding::binary) left -= element.count * element.record_bytes();
   }
-}
-
-void require_vertices(const PlyHeader& header) {
-  if (header.find("vertex") == nullptr) throw Error("the PLY header has no element vertex");
+  return header;
 }
 
 void write_property_lines(const ColumnSet& set, std::ostream& out) {
@@ -286,17 +449,13 @@ void write_faces(const PlyContent& content, const PlyEncoding& encoding, std::os
 }  // namespace
 
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes) {
-  const PlyHeader header = read_ply_header(head);
-  require_vertices(header);
-  require_rooms(header, file_bytes);
+  const PlyHeader header = checked_header(head, file_bytes);
   return info_of(header, file_bytes);
 }
 
 std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t file_bytes,
                                          const std::byte* block) {
-  const PlyHeader header = read_ply_header(head);
-  require_vertices(header);
-  require_rooms(header, file_bytes);
+  const PlyHeader header = checked_header(head, file_bytes);
   if (header.encoding != FileEncoding::binary) return std::nullopt;
   std::uint64_t begin = header.data_begin;
   for (const PlyElement& element : header.elements) {
@@ -316,7 +475,8 @@ GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes) {
   GeometryColumns content;
   content.info = info_of(header, bytes->size());
   content.viewpoint = header.viewpoint;
-  Cursor cursor{bytes, header.data_begin, TextRows(*bytes, header.data_begin, header.data_line)};
+  Cursor cursor{bytes, header.data_begin,
+                LineReader(std::string_view(*bytes).substr(header.data_begin), header.data_line)};
   for (const PlyElement& element : header.elements) {
     ColumnSet set = read_element(element, header, cursor, content);
     if (element.name == "vertex")

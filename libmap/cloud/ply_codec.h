@@ -4,14 +4,15 @@
 // info.skipped.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <ostream>
 #include <string>
 #include <string_view>
+#include <vector>
 
-#include "libmap/cloud/binary_records.h"
 #include "libmap/cloud/columns.h"
 
 namespace libmap {

@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/core/file_output.h"
 #include "libmap/core/point_cloud.h"
-#include "libmap/core/unnamed_file.h"
 
 namespace libmap {
 
@@ -57,7 +57,7 @@ class PointSpool {
   void for_squares_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
                       const Visit& visit) const;
 
-  UnnamedFile file_;
+  TempFile file_;
   PointSpoolOptions options_;
   std::size_t record_bytes_ = 0;
   std::size_t buffered_ = 0;

@@ -102,4 +102,24 @@ std::string GuardedProcess::end() {
   return WIFSIGNALED(status) ? " (signal " + std::to_string(WTERMSIG(status)) + ")" : "";
 }
 
+void GuardedOutput::error(const Error* error) {
+  array(error == nullptr ? std::string() : error->reason());
+  if (error == nullptr) return;
+  for (const std::string& text :
+       {error->context().field, error->context().value, error->context().bound})
+    array(text);
+  value(error->kind());
+}
+
+void GuardedInput::error() {
+  std::string reason;
+  array(reason);
+  if (reason.empty()) return;
+  ErrorContext context;
+  for (std::string* text : {&context.field, &context.value, &context.bound}) array(*text);
+  ErrorKind kind = ErrorKind::bad_input;
+  value(kind);
+  throw Error(reason, context, kind);
+}
+
 }  // namespace libmap

@@ -1,10 +1,15 @@
 #include "libmap/core/memory_budget.h"
 
+#include <unistd.h>
+
 #include <algorithm>
 
-#include "libmap/core/file_size.h"
-
 namespace libmap {
+
+std::uint64_t machine_memory() {
+  return static_cast<std::uint64_t>(sysconf(_SC_PHYS_PAGES)) *
+         static_cast<std::uint64_t>(sysconf(_SC_PAGESIZE));
+}
 
 MemoryBudget::MemoryBudget() : MemoryBudget(machine_memory() / 8) {}
 

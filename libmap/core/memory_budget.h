@@ -7,6 +7,9 @@
 
 namespace libmap {
 
+// Bytes of memory of the machine: to read a larger file whole would end the program.
+std::uint64_t machine_memory();
+
 // Threads take a share before they begin what needs much memory, and wait while the shares of
 // others leave too little. Order and number of results stay as they are; only time is lost.
 //

@@ -1,9 +1,7 @@
-// What output files and output folders share: the lock on what is in the making. Inner part of
-// libmap/core.
+// Locks on files, syncs, and the errors of system calls.
 #pragma once
 
 #include <filesystem>
-#include <functional>
 #include <optional>
 #include <string>
 
@@ -19,12 +17,6 @@ void sync_file(const std::filesystem::path& path);
 
 // "." where the path has no folder.
 std::filesystem::path folder_of(const std::filesystem::path& path);
-
-// Opens `temporary` with `open_temporary`, which returns a descriptor or -1 with errno, and locks
-// it; again where another process has put it in place meanwhile. Throws Error naming `final_path`:
-// it cannot be opened, or another process holds it.
-int lock_temporary(const std::filesystem::path& temporary, const std::filesystem::path& final_path,
-                   const std::function<int(const char* path)>& open_temporary);
 
 // Held by at most one process or object at a time. The file of that name is made if it is missing,
 // and is left there. Throws Error (failed): it cannot be made.

@@ -46,4 +46,9 @@ double squared_image_radius(int width, int height, double x_px, double y_px);
 // Pixels without a depth stay so.
 void correct_depth(DepthImage& depth, const DepthCorrection& correction);
 
+// Each measurement covers the pixels of `target` on which its own pixel falls, the nearest one
+// where several do; pixels that the depth camera cannot see stay without depth.
+DepthImage register_depth(const DepthImage& depth, const Camera& camera, const Camera& target,
+                          const Pose& target_from_camera);
+
 }  // namespace libmap

@@ -11,6 +11,7 @@
 #include <cmath>
 #include <cstring>
 #include <fstream>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <new>
@@ -23,9 +24,9 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/guarded_process.h"
 #include "libmap/core/output_lock.h"
 #include "libmap/core/text.h"
-#include "libmap/mesh/guarded_model.h"
 
 namespace libmap {
 namespace {
@@ -384,6 +385,27 @@ auto decode(const std::string& format, const Read& read, const Take& take) {
   }
 }
 
+// What decode() returns or throws in a process of its own: assimp crashes on some broken files.
+DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
+  // assimp's scene, our mesh and its bytes; a line of OBJ becomes some hundred bytes.
+  const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
+  return run_guarded<DecodedModel>(memory, "is broken: the library for its format crashed on it",
+                                   decode, [](auto& pipe, DecodedModel& decoded) {
+                                     TexturedMesh& model = decoded.model;
+                                     pipe.array(model.mesh.vertices);
+                                     pipe.array(model.mesh.triangles);
+                                     pipe.array(model.mesh.vertex_normals);
+                                     pipe.array(model.mesh.vertex_colors);
+                                     pipe.array(model.texture_coordinates);
+                                     pipe.array(model.page_of_triangle);
+                                     pipe.size(decoded.pictures);
+                                     for (TexturePicture& picture : decoded.pictures) {
+                                       pipe.array(picture.bytes);
+                                       pipe.array(picture.path);
+                                     }
+                                   });
+}
+
 Error not_written(const Assimp::Exporter& exporter) {
   return Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
                ErrorKind::failed);
@@ -415,17 +437,6 @@ DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std
   const auto read = [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); };
   return decode_guarded(std::filesystem::file_size(path),
                         [&] { return decode(format, read, model_of); });
-}
-
-void require_single_precision(const TriangleMesh& mesh, const std::string& format) {
-  constexpr auto most = static_cast<double>(std::numeric_limits<float>::max());
-  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
-    const double farthest = mesh.vertices[n].cwiseAbs().maxCoeff();
-    if (!(farthest <= most))
-      throw Error("too far away for " + format, {.field = "vertex " + std::to_string(n),
-                                                 .value = to_text(farthest) + " m",
-                                                 .bound = "<= " + to_text(most)});
-  }
 }
 
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {

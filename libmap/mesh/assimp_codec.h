@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "libmap/cloud/geometry_file.h"
-#include "libmap/core/textured_mesh.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -30,10 +29,6 @@ struct DecodedModel {
 
 // The .obj (with its materials) or .glb at `path`. Throws as decode_by_assimp does.
 DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format);
-
-// Throws Error if a vertex is no single-precision number, as which these formats keep or assimp
-// reads it: it would come back infinite.
-void require_single_precision(const TriangleMesh& mesh, const std::string& format);
 
 // `format` is "stl" or "glb". Throws Error.
 std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii);

@@ -2,22 +2,170 @@
 
 #include <algorithm>
 #include <array>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <ostream>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "libmap/cloud/cloud_columns.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/cloud/columns.h"
 #include "libmap/cloud/ply_codec.h"
 #include "libmap/cloud/vtp_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/core/text_lines.h"
 #include "libmap/mesh/assimp_codec.h"
-#include "libmap/mesh/mesh_text.h"
-#include "libmap/raster/dem_mesh.h"
 #include "libmap/raster/dem_reader.h"
 
 namespace libmap {
 namespace {
+
+template <typename Vector>
+std::string numbers(const Vector& vector) {
+  return to_text(vector[0]) + ' ' + to_text(vector[1]) + ' ' + to_text(vector[2]);
+}
+
+std::string color_text(const Color& color) {
+  std::string text;
+  for (const std::uint8_t channel : color)
+    text += ' ' + to_text(static_cast<float>(channel) / 255.0F);
+  return text;
+}
+
+// The text with comments blanked out, so that lines keep their numbers.
+std::string without_comments(std::string_view text) {
+  std::string plain(text);
+  bool in_comment = false;
+  for (char& c : plain) {
+    if (c == '#') in_comment = true;
+    if (c == '\n') in_comment = false;
+    if (in_comment) c = ' ';
+  }
+  return plain;
+}
+
+Error bad_line(const TextLine& line, const std::string& reason) {
+  return Error(reason, {.field = name_of(line)});
+}
+
+std::uint64_t index_of(const TextLine& line, std::size_t word, std::uint64_t limit) {
+  const std::optional<std::int64_t> index = parse_integer(line.words[word]);
+  if (!index || *index < 0 || static_cast<std::uint64_t>(*index) >= limit)
+    throw Error("not an index", {.field = name_of(line),
+                                 .value = "'" + std::string(line.words[word].substr(0, 40)) + "'",
+                                 .bound = "0 to " + std::to_string(limit) + " - 1"});
+  return static_cast<std::uint64_t>(*index);
+}
+
+struct OffCounts {
+  std::uint64_t vertices = 0;
+  std::uint64_t faces = 0;
+};
+
+// "OFF", and the counts on the same line or on the next.
+OffCounts read_off_counts(LineReader& lines) {
+  TextLine line;
+  if (!lines.next(line) ||
+      (line.words[0] != "OFF" && line.words[0] != "COFF" && line.words[0] != "NOFF"))
+    throw Error("not an OFF file");
+  line.words.erase(line.words.begin());
+  if (line.words.empty()) lines.next(line);
+  if (line.words.size() < 2) throw Error("the OFF file has no counts");
+  constexpr std::uint64_t most = std::numeric_limits<std::uint32_t>::max();
+  OffCounts counts{index_of(line, 0, most), index_of(line, 1, most)};
+  require_room_for_text(counts.vertices, 3, lines.remaining(), "vertices");
+  require_room_for_text(counts.faces, 4, lines.remaining(), "faces");
+  return counts;
+}
+
+Eigen::Vector3d read_off_vertex(const TextLine& line) {
+  if (line.words.size() < 3) throw bad_line(line, "a vertex needs three numbers");
+  Eigen::Vector3d vertex;
+  for (std::size_t axis = 0; axis < 3; ++axis)
+    vertex[static_cast<int>(axis)] =
+        number_of(line, axis, std::string(1, "xyz"[axis]), ScalarType::float64);
+  if (!vertex.allFinite()) throw bad_line(line, "position is not finite");
+  return vertex;
+}
+
+void read_off_face(const TextLine& line, TriangleMesh& mesh) {
+  const std::uint64_t corners = index_of(line, 0, line.words.size());
+  if (corners < 3) throw bad_line(line, "a face needs three corners");
+  Triangle triangle{};
+  for (std::uint64_t i = 0; i < corners; ++i) {
+    const auto corner = static_cast<std::uint32_t>(index_of(line, 1 + i, mesh.vertices.size()));
+    triangle[1] = triangle[2];
+    triangle[2] = corner;
+    if (i == 0) triangle[0] = corner;
+    if (i >= 2) mesh.triangles.push_back(triangle);
+  }
+}
+
+// Object File Format, also COFF and NOFF without their colors and normals. Polygons are cut into
+// fans. Throws Error: more rows promised than there are lines, a vertex that is not finite, a face
+// with less than three corners or with a corner that is no vertex.
+TriangleMesh read_off(std::string_view text) {
+  const std::string plain = without_comments(text);
+  LineReader lines(plain);
+  const OffCounts counts = read_off_counts(lines);
+  TriangleMesh mesh;
+  TextLine line;
+  const auto next = [&](const char* what, std::uint64_t done, std::uint64_t promised) {
+    if (!lines.next(line))
+      throw Error("the file promises " + std::to_string(promised) + " " + what +
+                  ", but ends after " + std::to_string(done));
+  };
+  for (std::uint64_t i = 0; i < counts.vertices; ++i) {
+    next("vertices", i, counts.vertices);
+    mesh.vertices.push_back(read_off_vertex(line));
+  }
+  for (std::uint64_t i = 0; i < counts.faces; ++i) {
+    next("faces", i, counts.faces);
+    read_off_face(line, mesh);
+  }
+  return mesh;
+}
+
+// Text formats are written in doubles with the shortest numbers that read back the same. (assimp
+// writes OBJ in float32 and renumbers its vertices, does not write OFF, and ends the program on
+// some broken OFF files.)
+//
+// Wavefront OBJ: v (with r g b from 0 to 1 where there are colors), vn, f.
+void write_obj(const TriangleMesh& mesh, std::ostream& out) {
+  const bool colored = !mesh.vertex_colors.empty();
+  const bool has_normals = !mesh.vertex_normals.empty();
+  std::string line;
+  for (std::size_t i = 0; i < mesh.vertices.size(); ++i) {
+    line = "v " + numbers(mesh.vertices[i]);
+    if (colored) line += color_text(mesh.vertex_colors[i]);
+    out << line << '\n';
+  }
+  for (const Eigen::Vector3f& normal : mesh.vertex_normals) out << "vn " + numbers(normal) + "\n";
+  for (const Triangle& triangle : mesh.triangles) {
+    line = "f";
+    for (const std::uint32_t corner : triangle) {
+      // Indices count from 1.
+      const std::string index = std::to_string(std::uint64_t{corner} + 1);
+      line += ' ' + index;
+      if (has_normals) line += "//" + index;
+    }
+    out << line << '\n';
+  }
+}
+
+// Geometry alone.
+void write_off(const TriangleMesh& mesh, std::ostream& out) {
+  out << "OFF\n" + std::to_string(mesh.vertices.size()) + ' ' +
+             std::to_string(mesh.triangles.size()) + " 0\n";
+  for (const Eigen::Vector3d& vertex : mesh.vertices) out << numbers(vertex) + "\n";
+  for (const Triangle& triangle : mesh.triangles)
+    out << "3 " + std::to_string(triangle[0]) + ' ' + std::to_string(triangle[1]) + ' ' +
+               std::to_string(triangle[2]) + "\n";
+}
 
 constexpr std::array<const char*, 5> read_formats = {".ply", ".obj", ".stl", ".off", ".glb"};
 
@@ -169,6 +317,17 @@ MeshReadResult read_mesh(const std::filesystem::path& path) {
     return result;
   } catch (const Error& error) {
     throw error.in_file(path.string());
+  }
+}
+
+void require_single_precision(const TriangleMesh& mesh, const std::string& format) {
+  constexpr auto most = static_cast<double>(std::numeric_limits<float>::max());
+  for (std::size_t n = 0; n < mesh.vertices.size(); ++n) {
+    const double farthest = mesh.vertices[n].cwiseAbs().maxCoeff();
+    if (!(farthest <= most))
+      throw Error("too far away for " + format, {.field = "vertex " + std::to_string(n),
+                                                 .value = to_text(farthest) + " m",
+                                                 .bound = "<= " + to_text(most)});
   }
 }
 

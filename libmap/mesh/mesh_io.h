@@ -3,8 +3,8 @@
 //          read by         written by      kept
 //   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
 //   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
-//   .obj   assimp          mesh_text       doubles written, float32 read; normals, colors
-//   .off   mesh_text       mesh_text       doubles; geometry alone
+//   .obj   assimp          this file       doubles written, float32 read; normals, colors
+//   .off   this file       this file       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
 //   .glb   assimp          assimp          float32; normals, colors
 //   .tif   libmap/raster   not written     a DEM; geometry alone
@@ -58,6 +58,10 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
 
 // Throws Error unless meshes are written in the format that the extension names.
 void require_mesh_format(const std::filesystem::path& path);
+
+// Throws Error if a vertex is no single-precision number, as which these formats keep or assimp
+// reads it: it would come back infinite.
+void require_single_precision(const TriangleMesh& mesh, const std::string& format);
 
 // Whether the file holds a mesh (it has faces), or a folder one that does, or a cloud: by its
 // extension, and for .ply by its content. Throws Error: an extension of neither, or a file that

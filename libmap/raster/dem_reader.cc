@@ -2,13 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/file_size.h"
-#include "libmap/core/guarded_arrays.h"
+#include "libmap/core/guarded_process.h"
 #include "libmap/core/manifest.h"
+#include "libmap/core/memory_budget.h"
 #include "libmap/core/text.h"
 #include "libmap/raster/raster_module.h"
 
@@ -20,71 +22,49 @@ namespace {
 
 // A block of 2^24 pixels as GDAL and we hold it, its mask, and GDAL's tables.
 constexpr std::uint64_t max_data_bytes = std::uint64_t{3} << 29;
-constexpr const char* broken = "is broken: GDAL crashed on it";
 
 enum class Parcel : std::uint8_t { info, block, end };
 
-// The numbers of DemInfo.
-struct InfoNumbers {
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-  double unit_m = 1.0;
-  double origin_m[3] = {};
-  double local_from_pixel[6] = {};
-};
-struct Window {
-  std::int64_t column = 0;
-  std::int64_t row = 0;
-  std::int64_t columns = 0;
-  std::int64_t rows = 0;
-};
-
-void send_info(const GuardedProcess::Write& write, const DemInfo& info) {
-  InfoNumbers numbers{
-      .columns = info.columns, .rows = info.rows, .unit_m = info.georeference.unit_m};
-  Eigen::Map<Eigen::Vector3d>(numbers.origin_m) = info.georeference.origin_m;
-  Eigen::Map<Eigen::Matrix<double, 2, 3>>(numbers.local_from_pixel) = info.local_from_pixel;
-  send_value(write, numbers);
-  send_array(write, info.georeference.crs_wkt);
-  send_array(write, info.band_type);
+void pass_info(auto& pipe, auto& info) {
+  pipe.value(info.columns);
+  pipe.value(info.rows);
+  pipe.array(info.band_type);
+  pipe.array(info.georeference.crs_wkt);
+  pipe.value(info.georeference.unit_m);
+  for (auto& number : info.georeference.origin_m) pipe.value(number);
+  for (auto& number : info.local_from_pixel.reshaped()) pipe.value(number);
 }
 
-DemInfo receive_info(GuardedProcess& process) {
-  InfoNumbers numbers;
-  DemInfo info;
-  receive_value(process, broken, numbers);
-  receive_array(process, broken, info.georeference.crs_wkt);
-  receive_array(process, broken, info.band_type);
-  info.columns = numbers.columns;
-  info.rows = numbers.rows;
-  info.georeference.unit_m = numbers.unit_m;
-  info.georeference.origin_m = Eigen::Vector3d(numbers.origin_m);
-  info.local_from_pixel = Eigen::Map<Eigen::Matrix<double, 2, 3>>(numbers.local_from_pixel);
-  return info;
+void pass_block(auto& pipe, auto& block) {
+  pipe.value(block.column);
+  pipe.value(block.row);
+  pipe.value(block.columns);
+  pipe.value(block.rows);
+  pipe.array(block.heights_m);
 }
 
 // What the process does: an Error or none before each parcel.
 void serve(const fs::path& path, const std::optional<Georeference>& frame,
            const GuardedProcess::Write& write) {
+  GuardedOutput output(write);
   const auto announce = [&](Parcel parcel) {
-    send_error(write, nullptr);
-    send_value(write, parcel);
+    output.error(nullptr);
+    output.value(parcel);
   };
   try {
     raster_module().read_dem(
         path, frame,
         [&](const DemInfo& info) {
           announce(Parcel::info);
-          send_info(write, info);
+          pass_info(output, info);
         },
         [&](const DemBlock& block) {
           announce(Parcel::block);
-          send_value(write, Window{block.column, block.row, block.columns, block.rows});
-          send_array(write, block.heights_m);
+          pass_block(output, block);
         });
     announce(Parcel::end);
   } catch (const Error& error) {
-    send_error(write, &error);
+    output.error(&error);
   }
 }
 
@@ -93,12 +73,13 @@ void serve(const fs::path& path, const std::optional<Georeference>& frame,
 class DemReader::Process {
  public:
   Process(fs::path path, const std::optional<Georeference>& frame)
-      : path_(std::move(path)), process_(max_data_bytes, [&](const GuardedProcess::Write& write) {
-          serve(path_, frame, write);
-        }) {
+      : path_(std::move(path)),
+        process_(max_data_bytes,
+                 [&](const GuardedProcess::Write& write) { serve(path_, frame, write); }),
+        input_(process_, "is broken: GDAL crashed on it") {
     in_file([&] {
       receive_parcel();
-      info_ = receive_info(process_);
+      pass_info(input_, info_);
     });
   }
 
@@ -108,23 +89,16 @@ class DemReader::Process {
     bool is_block = false;
     in_file([&] {
       is_block = receive_parcel() == Parcel::block;
-      if (!is_block) return;
-      Window window;
-      receive_value(process_, broken, window);
-      block.column = window.column;
-      block.row = window.row;
-      block.columns = window.columns;
-      block.rows = window.rows;
-      receive_array(process_, broken, block.heights_m);
+      if (is_block) pass_block(input_, block);
     });
     return is_block;
   }
 
  private:
   Parcel receive_parcel() {
-    receive_error(process_, broken);
+    input_.error();
     Parcel parcel = Parcel::end;
-    receive_value(process_, broken, parcel);
+    input_.value(parcel);
     return parcel;
   }
 
@@ -139,6 +113,7 @@ class DemReader::Process {
 
   fs::path path_;
   GuardedProcess process_;
+  GuardedInput input_;
   DemInfo info_;
 };
 
@@ -195,6 +170,70 @@ std::optional<Georeference> read_georeference(const fs::path& path) {
   }
   const auto manifest = read_manifest_of(path.has_filename() ? path : path.parent_path());
   return manifest ? manifest->georeference : std::nullopt;
+}
+
+namespace {
+
+constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
+// A vertex, its number and two triangles.
+constexpr std::uint64_t bytes_per_pixel = sizeof(Eigen::Vector3d) + 7 * sizeof(std::uint32_t);
+
+using Corners = std::array<std::uint32_t, 4>;  // around a cell
+
+// The triangles of a cell whose corners are given counter-clockwise from above.
+void add_cell(const Corners& corners, TriangleMesh& mesh) {
+  const auto height = [&](std::size_t corner) { return mesh.vertices[corners[corner]].z(); };
+  int missing = -1;
+  for (int n = 0; n < 4; ++n) {
+    if (corners[static_cast<std::size_t>(n)] != no_vertex) continue;
+    if (missing >= 0) return;
+    missing = n;
+  }
+  const auto add = [&](int first) {  // and the two after it
+    const auto at = [&](int n) { return corners[static_cast<std::size_t>((first + n) % 4)]; };
+    mesh.triangles.push_back({at(0), at(1), at(2)});
+  };
+  if (missing >= 0) return add(missing + 1);
+  const int begin = std::abs(height(0) - height(2)) <= std::abs(height(1) - height(3)) ? 0 : 1;
+  add(begin);
+  add(begin + 2);
+}
+
+}  // namespace
+
+TriangleMesh read_dem_mesh(const std::filesystem::path& path) {
+  DemReader reader(path);
+  const DemInfo& info = reader.info();
+  if (info.pixels() >= no_vertex || info.pixels() > machine_memory() / 2 / bytes_per_pixel)
+    throw Error("too many for a mesh in memory: cut the raster (gdal_translate -srcwin)",
+                {.file = path.string(), .field = "pixels", .value = std::to_string(info.pixels())});
+  std::vector<double> heights_m(info.pixels(), std::numeric_limits<double>::quiet_NaN());
+  DemBlock block;
+  while (reader.next(block))
+    for (std::size_t n = 0; n < block.heights_m.size(); ++n) {
+      const auto row = block.row + static_cast<std::int64_t>(n) / block.columns;
+      const auto column = block.column + static_cast<std::int64_t>(n) % block.columns;
+      heights_m[static_cast<std::size_t>(row * info.columns + column)] = block.heights_m[n];
+    }
+  const DemBlock whole{
+      .columns = info.columns, .rows = info.rows, .heights_m = std::move(heights_m)};
+  TriangleMesh mesh;
+  std::vector<std::uint32_t> vertex_of(info.pixels(), no_vertex);
+  for (std::size_t n = 0; n < vertex_of.size(); ++n) {
+    if (std::isnan(whole.heights_m[n])) continue;
+    vertex_of[n] = static_cast<std::uint32_t>(mesh.vertices.size());
+    mesh.vertices.push_back(point_of(info, whole, n));
+  }
+  const bool is_mirrored = info.local_from_pixel.leftCols<2>().determinant() < 0.0;
+  const auto width = static_cast<std::size_t>(info.columns);
+  for (std::size_t row = 0; row + 1 < static_cast<std::size_t>(info.rows); ++row)
+    for (std::size_t n = row * width; n + 1 < (row + 1) * width; ++n) {
+      // Rows lead south where the raster is not mirrored: its determinant is negative.
+      const Corners around = {vertex_of[n], vertex_of[n + width], vertex_of[n + width + 1],
+                              vertex_of[n + 1]};
+      add_cell(is_mirrored ? around : Corners{around[0], around[3], around[2], around[1]}, mesh);
+    }
+  return mesh;
 }
 
 }  // namespace libmap

@@ -11,6 +11,7 @@
 
 #include "libmap/core/georeference.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
 
@@ -79,5 +80,10 @@ PointCloud read_dem_cloud(const std::filesystem::path& path);
 // The georeference of a DEM, of the first DEM in a folder (in the order of names), or of any other
 // output by the manifest beside it; nothing if there is none.
 std::optional<Georeference> read_georeference(const std::filesystem::path& path);
+
+// Vertices are the centers of pixels that have a height, row by row; four neighbors make two
+// triangles, split along the diagonal with the smaller step of height, three make one. Normals
+// point up. Throws Error as DemReader, and if there is not enough memory.
+TriangleMesh read_dem_mesh(const std::filesystem::path& path);
 
 }  // namespace libmap

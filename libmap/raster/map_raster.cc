@@ -6,7 +6,7 @@
 #include <limits>
 
 #include "libmap/core/error.h"
-#include "libmap/core/file_size.h"
+#include "libmap/core/memory_budget.h"
 #include "libmap/core/text.h"
 #include "libmap/raster/raster_module.h"
 

@@ -185,12 +185,12 @@ bool FeatureCache::read(const std::string& key, const std::vector<Camera>& depth
   }
 }
 
-std::shared_ptr<UnnamedFile> FeatureCache::unnamed_file() const {
+std::shared_ptr<TempFile> FeatureCache::unnamed_file() const {
   if (!enabled()) return nullptr;
   try {
     std::error_code failure;
     std::filesystem::create_directory(folder_, failure);
-    return std::make_shared<UnnamedFile>(folder_);
+    return std::make_shared<TempFile>(folder_);
   } catch (const Error&) {
     return nullptr;
   }

@@ -5,7 +5,7 @@
 #include <memory>
 #include <string>
 
-#include "libmap/core/unnamed_file.h"
+#include "libmap/core/file_output.h"
 #include "libmap/refine/features.h"
 #include "libmap/scan/rgbd_frame.h"
 
@@ -30,7 +30,7 @@ class FeatureCache {
   bool read(const std::string& key, const std::vector<Camera>& depth_cameras,
             FrameFeatures& frame) const;
   // In its folder; nullptr where there is none, or none can be made.
-  std::shared_ptr<UnnamedFile> unnamed_file() const;
+  std::shared_ptr<TempFile> unnamed_file() const;
   // A file that cannot be written is no error: the next run goes without it. False then.
   bool write(const std::string& key, const FrameFeatures& frame) const;
 

@@ -209,7 +209,7 @@ std::vector<Camera> cameras_of(const ScanSource& scan, const std::vector<int>& n
   return {};
 }
 
-void keep_descriptors(const std::shared_ptr<UnnamedFile>& file, FrameFeatures& frame) {
+void keep_descriptors(const std::shared_ptr<TempFile>& file, FrameFeatures& frame) {
   frame.descriptors_begin = file->append(frame.descriptors.data(), frame.descriptors.size());
   frame.descriptor_file = file;
   std::vector<std::uint8_t>().swap(frame.descriptors);
@@ -308,7 +308,7 @@ FeatureResult find_features(const ScanSource& scan, const std::vector<int>& node
   std::vector<std::optional<Error>> faults(nodes.size());
   PixelRayCache rays;
   MemoryBudget memory;
-  const std::shared_ptr<UnnamedFile> file =
+  const std::shared_ptr<TempFile> file =
       cache != nullptr && nodes.size() > options.max_frames_in_memory ? cache->unnamed_file()
                                                                       : nullptr;
   progress.begin("features", nodes.size());

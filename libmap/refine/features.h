@@ -13,9 +13,9 @@
 #include "libmap/cloud/depth_planes.h"
 #include "libmap/core/camera.h"
 #include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
-#include "libmap/core/unnamed_file.h"
 #include "libmap/refine/depth_surface.h"
 #include "libmap/scan/scan_source.h"
 
@@ -65,10 +65,10 @@ struct FrameFeatures {
   FeatureType type = FeatureType::sift;
   std::vector<std::uint8_t> descriptors;  // 128 (SIFT) or 32 (ORB) bytes a feature; may be dropped
                                           // when all that look alike has been found
-  std::shared_ptr<const UnnamedFile> descriptor_file;  // where they are instead, if any
-  std::uint64_t descriptors_begin = 0;                 // in it
-  std::vector<DepthSurface> surfaces;                  // one a camera
-  std::size_t without_depth = 0;                       // features that were dropped for it
+  std::shared_ptr<const TempFile> descriptor_file;  // where they are instead, if any
+  std::uint64_t descriptors_begin = 0;              // in it
+  std::vector<DepthSurface> surfaces;               // one a camera
+  std::size_t without_depth = 0;                    // features that were dropped for it
 
   // Where feature n lies by its depth, in its camera's optical frame; in the frame of the base.
   Eigen::Vector3d point_in_camera(std::size_t n) const;

@@ -8,7 +8,6 @@
 #include "libmap/core/text.h"
 #include "libmap/ros/bag_storage.h"
 #include "libmap/ros/ros_messages.h"
-#include "libmap/ros/rosbag2_metadata.h"
 
 namespace libmap {
 

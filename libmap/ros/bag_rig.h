@@ -1,5 +1,4 @@
-// The depth images of a robot's cameras out of a bag, as a rig and a folder of images
-// (rig_images.h).
+// The depth images of a robot's cameras out of a bag, as a rig and a folder of images (rig_io.h).
 #pragma once
 
 #include <cstddef>
@@ -8,10 +7,11 @@
 #include <limits>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "libmap/core/parameters.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 
 namespace libmap {
 

@@ -49,6 +49,24 @@ extern const BagStorage ros1_storage;
 extern const BagStorage sqlite_storage;
 extern const BagStorage mcap_storage;
 
+// metadata.yaml of a rosbag2 folder (https://github.com/ros2/rosbag2:
+// rosbag2_storage/include/rosbag2_storage/yaml.hpp).
+inline constexpr const char* rosbag2_metadata_name = "metadata.yaml";
+
+// The names of the bag's files. Of any version: those from 1 to 9 have them alike; what else the
+// text says is in the files too. Throws Error: no such file, no YAML, a name missing, compressed
+// files or messages.
+std::vector<std::string> read_rosbag2_metadata(const std::filesystem::path& path);
+
+// The text of version 5, that of Humble, which later ones read too, of one file of `storage`.
+std::string rosbag2_metadata(const RecordedTopics& topics, const std::string& storage,
+                             const std::string& file);
+
+// Quality of service (rmw's enumerations, as Humble writes them) of a latched topic, which is kept
+// for those that subscribe later; "" otherwise. And whether a recorded one is of that kind.
+std::string quality_of_service(bool latching);
+bool is_latching(std::string_view quality_of_service);
+
 // A message to be written.
 struct StoredMessage {
   std::string topic{};
@@ -73,5 +91,13 @@ std::unique_ptr<BagSink> new_ros1_bag(const std::filesystem::path& path,
 // `folder` exists.
 std::unique_ptr<BagSink> new_sqlite_bag(const std::filesystem::path& folder);
 std::unique_ptr<BagSink> new_mcap(const std::filesystem::path& path, BagCompression compression);
+
+// Compressed chunks of MCAP (https://mcap.dev/spec/registry#well-known-compression-formats): frames
+// of LZ4 and Zstandard, by their libraries. `size` is what they are said to expand to. Memory grows
+// with what they do expand to. Throws Error: another compression ("": none), broken, another size,
+// more than 1 GiB.
+std::string decompress_chunk(const std::string& compression, std::string_view bytes,
+                             std::uint64_t size);
+std::string compress_chunk(const std::string& compression, const std::string& bytes);
 
 }  // namespace libmap

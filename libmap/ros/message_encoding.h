@@ -8,7 +8,7 @@
 #include "libmap/core/camera.h"
 #include "libmap/core/image.h"
 #include "libmap/core/point_cloud.h"
-#include "libmap/ros/bag_content.h"
+#include "libmap/ros/bag_writer.h"
 #include "libmap/ros/ros_messages.h"
 
 namespace libmap {

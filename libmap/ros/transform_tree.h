@@ -4,9 +4,11 @@
 #include <map>
 #include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "libmap/core/pose.h"
+#include "libmap/ros/bag_reader.h"
 
 namespace libmap {
 
@@ -43,5 +45,9 @@ class TransformTree {
 
 // "/base_link" -> "base_link".
 std::string plain_frame(const std::string& name);
+
+// Adds a message's transforms to `tree`. Throws Error: the message ends before its last transform,
+// a quaternion whose norm differs from 1 by 0.01 or more, and as TransformTree::add.
+void add_transforms(MessageEncoding encoding, std::string_view bytes, TransformTree& tree);
 
 }  // namespace libmap

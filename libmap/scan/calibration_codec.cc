@@ -2,10 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <optional>
 
+#include "libmap/core/bytes.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 
@@ -15,54 +15,6 @@ namespace {
 
 constexpr std::array<std::int32_t, 3> written_version{0, 23, 8};
 constexpr std::size_t local_transform_numbers = 12;
-
-class Reader {
- public:
-  explicit Reader(std::string_view bytes) : bytes_(bytes) {}
-
-  std::size_t left() const { return bytes_.size() - at_; }
-
-  template <typename T>
-  T one() {
-    T value{};
-    take(&value, sizeof value);
-    return value;
-  }
-
-  template <typename T, typename Count>
-  std::vector<T> list(Count count) {
-    // Before memory is taken.
-    if (count < 0 || static_cast<std::size_t>(count) > left() / sizeof(T)) ends_early();
-    std::vector<T> values(static_cast<std::size_t>(count));
-    if (!values.empty()) take(values.data(), values.size() * sizeof(T));
-    return values;
-  }
-
- private:
-  [[noreturn]] void ends_early() const {
-    throw Error("calibration ends after " + std::to_string(bytes_.size()) + " bytes");
-  }
-
-  void take(void* target, std::size_t count) {
-    if (count > left()) ends_early();
-    std::memcpy(target, bytes_.data() + at_, count);
-    at_ += count;
-  }
-
-  std::string_view bytes_;
-  std::size_t at_ = 0;
-};
-
-template <typename T>
-void append(std::string& bytes, const T& value) {
-  bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
-}
-
-template <typename T>
-void append_list(std::string& bytes, const std::vector<T>& values) {
-  if (!values.empty())
-    bytes.append(reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T));
-}
 
 void require_count(const char* field, std::int32_t count, std::int32_t full) {
   if (count != 0 && count != full)
@@ -75,89 +27,89 @@ void require_count(const char* field, std::int32_t count, std::int32_t full) {
 
 // CameraModel: 11 int32 {version, 0, w, h, nK, nD, nR, nP, nL}, then K D R P as float64, L as
 // float32.
-CalibrationRecord read_record(Reader& reader) {
+CalibrationRecord read_record(ByteReader& reader) {
   CalibrationRecord record;
-  record.version = reader.one<std::array<std::int32_t, 3>>();
-  const auto kind = reader.one<std::int32_t>();
+  record.version = reader.number<std::array<std::int32_t, 3>>();
+  const auto kind = reader.number<std::int32_t>();
   if (kind != 0)
     throw Error("calibration of an unknown kind", {.value = std::to_string(kind), .bound = "0"});
-  record.width = reader.one<std::int32_t>();
-  record.height = reader.one<std::int32_t>();
-  const auto counts = reader.one<std::array<std::int32_t, 5>>();
+  record.width = reader.number<std::int32_t>();
+  record.height = reader.number<std::int32_t>();
+  const auto counts = reader.number<std::array<std::int32_t, 5>>();
   require_count("K", counts[0], 9);
   require_count("R", counts[2], 9);
   require_count("P", counts[3], 12);
   require_count("L", counts[4], local_transform_numbers);
-  record.k = reader.list<double>(counts[0]);
-  record.d = reader.list<double>(counts[1]);
-  record.r = reader.list<double>(counts[2]);
-  record.p = reader.list<double>(counts[3]);
-  record.l = reader.list<float>(counts[4]);
+  record.k = reader.numbers<double>(counts[0]);
+  record.d = reader.numbers<double>(counts[1]);
+  record.r = reader.numbers<double>(counts[2]);
+  record.p = reader.numbers<double>(counts[3]);
+  record.l = reader.numbers<float>(counts[4]);
   return record;
 }
 
-void append_record(std::string& bytes, const CalibrationRecord& record) {
-  append(bytes, record.version);
-  append(bytes, std::int32_t{0});
-  append(bytes, record.width);
-  append(bytes, record.height);
+void append_record(ByteWriter& bytes, const CalibrationRecord& record) {
+  bytes.number(record.version);
+  bytes.number(std::int32_t{0});
+  bytes.number(record.width);
+  bytes.number(record.height);
   for (const std::size_t count :
        {record.k.size(), record.d.size(), record.r.size(), record.p.size(), record.l.size()})
-    append(bytes, static_cast<std::int32_t>(count));
-  append_list(bytes, record.k);
-  append_list(bytes, record.d);
-  append_list(bytes, record.r);
-  append_list(bytes, record.p);
-  append_list(bytes, record.l);
+    bytes.number(static_cast<std::int32_t>(count));
+  bytes.numbers(record.k);
+  bytes.numbers(record.d);
+  bytes.numbers(record.r);
+  bytes.numbers(record.p);
+  bytes.numbers(record.l);
 }
 
 // StereoCameraModel: 10 int32 {version, 1, nR, nT, nE, nF, bytes of left, of right}, then R T E F
 // as float64 and two records.
-StereoCalibrationRecord read_stereo_record(Reader& reader) {
+StereoCalibrationRecord read_stereo_record(ByteReader& reader) {
   StereoCalibrationRecord stereo;
-  stereo.version = reader.one<std::array<std::int32_t, 3>>();
-  reader.one<std::int32_t>();  // 1
-  const auto counts = reader.one<std::array<std::int32_t, 4>>();
-  const auto sizes = reader.one<std::array<std::int32_t, 2>>();
+  stereo.version = reader.number<std::array<std::int32_t, 3>>();
+  reader.number<std::int32_t>();  // 1
+  const auto counts = reader.number<std::array<std::int32_t, 4>>();
+  const auto sizes = reader.number<std::array<std::int32_t, 2>>();
   require_count("R", counts[0], 9);
   require_count("T", counts[1], 3);
   require_count("E", counts[2], 9);
   require_count("F", counts[3], 9);
-  stereo.r = reader.list<double>(counts[0]);
-  stereo.t = reader.list<double>(counts[1]);
-  stereo.e = reader.list<double>(counts[2]);
-  stereo.f = reader.list<double>(counts[3]);
+  stereo.r = reader.numbers<double>(counts[0]);
+  stereo.t = reader.numbers<double>(counts[1]);
+  stereo.e = reader.numbers<double>(counts[2]);
+  stereo.f = reader.numbers<double>(counts[3]);
   for (const auto& [side, size] : {std::pair{&stereo.left, sizes[0]}, {&stereo.right, sizes[1]}}) {
-    const std::size_t before = reader.left();
+    const std::size_t before = reader.rest().size();
     *side = read_record(reader);
-    if (static_cast<std::int64_t>(before - reader.left()) != size)
+    if (static_cast<std::int64_t>(before - reader.rest().size()) != size)
       throw Error("calibration of a stereo camera has another length than it says",
                   {.value = std::to_string(size)});
   }
   return stereo;
 }
 
-void append_stereo_record(std::string& bytes, const StereoCalibrationRecord& stereo) {
-  std::string left;
-  std::string right;
+void append_stereo_record(ByteWriter& bytes, const StereoCalibrationRecord& stereo) {
+  ByteWriter left;
+  ByteWriter right;
   append_record(left, stereo.left);
   append_record(right, stereo.right);
-  append(bytes, stereo.version);
-  append(bytes, std::int32_t{1});
+  bytes.number(stereo.version);
+  bytes.number(std::int32_t{1});
   for (const std::size_t count : {stereo.r.size(), stereo.t.size(), stereo.e.size(),
-                                  stereo.f.size(), left.size(), right.size()})
-    append(bytes, static_cast<std::int32_t>(count));
-  append_list(bytes, stereo.r);
-  append_list(bytes, stereo.t);
-  append_list(bytes, stereo.e);
-  append_list(bytes, stereo.f);
-  bytes += left + right;
+                                  stereo.f.size(), left.content().size(), right.content().size()})
+    bytes.number(static_cast<std::int32_t>(count));
+  bytes.numbers(stereo.r);
+  bytes.numbers(stereo.t);
+  bytes.numbers(stereo.e);
+  bytes.numbers(stereo.f);
+  bytes.bytes(left.content()).bytes(right.content());
 }
 
 // The first four int32 are small numbers; those of floats are not, unless the focal length is 0.
 bool begins_with_record(std::string_view bytes) {
   if (bytes.size() < 4 * sizeof(std::int32_t)) return false;
-  const auto numbers = Reader(bytes).one<std::array<std::int32_t, 4>>();
+  const auto numbers = ByteReader(bytes).number<std::array<std::int32_t, 4>>();
   return std::all_of(numbers.begin(), numbers.end(),
                      [](std::int32_t n) { return n >= 0 && n < 10000; }) &&
          numbers[3] <= 1;
@@ -165,9 +117,9 @@ bool begins_with_record(std::string_view bytes) {
 
 Calibration read_records(std::string_view bytes) {
   Calibration calibration{.layout = CalibrationLayout::records};
-  Reader reader(bytes);
-  while (reader.left() > 0) {
-    const std::string_view rest = bytes.substr(bytes.size() - reader.left());
+  ByteReader reader(bytes);
+  while (!reader.empty()) {
+    const std::string_view rest = reader.rest();
     if (!begins_with_record(rest)) throw Error("calibration contains bytes that are no record");
     if (rest[12] == 0)
       calibration.cameras.push_back(read_record(reader));
@@ -199,8 +151,8 @@ std::int32_t size_of(float number) {
 bool holds_sizes(std::string_view bytes) {
   constexpr std::size_t step = floats_bytes(CalibrationLayout::floats_with_size, false);
   for (std::size_t at = 0; at < bytes.size(); at += step) {
-    Reader reader(bytes.substr(at));
-    const auto numbers = reader.one<std::array<float, 6>>();
+    ByteReader reader(bytes.substr(at));
+    const auto numbers = reader.number<std::array<float, 6>>();
     if (!is_size(numbers[4]) || !is_size(numbers[5]) || numbers[4] < 2 || numbers[5] < 2)
       return false;
   }
@@ -222,17 +174,17 @@ std::optional<std::pair<CalibrationLayout, bool>> floats_layout(std::string_view
 
 Calibration read_floats(std::string_view bytes, CalibrationLayout layout, bool is_stereo) {
   Calibration calibration{.layout = layout};
-  Reader reader(bytes);
-  while (reader.left() > 0) {
+  ByteReader reader(bytes);
+  while (!reader.empty()) {
     CalibrationRecord record;
-    const auto [fx, fy, cx, cy] = reader.one<std::array<float, 4>>();
+    const auto [fx, fy, cx, cy] = reader.number<std::array<float, 4>>();
     record.k = {fx, 0, cx, 0, fy, cy, 0, 0, 1};
-    const float baseline_m = is_stereo ? reader.one<float>() : 0;
+    const float baseline_m = is_stereo ? reader.number<float>() : 0;
     if (layout == CalibrationLayout::floats_with_size) {
-      record.width = size_of(reader.one<float>());
-      record.height = size_of(reader.one<float>());
+      record.width = size_of(reader.number<float>());
+      record.height = size_of(reader.number<float>());
     }
-    record.l = reader.list<float>(local_transform_numbers);
+    record.l = reader.numbers<float>(local_transform_numbers);
     if (is_stereo)
       calibration.stereo.push_back(
           {.version = {}, .left = record, .right = {}, .baseline_m = baseline_m});
@@ -329,7 +281,13 @@ std::string to_text(CalibrationLayout layout) {
 
 Calibration decode_calibration(std::string_view bytes) {
   if (bytes.empty()) throw Error("calibration is empty");
-  if (begins_with_record(bytes)) return read_records(bytes);
+  if (begins_with_record(bytes)) {
+    try {
+      return read_records(bytes);
+    } catch (const std::length_error&) {
+      throw Error("calibration ends after " + std::to_string(bytes.size()) + " bytes");
+    }
+  }
   const auto layout = floats_layout(bytes);
   if (!layout)
     throw Error("calibration of an unknown layout, " + std::to_string(bytes.size()) + " bytes");
@@ -337,11 +295,11 @@ Calibration decode_calibration(std::string_view bytes) {
 }
 
 std::string encode_calibration(const Calibration& calibration) {
-  std::string bytes;
+  ByteWriter bytes;
   for (const CalibrationRecord& record : calibration.cameras) append_record(bytes, record);
   for (const StereoCalibrationRecord& stereo : calibration.stereo)
     append_stereo_record(bytes, stereo);
-  return bytes;
+  return bytes.content();
 }
 
 std::vector<Camera> cameras_of(const Calibration& calibration, int image_width, int image_height) {

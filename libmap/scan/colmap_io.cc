@@ -8,7 +8,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
-#include "libmap/scan/text_lines.h"
+#include "libmap/core/text_lines.h"
 
 namespace libmap {
 

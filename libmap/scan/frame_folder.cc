@@ -13,13 +13,12 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
+#include "libmap/core/text_lines.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/image/depth_codec.h"
-#include "libmap/image/depth_registration.h"
+#include "libmap/image/depth_correction.h"
 #include "libmap/image/image_codec.h"
-#include "libmap/scan/frame_folder_files.h"
 #include "libmap/scan/stamp_pairing.h"
-#include "libmap/scan/text_lines.h"
 #include "libmap/scan/trajectory_text.h"
 
 namespace libmap {

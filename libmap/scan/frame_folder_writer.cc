@@ -13,7 +13,6 @@
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/frame_folder.h"
-#include "libmap/scan/frame_folder_files.h"
 #include "libmap/scan/picture_file.h"
 #include "libmap/scan/trajectory_text.h"
 

@@ -1,6 +1,7 @@
 // What one node of a scan has recorded.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <vector>
 
@@ -41,5 +42,12 @@ struct CameraView {
 
 // The frame cut into its cameras. Throws Error naming the node if the image does not fit them.
 std::vector<CameraView> camera_views(const RgbdFrame& frame);
+
+// Pixels of the frame's cameras, or of its depth image where that has more.
+std::size_t image_pixels(const RgbdFrame& frame);
+
+// How many frames are held in memory side by side: by their size, not by the number of threads,
+// which results must not depend on. 8 of up to 2 megapixels each, fewer of larger ones, at least 1.
+std::size_t frames_in_batch(std::size_t max_image_pixels);
 
 }  // namespace libmap

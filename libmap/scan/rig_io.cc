@@ -2,16 +2,22 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <numeric>
 #include <optional>
 #include <set>
 #include <sstream>
+#include <system_error>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/table.h"
 #include "libmap/core/text.h"
 #include "libmap/core/yaml_document.h"
 #include "libmap/image/camera_io.h"
+#include "libmap/image/image_codec.h"
 
 namespace libmap {
 
@@ -196,6 +202,241 @@ std::string to_yaml(const CameraRig& rig) {
   std::string text = "%YAML:1.0\n---\ncameras:\n";
   for (const RigCamera& camera : rig.cameras) text += camera_entry(camera);
   return text;
+}
+
+namespace {
+
+namespace fs = std::filesystem;
+using State = SynchronizedSet::Camera::State;
+
+// File names have whole microseconds.
+constexpr double stamp_rounding_s = 1e-6;
+constexpr std::uint16_t saturated = 65535;
+
+double stamp_of(const std::string& text, const std::string& file, const std::string& field) {
+  const std::optional<double> stamp = parse_double(text);
+  if (!stamp || !std::isfinite(*stamp))
+    throw Error("is no time stamp",
+                {.file = file, .field = field, .value = text, .bound = "a number of seconds"});
+  return *stamp;
+}
+
+bool is_png(const fs::path& path) { return lower_case(path.extension().string()) == ".png"; }
+
+void append_folder(const fs::path& folder, std::size_t camera, std::vector<RigImage>& images) {
+  std::error_code code;
+  fs::directory_iterator entries(folder, code);
+  if (code) throw Error("cannot be read: " + code.message(), {.file = folder.string()});
+  for (const fs::directory_entry& entry : entries) {
+    const fs::path& file = entry.path();
+    // Hidden files are other programs' own.
+    if (!is_png(file) || file.filename().string().starts_with(".")) continue;
+    images.push_back({camera, stamp_of(file.stem().string(), file.string(), "name"), file});
+  }
+}
+
+std::vector<RigImage> images_of_table(const fs::path& folder, const CameraRig& rig) {
+  const Table table = read_csv(folder / rig_images_file_name);
+  const std::size_t camera_column = table.column("camera");
+  const std::size_t stamp_column = table.column("stamp_s");
+  const std::size_t file_column = table.column("file");
+  std::vector<std::string> names;
+  for (const RigCamera& camera : rig.cameras) names.push_back(camera.name);
+  std::vector<RigImage> images;
+  for (std::size_t row = 0; row < table.rows.size(); ++row) {
+    const std::string& name = table.rows[row][camera_column];
+    const auto found = std::find(names.begin(), names.end(), name);
+    if (found == names.end())
+      throw Error("the rig has no such camera" + did_you_mean(name, names),
+                  {.file = table.file, .field = "camera", .value = name});
+    stamp_of(table.rows[row][stamp_column], table.file, "stamp_s");
+    images.push_back({static_cast<std::size_t>(found - names.begin()),
+                      table.number(row, stamp_column), folder / table.rows[row][file_column]});
+  }
+  return images;
+}
+
+double sum_of_offsets(const SynchronizedSet& set) {
+  double sum = 0.0;
+  for (const SynchronizedSet::Camera& camera : set.cameras)
+    if (camera.state == State::seen) sum += std::abs(camera.offset_s);
+  return sum;
+}
+
+bool is_fuller(const SynchronizedSet& set, const SynchronizedSet& best) {
+  if (best.cameras.empty() || set.seen() != best.seen())
+    return best.cameras.empty() || set.seen() > best.seen();
+  return sum_of_offsets(set) < sum_of_offsets(best);
+}
+
+// Of each camera its images among `candidates`, which ascend in time.
+using ImagesByCamera = std::vector<std::vector<std::size_t>>;
+ImagesByCamera by_camera(const std::vector<RigImage>& images,
+                         const std::vector<std::size_t>& candidates, std::size_t camera_count) {
+  ImagesByCamera result(camera_count);
+  for (const std::size_t n : candidates) result.at(images[n].camera).push_back(n);
+  return result;
+}
+
+std::vector<std::size_t> in_order_of_time(const std::vector<RigImage>& images) {
+  std::vector<std::size_t> order(images.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return images[a].stamp_s < images[b].stamp_s;
+  });
+  return order;
+}
+
+// The first of those nearest to `stamp_s`; of none, none.
+std::optional<std::size_t> nearest_of(const std::vector<RigImage>& images,
+                                      const std::vector<std::size_t>& of_camera, double stamp_s) {
+  const auto first_from = [&](double stamp) {
+    return std::lower_bound(of_camera.begin(), of_camera.end(), stamp,
+                            [&](std::size_t n, double s) { return images[n].stamp_s < s; });
+  };
+  const auto offset = [&](auto image) { return std::abs(images[*image].stamp_s - stamp_s); };
+  const auto after = first_from(stamp_s);
+  if (after == of_camera.begin())
+    return of_camera.empty() ? std::nullopt : std::optional(of_camera.front());
+  const auto before = first_from(images[*std::prev(after)].stamp_s);
+  return after == of_camera.end() || offset(before) <= offset(after) ? *before : *after;
+}
+
+// Of each camera the image nearest to `stamp_s` within the reach.
+SynchronizedSet set_of(const std::vector<RigImage>& images, const ImagesByCamera& candidates,
+                       double stamp_s, double reach_s) {
+  SynchronizedSet set;
+  set.stamp_s = stamp_s;
+  set.cameras.resize(candidates.size());
+  for (std::size_t camera = 0; camera < candidates.size(); ++camera) {
+    const std::optional<std::size_t> n = nearest_of(images, candidates[camera], stamp_s);
+    if (!n || std::abs(images[*n].stamp_s - stamp_s) > reach_s) continue;
+    set.cameras[camera] = {State::seen, *n, images[*n].stamp_s - stamp_s};
+  }
+  return set;
+}
+
+}  // namespace
+
+std::string rig_image_name(const std::string& camera, double stamp_s) {
+  return camera + "/" + to_fixed_text(stamp_s, 6) + ".png";
+}
+
+std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& rig) {
+  if (!fs::is_directory(folder))
+    throw Error(fs::exists(folder) ? "is no folder" : "no such folder", {.file = folder.string()});
+  std::vector<RigImage> images;
+  if (fs::exists(folder / rig_images_file_name)) {
+    images = images_of_table(folder, rig);
+  } else {
+    for (std::size_t n = 0; n < rig.cameras.size(); ++n) {
+      std::error_code code;  // a camera may have a name that no folder can have
+      if (fs::is_directory(folder / rig.cameras[n].name, code))
+        append_folder(folder / rig.cameras[n].name, n, images);
+    }
+  }
+  if (images.empty())
+    throw Error("contains no image of any of the rig's cameras", {.file = folder.string()});
+  std::sort(images.begin(), images.end(), [](const RigImage& a, const RigImage& b) {
+    if (a.camera != b.camera) return a.camera < b.camera;
+    if (a.stamp_s != b.stamp_s) return a.stamp_s < b.stamp_s;
+    return a.file.native() < b.file.native();
+  });
+  return images;
+}
+
+Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera) {
+  Image<std::uint16_t> units;
+  try {
+    units = decode_gray16(read_whole_file(image.file));
+  } catch (const Error& error) {
+    throw error.in_file(image.file.string());
+  }
+  const Camera& calibrated = camera.camera;
+  if (units.width != calibrated.width || units.height != calibrated.height)
+    throw Error("does not fit the calibration of " + camera.name,
+                {.file = image.file.string(),
+                 .field = "image size",
+                 .value = size_text(units.width, units.height),
+                 .bound = size_text(calibrated.width, calibrated.height)});
+  return units;
+}
+
+DepthImage read_rig_depth(const RigImage& image, const RigCamera& camera) {
+  const Image<std::uint16_t> units = read_rig_units(image, camera);
+  DepthImage depth(units.width, units.height);
+  for (std::size_t n = 0; n < units.pixels.size(); ++n) {
+    if (units.pixels[n] == saturated) continue;
+    depth.pixels[n] = static_cast<float>(units.pixels[n] * camera.depth_scale_m);
+  }
+  return depth;
+}
+
+std::size_t SynchronizedSet::seen() const {
+  return static_cast<std::size_t>(std::count_if(
+      cameras.begin(), cameras.end(), [](const Camera& c) { return c.state == State::seen; }));
+}
+
+SynchronizedSet synchronized_set_at(const std::vector<RigImage>& images, std::size_t camera_count,
+                                    double stamp_s, double tolerance_s) {
+  SynchronizedSet set;
+  set.stamp_s = stamp_s;
+  set.cameras.resize(camera_count);
+  for (std::size_t n = 0; n < images.size(); ++n) {
+    SynchronizedSet::Camera& camera = set.cameras.at(images[n].camera);
+    const double offset = images[n].stamp_s - stamp_s;
+    const bool nearer = std::abs(offset) < std::abs(camera.offset_s) ||
+                        (std::abs(offset) == std::abs(camera.offset_s) && offset < camera.offset_s);
+    if (camera.state != State::missing && !nearer) continue;
+    camera.state = std::abs(offset) <= tolerance_s + stamp_rounding_s ? State::seen : State::late;
+    camera.image = n;
+    camera.offset_s = offset;
+  }
+  return set;
+}
+
+SynchronizedSet fullest_synchronized_set(const std::vector<RigImage>& images,
+                                         std::size_t camera_count, double tolerance_s) {
+  if (images.empty()) throw Error("there are no images to choose a moment from");
+  const std::vector<std::size_t> order = in_order_of_time(images);
+  const ImagesByCamera all = by_camera(images, order, camera_count);
+  SynchronizedSet best;
+  for (const std::size_t n : order) {
+    SynchronizedSet set = set_of(images, all, images[n].stamp_s, tolerance_s + stamp_rounding_s);
+    if (is_fuller(set, best)) best = std::move(set);
+  }
+  return synchronized_set_at(images, camera_count, best.stamp_s, tolerance_s);
+}
+
+std::vector<SynchronizedSet> synchronized_sets(const std::vector<RigImage>& images,
+                                               std::size_t camera_count, double tolerance_s) {
+  const std::vector<std::size_t> waiting = in_order_of_time(images);
+  std::vector<bool> taken(images.size(), false);
+  std::vector<SynchronizedSet> sets;
+  for (std::size_t first = 0; first < waiting.size(); ++first) {
+    if (taken[waiting[first]]) continue;
+    const double start = images[waiting[first]].stamp_s;
+    const double reach = tolerance_s + stamp_rounding_s;
+    std::vector<std::size_t> near;
+    for (std::size_t n = first; n < waiting.size(); ++n) {
+      if (images[waiting[n]].stamp_s > start + 2 * reach) break;
+      if (!taken[waiting[n]]) near.push_back(waiting[n]);
+    }
+    // The first image belongs to the set, whatever others its camera took.
+    ImagesByCamera candidates = by_camera(images, near, camera_count);
+    candidates[images[near.front()].camera].resize(1);
+    SynchronizedSet best;
+    for (const std::size_t middle : near) {
+      const double stamp = images[middle].stamp_s;
+      if (stamp > start + reach) break;
+      SynchronizedSet set = set_of(images, candidates, stamp, reach);
+      if (is_fuller(set, best)) best = std::move(set);
+    }
+    for (const SynchronizedSet::Camera& camera : best.cameras)
+      if (camera.state == State::seen) taken[camera.image] = true;
+    sets.push_back(std::move(best));
+  }
+  return sets;
 }
 
 }  // namespace libmap

@@ -18,21 +18,7 @@ namespace libmap {
 
 namespace {
 
-constexpr std::size_t pose_bytes = 48;
 constexpr std::size_t max_warnings = 100;
-// Of the nine numbers from the nearest rotation: float32 of old versions is off by 1e-4.
-constexpr double max_rotation_error = 0.05;
-
-template <typename T, std::size_t N>
-std::array<T, N> numbers_of(std::string_view bytes, const char* what) {
-  std::array<T, N> numbers{};
-  if (bytes.size() != sizeof numbers)
-    throw Error(std::string(what) + " of another length",
-                {.value = std::to_string(bytes.size()) + " bytes",
-                 .bound = std::to_string(sizeof numbers)});
-  std::memcpy(numbers.data(), bytes.data(), sizeof numbers);
-  return numbers;
-}
 
 class Warnings {
  public:
@@ -220,11 +206,6 @@ class LinkReader {
 // ---------------------------------------------------------------------------------- optimized
 // poses
 
-std::uint64_t elements_of(const StoredMatrix& matrix) {
-  return static_cast<std::uint64_t>(matrix.rows) * static_cast<std::uint64_t>(matrix.columns) *
-         static_cast<std::uint64_t>(matrix.channels);
-}
-
 std::map<int, Pose> decode_optimized_poses(const std::string& ids_blob,
                                            const std::string& poses_blob, const PoseGraph& graph,
                                            Warnings& warnings) {
@@ -260,65 +241,6 @@ void read_optimized_poses(const SqliteFile& file, const RtabmapColumns& columns,
 }
 
 }  // namespace
-
-void require_optimized_poses(const std::string& ids_blob, const std::string& poses_blob) {
-  const StoredMatrix ids = read_matrix_header(ids_blob);
-  const StoredMatrix poses = read_matrix_header(poses_blob);
-  if (ids.element != MatrixElement::int32 || poses.element != MatrixElement::float32)
-    throw Error("matrices of other types than int32 and float32");
-  constexpr std::uint64_t pose_numbers = pose_bytes / sizeof(float);
-  if (elements_of(poses) % pose_numbers != 0 ||
-      elements_of(poses) / pose_numbers != elements_of(ids))
-    throw Error("other numbers of ids and poses",
-                {.value = std::to_string(elements_of(ids)) + " and " +
-                          std::to_string(elements_of(poses) / pose_numbers)});
-}
-
-std::optional<Pose> decode_pose(std::string_view bytes) {
-  const auto numbers = numbers_of<float, 12>(bytes, "pose");
-  if (std::all_of(numbers.begin(), numbers.end(), [](float number) { return number == 0; }))
-    return std::nullopt;
-  using RowMajor = Eigen::Matrix<float, 3, 4, Eigen::RowMajor>;
-  const Eigen::Matrix<double, 3, 4> stored =
-      Eigen::Map<const RowMajor>(numbers.data()).cast<double>();
-  if (!stored.allFinite()) throw Error("pose that is not finite");
-  if (stored.col(3).cwiseAbs().maxCoeff() > max_position_m)
-    throw Error("pose that lies beyond 1e8 m of the origin");
-  Pose pose = Pose::Identity();
-  pose.linear() = nearest_rotation(stored.leftCols<3>());
-  pose.translation() = stored.col(3);
-  if ((pose.linear() - stored.leftCols<3>()).norm() > max_rotation_error)
-    throw Error("pose whose matrix is no rotation");
-  return pose;
-}
-
-Matrix6d decode_information(std::string_view bytes) {
-  const auto numbers = numbers_of<double, 36>(bytes, "information matrix");
-  using RowMajor = Eigen::Matrix<double, 6, 6, Eigen::RowMajor>;
-  Matrix6d information = Eigen::Map<const RowMajor>(numbers.data());
-  if (!(information.cwiseAbs().array() <= max_information).all())
-    throw Error("information matrix that is not finite, or beyond 1e300");
-  return information;
-}
-
-std::optional<std::array<double, 6>> decode_velocity(std::string_view bytes) {
-  const auto numbers = numbers_of<float, 6>(bytes, "velocity");
-  std::array<double, 6> velocity{};
-  std::copy(numbers.begin(), numbers.end(), velocity.begin());
-  const bool is_known =
-      std::any_of(velocity.begin(), velocity.end(), [](double v) { return v != 0; }) &&
-      std::all_of(velocity.begin(), velocity.end(), [](double v) { return std::isfinite(v); });
-  return is_known ? std::optional(velocity) : std::nullopt;
-}
-
-std::optional<GpsFix> decode_gps(std::string_view bytes) {
-  const auto numbers = numbers_of<double, 6>(bytes, "gps");
-  if (std::all_of(numbers.begin(), numbers.end(), [](double number) { return number == 0; }))
-    return std::nullopt;
-  if (!std::all_of(numbers.begin(), numbers.end(), [](double n) { return std::isfinite(n); }))
-    throw Error("gps that is not finite");
-  return GpsFix{numbers[0], numbers[1], numbers[2], numbers[3], numbers[4], numbers[5]};
-}
 
 RtabmapGraph read_rtabmap_graph(const SqliteFile& file, const RtabmapColumns& columns) {
   RtabmapGraph result;

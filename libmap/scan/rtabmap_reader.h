@@ -20,7 +20,7 @@
 #include "libmap/image/depth_codec.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/scan/calibration_codec.h"
-#include "libmap/scan/rtabmap_columns.h"
+#include "libmap/scan/rtabmap_schema.h"
 #include "libmap/scan/scan_source.h"
 
 namespace libmap {

@@ -1,11 +1,17 @@
 #include "libmap/scan/scan_source.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <cstdlib>
+#include <limits>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/scan/frame_folder.h"
-#include "libmap/scan/joined_scan.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 
@@ -36,6 +42,223 @@ std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path) {
     throw Error("is no scan: neither a database of RTAB-Map nor a folder of images",
                 {.file = path.string()});
   return std::make_unique<RtabmapDatabase>(path);
+}
+
+namespace {
+
+class JoinedScan : public ScanSource {
+ public:
+  explicit JoinedScan(std::vector<std::unique_ptr<ScanSource>> scans) : scans_(std::move(scans)) {
+    find_step();
+    for (std::size_t n = 0; n < scans_.size(); ++n) add(n);
+  }
+
+  // Of the first.
+  const std::filesystem::path& path() const override { return scans_.front()->path(); }
+  const PoseGraph& graph() const override { return graph_; }
+  const std::vector<std::string>& warnings() const override { return warnings_; }
+  std::string image_name(int node) const override {
+    const std::string name = of(node).image_name(node % step_);
+    return name.empty() || node < step_ ? name : std::to_string(node / step_ + 1) + "_" + name;
+  }
+  RgbdFrame read_frame(int node, FrameParts parts) const override {
+    RgbdFrame frame = of(node).read_frame(node % step_, parts);
+    frame.node = node;
+    return frame;
+  }
+
+  SourceNode source_of(int node) const override { return {of(node).path(), node % step_}; }
+
+ private:
+  const ScanSource& of(int node) const {
+    const auto scan = static_cast<std::size_t>(node / step_);
+    if (node < 0 || scan >= scans_.size())
+      throw Error("the scan has no such node",
+                  {.file = path().string(), .field = "node", .value = std::to_string(node)});
+    return *scans_[scan];
+  }
+  void find_step();
+  void add(std::size_t scan);
+
+  std::vector<std::unique_ptr<ScanSource>> scans_;
+  int step_ = 10;
+  int sessions_ = 0;
+  PoseGraph graph_;
+  std::vector<std::string> warnings_;
+};
+
+void JoinedScan::find_step() {
+  std::int64_t largest = 0;
+  const auto take = [&](int node) { largest = std::max(largest, std::abs(std::int64_t{node})); };
+  for (const auto& scan : scans_) {
+    for (const GraphNode& node : scan->graph().nodes) take(node.id);
+    for (const PoseLink& link : scan->graph().links) {
+      take(link.from);
+      take(link.to);
+    }
+  }
+  const auto most = static_cast<std::int64_t>(std::numeric_limits<int>::max()) /
+                    static_cast<std::int64_t>(scans_.size());
+  std::int64_t step = 10;
+  while (step <= largest) step *= 10;
+  if (step > most)
+    throw Error("node numbers are too large for so many scans",
+                {.file = path().string(),
+                 .field = "node",
+                 .value = std::to_string(largest),
+                 .bound = "< " + std::to_string(most / 10)});
+  step_ = static_cast<int>(step);
+}
+
+void JoinedScan::add(std::size_t scan) {
+  const PoseGraph& graph = scans_[scan]->graph();
+  const int higher = static_cast<int>(scan) * step_;
+  const auto renumbered = [&](int node) { return node < 0 ? node - higher : node + higher; };
+  int sessions = 0;
+  for (GraphNode node : graph.nodes) {
+    sessions = std::max(sessions, node.session + 1);
+    node.id = renumbered(node.id);
+    node.session += sessions_;
+    graph_.nodes.push_back(std::move(node));
+  }
+  sessions_ += sessions;
+  for (PoseLink link : graph.links) {
+    link.from = renumbered(link.from);
+    link.to = renumbered(link.to);
+    graph_.links.push_back(std::move(link));
+  }
+  for (const std::string& warning : scans_[scan]->warnings())
+    warnings_.push_back(scan == 0 ? warning : scans_[scan]->path().string() + ": " + warning);
+}
+
+}  // namespace
+
+std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans) {
+  if (scans.empty()) throw Error("no scan is given");
+  if (scans.size() == 1) return std::move(scans.front());
+  for (std::size_t a = 0; a < scans.size(); ++a)
+    for (std::size_t b = 0; b < a; ++b)
+      if (std::filesystem::equivalent(scans[a]->path(), scans[b]->path()))
+        throw Error("the same scan is given twice", {.file = scans[a]->path().string()});
+  return std::make_unique<JoinedScan>(std::move(scans));
+}
+
+std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>& paths) {
+  std::vector<std::unique_ptr<ScanSource>> scans;
+  for (const std::filesystem::path& path : paths) scans.push_back(open_scan(path));
+  return join_scans(std::move(scans));
+}
+
+namespace {
+
+constexpr double max_step = 0.03;  // of depth between pixels of one surface
+constexpr double max_miss_px = 0.5;
+constexpr int search_rounds = 5;
+
+class CalibratedScan : public ScanSource {
+ public:
+  CalibratedScan(std::unique_ptr<ScanSource> scan, CameraFile calibration)
+      : scan_(std::move(scan)), calibration_(std::move(calibration)) {}
+
+  const std::filesystem::path& path() const override { return scan_->path(); }
+  const PoseGraph& graph() const override { return scan_->graph(); }
+  const std::vector<std::string>& warnings() const override { return scan_->warnings(); }
+  SourceNode source_of(int node) const override { return scan_->source_of(node); }
+  std::string image_name(int node) const override { return scan_->image_name(node); }
+  RgbdFrame read_frame(int node, FrameParts parts) const override;
+
+ private:
+  std::unique_ptr<ScanSource> scan_;
+  CameraFile calibration_;
+};
+
+std::string size_of(const Camera& camera) {
+  return std::to_string(camera.width) + " x " + std::to_string(camera.height);
+}
+
+// Depth at a place between pixels whose four neighbors are of one surface, else at the nearest.
+double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
+  const int left = std::clamp(static_cast<int>(std::floor(at.x())), 0, depth.width - 2);
+  const int top = std::clamp(static_cast<int>(std::floor(at.y())), 0, depth.height - 2);
+  const auto z = [&](int i, int j) { return static_cast<double>(depth.at(left + i, top + j)); };
+  const double u = std::clamp(at.x() - left, 0.0, 1.0);
+  const double v = std::clamp(at.y() - top, 0.0, 1.0);
+  const auto [least, most] = std::minmax({z(0, 0), z(1, 0), z(0, 1), z(1, 1)});
+  if (!(least > 0.0 && most - least < max_step * most)) return z(u < 0.5 ? 0 : 1, v < 0.5 ? 0 : 1);
+  return (1.0 - v) * ((1.0 - u) * z(0, 0) + u * z(1, 0)) + v * ((1.0 - u) * z(0, 1) + u * z(1, 1));
+}
+
+// The depth image as the color camera sees it. Each pixel looks for the measurement that falls on
+// it, from pixel to pixel by how far it misses.
+DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth) {
+  const DepthImage& taken = frame.depth;
+  DepthImage seen(taken.width, taken.height);
+  if (taken.width < 2 || taken.height < 2) return seen;
+  RgbdFrame depth_only;
+  depth_only.cameras = frame.cameras;
+  depth_only.depth = taken;
+  const Camera camera = camera_views(depth_only).front().depth_camera;
+  for (int y = 0; y < taken.height; ++y)
+    for (int x = 0; x < taken.width; ++x) {
+      Eigen::Vector2d source(x, y);
+      Eigen::Vector3d point = Eigen::Vector3d::Zero();
+      double miss_px = std::numeric_limits<double>::infinity();
+      for (int round = 0; round < search_rounds && miss_px > 0.05; ++round) {
+        const double z = depth_between(taken, source);
+        const auto ray = pixel_to_ray(camera, source);
+        if (!(z > 0.0) || !ray) break;
+        point = color_from_depth * Eigen::Vector3d(z * ray->homogeneous());
+        const auto pixel = project_point(camera, point);
+        if (!pixel) break;
+        const Eigen::Vector2d miss = Eigen::Vector2d(x, y) - *pixel;
+        miss_px = miss.norm();
+        source += miss;
+        if (!(source.x() > -0.5 && source.y() > -0.5 && source.x() < taken.width - 0.5 &&
+              source.y() < taken.height - 0.5))
+          break;
+      }
+      if (miss_px < max_miss_px) seen.at(x, y) = static_cast<float>(point.z());
+    }
+  return seen;
+}
+
+RgbdFrame CalibratedScan::read_frame(int node, FrameParts parts) const {
+  RgbdFrame frame = scan_->read_frame(node, parts);
+  try {
+    apply_calibration(frame, calibration_);
+  } catch (const Error& error) {
+    throw error.in_field("node " + std::to_string(node)).in_file(scan_->path().string());
+  }
+  return frame;
+}
+
+}  // namespace
+
+void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
+  if (frame.cameras.empty() && frame.stereo.empty()) return;
+  if (frame.cameras.size() != 1 || !frame.stereo.empty())
+    throw Error("a calibration is of one camera",
+                {.field = "cameras",
+                 .value = std::to_string(frame.cameras.size() + 2 * frame.stereo.size()),
+                 .bound = "1"});
+  Camera& camera = frame.cameras.front();
+  const Camera& known = calibration.camera;
+  if (camera.width != known.width || camera.height != known.height)
+    throw Error("the calibration is of another size",
+                {.field = "camera", .value = size_of(camera), .bound = size_of(known)});
+  const Pose base_from_camera = camera.base_from_camera;
+  // By the stored camera, as it was estimated.
+  const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);
+  if (!color_from_depth.matrix().isIdentity(0.0))
+    frame.depth = registered_depth(frame, color_from_depth);
+  camera = known;
+  camera.base_from_camera = base_from_camera;
+  correct_depth(frame.depth, calibration.depth);
+}
+
+std::unique_ptr<ScanSource> with_calibration(std::unique_ptr<ScanSource> scan,
+                                             const CameraFile& calibration) {
+  return std::make_unique<CalibratedScan>(std::move(scan), calibration);
 }
 
 }  // namespace libmap

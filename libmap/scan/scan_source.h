@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/image/camera_io.h"
 #include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
@@ -48,8 +49,30 @@ class ScanSource {
 };
 
 // An RTAB-Map database, a folder in the layout of the TUM RGB-D benchmark, or a folder of
-// databases, joined in the order of their names (joined_scan.h). Throws Error if the path is none
-// of them.
+// databases, joined in the order of their names (join_scans). Throws Error if the path is none of
+// them.
 std::unique_ptr<ScanSource> open_scan(const std::filesystem::path& path);
+
+// Several scans as one, such as those of different days: each session stays in a frame of its own.
+// Nodes of the n-th scan, from 0, are numbered n * step higher, where step is the lowest power of
+// ten above all numbers: node 12 of the second of two small scans is 112. Sessions and landmarks
+// are told apart in the same way; optimized poses are left out, since each scan's are in another
+// frame. A single scan is returned as it is. Throws Error: no scan, too large numbers, or the same
+// file twice.
+std::unique_ptr<ScanSource> join_scans(std::vector<std::unique_ptr<ScanSource>> scans);
+
+// Opens and joins all; of one path as open_scan does.
+std::unique_ptr<ScanSource> open_scans(const std::vector<std::filesystem::path>& paths);
+
+// The frame with the focal lengths, principal point and distortion of `calibration`, and its depth
+// corrected and registered; where the camera is mounted stays, and pictures keep their rolling
+// shutter. Throws Error for a frame of several cameras, of a
+// stereo pair, or of another size than the calibration's.
+void apply_calibration(RgbdFrame& frame, const CameraFile& calibration);
+
+// `scan` with the calibration applied to each frame; read_frame throws Error naming the node where
+// that is not possible.
+std::unique_ptr<ScanSource> with_calibration(std::unique_ptr<ScanSource> scan,
+                                             const CameraFile& calibration);
 
 }  // namespace libmap

@@ -350,11 +350,6 @@ Trajectory poses_of_motion(const CameraMotion& motion, const CameraTrajectoryOpt
   return numbered(std::move(trajectory), options.frame_interval_s);
 }
 
-Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
-                        std::uint64_t seed) {
-  return poses_of_motion(camera_motion(mesh, options, seed), options);
-}
-
 Trajectory numbered(Trajectory poses, double frame_interval_s) {
   const bool stamped = std::any_of(poses.begin(), poses.end(),
                                    [](const TrajectoryPose& pose) { return pose.stamp_s != 0.0; });

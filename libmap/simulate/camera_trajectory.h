@@ -72,9 +72,6 @@ CameraMotion motion_through(Trajectory poses);
 // Poses at the frames; nodes from 1. Stamps begin at 1,700,000,000 s. The hand's motions are smooth
 // in time; the same seed gives the same.
 Trajectory poses_of_motion(const CameraMotion& motion, const CameraTrajectoryOptions& options);
-// The same of camera_motion.
-Trajectory carry_camera(const TriangleMesh& mesh, const CameraTrajectoryOptions& options,
-                        std::uint64_t seed);
 // Numbers the poses from 1 on, and stamps them as poses_of_motion does if no pose has a stamp.
 // Throws Error where a stamp is not later than the one before.
 Trajectory numbered(Trajectory poses, double frame_interval_s);

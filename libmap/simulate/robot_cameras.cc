@@ -7,7 +7,7 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/ray_caster.h"
-#include "libmap/simulate/multipath.h"
+#include "libmap/simulate/sensor_faults.h"
 
 namespace libmap {
 

@@ -10,8 +10,8 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/image/depth_registration.h"
-#include "libmap/simulate/multipath.h"
+#include "libmap/image/depth_correction.h"
+#include "libmap/simulate/sensor_faults.h"
 
 namespace libmap {
 

@@ -1,7 +1,9 @@
 // The visible surface of a scene of primitive shapes as triangles.
 #pragma once
 
+#include <Eigen/Core>
 #include <cstdint>
+#include <vector>
 
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/simulate/primitive_scene.h"

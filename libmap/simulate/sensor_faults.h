@@ -11,6 +11,7 @@
 #include "libmap/core/camera.h"
 #include "libmap/core/image.h"
 #include "libmap/core/parameters.h"
+#include "libmap/core/pose.h"
 #include "libmap/simulate/depth_camera.h"
 
 namespace libmap {
@@ -25,7 +26,7 @@ struct DepthFaults {
   double wiggle_period_m = 1.2;
   double corner_m = 0.0;   // added at the corners, growing with the squared radius
   double holes = 0.0;      // share of the image in discs without depth
-  double multipath = 0.0;  // reflectance of surfaces that mirror light onto others (multipath.h)
+  double multipath = 0.0;  // reflectance of surfaces that mirror light onto others (add_multipath)
 
   bool changes_depth() const { return scale_percent != 0 || wiggle_m != 0 || corner_m != 0; }
   // What is measured at `depth_m`, without noise; radius2: from the middle of the image, of that of
@@ -96,6 +97,16 @@ std::vector<RecordedFrame> recorded_frames(std::size_t frames, const RecordingFa
 
 // Depths of a view as the sensor errs, before its noise.
 void distort_depth(SurfaceView& view, const DepthFaults& faults);
+
+// Ranges of the view with what diffuse surfaces of this reflectance (0 to 1) mirror onto each
+// other: light of the camera that meets one surface, then a second one, arrives later than the
+// direct light of the second, and the camera measures the mean of both by their strength (the limit
+// of paths that differ by little of the modulation's wavelength: Fuchs 2010). Concave edges become
+// round and move away; flat and convex surfaces stay. One reflection, on a grid of pixels,
+// interpolated.
+void add_multipath(SurfaceView& view, const VisibleSurface& surface, const ViewRays& rays,
+                   const Pose& world_from_camera, double reflectance);
+
 // Discs without depth; how many measured pixels were lost.
 std::size_t punch_holes(DepthImage& depth, const DepthFaults& faults, std::uint64_t seed);
 

@@ -50,11 +50,11 @@ void drop_unused_vertices(std::vector<Eigen::Vector3d>& vertices, std::vector<Tr
 Solid in_order(const Solid& solid);
 
 // The same surface with each flat region of one label cut into even triangles; regions keep their
-// outline, and their edges stay where they are. solid_facets.cc.
+// outline, and their edges stay where they are.
 Solid refine_facets(const Solid& solid, double edge_length_m);
 
 // Unions and differences of solids in general position (CGAL's corefinement with exact
-// predicates). Throws Error if the result is no manifold. solid_boolean.cc.
+// predicates). Throws Error if the result is no manifold.
 // Without the splinters that cuts leave: edges shorter than `min_edge_m` are collapsed where the
 // surface stays a manifold and no triangle turns over.
 Solid unite(const std::vector<Solid>& solids, double min_edge_m = 0.0);

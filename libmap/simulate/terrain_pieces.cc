@@ -2,12 +2,193 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
+#include "libmap/core/angle.h"
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
+#include "libmap/simulate/rock_site.h"
+#include "libmap/simulate/solid_noise.h"
 
 namespace libmap {
+
+namespace {
+
+using std::numbers::pi;
+constexpr double rock_cell_m = 1.0;    // rocks are drawn cell by cell
+constexpr double bucket_m = 0.25;      // and found by buckets
+constexpr double power_index = 2.65;   // of heights (Michikami et al. 2019)
+constexpr double cobble_share = 0.25;  // of the rocks
+constexpr double roughness_length_m = 0.16;
+constexpr double rounding_m = 1e-6;    // of places on the borders of buckets
+constexpr double largest_reach = 2.4;  // of a rock, in its heights
+// Streams of random numbers, one for each purpose.
+constexpr std::uint64_t relief_stream = 11;
+constexpr std::uint64_t roughness_stream = 12;
+constexpr std::uint64_t rocks_stream = 13;
+
+// Truncated power law: the share of rocks higher than h goes with h^-power_index.
+double draw_height(const RockyTerrainOptions& options, RandomStream& draw) {
+  const double low = std::pow(options.min_rock_m, -power_index);
+  const double high = std::pow(options.max_rock_m, -power_index);
+  return std::pow(low - draw.uniform() * (low - high), -1.0 / power_index);
+}
+
+std::int64_t cell_below(double place_m, double cell_m) {
+  return static_cast<std::int64_t>(std::floor(place_m / cell_m));
+}
+
+}  // namespace
+
+void bind(ParameterTable& table, RockyTerrainOptions& options) {
+  table.add("seed", options.seed, not_negative, "another terrain of the kind");
+  table.add("relief_m", options.relief_m, Range{0.0, 100.0}, "height of the ground's waves, m");
+  table.add("relief_length_m", options.relief_length_m, Range{0.1, 10'000.0},
+            "length of the longest of them, m");
+  table.add("roughness_m", options.roughness_m, Range{0.0, 1.0},
+            "height of the surface's unevenness, m");
+  table.add("rocks_per_m2", options.rocks_per_m2, Range{0.0, 100.0}, "rocks a square meter");
+  table.add("min_rock_m", options.min_rock_m, Range{0.01, 5.0}, "height of the lowest rocks, m");
+  table.add("max_rock_m", options.max_rock_m, Range{0.01, 5.0}, "height of the highest, m");
+}
+
+void RockyTerrainOptions::check() const {
+  if (max_rock_m < min_rock_m)
+    throw Error("the highest rocks are lower than the lowest",
+                {.field = "max_rock_m",
+                 .value = to_text(max_rock_m),
+                 .bound = ">= min_rock_m, " + to_text(min_rock_m)});
+}
+
+RockyTerrain::RockyTerrain(const RockyTerrainOptions& options,
+                           const Eigen::AlignedBox2d& rectangle_m)
+    : options_(options), rectangle_m_(rectangle_m) {
+  const double margin = largest_reach * options_.max_rock_m;
+  const auto first_i = cell_below(rectangle_m.min().x() - margin, rock_cell_m);
+  const auto last_i = cell_below(rectangle_m.max().x() + margin, rock_cell_m);
+  const auto first_j = cell_below(rectangle_m.min().y() - margin, rock_cell_m);
+  const auto last_j = cell_below(rectangle_m.max().y() + margin, rock_cell_m);
+  for (std::int64_t i = first_i; i <= last_i; ++i)
+    for (std::int64_t j = first_j; j <= last_j; ++j) add_rocks_of_cell(i, j);
+  sort_into_buckets();
+}
+
+double RockyTerrain::ground(double x_m, double y_m) const {
+  const Eigen::Vector3d place(x_m / options_.relief_length_m, y_m / options_.relief_length_m, 0.5);
+  return options_.relief_m * fractal_noise(place, mix_bits(options_.seed, relief_stream), 4);
+}
+
+// Walls that lean back, shoulders and a top that is nearly flat.
+RockyTerrain::Rock RockyTerrain::draw_block(double height_m, std::uint64_t seed) const {
+  const SiteRock form = draw_rock(RockShape::block, height_m, seed);
+  RandomStream draw(seed, 2);
+  Rock rock;
+  const double yaw = form.yaw_deg * radians_per_degree;
+  // z of the plane through a point at `distance` along `heading` and at `level`.
+  const auto add = [&](double heading, double slope, double distance, double level) {
+    const double steepness = std::tan(slope);
+    rock.facets.push_back({steepness * std::cos(heading + yaw), steepness * std::sin(heading + yaw),
+                           level + steepness * distance});
+  };
+  const auto half_width = [&](double heading) {
+    return 0.5 * std::hypot(form.width_m * std::cos(heading), form.depth_m * std::sin(heading));
+  };
+  for (int n = 0; n < form.sides; ++n) {
+    const double heading = 2.0 * pi * (n + draw.uniform(-0.2, 0.2)) / form.sides;
+    add(heading, radians_per_degree * draw.uniform(66.0, 82.0),
+        half_width(heading) * draw.uniform(0.86, 1.0), 0.0);
+  }
+  const int shoulders = 2 + static_cast<int>(draw.uniform(0.0, 3.0));
+  for (int n = 0; n < shoulders; ++n) {
+    const double heading = draw.uniform(0.0, 2.0 * pi);
+    add(heading, radians_per_degree * draw.uniform(30.0, 65.0),
+        half_width(heading) * draw.uniform(0.5, 0.8), height_m);
+  }
+  add(draw.uniform(0.0, 2.0 * pi), radians_per_degree * draw.uniform(0.5, 6.0), 0.0, height_m);
+  rock.reach_m = 1.3 * std::max(form.width_m, form.depth_m);
+  return rock;
+}
+
+// The upper part of an ellipsoid.
+RockyTerrain::Rock RockyTerrain::draw_cobble(double height_m, std::uint64_t seed) const {
+  const SiteRock form = draw_rock(RockShape::cobble, height_m, seed);
+  Rock rock;
+  rock.height_m = height_m;
+  // Its outline on the ground lies at sqrt(3)/2 of the half-axes.
+  const double root3 = std::sqrt(3.0);
+  rock.unit_from_plan = Eigen::Vector2d(root3 / form.width_m, root3 / form.depth_m).asDiagonal() *
+                        Eigen::Rotation2Dd(-form.yaw_deg * radians_per_degree).toRotationMatrix();
+  rock.reach_m = std::max(form.width_m, form.depth_m) / root3;
+  return rock;
+}
+
+void RockyTerrain::add_rocks_of_cell(std::int64_t i, std::int64_t j) {
+  const std::uint64_t cell = mix_bits(static_cast<std::uint64_t>(i), static_cast<std::uint64_t>(j));
+  RandomStream draw(mix_bits(options_.seed, rocks_stream), cell);
+  const int count = static_cast<int>(
+      std::floor(options_.rocks_per_m2 * rock_cell_m * rock_cell_m + draw.uniform()));
+  for (int n = 0; n < count; ++n) {
+    const double x = (static_cast<double>(i) + draw.uniform()) * rock_cell_m;
+    const double y = (static_cast<double>(j) + draw.uniform()) * rock_cell_m;
+    const double height_m = draw_height(options_, draw);
+    const bool is_cobble = draw.uniform() < cobble_share;
+    const std::uint64_t seed = mix_bits(mix_bits(options_.seed, cell), static_cast<unsigned>(n));
+    Rock rock = is_cobble ? draw_cobble(height_m, seed) : draw_block(height_m, seed);
+    rock.center = {x, y};
+    if (rectangle_m_.squaredExteriorDistance(rock.center) > rock.reach_m * rock.reach_m) continue;
+    rock.foot_m = ground(x, y);
+    rocks_.push_back(std::move(rock));
+  }
+}
+
+void RockyTerrain::sort_into_buckets() {
+  const Eigen::Vector2d size = rectangle_m_.sizes();
+  columns_ = static_cast<std::size_t>(size.x() / bucket_m) + 1;
+  const std::size_t rows = static_cast<std::size_t>(size.y() / bucket_m) + 1;
+  buckets_.resize(columns_ * rows);
+  const auto bucket_at = [&](double offset_m, std::size_t count) {
+    const double bucket = std::floor(offset_m / bucket_m);
+    return static_cast<std::size_t>(std::clamp(bucket, 0.0, static_cast<double>(count - 1)));
+  };
+  for (std::size_t r = 0; r < rocks_.size(); ++r) {
+    const Eigen::Vector2d reach = Eigen::Vector2d::Constant(rocks_[r].reach_m + rounding_m);
+    const Eigen::Vector2d low = rocks_[r].center - reach - rectangle_m_.min();
+    const Eigen::Vector2d high = rocks_[r].center + reach - rectangle_m_.min();
+    for (std::size_t row = bucket_at(low.y(), rows); row <= bucket_at(high.y(), rows); ++row)
+      for (std::size_t column = bucket_at(low.x(), columns_);
+           column <= bucket_at(high.x(), columns_); ++column)
+        buckets_[row * columns_ + column].push_back(static_cast<std::uint32_t>(r));
+  }
+}
+
+double RockyTerrain::height_over_foot(const Rock& rock, const Eigen::Vector2d& place) {
+  const Eigen::Vector2d offset = place - rock.center;
+  if (offset.squaredNorm() > rock.reach_m * rock.reach_m) return -HUGE_VAL;
+  if (rock.facets.empty()) {
+    const double squared = (rock.unit_from_plan * offset).squaredNorm();
+    // Half of the ellipsoid's upper half stands out of the ground.
+    return squared >= 1.0 ? -HUGE_VAL : rock.height_m * (2.0 * std::sqrt(1.0 - squared) - 1.0);
+  }
+  double height = HUGE_VAL;
+  for (const Facet& facet : rock.facets)
+    height = std::min(height, facet.c - facet.a * offset.x() - facet.b * offset.y());
+  return height;
+}
+
+double RockyTerrain::height(double x_m, double y_m) const {
+  const Eigen::Vector2d place(x_m, y_m);
+  const Eigen::Vector2d bucket = (place - rectangle_m_.min()) / bucket_m;
+  const auto column = std::min(static_cast<std::size_t>(std::max(bucket.x(), 0.0)), columns_ - 1);
+  const auto row =
+      std::min(static_cast<std::size_t>(std::max(bucket.y(), 0.0)), buckets_.size() / columns_ - 1);
+  double height = ground(x_m, y_m);
+  for (const std::uint32_t r : buckets_[row * columns_ + column])
+    height = std::max(height, rocks_[r].foot_m + height_over_foot(rocks_[r], place));
+  const Eigen::Vector3d fine(x_m / roughness_length_m, y_m / roughness_length_m, 0.5);
+  return height +
+         options_.roughness_m * fractal_noise(fine, mix_bits(options_.seed, roughness_stream), 3);
+}
 
 namespace {
 

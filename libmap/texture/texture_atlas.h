@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "libmap/core/textured_mesh.h"
+#include "libmap/core/triangle_mesh.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/texture/texture_photos.h"
 

@@ -16,7 +16,7 @@
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/stage_timer.h"
-#include "libmap/core/textured_mesh.h"
+#include "libmap/core/triangle_mesh.h"
 #include "libmap/mesh/mesh_piece_index.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_atlas.h"

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "libmap/core/progress.h"
-#include "libmap/core/textured_mesh.h"
+#include "libmap/core/triangle_mesh.h"
 #include "libmap/texture/texture_atlas.h"
 #include "libmap/texture/texture_exposure.h"
 #include "libmap/texture/texture_photos.h"

@@ -8,7 +8,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
-#include "libmap/image/image_sharpness.h"
+#include "libmap/image/color_image.h"
 
 namespace libmap {
 

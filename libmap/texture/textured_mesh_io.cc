@@ -7,7 +7,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/core/file_size.h"
+#include "libmap/core/memory_budget.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/assimp_codec.h"
 #include "libmap/mesh/mesh_io.h"

@@ -14,7 +14,7 @@
 #include <functional>
 #include <vector>
 
-#include "libmap/core/textured_mesh.h"
+#include "libmap/core/triangle_mesh.h"
 #include "libmap/image/image_codec.h"
 
 namespace libmap {

@@ -11,7 +11,6 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
-#include "libmap/core/textured_mesh.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/view/color_map.h"
 #include "libmap/view/image_io.h"

@@ -9,8 +9,8 @@
 #include "libmap/image/camera_io.h"
 #include "libmap/report/outline_io.h"
 #include "libmap/scan/rig_io.h"
-#include "libmap/simulate/primitive_scene_io.h"
-#include "libmap/simulate/rock_site_io.h"
+#include "libmap/simulate/primitive_scene.h"
+#include "libmap/simulate/rock_site.h"
 #include "tests/fuzz/target_support.h"
 
 namespace graspmap_fuzz {

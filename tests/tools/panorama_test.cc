@@ -4,7 +4,7 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/image/image_codec.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace panorama_test {

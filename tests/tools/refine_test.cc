@@ -8,8 +8,6 @@
 #include "libmap/core/file_output.h"
 #include "libmap/image/camera_io.h"
 #include "libmap/image/image_codec.h"
-#include "libmap/scan/calibrated_scan.h"
-#include "libmap/scan/joined_scan.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"

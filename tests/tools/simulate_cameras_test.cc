@@ -5,7 +5,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 

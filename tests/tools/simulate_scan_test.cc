@@ -5,7 +5,7 @@
 #include "libmap/image/camera_io.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/simulate/rocky_terrain.h"
+#include "libmap/simulate/terrain_pieces.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -5,7 +5,7 @@
 
 #include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
-#include "libmap/core/textured_mesh.h"
+#include "libmap/core/triangle_mesh.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"

@@ -3,7 +3,6 @@
 #include "libmap/cloud/depth_fusion.h"
 #include "libmap/core/error.h"
 #include "libmap/refine/refinement.h"
-#include "libmap/scan/calibrated_scan.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/pose_import.h"
 #include "tools/python/values.h"

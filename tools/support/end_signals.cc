@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
-#include "libmap/core/unfinished_outputs.h"
+#include "libmap/core/file_output.h"
 
 namespace graspmap_tools {
 

@@ -2,7 +2,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/panorama.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"

@@ -2,7 +2,7 @@
 
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/tile_store.h"
-#include "libmap/cloud/pcd_parts.h"
+#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "libmap/raster/dem_reader.h"
 #include "tools/support/command_line.h"

@@ -7,9 +7,7 @@
 #include <sstream>
 
 #include "libmap/core/data_folder.h"
-#include "libmap/core/folder_output.h"
-#include "libmap/core/named_output.h"
-#include "libmap/core/unfinished_outputs.h"
+#include "libmap/core/file_output.h"
 #include "tools/support/message_text.h"
 
 namespace graspmap_tools {
@@ -268,7 +266,7 @@ void Run::write_output_tree(const fs::path& given, const std::vector<std::string
   libmap::OutputFolder output(folder, names);
   timed("write", [&] { libmap::write_named(output.temporary_path(), folder, writer); });
   write_named(manifest, text_writer(libmap::to_json(manifest_)));
-  const libmap::OutputsInStep step;
+  const libmap::CommitGuard guard;
   manifest.commit();
   output.commit();
 }

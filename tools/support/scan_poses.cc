@@ -2,9 +2,8 @@
 
 #include <set>
 
-#include "libmap/scan/calibrated_scan.h"
-#include "libmap/scan/joined_scan.h"
 #include "libmap/scan/rtabmap_reader.h"
+#include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_error.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/map_frame.h"

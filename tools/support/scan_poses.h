@@ -43,7 +43,7 @@ void add_camera(const libmap::CameraFile& camera, Run& run);
 // of the camera, if there is one.
 std::unique_ptr<libmap::ScanSource> open_scan(const std::string& scan, bool strict, Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});
-// The same of several scans, joined (joined_scan.h).
+// The same of several scans, joined (join_scans).
 std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& scans, bool strict,
                                               Run& run,
                                               const std::optional<libmap::CameraFile>& camera = {});

@@ -2,7 +2,6 @@
 #include "libmap/core/data_folder.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/scan/rig_images.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/simulate/robot_cameras.h"
 #include "tools/support/command_line.h"

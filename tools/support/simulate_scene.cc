@@ -1,8 +1,10 @@
 // graspmap simulate scene: scenes of primitive shapes with their closed-form truth.
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/yaml_document.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/simulate/primitive_scene_io.h"
+#include "libmap/simulate/primitive_scene.h"
 #include "libmap/simulate/scene_mesh.h"
 #include "libmap/simulate/scene_sampling.h"
 #include "tools/support/command_line.h"
@@ -76,7 +78,8 @@ void simulate(const SimulateOptions& options, Run& run) {
     libmap::require_cloud_format(options.output);
   run.claim_output(options.output);
   const auto file = libmap::find_data_file("scenes", options.scene);
-  const libmap::PrimitiveScene scene = libmap::load_scene(file);
+  const libmap::PrimitiveScene scene =
+      libmap::parse_scene(libmap::read_whole_file(file, libmap::max_yaml_bytes), file.string());
   run.add_input(file);
   run.manifest().frame = "scene";
   if (options.mesh)

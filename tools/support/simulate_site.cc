@@ -1,8 +1,10 @@
 // graspmap simulate site: test sites with their true mesh and places for a field test.
 #include "libmap/core/data_folder.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/yaml_document.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/simulate/field_points.h"
-#include "libmap/simulate/rock_site_io.h"
+#include "libmap/simulate/rock_site.h"
 #include "libmap/simulate/site_mesh.h"
 #include "tools/support/command_line.h"
 #include "tools/support/usages.h"
@@ -34,7 +36,8 @@ void bind(libmap::ParameterTable& table, SimulateSiteOptions& options) {
 libmap::RockSite load(const SimulateSiteOptions& options, const std::filesystem::path& file) {
   std::optional<std::uint64_t> seed;
   if (options.seed != 0) seed = options.seed;
-  libmap::RockSite site = libmap::load_site(file, seed);
+  libmap::RockSite site = libmap::parse_site(libmap::read_whole_file(file, libmap::max_yaml_bytes),
+                                             file.string(), seed);
   if (options.places != 0) site.field_points.count = static_cast<int>(options.places);
   if (site.rocks.empty())
     throw libmap::Error("a site needs at least one rock",

@@ -7,7 +7,6 @@
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
-#include "libmap/core/named_output.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 

@@ -1,5 +1,4 @@
 // A PCD written part by part is the file of the whole cloud.
-#include "libmap/cloud/pcd_parts.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "libmap/core/folder_output.h"
+#include "libmap/core/file_output.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "libmap/core/pose.h"
-#include "libmap/core/textured_mesh.h"
 #include "tests/support/test_support.h"
 
 namespace triangle_mesh_test {

@@ -1,4 +1,4 @@
-#include "libmap/core/unfinished_outputs.h"
+#include "libmap/core/file_output.h"
 
 #include <gtest/gtest.h>
 #include <sys/wait.h>
@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "libmap/core/error.h"
-#include "libmap/core/folder_output.h"
 #include "tests/support/file_names.h"
 #include "tests/support/test_support.h"
 
@@ -108,7 +107,7 @@ TEST_F(UnfinishedOutputs, WhatIsPutInPlaceAsOneStepComesAsAWhole) {
     }
     std::atomic<bool> is_in_step = false;
     std::thread([&] {
-      const libmap::OutputsInStep step;
+      const libmap::CommitGuard guard;
       is_in_step = true;
       std::this_thread::sleep_for(std::chrono::milliseconds(50));
       libmap::commit_together(outputs);

@@ -1,4 +1,4 @@
-#include "libmap/image/depth_registration.h"
+#include "libmap/image/depth_correction.h"
 
 #include <gtest/gtest.h>
 

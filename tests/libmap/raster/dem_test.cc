@@ -5,7 +5,6 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/cloud_pieces.h"
 #include "libmap/mesh/mesh_io.h"
-#include "libmap/raster/dem_mesh.h"
 #include "libmap/raster/dem_reader.h"
 #include "tests/libmap/raster/gdal_programs.h"
 

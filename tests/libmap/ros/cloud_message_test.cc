@@ -1,4 +1,3 @@
-#include "libmap/ros/cloud_message.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -10,12 +10,11 @@
 #include "libmap/ros/bag_cloud.h"
 #include "libmap/ros/bag_reader.h"
 #include "libmap/ros/bag_rig.h"
+#include "libmap/ros/bag_storage.h"
 #include "libmap/ros/bag_writer.h"
-#include "libmap/ros/chunk_compression.h"
 #include "libmap/ros/message_codec.h"
 #include "libmap/ros/message_encoding.h"
-#include "libmap/ros/rosbag2_metadata.h"
-#include "libmap/ros/transform_message.h"
+#include "libmap/ros/transform_tree.h"
 #include "tests/support/test_support.h"
 
 namespace ros2_bag_test {

@@ -1,5 +1,4 @@
 // Pictures and cameras for MeshLab: what is written, what the pictures show, which are chosen.
-#include "libmap/scan/bundler_io.h"
 
 #include <gmock/gmock.h>
 
@@ -7,9 +6,8 @@
 #include <cmath>
 #include <sstream>
 
-#include "libmap/image/image_sharpness.h"
-#include "libmap/image/pinhole_image.h"
-#include "libmap/scan/view_selection.h"
+#include "libmap/image/color_image.h"
+#include "libmap/scan/picture_file.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

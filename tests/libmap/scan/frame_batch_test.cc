@@ -1,4 +1,4 @@
-#include "libmap/scan/frame_batch.h"
+#include "libmap/scan/rgbd_frame.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "libmap/scan/joined_scan.h"
+#include "libmap/scan/scan_source.h"
 
 #include <gtest/gtest.h>
 

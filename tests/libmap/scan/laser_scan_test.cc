@@ -1,4 +1,4 @@
-#include "libmap/scan/laser_scan.h"
+#include "libmap/scan/scan_verification.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "libmap/scan/rig_images.h"
+#include "libmap/scan/rig_io.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -7,7 +7,7 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/image/matrix_codec.h"
-#include "libmap/scan/rtabmap_graph.h"
+#include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/scan_verification.h"
 #include "tests/libmap/scan/sample_checks.h"
 #include "tests/libmap/scan/sample_database.h"

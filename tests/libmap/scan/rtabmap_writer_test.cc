@@ -9,7 +9,7 @@
 
 #include "libmap/core/file_output.h"
 #include "libmap/image/matrix_codec.h"
-#include "libmap/scan/rtabmap_graph.h"
+#include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/database_rows.h"
 #include "tests/libmap/scan/example_scan.h"

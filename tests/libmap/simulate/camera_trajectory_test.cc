@@ -14,11 +14,15 @@ namespace camera_trajectory_test {
 using graspmap_test::error_of;
 using graspmap_test::square_mesh;
 using libmap::CameraTrajectoryOptions;
-using libmap::carry_camera;
 using libmap::Pose;
 using libmap::Trajectory;
 
 constexpr double degrees = 180.0 / std::numbers::pi;
+
+Trajectory carry_camera(const libmap::TriangleMesh& mesh, const CameraTrajectoryOptions& options,
+                        std::uint64_t seed) {
+  return libmap::poses_of_motion(libmap::camera_motion(mesh, options, seed), options);
+}
 
 CameraTrajectoryOptions steady() {
   CameraTrajectoryOptions options;

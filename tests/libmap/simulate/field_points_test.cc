@@ -9,9 +9,10 @@
 #include <set>
 
 #include "libmap/core/parallel.h"
-#include "libmap/simulate/rock_site_io.h"
+#include "libmap/simulate/rock_site.h"
 #include "libmap/simulate/site_mesh.h"
 #include "libmap/simulate/solid.h"
+#include "tests/libmap/simulate/scene_test_support.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -110,7 +111,7 @@ TEST(FieldPoints, WhereTheSurfaceBendsInwardIsIrregular) {
 }
 
 TEST(FieldPoints, SpreadOverRocksAndKeepApart) {
-  const RockSite site = load_site(graspmap_test::source_folder() / "data/sites/rocks.yaml");
+  const RockSite site = graspmap_test::shipped_site("rocks.yaml");
   const TriangleMesh mesh = site_mesh(site, {.edge_length_m = 0.015});
   const std::vector<FieldPoint> points = choose_field_points(site, mesh);
   ASSERT_EQ(points.size(), 30U);

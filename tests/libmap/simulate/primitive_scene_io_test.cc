@@ -1,5 +1,5 @@
 // YAML there and back, and every way in which a file can be wrong.
-#include "libmap/simulate/primitive_scene_io.h"
+#include "libmap/simulate/primitive_scene.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -15,7 +15,7 @@ namespace primitive_scene_io_test {
 
 using graspmap_test::error_of;
 using graspmap_test::from_above;
-using graspmap_test::source_folder;
+using graspmap_test::shipped_scene;
 using graspmap_test::thesis_primitive_scene;
 using testing::AllOf;
 using testing::HasSubstr;
@@ -25,12 +25,11 @@ std::string message_of(const std::string& text) {
 }
 
 TEST(SceneYaml, the_primitive_shapes_file_is_the_thesis_scene) {
-  EXPECT_EQ(load_scene(source_folder() / "data/scenes/primitive_shapes.yaml"),
-            thesis_primitive_scene());
+  EXPECT_EQ(shipped_scene("primitive_shapes.yaml"), thesis_primitive_scene());
 }
 
 TEST(SceneYaml, the_slopes_file_is_a_hollow_with_bumps) {
-  const PrimitiveScene scene = load_scene(source_folder() / "data/scenes/slopes_and_bumps.yaml");
+  const PrimitiveScene scene = shipped_scene("slopes_and_bumps.yaml");
   const SceneGeometry geometry(scene);
   EXPECT_LT(from_above(geometry, 0.25, -0.2)->height, -0.5);
   EXPECT_GT(from_above(geometry, 1.4, 1.4)->height, 0.1);
@@ -93,11 +92,6 @@ TEST(SceneYaml, documents_of_another_form_are_errors) {
   }
   EXPECT_THAT(message_of(std::string(100'000, '[')), HasSubstr("scene.yaml"));
   EXPECT_THAT(message_of("shapes:\n  - {shape: sphere\n"), HasSubstr("line"));
-}
-
-TEST(SceneYaml, a_file_that_is_not_there_is_an_error) {
-  const std::filesystem::path path = graspmap_test::scratch_folder() / "none.yaml";
-  EXPECT_THAT(error_of([&] { load_scene(path); }).what(), HasSubstr("none.yaml"));
 }
 
 }  // namespace primitive_scene_io_test

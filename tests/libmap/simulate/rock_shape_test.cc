@@ -1,5 +1,5 @@
 // Every form that is drawn is a closed body of the size that was asked for.
-#include "libmap/simulate/rock_shape.h"
+#include "libmap/simulate/site_mesh.h"
 
 #include <gtest/gtest.h>
 

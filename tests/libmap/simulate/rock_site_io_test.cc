@@ -1,10 +1,11 @@
 // Site files: what is given stands, what is missing is drawn, what is wrong is named.
-#include "libmap/simulate/rock_site_io.h"
+#include "libmap/simulate/rock_site.h"
 
 #include <gtest/gtest.h>
 
 #include <cmath>
 
+#include "tests/libmap/simulate/scene_test_support.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -40,7 +41,7 @@ TEST(RockSiteIo, KeepsWhatIsGivenAndDrawsTheRest) {
 
 TEST(RockSiteIo, WrittenAndReadIsTheSameSite) {
   for (const char* name : {"rocks.yaml", "slopes_and_bumps.yaml", "bouldering_wall.yaml"}) {
-    const RockSite site = load_site(graspmap_test::source_folder() / "data/sites" / name, 3);
+    const RockSite site = graspmap_test::shipped_site(name, 3);
     const std::string text = to_yaml(site);
     const RockSite again = parse(text);
     EXPECT_EQ(to_yaml(again), text) << name;
@@ -57,7 +58,7 @@ TEST(RockSiteIo, WrittenAndReadIsTheSameSite) {
 // Placed rocks keep apart: corners of one rectangle are never inside another.
 TEST(RockSiteIo, PlacedRocksKeepApart) {
   for (std::uint64_t seed = 1; seed <= 20; ++seed) {
-    const RockSite site = load_site(graspmap_test::source_folder() / "data/sites/rocks.yaml", seed);
+    const RockSite site = graspmap_test::shipped_site("rocks.yaml", seed);
     for (const SiteRock& a : site.rocks) {
       for (const SiteRock& b : site.rocks) {
         if (&a == &b) continue;

@@ -42,7 +42,7 @@ Vector6d error_of_link(const PoseGraph& graph, const PoseLink& link) {
 }
 
 Trajectory default_way(std::uint64_t seed) {
-  return libmap::carry_camera(square_mesh(0.0, 1.5), {}, seed);
+  return libmap::poses_of_motion(libmap::camera_motion(square_mesh(0.0, 1.5), {}, seed), {});
 }
 
 // Sums over many seeds of the links of one type.

@@ -2,17 +2,34 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
 #include <numbers>
+#include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
+#include "libmap/core/file_output.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/simulate/primitive_scene.h"
+#include "libmap/simulate/rock_site.h"
 #include "tests/support/test_support.h"
 
 namespace graspmap_test {
 
 inline constexpr double pi = std::numbers::pi;
+
+// Of data/scenes and data/sites.
+inline libmap::PrimitiveScene shipped_scene(const std::string& name) {
+  const std::filesystem::path path = source_folder() / "data/scenes" / name;
+  return libmap::parse_scene(libmap::read_whole_file(path), path.string());
+}
+inline libmap::RockSite shipped_site(const std::string& name,
+                                     std::optional<std::uint64_t> seed = std::nullopt) {
+  const std::filesystem::path path = source_folder() / "data/sites" / name;
+  return libmap::parse_site(libmap::read_whole_file(path), path.string(), seed);
+}
 
 inline libmap::PrimitiveScene scene_of(std::vector<libmap::SceneShape> shapes) {
   return {std::move(shapes)};

@@ -10,7 +10,6 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/image/depth_correction.h"
 #include "libmap/mesh/ray_caster.h"
-#include "libmap/simulate/multipath.h"
 #include "libmap/simulate/scan_simulation.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 

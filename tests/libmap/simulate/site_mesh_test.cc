@@ -8,8 +8,9 @@
 #include <map>
 
 #include "libmap/core/parallel.h"
-#include "libmap/simulate/rock_site_io.h"
+#include "libmap/simulate/rock_site.h"
 #include "mesh_topology.h"
+#include "tests/libmap/simulate/scene_test_support.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {
@@ -17,6 +18,7 @@ namespace site_mesh_test {
 
 using graspmap_test::error_of;
 using graspmap_test::self_intersections;
+using graspmap_test::shipped_site;
 using graspmap_test::Topology;
 using graspmap_test::topology_of;
 
@@ -84,12 +86,8 @@ std::map<int, double> rock_heights(const RockSite& site, const TriangleMesh& mes
   return heights;
 }
 
-RockSite shipped(const char* name, std::optional<std::uint64_t> seed = std::nullopt) {
-  return load_site(graspmap_test::source_folder() / "data/sites" / name, seed);
-}
-
 TEST(SiteMesh, HasNoSplintersThatSinglePrecisionFlattens) {
-  const TriangleMesh mesh = site_mesh(shipped("rocks.yaml"), {.edge_length_m = 0.012});
+  const TriangleMesh mesh = site_mesh(shipped_site("rocks.yaml"), {.edge_length_m = 0.012});
   for (const Triangle& triangle : mesh.triangles) {
     TriangleMesh rounded;
     for (const std::uint32_t vertex : triangle)
@@ -99,7 +97,7 @@ TEST(SiteMesh, HasNoSplintersThatSinglePrecisionFlattens) {
 }
 
 TEST(SiteMesh, TheThesissRocks) {
-  const RockSite site = shipped("rocks.yaml");
+  const RockSite site = shipped_site("rocks.yaml");
   ASSERT_EQ(site.rocks.size(), 12U);
   const TriangleMesh mesh = site_mesh(site, {.edge_length_m = 0.025});
   const std::map<int, double> heights = rock_heights(site, mesh);
@@ -132,7 +130,7 @@ TEST(SiteMesh, TheThesissRocks) {
 }
 
 TEST(SiteMesh, AClimbingWallStandsUp) {
-  const RockSite site = shipped("bouldering_wall.yaml");
+  const RockSite site = shipped_site("bouldering_wall.yaml");
   EXPECT_EQ(site.rocks.size(), 58U);
   const TriangleMesh mesh = site_mesh(site, {.edge_length_m = 0.03});
   const Bounds3d bounds = bounds_of(mesh.vertices);
@@ -151,7 +149,7 @@ TEST(SiteMesh, AClimbingWallStandsUp) {
 }
 
 TEST(SiteMesh, SlopesAndBumps) {
-  const RockSite site = shipped("slopes_and_bumps.yaml");
+  const RockSite site = shipped_site("slopes_and_bumps.yaml");
   const TriangleMesh mesh = site_mesh(site, {.edge_length_m = 0.04});
   EXPECT_EQ(topology(mesh).bad_edges, 0U);
   const GroundRelief relief(site);
@@ -171,20 +169,20 @@ TEST(SiteMesh, SameBytesForAnyNumberOfThreadsAndOtherOnesForAnotherSeed) {
   EXPECT_EQ(one.vertices, four.vertices);
   EXPECT_EQ(one.triangles, four.triangles);
   EXPECT_EQ(one.vertex_colors, four.vertex_colors);
-  const RockSite first = shipped("rocks.yaml", 1);
-  const RockSite second = shipped("rocks.yaml", 2);
+  const RockSite first = shipped_site("rocks.yaml", 1);
+  const RockSite second = shipped_site("rocks.yaml", 2);
   EXPECT_NE(first.rocks[0].x_m, second.rocks[0].x_m);
   EXPECT_NE(first.rocks[0].seed, second.rocks[0].seed);
 }
 
 TEST(SiteMesh, EverySeedGivesASite) {
   for (std::uint64_t seed = 1; seed <= 60; ++seed) {
-    const RockSite site = shipped("rocks.yaml", seed);
+    const RockSite site = shipped_site("rocks.yaml", seed);
     EXPECT_EQ(site.rocks.size(), 12U);
   }
   for (std::uint64_t seed = 30; seed < 33; ++seed) {
     const TriangleMesh mesh =
-        site_mesh(shipped("rocks.yaml", seed), {.edge_length_m = 0.03, .closed = true});
+        site_mesh(shipped_site("rocks.yaml", seed), {.edge_length_m = 0.03, .closed = true});
     const Topology found = topology(mesh);
     EXPECT_EQ(found.open_edges + found.bad_edges, 0U) << seed;
     EXPECT_EQ(found.parts, 1U) << seed;

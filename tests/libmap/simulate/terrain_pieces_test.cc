@@ -8,7 +8,6 @@
 #include <set>
 #include <utility>
 
-#include "libmap/simulate/rocky_terrain.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

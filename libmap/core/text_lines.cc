@@ -1,8 +1,10 @@
-#include "libmap/scan/text_lines.h"
+#include "libmap/core/text_lines.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
+#include <utility>
 
 #include "libmap/core/error.h"
 #include "libmap/core/pose_graph.h"
@@ -12,17 +14,6 @@ namespace libmap {
 
 namespace {
 
-std::vector<std::string_view> split_words(std::string_view text) {
-  constexpr std::string_view separators = " \t\r,;";
-  std::vector<std::string_view> words;
-  for (std::size_t begin = text.find_first_not_of(separators); begin != std::string_view::npos;) {
-    const std::size_t end = text.find_first_of(separators, begin);
-    words.push_back(text.substr(begin, end - begin));
-    begin = text.find_first_not_of(separators, end);
-  }
-  return words;
-}
-
 void require_word(const TextLine& line, std::size_t word, const std::string& file) {
   if (word >= line.words.size())
     throw wrong_columns("ends too early", line, file, ">= " + std::to_string(word + 1));
@@ -30,18 +21,42 @@ void require_word(const TextLine& line, std::size_t word, const std::string& fil
 
 }  // namespace
 
-std::vector<TextLine> split_lines(std::string_view text) {
-  constexpr std::string_view byte_order_mark = "\xEF\xBB\xBF";
-  if (text.substr(0, byte_order_mark.size()) == byte_order_mark)
-    text.remove_prefix(byte_order_mark.size());
-  std::vector<TextLine> lines;
-  for (std::size_t number = 1; !text.empty(); ++number) {
-    const std::size_t end = text.find('\n');
-    TextLine line{.number = number, .text = text.substr(0, end)};
-    line.words = split_words(line.text);
-    if (!line.words.empty()) lines.push_back(std::move(line));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
+LineReader::LineReader(std::string_view text, std::size_t first_line, std::string_view separators)
+    : text_(text), next_number_(first_line) {
+  for (const char c : separators) is_separator_[static_cast<unsigned char>(c)] = true;
+}
+
+bool LineReader::next(TextLine& line) {
+  line.words.clear();
+  while (line.words.empty() && !text_.empty()) {
+    const std::size_t end = std::min(text_.find('\n'), text_.size());
+    line.number = next_number_++;
+    line.text = text_.substr(0, end);
+    const auto separates = [&](std::size_t at) {
+      return is_separator_[static_cast<unsigned char>(line.text[at])];
+    };
+    for (std::size_t at = 0; at < end;) {
+      while (at < end && separates(at)) ++at;
+      const std::size_t word = at;
+      while (at < end && !separates(at)) ++at;
+      if (at > word) line.words.push_back(line.text.substr(word, at - word));
+    }
+    text_.remove_prefix(std::min(end + 1, text_.size()));
   }
+  return !line.words.empty();
+}
+
+std::vector<std::string_view> words_of(std::string_view line) {
+  TextLine split;
+  LineReader(line).next(split);
+  return std::move(split.words);
+}
+
+std::vector<TextLine> split_lines(std::string_view text) {
+  if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  LineReader reader(text, 1, " \t\r,;");
+  std::vector<TextLine> lines;
+  for (TextLine line; reader.next(line);) lines.push_back(line);
   return lines;
 }
 
@@ -92,6 +107,15 @@ Error wrong_columns(const std::string& reason, const TextLine& line, const std::
 
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file) {
   return in_line("is a duplicate", line, file, record);
+}
+
+void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
+                           const std::string& what) {
+  // A word takes a character and a blank, but for the file's last one.
+  const std::uint64_t line_bytes = 2 * words;
+  if (line_bytes > 0 && rows > (bytes + 1) / line_bytes)
+    throw Error("the header promises " + std::to_string(rows) + " " + what + ", but only " +
+                std::to_string(bytes) + " bytes of text follow");
 }
 
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,

@@ -1,6 +1,7 @@
-// Text formats of one record per line.
+// Text formats of one record per line: lines of words, and their numbers.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <initializer_list>
@@ -16,10 +17,30 @@ namespace libmap {
 struct TextLine {
   std::size_t number = 0;  // from 1
   std::string_view text{};
-  std::vector<std::string_view> words{};  // between spaces, tabs and commas
+  std::vector<std::string_view> words{};
 };
 
-// The lines that hold a word, those that begin with '#' too; without a byte order mark.
+// Reads line by line; lines without a word are skipped.
+class LineReader {
+ public:
+  // `first_line` is the number of the first line of `text`.
+  explicit LineReader(std::string_view text, std::size_t first_line = 1,
+                      std::string_view separators = " \t\r\v\f");
+  // The next line, or false at the end.
+  bool next(TextLine& line);
+  std::size_t remaining() const { return text_.size(); }  // bytes behind the line read last
+
+ private:
+  std::string_view text_;
+  std::size_t next_number_;
+  std::array<bool, 256> is_separator_{};
+};
+
+// The words of one line, separated by blanks.
+std::vector<std::string_view> words_of(std::string_view line);
+
+// All lines with a word, comments too, without a byte order mark. Words are separated by spaces,
+// tabs, commas and semicolons.
 std::vector<TextLine> split_lines(std::string_view text);
 
 inline bool is_comment(const TextLine& line) { return line.words.front().front() == '#'; }
@@ -36,14 +57,18 @@ std::int64_t large_integer_of(const TextLine& line, std::size_t word, const std:
 // "REASON" in that line of `file`.
 Error in_line(const std::string& reason, const TextLine& line, const std::string& file,
               std::string value, std::string bound = {});
-// The same of a line's number of words.
+// The same for a line with a wrong number of words.
 Error wrong_columns(const std::string& reason, const TextLine& line, const std::string& file,
                     std::string bound);
 // For a record that an earlier line already has.
 Error duplicate(const TextLine& line, const std::string& record, const std::string& file);
 
-// A pose whose numbers stand in that line. Throws Error: the quaternion's length is off by more
-// than 5 %, the position lies more than 1e8 m away.
+// Throws Error if `bytes` bytes are too few for `rows` lines of `words` words.
+void require_room_for_text(std::uint64_t rows, std::uint64_t words, std::uint64_t bytes,
+                           const std::string& what);
+
+// A pose whose numbers are in that line. Throws Error: the quaternion's length differs from 1 by
+// more than 5 %, the position is more than 1e8 m from the origin.
 Pose pose_of(const TextLine& line, const Eigen::Vector3d& translation,
              const Eigen::Quaterniond& rotation, const std::string& file);
 

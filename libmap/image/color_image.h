@@ -1,4 +1,4 @@
-// Photographs as a camera without distortion would have taken them.
+// Photographs as a camera without distortion would have taken them, and how sharp they are.
 #pragma once
 
 #include "libmap/core/camera.h"
@@ -18,5 +18,10 @@ Camera centered_pinhole(const Camera& camera);
 // of a pixel; pixels of `from` that fall on pixels of `to` are kept as they are. Throws Error if
 // the image has not the size of `from`.
 ColorImage resample_image(const ColorImage& image, const Camera& from, const Camera& to);
+
+// How fine the structures of an image are that have contrast at all: the sum of the squares of its
+// Laplacian over that of its gradient, both after a blur of one pixel, against noise. Comparable
+// among pictures of one scene and size. 0 for a plain image, or one smaller than 5 x 5.
+double image_sharpness(const ColorImage& image);
 
 }  // namespace libmap
