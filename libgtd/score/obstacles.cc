@@ -6,7 +6,7 @@
 #include <string>
 
 #include "libgtd/terrain/voxel_grid.h"
-#include "libmap/core/disjoint_sets.h"
+#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 

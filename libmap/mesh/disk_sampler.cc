@@ -10,7 +10,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/single_precision.h"
-#include "libmap/mesh/sample_grid.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libmap {
 
@@ -55,7 +55,7 @@ std::vector<T> collect(std::size_t count, std::size_t at_once, const Chunk& chun
 // Finds the parts of a fragment that no single disc covers.
 class GapSearch {
  public:
-  GapSearch(const SampleGrid& samples, double radius_m)
+  GapSearch(const GrowingGrid& samples, double radius_m)
       : samples_(samples), radius_m_(radius_m), square_m2_(radius_m * radius_m) {}
 
   // Whether a single disc covers all of the block.
@@ -137,7 +137,7 @@ class GapSearch {
     }
   }
 
-  const SampleGrid& samples_;
+  const GrowingGrid& samples_;
   double radius_m_;
   double square_m2_;
   Eigen::Vector3d last_ = Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN());
@@ -300,7 +300,7 @@ class Sampler {
   double min_square_m2_;
   std::uint64_t seed_;
   double expected_;
-  SampleGrid samples_;
+  GrowingGrid samples_;
   std::vector<TrianglePoint> places_;
   SurfacePieces pieces_;
 };
@@ -315,7 +315,7 @@ DiskSamples sample_disks(const SampledSurface& surface, double radius_m, std::ui
 double smallest_distance(const std::vector<Eigen::Vector3d>& positions, double expected_m) {
   if (positions.size() < 2) return 0.0;
   for (double reach = 1.01 * expected_m;; reach *= 2.0) {
-    SampleGrid grid(positions.front(), 2.0 * reach, positions.size());
+    GrowingGrid grid(positions.front(), 2.0 * reach, positions.size());
     for (const Eigen::Vector3d& position : positions) grid.add(position);
     const Eigen::Vector3d margin = Eigen::Vector3d::Constant(reach);
     const double least = parallel_reduce(

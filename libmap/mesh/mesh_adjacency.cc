@@ -7,7 +7,7 @@
 #include <string>
 #include <utility>
 
-#include "libmap/core/disjoint_sets.h"
+#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/core/error.h"
 
 namespace libmap {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "libmap/core/disjoint_sets.h"
+#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/core/error.h"
 
 namespace libmap {

@@ -7,7 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 

@@ -8,7 +8,7 @@
 #include <optional>
 
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/refine/rigid_motion.h"
 

@@ -9,9 +9,9 @@
 #include <string>
 
 #include "libmap/core/error.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/mesh/sample_grid.h"
 
 namespace libmap {
 
@@ -171,7 +171,7 @@ std::size_t weld_vertices(TriangleMesh& mesh, double distance_m) {
   // Most searches look into one or two cells. The odd factor keeps vertices of a lattice from the
   // same slots.
   const double cell_m = std::max(4.1 * distance_m, min_cell_m);
-  SampleGrid grid(Eigen::Vector3d::Zero(), cell_m, mesh.vertices.size());
+  GrowingGrid grid(Eigen::Vector3d::Zero(), cell_m, mesh.vertices.size());
   std::vector<std::uint32_t> kept;  // vertices by their number in the grid
   std::vector<std::uint32_t> kept_of(mesh.vertices.size());
   const Eigen::Vector3d margin = Eigen::Vector3d::Constant(distance_m);
