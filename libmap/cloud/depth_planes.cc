@@ -273,7 +273,7 @@ double max_plane_distance_m(const DepthPlaneOptions& options) {
 
 // The marked pixels, not 0, and those that decide on their planes: with these as `only`, the planes
 // of the marked pixels are those of the whole image.
-std::vector<std::uint8_t> grown_marks(const std::vector<std::uint8_t>& marks, int width,
+std::vector<std::uint8_t> dilate_mask(const std::vector<std::uint8_t>& marks, int width,
                                       int height) {
   std::vector<std::uint8_t> grown(marks.size(), 0);
   const auto columns = static_cast<std::ptrdiff_t>(width);
@@ -352,7 +352,7 @@ std::vector<std::uint8_t> pixels_around(const DepthImage& depth, const PixelRays
       pixels_in(depth, rays, placement, options.max_depth_m, cells.grown(margin));
   if (std::none_of(are_in.begin(), are_in.end(), [](std::uint8_t mark) { return mark != 0; }))
     return {};
-  return grown_marks(are_in, depth.width, depth.height);
+  return dilate_mask(are_in, depth.width, depth.height);
 }
 
 }  // namespace

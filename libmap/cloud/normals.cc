@@ -10,9 +10,9 @@
 #include <tuple>
 
 #include "libmap/core/parallel.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/geometry/disjoint_sets.h"
 #include "libmap/geometry/spatial_index.h"
-#include "libmap/core/symmetric_eigen.h"
 
 namespace libmap {
 

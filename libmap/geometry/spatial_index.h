@@ -1,8 +1,8 @@
-// Neighbor search among points: PointTree for points that are all known, GrowingGrid for points that
-// are added between searches. Other structures exist where these are measurably slower or where sums
-// depend on the order of the neighbors; each states its measurement: libgtd/shape/point_grid.h (8
-// times as fast for 27 neighbors), libmap/cloud/surface_points.cc (3 times),
-// libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
+// Neighbor search among points: PointTree for points that are all known, GrowingGrid for points
+// that are added between searches. Other structures exist where these are measurably slower or
+// where sums depend on the order of the neighbors; each states its measurement:
+// libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/cloud/surface_points.cc (3
+// times), libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
 #pragma once
 
 #include <Eigen/Core>
@@ -51,8 +51,8 @@ class PointTree {
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
 // Points in a hashed grid of cubes. nanoflann's tree that grows takes 10 times as long for 74,000
-// samples. Cells share slots where their hashes meet, so that a search may see points that lie elsewhere:
-// who searches measures distances anyway. Positions are counted from `origin`.
+// samples. Cells share slots where their hashes meet, so that a search may see points that lie
+// elsewhere: who searches measures distances anyway. Positions are counted from `origin`.
 class GrowingGrid {
  public:
   // Quickest for boxes of about `cell_m`.

@@ -68,8 +68,8 @@ inline VoxelPlace unpack(std::uint64_t key) {
   return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
 }
 
-// Position of a voxel on a Z-order curve (Morton 1966), its side last: what is near in space is near
-// on the curve.
+// Position of a voxel on a Z-order curve (Morton 1966), its side last: what is near in space is
+// near on the curve.
 inline std::uint64_t z_order(std::uint64_t key) {
   return voxel_key::spread(key >> 43U) << 3U | voxel_key::spread(key >> 22U) << 2U |
          voxel_key::spread(key >> 1U) << 1U | (key & 1U);

@@ -15,8 +15,8 @@
 #include <limits>
 
 #include "libmap/core/parallel.h"
+#include "libmap/surface/mesh_repair.h"
 #include "libmap/surface/self_intersections.h"
-#include "libmap/surface/triangle_repair.h"
 
 namespace libmap {
 

@@ -13,9 +13,8 @@
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/surface/mesh_manifold.h"
+#include "libmap/surface/mesh_repair.h"
 #include "libmap/surface/self_intersections.h"
-#include "libmap/surface/triangle_repair.h"
 
 namespace libmap {
 
@@ -28,13 +27,6 @@ std::vector<bool> inverse(std::vector<bool> marks) {
   marks.flip();
   return marks;
 }
-
-struct IntersectionRepair {
-  std::size_t faulty_triangles = 0;     // removed, without those around them
-  std::size_t closing_triangles = 0;    // that now close the places
-  std::size_t open_places = 0;          // boundaries that are left of them
-  std::size_t remaining_triangles = 0;  // that still meet others or are degenerate
-};
 
 constexpr int closing_rounds = 4;
 constexpr int max_rounds = 30;
@@ -60,7 +52,7 @@ std::vector<BoundaryLoop> loops_of(const TriangleMesh& mesh) {
 }
 
 // Intersecting and degenerate triangles.
-std::vector<bool> faulty_triangles(const TriangleMesh& mesh) {
+std::vector<bool> bad_faces(const TriangleMesh& mesh) {
   std::vector<bool> marks = degenerate_triangles(mesh);
   for (const TrianglePair& pair : find_self_intersections(mesh))
     marks[pair.first] = marks[pair.second] = true;
@@ -69,7 +61,7 @@ std::vector<bool> faulty_triangles(const TriangleMesh& mesh) {
 
 // The pieces that removing triangles of `removed_m2` has cut off: smaller than that, and not the
 // largest piece of what was one component. `component_field` names the component of each triangle.
-void drop_scraps(TriangleMesh& mesh, std::size_t components_before, double removed_m2) {
+void drop_fragments(TriangleMesh& mesh, std::size_t components_before, double removed_m2) {
   const ScalarField& former = field_named(mesh.face_fields, component_field);
   const MeshComponents pieces = connected_components(mesh);
   std::vector<std::size_t> former_of(pieces.areas_m2.size());
@@ -122,39 +114,39 @@ void remove_triangles(TriangleMesh& mesh, std::vector<bool> marks, int rings, do
     if (marks[t]) removed_m2 += area_normal(mesh, mesh.triangles[t]).norm() / 2.0;
   marks.flip();
   mesh = select_triangles(mesh, marks);
-  drop_scraps(mesh, components.areas_m2.size(), removed_m2);
+  drop_fragments(mesh, components.areas_m2.size(), removed_m2);
   make_manifold(mesh, min_gap_m);
   erase_field(mesh.face_fields, component_field);
 }
 
 // In rounds: triangles that meet others (self_intersections) or are degenerate are removed with a
-// ring of triangles around them, scraps that this cuts off as well, and the holes that it makes,
+// ring of triangles around them, fragments that this cuts off as well, and the holes that it makes,
 // unless they reach a boundary that was there before, are closed (hole_filling; marked `filled`).
 // Each round takes one more ring. What still meets others after four rounds is removed alone and
-// stays open; vertices that this parts lie `min_gap_m` apart (mesh_manifold). The mesh must be an
-// oriented manifold, and is one afterwards.
-IntersectionRepair repair_intersections(TriangleMesh& mesh, double min_gap_m) {
-  IntersectionRepair result;
-  std::vector<bool> faulty = faulty_triangles(mesh);
-  if (count_of(faulty) == 0) return result;
+// stays open; vertices that this separates are `min_gap_m` apart (make_manifold). The mesh must be
+// an oriented manifold, and is one afterwards.
+void repair_intersections(double min_gap_m, MeshCleaningResult& result) {
+  TriangleMesh& mesh = result.mesh;
+  result.remaining_intersecting_triangles = 0;
+  std::vector<bool> faces = bad_faces(mesh);
+  if (count_of(faces) == 0) return;
   mark_boundary(mesh);
   for (double& mark : filled_marks(mesh).values)
     if (mark != 0.0) mark = filled_before;
-  for (int round = 0; round < max_rounds && count_of(faulty) > 0; ++round) {
-    result.faulty_triangles += count_of(faulty);
+  for (int round = 0; round < max_rounds && count_of(faces) > 0; ++round) {
+    result.intersecting_triangles += count_of(faces);
     const bool closes = round < closing_rounds;
-    remove_triangles(mesh, faulty, closes ? round + 1 : 0, min_gap_m);
+    remove_triangles(mesh, faces, closes ? round + 1 : 0, min_gap_m);
     if (closes) fill_holes(mesh, new_loops(mesh), PatchCheck::manifold);
-    faulty = faulty_triangles(mesh);
+    faces = bad_faces(mesh);
   }
-  result.remaining_triangles = count_of(faulty);
-  result.open_places = new_loops(mesh).size();
+  result.remaining_intersecting_triangles = count_of(faces);
+  result.open_places += new_loops(mesh).size();
   for (double& mark : filled_marks(mesh).values) {
     if (mark == 1.0) ++result.closing_triangles;
     if (mark != 0.0) mark = 1.0;
   }
   erase_field(mesh.vertex_fields, boundary_field);
-  return result;
 }
 
 constexpr double inward = 0.5;                                // lambda
@@ -349,11 +341,7 @@ class Cleaning {
   }
 
   void remove_intersections() {
-    const IntersectionRepair repair = repair_intersections(mesh_(), 2.0 * merge_distance());
-    result_.intersecting_triangles += repair.faulty_triangles;
-    result_.closing_triangles += repair.closing_triangles;
-    result_.open_places += repair.open_places;
-    result_.remaining_intersecting_triangles = repair.remaining_triangles;
+    repair_intersections(2.0 * merge_distance(), result_);
     require_triangles(mesh_(), {.field = "intersecting triangles",
                                 .value = std::to_string(result_.intersecting_triangles)});
   }

@@ -1,11 +1,11 @@
 // From any triangles to a clean surface: an oriented manifold without degenerate, doubled or
-// intersecting triangles, without scraps, small holes closed; smoothed and decimated if wanted.
+// intersecting triangles, without fragments, small holes closed; smoothed and decimated if wanted.
 //
 // The steps, in this order; each keeps the order of what it keeps:
 //  1. vertices nearer than a tolerance are made one (the first); triangles without area and
 //     repeated ones are dropped, caps (a corner on the opposite edge) by flipping that edge
 //  2. cutting at edges of more than two triangles, at vertices of more than one fan and where no
-//     consistent orientation exists (mesh_manifold); orientation as most of the area has it
+//     consistent orientation exists (make_manifold); orientation as most of the area has it
 //  3. islands dropped
 //  4. triangles that intersect others are removed with those around them, and the place closed
 //     again (self_intersections, hole_filling); what cannot be closed stays open
