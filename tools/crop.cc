@@ -73,7 +73,7 @@ std::vector<Eigen::Vector2d> polygon_of(const std::string& file) {
   std::vector<Eigen::Vector2d> corners;
   for (std::size_t row = 0; row < table.rows.size(); ++row)
     corners.emplace_back(table.number(row, x), table.number(row, y));
-  return in_file(file, [&] { return libmap::Outline(corners).corners(); });
+  return in_file(file, [&] { return libmap::PlanPolygon(corners).corners(); });
 }
 
 void read_region(CropCommandOptions& options) {
@@ -175,8 +175,8 @@ void tell_site(const libmap::CropReport& report, const libmap::Bounds3d& bounds,
     std::vector<double> corners;
     for (const Eigen::Vector2d& corner : report.outline)
       corners.insert(corners.end(), {corner.x(), corner.y()});
-    run.add_results(
-        {{"outline_area_m2", libmap::Outline(report.outline).area_m2()}, {"outline_m", corners}});
+    run.add_results({{"outline_area_m2", libmap::PlanPolygon(report.outline).area_m2()},
+                     {"outline_m", corners}});
   }
   run.say("size: {:.3f} x {:.3f} x {:.3f} m", size.x(), size.y(), size.z());
 }

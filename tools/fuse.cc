@@ -89,7 +89,7 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
   if (result.points_made > 0) return;
   if (result.points.unconfirmed > 0)
     run.warn("--min-views {} leaves no point: the cloud is empty; {} frames see one at most",
-             options.fusion.min_views, result.points.max_views);
+             options.fusion.points.min_views, result.points.max_views);
   else
     run.warn("nothing was measured within the limits: the cloud is empty");
 }

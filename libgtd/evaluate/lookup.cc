@@ -7,7 +7,7 @@
 #include "libgtd/terrain/voxel_fields.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libgtd {
 

@@ -8,7 +8,7 @@
 #include "libgtd/evaluate/value_bins.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libgtd {
 

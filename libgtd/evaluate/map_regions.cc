@@ -1,16 +1,16 @@
 #include "libgtd/evaluate/map_regions.h"
 
 #include <algorithm>
-#include <boost/pending/disjoint_sets.hpp>
 #include <limits>
 
 #include "libmap/core/error.h"
+#include "libmap/geometry/disjoint_sets.h"
 
 namespace libgtd {
 
 namespace {
 
-using Sets = boost::disjoint_sets_with_storage<>;
+using Sets = libmap::DisjointSets<std::uint32_t>;
 
 std::vector<std::uint32_t> graspable_voxels(const VoxelMap& map, bool border) {
   std::vector<std::uint32_t> graspable;
@@ -32,7 +32,7 @@ void join_neighbors(const VoxelMap& map, const std::vector<std::uint32_t>& grasp
         const Voxel last{here.i + di, here.j + dj, here.k + reach};
         while (cursor < n && map.voxels[graspable[cursor]] < first) ++cursor;
         for (std::uint32_t m = cursor; m < n && map.voxels[graspable[m]] <= last; ++m)
-          sets.union_set(n, m);
+          sets.join(n, m);
       }
     }
 }
@@ -44,7 +44,7 @@ std::vector<std::vector<std::uint32_t>> members_of(const std::vector<std::uint32
   std::vector<std::uint32_t> number(graspable.size(), none);
   std::vector<std::vector<std::uint32_t>> members;
   for (std::uint32_t n = 0; n < graspable.size(); ++n) {
-    std::uint32_t& set = number[sets.find_set(n)];
+    std::uint32_t& set = number[sets.find(n)];
     if (set == none) {
       set = static_cast<std::uint32_t>(members.size());
       members.emplace_back();

@@ -47,7 +47,7 @@ class FirstContact {
     nearest_ = std::min({link.base, reach_, link.radius(foot)});
   }
 
-  void meet(const ProfileSegment& segment) {
+  void meet(const GroundSegment& segment) {
     const Eigen::Vector2d a = segment.a - link_.pivot;
     const Eigen::Vector2d b = segment.b - link_.pivot;
     meet_point(a);
@@ -104,14 +104,14 @@ class FirstContact {
 };
 
 std::optional<LinkContact> first_contact(const TurningLink& link, double first, double last,
-                                         std::span<const ProfileSegment> profile) {
+                                         std::span<const GroundSegment> profile) {
   FirstContact search(link, first, last);
-  for (const ProfileSegment& segment : profile) search.meet(segment);
+  for (const GroundSegment& segment : profile) search.meet(segment);
   return search.contact();
 }
 
 // Height of a chain of straight links above the profile, at its lowest.
-void rise_above(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const ProfileSegment& segment,
+void rise_above(const Eigen::Vector2d& p, const Eigen::Vector2d& q, const GroundSegment& segment,
                 std::optional<double>& height) {
   const auto [link_low, link_high] = std::minmax(p.x(), q.x());
   const auto [ground_low, ground_high] = std::minmax(segment.a.x(), segment.b.x());
@@ -154,7 +154,7 @@ FingerGeometry finger_geometry(const Gripper& gripper) {
   return finger;
 }
 
-FingerClosing close_finger(const FingerGeometry& finger, std::span<const ProfileSegment> profile) {
+FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile) {
   const TurningLink proximal{finger.joint(), 0.0, finger.proximal_m, 0.0};
   const TurningLink distal{finger.joint(), finger.proximal_m, finger.distal_m, finger.curl_rad};
   const auto on_proximal = first_contact(proximal, finger.opening_rad, finger.closing_rad, profile);
@@ -188,11 +188,11 @@ FingerClosing close_finger(const FingerGeometry& finger, std::span<const Profile
 }
 
 std::optional<double> open_finger_height(const FingerGeometry& finger,
-                                         std::span<const ProfileSegment> profile) {
+                                         std::span<const GroundSegment> profile) {
   const std::array<Eigen::Vector2d, 3> chain = {finger.joint(), finger.knuckle(finger.opening_rad),
                                                 finger.tip(finger.opening_rad, finger.curl_rad)};
   std::optional<double> height;
-  for (const ProfileSegment& segment : profile) {
+  for (const GroundSegment& segment : profile) {
     rise_above(chain[0], chain[1], segment, height);
     rise_above(chain[1], chain[2], segment, height);
   }

@@ -34,7 +34,7 @@ struct FingerGeometry {
 FingerGeometry finger_geometry(const Gripper& gripper);
 
 // A piece of the ground's profile and the triangle that it is cut from.
-struct ProfileSegment {
+struct GroundSegment {
   Eigen::Vector2d a;
   Eigen::Vector2d b;
   std::uint32_t triangle = 0;
@@ -57,11 +57,11 @@ struct FingerClosing {
 // From the open finger, which touches nothing. The proximal link turns inward with the distal one
 // at the free curl. If the proximal link is stopped, the distal one goes on alone up to the limit
 // of the curl.
-FingerClosing close_finger(const FingerGeometry& finger, std::span<const ProfileSegment> profile);
+FingerClosing close_finger(const FingerGeometry& finger, std::span<const GroundSegment> profile);
 
 // The least height of the palm at which the open finger passes above the whole profile; nothing if
 // no part of the profile is below the finger. `profile` is relative to the palm at z = 0.
 std::optional<double> open_finger_height(const FingerGeometry& finger,
-                                         std::span<const ProfileSegment> profile);
+                                         std::span<const GroundSegment> profile);
 
 }  // namespace libgtd

@@ -60,7 +60,7 @@ struct CarriedVertices {
 // palm's axis. The triangle has vertices on both sides of the plane.
 void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Eigen::Vector3d& axis,
              const Eigen::Vector2d& along, const FingerGeometry& finger, std::uint32_t t,
-             std::vector<ProfileSegment>& profile) {
+             std::vector<GroundSegment>& profile) {
   const double farthest = finger.joint_radius_m + finger.proximal_m + finger.distal_m;
   std::array<Eigen::Vector3d, 3> corners;
   std::array<double, 3> side{};  // distances from the plane
@@ -77,8 +77,8 @@ void add_cut(const GroundPatch& patch, const CarriedVertices& vertices, const Ei
     const Eigen::Vector3d point = corners[lone] + share * (corners[other] - corners[lone]);
     return Eigen::Vector2d(along.dot(point.head<2>()), point.z());
   };
-  ProfileSegment segment{cut((lone + 1) % 3), cut((lone + 2) % 3), t,
-                         patch.area_normals[t].dot(axis) > 0.0};
+  GroundSegment segment{cut((lone + 1) % 3), cut((lone + 2) % 3), t,
+                        patch.area_normals[t].dot(axis) > 0.0};
   const auto [low, high] = std::minmax(segment.a.x(), segment.b.x());
   if (low <= farthest && high >= -finger.distal_m) profile.push_back(segment);
 }
@@ -124,7 +124,7 @@ std::optional<double> height_over_disc(const std::array<Eigen::Vector3d, 3>& cor
 // What the palm and the fingers may meet of the ground.
 struct GroundCuts {
   std::optional<double> palm_m;  // height at which the palm's disc meets it, from below the start
-  std::vector<std::vector<ProfileSegment>> profiles;  // of the fingers
+  std::vector<std::vector<GroundSegment>> profiles;  // of the fingers
 };
 
 GroundCuts cuts_of(const GroundPatch& patch, const CarriedVertices& vertices,
@@ -151,19 +151,18 @@ GroundCuts cuts_of(const GroundPatch& patch, const CarriedVertices& vertices,
 
 // Whether ground that faces the palm is above `start_m` without a ceiling between: the finger would
 // begin its way inside the ground. Takes segments above `start_m` out of the profile.
-bool is_blocked(std::vector<ProfileSegment>& profile, const FingerGeometry& finger,
-                double start_m) {
-  const auto is_above = [&](const ProfileSegment& segment) {
+bool is_blocked(std::vector<GroundSegment>& profile, const FingerGeometry& finger, double start_m) {
+  const auto is_above = [&](const GroundSegment& segment) {
     return std::min(segment.a.y(), segment.b.y()) > start_m;
   };
   const double tip = finger.tip(finger.opening_rad, finger.curl_rad).x();
   bool blocked = false;
-  for (const ProfileSegment& top : profile) {
+  for (const GroundSegment& top : profile) {
     if (!top.faces_palm || !is_above(top)) continue;
     const Eigen::Vector2d middle = 0.5 * (top.a + top.b);
     if (middle.x() < finger.joint_radius_m || middle.x() > tip) continue;
     const bool has_ceiling =
-        std::any_of(profile.begin(), profile.end(), [&](const ProfileSegment& other) {
+        std::any_of(profile.begin(), profile.end(), [&](const GroundSegment& other) {
           const auto [low, high] = std::minmax(other.a.x(), other.b.x());
           return !other.faces_palm && low <= middle.x() && middle.x() <= high &&
                  std::min(other.a.y(), other.b.y()) < middle.y() && is_above(other);
@@ -175,10 +174,10 @@ bool is_blocked(std::vector<ProfileSegment>& profile, const FingerGeometry& fing
 }
 
 // ClosedFinger::unseen: by the union of what the profile covers.
-double unseen_share(const GroundPatch& patch, const std::vector<ProfileSegment>& profile,
+double unseen_share(const GroundPatch& patch, const std::vector<GroundSegment>& profile,
                     double tip_radius) {
   std::vector<std::pair<double, double>> spans;
-  for (const ProfileSegment& segment : profile)
+  for (const GroundSegment& segment : profile)
     if (segment.faces_palm && std::min(segment.a.y(), segment.b.y()) < 0.0 &&
         (patch.is_unsure.empty() || patch.is_unsure[segment.triangle] == 0))
       spans.push_back(std::minmax(segment.a.x(), segment.b.x()));
@@ -277,7 +276,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   auto [palm, profiles] =
       cuts_of(patch, vertices, axis, along, finger, palm_radius, options.start_height_m);
   std::optional<double> height = palm;
-  for (std::vector<ProfileSegment>& profile : profiles) {
+  for (std::vector<GroundSegment>& profile : profiles) {
     if (is_blocked(profile, finger, options.start_height_m)) {
       closed.approach = ApproachEnd::blocked;
       return closed;
@@ -296,7 +295,7 @@ ClosedGripper close_gripper(const GroundPatch& patch, const Gripper& gripper,
   const double tip = finger.tip(finger.opening_rad, finger.curl_rad).x();
   for (int n = 0; n < count; ++n) {
     auto& profile = profiles[static_cast<std::size_t>(n)];
-    for (ProfileSegment& segment : profile) {
+    for (GroundSegment& segment : profile) {
       segment.a.y() -= *height;
       segment.b.y() -= *height;
     }

@@ -11,6 +11,6 @@ namespace {
 #include "libmap/core/instruction_set_loops.h"
 }  // namespace
 
-const BitLoops& loops_of(InstructionSet instructions) { return all_of(instructions); }
+const BitLoops& loops_of(libmap::InstructionSet instructions) { return all_of(instructions); }
 
 }  // namespace libgtd

@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "libgtd/shape/instruction_set.h"
+#include "libmap/core/instruction_set.h"
 
 namespace libgtd {
 
@@ -35,6 +35,6 @@ struct BitLoops {
 };
 
 // Of instructions that the processor has.
-const BitLoops& loops_of(InstructionSet instructions);
+const BitLoops& loops_of(libmap::InstructionSet instructions);
 
 }  // namespace libgtd

@@ -54,7 +54,7 @@ class Lanes {
 // Scores blocks one after the other; keeps its memory for the next one.
 class BlockMatcher {
  public:
-  BlockMatcher(const VoxelGrid& grid, const MatchingPlan& plan, InstructionSet instructions)
+  BlockMatcher(const VoxelGrid& grid, const MatchingPlan& plan, libmap::InstructionSet instructions)
       : grid_(grid), plan_(plan), loops_(loops_of(instructions)) {}
 
   // A run of neighboring pivots: the places first .. last - 1 of `pivots`.

@@ -6,9 +6,9 @@
 #include <string>
 
 #include "libgtd/terrain/voxel_grid.h"
-#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/disjoint_sets.h"
 
 namespace libgtd {
 

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "libgtd/shape/instruction_set.h"
+#include "libmap/core/instruction_set.h"
 
 namespace libgtd {
 
@@ -37,6 +37,6 @@ struct TiltedLoops {
 };
 
 // Of instructions that the processor has.
-const TiltedLoops& tilted_loops_of(InstructionSet instructions);
+const TiltedLoops& tilted_loops_of(libmap::InstructionSet instructions);
 
 }  // namespace libgtd

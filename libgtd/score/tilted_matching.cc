@@ -145,7 +145,7 @@ class TiltedTerrain::Window {
   TiltedBox box_;
   std::int64_t reach_;
   std::vector<Run> runs_;
-  const TiltedLoops& loops_ = tilted_loops_of(best_instruction_set());
+  const TiltedLoops& loops_ = tilted_loops_of(libmap::best_instruction_set());
   std::vector<int> cells_;
 };
 
@@ -187,7 +187,7 @@ class OccupiedBits {
   Words occupied_;
   Words counted_;
   Words solid_;
-  const TiltedLoops& loops_ = tilted_loops_of(best_instruction_set());
+  const TiltedLoops& loops_ = tilted_loops_of(libmap::best_instruction_set());
 };
 
 }  // namespace

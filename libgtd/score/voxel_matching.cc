@@ -70,7 +70,8 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
 
 std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
                                       const std::vector<std::size_t>& pivots,
-                                      InstructionSet instructions, libmap::Progress& progress) {
+                                      libmap::InstructionSet instructions,
+                                      libmap::Progress& progress) {
   const MatchingPlan plan = plan_matching(mask);
   const Blocks blocks = cut_into_blocks(grid, pivots);
   std::vector<VoxelCounts> counts(pivots.size());

@@ -29,9 +29,9 @@ std::vector<std::size_t> pivots_in(const VoxelGrid& grid, const GripperMask& mas
 // Blocks run in parallel; the counts of a pivot do not depend on which others are asked for, on the
 // number of threads or on `instructions`, which the processor must have. Memory goes with the
 // number of voxels and the size of the mask, not with the box around them.
-std::vector<VoxelCounts> match_voxels(const VoxelGrid& grid, const GripperMask& mask,
-                                      const std::vector<std::size_t>& pivots,
-                                      InstructionSet instructions = best_instruction_set(),
-                                      libmap::Progress& progress = libmap::no_progress());
+std::vector<VoxelCounts> match_voxels(
+    const VoxelGrid& grid, const GripperMask& mask, const std::vector<std::size_t>& pivots,
+    libmap::InstructionSet instructions = libmap::best_instruction_set(),
+    libmap::Progress& progress = libmap::no_progress());
 
 }  // namespace libgtd

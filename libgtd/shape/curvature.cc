@@ -168,7 +168,7 @@ class QuadricFitter {
   CellSurroundings candidates_;
   double radius_;
   Vector3d up_;
-  const NeighborLoops& loops_ = neighbor_loops_of(best_instruction_set());
+  const NeighborLoops& loops_ = neighbor_loops_of(libmap::best_instruction_set());
   CoordinateRows neighbors_;
   // The last fit: points in one place share it, however many there are.
   bool is_fitted_ = false;

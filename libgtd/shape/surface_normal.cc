@@ -62,7 +62,7 @@ class PlaneFitter {
   CellSurroundings candidates_;
   double radius_;
   Vector3d up_;
-  const NeighborLoops& loops_ = neighbor_loops_of(best_instruction_set());
+  const NeighborLoops& loops_ = neighbor_loops_of(libmap::best_instruction_set());
   CoordinateRows neighbors_;
 };
 

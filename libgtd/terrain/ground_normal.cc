@@ -4,13 +4,13 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
 #include <utility>
 #include <vector>
 
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/voxel_key.h"
 
 namespace libgtd {
 
@@ -38,28 +38,28 @@ struct Mean {
 
 // Along the start's axes from its centroid, in its extents, in the order of the cells.
 std::vector<Vector3d> cell_means(const libmap::PointStream& points, const FittedPlane& start) {
-  std::unordered_map<std::uint64_t, Mean> cells;
-  const auto index = [&](double along) {
-    return static_cast<std::uint64_t>(std::llround(along * cells_per_extent) + (1 << 20)) &
-           0x1fffffU;
-  };
+  libmap::VoxelIndex cells;
+  std::vector<Mean> sums;  // of the cells
   points.for_each_block(libmap::PointStream::Need::positions, [&](const libmap::PointCloud& block) {
     for (const Vector3d& position : block.positions) {
       if (!position.allFinite()) continue;
       const Vector3d place = start.axes.transpose() * (position - start.centroid) / start.extent_m;
-      Mean& mean = cells[index(place.x()) << 42U | index(place.y()) << 21U | index(place.z())];
-      mean.sum += place;
-      mean.count += 1.0;
+      libmap::VoxelPlace voxel;
+      for (int axis = 0; axis < 3; ++axis)
+        voxel.cell[axis] = static_cast<int>(std::llround(place[axis] * cells_per_extent));
+      const std::uint32_t cell = cells.find_or_add(pack(voxel));
+      if (cell == sums.size()) sums.emplace_back();
+      sums[cell].sum += place;
+      sums[cell].count += 1.0;
     }
   });
-  std::vector<std::pair<std::uint64_t, Vector3d>> listed;
-  listed.reserve(cells.size());
-  for (const auto& [cell, mean] : cells) listed.emplace_back(cell, mean.sum / mean.count);
-  std::sort(listed.begin(), listed.end(),
-            [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  order.reserve(sums.size());
+  for (const std::uint64_t key : cells.keys()) order.emplace_back(key, order.size());
+  std::sort(order.begin(), order.end());
   std::vector<Vector3d> means;
-  means.reserve(listed.size());
-  for (const auto& [cell, mean] : listed) means.push_back(mean);
+  means.reserve(order.size());
+  for (const auto& [key, cell] : order) means.push_back(sums[cell].sum / sums[cell].count);
   return means;
 }
 

@@ -7,7 +7,6 @@
 #include <optional>
 #include <span>
 
-#include "libmap/cloud/coarse_surface.h"
 #include "libmap/cloud/frame_registration.h"
 #include "libmap/cloud/fusion_frames.h"
 #include "libmap/cloud/fusion_tiling.h"
@@ -223,16 +222,8 @@ class Fusion {
         [&](const CoarseFrame& coarse) { sample_.merge(coarse.voxels, sampled_); });
   }
 
-  SurfaceRefinementOptions refinement_options() const {
-    SurfaceRefinementOptions options;
-    options.disc_radius_m = options_.disc_radius_voxels * options_.voxel_size_m;
-    options.search_m = options_.voxel_size_m;
-    options.min_depth_m = options_.planes.min_depth_m;
-    options.max_depth_m = options_.planes.max_depth_m;
-    options.max_incidence_deg = options_.planes.max_incidence_deg;
-    options.noise = options_.planes.noise;
-    options.pose_error_m = options_.pose_error_m;
-    return options;
+  SurfaceSearch search_within(double search_m) const {
+    return {options_.disc_radius_voxels * options_.voxel_size_m, search_m};
   }
 
   // Some of the coarse surface.
@@ -252,15 +243,14 @@ class Fusion {
   // By what the frames measured of the elements.
   FrameRegistration registration(int round) {
     const std::vector<SurfaceElement> elements = registration_elements_of_sample();
-    SurfaceRefinementOptions options = refinement_options();
-    options.search_m = first_search_voxels * options_.voxel_size_m / round;
+    const SurfaceSearch search = search_within(first_search_voxels * options_.voxel_size_m / round);
     std::vector<SurfaceObservation> observations;
-    images_.each_view_group(frames(), false,
-                            [&](std::span<const RefinementView> views, std::size_t frames) {
-                              const auto more = observe_surface(elements, views, options);
-                              observations.insert(observations.end(), more.begin(), more.end());
-                              progress_->advance(frames);
-                            });
+    images_.each_view_group(
+        frames(), false, [&](std::span<const RefinementView> views, std::size_t frames) {
+          const auto more = observe_surface(elements, views, options_.planes, search);
+          observations.insert(observations.end(), more.begin(), more.end());
+          progress_->advance(frames);
+        });
     std::stable_sort(observations.begin(), observations.end(),
                      [](const auto& a, const auto& b) { return a.element < b.element; });
     std::vector<Eigen::Vector3d> centers;
@@ -287,12 +277,14 @@ class Fusion {
 
   FusionTiling tiling_of(double tile_m) const {
     // By refinement's gate a height lies within it of its element's plane.
-    const SurfaceRefinementOptions options = refinement_options();
+    const SurfaceSearch search = search_within(options_.voxel_size_m);
+    const double gate_m = max_gate_m(options_.planes, search);
     double shift_m = 0.0;
-    double disc_m = options.disc_radius_m;
+    double disc_m = search.disc_radius_m;
     for (const FusionFrame& frame : frames()) {
-      shift_m = std::max(shift_m, frame.max_ray_length * max_gate_m(options));
-      disc_m = std::max(disc_m, frame.max_pixel_pitch * min_disc_pixels * options.max_depth_m);
+      shift_m = std::max(shift_m, frame.max_ray_length * gate_m);
+      disc_m =
+          std::max(disc_m, frame.max_pixel_pitch * min_disc_pixels * options_.planes.max_depth_m);
     }
     const double far = 1e15;
     if (!((survey_.grid_origin.cwiseAbs() / std::min(tile_m, options_.voxel_size_m)).maxCoeff() <
@@ -402,13 +394,15 @@ TileFusion::Tile Fusion::fuse_tile(const PlanCells& cells, int element_margin,
     progress_->advance(of_tile.size());
   } else {
     timed("refinement", [&] {
-      surface = refine_surface(std::move(elements), refinement_options(), [&](const AddViews& add) {
-        images_.each_view_group(of_tile, options_.color,
-                                [&](std::span<const RefinementView> views, std::size_t count) {
-                                  add(views);
-                                  progress_->advance(count);
-                                });
-      });
+      surface = refine_surface(
+          std::move(elements), options_.planes, search_within(options_.voxel_size_m),
+          options_.pose_error_m, [&](const AddViews& add) {
+            images_.each_view_group(of_tile, options_.color,
+                                    [&](std::span<const RefinementView> views, std::size_t count) {
+                                      add(views);
+                                      progress_->advance(count);
+                                    });
+          });
     });
   }
   timed("cloud", [&] { tile.cloud = make_cloud(cells, surface, tile.counts); });
@@ -440,13 +434,8 @@ SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& ar
 
 PointCloud Fusion::make_cloud(const PlanCells& cells, const RefinedSurface& surface,
                               FusionCounts& counts) const {
-  SurfacePointOptions options;
-  options.voxel_size_m = options_.voxel_size_m;
-  options.min_views = options_.min_views;
-  options.max_seen_through = options_.max_seen_through;
-  options.max_missed = options_.max_missed;
-  options.cells = cells;
-  SurfacePoints points = make_surface_points(surface, options);
+  SurfacePoints points =
+      make_surface_points(surface, options_.voxel_size_m, cells, options_.points);
   counts.points += points.counts;
   counts.points_made += points.cloud.size();
   for (Eigen::Vector3d& position : points.cloud.positions) position += survey_.grid_origin;

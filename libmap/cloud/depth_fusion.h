@@ -41,13 +41,7 @@ struct DepthFusionOptions {
   // >= 0: times, at most, that all poses are corrected so that frames agree before they are fused
   // (frame_registration); 0: poses are taken as they are.
   int registration_rounds = 3;
-  int min_views = 1;  // distinct frames that must have measured a point
-  // A point is dropped that more views see through than see, each counted by its cosine (Merrell et
-  // al. 2007); larger keeps more.
-  double max_seen_through = 0.3;
-  // The same of views that measured nothing around a point, though it is within what they measured
-  // elsewhere and not seen obliquely: what moves before an open background.
-  double max_missed = 1.5;
+  SurfacePointOptions points{};
   // Points one voxel beyond the edge of what was measured, unless views see through them.
   bool extend_edges = true;
   bool color = true;

@@ -25,10 +25,11 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
             "standard deviation of a whole frame, along a normal");
   table.add("registration_rounds", options.registration_rounds, {0, 20},
             "times, at most, that poses are corrected so that frames agree; 0: not at all");
-  table.add("min_views", options.min_views, {1}, "points that fewer frames measured are dropped");
-  table.add("max_seen_through", options.max_seen_through, not_negative,
+  table.add("min_views", options.points.min_views, {1},
+            "points that fewer frames measured are dropped");
+  table.add("max_seen_through", options.points.max_seen_through, not_negative,
             "points are dropped that are seen through more often, against being seen");
-  table.add("max_missed", options.max_missed, not_negative,
+  table.add("max_missed", options.points.max_missed, not_negative,
             "points are dropped where more views that should measure them measure nothing, against "
             "being seen");
   table.add("extend_edges", options.extend_edges,

@@ -1,4 +1,4 @@
-// How far a depth camera's measurements scatter.
+// What a depth camera measures, and with which noise.
 #pragma once
 
 namespace libmap {
@@ -14,6 +14,13 @@ struct DepthNoise {
   double lateral_px = 0.8;        // >= 0
 
   double axial_at(double z_m) const { return axial_m + axial_of_range * z_m; }
+};
+
+struct DepthSensor {
+  double min_depth_m = 0.1;
+  double max_depth_m = 4.0;
+  double max_incidence_deg = 85.0;  // between line of sight and normal: more is grazing
+  DepthNoise noise{};
 };
 
 }  // namespace libmap

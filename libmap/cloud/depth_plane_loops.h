@@ -1,4 +1,4 @@
-// The innermost loops of depth_planes and coarse_surface over the pixels of one row, each for
+// The innermost loops of depth_planes over the pixels of one row, each for
 // several instruction sets, with the same bits from each: no pixel depends on those in other lanes.
 // Plain pointers alone: sources that are compiled for more than the base instruction set must see
 // no type whose inline functions other sources compile too.

@@ -4,10 +4,13 @@
 #include <cmath>
 #include <cstddef>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <memory>
 #include <numbers>
 #include <utility>
+
+#include "libmap/cloud/depth_plane_loops.h"
 
 namespace libmap {
 
@@ -23,6 +26,8 @@ using Loops = DepthPlaneLoops;
 std::size_t padded(int width) {
   return static_cast<std::size_t>((width + Loops::lanes - 1) / Loops::lanes * Loops::lanes);
 }
+
+using UsePlaneRow = std::function<void(int y, const Loops::Planes& planes)>;
 
 class PlaneFit {
  public:
@@ -256,19 +261,7 @@ void PlaneFit::finish(const UsePlaneRow& use) {
   }
 }
 
-}  // namespace
-
-DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
-  pixels += more.pixels;
-  unmeasured += more.unmeasured;
-  out_of_range += more.out_of_range;
-  without_ray += more.without_ray;
-  flying += more.flying;
-  grazing += more.grazing;
-  used += more.used;
-  return *this;
-}
-
+// No plane is further than this from the depth of its pixel, along the axis, m.
 // The gate g s(z) / z^2 is of inverse depth: with d = g s(z) / z a plane is at most z d / (1 - d)
 // farther than its pixel, and less nearer.
 double max_plane_distance_m(const DepthPlaneOptions& options) {
@@ -278,7 +271,9 @@ double max_plane_distance_m(const DepthPlaneOptions& options) {
   return gate * options.noise.axial_at(options.max_depth_m) / (1.0 - nearest);
 }
 
-std::vector<std::uint8_t> grown_marks(const std::vector<std::uint8_t>& marks, int width,
+// The marked pixels, not 0, and those that decide on their planes: with these as `only`, the planes
+// of the marked pixels are those of the whole image.
+std::vector<std::uint8_t> dilate_mask(const std::vector<std::uint8_t>& marks, int width,
                                       int height) {
   std::vector<std::uint8_t> grown(marks.size(), 0);
   const auto columns = static_cast<std::ptrdiff_t>(width);
@@ -294,11 +289,83 @@ std::vector<std::uint8_t> grown_marks(const std::vector<std::uint8_t>& marks, in
   return grown;
 }
 
+// Calls use(y, planes) for each row in which there are planes. `only`, if it is not empty, marks
+// the pixels whose planes are wanted, not 0; others have none, and the counts say nothing.
 DepthPixelCounts each_plane_row(const DepthImage& depth, const PixelRays& rays,
                                 const DepthPlaneOptions& options,
                                 const std::vector<std::uint8_t>& only, const UsePlaneRow& use) {
   if (depth.pixels.empty()) return {};
   return PlaneFit(depth, rays, options, only).run(use);
+}
+
+Loops::Placement placement_of(const Pose& grid_from_camera, const DepthNoise& noise,
+                              double voxel_size_m) {
+  Loops::Placement placement{};
+  placement.scale = static_cast<float>(1.0 / voxel_size_m);
+  for (int axis = 0; axis < 3; ++axis) {
+    for (int of = 0; of < 3; ++of)
+      placement.rotation[3 * axis + of] = static_cast<float>(grid_from_camera.linear()(axis, of));
+    placement.translation[axis] =
+        static_cast<float>(grid_from_camera.translation()[axis]) * placement.scale;
+  }
+  placement.axial_m = static_cast<float>(noise.axial_m);
+  placement.axial_of_range = static_cast<float>(noise.axial_of_range);
+  return placement;
+}
+
+std::size_t row_begin(const DepthImage& depth, int y) {
+  return static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width);
+}
+
+// Marks the pixels that were measured in `cells`, not 0.
+std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& rays,
+                                    const Loops::Placement& placement, double max_depth_m,
+                                    const PlanCells& cells) {
+  const Loops& loops = depth_plane_loops_of(best_instruction_set());
+  const auto max_depth = static_cast<float>(max_depth_m);
+  std::vector<std::uint8_t> are_in(depth.pixels.size(), 0);
+  const auto width = static_cast<std::size_t>(depth.width);
+  std::vector<float> places(2 * (width + Loops::lanes));
+  float* const x = places.data();
+  float* const y = x + width + Loops::lanes;
+  for (int row = 0; row < depth.height; ++row) {
+    const std::size_t first = row_begin(depth, row);
+    loops.place_depths(&depth.pixels[first], &rays.x[first], &rays.y[first], depth.width, placement,
+                       x, y);
+    for (std::size_t n = 0; n < width; ++n) {
+      const float z = depth.pixels[first + n];
+      if (z > 0.0F && z <= max_depth) are_in[first + n] = cells.has_place({x[n], y[n]}) ? 1 : 0;
+    }
+  }
+  return are_in;
+}
+
+// Marks all pixels whose planes may be in `cells`, and those that these planes depend on.
+std::vector<std::uint8_t> pixels_around(const DepthImage& depth, const PixelRays& rays,
+                                        const Loops::Placement& placement,
+                                        const DepthPlaneOptions& options, double voxel_size_m,
+                                        const PlanCells& cells) {
+  const double ray_length = rays.min.cwiseAbs().cwiseMax(rays.max.cwiseAbs()).homogeneous().norm();
+  const double moved = max_plane_distance_m(options) * ray_length / voxel_size_m;
+  const int margin = 1 + static_cast<int>(std::min(moved, static_cast<double>(voxel_cell_limit)));
+  const std::vector<std::uint8_t> are_in =
+      pixels_in(depth, rays, placement, options.max_depth_m, cells.grown(margin));
+  if (std::none_of(are_in.begin(), are_in.end(), [](std::uint8_t mark) { return mark != 0; }))
+    return {};
+  return dilate_mask(are_in, depth.width, depth.height);
+}
+
+}  // namespace
+
+DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
+  pixels += more.pixels;
+  unmeasured += more.unmeasured;
+  out_of_range += more.out_of_range;
+  without_ray += more.without_ray;
+  flying += more.flying;
+  grazing += more.grazing;
+  used += more.used;
+  return *this;
 }
 
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
@@ -311,19 +378,49 @@ DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
   planes.normals.assign(size, Eigen::Vector3f::Zero());
   planes.cos_incidence.assign(size, 0.0F);
   planes.support.assign(size, 0);
-  planes.counts =
-      each_plane_row(depth, rays, options, {}, [&](int y, const DepthPlaneLoops::Planes& row) {
-        const std::size_t first =
-            static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width);
-        for (std::size_t x = 0; x < static_cast<std::size_t>(depth.width); ++x) {
-          if (row.support[x] == 0) continue;
-          planes.depth_m[first + x] = row.depth_m[x];
-          planes.normals[first + x] = {row.normal[0][x], row.normal[1][x], row.normal[2][x]};
-          planes.cos_incidence[first + x] = row.cosine[x];
-          planes.support[first + x] = row.support[x];
-        }
-      });
+  planes.counts = each_plane_row(depth, rays, options, {}, [&](int y, const Loops::Planes& row) {
+    const std::size_t first = static_cast<std::size_t>(y) * static_cast<std::size_t>(depth.width);
+    for (std::size_t x = 0; x < static_cast<std::size_t>(depth.width); ++x) {
+      if (row.support[x] == 0) continue;
+      planes.depth_m[first + x] = row.depth_m[x];
+      planes.normals[first + x] = {row.normal[0][x], row.normal[1][x], row.normal[2][x]};
+      planes.cos_incidence[first + x] = row.cosine[x];
+      planes.support[first + x] = row.support[x];
+    }
+  });
   return planes;
+}
+
+DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
+                                  const Pose& grid_from_camera, const DepthPlaneOptions& options,
+                                  double voxel_size_m, const PlanCells& cells, FittedPixels fitted,
+                                  SurfaceVoxels& voxels) {
+  const Loops::Placement placement = placement_of(grid_from_camera, options.noise, voxel_size_m);
+  std::vector<std::uint8_t> only;
+  if (fitted == FittedPixels::in_cells) {
+    only = cells.thinning > 0 ? pixels_in(depth, rays, placement, options.max_depth_m, cells)
+                              : pixels_around(depth, rays, placement, options, voxel_size_m, cells);
+    if (only.empty()) return {};
+  }
+  const Loops& loops = depth_plane_loops_of(best_instruction_set());
+  const auto width = static_cast<std::size_t>(depth.width);
+  const std::size_t stride = width + Loops::lanes;
+  std::vector<float> numbers(7 * stride);
+  const auto numbers_at = [&](std::size_t n) { return numbers.data() + n * stride; };
+  const Loops::Places places{{numbers_at(0), numbers_at(1), numbers_at(2)},
+                             {numbers_at(3), numbers_at(4), numbers_at(5)},
+                             numbers_at(6)};
+  return each_plane_row(depth, rays, options, only, [&](int y, const Loops::Planes& planes) {
+    const std::size_t first = row_begin(depth, y);
+    loops.place(planes, &rays.x[first], &rays.y[first], depth.width, placement, places);
+    for (std::size_t x = 0; x < width; ++x) {
+      if (planes.support[x] == 0) continue;
+      const Eigen::Vector3f place(places.place[0][x], places.place[1][x], places.place[2][x]);
+      if (!cells.has_place(place.head<2>())) continue;
+      voxels.add(place, {places.normal[0][x], places.normal[1][x], places.normal[2][x]},
+                 places.weight[x]);
+    }
+  });
 }
 
 }  // namespace libmap

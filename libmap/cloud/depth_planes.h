@@ -8,23 +8,20 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <functional>
 #include <vector>
 
 #include "libmap/cloud/depth_noise.h"
-#include "libmap/cloud/depth_plane_loops.h"
 #include "libmap/cloud/depth_projection.h"
+#include "libmap/cloud/plan_cells.h"
+#include "libmap/cloud/surface_voxels.h"
 #include "libmap/core/image.h"
+#include "libmap/core/pose.h"
 
 namespace libmap {
 
-struct DepthPlaneOptions {
-  double min_depth_m = 0.1;
-  double max_depth_m = 4.0;
-  DepthNoise noise{};
-  int radius_px = 3;                // 1 to 7: of the disc of pixels that a plane is fitted to
-  double min_pair_share = 0.5;      // of the pairs of opposite pixels in it that must agree
-  double max_incidence_deg = 85.0;  // between line of sight and normal: more is grazing
+struct DepthPlaneOptions : DepthSensor {
+  int radius_px = 3;            // 1 to 7: of the disc of pixels that a plane is fitted to
+  double min_pair_share = 0.5;  // of the pairs of opposite pixels in it that must agree
 };
 
 // What became of each pixel.
@@ -58,19 +55,17 @@ struct DepthPlanes {
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options = {});
 
-// The same, use(y, planes) for each row in which there are planes. `only`, if it is not empty,
-// marks the pixels whose planes are wanted, not 0; others have none, and the counts say nothing.
-using UsePlaneRow = std::function<void(int y, const DepthPlaneLoops::Planes& planes)>;
-DepthPixelCounts each_plane_row(const DepthImage& depth, const PixelRays& rays,
-                                const DepthPlaneOptions& options,
-                                const std::vector<std::uint8_t>& only, const UsePlaneRow& use);
+// Which pixels planes are fitted to: all, and the counts are those of the image; or those that may
+// be in the cells, and the counts say nothing.
+enum class FittedPixels { all, in_cells };
 
-// No plane is further than this from the depth of its pixel, along the axis, m.
-double max_plane_distance_m(const DepthPlaneOptions& options);
-
-// The marked pixels, not 0, and those that decide on their planes: with these as `only`, the planes
-// of the marked pixels are those of the whole image.
-std::vector<std::uint8_t> grown_marks(const std::vector<std::uint8_t>& marks, int width,
-                                      int height);
+// Fits planes to the pixels of one depth image (m) and adds those in `cells` to the voxels of the
+// grid, each weighted by its cosine, its support and the noise of its depth. Both kinds of fitted
+// pixels give the same voxels; but of downsampled cells the edges are fitted roughly. What became
+// of the pixels.
+DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
+                                  const Pose& grid_from_camera, const DepthPlaneOptions& options,
+                                  double voxel_size_m, const PlanCells& cells, FittedPixels fitted,
+                                  SurfaceVoxels& voxels);
 
 }  // namespace libmap

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <boost/pending/disjoint_sets.hpp>
 #include <cmath>
 #include <cstdint>
 #include <functional>
@@ -11,8 +10,9 @@
 #include <tuple>
 
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/disjoint_sets.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libmap {
 
@@ -119,13 +119,11 @@ void SpanningTree::choose_tree() {
   std::sort(edges_.begin(), edges_.end(), [](const GraphEdge& one, const GraphEdge& two) {
     return std::tie(one.turn, one.a, one.b) < std::tie(two.turn, two.a, two.b);
   });
-  boost::disjoint_sets_with_storage<> groups(normals_.size());
+  DisjointSets<std::uint32_t> groups(normals_.size());
   std::vector<GraphEdge> kept;
   for (const GraphEdge& edge : edges_) {
-    const std::size_t a = groups.find_set(edge.a);
-    const std::size_t b = groups.find_set(edge.b);
-    if (a == b) continue;
-    groups.link(a, b);
+    if (groups.find(edge.a) == groups.find(edge.b)) continue;
+    groups.join(edge.a, edge.b);
     kept.push_back(edge);
   }
   edges_.clear();

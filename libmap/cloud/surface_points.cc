@@ -1,14 +1,15 @@
 #include "libmap/cloud/surface_points.h"
 
+#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <span>
 #include <tuple>
 #include <utility>
 #include <vector>
 
-#include "libmap/cloud/surface_normals.h"
 #include "libmap/cloud/surface_voxels.h"
 #include "libmap/core/parallel.h"
 
@@ -27,6 +28,110 @@ constexpr double normal_radius_voxels = 2.0;
 constexpr std::uint32_t weak_frames = 2;
 constexpr double contradicted_share = 0.5;
 
+constexpr float min_agreement = 0.7F;
+// Second eigenvalue of the neighbors' covariance, in squared radii, below which they lie on a
+// line.
+constexpr float min_spread_ratio = 0.02F;
+
+// What a fit needs of a point, lengths in radii.
+struct Neighbor {
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // from the middle of the cell
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+  float certainty = 0.0F;
+};
+
+// Points by cells as wide as the radius, the points of a cell side by side. Not a PointTree: one
+// walk serves all points of a cell (the tree's search alone takes 3 times as long as all of
+// fit_normals), and the order of the cells is that of the single-precision sums.
+class NeighborCells {
+ public:
+  NeighborCells(const PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m)
+      : cloud_(cloud),
+        radius_m_(radius_m),
+        deviations_m_(deviations_m),
+        first_cell_((bounds_of(cloud.positions).min / radius_m).array().floor()) {
+    std::vector<std::uint32_t> cell_of(cloud.size());
+    for (std::size_t n = 0; n < cloud.size(); ++n)
+      cell_of[n] = index_.find_or_add(
+          pack({((cloud.positions[n] / radius_m).array().floor() - first_cell_).cast<int>(), 0}));
+    starts_.assign(index_.size() + 1, 0);
+    for (const std::uint32_t c : cell_of) ++starts_[c + 1];
+    for (std::size_t c = 0; c < index_.size(); ++c) starts_[c + 1] += starts_[c];
+    members_.resize(cloud.size());
+    std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
+    for (std::size_t n = 0; n < cloud.size(); ++n)
+      members_[next[cell_of[n]]++] = static_cast<std::uint32_t>(n);
+  }
+
+  std::size_t size() const { return index_.size(); }
+  std::span<const std::uint32_t> members(std::size_t cell) const {
+    return {members_.data() + starts_[cell], members_.data() + starts_[cell + 1]};
+  }
+
+  // Of the cell and the 26 around it; the cell's own members first.
+  void gather(std::size_t cell, std::vector<Neighbor>& neighbors) const {
+    neighbors.clear();
+    const Eigen::Vector3i there = unpack(index_.keys()[cell]).cell;
+    // Of whole numbers, so that it does not depend on what lies far off.
+    const Eigen::Vector3d middle =
+        (first_cell_ + there.cast<double>().array() + 0.5).matrix() * radius_m_;
+    add_members(cell, middle, neighbors);
+    for (int n = 0; n < 27; ++n) {
+      if (n == 13) continue;
+      const Eigen::Vector3i beside = there + Eigen::Vector3i(n % 3 - 1, n / 3 % 3 - 1, n / 9 - 1);
+      const std::uint32_t c = index_.find(pack({beside, 0}));
+      if (c != VoxelIndex::none) add_members(c, middle, neighbors);
+    }
+  }
+
+ private:
+  void add_members(std::size_t cell, const Eigen::Vector3d& middle,
+                   std::vector<Neighbor>& neighbors) const {
+    for (const std::uint32_t n : members(cell)) {
+      // No point is believed more than 1 % of the radius.
+      const double deviation = deviations_m_[n] / radius_m_;
+      neighbors.push_back({((cloud_.positions[n] - middle) / radius_m_).cast<float>(),
+                           cloud_.normals[n],
+                           static_cast<float>(1.0 / (deviation * deviation + 1e-4))});
+    }
+  }
+
+  const PointCloud& cloud_;
+  double radius_m_;
+  const std::vector<double>& deviations_m_;
+  Eigen::Array3d first_cell_;  // cells count from 0 on
+  VoxelIndex index_;
+  std::vector<std::uint32_t> starts_;
+  std::vector<std::uint32_t> members_;
+};
+
+Eigen::Vector3f fitted_normal(const Neighbor& point, const std::vector<Neighbor>& neighbors) {
+  float weights = 0.0F;
+  Eigen::Vector3f mean = Eigen::Vector3f::Zero();
+  Eigen::Vector3f squares = Eigen::Vector3f::Zero();   // xx, yy, zz
+  Eigen::Vector3f products = Eigen::Vector3f::Zero();  // xy, yz, zx
+  for (const Neighbor& other : neighbors) {
+    const Eigen::Vector3f arm = other.position - point.position;
+    const float near = 1.0F - arm.squaredNorm();
+    if (near <= 0.0F || other.normal.dot(point.normal) < min_agreement) continue;
+    const float weight = near * other.certainty;
+    const Eigen::Vector3f weighted = weight * arm;
+    weights += weight;
+    mean += weighted;
+    squares += weighted.cwiseProduct(arm);
+    products += weighted.cwiseProduct(Eigen::Vector3f(arm.y(), arm.z(), arm.x()));
+  }
+  mean /= weights;
+  Eigen::Matrix3f moments;
+  moments << squares.x(), products.x(), products.z(), products.x(), squares.y(), products.y(),
+      products.z(), products.y(), squares.z();
+  Eigen::SelfAdjointEigenSolver<Eigen::Matrix3f> solver;
+  solver.computeDirect(moments / weights - mean * mean.transpose());
+  if (!(solver.eigenvalues()[1] >= min_spread_ratio)) return point.normal;
+  const Eigen::Vector3f normal = solver.eigenvectors().col(0).normalized();
+  return normal.dot(point.normal) < 0.0F ? Eigen::Vector3f(-normal) : normal;
+}
+
 // Points that share a voxel, weighted by their certainty.
 struct MergedPoint {
   Eigen::Vector3f position = Eigen::Vector3f::Zero();  // these three weighted
@@ -36,7 +141,7 @@ struct MergedPoint {
   float expected_error_m = 0.0F;
   std::uint32_t frames = 0;  // 0: not begun
   bool extended = false;
-  bool is_wanted = true;  // in options.cells
+  bool is_wanted = true;  // in the columns asked for
 };
 
 Color to_color(const Eigen::Vector3f& color) {
@@ -48,8 +153,9 @@ Color to_color(const Eigen::Vector3f& color) {
 
 class PointMaker {
  public:
-  PointMaker(const RefinedSurface& surface, const SurfacePointOptions& options)
-      : surface_(surface), options_(options) {}
+  PointMaker(const RefinedSurface& surface, double voxel_size_m, const PlanCells& cells,
+             const SurfacePointOptions& options)
+      : surface_(surface), voxel_size_m_(voxel_size_m), cells_(cells), options_(options) {}
 
   SurfacePoints run() {
     find_contradicted();
@@ -80,6 +186,8 @@ class PointMaker {
   SurfacePoints make_cloud();
 
   const RefinedSurface& surface_;
+  double voxel_size_m_;
+  const PlanCells& cells_;
   const SurfacePointOptions& options_;
   std::vector<char> is_contradicted_;  // one an element
   VoxelIndex index_;
@@ -88,8 +196,8 @@ class PointMaker {
 };
 
 std::size_t PointMaker::wanted(const SurfaceElement& element) const {
-  const Eigen::Vector2d place = element.position.head<2>().cast<double>() / options_.voxel_size_m;
-  return options_.cells.has_cell(place.array().floor().cast<int>()) ? 1 : 0;
+  const Eigen::Vector2d place = element.position.head<2>().cast<double>() / voxel_size_m_;
+  return cells_.has_cell(place.array().floor().cast<int>()) ? 1 : 0;
 }
 
 bool PointMaker::is_contradicted(std::size_t n) {
@@ -124,7 +232,7 @@ void PointMaker::spread_contradiction() {
   VoxelIndex blocks;
   std::vector<std::uint32_t> block_of(surface_.elements.size(), VoxelIndex::none);
   std::vector<Counts> counts;
-  const double block_m = contradiction_block * options_.voxel_size_m;
+  const double block_m = contradiction_block * voxel_size_m_;
   for (std::size_t n = 0; n < block_of.size(); ++n) {
     if (!is_weak(n)) continue;
     Eigen::Vector3i block = Eigen::Vector3i::Zero();
@@ -168,7 +276,7 @@ bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElemen
     return false;
   }
   if (element.extended &&
-      std::abs(static_cast<double>(refined.shift_m)) > max_extended_shift * options_.voxel_size_m) {
+      std::abs(static_cast<double>(refined.shift_m)) > max_extended_shift * voxel_size_m_) {
     counts_.bent_away += wanted(element);
     return false;
   }
@@ -178,7 +286,7 @@ bool PointMaker::is_confirmed(const SurfaceElement& element, const RefinedElemen
 void PointMaker::merge(const SurfaceElement& element, const RefinedElement& refined) {
   const Eigen::Vector3f position = element.position + refined.shift_m * element.normal;
   const Eigen::Vector3i cell =
-      (position.cast<double>() / options_.voxel_size_m).array().floor().cast<int>();
+      (position.cast<double>() / voxel_size_m_).array().floor().cast<int>();
   std::uint32_t number = index_.find_or_add(pack({cell, 0}));
   if (number < points_.size() && points_[number].normal.dot(element.normal) < 0.0F)
     number = index_.find_or_add(pack({cell, 1}));
@@ -188,7 +296,7 @@ void PointMaker::merge(const SurfaceElement& element, const RefinedElement& refi
     counts_.merged += point.is_wanted ? 1 : 0;
     if (element.extended && !point.extended) return;
   }
-  point.is_wanted = options_.cells.has_cell(cell.head<2>());
+  point.is_wanted = cells_.has_cell(cell.head<2>());
   point.extended = element.extended;
   const float error = refined.expected_error_m;
   const float weight = 1.0F / (error * error);
@@ -210,7 +318,7 @@ bool PointMaker::is_echo(std::size_t point, std::size_t other, int axis) const {
   if (two.normal.dot(one.normal) <= 0.0F || (two.extended && !one.extended)) return false;
   if (!two.extended && two.expected_error_m < echo_certainty * one.expected_error_m) return true;
   const float apart = std::abs(two.position[axis] / two.weight - one.position[axis] / one.weight);
-  if (static_cast<double>(apart) > max_echo_distance * options_.voxel_size_m) return false;
+  if (static_cast<double>(apart) > max_echo_distance * voxel_size_m_) return false;
   return std::tuple(two.extended, two.expected_error_m, other) <
          std::tuple(one.extended, one.expected_error_m, point);
 }
@@ -258,13 +366,29 @@ SurfacePoints PointMaker::make_cloud() {
     errors.values.push_back(static_cast<double>(point.expected_error_m));
     counts_.extended_points += point.extended && point.is_wanted ? 1 : 0;
   }
-  fit_normals(cloud, normal_radius_voxels * options_.voxel_size_m, errors.values);
+  fit_normals(cloud, normal_radius_voxels * voxel_size_m_, errors.values);
   cloud.fields = {std::move(views), std::move(errors)};
   if (wanted.size() < cloud.size()) cloud = select_points(cloud, wanted);
   return {std::move(cloud), counts_};
 }
 
 }  // namespace
+
+void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m) {
+  if (cloud.empty()) return;
+  const NeighborCells cells(cloud, radius_m, deviations_m);
+  std::vector<Eigen::Vector3f> fitted(cloud.size());
+  parallel_for(cells.size(), 256, [&](std::size_t begin, std::size_t end) {
+    std::vector<Neighbor> neighbors;
+    for (std::size_t c = begin; c < end; ++c) {
+      cells.gather(c, neighbors);
+      const std::span<const std::uint32_t> members = cells.members(c);
+      for (std::size_t i = 0; i < members.size(); ++i)
+        fitted[members[i]] = fitted_normal(neighbors[i], neighbors);
+    }
+  });
+  cloud.normals = std::move(fitted);
+}
 
 SurfacePointCounts& SurfacePointCounts::operator+=(const SurfacePointCounts& more) {
   unconfirmed += more.unconfirmed;
@@ -278,9 +402,9 @@ SurfacePointCounts& SurfacePointCounts::operator+=(const SurfacePointCounts& mor
   return *this;
 }
 
-SurfacePoints make_surface_points(const RefinedSurface& surface,
-                                  const SurfacePointOptions& options) {
-  return PointMaker(surface, options).run();
+SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
+                                  const PlanCells& cells, const SurfacePointOptions& options) {
+  return PointMaker(surface, voxel_size_m, cells, options).run();
 }
 
 }  // namespace libmap

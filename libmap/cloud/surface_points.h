@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <vector>
 
 #include "libmap/cloud/plan_cells.h"
 #include "libmap/cloud/surface_refinement.h"
@@ -15,11 +16,13 @@ namespace libmap {
 inline constexpr int contradiction_block = 16;
 
 struct SurfacePointOptions {
-  double voxel_size_m = 0.01;     // > 0
-  int min_views = 1;              // frames that must have measured a point
-  double max_seen_through = 0.3;  // views that see through a point for each that sees it
-  double max_missed = 1.5;        // views that miss it for each that sees it
-  PlanCells cells;                // columns of voxels whose points are returned and counted
+  int min_views = 1;  // distinct frames that must have measured a point
+  // Drops points that more views see through than see, each counted by its cosine (Merrell et al.
+  // 2007). Larger values keep more.
+  double max_seen_through = 0.3;
+  // The same for views that measured nothing around a point, although it is within their range and
+  // not seen obliquely: what moves before an open background.
+  double max_missed = 1.5;
 };
 
 struct SurfacePointCounts {
@@ -43,7 +46,14 @@ struct SurfacePoints {
   SurfacePointCounts counts;
 };
 // The refined elements as points: contradicted ones dropped, one left per voxel, edges extended.
-SurfacePoints make_surface_points(const RefinedSurface& surface,
-                                  const SurfacePointOptions& options);
+// Returns and counts the points in the columns of voxels `cells`.
+SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
+                                  const PlanCells& cells, const SurfacePointOptions& options);
+
+// Replaces each normal of `cloud`, of unit length, by that of the plane of weighted total least
+// squares through the points within `radius_m` whose normals look the same way (within 45 degrees;
+// Hoppe et al. 1992). `deviations_m` are the points' own standard deviations, one each; sides are
+// kept. A point whose neighbors span no plane keeps its normal.
+void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& deviations_m);
 
 }  // namespace libmap

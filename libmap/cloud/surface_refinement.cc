@@ -93,21 +93,22 @@ inline Four not_negative_part(const Four& value) { return value.max(Four::Zero()
 
 class ViewGather {
  public:
-  ViewGather(const RefinementView& view, const SurfaceRefinementOptions& options)
+  ViewGather(const RefinementView& view, const DepthSensor& sensor, const SurfaceSearch& search)
       : view_(view),
-        options_(options),
+        sensor_(sensor),
+        search_(search),
         rotation_(view.camera_from_grid.linear()),
         translation_(view.camera_from_grid.translation()),
         rotation_f_(rotation_.cast<float>()),
         pixel_pitch_(
             static_cast<float>(1.0 / std::min(view.depth_camera.fx, view.depth_camera.fy))),
         min_incidence_(
-            static_cast<float>(std::cos(options.max_incidence_deg * std::numbers::pi / 180.0))),
+            static_cast<float>(std::cos(sensor.max_incidence_deg * std::numbers::pi / 180.0))),
         is_distorted_(view.depth_camera.is_distorted()) {}
 
   bool may_see(const Chunk& chunk) const {
     const Eigen::Vector3d p = rotation_ * chunk.center + translation_;
-    if (p.z() + chunk.radius < options_.min_depth_m || p.z() - chunk.radius > options_.max_depth_m)
+    if (p.z() + chunk.radius < sensor_.min_depth_m || p.z() - chunk.radius > sensor_.max_depth_m)
       return false;
     const auto beyond = [&](double offset, double slope) {
       return offset > chunk.radius * std::sqrt(1.0 + slope * slope);
@@ -150,7 +151,7 @@ class ViewGather {
 
   bool look_at(const SurfaceElement& element, SeenElement& seen) const {
     const Eigen::Vector3d p = rotation_ * element.position.cast<double>() + translation_;
-    if (!(p.z() >= options_.min_depth_m && p.z() <= options_.max_depth_m)) return false;
+    if (!(p.z() >= sensor_.min_depth_m && p.z() <= sensor_.max_depth_m)) return false;
     if (is_distorted_) {
       const auto pixel = project_point(view_.depth_camera, p);
       if (!pixel) return false;
@@ -171,14 +172,14 @@ class ViewGather {
     if (!(seen.cosine >= min_incidence_)) return false;
     const float z = seen.position.z();
     const float square = seen.cosine * seen.cosine;
-    const float lateral = static_cast<float>(options_.noise.lateral_px) * pixel_pitch_ * z;
-    seen.sigma = static_cast<float>(options_.noise.axial_at(p.z()));
+    const float lateral = static_cast<float>(sensor_.noise.lateral_px) * pixel_pitch_ * z;
+    seen.sigma = static_cast<float>(sensor_.noise.axial_at(p.z()));
     seen.information =
         1.0F / (seen.sigma * seen.sigma * square + lateral * lateral * (1.0F - square));
     seen.gate = refinement_gate_sigmas * seen.sigma +
-                static_cast<float>(options_.search_m) / std::max(seen.cosine, min_search_cosine);
+                static_cast<float>(search_.search_m) / std::max(seen.cosine, min_search_cosine);
     // At least the pixel's own footprint: a disc without a pixel says nothing.
-    seen.radius = std::max(static_cast<float>(options_.disc_radius_m),
+    seen.radius = std::max(static_cast<float>(search_.disc_radius_m),
                            static_cast<float>(min_disc_pixels) * pixel_pitch_ * z);
     return true;
   }
@@ -294,7 +295,8 @@ class ViewGather {
   }
 
   const RefinementView& view_;
-  const SurfaceRefinementOptions& options_;
+  const DepthSensor& sensor_;
+  const SurfaceSearch& search_;
   Eigen::Matrix3d rotation_;
   Eigen::Vector3d translation_;
   Eigen::Matrix3f rotation_f_;
@@ -358,29 +360,25 @@ std::vector<Chunk> chunks_of(std::span<const SurfaceElement> elements, double ma
   return chunks;
 }
 
-float pose_variance(const SurfaceRefinementOptions& options) {
-  return static_cast<float>(options.pose_error_m * options.pose_error_m);
-}
-
 }  // namespace
 
-double max_gate_m(const SurfaceRefinementOptions& options) {
-  return static_cast<double>(refinement_gate_sigmas) * options.noise.axial_at(options.max_depth_m) +
-         options.search_m / static_cast<double>(min_search_cosine);
+double max_gate_m(const DepthSensor& sensor, const SurfaceSearch& search) {
+  return static_cast<double>(refinement_gate_sigmas) * sensor.noise.axial_at(sensor.max_depth_m) +
+         search.search_m / static_cast<double>(min_search_cosine);
 }
 
-RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
-                              const SurfaceRefinementOptions& options,
+RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
+                              const SurfaceSearch& search, double pose_error_m,
                               const std::function<void(const AddViews&)>& each_group) {
-  const std::vector<Chunk> chunks = chunks_of(elements, options.disc_radius_m);
-  const float variance = pose_variance(options);
+  const std::vector<Chunk> chunks = chunks_of(elements, search.disc_radius_m);
+  const auto variance = static_cast<float>(pose_error_m * pose_error_m);
   std::vector<ElementSum> sums(elements.size());
   RefinedSurface surface;
   each_group([&](std::span<const RefinementView> views) {
     std::vector<ViewGather> gathers;
     gathers.reserve(views.size());
     for (const RefinementView& view : views) {
-      gathers.emplace_back(view, options);
+      gathers.emplace_back(view, sensor, search);
       surface.has_color = surface.has_color || !view.color.empty();
     }
     parallel_for(chunks.size(), 4, [&](std::size_t first, std::size_t last) {
@@ -410,11 +408,12 @@ RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
 
 std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> elements,
                                                 std::span<const RefinementView> views,
-                                                const SurfaceRefinementOptions& options) {
+                                                const DepthSensor& sensor,
+                                                const SurfaceSearch& search) {
   std::vector<ViewGather> gathers;
   gathers.reserve(views.size());
-  for (const RefinementView& view : views) gathers.emplace_back(view, options);
-  const std::vector<Chunk> chunks = chunks_of(elements, options.disc_radius_m);
+  for (const RefinementView& view : views) gathers.emplace_back(view, sensor, search);
+  const std::vector<Chunk> chunks = chunks_of(elements, search.disc_radius_m);
   std::vector<std::vector<SurfaceObservation>> found(chunks.size());
   parallel_for(chunks.size(), 4, [&](std::size_t first, std::size_t last) {
     for (std::size_t c = first; c < last; ++c) {

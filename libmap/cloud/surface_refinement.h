@@ -20,18 +20,14 @@
 
 namespace libmap {
 
-struct SurfaceRefinementOptions {
+// Which measurements count for an element.
+struct SurfaceSearch {
   double disc_radius_m = 0.015;  // > 0: measurements this near along the surface are averaged
-  double search_m = 0.01;        // >= 0: by which an element may be wrong before it is refined
-  double min_depth_m = 0.1;
-  double max_depth_m = 4.0;
-  double max_incidence_deg = 85.0;
-  DepthNoise noise{};
-  double pose_error_m = 0.0;  // >= 0: standard deviation of a whole frame along the normal
+  double search_m = 0.01;        // >= 0: maximum error of an element along its normal
 };
 
 // Depths that differ more from an element's plane have no weight, at any distance, m.
-double max_gate_m(const SurfaceRefinementOptions& options);
+double max_gate_m(const DepthSensor& sensor, const SurfaceSearch& search);
 // Radius of the smallest disc.
 inline constexpr double min_disc_pixels = 1.5;
 
@@ -66,12 +62,13 @@ struct RefinedSurface {
   bool has_color = false;
 };
 
-// What the views measured of every element. `each_group(add)` calls add(views) for all views, by
-// frame: their order changes the result by rounding, their grouping and the number of threads do
-// not. Elements in meters.
+// What the views measured of every element. `pose_error_m` >= 0 is the standard deviation of a
+// whole frame along the normal. `each_group(add)` calls add(views) for all views, by frame: their
+// order changes the result by rounding, their grouping and the number of threads do not. Elements
+// in meters.
 using AddViews = std::function<void(std::span<const RefinementView>)>;
-RefinedSurface refine_surface(std::vector<SurfaceElement> elements,
-                              const SurfaceRefinementOptions& options,
+RefinedSurface refine_surface(std::vector<SurfaceElement> elements, const DepthSensor& sensor,
+                              const SurfaceSearch& search, double pose_error_m,
                               const std::function<void(const AddViews&)>& each_group);
 
 // What one frame measured of an element: the mean height within its disc.
@@ -85,6 +82,7 @@ struct SurfaceObservation {
 // By element, then by view. The same for any number of threads.
 std::vector<SurfaceObservation> observe_surface(std::span<const SurfaceElement> elements,
                                                 std::span<const RefinementView> views,
-                                                const SurfaceRefinementOptions& options);
+                                                const DepthSensor& sensor,
+                                                const SurfaceSearch& search);
 
 }  // namespace libmap

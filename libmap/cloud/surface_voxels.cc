@@ -11,27 +11,6 @@
 
 namespace libmap {
 
-namespace {
-
-// Two zeros before each bit of a 21-bit number.
-std::uint64_t spread_bits(std::uint64_t bits) {
-  bits &= voxel_key::axis_mask;
-  bits = (bits | bits << 32U) & 0x1f00000000ffffU;
-  bits = (bits | bits << 16U) & 0x1f0000ff0000ffU;
-  bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
-  bits = (bits | bits << 4U) & 0x10c30c30c30c30c3U;
-  return (bits | bits << 2U) & 0x1249249249249249U;
-}
-
-// Along a Z-order curve (Morton 1966), so that what is near in space is near in the list; the side
-// last.
-std::uint64_t curve_place(std::uint64_t key) {
-  return spread_bits(key >> 43U) << 3U | spread_bits(key >> 22U) << 2U |
-         spread_bits(key >> 1U) << 1U | (key & 1U);
-}
-
-}  // namespace
-
 SurfaceVoxels::Sum& SurfaceVoxels::side_of(const VoxelPlace& place, const Eigen::Vector3f& normal) {
   std::uint32_t number = index_.find_or_add(pack({place.cell, 0}));
   if (number < sums_.size() && sums_[number].normal.dot(normal) < 0.0F)
@@ -104,7 +83,7 @@ class ElementMaker {
       const Piece& piece = pieces_[n];
       if (!piece.speaks) continue;
       const VoxelPlace place = unpack(key_of(n));
-      found_.emplace_back(curve_place(key_of(n)),
+      found_.emplace_back(z_order(key_of(n)),
                           element(place.cell, piece.axis, piece.height, piece.normal, false));
       for (std::size_t step = 0; step < 4; ++step)
         if (piece.is_edge[step]) expect(neighbor(n, step), piece, voxels_.sums()[n].weight);
@@ -113,7 +92,7 @@ class ElementMaker {
       const Beside& one = beside_[n];
       const VoxelPlace place = unpack(beside_index_.keys()[n]);
       found_.emplace_back(
-          curve_place(beside_index_.keys()[n]),
+          z_order(beside_index_.keys()[n]),
           element(place.cell, one.axis, one.height / one.weight, one.normal.normalized(), true));
     }
     return in_order();

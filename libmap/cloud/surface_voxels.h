@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "libmap/cloud/voxel_index.h"
+#include "libmap/geometry/voxel_key.h"
 
 namespace libmap {
 

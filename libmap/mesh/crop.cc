@@ -47,7 +47,7 @@ std::vector<Vector2d> seen_from_above(const std::vector<Vector3d>& points) {
 struct Plan {
   Pose cut_from_map = Pose::Identity();   // the frame in which it is cut
   Pose site_from_cut = Pose::Identity();  // the identity but for a box or polygon in the map
-  UprightPrism prism;
+  ExtrudedPolygon prism;
   CropReport report;
 };
 
@@ -100,14 +100,14 @@ void lay_rectangle(const Source& source, const CropOptions& options, const Pose&
   const Vector2d half = options.size_m / 2.0;
   if (!options.yaw_deg) {
     plan.cut_from_map = turn_about(rectangle.center, -rectangle.yaw_deg) * level;
-    plan.prism.outline = make_rectangle(rectangle.center - half, rectangle.center + half);
+    plan.prism.polygon = make_rectangle(rectangle.center - half, rectangle.center + half);
     return;
   }
   const Pose turn = turn_about(source.middle, *options.yaw_deg);
   const Pose from_rectangle = turn_about(rectangle.center, rectangle.yaw_deg);
-  const Outline straight = make_rectangle(rectangle.center - half, rectangle.center + half);
+  const PlanPolygon straight = make_rectangle(rectangle.center - half, rectangle.center + half);
   plan.cut_from_map = turn * level;
-  plan.prism.outline = Outline(moved(straight.corners(), turn * from_rectangle));
+  plan.prism.polygon = PlanPolygon(moved(straight.corners(), turn * from_rectangle));
 }
 
 void lay_border(const Source& source, const CropOptions& options, const Pose& level, Plan& plan) {
@@ -121,7 +121,7 @@ void lay_border(const Source& source, const CropOptions& options, const Pose& le
   const Pose turn = options.yaw_deg ? turn_about(source.middle, *options.yaw_deg)
                                     : turn_about(center, -yaw_of(corners));
   plan.cut_from_map = turn * level;
-  plan.prism.outline = Outline(moved(corners, turn));
+  plan.prism.polygon = PlanPolygon(moved(corners, turn));
 }
 
 // A box or polygon that the user gave.
@@ -131,28 +131,28 @@ void lay_given(const Source& source, const CropOptions& options, const Pose& lev
     plan.site_from_cut = turned;
   else
     plan.cut_from_map = turned;
-  if (options.region == CropRegion::polygon) plan.prism.outline = Outline(options.polygon);
+  if (options.region == CropRegion::polygon) plan.prism.polygon = PlanPolygon(options.polygon);
   if (options.region != CropRegion::box) return;
-  plan.prism.outline = make_rectangle(options.box.min.head<2>(), options.box.max.head<2>());
+  plan.prism.polygon = make_rectangle(options.box.min.head<2>(), options.box.max.head<2>());
   plan.prism.min_z = options.box.min.z();
   plan.prism.max_z = options.box.max.z();
 }
 
 // x = y = 0 in the middle of the outline's box.
 void center_outline(const CropOptions& options, Plan& plan) {
-  const Outline& outline = *plan.prism.outline;
+  const PlanPolygon& outline = *plan.prism.polygon;
   const Vector2d middle = (outline.min() + outline.max()) / 2.0;
   Pose shift = Pose::Identity();
   shift.translation().head<2>() = -middle;
   plan.cut_from_map = shift * plan.cut_from_map;
   if (options.region == CropRegion::size && !options.yaw_deg) {
     const Vector2d half = options.size_m / 2.0;
-    plan.prism.outline = make_rectangle(-half, half);
+    plan.prism.polygon = make_rectangle(-half, half);
     return;
   }
   std::vector<Vector2d> corners = outline.corners();
   for (Vector2d& corner : corners) corner -= middle;
-  plan.prism.outline = Outline(std::move(corners));
+  plan.prism.polygon = PlanPolygon(std::move(corners));
 }
 
 void require_sound(const CropOptions& options) {
@@ -180,9 +180,9 @@ Plan make_plan(const Source& source, const CropOptions& options) {
     lay_border(source, options, level, plan);
   else
     lay_given(source, options, level, plan);
-  const bool cut_in_site = options.frame == CropFrame::level || !plan.prism.outline;
-  if (options.center && plan.prism.outline && cut_in_site) center_outline(options, plan);
-  if (plan.prism.outline) plan.report.outline = plan.prism.outline->corners();
+  const bool cut_in_site = options.frame == CropFrame::level || !plan.prism.polygon;
+  if (options.center && plan.prism.polygon && cut_in_site) center_outline(options, plan);
+  if (plan.prism.polygon) plan.report.outline = plan.prism.polygon->corners();
   return plan;
 }
 
@@ -192,7 +192,7 @@ template <typename Bounds, typename Move>
 void finish(Plan& plan, const CropOptions& options, const Bounds& bounds_moved, const Move& move) {
   CropReport& report = plan.report;
   Pose site_from_cut = plan.site_from_cut;
-  const bool to_center = options.center && (!plan.prism.outline || options.frame == CropFrame::map);
+  const bool to_center = options.center && (!plan.prism.polygon || options.frame == CropFrame::map);
   if (to_center) {
     const Eigen::AlignedBox3d bounds = bounds_moved(site_from_cut);
     Pose shift = Pose::Identity();
@@ -349,7 +349,7 @@ CropCloudResult crop_cloud(const PointCloud& cloud, const CropOptions& options) 
   };
   Plan plan = make_plan(source, options);
   if (!is_identity(plan.cut_from_map)) kept = transform_cloud(kept, plan.cut_from_map);
-  PointCloud inside = cut_cloud(kept, plan.prism);
+  PointCloud inside = clip_cloud(kept, plan.prism);
   if (inside.empty()) throw nothing_inside(box_of(kept.positions, Pose::Identity()), "cloud");
   finish(
       plan, options, [&](const Pose& pose) { return box_of(inside.positions, pose); },

@@ -8,7 +8,7 @@
 
 #include "libmap/cloud/border_band.h"
 #include "libmap/cloud/ground_plane.h"
-#include "libmap/cloud/outline.h"
+#include "libmap/cloud/plan_polygon.h"
 #include "libmap/cloud/site_rectangle.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <functional>
@@ -10,9 +11,64 @@
 #include "libmap/core/progress.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/mesh/surface_fragments.h"
 
 namespace libmap {
+
+// A part of a triangle: its corners as (u, v) of that triangle.
+struct Fragment {
+  std::uint32_t triangle = 0;
+  std::array<Eigen::Vector2d, 3> corners;
+};
+
+// A fragment with its corners in space.
+struct PlacedFragment {
+  Fragment fragment;
+  std::array<Eigen::Vector3d, 3> corners;
+
+  // Of the fragment's triangle.
+  double area_m2() const;
+  double square_of_longest_side() const;
+  // Cut through the middle of its longest side (Rivara 1984).
+  std::array<PlacedFragment, 2> halves() const;
+};
+PlacedFragment placed(const TriangleMesh& mesh, const Fragment& fragment);
+
+// Where two numbers from 0 to 1 put a point, evenly over the fragment.
+TrianglePoint point_of(const Fragment& fragment, double first, double second);
+
+// Consecutive pieces of a surface.
+struct SurfaceBlock {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+  double area_m2 = 0.0;
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  double reach_m = 0.0;    // no point of them is farther from the center
+  double longest_m = 0.0;  // of their sides
+};
+
+// A surface in pieces: triangles of its mesh, and parts of those that are too large.
+class SurfacePieces {
+ public:
+  // All triangles as they are. The mesh must stay while the pieces are used.
+  explicit SurfacePieces(const TriangleMesh& mesh);
+  // `triangles` cut until no side is longer than `longest_m`. Throws Error if that yields more than
+  // `max_parts`.
+  SurfacePieces(const SurfacePieces& triangles, double longest_m, std::size_t max_parts);
+
+  const std::vector<SurfaceBlock>& blocks() const { return blocks_; }
+  // Of all pieces together; one piece by its number.
+  double area_m2() const;
+  PlacedFragment piece(std::size_t number) const;
+
+ private:
+  void cut(const PlacedFragment& fragment, double longest_m, std::size_t max_parts);
+  void add_blocks(std::size_t begin, std::size_t end);
+  SurfaceBlock measured(std::size_t begin, std::size_t end) const;
+
+  const TriangleMesh& mesh_;
+  std::vector<Fragment> parts_;  // numbered behind the triangles
+  std::vector<SurfaceBlock> blocks_;
+};
 
 struct SampledSurface {
   const TriangleMesh& mesh;  // its vertices finite

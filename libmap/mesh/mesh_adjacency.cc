@@ -7,8 +7,8 @@
 #include <string>
 #include <utility>
 
-#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
+#include "libmap/geometry/disjoint_sets.h"
 
 namespace libmap {
 

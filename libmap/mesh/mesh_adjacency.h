@@ -1,5 +1,4 @@
-// Which triangles meet along which edges. Inner part of libmap/mesh: cleaning and reports stand on
-// it.
+// Adjacency of triangles along edges and around vertices.
 #pragma once
 
 #include <cstddef>

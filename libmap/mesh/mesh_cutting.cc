@@ -32,7 +32,7 @@ struct Piece {
   std::uint32_t source = 0;
 };
 
-// One edge of an outline, seen from above, or a height.
+// One edge of a polygon, seen from above, or a height.
 class Cut {
  public:
   static Cut along(const Vector2d& from, const Vector2d& to) {
@@ -121,7 +121,7 @@ class MeshCutter {
   bool insert_inside(std::size_t piece, const Vector2d& corner);
 
   TriangleMesh& mesh_;
-  std::vector<char> fixed_;  // vertices that stand on the outline already
+  std::vector<char> fixed_;  // vertices that are on the border already
   std::vector<Piece> pieces_;
 };
 
@@ -306,7 +306,7 @@ void require_finite(const TriangleMesh& mesh) {
 
 enum class Place : char { outside, inside, on_border };
 
-Place place_of(const TriangleMesh& mesh, const Triangle& corners, const UprightPrism& prism) {
+Place place_of(const TriangleMesh& mesh, const Triangle& corners, const ExtrudedPolygon& prism) {
   const Vector3d& a = mesh.vertices[corners[0]];
   const Vector3d& b = mesh.vertices[corners[1]];
   const Vector3d& c = mesh.vertices[corners[2]];
@@ -314,9 +314,9 @@ Place place_of(const TriangleMesh& mesh, const Triangle& corners, const UprightP
   const Vector3d high = (a.cwiseMax(b).cwiseMax(c).array() + reach_m).matrix();
   if (high.z() < prism.min_z || low.z() > prism.max_z) return Place::outside;
   const bool across = low.z() < prism.min_z || high.z() > prism.max_z;
-  if (prism.outline) {
-    if (!prism.outline->edges_near(low.head<2>(), high.head<2>()).empty()) return Place::on_border;
-    if (!prism.outline->contains(a.head<2>())) return Place::outside;
+  if (prism.polygon) {
+    if (!prism.polygon->edges_near(low.head<2>(), high.head<2>()).empty()) return Place::on_border;
+    if (!prism.polygon->contains(a.head<2>())) return Place::outside;
   }
   return across ? Place::on_border : Place::inside;
 }
@@ -338,7 +338,7 @@ TriangleMesh mesh_of(TriangleMesh mesh, std::vector<Piece> kept) {
 
 }  // namespace
 
-TriangleMesh cut_mesh(TriangleMesh mesh, const UprightPrism& prism) {
+TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism) {
   require_finite(mesh);
   std::vector<Place> places(mesh.triangles.size());
   parallel_for(places.size(), 4096, [&](std::size_t begin, std::size_t end) {
@@ -352,14 +352,14 @@ TriangleMesh cut_mesh(TriangleMesh mesh, const UprightPrism& prism) {
   MeshCutter cutter(mesh, std::move(on_border));
   for (const double z : {prism.min_z, prism.max_z})
     if (std::isfinite(z)) cutter.cut(Cut::at_height(z));
-  if (prism.outline) {
-    const std::vector<Vector2d>& corners = prism.outline->corners();
+  if (prism.polygon) {
+    const std::vector<Vector2d>& corners = prism.polygon->corners();
     for (const Vector2d& corner : corners) cutter.insert_corner(corner);
     for (std::size_t n = 0; n < corners.size(); ++n)
       cutter.cut(Cut::along(corners[n], corners[(n + 1) % corners.size()]));
   }
   // No piece reaches over the border any more: one of its inner points speaks for all of it.
-  UprightPrism widened = prism;
+  ExtrudedPolygon widened = prism;
   widened.min_z -= snap_m;
   widened.max_z += snap_m;
   for (const Piece& piece : cutter.pieces())

@@ -1,7 +1,7 @@
-// Meshes cut along an outline on the ground and at heights.
+// Meshes cut along a polygon of the x-y plane and at heights.
 #pragma once
 
-#include "libmap/cloud/outline.h"
+#include "libmap/cloud/plan_polygon.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -13,6 +13,6 @@ namespace libmap {
 // colors and fields of vertices are interpolated (mesh_parts.h), those of faces kept. Surfaces of
 // any form will do: open, not manifold, overhanging, upright. Nothing inside: an empty mesh. Throws
 // Error: arrays that do not fit, a vertex of a triangle that is not finite.
-TriangleMesh cut_mesh(TriangleMesh mesh, const UprightPrism& prism);
+TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism);
 
 }  // namespace libmap

@@ -6,8 +6,8 @@
 #include <cmath>
 #include <unordered_map>
 
-#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
+#include "libmap/geometry/disjoint_sets.h"
 
 namespace libmap {
 

@@ -7,7 +7,7 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/surface_distance.h"
 

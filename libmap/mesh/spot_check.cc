@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "libmap/core/error.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/ray_caster.h"
 
 namespace libmap {

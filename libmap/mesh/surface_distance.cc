@@ -7,9 +7,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libmap {
 

@@ -7,7 +7,7 @@
 #include <set>
 #include <utility>
 
-#include "libmap/core/disjoint_sets.h"
+#include "libmap/geometry/disjoint_sets.h"
 
 namespace libmap {
 

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/surface_samples.h"
 

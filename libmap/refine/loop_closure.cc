@@ -8,8 +8,8 @@
 #include <optional>
 
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/random_stream.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/refine/rigid_motion.h"
 
 namespace libmap {

@@ -1,20 +1,30 @@
 #include "libmap/surface/hole_filling.h"
 
+#define CGAL_EIGEN3_ENABLED
+#include <CGAL/Exact_predicates_inexact_constructions_kernel.h>
+#include <CGAL/Polygon_mesh_processing/triangulate_hole.h>
+#include <CGAL/Surface_mesh.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <exception>
+#include <iterator>
 #include <limits>
 
 #include "libmap/core/parallel.h"
-#include "libmap/surface/hole_patch.h"
+#include "libmap/surface/mesh_repair.h"
 #include "libmap/surface/self_intersections.h"
-#include "libmap/surface/triangle_repair.h"
 
 namespace libmap {
 
 namespace {
+
+namespace processing = CGAL::Polygon_mesh_processing;
+using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
+using Mesh = CGAL::Surface_mesh<Kernel::Point_3>;
 
 // A boundary of more edges is left open: its triangulation may take the square of them.
 constexpr std::size_t max_hole_edges = 5000;
@@ -23,8 +33,96 @@ constexpr std::size_t max_hole_edges = 5000;
 // needs one.
 constexpr int rings = 2;
 
+// Larger holes are triangulated over their Delaunay triangulation alone: the search over all
+// triangulations takes the cube of the number of edges.
+constexpr std::size_t max_cubic_edges = 150;
+
+// The surface that closes a hole.
+enum class PatchShape {
+  faired,        // as smooth as the surface around it: tangent planes continued (C1)
+  refined,       // triangles as large as those around the hole
+  triangulated,  // no new vertices
+};
 constexpr std::array<PatchShape, 3> shapes = {PatchShape::faired, PatchShape::refined,
                                               PatchShape::triangulated};
+
+// Indices below `vertices` of the mesh that was given are its own; the others are those of
+// `new_vertices` behind them.
+struct HolePatch {
+  std::vector<Eigen::Vector3d> new_vertices;
+  std::vector<Triangle> triangles;  // empty: none was found
+};
+
+// Whether all of it could be entered.
+bool enter(const std::vector<Eigen::Vector3d>& vertices, const std::vector<Triangle>& triangles,
+           Mesh& mesh) {
+  for (const Eigen::Vector3d& v : vertices) mesh.add_vertex({v.x(), v.y(), v.z()});
+  const auto vertex = [](std::uint32_t v) { return Mesh::Vertex_index(v); };
+  for (const Triangle& t : triangles)
+    if (mesh.add_face(vertex(t[0]), vertex(t[1]), vertex(t[2])) == Mesh::null_face()) return false;
+  return true;
+}
+
+std::size_t edges_around(const Mesh& mesh, Mesh::Halfedge_index h) {
+  std::size_t count = 1;
+  for (auto at = mesh.next(h); at != h && count <= mesh.number_of_halfedges(); at = mesh.next(at))
+    ++count;
+  return count;
+}
+
+std::vector<Mesh::Face_index> fill(Mesh& mesh, Mesh::Halfedge_index border, PatchShape shape) {
+  std::vector<Mesh::Face_index> faces;
+  std::vector<Mesh::Vertex_index> vertices;
+  const auto parameters =
+      CGAL::parameters::do_not_use_cubic_algorithm(edges_around(mesh, border) > max_cubic_edges);
+  if (shape == PatchShape::triangulated)
+    processing::triangulate_hole(mesh, border, std::back_inserter(faces), parameters);
+  else
+    processing::triangulate_and_refine_hole(mesh, border, std::back_inserter(faces),
+                                            std::back_inserter(vertices), parameters);
+  if (shape == PatchShape::faired &&
+      !processing::fair(mesh, vertices, CGAL::parameters::fairing_continuity(1)))
+    faces.clear();
+  return faces;
+}
+
+HolePatch patch_from(const Mesh& mesh, const std::vector<Mesh::Face_index>& faces,
+                     std::size_t old_vertices) {
+  HolePatch patch;
+  for (const Mesh::Face_index face : faces) {
+    Triangle& triangle = patch.triangles.emplace_back();
+    std::size_t k = 0;
+    for (const Mesh::Vertex_index v : mesh.vertices_around_face(mesh.halfedge(face)))
+      if (k < 3) triangle[k++] = static_cast<std::uint32_t>(v);
+  }
+  for (std::size_t v = old_vertices; v < mesh.number_of_vertices(); ++v) {
+    const Kernel::Point_3& p = mesh.point(Mesh::Vertex_index(static_cast<std::uint32_t>(v)));
+    patch.new_vertices.emplace_back(p.x(), p.y(), p.z());
+  }
+  return patch;
+}
+
+// Triangulates the boundary (Liepa 2003, "Filling holes in meshes"; over a Delaunay triangulation
+// where that holds a solution), refines and fairs it. `surroundings` are the triangles near the
+// hole, an oriented manifold; the half-edge from `from` to `to` is one of the hole's. Never throws
+// for geometry that cannot be filled.
+HolePatch patch_hole(const std::vector<Eigen::Vector3d>& vertices,
+                     const std::vector<Triangle>& surroundings, std::uint32_t from,
+                     std::uint32_t to, PatchShape shape) {
+  try {
+    Mesh mesh;
+    if (!enter(vertices, surroundings, mesh)) return {};
+    const Mesh::Halfedge_index inside =
+        mesh.halfedge(Mesh::Vertex_index(from), Mesh::Vertex_index(to));
+    if (inside == Mesh::null_halfedge()) return {};
+    const Mesh::Halfedge_index border = mesh.opposite(inside);
+    if (!mesh.is_border(border)) return {};
+    return patch_from(mesh, fill(mesh, border, shape), vertices.size());
+  } catch (const std::exception&) {
+    // CGAL reports geometry that it cannot take by exceptions of several kinds.
+    return {};
+  }
+}
 
 std::vector<Eigen::Vector3d> positions_of(const TriangleMesh& mesh, const BoundaryLoop& loop) {
   std::vector<Eigen::Vector3d> positions;

@@ -43,7 +43,7 @@ struct HoleFilling {
   double area_m2 = 0.0;
 };
 
-// Adds a patch for each hole (hole_patch): faired; where that does not stand the check, refined; or
+// Adds a patch for each hole: faired; where that does not stand the check, refined; or
 // else of the boundary's vertices alone. New vertices follow those of the mesh; colors and fields
 // of whole or real numbers are those of the boundary, weighted by the inverse square of the
 // distance (whole numbers: of the nearest). New triangles follow the others; their face fields are

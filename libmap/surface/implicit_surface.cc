@@ -1,15 +1,14 @@
-#include "libmap/surface/implicit_surface.h"
-
 #include <pcl/surface/marching_cubes.h>
 
 #include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdint>
-#include <unordered_map>
 #include <utility>
 
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/voxel_key.h"
+#include "libmap/surface/surface_solvers.h"
 
 namespace libmap {
 
@@ -45,15 +44,6 @@ constexpr std::array<std::array<int, 2>, 12> edge_corners = {{{0, 1},
                                                               {3, 7}}};
 
 constexpr std::uint32_t unnumbered = 0xffffffff;
-
-// 21 bits an axis.
-std::uint64_t pack(const Vector3i& place) {
-  constexpr int middle = 1 << 20;
-  const auto bits = [](int value) {
-    return static_cast<std::uint64_t>(value + middle) & 0x1fffffU;
-  };
-  return bits(place.z()) << 42U | bits(place.y()) << 21U | bits(place.x());
-}
 
 // Sums over the samples around a corner; lengths in cells.
 struct Corner {
@@ -108,8 +98,9 @@ struct Cube {
 struct Part {
   struct Vertex {
     Vector3d position;
-    std::uint64_t edge = 0;  // that it lies on: three times the packed lower corner, and the axis
-    bool is_shared = false;  // the edge is one of other blocks, too
+    std::uint64_t corner = 0;  // packed: the lower corner of its edge
+    std::size_t axis = 0;      // of its edge
+    bool is_shared = false;    // the edge is one of other blocks, too
   };
   std::vector<Vertex> vertices;
   std::vector<Triangle> triangles;  // of these vertices
@@ -161,7 +152,7 @@ class ImplicitSurface {
 };
 
 void ImplicitSurface::find_blocks() {
-  std::unordered_map<std::uint64_t, std::size_t> numbers;
+  VoxelIndex numbers;
   for (std::size_t n = 0; n < samples_.size(); ++n) {
     const Vector3d place = place_of(samples_[n]) / block_cells;
     const Vector3d reach = Vector3d::Constant(reach_of(samples_[n]) / block_cells);
@@ -170,9 +161,9 @@ void ImplicitSurface::find_blocks() {
     for (int z = low.z(); z <= high.z(); ++z)
       for (int y = low.y(); y <= high.y(); ++y)
         for (int x = low.x(); x <= high.x(); ++x) {
-          const auto [found, is_new] = numbers.try_emplace(pack({x, y, z}), blocks_.size());
-          if (is_new) blocks_.push_back({Vector3i(x, y, z) * block_cells, {}});
-          blocks_[found->second].samples.push_back(static_cast<std::uint32_t>(n));
+          const std::uint32_t block = numbers.find_or_add(pack({{x, y, z}, 0}));
+          if (block == blocks_.size()) blocks_.push_back({Vector3i(x, y, z) * block_cells, {}});
+          blocks_[block].samples.push_back(static_cast<std::uint32_t>(n));
         }
   }
 }
@@ -267,7 +258,8 @@ Part::Vertex ImplicitSurface::vertex_of(const Block& block, const Vector3i& in_b
   const Vector3i corner = block.begin + in_block;
   Part::Vertex vertex;
   vertex.position = cell_m_ * (corner.cast<double>() + share * Vector3d::Unit(axis));
-  vertex.edge = 3 * pack(corner) + static_cast<std::uint64_t>(axis);
+  vertex.corner = pack({corner, 0});
+  vertex.axis = static_cast<std::size_t>(axis);
   for (int other = 0; other < 3; ++other)
     if (other != axis && in_block[other] % block_cells == 0) vertex.is_shared = true;
   return vertex;
@@ -278,15 +270,22 @@ TriangleMesh ImplicitSurface::joined() const {
   std::size_t triangles = 0;
   for (const Part& part : parts_) triangles += part.triangles.size();
   mesh.triangles.reserve(triangles);
-  std::unordered_map<std::uint64_t, std::uint32_t> shared;
+  // Of the shared vertices, by the axis of their edge.
+  std::array<VoxelIndex, 3> edges;
+  std::array<std::vector<std::uint32_t>, 3> on_edges;
   std::vector<std::uint32_t> numbers;
   for (const Part& part : parts_) {
     numbers.clear();
     for (const Part::Vertex& vertex : part.vertices) {
-      const auto next = static_cast<std::uint32_t>(mesh.vertices.size());
-      numbers.push_back(vertex.is_shared ? shared.try_emplace(vertex.edge, next).first->second
-                                         : next);
-      if (numbers.back() == next) mesh.vertices.push_back(vertex.position);
+      auto number = static_cast<std::uint32_t>(mesh.vertices.size());
+      if (vertex.is_shared) {
+        std::vector<std::uint32_t>& known = on_edges[vertex.axis];
+        const std::uint32_t edge = edges[vertex.axis].find_or_add(vertex.corner);
+        if (edge == known.size()) known.push_back(number);
+        number = known[edge];
+      }
+      if (number == mesh.vertices.size()) mesh.vertices.push_back(vertex.position);
+      numbers.push_back(number);
     }
     for (const Triangle& triangle : part.triangles)
       mesh.triangles.push_back({numbers[triangle[0]], numbers[triangle[1]], numbers[triangle[2]]});

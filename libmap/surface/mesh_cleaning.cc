@@ -1,18 +1,20 @@
 #include "libmap/surface/mesh_cleaning.h"
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/surface/intersection_repair.h"
-#include "libmap/surface/mesh_manifold.h"
-#include "libmap/surface/mesh_smoothing.h"
-#include "libmap/surface/triangle_repair.h"
+#include "libmap/surface/mesh_repair.h"
+#include "libmap/surface/self_intersections.h"
 
 namespace libmap {
 
@@ -24,6 +26,197 @@ constexpr double merge_share = 1e-7;
 std::vector<bool> inverse(std::vector<bool> marks) {
   marks.flip();
   return marks;
+}
+
+constexpr int closing_rounds = 4;
+constexpr int max_rounds = 30;
+
+// Fields that only this file sees, while it works: no file has fields of such names.
+constexpr std::string_view boundary_field = "\x01on a boundary before";
+constexpr std::string_view component_field = "\x01component";
+
+// `filled` while this works: what was marked before keeps apart from what is put in now.
+constexpr double filled_before = 2.0;
+
+ScalarField& field_named(std::vector<ScalarField>& fields, std::string_view name) {
+  return *std::find_if(fields.begin(), fields.end(),
+                       [&](const ScalarField& field) { return field.name == name; });
+}
+
+void erase_field(std::vector<ScalarField>& fields, std::string_view name) {
+  std::erase_if(fields, [&](const ScalarField& field) { return field.name == name; });
+}
+
+std::vector<BoundaryLoop> loops_of(const TriangleMesh& mesh) {
+  return boundary_loops(mesh.triangles, opposites_of(mesh));
+}
+
+// Intersecting and degenerate triangles.
+std::vector<bool> bad_faces(const TriangleMesh& mesh) {
+  std::vector<bool> marks = degenerate_triangles(mesh);
+  for (const TrianglePair& pair : find_self_intersections(mesh))
+    marks[pair.first] = marks[pair.second] = true;
+  return marks;
+}
+
+// The pieces that removing triangles of `removed_m2` has cut off: smaller than that, and not the
+// largest piece of what was one component. `component_field` names the component of each triangle.
+void drop_fragments(TriangleMesh& mesh, std::size_t components_before, double removed_m2) {
+  const ScalarField& former = field_named(mesh.face_fields, component_field);
+  const MeshComponents pieces = connected_components(mesh);
+  std::vector<std::size_t> former_of(pieces.areas_m2.size());
+  std::vector<double> largest(components_before, 0.0);
+  for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
+    const std::uint32_t piece = pieces.of_triangle[t];
+    former_of[piece] = static_cast<std::size_t>(former.values[t]);
+    double& area = largest[former_of[piece]];
+    area = std::max(area, pieces.areas_m2[piece]);
+  }
+  std::vector<bool> keep(mesh.triangles.size());
+  for (std::size_t t = 0; t < keep.size(); ++t) {
+    const std::uint32_t piece = pieces.of_triangle[t];
+    const double area = pieces.areas_m2[piece];
+    keep[t] = area > removed_m2 || area >= largest[former_of[piece]];
+  }
+  if (count_of(keep) < keep.size()) mesh = select_triangles(mesh, keep);
+}
+
+// Loops that touch no boundary that was there before.
+std::vector<BoundaryLoop> new_loops(const TriangleMesh& mesh) {
+  const ScalarField* before = nullptr;
+  for (const ScalarField& field : mesh.vertex_fields)
+    if (field.name == boundary_field) before = &field;
+  std::vector<BoundaryLoop> loops = loops_of(mesh);
+  std::erase_if(loops, [&](const BoundaryLoop& loop) {
+    return std::any_of(loop.begin(), loop.end(), [&](HalfEdge h) {
+      return before->values[source_of(mesh.triangles, h)] != 0.0;
+    });
+  });
+  return loops;
+}
+
+void mark_boundary(TriangleMesh& mesh) {
+  ScalarField marks{std::string(boundary_field), ScalarType::uint8,
+                    std::vector<double>(mesh.vertices.size(), 0.0)};
+  for (const BoundaryLoop& loop : loops_of(mesh))
+    for (const HalfEdge h : loop) marks.values[source_of(mesh.triangles, h)] = 1.0;
+  mesh.vertex_fields.push_back(std::move(marks));
+}
+
+void remove_triangles(TriangleMesh& mesh, std::vector<bool> marks, int rings, double min_gap_m) {
+  grow_marks(mesh, rings, marks);
+  const MeshComponents components = connected_components(mesh);
+  mesh.face_fields.push_back(
+      {std::string(component_field), ScalarType::float64,
+       std::vector<double>(components.of_triangle.begin(), components.of_triangle.end())});
+  double removed_m2 = 0.0;
+  for (std::size_t t = 0; t < marks.size(); ++t)
+    if (marks[t]) removed_m2 += area_normal(mesh, mesh.triangles[t]).norm() / 2.0;
+  marks.flip();
+  mesh = select_triangles(mesh, marks);
+  drop_fragments(mesh, components.areas_m2.size(), removed_m2);
+  make_manifold(mesh, min_gap_m);
+  erase_field(mesh.face_fields, component_field);
+}
+
+// In rounds: triangles that meet others (self_intersections) or are degenerate are removed with a
+// ring of triangles around them, fragments that this cuts off as well, and the holes that it makes,
+// unless they reach a boundary that was there before, are closed (hole_filling; marked `filled`).
+// Each round takes one more ring. What still meets others after four rounds is removed alone and
+// stays open; vertices that this separates are `min_gap_m` apart (make_manifold). The mesh must be
+// an oriented manifold, and is one afterwards.
+void repair_intersections(double min_gap_m, MeshCleaningResult& result) {
+  TriangleMesh& mesh = result.mesh;
+  result.remaining_intersecting_triangles = 0;
+  std::vector<bool> faces = bad_faces(mesh);
+  if (count_of(faces) == 0) return;
+  mark_boundary(mesh);
+  for (double& mark : filled_marks(mesh).values)
+    if (mark != 0.0) mark = filled_before;
+  for (int round = 0; round < max_rounds && count_of(faces) > 0; ++round) {
+    result.intersecting_triangles += count_of(faces);
+    const bool closes = round < closing_rounds;
+    remove_triangles(mesh, faces, closes ? round + 1 : 0, min_gap_m);
+    if (closes) fill_holes(mesh, new_loops(mesh), PatchCheck::manifold);
+    faces = bad_faces(mesh);
+  }
+  result.remaining_intersecting_triangles = count_of(faces);
+  result.open_places += new_loops(mesh).size();
+  for (double& mark : filled_marks(mesh).values) {
+    if (mark == 1.0) ++result.closing_triangles;
+    if (mark != 0.0) mark = 1.0;
+  }
+  erase_field(mesh.vertex_fields, boundary_field);
+}
+
+constexpr double inward = 0.5;                                // lambda
+constexpr double pass_band = 0.02;                            // k_PB = 1 / lambda + 1 / mu
+constexpr double outward = 1.0 / (pass_band - 1.0 / inward);  // mu
+constexpr std::size_t vertices_grain = 4096;
+
+// The neighbors of each vertex that may move; those that stay have none.
+struct Neighbors {
+  std::vector<std::uint32_t> first;
+  std::vector<std::uint32_t> vertices;
+};
+
+Neighbors neighbors_of(const TriangleMesh& mesh) {
+  const MeshEdges edges = edges_of(mesh.triangles, mesh.vertices.size());
+  const auto ends = [&](std::size_t e) {
+    const HalfEdge h = edges.half_edges[edges.first[e]];
+    return std::array<std::uint32_t, 2>{source_of(mesh.triangles, h), target_of(mesh.triangles, h)};
+  };
+  std::vector<bool> stays(mesh.vertices.size(), false);
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    if (edges.count(e) != 2)
+      for (const std::uint32_t v : ends(e)) stays[v] = true;
+  Neighbors result;
+  result.first.assign(mesh.vertices.size() + 1, 0);
+  for (std::size_t e = 0; e < edges.size(); ++e)
+    for (const std::uint32_t v : ends(e))
+      if (!stays[v]) ++result.first[v + 1];
+  for (std::size_t v = 0; v < mesh.vertices.size(); ++v) result.first[v + 1] += result.first[v];
+  result.vertices.resize(result.first.back());
+  std::vector<std::uint32_t> place(result.first.begin(), result.first.end() - 1);
+  for (std::size_t e = 0; e < edges.size(); ++e) {
+    const auto [a, b] = ends(e);
+    if (!stays[a]) result.vertices[place[a]++] = b;
+    if (!stays[b]) result.vertices[place[b]++] = a;
+  }
+  return result;
+}
+
+void smoothing_step(const Neighbors& neighbors, double share,
+                    const std::vector<Eigen::Vector3d>& from, std::vector<Eigen::Vector3d>& to) {
+  parallel_for(from.size(), vertices_grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      Eigen::Vector3d towards = Eigen::Vector3d::Zero();
+      double weights = 0.0;
+      for (std::uint32_t n = neighbors.first[v]; n < neighbors.first[v + 1]; ++n) {
+        const Eigen::Vector3d edge = from[neighbors.vertices[n]] - from[v];
+        const double length = edge.norm();
+        if (length == 0.0) continue;
+        towards += edge / length;
+        weights += 1.0 / length;
+      }
+      to[v] = weights > 0.0 ? Eigen::Vector3d(from[v] + share / weights * towards) : from[v];
+    }
+  });
+}
+
+// Taubin 1995, "A signal processing approach to fair surface design": each iteration moves every
+// vertex by 0.5 of the way to the mean of its neighbors, weighted by the inverse of the edge's
+// length (Fujiwara), then by -0.505 of it: waves longer than the edges by far pass unchanged. The
+// vertices of boundaries and non-manifold edges stay. Positions alone change. The same for any
+// number of threads.
+void smooth_mesh(TriangleMesh& mesh, int iterations) {
+  if (iterations <= 0 || mesh.triangles.empty()) return;
+  const Neighbors neighbors = neighbors_of(mesh);
+  std::vector<Eigen::Vector3d> moved(mesh.vertices.size());
+  for (int n = 0; n < iterations; ++n) {
+    smoothing_step(neighbors, inward, mesh.vertices, moved);
+    smoothing_step(neighbors, outward, moved, mesh.vertices);
+  }
 }
 
 class Cleaning {
@@ -148,11 +341,7 @@ class Cleaning {
   }
 
   void remove_intersections() {
-    const IntersectionRepair repair = repair_intersections(mesh_(), 2.0 * merge_distance());
-    result_.intersecting_triangles += repair.faulty_triangles;
-    result_.closing_triangles += repair.closing_triangles;
-    result_.open_places += repair.open_places;
-    result_.remaining_intersecting_triangles = repair.remaining_triangles;
+    repair_intersections(2.0 * merge_distance(), result_);
     require_triangles(mesh_(), {.field = "intersecting triangles",
                                 .value = std::to_string(result_.intersecting_triangles)});
   }

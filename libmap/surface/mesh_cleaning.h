@@ -1,16 +1,16 @@
 // From any triangles to a clean surface: an oriented manifold without degenerate, doubled or
-// intersecting triangles, without scraps, small holes closed; smoothed and decimated if wanted.
+// intersecting triangles, without fragments, small holes closed; smoothed and decimated if wanted.
 //
 // The steps, in this order; each keeps the order of what it keeps:
 //  1. vertices nearer than a tolerance are made one (the first); triangles without area and
 //     repeated ones are dropped, caps (a corner on the opposite edge) by flipping that edge
 //  2. cutting at edges of more than two triangles, at vertices of more than one fan and where no
-//     consistent orientation exists (mesh_manifold); orientation as most of the area has it
+//     consistent orientation exists (make_manifold); orientation as most of the area has it
 //  3. islands dropped
 //  4. triangles that intersect others are removed with those around them, and the place closed
 //     again (self_intersections, hole_filling); what cannot be closed stays open
 //  5. holes filled (hole_filling)
-//  6. smoothing (mesh_smoothing), decimation (mesh_decimation), then step 4 again
+//  6. smoothing, decimation, then step 4 again
 //  7. islands dropped again, unused vertices dropped, vertex normals estimated
 #pragma once
 
@@ -22,7 +22,6 @@
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/surface/hole_filling.h"
-#include "libmap/surface/mesh_decimation.h"
 
 namespace libmap {
 
@@ -44,6 +43,12 @@ struct MeshCleaningOptions {
   std::optional<PlanBox> known = std::nullopt;
 };
 void bind(ParameterTable& table, MeshCleaningOptions& options);
+
+struct MeshDecimation {
+  std::size_t removed_triangles = 0;
+  // No point of either surface is farther than this from the other; not above the bound asked for.
+  double deviation_m = 0.0;
+};
 
 struct MeshCleaningResult {
   // With unit vertex normals and the face field `filled` (uint8): 1 on triangles that close holes.
@@ -74,5 +79,17 @@ struct MeshCleaningResult {
 // out of range, a vertex that is not finite, no triangle to begin with or none left.
 MeshCleaningResult clean_mesh(const TriangleMesh& mesh, const MeshCleaningOptions& options = {},
                               Progress& progress = no_progress());
+
+// Edges are collapsed into one of their ends (OpenMesh: quadric error first; no removed vertex
+// farther than a tolerance from the triangles that replace its own; no normal turned by more than
+// 30 degrees; no needles). Then the distance of the surfaces is bounded both ways:
+// triangles are divided until all corners of a part lie within the bound of one and the same
+// triangle, which is convex, so that all points between them do, too. Where it exceeds
+// `max_error_m`, the vertices there are locked and all is done again, later with a smaller
+// tolerance, too; if no attempt succeeds the mesh stays as it was.
+// Vertices and triangles that stay keep their values and their order. The mesh must be an oriented
+// manifold.
+MeshDecimation decimate_mesh(TriangleMesh& mesh, double max_error_m,
+                             Progress& progress = no_progress());
 
 }  // namespace libmap

@@ -1,5 +1,3 @@
-#include "libmap/surface/mesh_decimation.h"
-
 #include <OpenMesh/Core/Mesh/TriMesh_ArrayKernelT.hh>
 #include <OpenMesh/Tools/Decimater/DecimaterT.hh>
 #include <OpenMesh/Tools/Decimater/ModHausdorffT.hh>
@@ -16,6 +14,7 @@
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/surface/mesh_cleaning.h"
 
 namespace libmap {
 

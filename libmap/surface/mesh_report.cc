@@ -6,8 +6,8 @@
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/hole_filling.h"
+#include "libmap/surface/mesh_repair.h"
 #include "libmap/surface/self_intersections.h"
-#include "libmap/surface/triangle_repair.h"
 
 namespace libmap {
 

@@ -1,5 +1,3 @@
-#include "libmap/surface/pcl_poisson.h"
-
 #include <fcntl.h>
 #include <pcl/point_cloud.h>
 #include <pcl/point_types.h>
@@ -15,6 +13,7 @@
 #include <mutex>
 
 #include "libmap/core/error.h"
+#include "libmap/surface/surface_solvers.h"
 
 namespace libmap {
 

@@ -11,6 +11,8 @@
 #include <limits>
 
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/voxel_key.h"
+#include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {
 
@@ -19,8 +21,7 @@ namespace {
 using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 using Point = Kernel::Point_3;
 
-constexpr std::size_t leaf_size = 8;
-constexpr std::size_t leaves_grain = 64;
+constexpr std::size_t groups_grain = 64;
 constexpr std::size_t triangles_grain = 1024;
 
 Point point_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
@@ -95,8 +96,8 @@ class PairTest {
 
 // Of triangles, in single precision: no smaller than they are.
 struct Box {
-  std::array<float, 3> low{};
-  std::array<float, 3> high{};
+  std::array<float, 3> low = {HUGE_VALF, HUGE_VALF, HUGE_VALF};
+  std::array<float, 3> high = {-HUGE_VALF, -HUGE_VALF, -HUGE_VALF};
 
   bool meets(const Box& other) const {
     return low[0] <= other.high[0] && other.low[0] <= high[0] && low[1] <= other.high[1] &&
@@ -112,8 +113,6 @@ struct Box {
 
 Box box_of(const TriangleMesh& mesh, std::uint32_t triangle) {
   Box box;
-  box.low.fill(HUGE_VALF);
-  box.high.fill(-HUGE_VALF);
   for (const std::uint32_t v : mesh.triangles[triangle])
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto value = static_cast<float>(mesh.vertices[v][static_cast<Eigen::Index>(axis)]);
@@ -126,148 +125,88 @@ Box box_of(const TriangleMesh& mesh, std::uint32_t triangle) {
   return box;
 }
 
-// Boxes of triangles, halved by the median along their longest side. Nodes stand in preorder, so
-// that a walk needs no stack.
+// Boxes of triangles in the order of a Z curve, joined in groups of eight, these again, and so on.
 class BoxTree {
  public:
   BoxTree(const TriangleMesh& mesh, const std::vector<std::uint32_t>& triangles)
-      : items_(triangles.size()), boxes_(triangles.size()) {
-    if (triangles.empty()) return;
-    parallel_for(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) {
-        const Box box = box_of(mesh, triangles[n]);
-        for (std::size_t axis = 0; axis < 3; ++axis)
-          items_[n].center[axis] = 0.5F * box.low[axis] + 0.5F * box.high[axis];
-        items_[n].triangle = triangles[n];
-      }
+      : triangles_(in_z_order(mesh, triangles)), levels_(1) {
+    levels_[0].resize(triangles_.size());
+    parallel_for(triangles_.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) levels_[0][n] = box_of(mesh, triangles_[n]);
     });
-    const auto count = static_cast<std::uint32_t>(triangles.size());
-    nodes_.resize(node_count(count));
-    std::vector<Range> parts;
-    split(0, {0, count}, split_levels, parts);
-    parallel_each(parts.size(), [&](std::size_t n) {
-      std::vector<Range> whole;
-      split(parts[n].node, parts[n], std::numeric_limits<int>::max(), whole);
-    });
-    parallel_for(items_.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) boxes_[n] = box_of(mesh, items_[n].triangle);
-    });
-    for (std::size_t n = nodes_.size(); n-- > 0;) find_box(n);
-    for (std::uint32_t n = 0; n < nodes_.size(); ++n)
-      if (nodes_[n].is_leaf()) leaves_.push_back(n);
+    do {
+      const std::vector<Box>& below = levels_.back();
+      std::vector<Box> level((below.size() + 7) / 8);
+      for (std::size_t n = 0; n < below.size(); ++n) level[n / 8].extend(below[n]);
+      levels_.push_back(std::move(level));
+    } while (levels_.back().size() > 1);
   }
 
   // visit(triangle) for those whose boxes meet this one.
   template <typename Visit>
   void each_near(const Box& box, const Visit& visit) const {
-    each_leaf_near(box, 0, [&](const Node& leaf) {
-      for (std::uint32_t n = leaf.begin; n < leaf.end; ++n)
-        if (boxes_[n].meets(box)) visit(items_[n].triangle);
+    each_group_near(box, 0, [&](std::size_t group) {
+      for (std::size_t n = 8 * group; n < end_of(group); ++n)
+        if (levels_[0][n].meets(box)) visit(triangles_[n]);
     });
   }
 
-  // Of the leaves.
-  const std::vector<std::uint32_t>& leaves() const { return leaves_; }
-  // visit(a, b) for pairs whose boxes meet, one in the leaf; of all leaves together, each pair
+  // Of triangles.
+  std::size_t groups() const { return levels_[1].size(); }
+  // visit(a, b) for pairs whose boxes meet, one in the group; of all groups together, each pair
   // once.
   template <typename Visit>
-  void each_pair(std::uint32_t leaf, const Visit& visit) const {
-    const Node& own = nodes_[leaf];
-    each_leaf_near(own.box, leaf, [&](const Node& other) {
-      for (std::uint32_t i = own.begin; i < own.end; ++i)
-        for (std::uint32_t j = &own == &other ? i + 1 : other.begin; j < other.end; ++j)
-          if (boxes_[i].meets(boxes_[j])) visit(items_[i].triangle, items_[j].triangle);
+  void each_pair(std::size_t group, const Visit& visit) const {
+    each_group_near(levels_[1][group], group, [&](std::size_t other) {
+      for (std::size_t i = 8 * group; i < end_of(group); ++i)
+        for (std::size_t j = group == other ? i + 1 : 8 * other; j < end_of(other); ++j)
+          if (levels_[0][i].meets(levels_[0][j])) visit(triangles_[i], triangles_[j]);
     });
   }
 
  private:
-  // Levels of the tree that are made one after the other, before threads share the rest.
-  static constexpr int split_levels = 5;
-
-  struct Item {
-    std::array<float, 3> center{};
-    std::uint32_t triangle = 0;
-  };
-  struct Node {
-    Box box;
-    std::uint32_t begin = 0;  // of its items
-    std::uint32_t end = 0;
-    std::uint32_t after = 0;  // the first node that is not below this one
-    bool is_leaf() const { return end - begin <= leaf_size; }
-  };
-  struct Range {
-    std::uint32_t begin = 0;
-    std::uint32_t end = 0;
-    std::uint32_t node = 0;
-  };
-
-  // From a node on.
-  template <typename Visit>
-  void each_leaf_near(const Box& box, std::uint32_t first, const Visit& visit) const {
-    for (std::uint32_t n = first; n < nodes_.size();) {
-      const Node& node = nodes_[n];
-      if (!node.box.meets(box)) {
-        n = node.after;
-        continue;
+  static std::vector<std::uint32_t> in_z_order(const TriangleMesh& mesh,
+                                               const std::vector<std::uint32_t>& triangles) {
+    Eigen::AlignedBox3d bounds;
+    for (const std::uint32_t t : triangles) bounds.extend(center_of(mesh, mesh.triangles[t]));
+    const double cells_per_m = (voxel_cell_limit - 1) / std::max(bounds.sizes().maxCoeff(), 1e-300);
+    std::vector<std::pair<std::uint64_t, std::uint32_t>> order(triangles.size());
+    parallel_for(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n) {
+        const Eigen::Vector3d center = center_of(mesh, mesh.triangles[triangles[n]]);
+        const Eigen::Vector3i cell = ((center - bounds.min()) * cells_per_m).cast<int>();
+        order[n] = {z_order(pack({cell, 0})), triangles[n]};
       }
-      if (node.is_leaf()) visit(node);
-      ++n;
+    });
+    std::sort(order.begin(), order.end());
+    std::vector<std::uint32_t> sorted;
+    sorted.reserve(order.size());
+    for (const auto& [key, triangle] : order) sorted.push_back(triangle);
+    return sorted;
+  }
+
+  std::size_t end_of(std::size_t group) const { return std::min(8 * group + 8, triangles_.size()); }
+
+  // visit(group) for groups from `first` on whose boxes meet this one.
+  template <typename Visit>
+  void each_group_near(const Box& box, std::size_t first, const Visit& visit) const {
+    walk(levels_.size() - 1, 0, box, first, visit);
+  }
+  template <typename Visit>
+  void walk(std::size_t level, std::size_t node, const Box& box, std::size_t first,
+            const Visit& visit) const {
+    const std::size_t end = std::min(node + 8, levels_[level].size());
+    for (; node < end; ++node) {
+      if (((node + 1) << (3 * (level - 1))) <= first || !levels_[level][node].meets(box)) continue;
+      if (level == 1)
+        visit(node);
+      else
+        walk(level - 1, 8 * node, box, first, visit);
     }
   }
 
-  static std::uint32_t node_count(std::uint32_t items) {
-    return items <= leaf_size ? 1 : 1 + node_count(items / 2) + node_count(items - items / 2);
-  }
-
-  // Makes the nodes of a range, `levels` of them; of the ranges below, which are left, none is
-  // made. Returns the node after them.
-  std::uint32_t split(std::uint32_t number, Range range, int levels, std::vector<Range>& left) {
-    range.node = number;
-    if (levels == 0) {
-      left.push_back(range);
-      return number + node_count(range.end - range.begin);
-    }
-    Node& node = nodes_[number];
-    node.begin = range.begin;
-    node.end = range.end;
-    if (node.is_leaf()) return node.after = number + 1;
-    const std::uint32_t middle = range.begin + (range.end - range.begin) / 2;
-    halve(range, middle);
-    const std::uint32_t second = split(number + 1, {range.begin, middle}, levels - 1, left);
-    return node.after = split(second, {middle, range.end}, levels - 1, left);
-  }
-
-  void halve(const Range& range, std::uint32_t middle) {
-    Box centers{items_[range.begin].center, items_[range.begin].center};
-    for (std::uint32_t n = range.begin + 1; n < range.end; ++n)
-      centers.extend({items_[n].center, items_[n].center});
-    std::size_t axis = 0;
-    for (std::size_t a = 1; a < 3; ++a)
-      if (centers.high[a] - centers.low[a] > centers.high[axis] - centers.low[axis]) axis = a;
-    const auto first = items_.begin();
-    std::nth_element(first + range.begin, first + middle, first + range.end,
-                     [axis](const Item& a, const Item& b) {
-                       return std::pair(a.center[axis], a.triangle) <
-                              std::pair(b.center[axis], b.triangle);
-                     });
-  }
-
-  // Of those below it.
-  void find_box(std::size_t number) {
-    Node& node = nodes_[number];
-    if (node.is_leaf()) {
-      node.box = boxes_[node.begin];
-      for (std::uint32_t n = node.begin + 1; n < node.end; ++n) node.box.extend(boxes_[n]);
-    } else {
-      node.box = nodes_[number + 1].box;
-      node.box.extend(nodes_[nodes_[number + 1].after].box);
-    }
-  }
-
-  std::vector<Item> items_;
-  std::vector<Box> boxes_;  // of the items
-  std::vector<Node> nodes_;
-  std::vector<std::uint32_t> leaves_;
+  std::vector<std::uint32_t> triangles_;
+  std::vector<std::vector<Box>> levels_;  // of triangles, of groups of eight, of groups of these...
 };
 
 bool is_collinear(const TriangleMesh& mesh, const Triangle& t) {
@@ -316,8 +255,8 @@ std::vector<TrianglePair> find_self_intersections(const TriangleMesh& mesh,
   const BoxTree tree(mesh, marked);
   const PairTest test(mesh);
   std::vector<TrianglePair> found = found_in_ranges(
-      tree.leaves().size(), leaves_grain, [&](std::size_t n, std::vector<TrianglePair>& part) {
-        tree.each_pair(tree.leaves()[n], [&](std::uint32_t a, std::uint32_t b) {
+      tree.groups(), groups_grain, [&](std::size_t n, std::vector<TrianglePair>& part) {
+        tree.each_pair(n, [&](std::uint32_t a, std::uint32_t b) {
           const TrianglePair pair = std::minmax(a, b);
           if (test(pair)) part.push_back(pair);
         });

@@ -10,12 +10,12 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/spatial_index.h"
+#include "libmap/geometry/voxel_key.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/surface/implicit_surface.h"
-#include "libmap/surface/pcl_poisson.h"
+#include "libmap/surface/surface_solvers.h"
 
 namespace libmap {
 
@@ -28,8 +28,7 @@ constexpr double min_weight = 1.0 / 16;
 // The octree's cube against the samples' box, at least.
 constexpr double cube_margin = 1.1;
 constexpr int min_depth = 3;
-// Of a packed cell, 21 bits an axis.
-constexpr double max_grid_cells = 1 << 20;
+constexpr double max_grid_cells = voxel_cell_limit;
 // Smallest second standard deviation of a cloud's positions, against its first, of a surface.
 constexpr double min_width = 1e-4;
 

@@ -4,10 +4,10 @@
 #include <cmath>
 #include <set>
 
-#include "libmap/core/disjoint_sets.h"
 #include "libmap/core/error.h"
 #include "libmap/core/single_precision.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 

@@ -1,4 +1,4 @@
-// Finer triangles on the same surface. Inner part of libmap/mesh.
+// Finer triangles on the same surface. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>

@@ -1,4 +1,4 @@
-// Charts of a mesh on the pages of a texture. Inner part of libmap/mesh.
+// Charts of a mesh on the pages of a texture. Private to libmap/texture.
 //
 // A chart is a connected set of triangles that one photograph shows; its shape is that of its
 // picture there, whole pixels apart, so that at a scale of 1 its texels are the photograph's
@@ -63,6 +63,19 @@ struct TextureAtlas {
 TextureAtlas make_texture_atlas(const TriangleMesh& mesh, const std::vector<HalfEdge>& opposite,
                                 const std::vector<std::uint32_t>& label,
                                 const TexturePhotos& photos, const TextureAtlasOptions& options);
+
+struct PackedRectangle {
+  int width = 0;
+  int height = 0;
+  // Results.
+  std::size_t page = 0;
+  int column = 0;
+  int row = 0;
+};
+
+// Fills one page after the other (skyline, bottom left: stb_rect_pack). Pages are squares of
+// `page_size`. Returns the number of pages. Throws Error if a rectangle is larger than a page.
+std::size_t pack_rectangles(std::vector<PackedRectangle>& rectangles, int page_size);
 
 // Where a point lies on its chart's page: texels, (0, 0) the center of the page's first.
 Eigen::Vector2d place_on_page(const TextureChart& chart, const PhotoProjector& projector,

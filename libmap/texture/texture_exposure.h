@@ -1,5 +1,5 @@
 // How bright each photograph is against the others, and how a lens darkens towards its corners:
-// what colors are divided by before they are put side by side. Inner part of libmap/mesh.
+// what colors are divided by before they are put side by side. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>

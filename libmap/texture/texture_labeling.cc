@@ -5,7 +5,7 @@
 #include <numeric>
 #include <span>
 
-#include "libmap/core/disjoint_sets.h"
+#include "libmap/geometry/disjoint_sets.h"
 
 namespace libmap {
 

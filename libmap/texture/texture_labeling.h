@@ -1,5 +1,5 @@
 // One photograph for each triangle, so that photographs are good and seams between them are few.
-// Inner part of libmap/mesh.
+// Private to libmap/texture.
 //
 // The energy is that of Lempitsky and Ivanov 2007 (equation 1): what a triangle's view lacks
 // against its best one, plus the length of the seams. It is lowered by exact dynamic programming

@@ -1,4 +1,4 @@
-// The colors of a texture's pages from the photographs. Inner part of libmap/mesh.
+// The colors of a texture's pages from the photographs. Private to libmap/texture.
 #pragma once
 
 #include <cstdint>

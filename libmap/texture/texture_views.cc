@@ -2,19 +2,17 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <limits>
-#include <map>
 #include <memory>
 #include <numbers>
 #include <numeric>
 
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/voxel_key.h"
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/ray_caster.h"
-#include "libmap/texture/occluder_cells.h"
 
 namespace libmap {
 
@@ -197,15 +195,13 @@ void ViewFinder::choose_vertices() {
 }
 
 void ViewFinder::make_blocks() {
-  using Cube = std::array<std::int64_t, 3>;
-  std::map<Cube, std::size_t> cubes;
+  VoxelIndex cubes;
   std::vector<std::uint32_t> block_of(mesh_.vertices.size());
   for (std::size_t v = 0; v < block_of.size(); ++v) {
-    Cube cube;
-    for (std::size_t k = 0; k < 3; ++k)
-      cube[k] = std::llround(mesh_.vertices[v][static_cast<Eigen::Index>(k)] / block_m);
-    const auto found = cubes.try_emplace(cube, cubes.size()).first;
-    block_of[v] = static_cast<std::uint32_t>(found->second);
+    VoxelPlace cube;
+    for (int axis = 0; axis < 3; ++axis)
+      cube.cell[axis] = static_cast<int>(std::llround(mesh_.vertices[v][axis] / block_m));
+    block_of[v] = cubes.find_or_add(pack(cube));
   }
   blocks_.resize(cubes.size());
   // Numbers by their block, those of one block in their order.

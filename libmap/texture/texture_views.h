@@ -1,4 +1,4 @@
-// Which photographs see which parts of a mesh, and how well. Inner part of libmap/mesh.
+// Which photographs see which parts of a mesh, and how well. Private to libmap/texture.
 #pragma once
 
 #include <Eigen/Core>

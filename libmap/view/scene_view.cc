@@ -27,8 +27,8 @@
 #include "libmap/core/error.h"
 #include "libmap/view/offscreen.h"
 #include "libmap/view/overlay.h"
-#include "libmap/view/scene_geometry.h"
 #include "libmap/view/scene_page.h"
+#include "libmap/view/scene_triangles.h"
 
 namespace libmap {
 namespace {

@@ -9,8 +9,8 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
-#include "libmap/core/point_tree.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/surface_distance.h"
 

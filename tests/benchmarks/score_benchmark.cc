@@ -23,9 +23,9 @@ using graspmap_bench::folder_of;
 using graspmap_bench::time_iterations;
 using graspmap_bench::Times;
 using libgtd::GripperMask;
-using libgtd::InstructionSet;
 using libgtd::Method;
 using libgtd::VoxelGrid;
+using libmap::InstructionSet;
 
 struct Set {
   std::string name;
@@ -80,8 +80,8 @@ Workload& workload(const Set& set) {
 }
 
 // Bytes of mask a second, one thread: the loop alone on aligned bits in the first cache.
-double peak_bytes_per_s(InstructionSet instructions) {
-  static std::map<InstructionSet, double> measured;
+double peak_bytes_per_s(libmap::InstructionSet instructions) {
+  static std::map<libmap::InstructionSet, double> measured;
   const auto [at, is_new] = measured.try_emplace(instructions);
   if (!is_new) return at->second;
   constexpr std::size_t chunk_count = 64, pivot_count = 4096;
@@ -117,9 +117,9 @@ void triple_loop(benchmark::State& state, const Set& set) {
   state.SetLabel("triple loop, 1 thread");
 }
 
-void matching(benchmark::State& state, const Set& set, InstructionSet instructions,
+void matching(benchmark::State& state, const Set& set, libmap::InstructionSet instructions,
               const char* name_of_them) {
-  if (!libgtd::has_instruction_set(instructions)) {
+  if (!libmap::has_instruction_set(instructions)) {
     state.SkipWithError("this processor has no such instructions");
     return;
   }
@@ -154,8 +154,9 @@ const bool registered = [] {
         ->Iterations(1)
         ->Unit(benchmark::kMillisecond);
     for (const auto& [instructions, name_of_them] :
-         {std::pair(InstructionSet::portable, "portable"), std::pair(InstructionSet::avx2, "AVX2"),
-          std::pair(InstructionSet::avx512, "AVX-512")})
+         {std::pair(libmap::InstructionSet::portable, "portable"),
+          std::pair(libmap::InstructionSet::avx2, "AVX2"),
+          std::pair(libmap::InstructionSet::avx512, "AVX-512")})
       benchmark::RegisterBenchmark(
           name.c_str(),
           [&set, instructions = instructions, name_of_them = name_of_them](

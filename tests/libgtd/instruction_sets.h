@@ -2,17 +2,18 @@
 
 #include <vector>
 
-#include "libgtd/shape/instruction_set.h"
+#include "libmap/core/instruction_set.h"
 
 namespace graspmap_test {
 
 // Those that the processor has.
-inline std::vector<libgtd::InstructionSet> instruction_sets() {
-  using libgtd::InstructionSet;
-  std::vector<InstructionSet> all;
-  for (const InstructionSet set :
-       {InstructionSet::portable, InstructionSet::avx2, InstructionSet::avx512})
-    if (libgtd::has_instruction_set(set)) all.push_back(set);
+inline std::vector<libmap::InstructionSet> instruction_sets() {
+  using libmap::InstructionSet;
+  std::vector<libmap::InstructionSet> all;
+  for (const libmap::InstructionSet set :
+       {libmap::InstructionSet::portable, libmap::InstructionSet::avx2,
+        libmap::InstructionSet::avx512})
+    if (libmap::has_instruction_set(set)) all.push_back(set);
   return all;
 }
 

@@ -8,7 +8,7 @@
 #include <fstream>
 
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/image/image_codec.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"

@@ -13,12 +13,12 @@ using graspmap_test::error_of;
 using libgtd::FingerClosing;
 using libgtd::FingerEnd;
 using libgtd::FingerGeometry;
-using libgtd::ProfileSegment;
+using libgtd::GroundSegment;
 
 constexpr double degree = libmap::radians_per_degree;
 
-std::vector<ProfileSegment> profile_through(const std::vector<Eigen::Vector2d>& points) {
-  std::vector<ProfileSegment> profile;
+std::vector<GroundSegment> profile_through(const std::vector<Eigen::Vector2d>& points) {
+  std::vector<GroundSegment> profile;
   for (std::size_t n = 0; n + 1 < points.size(); ++n)
     profile.push_back({points[n], points[n + 1], static_cast<std::uint32_t>(n), true});
   return profile;
@@ -34,14 +34,14 @@ bool cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Eigen::Vect
 }
 
 bool touches(const Eigen::Vector2d& a, const Eigen::Vector2d& b,
-             const std::vector<ProfileSegment>& profile) {
+             const std::vector<GroundSegment>& profile) {
   return std::any_of(profile.begin(), profile.end(),
                      [&](const auto& segment) { return cross(a, b, segment.a, segment.b); });
 }
 
 // The same by small steps: the angles at which a link first cuts the profile.
 FingerClosing close_in_steps(const FingerGeometry& finger,
-                             const std::vector<ProfileSegment>& profile, double step) {
+                             const std::vector<GroundSegment>& profile, double step) {
   FingerClosing closing;
   closing.curl_rad = finger.curl_rad;
   for (double t = finger.opening_rad; t >= finger.closing_rad; t -= step) {

@@ -15,8 +15,8 @@
 namespace neighbor_loops_test {
 
 using graspmap_test::uniform;
-using libgtd::InstructionSet;
 using libgtd::NeighborLoops;
+using libmap::InstructionSet;
 
 constexpr std::size_t lanes = NeighborLoops::lanes;
 
@@ -113,7 +113,7 @@ TEST(NeighborLoops, SumsAreTheSameBitsOnEveryPath) {
                     1e-12 * static_cast<double>(count))
             << s;
       std::array<double, NeighborLoops::quadric_sums> portable{};
-      libgtd::neighbor_loops_of(InstructionSet::portable)
+      libgtd::neighbor_loops_of(libmap::InstructionSet::portable)
           .sum_quadric(places_of(neighbors), count, frame.data(), portable.data());
       EXPECT_EQ(q, portable);
     }

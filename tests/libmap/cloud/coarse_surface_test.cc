@@ -1,4 +1,4 @@
-#include "libmap/cloud/coarse_surface.h"
+#include "libmap/cloud/depth_planes.h"
 
 #include <gtest/gtest.h>
 

@@ -170,7 +170,7 @@ TEST(DepthFusionFrames, OptionsOutOfTheirRangesAreNamed) {
   EXPECT_THAT(refused([](auto& o) { o.planes.max_depth_m = 0.05; }), HasSubstr("max_depth_m"));
   EXPECT_THAT(refused([](auto& o) { o.planes.radius_px = 8; }), HasSubstr("plane_radius_px"));
   EXPECT_THAT(refused([](auto& o) { o.planes.noise.axial_m = 0; }), HasSubstr("axial_noise_m"));
-  EXPECT_THAT(refused([](auto& o) { o.min_views = 0; }), HasSubstr("min_views"));
+  EXPECT_THAT(refused([](auto& o) { o.points.min_views = 0; }), HasSubstr("min_views"));
   EXPECT_THAT(refused([](auto& o) { o.voxel_size_m = 1e-7; }),
               HasSubstr("voxel_size_m is 1e-07: voxels too small"));
   MemoryScan far = ring_scan(plane_z(0), 2, {});

@@ -205,9 +205,9 @@ TEST(DepthFusion, WhatOthersSeeThroughIsDropped) {
   EXPECT_EQ(points_above(result.cloud, 0.1), 0U);
   EXPECT_GT(result.points.seen_through, 200U);
   DepthFusionOptions options;
-  options.max_seen_through = 1000;
+  options.points.max_seen_through = 1000;
   EXPECT_GT(points_above(fuse_depth(scan, scan.poses, options).cloud, 0.1), 200U);
-  options.min_views = 2;
+  options.points.min_views = 2;
   const DepthFusionResult confirmed = fuse_depth(scan, scan.poses, options);
   EXPECT_EQ(points_above(confirmed.cloud, 0.1), 0U);
   EXPECT_GT(confirmed.points.unconfirmed, 200U);
@@ -223,7 +223,7 @@ TEST(DepthFusion, WhatOthersMissIsDropped) {
   EXPECT_EQ(points_above(result.cloud, 0.1), 0U);
   EXPECT_GT(result.points.missed, 20U);
   DepthFusionOptions options;
-  options.max_missed = 1000;
+  options.points.max_missed = 1000;
   const DepthFusionResult all = fuse_depth(scan, scan.poses, options);
   EXPECT_GT(points_above(all.cloud, 0.1), 20U);
   EXPECT_EQ(points_above(all.cloud, -0.01) - points_above(all.cloud, 0.1),

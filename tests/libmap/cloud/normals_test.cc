@@ -6,7 +6,7 @@
 #include <limits>
 #include <numbers>
 
-#include "libmap/cloud/surface_normals.h"
+#include "libmap/cloud/surface_points.h"
 #include "libmap/core/parallel.h"
 #include "tests/support/test_support.h"
 

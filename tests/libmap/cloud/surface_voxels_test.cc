@@ -14,39 +14,6 @@ namespace surface_voxels_test {
 using graspmap_test::random_engine;
 using graspmap_test::uniform;
 
-TEST(SurfaceVoxels, KeysRoundTrip) {
-  for (int n = 0; n < 1000; ++n) {
-    VoxelPlace place;
-    for (int axis = 0; axis < 3; ++axis)
-      place.cell[axis] = static_cast<int>(uniform(-voxel_cell_limit, voxel_cell_limit));
-    place.side = n % 2;
-    const VoxelPlace back = unpack(pack(place));
-    EXPECT_EQ(back.cell, place.cell);
-    EXPECT_EQ(back.side, place.side);
-  }
-}
-
-TEST(SurfaceVoxels, IndexAgreesWithAMap) {
-  VoxelIndex index;
-  std::map<std::uint64_t, std::uint32_t> truth;
-  const auto random_key = [](double reach) {
-    VoxelPlace place;
-    for (int axis = 0; axis < 3; ++axis)
-      place.cell[axis] = static_cast<int>(uniform(-reach, reach));
-    place.side = uniform(0, 1) < 0.5 ? 0 : 1;
-    return pack(place);
-  };
-  for (int n = 0; n < 20000; ++n) {
-    const std::uint64_t key = random_key(9);
-    const auto [at, is_new] = truth.try_emplace(key, static_cast<std::uint32_t>(truth.size()));
-    ASSERT_EQ(index.find_or_add(key), at->second);
-    const std::uint64_t asked = random_key(12);
-    const auto known = truth.find(asked);
-    ASSERT_EQ(index.find(asked), known == truth.end() ? VoxelIndex::none : known->second);
-  }
-  EXPECT_EQ(index.size(), truth.size());
-}
-
 TEST(SurfaceVoxels, MeansAreWeighted) {
   SurfaceVoxels voxels;
   voxels.add({0.25F, -0.5F, 7.5F}, {0, 0, 1}, 1.0F);

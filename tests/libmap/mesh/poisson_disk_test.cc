@@ -15,7 +15,7 @@
 
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "tests/libmap/mesh/mesh_samples.h"

@@ -11,7 +11,7 @@
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
-#include "libmap/surface/triangle_repair.h"
+#include "libmap/surface/mesh_repair.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/mesh/surface_samples.h"
 #include "tests/libmap/surface/cleaning_checks.h"

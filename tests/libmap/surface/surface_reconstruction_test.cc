@@ -1,4 +1,5 @@
 #include "libmap/surface/surface_reconstruction.h"
+#include "libmap/surface/surface_solvers.h"
 
 #include <gmock/gmock.h>
 
@@ -12,10 +13,8 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/surface_distance.h"
-#include "libmap/surface/implicit_surface.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"
-#include "libmap/surface/pcl_poisson.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

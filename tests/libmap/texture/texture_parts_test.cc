@@ -7,7 +7,6 @@
 
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/texture/mesh_subdivision.h"
-#include "libmap/texture/rectangle_packing.h"
 #include "libmap/texture/texture_atlas.h"
 #include "libmap/texture/texture_exposure.h"
 #include "libmap/texture/texture_labeling.h"

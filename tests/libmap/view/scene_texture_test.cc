@@ -1,4 +1,4 @@
-#include "libmap/view/scene_geometry.h"
+#include "libmap/view/scene_triangles.h"
 
 #include <gtest/gtest.h>
 

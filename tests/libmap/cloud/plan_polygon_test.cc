@@ -1,4 +1,4 @@
-#include "libmap/cloud/outline.h"
+#include "libmap/cloud/plan_polygon.h"
 
 #include <gtest/gtest.h>
 
@@ -11,7 +11,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace outline_test {
+namespace plan_polygon_test {
 
 using Eigen::Vector2d;
 using graspmap_test::error_of;
@@ -39,10 +39,10 @@ bool winds_around(const Corners& corners, const Vector2d& point) {
   return std::abs(turned) > std::numbers::pi;
 }
 
-TEST(Outline, InsideAsTheWindingNumberSays) {
+TEST(PlanPolygon, InsideAsTheWindingNumberSays) {
   for (const int count : {3, 4, 7, 40, 1500}) {
     const Corners corners = random_star(count);
-    const Outline outline(corners);
+    const PlanPolygon outline(corners);
     for (int n = 0; n < 150; ++n) {
       const Vector2d point(uniform(-2, 2), uniform(-2, 2));
       ASSERT_EQ(outline.contains(point), winds_around(corners, point)) << count;
@@ -50,10 +50,10 @@ TEST(Outline, InsideAsTheWindingNumberSays) {
   }
 }
 
-TEST(Outline, PointsLevelWithCorners) {
+TEST(PlanPolygon, PointsLevelWithCorners) {
   const Corners corners = {{0, 0}, {2, -2}, {4, 0}, {6, -2}, {8, 0}, {6, 0},
                            {7, 2}, {5, 4},  {4, 2}, {3, 4},  {1, 2}, {2, 1}};
-  const Outline outline(corners);
+  const PlanPolygon outline(corners);
   int inside = 0;
   for (double x = -0.5; x <= 9; x += 0.5)
     for (double y = -3; y <= 5; y += 1) {
@@ -72,9 +72,9 @@ TEST(Outline, PointsLevelWithCorners) {
   EXPECT_GT(inside, 40);
 }
 
-TEST(Outline, BorderBelongsToIt) {
+TEST(PlanPolygon, BorderBelongsToIt) {
   const Corners corners = {{0, 0}, {4, 0}, {4, 3}, {2, 1}, {0, 3}};
-  const Outline outline(corners);
+  const PlanPolygon outline(corners);
   EXPECT_NEAR(outline.area_m2(), 8, 1e-12);
   for (std::size_t n = 0; n < 5; ++n)
     for (const double t : {0.0, 0.25, 1.0}) {
@@ -90,20 +90,20 @@ TEST(Outline, BorderBelongsToIt) {
   EXPECT_FALSE(outline.contains({-1, 0}));
 }
 
-TEST(Outline, EitherWayRoundAndClosedOrNot) {
-  const Outline one({{0, 0}, {2, 0}, {2, 1}});
-  const Outline other({{0, 0}, {2, 1}, {2, 0}, {0, 0}});
+TEST(PlanPolygon, EitherWayRoundAndClosedOrNot) {
+  const PlanPolygon one({{0, 0}, {2, 0}, {2, 1}});
+  const PlanPolygon other({{0, 0}, {2, 1}, {2, 0}, {0, 0}});
   EXPECT_EQ(one.corners(), other.corners());
   EXPECT_EQ(one.area_m2(), 1);
 }
 
-TEST(Outline, FarFromTheOrigin) {
+TEST(PlanPolygon, FarFromTheOrigin) {
   const Vector2d far(500000.25, -4200000.5);
   Corners corners = random_star(30);
-  const Outline near(corners);
+  const PlanPolygon near(corners);
   Corners shifted = corners;
   for (Vector2d& corner : shifted) corner += far;
-  const Outline outline(shifted);
+  const PlanPolygon outline(shifted);
   EXPECT_NEAR(outline.area_m2(), near.area_m2(), 1e-7);
   for (int n = 0; n < 500; ++n) {
     const Vector2d point(uniform(-2, 2), uniform(-2, 2));
@@ -111,8 +111,8 @@ TEST(Outline, FarFromTheOrigin) {
   }
 }
 
-TEST(Outline, EdgesNearABox) {
-  const Outline outline(random_star(200));
+TEST(PlanPolygon, EdgesNearABox) {
+  const PlanPolygon outline(random_star(200));
   const Corners& corners = outline.corners();
   for (int n = 0; n < 300; ++n) {
     const Vector2d low(uniform(-2, 2), uniform(-2, 2));
@@ -131,9 +131,9 @@ TEST(Outline, EdgesNearABox) {
   EXPECT_TRUE(make_rectangle({0, 0}, {9, 9}).edges_near({4, 4}, {5, 5}).empty());
 }
 
-TEST(Outline, WhatIsNone) {
+TEST(PlanPolygon, WhatIsNone) {
   const auto reason = [](const Corners& corners) {
-    return error_of([&] { const Outline outline(corners); }).what() + std::string();
+    return error_of([&] { const PlanPolygon outline(corners); }).what() + std::string();
   };
   const auto says = [](const std::string& text, const std::string& part) {
     return text.find(part) != std::string::npos;
@@ -152,7 +152,7 @@ TEST(Outline, WhatIsNone) {
   EXPECT_TRUE(says(reason({{0, 0}, {4, 0}, {4, 4}, {4, -1}, {0, -1}}), "crosses or touches"));
 }
 
-TEST(Outline, CloudsAreCutWithAllTheirFields) {
+TEST(PlanPolygon, CloudsAreCutWithAllTheirFields) {
   PointCloud cloud;
   for (int x = 0; x <= 4; ++x)
     for (int y = 0; y <= 4; ++y) cloud.positions.emplace_back(x, y, x);
@@ -160,13 +160,13 @@ TEST(Outline, CloudsAreCutWithAllTheirFields) {
   cloud.colors.assign(25, {1, 2, 3});
   std::vector<double>& ids = cloud.add_field("id", ScalarType::int32).values;
   for (std::size_t n = 0; n < 25; ++n) ids[n] = static_cast<double>(n);
-  const PointCloud cut = cut_cloud(cloud, {make_rectangle({1, 0}, {4, 2}), -1, 3});
+  const PointCloud cut = clip_cloud(cloud, {make_rectangle({1, 0}, {4, 2}), -1, 3});
   ASSERT_EQ(cut.size(), 9U) << "the border included";
   EXPECT_EQ(cut.normals.size(), 9U);
   EXPECT_EQ(cut.colors.size(), 9U);
   EXPECT_EQ(cut.find_field("id")->values, (std::vector<double>{5, 6, 7, 10, 11, 12, 15, 16, 17}));
-  EXPECT_EQ(cut_cloud(cloud, {}).size(), 25U);
+  EXPECT_EQ(clip_cloud(cloud, {}).size(), 25U);
 }
 
-}  // namespace outline_test
+}  // namespace plan_polygon_test
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// Voxels by number. Inline, for the innermost loops of fusion.
+// Voxels packed into 64 bits, and their numbers in a hash table. Inline, for innermost loops.
 #pragma once
 
 #include <Eigen/Core>
@@ -10,7 +10,7 @@
 
 namespace libmap {
 
-// Where a voxel lies in its grid, and which of the two sides of a thin sheet it holds.
+// Index of a voxel in its grid, and which of the two sides of a thin sheet it holds.
 struct VoxelPlace {
   Eigen::Vector3i cell = Eigen::Vector3i::Zero();
   int side = 0;  // 0 or 1
@@ -27,8 +27,18 @@ inline constexpr std::uint64_t axis_mask = (std::uint64_t{1} << 21U) - 1;
 inline constexpr std::uint64_t block_bits =
     std::uint64_t{3} << 43U | std::uint64_t{3} << 22U | std::uint64_t{1} << 1U;
 
-inline std::uint64_t axis_bits(int cell) {
+inline std::uint64_t axis_bits(std::int64_t cell) {
   return static_cast<std::uint64_t>(cell + voxel_cell_limit) & axis_mask;
+}
+
+// Two zeros before each of the 21 bits.
+inline std::uint64_t spread(std::uint64_t bits) {
+  bits &= axis_mask;
+  bits = (bits | bits << 32U) & 0x1f00000000ffffU;
+  bits = (bits | bits << 16U) & 0x1f0000ff0000ffU;
+  bits = (bits | bits << 8U) & 0x100f00f00f00f00fU;
+  bits = (bits | bits << 4U) & 0x10c30c30c30c30c3U;
+  return (bits | bits << 2U) & 0x1249249249249249U;
 }
 
 inline std::size_t place_in_block(std::uint64_t key) {
@@ -56,6 +66,13 @@ inline VoxelPlace unpack(std::uint64_t key) {
     return static_cast<int>(bits & voxel_key::axis_mask) - voxel_cell_limit;
   };
   return {{cell(key >> 43U), cell(key >> 22U), cell(key >> 1U)}, static_cast<int>(key & 1U)};
+}
+
+// Position of a voxel on a Z-order curve (Morton 1966), its side last: what is near in space is
+// near on the curve.
+inline std::uint64_t z_order(std::uint64_t key) {
+  return voxel_key::spread(key >> 43U) << 3U | voxel_key::spread(key >> 22U) << 2U |
+         voxel_key::spread(key >> 1U) << 1U | (key & 1U);
 }
 
 // Keys to consecutive numbers, in the order in which they come. A hash table (open addressing)

@@ -1,13 +1,19 @@
-// The surface of an implicit function that depends on near samples only. Inner part of
-// surface_reconstruction.
+// Surfaces of oriented samples, without trimming. Private to surface_reconstruction.
 #pragma once
 
+#include <Eigen/Core>
 #include <vector>
 
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/surface/surface_sample.h"
 
 namespace libmap {
+
+struct SurfaceSample {
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();  // m, about the samples' middle
+  Eigen::Vector3f normal = Eigen::Vector3f::Zero();    // unit, outwards
+  float weight = 1.0F;                                 // > 0
+  float spacing_m = 0.0F;                              // local distance between samples
+};
 
 // Callers bound spacing_m by so many cells, since work grows with its cube.
 inline constexpr double max_spacing_cells = 4.0;
@@ -22,5 +28,17 @@ inline constexpr double max_spacing_cells = 4.0;
 // depends only on the samples whose support reaches it. Positions alone.
 TriangleMesh implicit_surface(const std::vector<SurfaceSample>& samples, double cell_m,
                               double support_cells);
+
+// PCL's Poisson reconstruction, with the same bytes in every run.
+struct PoissonProblem {
+  int depth = 0;        // of the octree
+  double cube_m = 0.0;  // its side, larger than the samples' box
+  double screening = 4.0;
+  double samples_per_cell = 1.0;
+};
+
+// The whole surface, positions alone. Throws Error of ErrorKind::failed if PCL gives up.
+TriangleMesh solve_poisson(const std::vector<SurfaceSample>& samples,
+                           const PoissonProblem& problem);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libmap/cloud/outline.h"
+#include "libmap/cloud/plan_polygon.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -57,7 +57,7 @@ std::string corner_name(std::size_t n) { return "corner " + std::to_string(n + 1
 
 }  // namespace
 
-Outline::Outline(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
+PlanPolygon::PlanPolygon(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
   for (std::size_t n = 0; n < corners_.size(); ++n)
     if (!corners_[n].allFinite())
       throw Error("not a place", {.field = corner_name(n), .value = place(corners_[n])});
@@ -83,14 +83,14 @@ Outline::Outline(std::vector<Vector2d> corners) : corners_(std::move(corners)) {
   if (!(area_m2_ > on_border_m * (max_ - min_).norm())) throw Error("the outline encloses no area");
 }
 
-std::size_t Outline::strip_of(double y) const {
+std::size_t PlanPolygon::strip_of(double y) const {
   const double height = max_.y() - min_.y();
   const double share = height > 0.0 ? (y - min_.y()) / height : 0.0;
   const auto count = static_cast<double>(strips_.size());
   return static_cast<std::size_t>(std::clamp(std::floor(share * count), 0.0, count - 1.0));
 }
 
-void Outline::make_strips() {
+void PlanPolygon::make_strips() {
   strips_.resize(std::min(corners_.size(), max_strips));
   for (std::uint32_t n = 0; n < corners_.size(); ++n) {
     const double a = corners_[n].y();
@@ -101,7 +101,7 @@ void Outline::make_strips() {
   }
 }
 
-void Outline::require_simple() const {
+void PlanPolygon::require_simple() const {
   const auto count = static_cast<std::uint32_t>(corners_.size());
   const auto end = [&](std::uint32_t n) -> const Vector2d& { return corners_[(n + 1) % count]; };
   const auto crossing = [&](std::uint32_t a, std::uint32_t b) {
@@ -126,7 +126,7 @@ void Outline::require_simple() const {
       }
 }
 
-bool Outline::contains(const Vector2d& point) const {
+bool PlanPolygon::contains(const Vector2d& point) const {
   if ((point.array() < min_.array() - on_border_m).any() ||
       (point.array() > max_.array() + on_border_m).any())
     return false;
@@ -143,8 +143,8 @@ bool Outline::contains(const Vector2d& point) const {
   return inside;
 }
 
-std::vector<std::uint32_t> Outline::edges_near(const Vector2d& box_min,
-                                               const Vector2d& box_max) const {
+std::vector<std::uint32_t> PlanPolygon::edges_near(const Vector2d& box_min,
+                                                   const Vector2d& box_max) const {
   std::vector<std::uint32_t> edges;
   if ((box_max.array() < min_.array()).any() || (box_min.array() > max_.array()).any())
     return edges;
@@ -168,11 +168,11 @@ std::vector<std::uint32_t> Outline::edges_near(const Vector2d& box_min,
   return edges;
 }
 
-Outline make_rectangle(const Vector2d& min, const Vector2d& max) {
-  return Outline({min, {max.x(), min.y()}, max, {min.x(), max.y()}});
+PlanPolygon make_rectangle(const Vector2d& min, const Vector2d& max) {
+  return PlanPolygon({min, {max.x(), min.y()}, max, {min.x(), max.y()}});
 }
 
-PointCloud cut_cloud(const PointCloud& cloud, const UprightPrism& prism) {
+PointCloud clip_cloud(const PointCloud& cloud, const ExtrudedPolygon& prism) {
   std::vector<char> inside(cloud.size());
   parallel_for(cloud.size(), 8192, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n)

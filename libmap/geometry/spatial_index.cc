@@ -1,4 +1,4 @@
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 
 #include <algorithm>
 #include <cmath>

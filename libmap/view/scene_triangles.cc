@@ -1,4 +1,4 @@
-#include "libmap/view/scene_geometry.h"
+#include "libmap/view/scene_triangles.h"
 
 #include <algorithm>
 #include <cmath>
@@ -7,7 +7,7 @@
 #include <variant>
 
 #include "libmap/core/error.h"
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libmap {
 namespace {

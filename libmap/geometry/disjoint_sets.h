@@ -8,7 +8,7 @@
 
 namespace libmap {
 
-// Of the numbers below `count`, at first each for itself. A set goes by its least number.
+// Sets of the numbers below `count`, initially one per number. A set is named by its least number.
 template <typename Index>
 class DisjointSets {
  public:

@@ -1,4 +1,4 @@
-#include "libmap/core/point_tree.h"
+#include "libmap/geometry/spatial_index.h"
 
 #include <gtest/gtest.h>
 
@@ -8,7 +8,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace point_tree_test {
+namespace spatial_index_test {
 
 using graspmap_test::uniform;
 
@@ -120,5 +120,31 @@ TEST(PointTree, SpacingOfALattice) {
   EXPECT_EQ(median_spacing({}), 0.0);
 }
 
-}  // namespace point_tree_test
+// Every point of the box is visited, before and after the grid has grown.
+TEST(GrowingGrid, VisitsAllPointsInABox) {
+  const std::vector<Eigen::Vector3d> points = random_points(400);
+  GrowingGrid grid({-1, -1, -1}, 0.1, 4);
+  for (std::size_t count = 1; count <= points.size(); ++count) {
+    grid.add(points[count - 1]);
+    if (count % 50 != 1) continue;
+    const Eigen::Vector3d low = Eigen::Vector3d::Constant(-0.4);
+    const Eigen::Vector3d high(0.3, 0.5, 0.2);
+    std::vector<bool> seen(count, false);
+    grid.any_in_box(low, high, [&](const Eigen::Vector3d& point, std::uint32_t index) {
+      EXPECT_EQ(point, points[index]);
+      seen[index] = true;
+      return false;
+    });
+    for (std::size_t n = 0; n < count; ++n) {
+      const bool inside =
+          (points[n].array() >= low.array()).all() && (points[n].array() <= high.array()).all();
+      EXPECT_TRUE(seen[n] || !inside);
+    }
+  }
+  EXPECT_EQ(grid.size(), points.size());
+  EXPECT_TRUE(grid.any_nearer(points[7], 1e-6, 1e-12));
+  EXPECT_FALSE(grid.any_nearer({5, 5, 5}, 0.1, 0.01));
+}
+
+}  // namespace spatial_index_test
 }  // namespace libmap

@@ -1,4 +1,4 @@
-// A closed outline on the ground: a simple polygon, convex or not.
+// Simple polygons of the x-y plane, convex or not.
 #pragma once
 
 #include <Eigen/Core>
@@ -11,11 +11,11 @@
 
 namespace libmap {
 
-class Outline {
+class PlanPolygon {
  public:
   // Corners in order, either way round; a last one equal to the first is dropped. Throws Error:
   // fewer than three, not finite, two in one place, edges that cross or touch, no area.
-  explicit Outline(std::vector<Eigen::Vector2d> corners);
+  explicit PlanPolygon(std::vector<Eigen::Vector2d> corners);
 
   // Counter-clockwise.
   const std::vector<Eigen::Vector2d>& corners() const { return corners_; }
@@ -43,21 +43,21 @@ class Outline {
 };
 
 // The rectangle from min to max.
-Outline make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
+PlanPolygon make_rectangle(const Eigen::Vector2d& min, const Eigen::Vector2d& max);
 
-// What stands on an outline, between two heights. No outline: between the heights, everywhere.
-struct UprightPrism {
-  std::optional<Outline> outline{};
+// A polygon extruded between two heights. Without a polygon: everything between the heights.
+struct ExtrudedPolygon {
+  std::optional<PlanPolygon> polygon{};
   double min_z = -std::numeric_limits<double>::infinity();
   double max_z = std::numeric_limits<double>::infinity();
 
   bool contains(const Eigen::Vector3d& point) const {
     return point.z() >= min_z && point.z() <= max_z &&
-           (!outline || outline->contains(point.head<2>()));
+           (!polygon || polygon->contains(point.head<2>()));
   }
 };
 
-// The points inside, those on its border included, with all that belongs to them.
-PointCloud cut_cloud(const PointCloud& cloud, const UprightPrism& prism);
+// The points inside and on the border, with their normals, colors and fields.
+PointCloud clip_cloud(const PointCloud& cloud, const ExtrudedPolygon& prism);
 
 }  // namespace libmap

@@ -1,22 +1,62 @@
-// Points that come one by one, in a hashed grid of cubes: PointTree needs all of its points before
-// the first search, and nanoflann's tree that grows takes 10 times as long for 74,000 samples.
-// Inner part of libmap/mesh.
+// Neighbor search among points: PointTree for points that are all known, GrowingGrid for points
+// that are added between searches. Other structures exist where these are measurably slower or
+// where sums depend on the order of the neighbors; each states its measurement:
+// libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/cloud/surface_points.cc (3
+// times), libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
 #pragma once
 
 #include <Eigen/Core>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 namespace libmap {
 
-// Cells share slots where their hashes meet, so that a search may see points that lie elsewhere:
-// who searches measures distances anyway. Positions are counted from `origin`.
-class SampleGrid {
+struct NeighborPoint {
+  std::size_t index = 0;
+  double square_m2 = 0.0;  // of the distance
+};
+
+// A k-d tree by nanoflann.
+class PointTree {
+ public:
+  // The points, all finite, must stay while the tree lives.
+  explicit PointTree(const std::vector<Eigen::Vector3d>& points);
+  ~PointTree();
+  PointTree(PointTree&&) noexcept;
+  PointTree& operator=(PointTree&&) noexcept;
+
+  // The `count` nearest points, or all if there are fewer, the nearest first, of equally near ones
+  // those of the lowest index. May be called from several threads at once.
+  std::vector<NeighborPoint> nearest(const Eigen::Vector3d& point, std::size_t count) const;
+  // The nearest one; there must be one.
+  NeighborPoint nearest(const Eigen::Vector3d& point) const;
+  // The nearest one, among equally near ones that of the lowest index; there must be one.
+  NeighborPoint first_of_nearest(const Eigen::Vector3d& point) const;
+  // The `count` points nearest to the n-th and at most `radius_m` away, the nearest first, without
+  // the n-th.
+  std::vector<NeighborPoint> around(std::size_t n, std::size_t count, double radius_m) const;
+  // All points at most `radius_m` away, by index.
+  std::vector<NeighborPoint> within(const Eigen::Vector3d& point, double radius_m) const;
+
+ private:
+  struct Index;
+  std::unique_ptr<Index> index_;
+};
+
+// Median of the distances from points to the nearest elsewhere, m; of at most 10000 of them, spread
+// evenly over the list. 0 if there are no two places.
+double median_spacing(const std::vector<Eigen::Vector3d>& points);
+
+// Points in a hashed grid of cubes. nanoflann's tree that grows takes 10 times as long for 74,000
+// samples. Cells share slots where their hashes meet, so that a search may see points that lie
+// elsewhere: who searches measures distances anyway. Positions are counted from `origin`.
+class GrowingGrid {
  public:
   // Quickest for boxes of about `cell_m`.
-  SampleGrid(const Eigen::Vector3d& origin, double cell_m, std::size_t expected_points)
+  GrowingGrid(const Eigen::Vector3d& origin, double cell_m, std::size_t expected_points)
       : origin_(origin), cells_per_m_(1.0 / cell_m) {
     std::size_t slots = 64;
     while (slots < 2 * expected_points) slots *= 2;
