@@ -4,8 +4,8 @@
 
 #include <cstddef>
 
-#include "libmap/cloud/plan_cells.h"
 #include "libmap/cloud/surface_refinement.h"
+#include "libmap/cloud/tile_mask.h"
 #include "libmap/core/point_cloud.h"
 
 namespace libmap {
@@ -19,7 +19,7 @@ struct SurfacePointOptions {
   int min_views = 1;              // frames that must have measured a point
   double max_seen_through = 0.3;  // views that see through a point for each that sees it
   double max_missed = 1.5;        // views that miss it for each that sees it
-  PlanCells cells;                // columns of voxels whose points are returned and counted
+  TileMask cells;                 // columns of voxels whose points are returned and counted
 };
 
 struct SurfacePointCounts {
