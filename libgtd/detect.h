@@ -14,6 +14,7 @@
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/stage_timer.h"
+#include "libmap/tiles/tile_share.h"
 
 namespace libgtd {
 
@@ -27,7 +28,7 @@ struct DetectionOptions {
   std::optional<Gripper> gripper;  // default: the one that the scenario names
   PlaneSource plane = PlaneSource::fit;
   std::optional<Eigen::Vector3d> up;  // in the cloud's frame: which side of the plane is outside
-  TileShare share;                    // score only these tiles
+  libmap::TileShare share;            // score only these tiles
 };
 // The keys of the scenario, and `plane`.
 void bind(libmap::ParameterTable& table, DetectionOptions& options);

@@ -35,7 +35,7 @@ struct Block {
 
 class StreamedDetection {
  public:
-  StreamedDetection(const TerrainFrame& frame, const NearbyPoints& points,
+  StreamedDetection(const TerrainFrame& frame, const libmap::PointTileStore& points,
                     const DetectionOptions& options, const StreamingOptions& streaming)
       : frame_(frame),
         points_(points),
@@ -156,7 +156,7 @@ class StreamedDetection {
   }
 
   const TerrainFrame& frame_;
-  const NearbyPoints& points_;
+  const libmap::PointTileStore& points_;
   const Scenario& scenario_;
   std::size_t max_points_;
   GripperMask mask_;
@@ -207,14 +207,14 @@ PointCloud to_terrain(const PointCloud& block, const TerrainFrame& frame) {
 }
 
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
-                                 const TileShare& share) {
+                                 const libmap::TileShare& share) {
   VoxelGrid box;
   box.lattice = frame.lattice;
   box.min = frame.min;
   box.max = frame.max;
   box.voxels = {frame.min, frame.max};
   std::vector<TileNumber> numbers;
-  std::vector<TileBounds> all = make_tiles(box, tile_voxels);
+  const std::vector<TileBounds> all = make_tiles(box, tile_voxels);
   // Each is a line of a journal, and a file if it has voxels.
   if (all.size() > max_stored_tiles)
     throw libmap::Error(
@@ -222,7 +222,7 @@ std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
         {.field = "tile_size_m",
          .value = libmap::to_text(tile_voxels * frame.lattice.voxel_size_m),
          .bound = "at most " + std::to_string(max_stored_tiles) + " tiles"});
-  const std::vector<TileBounds> tiles = share_of(std::move(all), share);
+  const std::vector<TileBounds> tiles = share_of(all, share);
   numbers.reserve(tiles.size());
   for (const TileBounds& tile : tiles)
     numbers.push_back(tile_of({tile.i_begin, tile.j_begin, 0}, tile_voxels));
@@ -238,7 +238,7 @@ PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame,
           origin + size * Eigen::Vector2d(columns.i_end + margin, columns.j_end + margin)};
 }
 
-void detect_streamed(const TerrainFrame& frame, const NearbyPoints& points,
+void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,
                      const std::function<void(std::vector<StreamedTile>)>& visit,
                      libmap::Progress& progress, const StreamingOptions& streaming) {

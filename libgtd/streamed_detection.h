@@ -12,6 +12,8 @@
 #include "libgtd/detect.h"
 #include "libgtd/score/tile_store.h"
 #include "libmap/core/point_stream.h"
+#include "libmap/tiles/point_tile_store.h"
+#include "libmap/tiles/tile_share.h"
 
 namespace libgtd {
 
@@ -34,18 +36,7 @@ libmap::PointCloud to_terrain(const libmap::PointCloud& block, const TerrainFram
 // The tiles of the box, ascending, and a share of them. Throws Error naming tile_size_m for more
 // than 2^20 tiles in all.
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
-                                 const TileShare& share = {});
-
-// Points in the terrain frame near a place.
-class NearbyPoints {
- public:
-  virtual ~NearbyPoints() = default;
-  // Those with low <= (x, y) <= high, in the order of the whole terrain.
-  virtual libmap::PointCloud points_in(const Eigen::Vector2d& low,
-                                       const Eigen::Vector2d& high) const = 0;
-  // Not fewer than that.
-  virtual std::size_t count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const = 0;
-};
+                                 const libmap::TileShare& share = {});
 
 struct StreamedTile {
   TileNumber number;
@@ -66,8 +57,9 @@ struct PointsRectangle {
 };
 PointsRectangle points_for(const TileBounds& columns, const TerrainFrame& frame, int halo_voxels);
 
-// Calls visit for a few of the tiles `wanted` after the other, each tile once.
-void detect_streamed(const TerrainFrame& frame, const NearbyPoints& points,
+// `points` are in the terrain frame. Calls visit for a few of the tiles `wanted` after the other,
+// each tile once.
+void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& points,
                      const std::vector<TileNumber>& wanted, const DetectionOptions& options,
                      const std::function<void(std::vector<StreamedTile> tiles)>& visit,
                      libmap::Progress& progress = libmap::no_progress(),

@@ -10,7 +10,7 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"
-#include "tools/support/piece_folder.h"
+#include "tools/support/tile_folder.h"
 
 using namespace graspmap_tools;
 
@@ -256,7 +256,7 @@ void crop_pieces(const CropCommandOptions& options, const std::vector<fs::path>&
 
 void crop_folder(const CropCommandOptions& options, Run& run) {
   const std::vector<fs::path> pieces = libmap::mesh_pieces(options.input);
-  const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".ply");
+  const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".ply");
   run.claim_output_tree(options.output, names, {options.input, options.polygon});
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {
     if (!folder.empty()) crop_pieces(options, pieces, folder, run);
@@ -286,7 +286,7 @@ void crop(CropCommandOptions& options, Run& run) {
   read_region(options);
   note_region(options, run);
   try {
-    is_piece_folder(options.output) ? crop_folder(options, run) : crop_file(options, run);
+    is_tile_folder(options.output) ? crop_folder(options, run) : crop_file(options, run);
   } catch (const libmap::Error& error) {
     throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
   }

@@ -3,14 +3,28 @@
 #include "libmap/cloud/depth_fusion.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/tiles/eigen_json.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
-#include "tools/support/fusion_facts.h"
-#include "tools/support/piece_folder.h"
-#include "tools/support/piece_progress.h"
 #include "tools/support/scan_poses.h"
-#include "tools/support/store_filling.h"
+#include "tools/support/tile_folder.h"
 #include "tools/support/usages.h"
+
+// What shares and resumed runs have in common, bit for bit.
+namespace libmap {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixels, reach,
+                                   max_ray_length, max_pixel_pitch)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, registration_rounds,
+                                   disagreement_before_m, disagreement_after_m)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DepthPixelCounts, pixels, unmeasured, out_of_range, without_ray,
+                                   flying, grazing, used)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SurfacePointCounts, unconfirmed, max_views, seen_through, missed,
+                                   beside, bent_away, merged, extended_points)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionCounts, pixels, occupied_voxels, elements, points,
+                                   points_made)
+
+}  // namespace libmap
 
 using namespace graspmap_tools;
 
@@ -95,7 +109,7 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
 }
 
 // Of several shares the last one claims them, when it writes them.
-bool is_share(const FuseOptions& options) { return parse_share(options.tile).count > 1; }
+bool is_share(const FuseOptions& options) { return libmap::parse_share(options.tile).count > 1; }
 
 void claim_poses(const FuseOptions& options, const std::vector<std::string>& inputs, Run& run) {
   if (options.corrected_poses.empty()) return;
@@ -134,65 +148,70 @@ void write_poses(const FuseOptions& options, const libmap::DepthFusionResult& re
   run.manifest().results = results;
 }
 
-void fuse_whole(const FuseOptions& options, const libmap::ScanSource& scan,
-                const libmap::Trajectory& poses, Run& run) {
-  libmap::DepthFusionResult result = in_file(options.scan, [&] {
-    return libmap::fuse_depth(scan, poses, options.fusion, run.progress());
-  });
-  const libmap::PointCloud cloud = carried(std::move(result.cloud), options,
-                                           wanted_from_cloud(options, scan, poses, result, run));
-  tell_results(result, options, run);
-  run.write_output(options.output,
-                   [&](const auto& temporary) { libmap::write_cloud(temporary, cloud); });
-  write_poses(options, result, run);
-}
-
-// Each tile is made, written and forgotten.
+// Each tile is made, written and forgotten; a cloud in one file is one tile.
 void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
-                const libmap::Trajectory& poses, PieceProgress& progress, Run& run) {
+                const libmap::Trajectory& poses, TileFolder* folder, Run& run) {
   std::optional<libmap::TileFusion> fusion;
-  const PieceProgress::Facts found = progress.common_facts([&] {
-    fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress());
-    return facts_of(fusion->survey());
-  });
+  const double tile_m = folder == nullptr ? libmap::whole_plan : options.tile_m;
+  const auto survey = [&] {
+    fusion.emplace(scan, poses, options.fusion, tile_m, run.progress());
+    return TileFolder::Facts(fusion->survey());
+  };
+  const TileFolder::Facts found = folder == nullptr ? TileFolder::Facts() : folder->begin(survey);
+  if (!fusion && found.is_null()) survey();
   if (!fusion) {
-    const libmap::FusionSurvey survey = fusion_survey_of(found);
-    fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress(), &survey);
+    const auto known = found.get<libmap::FusionSurvey>();
+    fusion.emplace(scan, poses, options.fusion, tile_m, run.progress(), &known);
   }
   libmap::DepthFusionResult result = fusion->report();
   const libmap::Pose wanted_from_tile = wanted_from_cloud(options, scan, poses, result, run);
-  std::vector<std::string> pieces;
-  for (const libmap::PlanTile& tile : fusion->tiles())
-    pieces.push_back(libmap::piece_file_name(tile, ""));
-  const auto make = [&](std::size_t n, const fs::path& to) {
+  const auto make = [&](std::size_t n) {
     libmap::TileFusion::Tile tile = fusion->make(n);
-    if (!tile.cloud.empty())
-      libmap::write_cloud(to, carried(std::move(tile.cloud), options, wanted_from_tile));
-    return facts_of(tile.counts);
+    tile.cloud = carried(std::move(tile.cloud), options, wanted_from_tile);
+    return tile;
   };
-  const auto finish = [&](const fs::path& folder) {
+  const auto add = [&](const libmap::FusionCounts& counts) {
+    result += counts;
+    result.timings_s = fusion->report().timings_s;
+  };
+  if (folder == nullptr) {
+    const libmap::TileFusion::Tile whole = make(0);
+    add(whole.counts);
+    tell_results(result, options, run);
+    run.write_output(options.output,
+                     [&](const fs::path& to) { libmap::write_cloud(to, whole.cloud); });
+    return write_poses(options, result, run);
+  }
+  std::vector<std::string> names;
+  for (const libmap::XyTile& tile : fusion->tiles())
+    names.push_back(libmap::tile_file_name(tile, ""));
+  const auto write = [&](std::size_t n, const fs::path& to) {
+    const libmap::TileFusion::Tile tile = make(n);
+    if (!tile.cloud.empty()) libmap::write_cloud(to, tile.cloud);
+    return TileFolder::Facts(tile.counts);
+  };
+  const auto finish = [&](const fs::path& to) {
     std::size_t written = 0;
-    for (const std::string& piece : pieces) {
-      const libmap::FusionCounts counts = fusion_counts_of(progress.facts(piece));
-      result += counts;
+    for (const std::string& name : names) {
+      const auto counts = folder->facts(name).get<libmap::FusionCounts>();
+      add(counts);
       if (counts.points_made == 0) continue;
       ++written;
-      const fs::path file = progress.file(piece, ".pcd");
-      PieceProgress::link_file(file, folder / file.filename());
+      const fs::path file = folder->file(name, ".pcd");
+      TileFolder::link_file(file, to / file.filename());
     }
-    result.timings_s = fusion->report().timings_s;
     run.add_results({{"pieces", written}});
     tell_results(result, options, run);
     write_poses(options, result, run);
   };
-  progress.make({pieces, ".pcd", make, finish});
+  folder->make({names, ".pcd", write, finish});
 }
 
 void fuse(FuseOptions options, Run& run) {
   std::vector<std::string> inputs = scan_inputs(options.scan, options.poses);
   inputs.push_back(options.calibration.source);
-  const bool in_pieces = is_piece_folder(options.output);
-  if (!in_pieces) {
+  const bool in_tiles = is_tile_folder(options.output);
+  if (!in_tiles) {
     libmap::require_cloud_format(options.output);
     run.claim_output(options.output, inputs);
   }
@@ -205,11 +224,14 @@ void fuse(FuseOptions options, Run& run) {
   if (in_true_frame) require_truth(*scan);
   if (fs::is_regular_file(options.scan)) run.add_input(options.scan);
   run.manifest().frame = in_true_frame ? "ground truth" : "poses";
-  if (!in_pieces) return fuse_whole(options, *scan, poses, run);
-  PieceProgress progress(options.output, piece_folder_names(options.output), inputs,
-                         parse_share(options.tile), run);
-  if (progress.is_complete()) return;
-  in_file(options.scan, [&] { make_tiles(options, *scan, poses, progress, run); });
+  std::optional<TileFolder> folder;
+  if (in_tiles) {
+    folder.emplace(options.output, tile_folder_names(options.output), inputs,
+                   libmap::parse_share(options.tile), run);
+    if (folder->is_complete()) return;
+  }
+  in_file(options.scan,
+          [&] { make_tiles(options, *scan, poses, folder ? &*folder : nullptr, run); });
 }
 
 // A folder of a camera rig, or --rig, which names the rig.
@@ -225,7 +247,7 @@ int fuse_scan(int argc, char** argv) {
   FuseOptions options;
   Command command("fuse");
   command.input("SCAN", options.scan, "scan: a database of RTAB-Map, or a folder of images");
-  command.output(options.output, std::string("cloud (.pcd, .ply, .vtp, .csv)") + or_piece_folder);
+  command.output(options.output, std::string("cloud (.pcd, .ply, .vtp, .csv)") + or_tile_folder);
   add_share_option(command, options.tile);
   add_poses_option(command, options.poses);
   add_calibration_option(command, options.calibration);

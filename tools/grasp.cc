@@ -23,7 +23,6 @@
 #include "tools/support/grasp_scenes.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/store_filling.h"
 
 namespace {
 
@@ -134,7 +133,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
   graspmap_tools::GraspMapInput input{.mesh_file = options.mesh,
                                       .map_file = options.map,
                                       .output = options.output,
-                                      .share = graspmap_tools::parse_share(options.tile),
+                                      .share = libmap::parse_share(options.tile),
                                       .parameters_hash = {}};
   require_map_output(input, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);

@@ -14,9 +14,7 @@
 #include "libmap/surface/surface_tiles.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/piece_folder.h"
-#include "tools/support/piece_progress.h"
-#include "tools/support/store_filling.h"
+#include "tools/support/tile_folder.h"
 
 using namespace graspmap_tools;
 
@@ -208,7 +206,7 @@ void mesh(const MeshOptions& options, Run& run) {
                    [&](const auto& temporary) { libmap::write_mesh(temporary, surface); });
 }
 
-PieceProgress::Facts facts_of(const libmap::SurfaceTile& made) {
+TileFolder::Facts facts_of(const libmap::SurfaceTile& made) {
   return {{"vertices", made.mesh.vertices.size()},
           {"triangles", made.mesh.triangles.size()},
           {"area_m2", libmap::surface_area(made.mesh)},
@@ -228,7 +226,7 @@ struct Totals {
          {"triangles", mesh.triangles.size()},
          {"area_m2", libmap::surface_area(mesh)}});
   }
-  void add(const PieceProgress::Facts& facts) {
+  void add(const TileFolder::Facts& facts) {
     const auto count = facts.at("triangles").get<std::int64_t>();
     pieces += count > 0 ? 1 : 0;
     vertices += facts.at("vertices").get<std::int64_t>();
@@ -238,13 +236,13 @@ struct Totals {
 };
 
 // The pieces that are done, without islands that go across them.
-std::string piece_of(const libmap::PlanTile& tile) { return libmap::piece_file_name(tile, ""); }
+std::string name_of(const libmap::XyTile& tile) { return libmap::tile_file_name(tile, ""); }
 
-Totals put_together(const MeshOptions& options, const PieceProgress& progress,
-                    const std::vector<libmap::PlanTile>& tiles, const fs::path& folder, Run& run) {
+Totals put_together(const MeshOptions& options, const TileFolder& output,
+                    const std::vector<libmap::XyTile>& tiles, const fs::path& folder, Run& run) {
   libmap::SurfaceIslands islands;
-  for (const libmap::PlanTile& tile : tiles) {
-    const PieceProgress::Facts facts = progress.facts(piece_of(tile));
+  for (const libmap::XyTile& tile : tiles) {
+    const TileFolder::Facts facts = output.facts(name_of(tile));
     libmap::SurfaceTile made;
     facts.at("component_areas_m2").get_to(made.component_areas_m2);
     facts.at("seams").get_to(made.seams);
@@ -252,18 +250,18 @@ Totals put_together(const MeshOptions& options, const PieceProgress& progress,
   }
   const libmap::SurfaceIslands::Dropped dropped = islands.dropped(options.surface.cleaning);
   Totals totals;
-  for (const libmap::PlanTile& tile : tiles) {
-    const PieceProgress::Facts facts = progress.facts(piece_of(tile));
-    const fs::path to = folder / libmap::piece_file_name(tile, ".ply");
+  for (const libmap::XyTile& tile : tiles) {
+    const TileFolder::Facts facts = output.facts(name_of(tile));
+    const fs::path to = folder / libmap::tile_file_name(tile, ".ply");
     const auto components = dropped.find(tile);
     if (components != dropped.end()) {
       const libmap::TriangleMesh kept = libmap::without_components(
-          libmap::read_mesh(progress.file(piece_of(tile), ".ply")).mesh, components->second);
+          libmap::read_mesh(output.file(name_of(tile), ".ply")).mesh, components->second);
       totals.add(kept);
       if (!kept.triangles.empty()) libmap::write_mesh(to, kept);
     } else if (facts.at("triangles") > 0) {
       totals.add(facts);
-      PieceProgress::link_file(progress.file(piece_of(tile), ".ply"), to);
+      TileFolder::link_file(output.file(name_of(tile), ".ply"), to);
     }
   }
   if (totals.triangles == 0)
@@ -278,9 +276,9 @@ Totals put_together(const MeshOptions& options, const PieceProgress& progress,
 }
 
 // Each tile is made, written and forgotten.
-void make_tiles(const MeshOptions& options, PieceProgress& progress, Run& run) {
+void make_tiles(const MeshOptions& options, TileFolder& output, Run& run) {
   libmap::SurfaceSurvey survey;
-  std::map<libmap::PlanTile, std::size_t> points_in_tiles;
+  std::map<libmap::XyTile, std::size_t> points_in_tiles;
   libmap::PieceIndex index = run.timed("survey", [&] {
     return libmap::PieceIndex(libmap::cloud_pieces(options.cloud),
                               [&](const libmap::PointCloud& piece) {
@@ -295,11 +293,11 @@ void make_tiles(const MeshOptions& options, PieceProgress& progress, Run& run) {
   run.add_results({{"points", index.points()},
                    {"dropped_points", survey.dropped_points()},
                    {"cell_size_m", options.surface.reconstruction.cell_size_m}});
-  std::vector<libmap::PlanTile> tiles;
-  std::vector<std::string> pieces;
+  std::vector<libmap::XyTile> tiles;
+  std::vector<std::string> names;
   for (const auto& [tile, points] : points_in_tiles) {
     tiles.push_back(tile);
-    pieces.push_back(piece_of(tile));
+    names.push_back(name_of(tile));
   }
   const auto make = [&](std::size_t n, const fs::path& to) {
     const libmap::PlanBox box =
@@ -310,11 +308,11 @@ void make_tiles(const MeshOptions& options, PieceProgress& progress, Run& run) {
     return facts_of(made);
   };
   const auto finish = [&](const fs::path& folder) {
-    const Totals totals = put_together(options, progress, tiles, folder, run);
+    const Totals totals = put_together(options, output, tiles, folder, run);
     run.say("{} points -> {} triangles in {} pieces", index.points(), totals.triangles,
             totals.pieces);
   };
-  progress.make({pieces, ".ply", make, finish});
+  output.make({names, ".ply", make, finish});
 }
 
 void mesh_in_tiles(const MeshOptions& options, Run& run) {
@@ -328,9 +326,9 @@ void mesh_in_tiles(const MeshOptions& options, Run& run) {
   in_file(options.cloud, [&] {
     run.add_input(options.cloud);
     carry_frame(options.cloud, run);
-    PieceProgress progress(options.output, piece_folder_names(options.output), {options.cloud},
-                           parse_share(options.tile), run);
-    if (!progress.is_complete()) make_tiles(options, progress, run);
+    TileFolder output(options.output, tile_folder_names(options.output), {options.cloud},
+                      libmap::parse_share(options.tile), run);
+    if (!output.is_complete()) make_tiles(options, output, run);
   });
 }
 
@@ -341,14 +339,14 @@ int main(int argc, char** argv) {
   Command command("mesh");
   command.input("CLOUD", options.cloud, "cloud (.pcd, .ply, .csv), or a folder of pieces");
   command.output(options.output,
-                 std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_piece_folder);
+                 std::string("mesh (.ply, .vtp, .obj, .stl, .off, .glb)") + or_tile_folder);
   add_share_option(command, options.tile);
   command.flag("--report", options.report,
                "print what the mesh is as a surface, and how far the points lie from it");
   command.flag("--json", options.json, "that report as JSON");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
-    if (is_piece_folder(options.output)) return mesh_in_tiles(options, run);
+    if (is_tile_folder(options.output)) return mesh_in_tiles(options, run);
     require_folder_of_share(options.output, options.tile);
     mesh(options, run);
   });

@@ -6,7 +6,7 @@
 #include "libmap/mesh/poisson_disk.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/piece_folder.h"
+#include "tools/support/tile_folder.h"
 
 using namespace graspmap_tools;
 
@@ -87,7 +87,7 @@ void write_pieces(const std::vector<fs::path>& pieces, libmap::PieceSampler& sam
 void resample_pieces(const ResampleOptions& options, Run& run) {
   require_one_of_radius_and_count(options.sampling);
   const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
-  const std::vector<std::string> names = piece_folder_names(options.output, pieces, ".pcd");
+  const std::vector<std::string> names = tile_folder_names(options.output, pieces, ".pcd");
   run.claim_output_tree(options.output, names, {options.mesh});
   std::vector<libmap::Bounds3d> boxes;
   for (const fs::path& piece : pieces)
@@ -108,9 +108,9 @@ int main(int argc, char** argv) {
   command.input("MESH", options.mesh,
                 "surface (.ply, .obj, .stl, .off, .glb), or a folder of pieces");
   command.output(options.output,
-                 std::string("cloud with normals (.pcd, .ply, .vtp, .csv)") + or_piece_folder);
+                 std::string("cloud with normals (.pcd, .ply, .vtp, .csv)") + or_tile_folder);
   libmap::bind(command.parameters(), options.sampling);
   return command.run(argc, argv, [&](Run& run) {
-    is_piece_folder(options.output) ? resample_pieces(options, run) : resample(options, run);
+    is_tile_folder(options.output) ? resample_pieces(options, run) : resample(options, run);
   });
 }

@@ -3,19 +3,291 @@
 #include "libgtd/gripper/closing_path.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/score/tile_store_io.h"
+#include "libgtd/store_plan.h"
 #include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/cloud/cloud_pieces.h"
 #include "libmap/core/data_folder.h"
+#include "libmap/core/parallel.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/map_tiles.h"
 #include "tools/support/option_values.h"
-#include "tools/support/score_store.h"
-#include "tools/support/store_filling.h"
 
 using namespace graspmap_tools;
 
 namespace {
+
+namespace fs = std::filesystem;
+using libgtd::StoredTile;
+using libgtd::TerrainFile;
+using libgtd::TileNumber;
+
+// Third standardized moment of the heights. Rocks and holds on their ground have +0.5 to +3, the
+// same upside down as much below 0; rolling ground has about 0.
+constexpr double upside_down_skewness = -1.0;
+
+std::string_view name_of(libgtd::UpSource source) {
+  if (source == libgtd::UpSource::frame_z) return "frame's z axis";
+  if (source == libgtd::UpSource::camera_origin) return "camera's origin";
+  return to_text(source);
+}
+
+// Reports what decided which side of the plane is up, unless it was given. Warns if that was the
+// frame's z axis and the relief contradicts it, as for a cloud in a camera's frame, whose z axis
+// points into the ground.
+void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
+  if (plane.up_source == libgtd::UpSource::direction) return;
+  run.say("up from the {}", name_of(plane.up_source));
+  // Of the other sources, viewpoint and normals saw the outside, and the relief agrees with itself.
+  if (plane.up_source == libgtd::UpSource::frame_z && plane.relief_skewness < upside_down_skewness)
+    run.warn(
+        "{}: its relief hangs below the plane: if this is upside down, give --up (--up=0,0,-1 for "
+        "a cloud in a camera's frame)",
+        terrain);
+}
+
+// Throws Error if no point is left, warns of those that were dropped.
+void require_points(std::size_t points, std::size_t dropped, const std::string& terrain, Run& run) {
+  if (points == 0)
+    throw libmap::Error(dropped == 0 ? "the cloud has no points"
+                                     : fmt::format("none of its {} points has a position", dropped),
+                        {.file = terrain});
+  if (dropped > 0) run.warn("{}: {} points without a position were dropped", terrain, dropped);
+}
+
+std::int64_t modified_ns(const fs::path& path) {
+  return std::chrono::duration_cast<std::chrono::nanoseconds>(
+             fs::last_write_time(path).time_since_epoch())
+      .count();
+}
+
+// Facts of an earlier run on each file with the same name, size and time; other files are read.
+std::vector<TerrainFile> survey(const std::vector<fs::path>& paths,
+                                const std::vector<TerrainFile>& known,
+                                const std::optional<libmap::Georeference>& georeference) {
+  std::vector<TerrainFile> files(paths.size());
+  libmap::parallel_each(paths.size(), [&](std::size_t n) {
+    TerrainFile& file = files[n];
+    file.input.path = paths[n].string();
+    file.input.bytes = fs::file_size(paths[n]);
+    file.modified_ns = modified_ns(paths[n]);
+    const auto same = std::find_if(known.begin(), known.end(), [&](const TerrainFile& one) {
+      return one.input.path == file.input.path && one.input.bytes == file.input.bytes &&
+             one.modified_ns == file.modified_ns;
+    });
+    if (same != known.end()) {
+      file = *same;
+      return;
+    }
+    file.input.sha256 = libmap::sha256_of_file(paths[n]);
+    const libmap::TileInfo info = libmap::survey_tile(paths[n], georeference);
+    file.points = info.points;
+    file.dropped_points = info.dropped_points;
+    file.box = info.box;
+  });
+  return files;
+}
+
+struct ScoreStoreOptions {
+  std::string terrain;  // a cloud file or a folder of such
+  std::string store;
+  std::filesystem::path gripper_file;
+  libgtd::MapFrame frame = libgtd::MapFrame::terrain;
+  bool append = false;
+  std::size_t points_at_once = 1'000'000;
+  libgtd::DetectionOptions detection;  // with the share
+};
+
+class StoreScoring {
+ public:
+  StoreScoring(const ScoreStoreOptions& options, Run& run)
+      : options_(options),
+        run_(run),
+        store_(options.store),
+        stream_(libmap::cloud_pieces(options.terrain)),
+        tiling_(options.detection) {
+    if (fs::is_directory(options.store) && fs::is_directory(options.terrain) &&
+        fs::equivalent(options.store, options.terrain))
+      throw libmap::Error("is the input: the output needs another name", {.file = options.store});
+  }
+
+  void score() {
+    if (run_.options().dry_run) return;
+    libmap::TileJournal journal = run_.timed(
+        "plan", [&] { return store_.begin(options_.detection.share, [&] { agree_on_plan(); }); });
+    const std::vector<TileNumber> wanted = run_.timed("check", [&] {
+      return store_.missing(
+          plan_, libgtd::tiles_of(frame_, tiling_.tile_voxels, options_.detection.share));
+    });
+    if (!wanted.empty()) {
+      libmap::PointTileStore points(
+          store_.folder() / "progress",
+          {.tile_m = point_tile_m(), .has_normals = stream_.has_normals()});
+      run_.timed("sort points", [&] { fill(points, wanted); });
+      run_.timed("tiles", [&] {
+        libgtd::detect_streamed(frame_, points, wanted, options_.detection,
+                                [&](std::vector<libgtd::StreamedTile> tiles) {
+                                  libgtd::add_tiles(write(tiles), plan_.key, journal);
+                                },
+                                run_.progress(), {.max_points = options_.points_at_once});
+      });
+    }
+    finish(wanted.size());
+  }
+
+ private:
+  // The earlier plan, if it is of the same parameters and inputs; else a new one. The caller holds
+  // the lock.
+  void agree_on_plan() {
+    const auto earlier = run_.options().force ? std::nullopt : store_.plan();
+    if (!earlier && !run_.options().force) require_no_index(store_);
+    plan_.terrain =
+        survey(stream_.pieces(), earlier ? earlier->terrain : std::vector<TerrainFile>{},
+               stream_.georeference());
+    plan_.index.manifest = make_manifest();
+    plan_.key = libmap::key_of(plan_.index.manifest);
+    if (earlier && earlier->key == plan_.key) {
+      // The same files may have another folder or time by now.
+      std::vector<TerrainFile> terrain = std::move(plan_.terrain);
+      plan_ = *earlier;
+      plan_.terrain = std::move(terrain);
+      frame_ = libgtd::frame_of(plan_, options_.detection, store_.plan_path());
+    } else {
+      if (earlier) {
+        libgtd::require_appendable(*earlier, plan_, options_.detection, options_.append,
+                                   options_.store);
+        libgtd::frame_of(*earlier, options_.detection, store_.plan_path());
+      }
+      store_.require_idle();
+      make_frame();
+      if (earlier)
+        plan_.kept =
+            libgtd::untouched_tiles(store_.done(*earlier), *earlier, plan_, frame_, tiling_);
+      else
+        store_.clear();
+      store_.set_plan(plan_);
+    }
+    remove_stale_index();
+  }
+
+  // Parameters and inputs, and what `score` says beside any map.
+  libmap::Manifest make_manifest() {
+    libmap::Manifest& manifest = run_.manifest();
+    carry_transforms(options_.terrain, run_);
+    for (const TerrainFile& file : plan_.terrain) manifest.inputs.push_back(file.input);
+    for (const auto& input : libgtd::gripper_files(options_.gripper_file)) run_.add_input(input);
+    manifest.frame = options_.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
+    libmap::Manifest copy = manifest;
+    copy.timings_s.clear();
+    copy.threads = 0;
+    return copy;
+  }
+
+  void make_frame() {
+    std::size_t points = 0, dropped = 0;
+    for (const TerrainFile& file : plan_.terrain) {
+      points += file.points;
+      dropped += file.dropped_points;
+    }
+    require_points(points, dropped, options_.terrain, run_);
+    in_file(options_.terrain, [&] {
+      frame_ = libgtd::frame_terrain(stream_, options_.detection);
+      libgtd::tiles_of(frame_, tiling_.tile_voxels);  // too many show before anything is kept
+    });
+    libgtd::set_frame(frame_, tiling_, plan_);
+    if (frame_.plane) report_plane(*frame_.plane, options_.terrain, run_);
+  }
+
+  void remove_stale_index() const {
+    if (!fs::exists(store_.index_path())) return;
+    try {
+      if (libgtd::read_tile_store(store_.folder()).key == plan_.key) return;
+    } catch (const libmap::Error&) {
+      // Broken: it is written again.
+    }
+    fs::remove(store_.index_path());
+  }
+
+  // Small against the tiles that are worked on at once, not small against their halo.
+  double point_tile_m() const {
+    return std::max(1.0 + tiling_.halo_voxels,
+                    std::min<double>(tiling_.tile_voxels, 4.0 * tiling_.halo_voxels)) *
+           options_.detection.scenario.voxel_size_m;
+  }
+
+  // The points on which the wanted tiles depend.
+  void fill(libmap::PointTileStore& points, const std::vector<TileNumber>& wanted) const {
+    const libgtd::PointsRectangle rectangle = libgtd::points_for(wanted, frame_, tiling_);
+    std::vector<fs::path> files;
+    for (const TerrainFile& file : plan_.terrain)
+      if (libgtd::touches(file, rectangle, frame_)) files.emplace_back(file.input.path);
+    const bool are_all = wanted.size() == libgtd::tiles_of(frame_, tiling_.tile_voxels).size();
+    const auto all = libmap::PointStream::Need::positions_and_normals;
+    libmap::PieceStream(files).for_each_block(all, [&](const libmap::PointCloud& block) {
+      const libmap::PointCloud terrain = libgtd::to_terrain(block, frame_);
+      libgtd::require_in_frame(terrain, frame_, store_.plan_path());
+      if (are_all) return points.add(terrain);
+      std::vector<std::size_t> inside;
+      for (std::size_t n = 0; n < terrain.size(); ++n) {
+        const auto position = terrain.positions[n].head<2>().array();
+        if ((position >= rectangle.low.array()).all() && (position <= rectangle.high.array()).all())
+          inside.push_back(n);
+      }
+      points.add(libmap::select_points(terrain, inside));
+    });
+    points.finish();
+  }
+
+  std::vector<StoredTile> write(std::vector<libgtd::StreamedTile>& tiles) const {
+    std::vector<StoredTile> stored(tiles.size());
+    libmap::parallel_each(tiles.size(), [&](std::size_t n) {
+      stored[n] = libgtd::stored_tile(tiles[n]);
+      libgtd::GraspabilityMap map;
+      map.lattice = frame_.lattice;
+      if (frame_.plane) map.terrain_from_input = frame_.plane->terrain_from_input;
+      map.zero_plane_m = options_.detection.scenario.zero_plane_m;
+      map.content = libgtd::content_of(options_.detection.scenario);
+      map.voxels = std::move(tiles[n].voxels);
+      if (!map.voxels.empty())
+        write_tile(store_.folder(), libgtd::to_cloud(map, options_.frame), stored[n]);
+    });
+    return stored;
+  }
+
+  // The last run writes the index.
+  void finish(std::size_t scored) {
+    const libmap::FileLock lock = store_.lock();
+    const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
+    if (!completion.index) {
+      run_.say("{} tiles scored; {} of {} are there", scored, completion.done, completion.tiles);
+      return;
+    }
+    const libgtd::TileStoreIndex& index = *completion.index;
+    store_.write_index(index, run_.manifest());
+    run_.say("{} of {} tiles scored, all are there: {} voxels, {} graspable", scored,
+             completion.tiles, index.voxels(), index.graspable_voxels());
+    if (index.voxels() == 0)
+      run_.warn("the terrain is smaller than the gripper mask: nothing was scored");
+  }
+
+  const ScoreStoreOptions& options_;
+  Run& run_;
+  libgtd::MapTileStore store_;
+  libmap::PieceStream stream_;
+  libgtd::StoreTiling tiling_;
+  libgtd::TilePlan plan_;
+  libgtd::TerrainFrame frame_;
+};
+
+// Scores the missing tiles of the share in the store, which is made if there is none.
+void score_into_store(const ScoreStoreOptions& options, Run& run) {
+  libgtd::require_streamable(options.detection);
+  if (run.options().force && options.detection.share.count > 1)
+    throw libmap::Error("removes the tiles of all shares: use it without --tile",
+                        {.field = "--force"});
+  StoreScoring(options, run).score();
+}
 
 struct ScoreOptions {
   std::string terrain;
@@ -100,7 +372,7 @@ libmap::PiecesReadResult read_terrain(const std::string& path) {
 
 void score(ScoreOptions& options, Run& run) {
   libgtd::Scenario& scenario = options.detection.scenario;
-  options.detection.share = parse_share(options.tile);
+  options.detection.share = libmap::parse_share(options.tile);
   if (options.up != "auto") options.detection.up = parse_vector(options.up, "--up");
   scenario.check();
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)

@@ -1,18 +1,26 @@
 // graspmap texture: a mesh and the photographs of a scan -> a textured mesh.
 #include <malloc.h>
 
-#include <nlohmann/json.hpp>
-
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_model.h"
 #include "libmap/texture/textured_mesh_io.h"
+#include "libmap/tiles/eigen_json.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
-#include "tools/support/piece_folder.h"
-#include "tools/support/piece_progress.h"
 #include "tools/support/scan_poses.h"
-#include "tools/support/store_filling.h"
+#include "tools/support/tile_folder.h"
+
+// What shares and resumed runs have in common, bit for bit.
+namespace libmap {
+
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,
+                                   spread)
+NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureCounts, cut_triangles, seen_triangles, unseen_triangles,
+                                   seen_m2, unseen_m2, charts, split_charts, shrunk_charts, pages,
+                                   atlas_scale, texels, seams_before_m, seams_m)
+
+}  // namespace libmap
 
 using namespace graspmap_tools;
 
@@ -140,41 +148,6 @@ void say_result(const libmap::TextureReport& result, Run& run) {
              1.0 / result.atlas_scale);
 }
 
-// Facts on pieces, as files between shares.
-PieceProgress::Facts facts_of(const libmap::TextureExposure& exposure) {
-  std::vector<std::array<float, 3>> gains;
-  for (const Eigen::Vector3f& gain : exposure.gains) gains.push_back({gain[0], gain[1], gain[2]});
-  return {{"gains", gains},
-          {"vignetting", exposure.vignetting},
-          {"observations", exposure.observations},
-          {"spread_before", exposure.spread_before},
-          {"spread", exposure.spread}};
-}
-
-libmap::TextureExposure exposure_of(const PieceProgress::Facts& facts) {
-  libmap::TextureExposure exposure;
-  for (const auto& [r, g, b] : facts.at("gains").get<std::vector<std::array<float, 3>>>())
-    exposure.gains.emplace_back(r, g, b);
-  facts.at("vignetting").get_to(exposure.vignetting);
-  facts.at("observations").get_to(exposure.observations);
-  facts.at("spread_before").get_to(exposure.spread_before);
-  facts.at("spread").get_to(exposure.spread);
-  return exposure;
-}
-
-PieceProgress::Facts facts_of(const libmap::TextureCounts& counts) {
-  PieceProgress::Facts facts;
-  libmap::for_each_count(counts, [&](const char* name, const auto& value) { facts[name] = value; });
-  return facts;
-}
-
-libmap::TextureCounts counts_of(const PieceProgress::Facts& facts) {
-  libmap::TextureCounts counts;
-  libmap::for_each_count(counts,
-                         [&](const char* name, auto& value) { facts.at(name).get_to(value); });
-  return counts;
-}
-
 // Pages of an earlier run that this one has not written anew.
 void remove_old_pages(const std::vector<fs::path>& old_pages,
                       const std::vector<libmap::ModelFile>& files) {
@@ -253,51 +226,46 @@ std::vector<std::string> stems_of(const std::vector<fs::path>& pieces) {
 // Each piece's model is made, written and forgotten.
 void make_models(const TextureCommandOptions& options, const libmap::ScanSource& scan,
                  const libmap::Trajectory& poses, const std::vector<fs::path>& pieces,
-                 PieceProgress& progress, Run& run) {
+                 TileFolder& output, Run& run) {
   // Arrays of a piece go back to the system: the heap would keep what the next does not fit into.
   mallopt(M_MMAP_THRESHOLD, 1 << 20);
   const std::vector<std::string> names = stems_of(pieces);
   libmap::MeshPieceIndex index(pieces);
   libmap::PieceTexturing texturing(index, options.margin_m, scan, poses, options.texture,
                                    run.progress());
-  std::optional<libmap::TextureExposure> exposure;
-  const auto find_exposure = [&] {
-    if (!exposure)
-      exposure =
-          exposure_of(progress.common_facts([&] { return facts_of(texturing.find_exposure()); }));
-  };
+  const TileFolder::Facts found =
+      output.begin([&] { return TileFolder::Facts(texturing.find_exposure()); });
+  if (found.is_null()) return;  // --dry-run
+  const auto exposure = found.get<libmap::TextureExposure>();
   const auto make = [&](std::size_t n, const fs::path& to) {
-    find_exposure();
-    const libmap::PieceTexturing::Piece piece = texturing.make(n, *exposure);
-    libmap::textured_mesh_files(to, piece.model, options.writing).front().write(to);
-    return facts_of(piece.counts);
+    const libmap::PieceTexturing::Piece tile = texturing.make(n, exposure);
+    libmap::textured_mesh_files(to, tile.model, options.writing).front().write(to);
+    return TileFolder::Facts(tile.counts);
   };
   const auto finish = [&](const fs::path& folder) {
     libmap::TextureReport whole = texturing.report();
-    find_exposure();
-    whole.exposure = *exposure;
+    whole.exposure = exposure;
     for (const std::string& name : names) {
-      whole += counts_of(progress.facts(name));
-      PieceProgress::link_file(progress.file(name, model_extension),
-                               folder / (name + model_extension));
+      whole += output.facts(name).get<libmap::TextureCounts>();
+      TileFolder::link_file(output.file(name, model_extension), folder / (name + model_extension));
     }
     libmap::require_seen(whole);
     report(whole, run);
     run.add_results({{"pieces", names.size()}});
   };
-  progress.make({names, model_extension, make, finish});
+  output.make({names, model_extension, make, finish});
 }
 
 void texture_in_pieces(TextureCommandOptions options, Run& run) {
   const std::vector<fs::path> pieces = libmap::mesh_pieces(options.mesh);
-  const std::vector<std::string> names =
-      piece_folder_names(options.output, pieces, model_extension);
+  const std::vector<std::string> names = tile_folder_names(options.output, pieces, model_extension);
   const auto scan = scan_of(options, run);
   const libmap::Trajectory poses = poses_of(options, *scan, run);
   add_inputs(options, run);
-  PieceProgress progress(options.output, names, inputs_of(options), parse_share(options.tile), run);
-  if (progress.is_complete()) return;
-  in_file(options.mesh, [&] { make_models(options, *scan, poses, pieces, progress, run); });
+  TileFolder output(options.output, names, inputs_of(options), libmap::parse_share(options.tile),
+                    run);
+  if (output.is_complete()) return;
+  in_file(options.mesh, [&] { make_models(options, *scan, poses, pieces, output, run); });
 }
 
 }  // namespace
@@ -311,7 +279,7 @@ int main(int argc, char** argv) {
       options.output,
       std::string("textured mesh (.glb; .obj: with STEM.mtl and a picture per page, STEM_0.png "
                   "...)") +
-          or_piece_folder);
+          or_tile_folder);
   command.option("--scan", "SCAN", options.scan,
                  "scan with the photographs: a database of RTAB-Map, or a folder of images", true);
   add_share_option(command, options.tile);
@@ -319,7 +287,7 @@ int main(int argc, char** argv) {
   add_calibration_option(command, options.calibration);
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) {
-    if (is_piece_folder(options.output)) return texture_in_pieces(options, run);
+    if (is_tile_folder(options.output)) return texture_in_pieces(options, run);
     require_folder_of_share(options.output, options.tile);
     texture(options, run);
   });

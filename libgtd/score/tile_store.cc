@@ -19,6 +19,11 @@ std::string tile_file_of(const TileNumber& tile) {
   return "tiles/" + std::to_string(tile.i) + "_" + std::to_string(tile.j) + ".pcd";
 }
 
+void extend(const Voxel& voxel, Voxel& min, Voxel& max) {
+  min = {std::min(min.i, voxel.i), std::min(min.j, voxel.j), std::min(min.k, voxel.k)};
+  max = {std::max(max.i, voxel.i), std::max(max.j, voxel.j), std::max(max.k, voxel.k)};
+}
+
 libmap::Pose TileStoreIndex::terrain_from_input() const {
   const libmap::Pose* pose = manifest.find_transform("terrain_from_input");
   return pose == nullptr ? libmap::Pose::Identity() : *pose;

@@ -25,6 +25,9 @@ TileNumber tile_of(const Voxel& voxel, int tile_voxels);
 TileBounds columns_of(const TileNumber& tile, int tile_voxels);  // not cut to the terrain's box
 std::string tile_file_of(const TileNumber& tile);                // "tiles/-3_12.pcd"
 
+// Grows the box until it contains the voxel.
+void extend(const Voxel& voxel, Voxel& min, Voxel& max);
+
 struct StoredTile {
   TileNumber number;
   Voxel min;  // box of its voxels

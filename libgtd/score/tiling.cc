@@ -80,21 +80,6 @@ std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels) {
   return tiles;
 }
 
-std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare& share) {
-  if (share.count < 1 || share.number < 1 || share.number > share.count)
-    throw libmap::Error("no such share",
-                        {.field = "tile",
-                         .value = std::to_string(share.number) + "/" + std::to_string(share.count),
-                         .bound = "K/N with 1 <= K <= N"});
-  const auto number = static_cast<std::size_t>(share.number);
-  const auto count = static_cast<std::size_t>(share.count);
-  const auto first = static_cast<std::ptrdiff_t>(tiles.size() * (number - 1) / count);
-  const auto last = static_cast<std::ptrdiff_t>(tiles.size() * number / count);
-  tiles.erase(tiles.begin() + last, tiles.end());
-  tiles.erase(tiles.begin(), tiles.begin() + first);
-  return tiles;
-}
-
 std::vector<std::uint8_t> find_edges(const VoxelGrid& grid, const GripperMask& mask,
                                      const TileBounds& tile,
                                      const std::vector<std::size_t>& pivots) {

@@ -17,14 +17,6 @@ namespace libgtd {
 // than 2^24 tiles.
 std::vector<TileBounds> make_tiles(const VoxelGrid& grid, int tile_voxels);
 
-// Share `number` of `count`, from 1 on: a run of neighboring tiles; all shares together are all
-// tiles. Throws Error naming `--tile`.
-struct TileShare {
-  int number = 1;
-  int count = 1;
-};
-std::vector<TileBounds> share_of(std::vector<TileBounds> tiles, const TileShare& share);
-
 struct ScoredVoxel {
   Voxel voxel;
   VoxelCounts counts;

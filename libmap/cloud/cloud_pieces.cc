@@ -211,25 +211,25 @@ void PieceStream::for_each_block(Need need, const Visit& visit) const {
   if (!block.empty()) visit(block);
 }
 
-PieceFacts survey_piece(const fs::path& piece, const std::optional<Georeference>& georeference) {
-  PieceFacts facts;
+TileInfo survey_tile(const fs::path& piece, const std::optional<Georeference>& georeference) {
+  TileInfo info;
   CloudBlockReader reader(piece, georeference);
   reader.leave_out_normals();
   PointCloud block;
   while (reader.append(PointStream::block_points, block)) {
     const Bounds3d box = bounds_of(block.positions);
-    if (facts.points == 0) {
-      facts.box = box;
+    if (info.points == 0) {
+      info.box = box;
     } else if (!block.empty()) {
-      facts.box.min = facts.box.min.cwiseMin(box.min);
-      facts.box.max = facts.box.max.cwiseMax(box.max);
+      info.box.min = info.box.min.cwiseMin(box.min);
+      info.box.max = info.box.max.cwiseMax(box.max);
     }
-    facts.points += block.size();
+    info.points += block.size();
     block.positions.clear();
     block.normals.clear();
   }
-  facts.dropped_points = reader.dropped_points();
-  return facts;
+  info.dropped_points = reader.dropped_points();
+  return info;
 }
 
 PiecesReadResult read_pieces(const std::vector<fs::path>& pieces) {

@@ -37,15 +37,15 @@ class PieceStream : public PointStream {
   std::optional<Georeference> georeference_;
 };
 
-struct PieceFacts {
+struct TileInfo {
   std::size_t points = 0;  // with a position
   std::size_t dropped_points = 0;
   Bounds3d box;
 };
 // Reads the whole piece once; `georeference` is that of its PieceStream. Throws Error naming it if
 // it cannot be read.
-PieceFacts survey_piece(const std::filesystem::path& piece,
-                        const std::optional<Georeference>& georeference = std::nullopt);
+TileInfo survey_tile(const std::filesystem::path& piece,
+                     const std::optional<Georeference>& georeference = std::nullopt);
 
 struct PiecesReadResult {
   PointCloud cloud;

@@ -10,10 +10,10 @@
 #include "libmap/cloud/frame_registration.h"
 #include "libmap/cloud/fusion_frames.h"
 #include "libmap/cloud/fusion_tiling.h"
-#include "libmap/cloud/plan_cells.h"
 #include "libmap/cloud/surface_points.h"
 #include "libmap/cloud/surface_refinement.h"
 #include "libmap/cloud/surface_voxels.h"
+#include "libmap/cloud/tile_mask.h"
 #include "libmap/core/error.h"
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
@@ -78,17 +78,9 @@ class Fusion {
   }
 
   const FusionSurvey& survey() const { return survey_; }
-  const std::vector<PlanTile>& tiles() const { return tiles_; }
+  const std::vector<XyTile>& tiles() const { return tiles_; }
   void make_tiles(double tile_m);
   TileFusion::Tile make(std::size_t tile);
-  // All in one tile.
-  TileFusion::Tile make_whole() {
-    Members all;
-    for (std::size_t n = 0; n < frames().size(); ++n) all.frames.push_back(n);
-    all.counted = all.frames;
-    progress_->begin("fusion", 2 * all.frames.size());
-    return fuse_tile({}, 0, all);
-  }
   DepthFusionResult report() const;
 
  private:
@@ -138,12 +130,12 @@ class Fusion {
   // merge(n, make(n, cells)) for each frame in their order: one thread merges the frames before,
   // while others make these by the cells as they were.
   template <typename Make, typename Merge>
-  void each_frame(std::size_t count, const PlanCells& cells, const Make& make, const Merge& merge) {
+  void each_frame(std::size_t count, const TileMask& cells, const Make& make, const Merge& merge) {
     std::vector<CoarseFrame> before;
     for (std::size_t first = 0; first < count || !before.empty(); first += frames_in_flight) {
       const std::size_t now = first < count ? std::min(frames_in_flight, count - first) : 0;
       std::vector<CoarseFrame> parts(now);
-      const PlanCells as_they_are = cells;
+      const TileMask as_they_are = cells;
       parallel_each(now + 1, [&](std::size_t task) {
         if (task > 0) {
           parts[task - 1] = make(first + task - 1, as_they_are);
@@ -157,7 +149,7 @@ class Fusion {
   }
 
   // Adds the planes through the pixels of one frame; of pixels and planes those in `cells`.
-  void add_frame(const RgbdFrame& depth, const Pose& grid_from_base, const PlanCells& cells,
+  void add_frame(const RgbdFrame& depth, const Pose& grid_from_base, const TileMask& cells,
                  FittedPixels fitted, CoarseFrame& coarse) {
     const MemoryBudget::Share share = memory_.take(coarse_pixel_bytes * depth.depth.pixels.size());
     SurfaceVoxels voxels;
@@ -171,7 +163,7 @@ class Fusion {
   }
 
   // What the frame can be used for, and how far it reaches.
-  void survey_frame(CoarseFrame& coarse, const PlanCells& cells) {
+  void survey_frame(CoarseFrame& coarse, const TileMask& cells) {
     FusionFrame& frame = coarse.frame;
     const std::shared_ptr<const RgbdFrame> depth = images_.depth_of(frame.node);
     images_.measure_reach(*depth, options_.planes.max_depth_m, frame);
@@ -186,7 +178,7 @@ class Fusion {
   void survey(const std::vector<FusionFrame>& given) {
     progress_->begin("survey", given.size());
     const std::size_t max_voxels = voxels_per_element * wanted_elements(given.size());
-    const auto make = [&](std::size_t n, const PlanCells& wanted) {
+    const auto make = [&](std::size_t n, const TileMask& wanted) {
       CoarseFrame coarse;
       coarse.frame = given[n];
       try {
@@ -213,7 +205,7 @@ class Fusion {
     sample_ = {};
     each_frame(
         frames().size(), sampled_,
-        [&](std::size_t n, const PlanCells& wanted) {
+        [&](std::size_t n, const TileMask& wanted) {
           CoarseFrame coarse;
           add_frame(*images_.depth_of(frames()[n].node), frames()[n].grid_from_base, wanted,
                     FittedPixels::in_cells, coarse);
@@ -294,10 +286,10 @@ class Fusion {
     return {tile_m, options_.voxel_size_m, survey_.grid_origin, shift_m, disc_m};
   }
 
-  TileFusion::Tile fuse_tile(const PlanCells& cells, int element_margin, const Members& members);
-  SurfaceVoxels coarse_surface(const Members& members, const PlanCells& around,
-                               const PlanCells& cells, FusionCounts& counts);
-  PointCloud make_cloud(const PlanCells& cells, const RefinedSurface& surface,
+  TileFusion::Tile fuse_tile(const TileMask& cells, int element_margin, const Members& members);
+  SurfaceVoxels coarse_surface(const Members& members, const TileMask& around,
+                               const TileMask& cells, FusionCounts& counts);
+  PointCloud make_cloud(const TileMask& cells, const RefinedSurface& surface,
                         FusionCounts& counts) const;
 
   DepthFusionOptions options_;
@@ -306,10 +298,10 @@ class Fusion {
   FusionFrames images_;
   MemoryBudget memory_;
   FusionSurvey survey_;
-  PlanCells sampled_;  // the part of the coarse surface that frames are registered by
+  TileMask sampled_;  // the part of the coarse surface that frames are registered by
   SurfaceVoxels sample_;
   std::optional<FusionTiling> tiling_;
-  std::vector<PlanTile> tiles_;
+  std::vector<XyTile> tiles_;
   std::vector<Members> members_;  // of the tiles
   StageTimings timings_s_;
 };
@@ -347,12 +339,19 @@ DepthFusionResult Fusion::report() const {
 }
 
 void Fusion::make_tiles(double tile_m) {
+  if (tile_m == whole_plan) {
+    tiles_.emplace_back();
+    Members& all = members_.emplace_back();
+    for (std::size_t n = 0; n < frames().size(); ++n) all.frames.push_back(n);
+    all.counted = all.frames;
+    return;
+  }
   progress_ = &no_progress();
   tiling_ = tiling_of(tile_m);
-  std::map<PlanTile, Members> members;
+  std::map<XyTile, Members> members;
   for (std::size_t n = 0; n < frames().size(); ++n) {
-    std::optional<PlanTile> first;
-    tiling_->each_tile(frames()[n].reach, [&](const PlanTile& tile) {
+    std::optional<XyTile> first;
+    tiling_->each_tile(frames()[n].reach, [&](const XyTile& tile) {
       members[tile].frames.push_back(n);
       first = std::min(first.value_or(tile), tile);
     });
@@ -365,16 +364,19 @@ void Fusion::make_tiles(double tile_m) {
 }
 
 TileFusion::Tile Fusion::make(std::size_t tile) {
-  return fuse_tile(tiling_->points(tiles_[tile]), tiling_->element_margin(), members_[tile]);
+  const Members& members = members_[tile];
+  progress_->begin("fusion", 2 * members.frames.size());
+  if (!tiling_) return fuse_tile({}, 0, members);
+  return fuse_tile(tiling_->points(tiles_[tile]), tiling_->element_margin(), members);
 }
 
-TileFusion::Tile Fusion::fuse_tile(const PlanCells& cells, int element_margin,
+TileFusion::Tile Fusion::fuse_tile(const TileMask& cells, int element_margin,
                                    const Members& members) {
   TileFusion::Tile tile;
   std::vector<FusionFrame> of_tile;
   for (const std::size_t n : members.frames) of_tile.push_back(frames()[n]);
   images_.keep_only(of_tile);
-  const PlanCells around = cells.grown(element_margin);
+  const TileMask around = cells.grown(element_margin);
   std::vector<SurfaceElement> elements;
   timed("coarse surface", [&] {
     const SurfaceVoxels voxels =
@@ -409,10 +411,10 @@ TileFusion::Tile Fusion::fuse_tile(const PlanCells& cells, int element_margin,
   return tile;
 }
 
-SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& around,
-                                     const PlanCells& cells, FusionCounts& counts) {
+SurfaceVoxels Fusion::coarse_surface(const Members& members, const TileMask& around,
+                                     const TileMask& cells, FusionCounts& counts) {
   SurfaceVoxels voxels;
-  const auto make = [&](std::size_t n, const PlanCells& wanted) {
+  const auto make = [&](std::size_t n, const TileMask& wanted) {
     CoarseFrame coarse;
     coarse.number = members.frames[n];
     const FusionFrame& frame = frames()[coarse.number];
@@ -432,7 +434,7 @@ SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& ar
   return voxels;
 }
 
-PointCloud Fusion::make_cloud(const PlanCells& cells, const RefinedSurface& surface,
+PointCloud Fusion::make_cloud(const TileMask& cells, const RefinedSurface& surface,
                               FusionCounts& counts) const {
   SurfacePoints points =
       make_surface_points(surface, options_.voxel_size_m, cells, options_.points);
@@ -455,8 +457,8 @@ FusionCounts& FusionCounts::operator+=(const FusionCounts& more) {
 
 DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
                              const DepthFusionOptions& options, Progress& progress) {
-  Fusion fusion(scan, world_from_base, options, progress, nullptr);
-  TileFusion::Tile whole = fusion.make_whole();
+  TileFusion fusion(scan, world_from_base, options, whole_plan, progress);
+  TileFusion::Tile whole = fusion.make(0);
   DepthFusionResult result = fusion.report();
   static_cast<FusionCounts&>(result) = whole.counts;
   result.cloud = std::move(whole.cloud);
@@ -479,7 +481,7 @@ TileFusion::~TileFusion() = default;
 
 const FusionSurvey& TileFusion::survey() const { return work_->survey(); }
 
-const std::vector<PlanTile>& TileFusion::tiles() const { return work_->tiles(); }
+const std::vector<XyTile>& TileFusion::tiles() const { return work_->tiles(); }
 
 TileFusion::Tile TileFusion::make(std::size_t tile) { return work_->make(tile); }
 

@@ -12,6 +12,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <memory>
 #include <string>
 #include <utility>
@@ -22,12 +23,12 @@
 #include "libmap/cloud/surface_points.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parameters.h"
-#include "libmap/core/plan_tiles.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/scan/scan_source.h"
+#include "libmap/tiles/xy_tile.h"
 
 namespace libmap {
 
@@ -102,6 +103,9 @@ DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_fro
                              const DepthFusionOptions& options = {},
                              Progress& progress = no_progress());
 
+// Side of a tile that contains the whole plan.
+inline constexpr double whole_plan = std::numeric_limits<double>::infinity();
+
 // The same in square tiles of the world's x-y plane, with the side `tile_m`, rounded to whole
 // voxels. Memory depends on the size of a tile, and each frame adds 4 kB. Each point is in one tile
 // only. It is the same point, bit for bit, as without tiles.
@@ -115,8 +119,8 @@ class TileFusion {
              const FusionSurvey* known = nullptr);
   ~TileFusion();
 
-  const FusionSurvey& survey() const;          // for a later TileFusion
-  const std::vector<PlanTile>& tiles() const;  // to which a frame matters, in their order
+  const FusionSurvey& survey() const;        // for a later TileFusion
+  const std::vector<XyTile>& tiles() const;  // to which a frame matters, in their order
   struct Tile {
     PointCloud cloud;
     FusionCounts counts;

@@ -320,7 +320,7 @@ std::size_t row_begin(const DepthImage& depth, int y) {
 // Marks the pixels that were measured in `cells`, not 0.
 std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& rays,
                                     const Loops::Placement& placement, double max_depth_m,
-                                    const PlanCells& cells) {
+                                    const TileMask& cells) {
   const Loops& loops = depth_plane_loops_of(best_instruction_set());
   const auto max_depth = static_cast<float>(max_depth_m);
   std::vector<std::uint8_t> are_in(depth.pixels.size(), 0);
@@ -344,7 +344,7 @@ std::vector<std::uint8_t> pixels_in(const DepthImage& depth, const PixelRays& ra
 std::vector<std::uint8_t> pixels_around(const DepthImage& depth, const PixelRays& rays,
                                         const Loops::Placement& placement,
                                         const DepthPlaneOptions& options, double voxel_size_m,
-                                        const PlanCells& cells) {
+                                        const TileMask& cells) {
   const double ray_length = rays.min.cwiseAbs().cwiseMax(rays.max.cwiseAbs()).homogeneous().norm();
   const double moved = max_plane_distance_m(options) * ray_length / voxel_size_m;
   const int margin = 1 + static_cast<int>(std::min(moved, static_cast<double>(voxel_cell_limit)));
@@ -393,7 +393,7 @@ DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
 
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
-                                  double voxel_size_m, const PlanCells& cells, FittedPixels fitted,
+                                  double voxel_size_m, const TileMask& cells, FittedPixels fitted,
                                   SurfaceVoxels& voxels) {
   const Loops::Placement placement = placement_of(grid_from_camera, options.noise, voxel_size_m);
   std::vector<std::uint8_t> only;

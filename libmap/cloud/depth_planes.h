@@ -12,7 +12,7 @@
 
 #include "libmap/cloud/depth_noise.h"
 #include "libmap/cloud/depth_projection.h"
-#include "libmap/cloud/plan_cells.h"
+#include "libmap/cloud/tile_mask.h"
 #include "libmap/cloud/surface_voxels.h"
 #include "libmap/core/image.h"
 #include "libmap/core/pose.h"
@@ -65,7 +65,7 @@ enum class FittedPixels { all, in_cells };
 // of the pixels.
 DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays,
                                   const Pose& grid_from_camera, const DepthPlaneOptions& options,
-                                  double voxel_size_m, const PlanCells& cells, FittedPixels fitted,
+                                  double voxel_size_m, const TileMask& cells, FittedPixels fitted,
                                   SurfaceVoxels& voxels);
 
 }  // namespace libmap

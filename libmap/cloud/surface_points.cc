@@ -153,7 +153,7 @@ Color to_color(const Eigen::Vector3f& color) {
 
 class PointMaker {
  public:
-  PointMaker(const RefinedSurface& surface, double voxel_size_m, const PlanCells& cells,
+  PointMaker(const RefinedSurface& surface, double voxel_size_m, const TileMask& cells,
              const SurfacePointOptions& options)
       : surface_(surface), voxel_size_m_(voxel_size_m), cells_(cells), options_(options) {}
 
@@ -187,7 +187,7 @@ class PointMaker {
 
   const RefinedSurface& surface_;
   double voxel_size_m_;
-  const PlanCells& cells_;
+  const TileMask& cells_;
   const SurfacePointOptions& options_;
   std::vector<char> is_contradicted_;  // one an element
   VoxelIndex index_;
@@ -403,7 +403,7 @@ SurfacePointCounts& SurfacePointCounts::operator+=(const SurfacePointCounts& mor
 }
 
 SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
-                                  const PlanCells& cells, const SurfacePointOptions& options) {
+                                  const TileMask& cells, const SurfacePointOptions& options) {
   return PointMaker(surface, voxel_size_m, cells, options).run();
 }
 

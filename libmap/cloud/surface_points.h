@@ -5,8 +5,8 @@
 #include <cstddef>
 #include <vector>
 
-#include "libmap/cloud/plan_cells.h"
 #include "libmap/cloud/surface_refinement.h"
+#include "libmap/cloud/tile_mask.h"
 #include "libmap/core/point_cloud.h"
 
 namespace libmap {
@@ -48,7 +48,7 @@ struct SurfacePoints {
 // The refined elements as points: contradicted ones dropped, one left per voxel, edges extended.
 // Returns and counts the points in the columns of voxels `cells`.
 SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
-                                  const PlanCells& cells, const SurfacePointOptions& options);
+                                  const TileMask& cells, const SurfacePointOptions& options);
 
 // Replaces each normal of `cloud`, of unit length, by that of the plane of weighted total least
 // squares through the points within `radius_m` whose normals look the same way (within 45 degrees;

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "libmap/cloud/plan_cells.h"
+#include "libmap/cloud/tile_mask.h"
 #include "libmap/core/parallel.h"
 
 namespace libmap {
@@ -29,7 +29,7 @@ void SurfaceVoxels::add(const Eigen::Vector3f& place, const Eigen::Vector3f& nor
   sum.frames = 1;
 }
 
-SurfaceVoxels SurfaceVoxels::in(const PlanCells& cells) const {
+SurfaceVoxels SurfaceVoxels::in(const TileMask& cells) const {
   SurfaceVoxels found;
   for (std::size_t n = 0; n < sums_.size(); ++n) {
     const std::uint64_t key = index_.keys()[n];
@@ -40,7 +40,7 @@ SurfaceVoxels SurfaceVoxels::in(const PlanCells& cells) const {
   return found;
 }
 
-void SurfaceVoxels::merge(const Frame& frame, const PlanCells& cells) {
+void SurfaceVoxels::merge(const Frame& frame, const TileMask& cells) {
   for (std::size_t n = 0; n < frame.sums.size(); ++n) {
     const VoxelPlace place = unpack(frame.keys[n]);
     if (!cells.has_cell(place.cell.head<2>())) continue;

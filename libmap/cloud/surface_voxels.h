@@ -12,7 +12,7 @@
 
 namespace libmap {
 
-struct PlanCells;  // plan_cells.h
+struct TileMask;  // tile_mask.h
 
 class SurfaceVoxels {
  public:
@@ -34,9 +34,9 @@ class SurfaceVoxels {
   };
   Frame take_frame() && { return {std::move(index_).take_keys(), std::move(sums_)}; }
   // All of it that is in the columns `cells`.
-  void merge(const Frame& frame, const PlanCells& cells);
+  void merge(const Frame& frame, const TileMask& cells);
   // Those in the columns `cells`, in their order.
-  SurfaceVoxels in(const PlanCells& cells) const;
+  SurfaceVoxels in(const TileMask& cells) const;
 
   std::size_t size() const { return sums_.size(); }
   const VoxelIndex& index() const { return index_; }

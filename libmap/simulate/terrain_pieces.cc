@@ -300,16 +300,16 @@ void TerrainPiecesOptions::check() const {
                                     .bound = "large enough for at most 1,000,000 pieces"});
 }
 
-std::vector<PlanTile> terrain_pieces(const TerrainPiecesOptions& options) {
+std::vector<XyTile> terrain_pieces(const TerrainPiecesOptions& options) {
   options.check();
-  std::vector<PlanTile> pieces;
+  std::vector<XyTile> pieces;
   for (std::int64_t i = 0; cells_of_piece(i, options.size_x_m, options).count() > 0; ++i)
     for (std::int64_t j = 0; cells_of_piece(j, options.size_y_m, options).count() > 0; ++j)
       pieces.push_back({i, j});
   return pieces;
 }
 
-PointCloud sample_piece(const TerrainPiecesOptions& options, const PlanTile& piece) {
+PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece) {
   options.check();
   const double spacing = options.spacing_m;
   const CellRange x = cells_of_piece(piece.i, options.size_x_m, options);

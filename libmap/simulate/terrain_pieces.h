@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "libmap/core/parameters.h"
-#include "libmap/core/plan_tiles.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/tiles/xy_tile.h"
 
 namespace libmap {
 
@@ -87,13 +87,13 @@ struct TerrainPiecesOptions {
 void bind(ParameterTable& table, TerrainPiecesOptions& options);
 
 // The pieces that cover the terrain, ascending.
-std::vector<PlanTile> terrain_pieces(const TerrainPiecesOptions& options);
+std::vector<XyTile> terrain_pieces(const TerrainPiecesOptions& options);
 
 // The points of one piece, with normals, in meters, z up: the plan is cut into squares of
 // `spacing_m`, and each holds a point for each spacing_m^2 of its surface, by chance rounded up or
 // down, at least one. A piece depends on its place, the seed, the spacing and the terrain alone;
 // one that the size cuts off holds the same points as the whole one as far as it goes. Sizes are
 // rounded to whole spacings.
-PointCloud sample_piece(const TerrainPiecesOptions& options, const PlanTile& piece);
+PointCloud sample_piece(const TerrainPiecesOptions& options, const XyTile& piece);
 
 }  // namespace libmap

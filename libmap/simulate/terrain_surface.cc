@@ -105,7 +105,7 @@ TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
   return with_used_vertices(mesh);
 }
 
-TerrainSurface::TerrainSurface(const PointSpool& points, const GroundHeights& heights,
+TerrainSurface::TerrainSurface(const PointTileStore& points, const GroundHeights& heights,
                                const TerrainSurfaceOptions& options)
     : points_(points),
       heights_(heights),

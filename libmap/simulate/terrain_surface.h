@@ -11,10 +11,10 @@
 #include <utility>
 #include <vector>
 
-#include "libmap/cloud/point_spool.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/simulate/depth_camera.h"
 #include "libmap/simulate/ground_heights.h"
+#include "libmap/tiles/point_tile_store.h"
 
 namespace libmap {
 
@@ -43,7 +43,7 @@ struct TerrainSurfaceOptions {
 class TerrainSurface {
  public:
   // `points` and `heights` are of the same points, and outlive it.
-  TerrainSurface(const PointSpool& points, const GroundHeights& heights,
+  TerrainSurface(const PointTileStore& points, const GroundHeights& heights,
                  const TerrainSurfaceOptions& options = {});
 
   // What each of several cameras can see of it from its poses, for as long as the result lives:
@@ -69,7 +69,7 @@ class TerrainSurface {
   void load(const std::vector<Place>& places);
   void forget();
 
-  const PointSpool& points_;
+  const PointTileStore& points_;
   const GroundHeights& heights_;
   TerrainSurfaceOptions options_;
   double square_m_ = 0.0;

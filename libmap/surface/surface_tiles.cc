@@ -102,7 +102,7 @@ double SurfaceTileOptions::margin_m() const {
          surface_margin_m(reconstruction);
 }
 
-PlanBox plan_box_of(const PlanTile& tile, double tile_m, double margin_m) {
+PlanBox plan_box_of(const XyTile& tile, double tile_m, double margin_m) {
   const Eigen::Vector2d low =
       Eigen::Vector2d(static_cast<double>(tile.i), static_cast<double>(tile.j)) * tile_m;
   return {low.array() - margin_m, low.array() + tile_m + margin_m};
@@ -118,22 +118,22 @@ TriangleMesh without_components(const TriangleMesh& mesh,
 }
 
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
-                       std::map<PlanTile, std::size_t>& points_in_tiles) {
+                       std::map<XyTile, std::size_t>& points_in_tiles) {
   const double reach = surface_margin_m(options.reconstruction) + options.cleaning.max_hole_m;
   for (const Eigen::Vector3d& position : cloud.positions) {
     if (!(position.head<2>().cwiseAbs().maxCoeff() < max_tiles * options.tile_m))
       throw Error("too small for so large coordinates",
                   {.field = "tile_size_m", .value = to_text(options.tile_m)});
     const Eigen::Vector2d place = position.head<2>();
-    const PlanTile low = plan_tile_at(place.array() - reach, options.tile_m);
-    const PlanTile high = plan_tile_at(place.array() + reach, options.tile_m);
+    const XyTile low = xy_tile_at(place.array() - reach, options.tile_m);
+    const XyTile high = xy_tile_at(place.array() + reach, options.tile_m);
     for (std::int64_t i = low.i; i <= high.i; ++i)
       for (std::int64_t j = low.j; j <= high.j; ++j) ++points_in_tiles[{i, j}];
   }
 }
 
 SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& survey,
-                              const PlanTile& tile, const SurfaceTileOptions& options,
+                              const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress) {
   options.check();
   SurfaceTile made;
@@ -156,13 +156,13 @@ SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& sur
   cut_out(mesh,
           triangles_at(mesh,
                        [&](const Eigen::Vector2d& center) {
-                         return plan_tile_at(center, options.tile_m) == tile;
+                         return xy_tile_at(center, options.tile_m) == tile;
                        }),
           made);
   return made;
 }
 
-void SurfaceIslands::add(const PlanTile& tile, const SurfaceTile& made) {
+void SurfaceIslands::add(const XyTile& tile, const SurfaceTile& made) {
   const std::size_t first = parts_.size();
   for (std::size_t c = 0; c < made.component_areas_m2.size(); ++c)
     parts_.push_back({tile, static_cast<std::uint32_t>(c), made.component_areas_m2[c]});

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "libmap/core/plan_tiles.h"
 #include "libmap/core/progress.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/surface_reconstruction.h"
+#include "libmap/tiles/xy_tile.h"
 
 namespace libmap {
 
@@ -31,11 +31,11 @@ struct SurfaceTileOptions {
 };
 
 // The square, grown.
-PlanBox plan_box_of(const PlanTile& tile, double tile_m, double margin_m);
+PlanBox plan_box_of(const XyTile& tile, double tile_m, double margin_m);
 
 // The squares that may have a part of the surface of `cloud`.
 void add_surface_tiles(const PointCloud& cloud, const SurfaceTileOptions& options,
-                       std::map<PlanTile, std::size_t>& points_in_tiles);
+                       std::map<XyTile, std::size_t>& points_in_tiles);
 
 struct SurfaceTile {
   // The triangles whose centers are in the square. Positions are those of single precision where
@@ -54,7 +54,7 @@ struct SurfaceTile {
 // on beyond: SurfaceIslands finds them. Components narrower than min_island_area_m2 / margin_m()
 // that do so may keep a hole beside them from being filled.
 SurfaceTile make_surface_tile(const PointCloud& points, const SurfaceSurvey& survey,
-                              const PlanTile& tile, const SurfaceTileOptions& options,
+                              const XyTile& tile, const SurfaceTileOptions& options,
                               Progress& progress = no_progress());
 
 // The mesh without some of its connected_components, ascending.
@@ -65,15 +65,15 @@ TriangleMesh without_components(const TriangleMesh& mesh,
 class SurfaceIslands {
  public:
   // The components of one square, by which those of its neighbors are joined.
-  void add(const PlanTile& tile, const SurfaceTile& made);
+  void add(const XyTile& tile, const SurfaceTile& made);
   // The components of each square that belong to islands, ascending.
-  using Dropped = std::map<PlanTile, std::vector<std::uint32_t>>;
+  using Dropped = std::map<XyTile, std::vector<std::uint32_t>>;
   Dropped dropped(const MeshCleaningOptions& options);
   std::size_t islands() const { return islands_; }  // known after dropped()
 
  private:
   struct Part {
-    PlanTile tile;
+    XyTile tile;
     std::uint32_t component = 0;
     double area_m2 = 0.0;
   };

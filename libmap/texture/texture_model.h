@@ -65,24 +65,6 @@ struct TextureCounts {
   double texel_size_m() const;
 };
 
-// use(name, value) for each of them.
-template <typename Counts, typename Use>
-void for_each_count(Counts& counts, const Use& use) {
-  use("cut_triangles", counts.cut_triangles);
-  use("seen_triangles", counts.seen_triangles);
-  use("unseen_triangles", counts.unseen_triangles);
-  use("seen_m2", counts.seen_m2);
-  use("unseen_m2", counts.unseen_m2);
-  use("charts", counts.charts);
-  use("split_charts", counts.split_charts);
-  use("shrunk_charts", counts.shrunk_charts);
-  use("pages", counts.pages);
-  use("atlas_scale", counts.atlas_scale);
-  use("texels", counts.texels);
-  use("seams_before_m", counts.seams_before_m);
-  use("seams_m", counts.seams_m);
-}
-
 struct TextureReport : TextureCounts {
   std::size_t photos = 0;
   std::vector<std::pair<int, Error>> skipped;  // frames, and what they lack

@@ -5,9 +5,7 @@
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/map_downsampling.h"
-#include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
-#include "libgtd/score/tile_store_json.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/report/map_view.h"
 #include "tests/fuzz/scratch_file.h"
@@ -96,7 +94,11 @@ bool run_tile_index(std::string_view bytes) {
   });
 }
 
-Seeds tile_index_seeds() { return {libgtd::json_of(small_index()).dump()}; }
+Seeds tile_index_seeds() {
+  return {written("seed.tiles/index.json", [](const fs::path& path) {
+    libgtd::MapTileStore(path.parent_path()).write_index(small_index());
+  })};
+}
 
 // The plan of a store that is not finished, and a journal.
 bool run_tile_progress(std::string_view bytes) {
@@ -108,9 +110,9 @@ bool run_tile_progress(std::string_view bytes) {
   journal.write(bytes);
   accepts([&] { libgtd::read_tile_store(store); });
   return accepts([&] {
-    const libgtd::TileProgress progress(store);
-    const auto read = progress.plan();
-    if (read) progress.complete(*read);
+    const libgtd::MapTileStore unfinished(store);
+    const auto read = unfinished.plan();
+    if (read) unfinished.complete(*read);
     libgtd::finish_tile_store(store);
   });
 }
@@ -121,13 +123,15 @@ Seeds tile_progress_seeds() {
   plan.key = plan.index.key;
   plan.kept = {plan.index.tiles.front()};
   plan.has_plane = true;
-  plan.pieces = {{.input = small_manifest().inputs.front(), .points = 5, .box = {}}};
+  plan.terrain = {{.input = small_manifest().inputs.front(), .points = 5, .box = {}}};
   const std::string text = written("progress/plan.json", [&](const fs::path& path) {
-    libgtd::TileProgress(path.parent_path().parent_path()).set_plan(plan);
+    libgtd::MapTileStore(path.parent_path().parent_path()).set_plan(plan);
   });
-  libgtd::Json line = libgtd::json_of(plan.index.tiles.back());
-  line["key"] = plan.key;
-  return {text + '\f' + line.dump() + '\n'};
+  const std::string line = written("progress/1_of_1.jsonl", [&](const fs::path& path) {
+    libmap::TileJournal journal(path.parent_path().parent_path(), {});
+    libgtd::add_tiles({plan.index.tiles.back()}, plan.key, journal);
+  });
+  return {text + '\f' + line};
 }
 
 }  // namespace

@@ -73,15 +73,15 @@ TEST(MeshShares, TogetherAreTheFolderOfOneRun) {
   EXPECT_FALSE(fs::exists(scratch("other.progress")));
 }
 
-// Those that are done and not empty.
+// The files of those that are done and not empty.
 std::vector<fs::path> done_pieces(const std::string& progress) {
   std::vector<fs::path> pieces;
   std::error_code ignored;
-  for (const auto& entry : fs::recursive_directory_iterator(scratch(progress), ignored)) {
-    fs::path path = entry.path();
-    if (path.extension() == ".json" && fs::exists(path.replace_extension(".ply")))
-      pieces.push_back(path);
-  }
+  const fs::path journal = scratch(progress) / "progress/1_of_1.jsonl";
+  const std::string lines = fs::exists(journal) ? graspmap_test::read_text(journal) : std::string();
+  for (const auto& entry : fs::directory_iterator(scratch(progress) / "tiles", ignored))
+    if (lines.find("\"" + entry.path().stem().string() + "\"") != std::string::npos)
+      pieces.push_back(entry.path());
   return pieces;
 }
 

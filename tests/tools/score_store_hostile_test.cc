@@ -1,14 +1,10 @@
 // What `graspmap score` makes of a store whose plan was changed by hand, and of tiles without end.
 #include <gtest/gtest.h>
 
-#include <algorithm>
-#include <cmath>
-#include <cstdlib>
 #include <functional>
 
 #include "libgtd/score/tile_store_io.h"
 #include "tests/tools/tool_test_support.h"
-#include "tools/support/needed_tiles.h"
 
 namespace score_store_hostile_test {
 
@@ -20,46 +16,8 @@ using graspmap_test::graspmap;
 using graspmap_test::ProgramResult;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
-using graspmap_test::uniform;
 using graspmap_test::write_text;
-using graspmap_tools::NeededTiles;
-using libgtd::TileNumber;
 using Words = std::vector<std::string>;
-
-TEST(NeededTiles, AreThoseOfTheDefinition) {
-  for (const int reach : {0, 1, 3, 20}) {
-    std::vector<TileNumber> wanted;
-    for (int n = 0; n < 4; ++n)
-      wanted.push_back({static_cast<int>(uniform(-7, 9)), static_cast<int>(uniform(-3, 12))});
-    const NeededTiles needed({-7, -3}, {9, 12}, reach, wanted);
-    const auto is_needed = [&](const TileNumber& tile) {
-      return std::any_of(wanted.begin(), wanted.end(), [&](const TileNumber& one) {
-        return std::abs(one.i - tile.i) <= reach && std::abs(one.j - tile.j) <= reach;
-      });
-    };
-    for (int i = -40; i < 40; ++i)
-      for (int j = -40; j < 40; ++j) {
-        EXPECT_EQ(needed.hold({i, j}), is_needed({i, j})) << i << ' ' << j << ' ' << reach;
-        EXPECT_EQ(needed.hold_any({i, j}, {i + 1, j + 2}),
-                  is_needed({i, j}) || is_needed({i, j + 1}) || is_needed({i, j + 2}) ||
-                      is_needed({i + 1, j}) || is_needed({i + 1, j + 1}) ||
-                      is_needed({i + 1, j + 2}));
-      }
-  }
-  const NeededTiles all({0, 0}, {1, 1}, 1 << 28, {{0, 0}});
-  EXPECT_TRUE(all.hold({1 << 28, -(1 << 28)}));
-  EXPECT_FALSE(all.hold({1 << 29, 0}));
-}
-
-TEST(NeededTiles, BoxesThatReachAnywhere) {
-  const libgtd::VoxelLattice lattice;
-  EXPECT_EQ(graspmap_tools::tile_near(lattice, {0.095, -0.005, 1e300}, 10), (TileNumber{0, -1}));
-  const int farthest = 1 << 29;
-  EXPECT_EQ(graspmap_tools::tile_near(lattice, {1e300, -1e300, 0}, 1),
-            (TileNumber{farthest, -farthest}));
-  EXPECT_EQ(graspmap_tools::tile_near(lattice, {INFINITY, std::nan(""), 0}, 1),
-            (TileNumber{farthest, -farthest}));
-}
 
 class ScoreStoreHostile : public testing::Test {
  protected:

@@ -6,7 +6,6 @@
 #include <map>
 
 #include "libgtd/evaluate/voxel_map.h"
-#include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
 #include "libgtd/terrain/voxel_fields.h"
@@ -14,8 +13,6 @@
 #include "libmap/core/parallel.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/merge_tiles.h"
-#include "tools/support/store_filling.h"
 
 namespace graspmap_tools {
 
@@ -102,10 +99,6 @@ class TiledMap {
     }
   }
 
-  static void extend(const libgtd::Voxel& voxel, libgtd::Voxel& min, libgtd::Voxel& max) {
-    min = {std::min(min.i, voxel.i), std::min(min.j, voxel.j), std::min(min.k, voxel.k)};
-    max = {std::max(max.i, voxel.i), std::max(max.j, voxel.j), std::max(max.k, voxel.k)};
-  }
   bool is_set(const char* flag, std::size_t n) const {
     const libmap::ScalarField* field = cloud_.find_field(flag);
     return field != nullptr && field->values[n] == 1.0;
@@ -129,7 +122,7 @@ class MapGrasping {
         map_(input.map_file),
         ground_(ground),
         mesh_from_map_(map_from_input(map_.index().manifest).inverse()),
-        progress_(is_store() ? input.output : input.output + ".progress") {
+        store_(is_store() ? input.output : input.output + ".progress") {
     carry_facts(map_.index().manifest, run);
     in_file(input.map_file, [&] { require_usable(); });
     if (!map_.has_manifest())
@@ -138,22 +131,12 @@ class MapGrasping {
 
   void grasp() {
     if (run_.options().dry_run) return;
-    const bool is_new = !fs::exists(progress_.store());
-    progress_.open();
-    std::optional<libgtd::TileJournal> journal;
-    try {
-      const libmap::FileLock lock = progress_.lock();
-      agree_on_plan();
-      journal.emplace(progress_.store(), input_.share, plan_.key);
-    } catch (...) {
-      if (is_new) progress_.remove_if_bare();
-      throw;
-    }
-    const std::vector<TileNumber> missing = missing_tiles(
-        progress_, plan_,
-        libgtd::tiles_of(
-            {.plane = {}, .lattice = {}, .min = plan_.index.min, .max = plan_.index.max},
-            plan_.index.tile_voxels, input_.share));
+    std::optional<libmap::TileJournal> journal =
+        store_.begin(input_.share, [this] { agree_on_plan(); });
+    const std::vector<TileNumber> missing = store_.missing(
+        plan_, libgtd::tiles_of(
+                   {.plane = {}, .lattice = {}, .min = plan_.index.min, .max = plan_.index.max},
+                   plan_.index.tile_voxels, input_.share));
     run_.timed("grasp", [&] { test(missing, *journal); });
     journal.reset();
     finish(missing.size());
@@ -194,14 +177,14 @@ class MapGrasping {
   // caller holds the lock.
   void agree_on_plan() {
     const bool is_forced = run_.options().force && is_store();
-    const auto earlier = is_forced ? std::nullopt : progress_.plan();
+    const auto earlier = is_forced ? std::nullopt : store_.plan();
     plan_.index = map_.index();
     plan_.index.tiles.clear();
     plan_.index.manifest = run_.manifest();
     plan_.index.manifest.timings_s.clear();
     plan_.index.manifest.threads = 0;
     // A map's frame is in its manifest alone.
-    plan_.key = libmap::sha256_of(libgtd::key_of(run_.manifest()) + input_.parameters_hash +
+    plan_.key = libmap::sha256_of(libmap::key_of(run_.manifest()) + input_.parameters_hash +
                                   libmap::to_text(mesh_from_map_.matrix().sum()));
     if (earlier && earlier->key == plan_.key) return;
     if (earlier && is_store())
@@ -209,16 +192,13 @@ class MapGrasping {
           "contains tiles of another mesh, map, gripper or of other parameters: --force starts "
           "again",
           {.file = input_.output});
-    if (!earlier && !is_forced && fs::exists(progress_.store() / "index.json"))
-      throw libmap::Error(
-          "is complete, but its folder `progress` is not there: --force starts again",
-          {.file = input_.output});
-    progress_.require_idle();
-    progress_.clear();
-    progress_.set_plan(plan_);
+    if (!earlier && !is_forced) require_no_index(store_);
+    store_.require_idle();
+    store_.clear();
+    store_.set_plan(plan_);
   }
 
-  void test(const std::vector<TileNumber>& missing, libgtd::TileJournal& journal) {
+  void test(const std::vector<TileNumber>& missing, libmap::TileJournal& journal) {
     const std::vector<StoredTile>& tiles = map_.index().tiles;
     const auto find = [&](const TileNumber& number) { return map_.index().find(number); };
     std::size_t voxels = 0;
@@ -231,10 +211,10 @@ class MapGrasping {
       stored.number = number;
       if (const StoredTile* tile = find(number)) {
         stored = *tile;
-        write_tile(progress_,
+        write_tile(store_.folder(),
                    tested(map_.load(static_cast<std::size_t>(tile - tiles.data())), steps), stored);
       }
-      journal.add({stored});
+      libgtd::add_tiles({stored}, plan_.key, journal);
     }
     run_.progress().end();
   }
@@ -290,30 +270,25 @@ class MapGrasping {
 
   // Whoever comes last writes the index, or the map in one file.
   void finish(std::size_t tested) {
-    std::optional<libmap::FileLock> lock = progress_.lock();
-    const libgtd::TileProgress::Completion completion = progress_.complete(plan_);
+    std::optional<libmap::FileLock> lock = store_.lock();
+    const libgtd::MapTileStore::Completion completion = store_.complete(plan_);
     if (!completion.index) {
       run_.say("{} tiles tested; {} of {} are there", tested, completion.done, completion.tiles);
       return;
     }
     if (is_store()) {
-      if (!fs::exists(progress_.store() / "index.json")) {
-        libmap::Manifest manifest = completion.index->manifest;
-        manifest.timings_s = run_.manifest().timings_s;
-        manifest.threads = run_.manifest().threads;
-        progress_.write_index(*completion.index, manifest);
-      }
+      store_.write_index(*completion.index, run_.manifest());
       run_.say("{} of {} tiles tested, all are there", tested, completion.tiles);
       return;
     }
-    const MapTiles tiles(progress_.store(), *completion.index);
+    const MapTiles tiles(store_.folder(), *completion.index);
     note_results(tiles);
     run_.write_output(input_.output, [&](const fs::path& temporary) {
       write_merged(tiles, input_.output, temporary, {}, run_);
     });
-    progress_.clear();
+    store_.clear();
     lock.reset();
-    progress_.remove_if_bare();
+    store_.remove_if_bare();
   }
 
   void note_results(const MapTiles& tiles) {
@@ -346,7 +321,7 @@ class MapGrasping {
   TiledMap map_;
   GroundPieces& ground_;
   libmap::Pose mesh_from_map_;
-  libgtd::TileProgress progress_;
+  libgtd::MapTileStore store_;
   libgtd::TilePlan plan_;
 };
 

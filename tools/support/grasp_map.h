@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "libgtd/grasp/grasp_trials.h"
-#include "libgtd/score/tiling.h"
+#include "libmap/tiles/tile_share.h"
 #include "tools/support/ground_pieces.h"
 #include "tools/support/run.h"
 
@@ -15,7 +15,7 @@ struct GraspMapInput {
   std::string mesh_file;
   std::string map_file;  // or a tile store
   std::string output;    // or a tile store
-  libgtd::TileShare share;
+  libmap::TileShare share;
   std::string parameters_hash;  // of gripper and options
 };
 

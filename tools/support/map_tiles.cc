@@ -1,10 +1,14 @@
 #include "tools/support/map_tiles.h"
 
 #include "libgtd/evaluate/voxel_map.h"
-#include "libgtd/score/tile_store_io.h"
+#include "libgtd/score/map_shares.h"
 #include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
-#include "tools/support/run.h"
+#include "libmap/core/file_output.h"
+#include "libmap/core/parallel.h"
+#include "libmap/raster/dem_reader.h"
+#include "tools/support/command_line.h"
+#include "tools/support/raster_output.h"
 
 namespace graspmap_tools {
 
@@ -28,6 +32,24 @@ std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest)
   index.frame = manifest.frame == "input" ? libgtd::MapFrame::input : libgtd::MapFrame::terrain;
   index.manifest = manifest;
   return index;
+}
+
+void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
+                libgtd::StoredTile& tile) {
+  tile.file = libgtd::tile_file_of(tile.number);
+  libmap::OutputFile file(store / tile.file);
+  libmap::write_named(
+      file.temporary_path(), file.final_path(),
+      [&](const std::filesystem::path& temporary) { libmap::write_cloud(temporary, points); });
+  tile.bytes = std::filesystem::file_size(file.temporary_path());
+  tile.sha256 = libmap::sha256_of_file(file.temporary_path());
+  file.commit();
+}
+
+void require_no_index(const libgtd::MapTileStore& store) {
+  if (std::filesystem::exists(store.index_path()))
+    throw libmap::Error("is complete, but its folder `progress` is not there: --force starts again",
+                        {.file = store.folder().string()});
 }
 
 MapTiles::MapTiles(const std::string& store)
@@ -82,6 +104,145 @@ libmap::PointCloud MapTiles::load(std::size_t tile) const {
 
 libmap::PointCloud MapTiles::load_checked(std::size_t tile) const {
   return read(libgtd::checked_tile_path(store_, index_.tiles[tile]), index_.tiles[tile]);
+}
+
+namespace {
+
+libmap::Manifest manifest_of(const std::string& tile) {
+  const auto manifest = libmap::read_manifest_of(tile);
+  if (!manifest)
+    throw libmap::Error("no manifest beside it: it is not a tile that `graspmap score` wrote",
+                        {.file = tile});
+  return *manifest;
+}
+
+// Single precision in some shares' files and double in others would meet in the whole.
+void restore_full_precision(const libmap::Manifest& part, libmap::PointCloud& whole) {
+  if (const auto index = index_of(part)) libgtd::restore_positions(*index, whole);
+}
+
+// The tiles of a store that share their i, one after the other: consecutive in the map's order.
+struct TileRow {
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+std::vector<TileRow> rows_of(const libgtd::TileStoreIndex& index) {
+  std::vector<TileRow> rows;
+  for (std::size_t n = 0; n < index.tiles.size(); ++n) {
+    if (n == 0 || index.tiles[n].number.i != index.tiles[n - 1].number.i) rows.push_back({n, n});
+    rows.back().end = n + 1;
+  }
+  return rows;
+}
+
+libmap::PointCloud joined(const std::vector<libmap::PointCloud>& parts, const std::string& name) {
+  return in_file(name, [&] { return libgtd::merge_map_clouds(parts); });
+}
+
+libmap::PointCloud load_row(const MapTiles& tiles, const std::string& store, const TileRow& row) {
+  std::vector<libmap::PointCloud> parts(row.end - row.begin);
+  libmap::parallel_each(parts.size(),
+                        [&](std::size_t n) { parts[n] = tiles.load_checked(row.begin + n); });
+  return joined(parts, store);
+}
+
+void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
+                 Run& run) {
+  const libmap::CloudWriteOptions& writing = options.writing;
+  if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
+    throw libmap::Error("a tile store is written as binary .pcd",
+                        {.file = output, .field = "--encoding"});
+  const MapTiles tiles(store);
+  const libgtd::TileStoreIndex& index = tiles.index();
+  libgtd::copy_common_facts(index.manifest, run.manifest());
+  run.manifest().inputs = index.manifest.inputs;
+  run.add_input(store_index_path(store));
+  run.add_results({{"scored_voxels", index.voxels()},
+                   {"border_voxels", index.border_voxels()},
+                   {"graspable_voxels", index.graspable_voxels()}});
+  const auto tell = [&] {
+    run.say("{} scored voxels from {} tiles", index.voxels(), index.tiles.size());
+  };
+  if (libmap::is_dem_path(output)) {
+    const auto visit_rows = [&](const auto& visit) {
+      for (const TileRow& row : rows_of(index)) visit(load_row(tiles, store, row));
+    };
+    write_raster(output, raster_of(visit_rows, index.manifest, options.pixel_size_m), run);
+    return tell();
+  }
+  run.write_output(
+      output, [&](const auto& temporary) { write_merged(tiles, store, temporary, writing, run); });
+  tell();
+}
+
+}  // namespace
+
+void write_merged(const MapTiles& tiles, const std::string& store,
+                  const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
+                  Run& run) {
+  const std::vector<TileRow> rows = rows_of(tiles.index());
+  run.progress().begin("merge", rows.size());
+  if (libmap::format_of(file) == ".pcd") {
+    libmap::PcdPartsWriter writer(
+        file, {.points = tiles.index().voxels(), .float64_positions = tiles.float64_positions()});
+    for (const TileRow& row : rows) {
+      writer.append(load_row(tiles, store, row));
+      run.progress().advance(1);
+    }
+    writer.finish();
+  } else {
+    libmap::write_cloud(file, load_row(tiles, store, {0, tiles.index().tiles.size()}), writing);
+  }
+  run.progress().end();
+}
+
+bool is_part_of_map(const std::string& file) {
+  if (is_tile_store(file)) return true;
+  const auto manifest = libmap::read_manifest_of(file);
+  return manifest && libgtd::is_map_share(*manifest);
+}
+
+void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
+                 const MergeOptions& options, Run& run) {
+  if (!libmap::is_dem_path(output)) libmap::require_cloud_format(output);
+  run.claim_output(output, tiles);
+  const auto store = std::find_if(tiles.begin(), tiles.end(), is_tile_store);
+  if (store != tiles.end()) {
+    if (tiles.size() > 1) throw libmap::Error("a tile store is merged by itself", {.file = *store});
+    return merge_store(*store, output, options, run);
+  }
+  std::vector<libmap::Manifest> manifests;
+  for (const std::string& tile : tiles) manifests.push_back(manifest_of(tile));
+  libgtd::require_shares_of_one_map(manifests, tiles);
+  std::vector<libmap::PointCloud> parts;
+  parts.reserve(tiles.size());
+  for (const std::string& tile : tiles) parts.push_back(libmap::read_cloud(tile).cloud);
+  libmap::PointCloud whole = joined(parts, tiles.front());
+  restore_full_precision(manifests.front(), whole);
+  libgtd::copy_common_facts(manifests.front(), run.manifest());
+  // The terrain and the gripper that the parts were made from, then the parts.
+  run.manifest().inputs = manifests.front().inputs;
+  for (const std::string& tile : tiles) run.add_input(tile);
+  run.add_results({{"scored_voxels", whole.size()},
+                   {"border_voxels", libgtd::count_set(whole, "border")},
+                   {"graspable_voxels", libgtd::count_set(whole, "graspable")}});
+  run.say("{} scored voxels from {} files", whole.size(), parts.size());
+  // A share has slopes alone: the whole map decides on obstacles.
+  if (whole.find_field("slope_deg") != nullptr) {
+    const std::size_t obstacles = in_file(libmap::manifest_path(tiles.front()).string(), [&] {
+      return libgtd::add_obstacles_of(manifests.front(), whole);
+    });
+    run.add_results({{"obstacle_voxels", obstacles}});
+    run.say("{} voxels are obstacles", obstacles);
+  }
+  if (libmap::is_dem_path(output)) {
+    const auto visit_whole = [&](const auto& visit) { visit(whole); };
+    write_raster(output, raster_of(visit_whole, manifests.front(), options.pixel_size_m), run);
+    return;
+  }
+  run.write_output(output, [&](const auto& temporary) {
+    libmap::write_cloud(temporary, whole, options.writing);
+  });
 }
 
 }  // namespace graspmap_tools

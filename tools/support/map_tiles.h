@@ -1,4 +1,4 @@
-// Tile stores as commands read them.
+// Tile stores, and shares of maps, as commands read, fill and merge them.
 #pragma once
 
 #include <Eigen/Geometry>
@@ -8,8 +8,10 @@
 #include <string>
 #include <vector>
 
-#include "libgtd/score/tile_store.h"
+#include "libgtd/score/tile_store_io.h"
+#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/point_cloud.h"
+#include "tools/support/run.h"
 
 namespace graspmap_tools {
 
@@ -21,6 +23,13 @@ std::filesystem::path store_index_path(const std::string& store);
 // What the manifest of a map in one file says of it, as the index of a store: lattice, frame,
 // transforms, no tiles. Nothing if it knows no lattice.
 std::optional<libgtd::TileStoreIndex> index_of(const libmap::Manifest& manifest);
+
+// Writes the file of a tile of the store, and adds facts on the file to the tile.
+void write_tile(const std::filesystem::path& store, const libmap::PointCloud& points,
+                libgtd::StoredTile& tile);
+
+// Throws Error if a store has an index but no plan to resume by.
+void require_no_index(const libgtd::MapTileStore& store);
 
 class MapTiles {
  public:
@@ -51,5 +60,26 @@ class MapTiles {
   libgtd::TileStoreIndex index_;
   bool float64_positions_ = false;
 };
+
+// A tile store, or one of several shares of a map by its manifest.
+bool is_part_of_map(const std::string& file);
+
+// Writes the tiles of a store as one map, a PCD row by row of tiles; other formats need the whole
+// map in memory. Errors name `store`.
+void write_merged(const MapTiles& tiles, const std::string& store,
+                  const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
+                  Run& run);
+
+struct MergeOptions {
+  libmap::CloudWriteOptions writing;
+  double pixel_size_m = 0.0;  // of a raster, .tif; 0: the voxel size
+};
+
+// Writes the same bytes as scoring in one run. `tiles` are all shares that `score --tile K/N`
+// wrote, in any order, or one tile store, which is merged row by row of tiles. Throws Error if a
+// share is missing, given twice, or of another map.
+// A store is written as binary .pcd, in another format, or as .tif (the raster alone is in memory).
+void merge_tiles(const std::vector<std::string>& tiles, const std::string& output,
+                 const MergeOptions& options, Run& run);
 
 }  // namespace graspmap_tools

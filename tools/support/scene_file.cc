@@ -9,10 +9,10 @@
 #include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/plan_tiles.h"
 #include "libmap/core/table.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
+#include "libmap/tiles/xy_tile.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/option_values.h"
@@ -163,7 +163,7 @@ MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedB
 // The files of a folder of textured pieces; none if it is another one, or a file.
 std::vector<std::filesystem::path> models_in(const std::string& file) {
   std::vector<std::filesystem::path> models;
-  for (const std::string& name : libmap::piece_file_names(file))
+  for (const std::string& name : libmap::tile_file_names(file))
     if (libmap::format_of(name) == ".glb") models.push_back(std::filesystem::path(file) / name);
   std::sort(models.begin(), models.end());
   return models;

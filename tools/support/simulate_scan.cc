@@ -156,9 +156,9 @@ void scan_terrain(const SimulateScanOptions& options, const libmap::Trajectory& 
   run.manifest().frame = "terrain";
   run.write_output(options.output, [&](const fs::path& temporary) {
     libmap::GroundHeights ground;
-    libmap::PointSpool points(
+    libmap::PointTileStore points(
         temporary.has_parent_path() ? temporary.parent_path() : fs::path("."),
-        {.square_m = libmap::GroundHeights::cell_m, .buffer_bytes = spool_buffer_bytes});
+        {.tile_m = libmap::GroundHeights::cell_m, .buffer_bytes = spool_buffer_bytes});
     std::size_t count = 0;
     for (const fs::path& piece : stream.pieces()) count += libmap::read_cloud_info(piece).points;
     run.progress().begin("points", count);

@@ -4,7 +4,7 @@
 #include "libmap/simulate/terrain_pieces.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
-#include "tools/support/piece_folder.h"
+#include "tools/support/tile_folder.h"
 #include "tools/support/usages.h"
 
 using namespace graspmap_tools;
@@ -21,13 +21,13 @@ struct SimulateTerrainOptions {
 
 // Each piece is made, written and forgotten. Returns the number of points.
 std::size_t write_pieces(const SimulateTerrainOptions& options,
-                         const std::vector<libmap::PlanTile>& pieces, const fs::path& folder,
+                         const std::vector<libmap::XyTile>& pieces, const fs::path& folder,
                          Run& run) {
   run.progress().begin("pieces", pieces.size());
   std::vector<std::size_t> points(pieces.size());
   libmap::parallel_each(pieces.size(), [&](std::size_t n) {
     const libmap::PointCloud cloud = libmap::sample_piece(options.pieces, pieces[n]);
-    libmap::write_cloud(folder / libmap::piece_file_name(pieces[n], ".pcd"), cloud);
+    libmap::write_cloud(folder / libmap::tile_file_name(pieces[n], ".pcd"), cloud);
     points[n] = cloud.size();
     run.progress().advance(1);
   });
@@ -44,8 +44,8 @@ void simulate(SimulateTerrainOptions& options, Run& run) {
         "not a size", {.field = "--size", .value = options.size, .bound = "M or XxY, meters, > 0"});
   options.pieces.size_x_m = size->x();
   options.pieces.size_y_m = size->y();
-  const std::vector<libmap::PlanTile> pieces = libmap::terrain_pieces(options.pieces);
-  const std::vector<std::string> names = piece_folder_names(options.output);
+  const std::vector<libmap::XyTile> pieces = libmap::terrain_pieces(options.pieces);
+  const std::vector<std::string> names = tile_folder_names(options.output);
   run.claim_output_tree(options.output, names);
   run.manifest().frame = "terrain";
   run.write_output_tree(options.output, names, [&](const fs::path& folder) {

@@ -4,7 +4,6 @@
 
 #include <string>
 
-#include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libmap/core/error.h"
 #include "tests/support/test_support.h"
@@ -17,10 +16,10 @@ using graspmap_test::error_of;
 using graspmap_test::read_text;
 using graspmap_test::scratch_folder;
 using graspmap_test::write_text;
+using libgtd::MapTileStore;
 using libgtd::StoredTile;
 using libgtd::TileNumber;
 using libgtd::TilePlan;
-using libgtd::TileProgress;
 using libgtd::TileStoreIndex;
 
 TEST(TileStore, TilesOfVoxels) {
@@ -68,17 +67,17 @@ TilePlan small_plan() {
   plan.index.manifest.transforms.emplace_back("terrain_from_input", pose);
   plan.has_plane = true;
   plan.centroid = Eigen::Vector3d(1.0 / 7.0, 2, 3);
-  libgtd::TerrainPiece piece;
-  piece.input = {"a b.pcd", "0123", 12};
-  piece.modified_ns = 1234567890123456789;
-  piece.box.max = Eigen::Vector3d(1, 1.0 / 9.0, 0);
-  plan.pieces.push_back(piece);
+  libgtd::TerrainFile file;
+  file.input = {"a b.pcd", "0123", 12};
+  file.modified_ns = 1234567890123456789;
+  file.box.max = Eigen::Vector3d(1, 1.0 / 9.0, 0);
+  plan.terrain.push_back(file);
   return plan;
 }
 
-TEST(TileProgress, PlanAndIndexComeBackToTheBit) {
+TEST(MapTileStore, PlanAndIndexComeBackToTheBit) {
   const fs::path store = scratch_folder() / "m.tiles";
-  const TileProgress progress(store / "");
+  const MapTileStore progress(store / "");
   progress.open();
   EXPECT_FALSE(progress.plan());
   const TilePlan plan = small_plan();
@@ -89,22 +88,23 @@ TEST(TileProgress, PlanAndIndexComeBackToTheBit) {
   EXPECT_EQ(read.centroid, plan.centroid);
   EXPECT_EQ(read.index.terrain_from_input().matrix(), plan.index.terrain_from_input().matrix());
   EXPECT_EQ(read.index.max, plan.index.max);
-  ASSERT_EQ(read.pieces.size(), 1u);
-  EXPECT_EQ(read.pieces[0].modified_ns, 1234567890123456789);
-  EXPECT_EQ(read.pieces[0].box.max, plan.pieces[0].box.max);
+  ASSERT_EQ(read.terrain.size(), 1u);
+  EXPECT_EQ(read.terrain[0].modified_ns, 1234567890123456789);
+  EXPECT_EQ(read.terrain[0].box.max, plan.terrain[0].box.max);
 
-  libgtd::TileJournal one(store, {1, 2}, "key");
-  EXPECT_THROW(libgtd::TileJournal(store, {1, 2}, "key"), libmap::Error);
-  libgtd::TileJournal other(store, {2, 2}, "key");
-  one.add({tile(0, 1, 5), tile(-1, 1, 0)});
-  other.add({tile(-1, 0, 3)});
+  libmap::TileJournal one(store, {1, 2});
+  EXPECT_THROW(libmap::TileJournal(store, {1, 2}), libmap::Error);
+  libmap::TileJournal other(store, {2, 2});
+  libgtd::add_tiles({tile(0, 1, 5), tile(-1, 1, 0)}, "key", one);
+  libgtd::add_tiles({tile(-1, 0, 3)}, "key", other);
   EXPECT_EQ(progress.complete(read).done, 3u);
   EXPECT_EQ(progress.complete(read).tiles, 4u);
   EXPECT_FALSE(progress.complete(read).index);
   // Lines of another key do not count.
-  libgtd::TileJournal(store, {1, 1}, "other key").add({tile(0, 0, 1)});
+  libmap::TileJournal third(store, {1, 1});
+  libgtd::add_tiles({tile(0, 0, 1)}, "other key", third);
   EXPECT_FALSE(progress.complete(read).index);
-  other.add({tile(0, 0, 7)});
+  libgtd::add_tiles({tile(0, 0, 7)}, "key", other);
   const TileStoreIndex index = libgtd::finish_tile_store(store);
   ASSERT_EQ(index.tiles.size(), 3u);
   EXPECT_EQ(index.tiles[0].number, (TileNumber{-1, 0}));
@@ -138,9 +138,9 @@ TEST(TileStore, AFileIsNone) {
   EXPECT_EQ(error.context().file, store.string());
 }
 
-TEST(TileProgress, PlanOfAnotherVersion) {
+TEST(MapTileStore, PlanOfAnotherVersion) {
   const fs::path store = scratch_folder() / "m.tiles";
-  const TileProgress progress(store);
+  const MapTileStore progress(store);
   progress.open();
   progress.set_plan(small_plan());
   const fs::path path = store / "progress/plan.json";
@@ -153,14 +153,14 @@ TEST(TileProgress, PlanOfAnotherVersion) {
   EXPECT_EQ(error.context().bound, "\"graspmap tile store progress\", 1");
 }
 
-TEST(TileProgress, ABoxThatIsNone) {
-  const TileProgress progress(scratch_folder() / "m.tiles");
+TEST(MapTileStore, ABoxThatIsNone) {
+  const MapTileStore progress(scratch_folder() / "m.tiles");
   progress.open();
   TilePlan plan = small_plan();
-  plan.pieces[0].points = 5;
+  plan.terrain[0].points = 5;
   progress.set_plan(plan);
   EXPECT_TRUE(progress.plan());
-  plan.pieces[0].box.min.y() = 1.0;
+  plan.terrain[0].box.min.y() = 1.0;
   progress.set_plan(plan);
   const libmap::Error error = error_of([&] { progress.plan(); });
   EXPECT_EQ(error.context().field, "min and max of piece a b.pcd");
@@ -168,9 +168,9 @@ TEST(TileProgress, ABoxThatIsNone) {
 }
 
 // Lines of a journal that no run writes do not count.
-TEST(TileProgress, TilesThatCannotBe) {
+TEST(MapTileStore, TilesThatCannotBe) {
   const fs::path store = scratch_folder() / "m.tiles";
-  const TileProgress progress(store);
+  const MapTileStore progress(store);
   progress.open();
   const TilePlan plan = small_plan();
   progress.set_plan(plan);
@@ -178,18 +178,23 @@ TEST(TileProgress, TilesThatCannotBe) {
   elsewhere.file = "../../x";
   StoredTile many = tile(0, 1, 5);
   many.occupied_voxels = ~std::uint64_t{0} / 2;
-  libgtd::TileJournal(store, {1, 1}, "key").add({elsewhere, many, tile(-1, 0, 3), tile(5, 5, 1)});
+  libmap::TileJournal journal(store, {1, 1});
+  libgtd::add_tiles({elsewhere, many, tile(-1, 0, 3), tile(5, 5, 1)}, "key", journal);
   EXPECT_EQ(progress.complete(plan).done, 1u);
 }
 
 // Each change of a good index is refused in one line that names the file and what is wrong.
 TEST(TileStore, HostileIndex) {
   const fs::path store = scratch_folder() / "m.tiles";
-  const TileProgress progress(store);
+  const MapTileStore progress(store);
   progress.open();
   TileStoreIndex good = small_plan().index;
   good.tiles = {tile(-1, 0, 3), tile(0, 0, 7)};
-  progress.write_index(good, good.manifest);
+  const auto write_index_again = [&] {
+    fs::remove(progress.index_path());
+    progress.write_index(good);
+  };
+  write_index_again();
   const std::string text = read_text(store / "index.json");
   EXPECT_NO_THROW(libgtd::read_tile_store(store));
   const auto expect_error = [&](const std::string& from, const std::string& to,
@@ -228,14 +233,14 @@ TEST(TileStore, HostileIndex) {
     error_of([&] { libgtd::read_tile_store(store); });
   }
   good.tiles = {tile(-1, 0, 3), tile(0, 0, 0)};
-  progress.write_index(good, good.manifest);
+  write_index_again();
   const libmap::Error empty = error_of([&] { libgtd::read_tile_store(store); });
   EXPECT_EQ(empty.reason(), "lists a tile without voxels");
   EXPECT_EQ(empty.context().value, "0, 0");
   for (const std::vector<StoredTile>& tiles :
        {std::vector{tile(0, 0, 7), tile(-1, 0, 3)}, std::vector{tile(0, 0, 7), tile(0, 0, 7)}}) {
     good.tiles = tiles;
-    progress.write_index(good, good.manifest);
+    write_index_again();
     const libmap::Error error = error_of([&] { libgtd::read_tile_store(store); });
     EXPECT_EQ(error.reason(), "tiles do not ascend");
     EXPECT_EQ(error.context().value, tiles[1].file);

@@ -7,6 +7,7 @@
 
 #include "libgtd/streamed_detection.h"
 #include "libmap/core/parallel.h"
+#include "libmap/tiles/tile_share.h"
 #include "tests/libgtd/score/score_test_support.h"
 
 namespace libgtd {
@@ -57,7 +58,7 @@ TEST_P(EachMethod, SharesTogetherAreTheWholeMap) {
   for (const int count : {1, 2, 5, 40}) {
     std::vector<ScoredVoxel> joined;
     for (int number = 1; number <= count; ++number) {
-      const auto part = score_tiles(grid, mask, share_of(tiles, {number, count}), {});
+      const auto part = score_tiles(grid, mask, libmap::share_of(tiles, {number, count}), {});
       joined.insert(joined.end(), part.begin(), part.end());
     }
     std::sort(joined.begin(), joined.end(),
@@ -84,11 +85,6 @@ TEST(Tiles, TooManyAreAnError) {
   const VoxelGrid grid = grid_of({{0, 0, 0}, {100000, 100000, 0}});
   const libmap::Error error = graspmap_test::error_of([&] { make_tiles(grid, 1); });
   EXPECT_EQ(error.context().field, "tile_size_m");
-}
-
-TEST(Tiles, NoSuchShareIsAnError) {
-  for (const TileShare share : {TileShare{0, 3}, TileShare{4, 3}, TileShare{1, 0}})
-    graspmap_test::error_of([&] { share_of({}, share); });
 }
 
 // Chebyshev distances to occupied columns, column by column.
@@ -171,14 +167,6 @@ TEST(StoredTiles, TooManyAreAnError) {
   EXPECT_EQ(error.reason(), "too small: the tile store would have 1049600 tiles");
 }
 
-class NoPoints : public NearbyPoints {
- public:
-  libmap::PointCloud points_in(const Eigen::Vector2d&, const Eigen::Vector2d&) const override {
-    return {};
-  }
-  std::size_t count_in(const Eigen::Vector2d&, const Eigen::Vector2d&) const override { return 0; }
-};
-
 // However few points they have, tiles are worked on in parts.
 TEST(StoredTiles, NotAllAtOnce) {
   TerrainFrame frame;
@@ -187,9 +175,10 @@ TEST(StoredTiles, NotAllAtOnce) {
   options.gripper = gripper_named("scar-e");
   const std::vector<TileNumber> wanted = tiles_of(frame, 100);
   ASSERT_EQ(wanted.size(), 22500U);
+  const libmap::PointTileStore no_points(graspmap_test::scratch_folder(), {});
   std::vector<TileNumber> visited;
   std::size_t most = 0;
-  detect_streamed(frame, NoPoints(), wanted, options, [&](std::vector<StreamedTile> tiles) {
+  detect_streamed(frame, no_points, wanted, options, [&](std::vector<StreamedTile> tiles) {
     most = std::max(most, tiles.size());
     for (const StreamedTile& tile : tiles) visited.push_back(tile.number);
   });

@@ -83,11 +83,11 @@ TEST(CloudPieces, SurveyCountsAndBounds) {
   cloud.positions[0] = {std::nan(""), 0, 0};
   cloud.positions[99999] = {50, -60, 7};
   cloud.positions[70000] = {-50, 60, -7};
-  const libmap::PieceFacts facts = libmap::survey_piece(write("a.pcd", cloud));
-  EXPECT_EQ(facts.points, 99999u);
-  EXPECT_EQ(facts.dropped_points, 1u);
-  EXPECT_EQ(facts.box.min, Eigen::Vector3d(-50, -60, -7));
-  EXPECT_EQ(facts.box.max, Eigen::Vector3d(50, 60, 7));
+  const libmap::TileInfo info = libmap::survey_tile(write("a.pcd", cloud));
+  EXPECT_EQ(info.points, 99999u);
+  EXPECT_EQ(info.dropped_points, 1u);
+  EXPECT_EQ(info.box.min, Eigen::Vector3d(-50, -60, -7));
+  EXPECT_EQ(info.box.max, Eigen::Vector3d(50, 60, 7));
 }
 
 TEST(CloudPieces, ViewpointIsKnownIfAllAgree) {

@@ -19,7 +19,7 @@ constexpr double voxel_m = 0.02;
 // pixels.
 class CoarseSurface : public ::testing::Test {
  protected:
-  SurfaceVoxels voxels_in(const PlanCells& cells, FittedPixels fitted) {
+  SurfaceVoxels voxels_in(const TileMask& cells, FittedPixels fitted) {
     SurfaceVoxels voxels;
     counts_ = add_depth_planes(depth_, rays_, eye_, {}, voxel_m, cells, fitted, voxels);
     return voxels;
@@ -38,7 +38,7 @@ TEST_F(CoarseSurface, PixelsInTheCellsGiveTheVoxelsOfAllPixels) {
   std::size_t compared = 0;
   for (const int x : {-30, -8, 0, 14})
     for (const int y : {-12, 0, 6}) {
-      const PlanCells cells{{x, y}, {x + 17, y + 9}, 0};
+      const TileMask cells{{x, y}, {x + 17, y + 9}, 0};
       const SurfaceVoxels all = voxels_in(cells, FittedPixels::all);
       EXPECT_EQ(counts_.pixels, depth_.pixels.size());
       const SurfaceVoxels some = voxels_in(cells, FittedPixels::in_cells);

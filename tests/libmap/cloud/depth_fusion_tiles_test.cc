@@ -71,7 +71,7 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
       DepthFusionResult parts = again.report();
       EXPECT_EQ(parts.poses.size(), 10U);
       for (std::size_t n = 0; n < again.tiles().size(); ++n) {
-        const PlanTile& tile = again.tiles()[n];
+        const XyTile& tile = again.tiles()[n];
         const auto [cloud, of_tile] = (n % 2 == 0 ? again : fusion).make(n);
         parts += of_tile;
         cloud.check();

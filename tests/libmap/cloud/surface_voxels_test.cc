@@ -5,7 +5,7 @@
 #include <map>
 #include <set>
 
-#include "libmap/cloud/plan_cells.h"
+#include "libmap/cloud/tile_mask.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

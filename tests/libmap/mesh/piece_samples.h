@@ -6,9 +6,9 @@
 #include <string>
 #include <vector>
 
-#include "libmap/core/plan_tiles.h"
 #include "libmap/mesh/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
+#include "libmap/tiles/xy_tile.h"
 
 namespace graspmap_test {
 
@@ -19,7 +19,7 @@ inline std::vector<std::filesystem::path> write_pieces(const libmap::TriangleMes
   std::map<std::filesystem::path, std::vector<bool>> parts;
   for (std::size_t t = 0; t < mesh.triangles.size(); ++t) {
     const Eigen::Vector2d center = center_of(mesh, mesh.triangles[t]).head<2>();
-    const std::string name = piece_file_name(libmap::plan_tile_at(center, tile_m), ".ply");
+    const std::string name = tile_file_name(libmap::xy_tile_at(center, tile_m), ".ply");
     std::vector<bool>& marks = parts[folder / name];
     marks.resize(mesh.triangles.size());
     marks[t] = true;

@@ -152,7 +152,7 @@ TEST(Dem, PiecesShareTheFrameOfTheFirst) {
   EXPECT_EQ(cloud.positions[11] - cloud.positions[0], Eigen::Vector3d(5000, 0, 0));
   EXPECT_EQ(libmap::read_georeference(scratch_folder() / "pieces"),
             libmap::read_georeference(first));
-  const auto box = libmap::survey_piece(second, libmap::read_georeference(first)).box;
+  const auto box = libmap::survey_tile(second, libmap::read_georeference(first)).box;
   EXPECT_EQ(box.min.x(), cloud.positions[11].x());
   libmap::write_cloud(scratch_folder() / "pieces/c.pcd", cloud);
   EXPECT_EQ(error_of([] { libmap::read_pieces(libmap::cloud_pieces(scratch_folder() / "pieces")); })

@@ -130,7 +130,7 @@ TEST(RockyTerrain, HeightsOfRocksFollowThePowerLaw) {
 TEST(TerrainPieces, MeetAtTheirSeams) {
   const TerrainPiecesOptions options = small_pieces();
   const RockyTerrain terrain(options.terrain, rectangle(0, 0, 3, 2));
-  for (const PlanTile& piece : terrain_pieces(options)) {
+  for (const XyTile& piece : terrain_pieces(options)) {
     const PointCloud cloud = sample_piece(options, piece);
     for (const Eigen::Vector3d& p : cloud.positions) {
       EXPECT_EQ(p.z(), terrain.height(p.x(), p.y()));

@@ -18,7 +18,7 @@ namespace terrain_surface_test {
 using graspmap_test::scratch_folder;
 using libmap::GroundHeights;
 using libmap::PointCloud;
-using libmap::PointSpool;
+using libmap::PointTileStore;
 using libmap::Pose;
 using libmap::SurfaceView;
 using libmap::TerrainSurface;
@@ -44,7 +44,7 @@ double wave(double x, double y) { return 0.2 * std::sin(2.0 * x) + 0.1 * std::co
 
 struct Ground {
   GroundHeights heights;
-  PointSpool points{scratch_folder(), {.square_m = GroundHeights::cell_m}};
+  PointTileStore points{scratch_folder(), {.tile_m = GroundHeights::cell_m}};
 
   explicit Ground(const PointCloud& cloud) {
     heights.add(cloud.positions);

@@ -116,10 +116,10 @@ TEST(SurfaceTiles, SameTrianglesAsAtOnceBitForBit) {
   SurfaceSurvey survey;
   survey.add(points_in(cloud, {Eigen::Vector2d(2, -1), Eigen::Vector2d(9, 9)}), true);
   survey.add(points_in(cloud, {Eigen::Vector2d(-9, -1), Eigen::Vector2d(2, 9)}), true);
-  std::map<PlanTile, std::size_t> tiles;
+  std::map<XyTile, std::size_t> tiles;
   add_surface_tiles(cloud, options, tiles);
   SurfaceIslands islands;
-  std::map<PlanTile, TriangleMesh> made;
+  std::map<XyTile, TriangleMesh> made;
   for (const auto& [tile, points] : tiles) {
     const SurfaceTile one =
         make_surface_tile(points_in(cloud, plan_box_of(tile, options.tile_m, options.margin_m())),
@@ -158,7 +158,7 @@ TEST(SurfaceTiles, IslandsAreJudgedAcrossTiles) {
   options.cleaning.min_island_area_m2 = 0.03;
   SurfaceSurvey survey;
   survey.add(cloud, true);
-  std::map<PlanTile, std::size_t> tiles;
+  std::map<XyTile, std::size_t> tiles;
   add_surface_tiles(cloud, options, tiles);
   SurfaceIslands islands;
   double area = 0.0;

@@ -1,4 +1,4 @@
-#include "libmap/cloud/point_spool.h"
+#include "libmap/tiles/point_tile_store.h"
 
 #include <algorithm>
 #include <cmath>
@@ -25,24 +25,20 @@ const char* take(const char* at, T& value) {
 
 }  // namespace
 
-PointSpool::PointSpool(const std::filesystem::path& folder, const PointSpoolOptions& options)
+PointTileStore::PointTileStore(const std::filesystem::path& folder,
+                               const PointTileStoreOptions& options)
     : file_(folder),
       options_(options),
       record_bytes_(bare_record_bytes + (options.has_normals ? sizeof(Eigen::Vector3f) : 0)) {}
 
-PointSpool::Square PointSpool::square_of(double x, double y) const {
-  return {static_cast<std::int64_t>(std::floor(x / options_.square_m)),
-          static_cast<std::int64_t>(std::floor(y / options_.square_m))};
-}
-
-void PointSpool::add(const PointCloud& cloud) {
+void PointTileStore::add(const PointCloud& cloud) {
   Records* records = nullptr;
-  Square last;
+  XyTile last;
   for (std::size_t n = 0; n < cloud.size(); ++n) {
     const Eigen::Vector3d& position = cloud.positions[n];
-    const Square square = square_of(position.x(), position.y());
-    if (records == nullptr || square != last) records = &squares_[square];
-    last = square;
+    const XyTile tile = xy_tile_at(position.head<2>(), options_.tile_m);
+    if (records == nullptr || tile != last) records = &tiles_[tile];
+    last = tile;
     const std::size_t at = records->buffer.size();
     records->buffer.resize(at + record_bytes_);
     char* out = put(records->buffer.data() + at, static_cast<std::uint64_t>(size_));
@@ -55,8 +51,8 @@ void PointSpool::add(const PointCloud& cloud) {
   }
 }
 
-void PointSpool::flush() {
-  for (auto& [square, records] : squares_) {
+void PointTileStore::flush() {
+  for (auto& [tile, records] : tiles_) {
     if (records.buffer.empty()) continue;
     records.written.push_back(
         {file_.append(records.buffer.data(), records.buffer.size()), records.buffer.size()});
@@ -65,7 +61,7 @@ void PointSpool::flush() {
   buffered_ = 0;
 }
 
-void PointSpool::read_square(const Records& records, std::vector<char>& bytes) const {
+void PointTileStore::read_tile(const Records& records, std::vector<char>& bytes) const {
   bytes.resize(records.count * record_bytes_);
   std::size_t done = 0;
   for (const Extent& extent : records.written) {
@@ -77,21 +73,21 @@ void PointSpool::read_square(const Records& records, std::vector<char>& bytes) c
 }
 
 template <typename Visit>
-void PointSpool::for_squares_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
-                                const Visit& visit) const {
-  const Square first = square_of(low.x(), low.y());
-  const Square last = square_of(high.x(), high.y());
-  for (auto at = squares_.lower_bound(first); at != squares_.end() && at->first.first <= last.first;
-       ++at)
-    if (at->first.second >= first.second && at->first.second <= last.second) visit(at->second);
+void PointTileStore::for_tiles_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high,
+                                  const Visit& visit) const {
+  const XyTile first = xy_tile_at(low, options_.tile_m);
+  const XyTile last = xy_tile_at(high, options_.tile_m);
+  for (auto at = tiles_.lower_bound(first); at != tiles_.end() && at->first.i <= last.i; ++at)
+    if (at->first.j >= first.j && at->first.j <= last.j) visit(at->second);
 }
 
-PointCloud PointSpool::points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
+PointCloud PointTileStore::points_in(const Eigen::Vector2d& low,
+                                     const Eigen::Vector2d& high) const {
   PointCloud found;
   std::vector<std::pair<std::uint64_t, std::size_t>> order;  // place, and index in `found`
   std::vector<char> bytes;
-  for_squares_in(low, high, [&](const Records& records) {
-    read_square(records, bytes);
+  for_tiles_in(low, high, [&](const Records& records) {
+    read_tile(records, bytes);
     for (const char* at = bytes.data(); at < bytes.data() + bytes.size(); at += record_bytes_) {
       std::uint64_t place = 0;
       Eigen::Vector3d position;
@@ -111,9 +107,10 @@ PointCloud PointSpool::points_in(const Eigen::Vector2d& low, const Eigen::Vector
   return libmap::select_points(found, indices);
 }
 
-std::size_t PointSpool::count_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) const {
+std::size_t PointTileStore::count_in(const Eigen::Vector2d& low,
+                                     const Eigen::Vector2d& high) const {
   std::size_t count = 0;
-  for_squares_in(low, high, [&](const Records& records) { count += records.count; });
+  for_tiles_in(low, high, [&](const Records& records) { count += records.count; });
   return count;
 }
 

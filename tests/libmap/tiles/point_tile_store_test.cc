@@ -1,24 +1,24 @@
-#include "libmap/cloud/point_spool.h"
+#include "libmap/tiles/point_tile_store.h"
 
 #include <gtest/gtest.h>
 
 #include "libmap/core/error.h"
 #include "tests/support/test_support.h"
 
-namespace point_spool_test {
+namespace point_tile_store_test {
 
 using Eigen::Vector2d;
 using graspmap_test::scratch_folder;
 using graspmap_test::uniform;
 using libmap::PointCloud;
-using libmap::PointSpool;
+using libmap::PointTileStore;
 
 // Against the plain filter, whatever fits into the buffer.
-TEST(PointSpool, PointsOfARectangleInTheirOrder) {
+TEST(PointTileStore, PointsOfARectangleInTheirOrder) {
   for (const std::size_t buffer : {std::size_t{100}, std::size_t{20000}, std::size_t{1} << 26U}) {
     for (const bool normals : {false, true}) {
-      PointSpool spool(scratch_folder(),
-                       {.square_m = 0.7, .has_normals = normals, .buffer_bytes = buffer});
+      PointTileStore store(scratch_folder(),
+                           {.tile_m = 0.7, .has_normals = normals, .buffer_bytes = buffer});
       PointCloud all;
       for (int part = 0; part < 3; ++part) {
         PointCloud cloud;
@@ -26,12 +26,12 @@ TEST(PointSpool, PointsOfARectangleInTheirOrder) {
           cloud.positions.emplace_back(uniform(-5, 5), uniform(-5, 5), uniform(-1, 1));
           if (normals) cloud.normals.emplace_back(static_cast<float>(n), 0.0F, 1.0F);
         }
-        spool.add(cloud);
+        store.add(cloud);
         all.positions.insert(all.positions.end(), cloud.positions.begin(), cloud.positions.end());
         all.normals.insert(all.normals.end(), cloud.normals.begin(), cloud.normals.end());
       }
-      if (buffer == 100) spool.finish();
-      EXPECT_EQ(spool.size(), 2100u);
+      if (buffer == 100) store.finish();
+      EXPECT_EQ(store.size(), 2100u);
       for (int trial = 0; trial < 20; ++trial) {
         const Vector2d low(uniform(-6, 5), uniform(-6, 5));
         const Vector2d high = low + Vector2d(uniform(0, 4), uniform(0, 4));
@@ -41,18 +41,18 @@ TEST(PointSpool, PointsOfARectangleInTheirOrder) {
           if ((place >= low.array()).all() && (place <= high.array()).all()) inside.push_back(n);
         }
         const PointCloud expected = libmap::select_points(all, inside);
-        const PointCloud found = spool.points_in(low, high);
+        const PointCloud found = store.points_in(low, high);
         EXPECT_EQ(found.positions, expected.positions);
         EXPECT_EQ(found.normals, expected.normals);
-        EXPECT_GE(spool.count_in(low, high), inside.size());
+        EXPECT_GE(store.count_in(low, high), inside.size());
       }
     }
   }
   EXPECT_TRUE(std::filesystem::is_empty(scratch_folder()));
 }
 
-TEST(PointSpool, FolderThatIsNotThere) {
-  EXPECT_THROW(PointSpool(scratch_folder() / "none", {}), libmap::Error);
+TEST(PointTileStore, FolderThatIsNotThere) {
+  EXPECT_THROW(PointTileStore(scratch_folder() / "none", {}), libmap::Error);
 }
 
-}  // namespace point_spool_test
+}  // namespace point_tile_store_test

@@ -5,12 +5,12 @@
 #include <cstdint>
 
 #include "libmap/cloud/surface_voxels.h"
-#include "libmap/core/plan_tiles.h"
 #include "libmap/core/random_stream.h"
+#include "libmap/tiles/xy_tile.h"
 
 namespace libmap {
 
-struct PlanCells {
+struct TileMask {
   Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
   Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
   // Of squares of 4 x 4 columns, one in 2^thinning, by chance; those of a larger number are among
@@ -29,7 +29,7 @@ struct PlanCells {
            has_cell(place.array().floor().cast<int>());
   }
 
-  PlanCells grown(int cells) const { return {low - cells, high + cells, thinning}; }
+  TileMask grown(int cells) const { return {low - cells, high + cells, thinning}; }
 };
 
 }  // namespace libmap

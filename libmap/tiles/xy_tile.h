@@ -1,0 +1,29 @@
+// Tiles of the x-y plane, indexed from the origin.
+#pragma once
+
+#include <Eigen/Core>
+#include <compare>
+#include <cstdint>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+namespace libmap {
+
+struct XyTile {
+  std::int64_t i = 0;  // x of its lower corner, in sides
+  std::int64_t j = 0;
+
+  auto operator<=>(const XyTile&) const = default;
+};
+
+// The tile with the side `tile_m` that contains the position.
+XyTile xy_tile_at(const Eigen::Vector2d& position, double tile_m);
+
+std::string tile_file_name(const XyTile& tile, const std::string& extension);  // "piece_3_0.pcd"
+bool is_tile_file_name(const std::string& name);                               // any extension
+
+// The names of the tile files in `folder`; none if there is no such folder.
+std::vector<std::string> tile_file_names(const std::filesystem::path& folder);
+
+}  // namespace libmap

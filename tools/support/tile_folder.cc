@@ -1,0 +1,185 @@
+#include "tools/support/tile_folder.h"
+
+#include "libmap/core/json_input.h"
+
+namespace graspmap_tools {
+
+namespace fs = std::filesystem;
+
+namespace {
+
+TileFolder::Facts parse_facts(const std::string& text, const fs::path& file) {
+  try {
+    return libmap::parse_json<TileFolder::Facts>(text);
+  } catch (const nlohmann::json::exception& error) {
+    throw libmap::Error(std::string("is broken: ") + error.what(), {.file = file.string()});
+  }
+}
+
+// A file's name may be no UTF-8.
+std::string json_text(const TileFolder::Facts& json) {
+  return json.dump(-1, ' ', false, TileFolder::Facts::error_handler_t::replace);
+}
+
+}  // namespace
+
+void add_share_option(Command& command, std::string& share) {
+  command.option("--tile", "K/N", share,
+                 "make only share K of N of the pieces; the last share completes the folder");
+}
+
+void require_folder_of_share(const std::string& output, const std::string& share) {
+  if (is_tile_folder(output)) return;
+  refuse_given({{"--tile", share != whole_share}}, "is for a folder of pieces");
+}
+
+TileFolder::TileFolder(const std::string& output, const std::vector<std::string>& names,
+                       const std::vector<std::string>& inputs, const libmap::TileShare& share,
+                       Run& run)
+    : output_(without_trailing_slash(output)),
+      names_(names),
+      inputs_(inputs),
+      share_(share),
+      run_(run),
+      key_(libmap::key_of(run.manifest())),
+      store_(output_ + ".progress") {
+  if (share_.count == 1) {
+    run_.claim_output_tree(output_, names_, inputs_);
+    return;
+  }
+  run_.check_output_tree(output_, inputs_);
+  if (run_.options().force)
+    throw libmap::Error("removes the pieces of all shares: use it without --tile",
+                        {.field = "--force"});
+  if (!run_.options().dry_run) earlier_plan();
+}
+
+// The plan of an earlier run, or of another share, with the same parameters and inputs.
+std::optional<TileFolder::Facts> TileFolder::earlier_plan() const {
+  const auto text = run_.options().force ? std::nullopt : store_.plan_text();
+  if (!text) return std::nullopt;
+  Facts plan = parse_facts(*text, store_.plan_path());
+  if (plan.at("key") == key_) return plan;
+  if (share_.count == 1) return std::nullopt;
+  throw libmap::Error(
+      "contains pieces of another input or of other parameters: --force without --tile starts "
+      "again",
+      {.file = store_.folder().string()});
+}
+
+bool TileFolder::is_put_together() const {
+  if (share_.count == 1 || !fs::is_directory(output_)) return false;
+  const auto manifest = libmap::read_manifest_of(output_);
+  return manifest && libmap::key_of(*manifest) == key_;
+}
+
+bool TileFolder::is_complete() const {
+  if (!is_put_together()) return false;
+  run_.say("all pieces are there");
+  return true;
+}
+
+// Removes the store after a bad input of a run of all tiles: to resume it would end the same.
+template <typename Step>
+void TileFolder::resumable(const Step& step) {
+  try {
+    step();
+  } catch (const libmap::Error& error) {
+    if (error.kind() == libmap::ErrorKind::bad_input && share_.count == 1) remove_store();
+    throw;
+  }
+}
+
+TileFolder::Facts TileFolder::begin(const std::function<Facts()>& find) {
+  if (run_.options().dry_run) return {};
+  resumable([&] { journal_.emplace(store_.begin(share_, [&] { agree_on_plan(find); })); });
+  return common_;
+}
+
+void TileFolder::agree_on_plan(const std::function<Facts()>& find) {
+  if (const auto earlier = earlier_plan()) {
+    common_ = earlier->at("common");
+    return;
+  }
+  store_.require_idle();
+  store_.clear();
+  common_ = find();
+  store_.write_plan(Facts{{"key", key_}, {"common", common_}}.dump());
+}
+
+void TileFolder::find_done() {
+  done_.clear();
+  store_.each_line([this](const std::string& text, const libmap::TileStore::Line& line) {
+    const Facts facts = Facts::parse(text, nullptr, false);
+    if (facts.is_object() && facts.value("key", Facts()) == key_ && facts.contains("tile"))
+      done_[json_text(facts.at("tile"))] = line;
+  });
+}
+
+bool TileFolder::is_done(const std::string& tile) const { return done_.contains(json_text(tile)); }
+
+TileFolder::Facts TileFolder::facts(const std::string& tile) const {
+  const libmap::TileStore::Line& line = done_.at(json_text(tile));
+  return parse_facts(libmap::TileStore::read_line(line), line.journal);
+}
+
+void TileFolder::make(const Work& work) {
+  if (run_.options().dry_run) return;
+  if (!journal_) begin();
+  resumable([&] {
+    run_.timed("tiles", [&] { make_missing(work); });
+    put_together(work);
+  });
+}
+
+void TileFolder::make_missing(const Work& work) {
+  find_done();
+  std::vector<std::size_t> missing;
+  const auto [first, last] = libmap::share_range(work.tiles.size(), share_);
+  for (std::size_t n = first; n < last; ++n)
+    if (!is_done(work.tiles[n])) missing.push_back(n);
+  run_.progress().begin("tiles", missing.size());
+  for (const std::size_t n : missing) {
+    libmap::OutputFile tile(file(work.tiles[n], work.extension));
+    Facts facts = work.make(n, tile.temporary_path());
+    if (fs::file_size(tile.temporary_path()) > 0) tile.commit();
+    facts["key"] = key_;
+    facts["tile"] = work.tiles[n];
+    journal_->add({json_text(facts)});
+    run_.progress().advance(1);
+  }
+  run_.progress().end();
+}
+
+void TileFolder::put_together(const Work& work) {
+  find_done();
+  const auto done = static_cast<std::size_t>(
+      std::count_if(work.tiles.begin(), work.tiles.end(),
+                    [this](const std::string& tile) { return is_done(tile); }));
+  // The run of another share may have been the last as well, and have removed the store since.
+  if (done < work.tiles.size() && !is_put_together())
+    return run_.say("{} of {} pieces are done", done, work.tiles.size());
+  if (share_.count > 1) {
+    try {
+      run_.claim_output_tree(output_, names_, inputs_);
+    } catch (const libmap::Error& error) {
+      if (error.kind() != libmap::ErrorKind::failed) throw;
+      return run_.say("another share puts the pieces together");
+    }
+  }
+  if (!is_put_together()) run_.write_output_tree(output_, names_, work.finish);
+  remove_store();
+}
+
+void TileFolder::remove_store() const {
+  std::error_code ignored;
+  fs::remove_all(store_.folder(), ignored);
+}
+
+void TileFolder::link_file(const fs::path& file, const fs::path& to) {
+  std::error_code code;
+  fs::create_hard_link(file, to, code);
+  if (code) fs::copy_file(file, to);
+}
+
+}  // namespace graspmap_tools
