@@ -142,28 +142,6 @@ void write_poses_output(const std::string& path, const libmap::TrajectoryFile& p
       path, [&](const auto& temporary) { libmap::write_trajectory(temporary, poses, nodes); });
 }
 
-// The camera of the scan as the refinement knows it now.
-libmap::CameraFile camera_of(const libmap::RefinementResult& result,
-                             const libmap::ScanSource& scan) {
-  for (const libmap::TrajectoryPose& pose : result.poses) {
-    const std::vector<libmap::Camera> cameras =
-        scan.read_frame(pose.node, {.color = false, .depth = false}).cameras;
-    if (cameras.empty()) continue;
-    if (cameras.size() > 1)
-      throw libmap::Error("a calibration is of one camera",
-                          {.file = scan.path().string(),
-                           .field = "cameras",
-                           .value = std::to_string(cameras.size()),
-                           .bound = "1"});
-    libmap::CameraFile file = libmap::calibrated_camera(cameras.front(), result.cameras.front(),
-                                                        result.calibration, 0, scan.graph());
-    file.findings = result.findings;
-    file.findings.push_back(result.scale);
-    return file;
-  }
-  throw libmap::Error("the scan has no calibration", {.file = scan.path().string()});
-}
-
 void write_outputs(const RefineOptions& options, const libmap::RefinementResult& result,
                    const libmap::ScanSource& scan, const std::optional<libmap::CameraFile>& known,
                    Run& run) {
@@ -174,12 +152,12 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
       for (const libmap::TrajectoryPose& pose : result.poses)
         poses.emplace(pose.node, pose.world_from_base);
       std::optional<libmap::CameraFile> camera;
-      if (!result.calibration.empty()) camera = camera_of(result, scan);
+      if (!result.calibration.empty()) camera = libmap::refined_camera(result, scan);
       libmap::copy_with_optimized_poses(options.scans.front(), temporary, poses, result.closures,
                                         camera);
     });
   if (!options.new_calibration.empty())
-    run.write_text(options.new_calibration, libmap::to_yaml(camera_of(result, scan)));
+    run.write_text(options.new_calibration, libmap::to_yaml(libmap::refined_camera(result, scan)));
   for (const std::string& report : options.reports)
     run.write_text(report, fs::path(report).extension() == ".txt"
                                ? refinement_text(options.scans.front(), result)
@@ -191,7 +169,7 @@ void write_outputs(const RefineOptions& options, const libmap::RefinementResult&
   if (known)
     add_camera(*known, run);
   else if (!result.calibration.empty() && result.cameras.size() == 1)
-    add_camera(camera_of(result, scan), run);
+    add_camera(libmap::refined_camera(result, scan), run);
   write_poses_output(options.output, {result.poses, result.links}, scan, options.nodes, run);
 }
 
@@ -228,58 +206,62 @@ void say_scans(const libmap::RefinementResult& result, const libmap::ScanSource&
   }
 }
 
-void refine(RefineOptions& options, Run& run) {
+void claim_text(const std::string& flag, const std::string& what, const std::string& path,
+                const std::vector<std::string>& extensions, const RefineOptions& options,
+                Run& run) {
+  if (std::find(extensions.begin(), extensions.end(), fs::path(path).extension()) ==
+      extensions.end())
+    throw libmap::Error("unknown format of " + what,
+                        {.field = flag,
+                         .value = path,
+                         .bound = fmt::format("a file {}", fmt::join(extensions, " or "))});
+  run.claim_output(path, options.scans);
+}
+
+void claim_database(const RefineOptions& options, Run& run) {
   const std::string& first = options.scans.front();
   const bool is_file = options.scans.size() == 1 && fs::is_regular_file(first);
+  if (!is_file && fs::exists(first))
+    throw libmap::Error("a copy of a database, which the scan is not",
+                        {.field = "--write-database",
+                         .value = options.database,
+                         .bound = "left out where SCAN is a folder or several"});
+  run.claim_output(options.database, options.scans);
+}
+
+// Claims the outputs before the work. Returns the camera that --calibration names.
+std::optional<libmap::CameraFile> claim_outputs(const RefineOptions& options, Run& run) {
   claim_poses_output(options.output, options.scans, run);
-  if (!options.links.empty()) {
-    if (fs::path(options.links).extension() != ".g2o")
-      throw libmap::Error("unknown format of links",
-                          {.field = "--links", .value = options.links, .bound = "a file .g2o"});
-    run.claim_output(options.links, options.scans);
-  }
+  if (!options.links.empty()) claim_text("--links", "links", options.links, {".g2o"}, options, run);
   if (!options.new_calibration.empty()) {
     std::vector<std::string> inputs = options.scans;
     inputs.push_back(options.calibration.source);
     run.claim_output(options.new_calibration, inputs);
   }
-  const auto camera = known_camera(options.calibration, first, {}, run);
+  auto camera = known_camera(options.calibration, options.scans.front(), {}, run);
   if (camera)
     refuse_given({{"--write-calibration", !options.new_calibration.empty()},
                   {"--write-database", !options.database.empty()}},
                  "starts from the stored camera, not from --calibration");
-  if (!options.database.empty()) {
-    if (!is_file && fs::exists(first))
-      throw libmap::Error("a copy of a database, which the scan is not",
-                          {.field = "--write-database",
-                           .value = options.database,
-                           .bound = "left out where SCAN is a folder or several"});
-    run.claim_output(options.database, options.scans);
-  }
-  for (const std::string& report : options.reports) {
-    const fs::path extension = fs::path(report).extension();
-    if (extension != ".json" && extension != ".txt")
-      throw libmap::Error("unknown format of reports",
-                          {.field = "--report", .value = report, .bound = "a file .json or .txt"});
-    run.claim_output(report, options.scans);
-  }
-  const auto scan = open_scan(options.scans, options.strict, run, camera);
-  // Nodes of several scans may have the same stamps.
-  if (count_by_scan({}, *scan).size() > 1) options.refinement.one_map = options.nodes = true;
-  const libmap::RefinementResult result = in_file(first, [&] {
-    return libmap::refine_poses(*scan, options.refinement, run.progress(),
-                                feature_cache_of(options, run));
-  });
+  if (!options.database.empty()) claim_database(options, run);
+  for (const std::string& report : options.reports)
+    claim_text("--report", "reports", report, {".json", ".txt"}, options, run);
+  return camera;
+}
+
+void say_result(const RefineOptions& options, const libmap::RefinementResult& result,
+                bool with_known_camera, Run& run) {
+  const std::string& first = options.scans.front();
   for (const auto& [node, fault] : result.skipped)
     run.warn("no features: node {}: {}", node, fault.what());
   for (const std::string& warning : result.warnings) run.warn(first + ": " + warning);
   for (const libmap::StageReport& stage : result.stages) say_stage(stage, run);
   for (const std::string& finding : result.findings) run.say(finding);
-  if (!result.calibration.empty() && (camera || result.cameras.size() > 1) &&
+  if (!result.calibration.empty() && (with_known_camera || result.cameras.size() > 1) &&
       options.database.empty())
-    run.warn(
-        "{}: what was corrected is in the poses alone: {}", first,
-        camera ? "begin with the stored camera" : "--write-database keeps it of several cameras");
+    run.warn("{}: what was corrected is in the poses alone: {}", first,
+             with_known_camera ? "begin with the stored camera"
+                               : "--write-database keeps it of several cameras");
   const bool is_depth_scale = options.refinement.known_lengths.empty() &&
                               !options.refinement.board && options.refinement.scale == 1.0 &&
                               options.refinement.scale_from == libmap::ScaleSource::depth;
@@ -289,6 +271,18 @@ void refine(RefineOptions& options, Run& run) {
     run.say(result.scale);
   run.say("{} poses, {} links, of which {} were found", result.poses.size(), result.links.size(),
           result.closures.size());
+}
+
+void refine(RefineOptions& options, Run& run) {
+  const auto camera = claim_outputs(options, run);
+  const auto scan = open_scan(options.scans, options.strict, run, camera);
+  // Nodes of several scans may have the same stamps.
+  if (count_by_scan({}, *scan).size() > 1) options.refinement.one_map = options.nodes = true;
+  const libmap::RefinementResult result = in_file(options.scans.front(), [&] {
+    return libmap::refine_poses(*scan, options.refinement, run.progress(),
+                                feature_cache_of(options, run));
+  });
+  say_result(options, result, camera.has_value(), run);
   say_scans(result, *scan, run);
   for (const std::string& path : options.scans)
     if (fs::is_regular_file(path)) run.add_input(path);

@@ -6,7 +6,7 @@
 #include <map>
 #include <vector>
 
-#include "libmap/refine/loop_closure.h"
+#include "libmap/refine/feature_tracks.h"
 
 namespace libmap {
 

@@ -6,9 +6,9 @@
 
 #include "libmap/core/pose.h"
 #include "libmap/core/pose_graph.h"
+#include "libmap/refine/feature_tracks.h"
 #include "libmap/refine/features.h"
 #include "libmap/refine/icp_refinement.h"
-#include "libmap/refine/loop_closure.h"
 #include "libmap/refine/pose_graph_optimization.h"
 
 namespace libmap {

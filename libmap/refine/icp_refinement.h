@@ -9,8 +9,8 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
 #include "libmap/refine/block_system.h"
+#include "libmap/refine/feature_tracks.h"
 #include "libmap/refine/features.h"
-#include "libmap/refine/loop_closure.h"
 #include "libmap/refine/pose_graph_optimization.h"
 
 namespace libmap {

@@ -101,11 +101,9 @@ Pose best_move(const std::vector<Bridge>& bridges) {
   std::size_t most = 0;
   for (std::size_t n = 0; n < bridges.size(); n += stride) {
     std::size_t votes = 0;
-    for (const Bridge& other : bridges) {
-      const Vector6d apart =
-          step_between(bridges[n].move * bridges[n].probe, other.move * bridges[n].probe);
-      votes += apart.head<3>().norm() < agreement_m && apart.tail<3>().norm() < agreement_rad;
-    }
+    for (const Bridge& other : bridges)
+      votes += is_near(bridges[n].move * bridges[n].probe, other.move * bridges[n].probe,
+                       agreement_m, agreement_rad);
     if (votes > most) {
       most = votes;
       best = n;

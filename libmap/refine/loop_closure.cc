@@ -2,14 +2,11 @@
 
 #include <Eigen/Cholesky>
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
-#include <optional>
 
-#include "libmap/core/parallel.h"
-#include "libmap/core/random_stream.h"
 #include "libmap/geometry/spatial_index.h"
+#include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
@@ -17,15 +14,9 @@ namespace libmap {
 namespace {
 
 constexpr double degree = std::numbers::pi / 180.0;
-constexpr int few_matches = 6;
+constexpr double confirmed_m = 0.1;  // between two links of the same parts
+constexpr double confirmed_rad = 5.0 * degree;
 constexpr std::size_t considered_per_pair = 8;  // times as many as are taken, for their directions
-
-bool is_held_out(int feature, std::size_t frame, int every) {
-  // Features stand by strength: numbers alone would pick like ones in every frame.
-  return mix_bits(static_cast<std::uint64_t>(frame), static_cast<std::uint64_t>(feature)) %
-             static_cast<std::uint64_t>(every) ==
-         0;
-}
 
 FramePair ordered(std::size_t a, std::size_t b) { return {std::min(a, b), std::max(a, b)}; }
 
@@ -53,51 +44,6 @@ void add_near_pairs(const std::vector<std::size_t>& members, const std::vector<c
     ranked.resize(std::min(ranked.size(), wanted));
     for (const auto& [measure, other] : ranked) pairs.insert(ordered(members[n], other));
   }
-}
-
-struct Verified {
-  RelativePoseOutcome outcome = RelativePoseOutcome::too_few_matches;
-  std::optional<FeatureLink> link;
-};
-
-Verified verify_pair(const FrameFeatures& a, const FrameFeatures& b, FramePair pair,
-                     const std::vector<FeatureMatch>& matches,
-                     const LoopClosureDetectionOptions& options, std::uint64_t seed) {
-  std::vector<FeatureMatch> used;
-  std::vector<FeatureMatch> kept;
-  for (const FeatureMatch& match : matches)
-    (is_held_out(match.a, pair.first, options.held_out) ? kept : used).push_back(match);
-  RelativePose pose = estimate_relative_pose(a, b, used, options.estimate, seed);
-  Verified result{pose.outcome, std::nullopt};
-  if (pose.outcome != RelativePoseOutcome::found) return result;
-  FeatureLink link;
-  link.frames = pair;
-  link.link = {a.node, b.node, LinkType::local_space_closure, pose.a_from_b, pose.information};
-  link.matches = std::move(pose.inliers);
-  link.chi_square_per_freedom = pose.chi_square_per_freedom;
-  for (const FeatureMatch& match : kept) {
-    const MatchResidual residual = match_residual(a, b, match, pose.a_from_b);
-    // Wider than for inliers: the poses of later stages are measured by them.
-    if (residual.in_front && residual.chi_square() <= 4.0 * options.estimate.max_chi_square)
-      link.held_out.push_back(match);
-  }
-  result.link = std::move(link);
-  return result;
-}
-
-const std::vector<FeatureMatch>* known_matches(const KnownMatches* known, const FramePair& pair) {
-  if (known == nullptr) return nullptr;
-  const auto found = known->find(pair);
-  return found == known->end() ? nullptr : &found->second;
-}
-
-// In the order of RelativePoseOutcome.
-void count(RelativePoseOutcome outcome, RejectionCounts& counts) {
-  constexpr std::array counted = {&RejectionCounts::accepted, &RejectionCounts::too_few_matches,
-                                  &RejectionCounts::too_few_inliers, &RejectionCounts::narrow,
-                                  &RejectionCounts::not_converged};
-  ++counts.candidates;
-  ++(counts.*counted.at(static_cast<std::size_t>(outcome)));
 }
 
 Matrix6d slack_of(const LoopClosureDetectionOptions& options) {
@@ -132,8 +78,7 @@ bool agree(const FeatureLink& one, const FeatureLink& other, const PoseGraphResu
   const Pose b = moved_by(other.link, swapped);
   // Where the one link's node would lie by the other.
   const Pose& node = graph.map_from_base.at(one.link.to);
-  const Vector6d apart = step_between(a * node, b * node);
-  return apart.head<3>().norm() < 0.1 && apart.tail<3>().norm() < 5.0 * degree;
+  return is_near(a * node, b * node, confirmed_m, confirmed_rad);
 }
 
 }  // namespace
@@ -225,51 +170,6 @@ std::set<FramePair> near_pairs(const std::vector<FrameFeatures>& frames,
     if (members.size() > 1) add_near_pairs(members, poses, options, pairs);
   }
   return pairs;
-}
-
-PairVerification verify_pairs(const std::vector<FrameFeatures>& frames,
-                              const std::vector<FramePair>& pairs,
-                              const LoopClosureDetectionOptions& options, std::uint64_t seed,
-                              Progress& progress, KnownMatches* known) {
-  std::vector<Verified> verified(pairs.size());
-  std::vector<std::vector<FeatureMatch>> fresh(pairs.size());
-  progress.begin("matching", pairs.size());
-  parallel_for(pairs.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const auto [a, b] = pairs[n];
-      const std::uint64_t own = mix_bits(mix_bits(seed, static_cast<std::uint64_t>(frames[a].node)),
-                                         static_cast<std::uint64_t>(frames[b].node));
-      const std::vector<FeatureMatch>* matches = known_matches(known, pairs[n]);
-      if (matches == nullptr) {
-        fresh[n] = match_features(descriptor_vectors(frames[a]), descriptor_vectors(frames[b]),
-                                  options.max_ratio);
-        matches = &fresh[n];
-      }
-      verified[n] = verify_pair(frames[a], frames[b], pairs[n], *matches, options, own);
-      if (known == nullptr) fresh[n] = {};
-      progress.advance(1);
-    }
-  });
-  progress.end();
-  for (std::size_t n = 0; known != nullptr && n < pairs.size(); ++n)
-    known->emplace(pairs[n], std::move(fresh[n]));
-  PairVerification result;
-  for (Verified& pair : verified) {
-    count(pair.outcome, result.counts);
-    if (pair.link) result.links.push_back(std::move(*pair.link));
-  }
-  return result;
-}
-
-std::optional<Pose> guess_motion(const std::vector<FrameFeatures>& frames, const FramePair& pair,
-                                 const LoopClosureDetectionOptions& options, std::uint64_t seed) {
-  LoopClosureDetectionOptions few = options;
-  few.estimate.min_inliers = few_matches;
-  few.estimate.min_inlier_share = 0.0;
-  few.estimate.min_spread = 0.0;
-  const PairVerification verified = verify_pairs(frames, {pair}, few, seed);
-  if (verified.links.empty()) return std::nullopt;
-  return verified.links.front().link.from_from_to;
 }
 
 void check_against_graph(std::vector<FeatureLink>& links, const PoseGraphResult& graph,

@@ -1,4 +1,4 @@
-#include "libmap/refine/lost_frames.h"
+#include "libmap/refine/visual_odometry.h"
 
 #include <algorithm>
 #include <array>
@@ -56,10 +56,7 @@ class LostFrames {
              return start_.map_from_base.contains(node);
            });
   }
-  int session(std::size_t frame) const {
-    const auto known = start_.session.find(node(frame));
-    return known == start_.session.end() ? 0 : known->second;
-  }
+  int session(std::size_t frame) const { return start_.session_of(node(frame)); }
 
   // The nearest that is not lost.
   std::size_t neighbor(std::size_t frame, std::size_t step) const {
@@ -99,9 +96,7 @@ class LostFrames {
       places.push_back(pose(other) * link->from_from_to);
     }
     if (links.empty()) return false;
-    const Vector6d apart = step_between(places.front(), places.back());
-    if (apart.head<3>().norm() > sides_agree_m || apart.tail<3>().norm() > sides_agree_rad)
-      return false;
+    if (!is_near(places.front(), places.back(), sides_agree_m, sides_agree_rad)) return false;
     move_part(frame, links.front().from, places.front());
     result_.depth_links.insert(result_.depth_links.end(), links.begin(), links.end());
     return true;

@@ -65,14 +65,14 @@ struct StageError {
 };
 
 struct StageReport {
-  std::string name;
+  std::string name{};
   bool rejected = false;
-  RejectionCounts closures;                             // of this stage
-  HeldOutEvaluation held_out;                           // of this stage's links and of those before
-  std::map<std::string, LinkGroupResult> groups;        // of an optimized graph
-  std::vector<std::pair<std::string, double>> figures;  // what else the stage counts
-  std::optional<StageError> error;
-  std::optional<StageError> rejected_error;  // of the poses that were given up
+  RejectionCounts closures{};                       // of this stage
+  HeldOutEvaluation held_out{};                     // of this stage's links and of those before
+  std::map<std::string, LinkGroupResult> groups{};  // of an optimized graph
+  std::vector<std::pair<std::string, double>> figures{};  // metrics of the stage
+  std::optional<StageError> error{};
+  std::optional<StageError> rejected_error{};  // of the poses that were given up
   double seconds = 0.0;
   double processor_seconds = 0.0;
 };
@@ -106,5 +106,9 @@ struct RefinementResult {
 // nothing else gives poses, a board that does not determine the scale.
 RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& options = {},
                               Progress& progress = no_progress(), const FeatureCache& cache = {});
+
+// The camera of the scan as estimated, with the findings. Throws Error: the scan has no
+// calibration, or several cameras.
+CameraFile refined_camera(const RefinementResult& result, const ScanSource& scan);
 
 }  // namespace libmap

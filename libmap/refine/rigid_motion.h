@@ -55,6 +55,12 @@ inline Vector6d step_between(const Pose& from, const Pose& to) {
   return step;
 }
 
+// Whether two poses differ by no more than this.
+inline bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad) {
+  const Vector6d apart = step_between(a, b);
+  return apart.head<3>().norm() <= distance_m && apart.tail<3>().norm() <= angle_rad;
+}
+
 // How the step of a_from_b = a^-1 b follows from steps of a and b, to first order.
 struct RelativeJacobian {
   Matrix6d by_a;

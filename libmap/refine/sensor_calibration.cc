@@ -16,7 +16,7 @@ namespace libmap {
 namespace {
 
 // A part of a scan as a scan of its own.
-struct Excerpt {
+struct SubScan {
   std::vector<FrameFeatures> frames;
   std::vector<FeatureLink> links;
   FeatureTracks tracks;
@@ -25,9 +25,10 @@ struct Excerpt {
   std::vector<GraphComponent> components;
 };
 
+constexpr std::size_t max_frames = 80;
+
 // Breadth first from the frame with most links.
-std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links,
-                                    std::size_t max_frames) {
+std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<FeatureLink>& links) {
   std::vector<std::vector<std::size_t>> joined(frames);
   for (const FeatureLink& link : links) {
     joined[link.frames.first].push_back(link.frames.second);
@@ -47,22 +48,18 @@ std::set<std::size_t> joined_frames(std::size_t frames, const std::vector<Featur
   return taken;
 }
 
-Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
-                   const std::map<int, Pose>& map_from_base,
-                   const std::vector<GraphLinkResult>& graph_links,
-                   const std::vector<GraphComponent>& components,
-                   const std::set<std::size_t>& chosen) {
-  Excerpt part;
+SubScan sub_scan_of(const CalibrationInput& input, const std::set<std::size_t>& chosen) {
+  SubScan part;
   std::map<std::size_t, std::size_t> place;
   for (const std::size_t f : chosen) {
-    const auto pose = map_from_base.find(frames[f].node);
-    if (pose == map_from_base.end()) continue;
+    const auto pose = input.map_from_base.find(input.frames[f].node);
+    if (pose == input.map_from_base.end()) continue;
     place.emplace(f, part.frames.size());
-    part.frames.push_back(frames[f]);
+    part.frames.push_back(input.frames[f]);
     part.frames.back().descriptors = {};
     part.poses.insert(*pose);
   }
-  for (const FeatureLink& link : links) {
+  for (const FeatureLink& link : input.links) {
     const auto a = place.find(link.frames.first);
     const auto b = place.find(link.frames.second);
     if (a == place.end() || b == place.end()) continue;
@@ -70,10 +67,10 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
     part.links.back().frames = {a->second, b->second};
   }
   part.tracks = build_tracks(part.frames, part.links);
-  for (const GraphLinkResult& link : graph_links)
+  for (const GraphLinkResult& link : input.graph_links)
     if (part.poses.contains(link.link.from) && part.poses.contains(link.link.to))
       part.graph_links.push_back(link);
-  for (const GraphComponent& component : components) {
+  for (const GraphComponent& component : input.components) {
     GraphComponent kept;
     std::copy_if(component.nodes.begin(), component.nodes.end(), std::back_inserter(kept.nodes),
                  [&](int node) { return part.poses.contains(node); });
@@ -83,6 +80,19 @@ Excerpt excerpt_of(const std::vector<FrameFeatures>& frames, const std::vector<F
     part.components.push_back(std::move(kept));
   }
   return part;
+}
+
+SubScan joined_sub_scan(const CalibrationInput& input) {
+  return sub_scan_of(input, joined_frames(input.frames.size(), input.links));
+}
+
+BundleAdjustmentOptions with_free(const CalibrationParts& parts, BundleAdjustmentOptions options) {
+  options.refine_intrinsics = parts.intrinsics;
+  options.refine_depth = parts.depth;
+  options.refine_registration = parts.registration;
+  options.refine_timing = parts.timing;
+  options.with_information = false;
+  return options;
 }
 
 constexpr int max_rounds = 4;
@@ -101,44 +111,23 @@ constexpr double min_timing_gain = 0.02;
 // larger than what the last steps change.
 constexpr double rough_tolerance = 1e-4;
 
-// What is free in an adjustment.
-struct Model {
-  bool intrinsics = false;
-  bool depth = false;
-  bool registration = false;
-  bool timing = false;
-
-  bool operator==(const Model&) const = default;
-  std::string name() const {
-    std::string text;
-    for (const auto& [free, part] :
-         {std::pair(intrinsics, "intrinsics"), std::pair(depth, "depth"),
-          std::pair(registration, "registration"), std::pair(timing, "timing")})
-      if (free) text += (text.empty() ? "" : "_") + std::string(part);
-    return text;
-  }
-};
-
 // How what was held out fits with a model.
 struct Candidate {
-  Model model;
+  CalibrationParts model;
   BundleAdjustmentResult adjustment;
   HeldOutCosts costs;
 };
 
-Candidate try_model(const Model& model, const Excerpt& part, BundleAdjustmentOptions options,
-                    SensorCalibration start, std::map<int, Pose> poses, int rounds) {
-  options.refine_intrinsics = model.intrinsics;
-  options.refine_depth = model.depth;
-  options.refine_registration = model.registration;
-  options.refine_timing = model.timing;
-  options.with_information = false;
+Candidate try_model(const CalibrationParts& model, const SubScan& part,
+                    const BundleAdjustmentOptions& options, SensorCalibration start,
+                    std::map<int, Pose> poses, int rounds) {
+  const BundleAdjustmentOptions free = with_free(model, options);
   Candidate candidate;
   candidate.model = model;
   // Other planes are met when depth is taken from elsewhere: once more from there.
   for (int round = 0; round < rounds; ++round) {
     candidate.adjustment = adjust_bundle(part.frames, part.tracks.tracks, poses, part.graph_links,
-                                         part.components, options, {}, start);
+                                         part.components, free, {}, start);
     const SensorCalibration& found = candidate.adjustment.calibration;
     if (!model.registration && !model.timing) break;
     if (takes_depth_from_near(start, found, 1e-4, 5e-5, 3e-4)) break;
@@ -193,7 +182,7 @@ bool is_needed(const HeldOutCosts& without, const HeldOutCosts& with, double gai
 // The simplest model that fits.
 class ModelSearch {
  public:
-  ModelSearch(const Excerpt& part, const BundleAdjustmentOptions& options,
+  ModelSearch(const SubScan& part, const BundleAdjustmentOptions& options,
               const CalibrationChoice& choice)
       : part_(part),
         options_(options),
@@ -207,22 +196,22 @@ class ModelSearch {
   CalibrationEstimate run();
 
  private:
-  Candidate attempt(const Model& model, const SensorCalibration& start,
+  Candidate attempt(const CalibrationParts& model, const SensorCalibration& start,
                     const std::map<int, Pose>& poses, int rounds) {
     Candidate candidate = try_model(model, part_, rough_, start, poses, rounds);
     estimate_.tried.emplace_back(model.name(), evaluate_held_out(before_, candidate.costs));
     return candidate;
   }
   // One round is enough for a comparison: planes are met where the best meets them.
-  Candidate attempt_from_best(const Model& model, int rounds) {
+  Candidate attempt_from_best(const CalibrationParts& model, int rounds) {
     return attempt(model, best_.adjustment.calibration, best_.adjustment.map_from_base, rounds);
   }
   bool is_good(const Candidate& candidate) const;
-  void simplify_to(const Model& simpler);
+  void simplify_to(const CalibrationParts& simpler);
   void leave_out();
   void try_timing();
 
-  const Excerpt& part_;
+  const SubScan& part_;
   const BundleAdjustmentOptions& options_;
   BundleAdjustmentOptions rough_;
   const CalibrationChoice& choice_;
@@ -240,7 +229,7 @@ bool ModelSearch::is_good(const Candidate& candidate) const {
 }
 
 // Unless what it leaves out is needed.
-void ModelSearch::simplify_to(const Model& simpler) {
+void ModelSearch::simplify_to(const CalibrationParts& simpler) {
   if (!is_good(best_) || simpler.name().empty() || simpler == best_.model) return;
   Candidate candidate = attempt_from_best(simpler, 1);
   // Motions leave errors that what is not at fault would absorb.
@@ -252,8 +241,9 @@ void ModelSearch::simplify_to(const Model& simpler) {
 void ModelSearch::leave_out() {
   if (!choice_.only_if_better || !choice_.leave_out) return;
   if (best_.model.timing) simplify_to({.timing = true});
-  for (bool Model::*const part_of : {&Model::registration, &Model::depth, &Model::intrinsics}) {
-    Model simpler = best_.model;
+  for (bool CalibrationParts::*const part_of :
+       {&CalibrationParts::registration, &CalibrationParts::depth, &CalibrationParts::intrinsics}) {
+    CalibrationParts simpler = best_.model;
     simpler.*part_of = false;
     simplify_to(simpler);
   }
@@ -261,7 +251,7 @@ void ModelSearch::leave_out() {
 
 void ModelSearch::try_timing() {
   const bool was_good = is_good(best_);
-  Model timed = was_good ? best_.model : Model{};
+  CalibrationParts timed = was_good ? best_.model : CalibrationParts{};
   timed.timing = true;
   Candidate candidate = was_good ? attempt_from_best(timed, 1) : attempt(timed, {}, part_.poses, 1);
   if (!is_good(candidate) ||
@@ -274,15 +264,14 @@ void ModelSearch::try_timing() {
 }
 
 CalibrationEstimate ModelSearch::run() {
-  const Model all{choice_.intrinsics, choice_.depth, choice_.registration,
-                  choice_.timing && !choice_.start.timing.empty()};
+  CalibrationParts all = choice_.parts;
+  all.timing = all.timing && !choice_.start.timing.empty();
   best_ = attempt(all, choice_.start, part_.poses, max_rounds);
   // Too much freedom for little data may hide what intrinsics alone explain.
-  if (!is_good(best_) && choice_.leave_out && choice_.intrinsics &&
-      (choice_.depth || choice_.registration))
+  if (!is_good(best_) && choice_.leave_out && all.intrinsics && (all.depth || all.registration))
     best_ = attempt({.intrinsics = true}, {}, part_.poses, 1);
   leave_out();
-  if (choice_.timing && choice_.leave_out && !all.timing) try_timing();
+  if (choice_.parts.timing && choice_.leave_out && !all.timing) try_timing();
   if (is_good(best_) && choice_.settle) {
     Candidate settled = try_model(best_.model, part_, options_, best_.adjustment.calibration,
                                   best_.adjustment.map_from_base, 1);
@@ -296,33 +285,32 @@ CalibrationEstimate ModelSearch::run() {
 
 }  // namespace
 
-CalibrationEstimate estimate_calibration(const std::vector<FrameFeatures>& frames,
-                                         const std::vector<FeatureLink>& links,
-                                         const std::map<int, Pose>& map_from_base,
-                                         const std::vector<GraphLinkResult>& graph_links,
-                                         const std::vector<GraphComponent>& components,
-                                         const BundleAdjustmentOptions& options,
-                                         const CalibrationChoice& choice, std::size_t max_frames) {
-  const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components,
-                                  joined_frames(frames.size(), links, max_frames));
-  return ModelSearch(part, options, choice).run();
+std::string CalibrationParts::name() const {
+  std::string text;
+  for (const auto& [free, part] :
+       {std::pair(intrinsics, "intrinsics"), std::pair(depth, "depth"),
+        std::pair(registration, "registration"), std::pair(timing, "timing")})
+    if (free) text += (text.empty() ? "" : "_") + std::string(part);
+  return text;
 }
 
-BundleAdjustmentResult vary_calibration(
-    const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
-    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
-    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
-    const SensorCalibration& known, std::size_t count, std::size_t max_frames) {
-  const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components,
-                                  joined_frames(frames.size(), links, max_frames));
-  BundleAdjustmentOptions varied = options;
-  varied.refine_intrinsics = !known.intrinsics.empty();
-  varied.refine_depth = !known.depth.empty();
-  varied.refine_registration = !known.color_from_depth.empty();
-  varied.refine_timing = !known.timing.empty();
+CalibrationParts parts_of(const SensorCalibration& calibration) {
+  return {!calibration.intrinsics.empty(), !calibration.depth.empty(),
+          !calibration.color_from_depth.empty(), !calibration.timing.empty()};
+}
+
+CalibrationEstimate estimate_calibration(const CalibrationInput& input,
+                                         const CalibrationChoice& choice) {
+  const SubScan part = joined_sub_scan(input);
+  return ModelSearch(part, input.options, choice).run();
+}
+
+BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
+                                        const SensorCalibration& known, std::size_t count) {
+  const SubScan part = joined_sub_scan(input);
+  BundleAdjustmentOptions varied = with_free(parts_of(known), input.options);
   varied.alternatives = count;
   varied.tolerance = rough_tolerance;
-  varied.with_information = false;
   BundleAdjustmentResult result =
       adjust_bundle(part.frames, part.tracks.tracks, part.poses, part.graph_links, part.components,
                     varied, {}, known);
@@ -331,20 +319,12 @@ BundleAdjustmentResult vary_calibration(
   return result;
 }
 
-void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
-                  const std::map<int, Pose>& map_from_base,
-                  const std::vector<GraphLinkResult>& graph_links,
-                  const std::vector<GraphComponent>& components,
-                  const BundleAdjustmentOptions& options, bool hold_poses,
-                  SensorCalibration& calibration) {
-  BundleAdjustmentOptions moving = options;
+void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibration& calibration) {
+  const std::vector<FrameFeatures>& frames = input.frames;
+  BundleAdjustmentOptions moving = with_free(parts_of(calibration), input.options);
   moving.hold_poses = hold_poses;
   moving.refine_timing = moving.hold_cameras = true;
-  moving.refine_intrinsics = !calibration.intrinsics.empty();
-  moving.refine_depth = !calibration.depth.empty();
-  moving.refine_registration = !calibration.color_from_depth.empty();
   moving.tolerance = rough_tolerance;
-  moving.with_information = false;
   SensorCalibration start = calibration;
   std::map<int, Vector6d> motions;
   for (std::size_t first = 0; first < frames.size(); first += frames_a_window) {
@@ -353,7 +333,7 @@ void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<Fe
     for (std::size_t f = first - std::min(first, frames_beside);
          f < std::min(frames.size(), end + frames_beside); ++f)
       window.insert(f);
-    const Excerpt part = excerpt_of(frames, links, map_from_base, graph_links, components, window);
+    const SubScan part = sub_scan_of(input, window);
     std::map<int, Pose> poses = part.poses;
     start.motion = calibration.motion;
     for (int round = 0; round < (hold_poses ? 1 : motion_rounds); ++round) {
@@ -368,7 +348,7 @@ void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<Fe
         motions.insert(*motion);
   }
   calibration.motion = std::move(motions);
-  for (const GraphComponent& component : components)
+  for (const GraphComponent& component : input.components)
     if (component.nodes.size() == 1) calibration.motion.erase(component.nodes.front());
   interpolate_motions(frames, calibration.motion);
 }
@@ -384,10 +364,9 @@ bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& 
     return n < of.timing.size() ? of.timing[n] : CameraTiming{};
   };
   for (std::size_t n = 0; n < cameras; ++n) {
-    const Vector6d step = step_between(pose_of(a, n), pose_of(b, n));
     const CameraTiming at = timing_of(a, n);
     const CameraTiming bt = timing_of(b, n);
-    if (step.head<3>().norm() > shift_m || step.tail<3>().norm() > turn_rad ||
+    if (!is_near(pose_of(a, n), pose_of(b, n), shift_m, turn_rad) ||
         std::abs(at.depth_delay_s - bt.depth_delay_s) > time_s ||
         std::abs(at.rolling_shutter_s - bt.rolling_shutter_s) > time_s)
       return false;
@@ -396,22 +375,21 @@ bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& 
 }
 
 CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
-                             const SensorCalibration& calibration, std::size_t n,
-                             const PoseGraph& graph) {
+                             const SensorCalibration& calibration, const PoseGraph& graph) {
   CameraFile file{.camera = stored};
-  if (n < calibration.intrinsics.size()) {
+  if (!calibration.intrinsics.empty()) {
     // Estimated in pixels of the pictures, which may be smaller than the stored camera's.
-    IntrinsicsStep step = calibration.intrinsics[n];
+    IntrinsicsStep step = calibration.intrinsics.front();
     step.cx_px *= static_cast<double>(stored.width) / picture.width;
     step.cy_px *= static_cast<double>(stored.height) / picture.height;
     file.camera = moved(stored, step);
   }
-  if (n < calibration.color_from_depth.size())
-    file.color_from_depth = calibration.color_from_depth[n];
-  if (n < calibration.depth.size()) file.depth = calibration.depth[n];
-  if (n < calibration.timing.size()) {
-    file.depth_delay_s = calibration.timing[n].depth_delay_s;
-    file.rolling_shutter_s = calibration.timing[n].rolling_shutter_s;
+  if (!calibration.color_from_depth.empty())
+    file.color_from_depth = calibration.color_from_depth.front();
+  if (!calibration.depth.empty()) file.depth = calibration.depth.front();
+  if (!calibration.timing.empty()) {
+    file.depth_delay_s = calibration.timing.front().depth_delay_s;
+    file.rolling_shutter_s = calibration.timing.front().rolling_shutter_s;
     for (const GraphNode& node : graph.nodes)
       if (const auto motion = calibration.motion.find(node.id); motion != calibration.motion.end())
         file.motions.push_back({node.stamp_s, motion->second.head<3>(), motion->second.tail<3>()});

@@ -15,14 +15,32 @@
 
 namespace libmap {
 
-// What may be estimated, and whether only if it fits clearly better.
+// What a calibration is estimated from.
+struct CalibrationInput {
+  const std::vector<FrameFeatures>& frames;  // with the stored cameras
+  const std::vector<FeatureLink>& links;
+  const std::map<int, Pose>& map_from_base;
+  const std::vector<GraphLinkResult>& graph_links;  // other links than those of features
+  const std::vector<GraphComponent>& components;
+  const BundleAdjustmentOptions& options;
+};
+
+// Parts of a calibration: which are estimated.
+struct CalibrationParts {
+  bool intrinsics = false;
+  bool depth = false;
+  bool registration = false;
+  bool timing = false;
+
+  bool operator==(const CalibrationParts&) const = default;
+  std::string name() const;  // "intrinsics_depth"; empty for none
+};
+CalibrationParts parts_of(const SensorCalibration& calibration);
+
 struct CalibrationChoice {
-  bool intrinsics = true;
-  bool depth = true;
-  bool registration = true;
-  bool timing = true;
-  bool only_if_better = true;
-  bool leave_out = true;    // what is not needed
+  CalibrationParts parts{true, true, true, true};  // that may be estimated
+  bool only_if_better = true;                      // if the held-out data fit clearly better
+  bool leave_out = true;                           // drop parts that are not needed
   bool settle = true;       // the best to the tolerance of the options, not only as far as models
                             // are compared
   SensorCalibration start;  // where the search for registration and timing begins
@@ -40,40 +58,27 @@ struct CalibrationEstimate {
 // all together at first, since a false focal length absorbs errors of depth. If that fits the
 // held-out data clearly better, each of them is left out again unless the fit becomes clearly
 // worse; if not, intrinsics alone are tried. Timing needs a motion for each frame, so it is tried
-// last. A long scan is represented by the `max_frames` frames that links join most closely to the
-// one with most links: more frames do not improve the estimate. `links` join frames, `graph_links`
-// are other links of the graph.
-CalibrationEstimate estimate_calibration(
-    const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
-    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
-    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
-    const CalibrationChoice& choice, std::size_t max_frames = 80);
+// last. A long scan is represented by the 80 frames that links join most closely to the one with
+// most links: more frames do not improve the estimate.
+CalibrationEstimate estimate_calibration(const CalibrationInput& input,
+                                         const CalibrationChoice& choice);
 
-// The calibration again, from where it is, with `count` alternatives.
-BundleAdjustmentResult vary_calibration(
-    const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
-    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& graph_links,
-    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
-    const SensorCalibration& known, std::size_t count, std::size_t max_frames = 80);
+// Repeats the calibration `known` from its values, with `count` alternatives.
+BundleAdjustmentResult vary_calibration(const CalibrationInput& input,
+                                        const SensorCalibration& known, std::size_t count);
 
 // The motions of all frames with a pose at the timing of a calibration, in place of those of the
 // frames that it rests on. The rest of the calibration stays.
-void find_motions(const std::vector<FrameFeatures>& frames, const std::vector<FeatureLink>& links,
-                  const std::map<int, Pose>& map_from_base,
-                  const std::vector<GraphLinkResult>& graph_links,
-                  const std::vector<GraphComponent>& components,
-                  const BundleAdjustmentOptions& options, bool hold_poses,
-                  SensorCalibration& calibration);
+void find_motions(const CalibrationInput& input, bool hold_poses, SensorCalibration& calibration);
 
 // Whether registrations and timings of all cameras differ by no more than this.
 bool takes_depth_from_near(const SensorCalibration& a, const SensorCalibration& b, double shift_m,
                            double turn_rad, double time_s);
 
-// The n-th of the cameras with the calibration, for a file; `picture` is the camera of its
-// pictures, `graph` has the stamps of the nodes.
+// The first camera with the calibration, for a file; `picture` is the camera of its pictures,
+// `graph` has the stamps of the nodes.
 CameraFile calibrated_camera(const Camera& stored, const Camera& picture,
-                             const SensorCalibration& calibration, std::size_t n,
-                             const PoseGraph& graph);
+                             const SensorCalibration& calibration, const PoseGraph& graph);
 
 // One sentence for each thing that was found wrong and corrected.
 std::vector<std::string> findings(const SensorCalibration& calibration,

@@ -7,7 +7,6 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/refine/lost_frames.h"
 #include "libmap/refine/pair_alignment.h"
 #include "libmap/refine/place_recognition.h"
 #include "libmap/refine/rigid_motion.h"
@@ -79,10 +78,7 @@ class Tracker {
     return frames_[frame].features.size() >=
            static_cast<std::size_t>(std::max(6, matching_.estimate.min_inliers));
   }
-  int session_of(std::size_t frame) const {
-    const auto session = start_.session.find(frames_[frame].node);
-    return session == start_.session.end() ? 0 : session->second;
-  }
+  int session_of(std::size_t frame) const { return start_.session_of(frames_[frame].node); }
   bool is_fixed(std::size_t part) const { return fixed_.contains(part); }
 
   void verify(const std::vector<FramePair>& pairs);
@@ -321,9 +317,8 @@ bool Tracker::relocalize(std::size_t frame) {
       sightings.push_back({other, pose_by(frame, other, *seen.link), seen.link->matches.size()});
   }
   const auto agree = [&](const Sighting& a, const Sighting& b) {
-    const Vector6d apart = step_between(a.map_from_base, b.map_from_base);
-    return part_[a.frame] == part_[b.frame] && apart.head<3>().norm() < motion_agreement_m &&
-           apart.tail<3>().norm() < motion_agreement_rad;
+    return part_[a.frame] == part_[b.frame] &&
+           is_near(a.map_from_base, b.map_from_base, motion_agreement_m, motion_agreement_rad);
   };
   const Sighting* best = nullptr;
   std::pair<std::size_t, std::size_t> most{1, 0};  // sightings that agree, inliers

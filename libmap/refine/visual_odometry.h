@@ -32,6 +32,11 @@ struct TrackingStart {
   std::map<int, Pose> map_from_base;    // nodes that have a pose already: they keep it
   std::vector<std::vector<int>> parts;  // ... each in one part: its poses are in one frame
   std::map<int, Pose> first;  // where a part is put whose first node this is; else at the identity
+
+  int session_of(int node) const {
+    const auto known = session.find(node);
+    return known == session.end() ? 0 : known->second;
+  }
 };
 
 // A node that could not be tracked.
@@ -70,6 +75,17 @@ VisualOdometryResult track_frames(const std::vector<FrameFeatures>& frames,
                                   const LoopClosureDetectionOptions& matching,
                                   const VisualOdometryOptions& options, std::uint64_t seed,
                                   Progress& progress = no_progress());
+
+// Recovers frames that visual odometry lost, for example to motion blur, from depth; track_frames
+// does so at its end. Frames of parts of one to four are aligned by depth (align_pair) with the
+// nearest frames of larger parts before and after them, from where a steady motion between these
+// leads, or on from one side where the other has none, else from where a few matches lead
+// (guess_motion). Alignments with both sides must agree. The frame's part joins that one in
+// `result`, with the links in depth_links, which may help the next. `start` has the sessions, and
+// the nodes whose poses stay.
+void place_lost_frames(const std::vector<FrameFeatures>& frames, const TrackingStart& start,
+                       const LoopClosureDetectionOptions& matching, std::uint64_t seed,
+                       VisualOdometryResult& result);
 
 // Normalized estimation error squared (Bar-Shalom et al. 2001) of links against true poses, by
 // freedom: mean of e^T information e / 6. Near 1 where the stated covariances are honest. Links

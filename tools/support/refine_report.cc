@@ -17,6 +17,13 @@ using Json = nlohmann::ordered_json;
 
 constexpr double degrees = 180.0 / M_PI;
 
+template <typename Items, typename JsonOf>
+Json array_of(const Items& items, const JsonOf& json_of) {
+  Json array = Json::array();
+  for (const auto& item : items) array.push_back(json_of(item));
+  return array;
+}
+
 // Why pairs of frames gave no link, by its name in both kinds of report.
 std::vector<std::pair<const char*, std::size_t>> rejections_of(
     const libmap::RejectionCounts& counts) {
@@ -86,23 +93,16 @@ Json stage_json(const libmap::StageReport& stage) {
   return json;
 }
 
-// Standard deviations of each node against its part's gauge node.
-Json nodes_json(const libmap::RefinementResult& result) {
-  Json json = Json::array();
-  for (const auto& [node, covariance] : result.covariance) {
-    Json rows = Json::array();
-    for (int row = 0; row < 6; ++row) {
-      Json values = Json::array();
-      for (int column = 0; column < 6; ++column) values.push_back(covariance(row, column));
-      rows.push_back(values);
-    }
-    json.push_back(
-        {{"node", node},
-         {"deviation_m", std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0)},
-         {"deviation_deg", std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3.0) * degrees},
-         {"covariance", rows}});
-  }
-  return json;
+// Standard deviations of a node against its part's gauge node.
+Json node_json(int node, const libmap::Matrix6d& covariance) {
+  Json rows = Json::array();
+  for (int row = 0; row < 6; ++row)
+    rows.push_back(std::vector<double>(covariance.row(row).begin(), covariance.row(row).end()));
+  return {
+      {"node", node},
+      {"deviation_m", std::sqrt(covariance.topLeftCorner<3, 3>().trace() / 3.0)},
+      {"deviation_deg", std::sqrt(covariance.bottomRightCorner<3, 3>().trace() / 3.0) * degrees},
+      {"covariance", rows}};
 }
 
 std::string numbers_text(const std::vector<int>& numbers) {
@@ -165,29 +165,30 @@ void add_stage(const libmap::StageReport& stage, std::string& text) {
 }  // namespace
 
 std::string refinement_json(const std::string& scan, const libmap::RefinementResult& result) {
-  Json stages = Json::array();
-  for (const libmap::StageReport& stage : result.stages) stages.push_back(stage_json(stage));
-  Json parts = Json::array();
-  for (const libmap::GraphComponent& part : result.components)
-    parts.push_back({{"nodes", part.nodes.size()}, {"gauge_node", part.gauge_node}});
-  Json rejected = Json::array();
-  for (const libmap::PoseLink& link : result.rejected_links)
-    rejected.push_back({{"from", link.from}, {"to", link.to}, {"type", to_text(link.type)}});
-  Json skipped = Json::array();
-  for (const auto& [node, fault] : result.skipped)
-    skipped.push_back({{"node", node}, {"reason", fault.what()}});
-  Json losses = Json::array();
-  for (const libmap::TrackingLoss& loss : result.losses)
-    losses.push_back({{"node", loss.node},
-                      {"key_frame", loss.key_frame},
-                      {"reason", loss.reason},
-                      {"found_node", loss.found_node},
-                      {"found_at", loss.found_at}});
+  const Json parts = array_of(result.components, [](const auto& part) -> Json {
+    return {{"nodes", part.nodes.size()}, {"gauge_node", part.gauge_node}};
+  });
+  const Json losses = array_of(result.losses, [](const auto& loss) -> Json {
+    return {{"node", loss.node},
+            {"key_frame", loss.key_frame},
+            {"reason", loss.reason},
+            {"found_node", loss.found_node},
+            {"found_at", loss.found_at}};
+  });
+  const Json skipped = array_of(result.skipped, [](const auto& frame) -> Json {
+    return {{"node", frame.first}, {"reason", frame.second.what()}};
+  });
+  const Json rejected = array_of(result.rejected_links, [](const auto& link) -> Json {
+    return {{"from", link.from}, {"to", link.to}, {"type", to_text(link.type)}};
+  });
+  const Json nodes = array_of(result.covariance, [](const auto& of_node) {
+    return node_json(of_node.first, of_node.second);
+  });
   const Json json = {{"scan", scan},
                      {"poses", result.poses.size()},
                      {"links", result.links.size()},
                      {"closures_found", result.closures.size()},
-                     {"stages", stages},
+                     {"stages", array_of(result.stages, stage_json)},
                      {"parts", parts},
                      {"nodes_without_links", result.without_links},
                      {"nodes_without_pose", result.without_pose},
@@ -197,7 +198,7 @@ std::string refinement_json(const std::string& scan, const libmap::RefinementRes
                      {"sensor", result.findings},
                      {"scale", result.scale},
                      {"warnings", result.warnings},
-                     {"nodes", nodes_json(result)}};
+                     {"nodes", nodes}};
   return json.dump(2) + "\n";
 }
 

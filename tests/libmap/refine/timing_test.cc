@@ -202,7 +202,7 @@ TEST(SensorCalibration, AllFramesHaveMotions) {
   libmap::SensorCalibration calibration;
   calibration.timing = {{0.0, 0.06}};
   for (const bool hold_poses : {false, true}) {
-    libmap::find_motions(way.frames, links, way.truth, {}, way.components, {}, hold_poses,
+    libmap::find_motions({way.frames, links, way.truth, {}, way.components, {}}, hold_poses,
                          calibration);
     ASSERT_EQ(calibration.motion.size(), way.frames.size());
     for (const auto& [node, motion] : calibration.motion)
