@@ -29,7 +29,6 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN message_codec.h EXCLUDE
   PATTERN message_encoding.h EXCLUDE
   PATTERN named_cells.h EXCLUDE
-  PATTERN pose_residuals.h EXCLUDE
   PATTERN raster_module.h EXCLUDE
   PATTERN refinement_work.h EXCLUDE
   PATTERN ros_messages.h EXCLUDE

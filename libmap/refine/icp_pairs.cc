@@ -8,7 +8,7 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/surface_samples.h"
 
 namespace libmap {

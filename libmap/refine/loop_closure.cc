@@ -10,7 +10,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/point_tree.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
 
 namespace libmap {
 

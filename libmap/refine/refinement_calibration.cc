@@ -224,10 +224,10 @@ void Refinement::vary_calibration() {
     const TrackSystem observed(frames, tracks.tracks, options_.bundle_adjustment.robust_scale);
     BlockSystem system = observed.system(poses_, observed.points_at(poses_));
     system.add(surface_system(frames, poses_, surface_pairs_, surface_distance_m_, options_.icp));
-    return system.side();
+    return system.rhs();
   };
   const std::vector<Vector6d> best = asked(varied.calibration);
-  const BlockSolver solver(with_gauges(information_, poses_, graph_.components), 1e-6);
+  const BlockSolver solver(fix_gauges(information_, poses_, graph_.components), 1e-6);
   if (!solver.valid()) return;
   const double deviation =
       varied.calibration.timing.empty() ? calibration_deviation_scale : timing_deviation_scale;
