@@ -10,6 +10,7 @@
 
 #include "libmap/calibration/board_adjustment.h"
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/text.h"
 
 namespace libmap {
@@ -282,11 +283,9 @@ std::optional<std::size_t> find_odd_picture(const std::vector<BoardPicture>& pic
   const BoardCorners corners = corners_of(pictures, options.board);
   const std::vector<double> errors =
       picture_errors(fit_from_many_starts(corners, width, height, options.lens), corners);
-  std::vector<double> sorted = errors;
-  std::sort(sorted.begin(), sorted.end());
-  const double median = std::sqrt(sorted[sorted.size() / 2]);
-  if (!(std::sqrt(sorted.back()) > times_the_median * median)) return std::nullopt;
-  return static_cast<std::size_t>(std::max_element(errors.begin(), errors.end()) - errors.begin());
+  const auto worst = std::max_element(errors.begin(), errors.end());
+  if (!(std::sqrt(*worst) > times_the_median * std::sqrt(median(errors)))) return std::nullopt;
+  return static_cast<std::size_t>(worst - errors.begin());
 }
 
 cv::Mat as_mat(const GrayImage& image) {

@@ -10,13 +10,11 @@
 #include <utility>
 
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/rigid_motion.h"
 
 namespace libmap {
 
 namespace {
-
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-using Matrix6d = Eigen::Matrix<double, 6, 6>;
 
 constexpr int robust_rounds = 3;
 constexpr int max_iterations = 200;

@@ -9,9 +9,11 @@
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/pose_graph.h"
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/least_squares.h"
+#include "libmap/geometry/rigid_motion.h"
+#include "libmap/geometry/robust.h"
 
 namespace libmap {
 
@@ -30,7 +32,6 @@ void bind(ParameterTable& table, SurfaceAlignmentOptions& options) {
 
 namespace {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
 constexpr std::size_t distances_per_chunk = 512;
 
 std::vector<Eigen::Vector3d> downsampled(const std::vector<Eigen::Vector3d>& points, int most) {
@@ -74,16 +75,13 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
 // Tukey's biweight; its scale is the normalized median absolute deviation. Returns the number of
 // pairs with a weight.
 std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
-  constexpr double efficient = 4.685;       // 95 % efficiency for Gaussian errors
-  constexpr double normal_median = 1.4826;  // standard deviation over median absolute deviation
   std::vector<double> distances;
   distances.reserve(pairs.size());
   for (const Pair& pair : pairs) distances.push_back(pair.place.distance_m);
-  const double reach = std::max(floor_m, efficient * normal_median * median(std::move(distances)));
+  const double reach = std::max(floor_m, tukey_width_of(median(std::move(distances))));
   std::size_t inliers = 0;
   for (Pair& pair : pairs) {
-    const double share = pair.place.distance_m / reach;
-    pair.weight = share < 1.0 ? (1.0 - share * share) * (1.0 - share * share) : 0.0;
+    pair.weight = tukey_weight(pair.place.distance_m / reach);
     if (pair.weight > 0.0) ++inliers;
   }
   return inliers;
@@ -91,15 +89,13 @@ std::size_t weigh(std::vector<Pair>& pairs, double floor_m) {
 
 // Rotations count by how far they move the points, so that all six are lengths: turned about
 // `center` by an angle times `radius_m`.
-struct NormalEquations {
+struct CenteredEquations : NormalEquations<6> {
   Eigen::Vector3d center = Eigen::Vector3d::Zero();
   double radius_m = 0.0;
-  Matrix6d matrix = Matrix6d::Zero();
-  Vector6d right = Vector6d::Zero();
 };
 
-NormalEquations equations_of(const std::vector<Pair>& pairs) {
-  NormalEquations equations;
+CenteredEquations equations_of(const std::vector<Pair>& pairs) {
+  CenteredEquations equations;
   double weights = 0.0;
   for (const Pair& pair : pairs) {
     equations.center += pair.weight * pair.point;
@@ -117,7 +113,7 @@ NormalEquations equations_of(const std::vector<Pair>& pairs) {
     row << (pair.point - equations.center).cross(normal) / equations.radius_m, normal;
     const double residual = (pair.place.position - pair.point).dot(normal);
     equations.matrix += pair.weight / weights * row * row.transpose();
-    equations.right += pair.weight / weights * residual * row;
+    equations.rhs += pair.weight / weights * residual * row;
   }
   return equations;
 }
@@ -129,7 +125,7 @@ struct Step {
   double curvature = 1.0;
 };
 
-Step solve(const NormalEquations& equations, double min_curvature) {
+Step solve(const CenteredEquations& equations, double min_curvature) {
   const SymmetricEigen<6> eigen = symmetric_eigen(equations.matrix);
   const double greatest = eigen.values[5];
   Step step;
@@ -143,7 +139,7 @@ Step solve(const NormalEquations& equations, double min_curvature) {
     }
     step.curvature = curvature;
     const Vector6d direction = eigen.vectors.col(n);
-    motion += direction.dot(equations.right) / eigen.values[n] * direction;
+    motion += direction.dot(equations.rhs) / eigen.values[n] * direction;
   }
   const Eigen::Vector3d turn = motion.head<3>() / equations.radius_m;
   step.length_m = motion.norm();
@@ -182,20 +178,26 @@ SurfaceAlignmentResult align_to_surface(const std::vector<Eigen::Vector3d>& poin
   const double floor_m = 1e-9 * (surface.bounds().max - surface.bounds().min).norm();
   SurfaceAlignmentResult result;
   result.points = used.size();
-  while (true) {
-    std::vector<Pair> pairs = pairs_of(used, result.surface_from_points, surface, options);
+  std::vector<Pair> pairs;
+  const auto find_pairs = [&] {
+    pairs = pairs_of(used, result.surface_from_points, surface, options);
     result.overlap = pairs.size();
     result.inliers = weigh(pairs, floor_m);
     result.rmse_m = rmse_of(pairs);
-    if (result.converged || result.iterations == options.max_iterations) return result;
+  };
+  find_pairs();
+  const GaussNewtonSummary summary = gauss_newton(options.max_iterations, [&] {
     const Step step = solve(equations_of(pairs), options.min_curvature);
     result.surface_from_points = step.motion * result.surface_from_points;
     result.surface_from_points.linear() = nearest_rotation(result.surface_from_points.linear());
     result.free_motions = step.free_motions;
     result.curvature = step.curvature;
-    result.converged = step.length_m <= options.tolerance_m;
-    ++result.iterations;
-  }
+    find_pairs();
+    return step.length_m <= options.tolerance_m ? StepState::converged : StepState::moving;
+  });
+  result.iterations = summary.iterations;
+  result.converged = summary.state == StepState::converged;
+  return result;
 }
 
 }  // namespace libmap

@@ -34,7 +34,7 @@ std::vector<std::size_t> fill_reducing_places(const BlockSystem& system) {
 
 }  // namespace
 
-BlockSystem::BlockSystem(std::size_t blocks) : size_(blocks), side_(blocks, Vector6d::Zero()) {}
+BlockSystem::BlockSystem(std::size_t blocks) : size_(blocks), rhs_(blocks, Vector6d::Zero()) {}
 
 void BlockSystem::add(std::size_t row, std::size_t column, const Matrix6d& block) {
   const bool upper = row <= column;
@@ -46,11 +46,20 @@ void BlockSystem::add(std::size_t row, std::size_t column, const Matrix6d& block
     entry->second += block.transpose();
 }
 
-void BlockSystem::add_side(std::size_t row, const Vector6d& side) { side_[row] += side; }
+void BlockSystem::add_rhs(std::size_t row, const Vector6d& rhs) { rhs_[row] += rhs; }
+
+void BlockSystem::add_pair(std::size_t a, std::size_t b, const Matrix6d& by_a, const Matrix6d& by_b,
+                           const Matrix6d& information, const Vector6d& rhs) {
+  add(a, a, by_a.transpose() * information * by_a);
+  add(a, b, by_a.transpose() * information * by_b);
+  add(b, b, by_b.transpose() * information * by_b);
+  add_rhs(a, by_a.transpose() * rhs);
+  add_rhs(b, by_b.transpose() * rhs);
+}
 
 void BlockSystem::add(const BlockSystem& other) {
   for (const auto& [key, block] : other.blocks_) add(key.first, key.second, block);
-  for (std::size_t n = 0; n < size_; ++n) side_[n] += other.side_[n];
+  for (std::size_t n = 0; n < size_; ++n) rhs_[n] += other.rhs_[n];
 }
 
 Matrix6d BlockSystem::block(std::size_t row, std::size_t column) const {
@@ -59,8 +68,8 @@ Matrix6d BlockSystem::block(std::size_t row, std::size_t column) const {
   return row <= column ? found->second : Matrix6d(found->second.transpose());
 }
 
-void BlockSystem::clear_side() {
-  for (Vector6d& side : side_) side.setZero();
+void BlockSystem::clear_rhs() {
+  for (Vector6d& rhs : rhs_) rhs.setZero();
 }
 
 struct BlockSolver::Parts {
@@ -103,12 +112,12 @@ BlockSolver::~BlockSolver() = default;
 
 bool BlockSolver::valid() const { return parts_->valid; }
 
-std::vector<Vector6d> BlockSolver::solve(const std::vector<Vector6d>& side) const {
+std::vector<Vector6d> BlockSolver::solve(const std::vector<Vector6d>& rhs) const {
   Eigen::VectorXd right(parts_->size);
-  for (std::size_t n = 0; n < side.size(); ++n) right.segment<6>(parts_->at(n)) = side[n];
+  for (std::size_t n = 0; n < rhs.size(); ++n) right.segment<6>(parts_->at(n)) = rhs[n];
   const Eigen::VectorXd left = parts_->solver.solve(right);
-  std::vector<Vector6d> result(side.size());
-  for (std::size_t n = 0; n < side.size(); ++n) result[n] = left.segment<6>(parts_->at(n));
+  std::vector<Vector6d> result(rhs.size());
+  for (std::size_t n = 0; n < rhs.size(); ++n) result[n] = left.segment<6>(parts_->at(n));
   return result;
 }
 

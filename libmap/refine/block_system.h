@@ -1,4 +1,4 @@
-// Sparse normal equations in blocks of six: one block of unknowns a pose.
+// Sparse normal equations in blocks of six: one block of unknowns per pose.
 #pragma once
 
 #include <cstddef>
@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
 
 namespace libmap {
 
@@ -18,17 +18,21 @@ class BlockSystem {
 
   // The information matrix's block (row, column) and its mirror image.
   void add(std::size_t row, std::size_t column, const Matrix6d& block);
-  void add_side(std::size_t row, const Vector6d& side);
+  void add_rhs(std::size_t row, const Vector6d& rhs);
+  // A residual that is linear in two blocks of unknowns, with its own information and right-hand
+  // side.
+  void add_pair(std::size_t a, std::size_t b, const Matrix6d& by_a, const Matrix6d& by_b,
+                const Matrix6d& information, const Vector6d& rhs);
   void add(const BlockSystem& other);
   Matrix6d block(std::size_t row, std::size_t column) const;  // zero where none was added
   const std::map<std::pair<std::size_t, std::size_t>, Matrix6d>& blocks() const { return blocks_; }
-  const std::vector<Vector6d>& side() const { return side_; }
-  void clear_side();
+  const std::vector<Vector6d>& rhs() const { return rhs_; }
+  void clear_rhs();
 
  private:
   std::size_t size_ = 0;
   std::map<std::pair<std::size_t, std::size_t>, Matrix6d> blocks_;  // row <= column
-  std::vector<Vector6d> side_;
+  std::vector<Vector6d> rhs_;
 };
 
 // The factored system. Sparse LDL^T with a fill-reducing order of the blocks: the same bytes on
@@ -43,7 +47,7 @@ class BlockSolver {
 
   bool valid() const;  // positive definite
   // The unknowns for one right-hand side; only where valid().
-  std::vector<Vector6d> solve(const std::vector<Vector6d>& side) const;
+  std::vector<Vector6d> solve(const std::vector<Vector6d>& rhs) const;
   // Blocks (row, column) of the inverse for each row, of one column.
   std::vector<Matrix6d> inverse_column(std::size_t column) const;
   // The blocks of the inverse where `wanted` has blocks. Those that the factored system has too, be

@@ -12,7 +12,9 @@
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/least_squares.h"
+#include "libmap/geometry/rigid_motion.h"
+#include "libmap/refine/bundle_residuals.h"
 #include "libmap/scan/picture_file.h"
 #include "libmap/scan/stereo_depth.h"
 
@@ -171,13 +173,12 @@ Sums sums_of(const Sight& sight, const Corners& corners, const PlacedBoard& boar
     const Eigen::Vector3d on_board = board.size * corners[n];
     const Eigen::Vector3d in_base = base_from_board * on_board;
     const Eigen::Vector3d point = sight.base_from_camera.inverse() * in_base;
-    Eigen::Matrix<double, 2, 3> by_point;
-    by_point << Eigen::Matrix2d::Identity(), -point.hnormalized();
-    by_point = (sight.focal_px / point.z()).asDiagonal() * by_point.eval();
+    const Projection projection = project(point, sight.focal_px, sight.rays[n], 0.0);
+    const Eigen::Matrix<double, 2, 3> by_point = projection.by_point.topRows<2>();
     Eigen::Matrix<double, 2, 14> row;
     row << by_point * turn, -by_point * turn * cross_matrix(on_board), by_point * turn * on_board,
-        sight.focal_px.cwiseProduct(point.hnormalized() - sight.rays[n]),
-        -by_point * camera_from_base, by_point * camera_from_base * cross_matrix(in_base);
+        projection.residual.head<2>(), -by_point * camera_from_base,
+        by_point * camera_from_base * cross_matrix(in_base);
     sums += row.transpose() * row;
   }
   return sums;
@@ -230,17 +231,18 @@ struct BoardPosition {
 std::optional<BoardPosition> fit(const std::vector<OrderedSight>& sights,
                                  const PlacedBoard& start) {
   BoardPosition found{start};
-  for (int iteration = 0; iteration < max_iterations; ++iteration) {
+  const GaussNewtonSummary summary = gauss_newton(max_iterations, [&] {
     const System system = weigh(sights, found.board).system;
     const Eigen::LLT<Eigen::Matrix<double, 7, 7>> normal(system.topLeftCorner<7, 7>());
     const Eigen::Matrix<double, 7, 1> step = normal.solve(-system.topRightCorner<7, 1>());
-    if (normal.info() != Eigen::Success || !step.allFinite()) return std::nullopt;
+    if (normal.info() != Eigen::Success || !step.allFinite()) return StepState::failed;
     found.board.map_from_board = moved(found.board.map_from_board, step.head<6>());
     found.board.size *= std::exp(std::clamp(step[6], -0.5, 0.5));
     const Eigen::Matrix<double, 7, 1> unit = Eigen::Matrix<double, 7, 1>::Unit(6);
     found.size_variance = normal.solve(unit)[6];
-    if (step.norm() < settled_step) break;
-  }
+    return step.norm() < settled_step ? StepState::converged : StepState::moving;
+  });
+  if (summary.state == StepState::failed) return std::nullopt;
   return found;
 }
 

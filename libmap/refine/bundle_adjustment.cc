@@ -1,16 +1,17 @@
 #include "libmap/refine/bundle_adjustment.h"
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <iterator>
 #include <utility>
 
+#include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/bundle_residuals.h"
-#include "libmap/refine/calibration_uncertainty.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/joint_adjustment.h"
-#include "libmap/refine/motions_between.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/refine/relative_motions.h"
 #include "libmap/refine/sparse_adjustment.h"
 
 namespace libmap {
@@ -21,6 +22,8 @@ constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more
 constexpr double registration_prior_m = 0.02;
 constexpr double registration_prior_rad = 0.03;
 constexpr double timing_prior_s = 0.03;
+// Keeps a pose that nothing binds from making the system singular.
+constexpr double pose_damping = 1e-6;
 
 std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
   std::size_t cameras = 0;
@@ -43,7 +46,7 @@ class Priors {
     for (Eigen::Index n = 0; n < means.size(); ++n)
       add(means[n] / deviations[n])[first + n] = 1.0 / deviations[n];
   }
-  void give(JointProblem& problem) const {
+  void add_to(JointProblem& problem) const {
     problem.prior.resize(static_cast<Eigen::Index>(rows_.size()), numbers_);
     for (std::size_t n = 0; n < rows_.size(); ++n)
       problem.prior.row(static_cast<Eigen::Index>(n)) = rows_[n];
@@ -56,6 +59,45 @@ class Priors {
   std::vector<Eigen::VectorXd> rows_;
   std::vector<double> means_;
 };
+
+// Rows of normal equations.
+struct FreeRows {
+  std::vector<Eigen::Index> poses;   // the first of six each: of a step (rigid_motion.h)
+  std::vector<Eigen::Index> params;  // of cameras and motions
+};
+
+// Changes of the parameters by one standard deviation in independent directions, poses being
+// unknown (Schur complement): the `count` ones that move the positions of the poses most. Points
+// are eliminated from the information already.
+std::vector<Eigen::VectorXd> calibration_modes(const Eigen::MatrixXd& information,
+                                               const FreeRows& rows, std::size_t count) {
+  if (rows.params.empty()) return {};
+  std::vector<Eigen::Index> steps;
+  for (const Eigen::Index first : rows.poses)
+    for (Eigen::Index n = 0; n < 6; ++n) steps.push_back(first + n);
+  Eigen::MatrixXd of_poses = information(steps, steps);
+  of_poses.diagonal().array() += pose_damping;
+  // How poses follow the cameras.
+  const Eigen::MatrixXd mixed = information(steps, rows.params);
+  const Eigen::MatrixXd follow = -of_poses.ldlt().solve(mixed);
+  const Eigen::MatrixXd of_params =
+      information(rows.params, rows.params) + mixed.transpose() * follow;
+  const Eigen::LLT<Eigen::MatrixXd> root(of_params);
+  if (root.info() != Eigen::Success) return {};
+  const Eigen::Index params = of_params.rows();
+  const Eigen::MatrixXd deviations =
+      root.matrixU().solve(Eigen::MatrixXd::Identity(params, params));
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(params, params);
+  for (Eigen::Index pose = 0; pose < follow.rows(); pose += 6) {
+    const Eigen::MatrixXd moves = follow.middleRows<3>(pose) * deviations;
+    squares += moves.transpose() * moves;
+  }
+  const SymmetricEigen<Eigen::Dynamic> effects = symmetric_eigen<Eigen::Dynamic>(squares);
+  std::vector<Eigen::VectorXd> changes;
+  for (Eigen::Index n = params - 1; n >= 0 && changes.size() < count; --n)
+    changes.emplace_back(deviations * effects.vectors.col(n));
+  return changes;
+}
 
 class Adjustment {
  public:
@@ -109,16 +151,16 @@ Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
   state_.poses = poses;
   for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
   problem_.robust_scale = options.robust_scale;
-  problem_.numbers_held = options.hold_cameras;
-  problem_.held.assign(place_.size(), options.hold_poses);
+  problem_.fix_cameras = options.hold_cameras;
+  problem_.fixed.assign(place_.size(), options.hold_poses);
   for (const GraphComponent& component : components)
     if (const auto place = place_.find(component.gauge_node); place != place_.end())
-      problem_.held[place->second] = true;
+      problem_.fixed[place->second] = true;
   start_numbers(start, components);
   add_observations();
-  Priors priors(state_.numbers.size());
+  Priors priors(state_.camera_params.size());
   for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(n, priors);
-  priors.give(problem_);
+  priors.add_to(problem_);
 }
 
 void Adjustment::start_numbers(const SensorCalibration& start,
@@ -137,9 +179,9 @@ void Adjustment::start_numbers(const SensorCalibration& start,
     if (n < corrections_.size())
       numbers += static_cast<Eigen::Index>(corrections_[n].spline_m.size());
   }
-  state_.numbers = Eigen::VectorXd::Zero(numbers);
+  state_.camera_params = Eigen::VectorXd::Zero(numbers);
   for (std::size_t n = 0; n < cameras_; ++n) {
-    double* const own = state_.numbers.data() + first_[n];
+    double* const own = state_.camera_params.data() + first_[n];
     own[timing_at] = start_.timing[n].depth_delay_s;
     own[timing_at + 1] = start_.timing[n].rolling_shutter_s;
     if (options_.refine_intrinsics && n < start.intrinsics.size()) {
@@ -155,7 +197,7 @@ void Adjustment::start_numbers(const SensorCalibration& start,
   }
   if (!options_.refine_timing) return;
   problem_.moving = true;
-  const std::map<int, KnownMotion> between = motions_between(frames_, state_.poses, components);
+  const std::map<int, KnownMotion> between = relative_motions(frames_, state_.poses, components);
   for (const auto& [node, pose] : state_.poses) {
     const auto found = between.find(node);
     const KnownMotion known = found == between.end() ? KnownMotion{} : found->second;
@@ -273,7 +315,7 @@ void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
 // on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
 // squares with both as measurements makes times too long.
 double Adjustment::motion_scale() const {
-  if (!problem_.moving || problem_.numbers_held) return 1.0;
+  if (!problem_.moving || problem_.fix_cameras) return 1.0;
   double mixed = 0.0;
   double squares = 0.0;
   for (std::size_t n = 0; n < state_.motions.size(); ++n) {
@@ -288,7 +330,7 @@ double Adjustment::motion_scale() const {
 SensorCalibration Adjustment::calibration(const JointState& state, double motion_scale) const {
   SensorCalibration found;
   for (std::size_t n = 0; n < cameras_; ++n) {
-    const double* own = state.numbers.data() + first_[n];
+    const double* own = state.camera_params.data() + first_[n];
     const double* step = own + intrinsics_at;
     if (options_.refine_intrinsics)
       found.intrinsics.push_back({step[0], step[1], step[2], step[3]});
@@ -316,22 +358,23 @@ void Adjustment::find_alternatives() {
   const auto poses = static_cast<Eigen::Index>(state_.poses.size());
   FreeRows rows;
   for (Eigen::Index n = 0; n < poses; ++n) {
-    if (!problem_.held[static_cast<std::size_t>(n)]) rows.poses.push_back(size * n);
-    for (Eigen::Index k = 6; k < size; ++k) rows.numbers.push_back(size * n + k);
+    if (!problem_.fixed[static_cast<std::size_t>(n)]) rows.poses.push_back(size * n);
+    for (Eigen::Index k = 6; k < size; ++k) rows.params.push_back(size * n + k);
   }
-  for (const Eigen::Index number : free_) rows.numbers.push_back(size * poses + number);
+  for (const Eigen::Index number : free_) rows.params.push_back(size * poses + number);
   const double scale = motion_scale();
   const Eigen::MatrixXd information =
       joint_system(problem_, state_).matrix.selfadjointView<Eigen::Lower>();
-  for (const Eigen::VectorXd& change : likely_changes(information, rows, options_.alternatives)) {
+  for (const Eigen::VectorXd& change :
+       calibration_modes(information, rows, options_.alternatives)) {
     JointState other = state_;
-    for (std::size_t n = 0; n < rows.numbers.size(); ++n) {
-      const Eigen::Index row = rows.numbers[n];
+    for (std::size_t n = 0; n < rows.params.size(); ++n) {
+      const Eigen::Index row = rows.params[n];
       const double by = change[static_cast<Eigen::Index>(n)];
       if (row < size * poses)
         other.motions[static_cast<std::size_t>(row / size)][row % size - 6] += by;
       else
-        other.numbers[row - size * poses] += by;
+        other.camera_params[row - size * poses] += by;
     }
     result_.alternatives.push_back(calibration(other, scale));
   }
@@ -340,12 +383,12 @@ void Adjustment::find_alternatives() {
 BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links) {
   problem_.links = links;
   if (result_.observations > 0) {
-    const JointSummary summary =
+    const LeastSquaresSummary summary =
         adjust_jointly(problem_, state_, options_.max_iterations, options_.tolerance);
     result_.initial_cost = summary.initial_cost;
     result_.final_cost = summary.final_cost;
     result_.iterations = summary.iterations;
-    result_.converged = summary.converged;
+    result_.converged = true;  // the cost has not risen
   }
   result_.map_from_base = state_.poses;
   result_.points.assign(tracks_.size(), Eigen::Vector3d::Zero());
@@ -373,7 +416,7 @@ void add_information(const std::vector<FrameFeatures>& frames,
   observed.totals(result.map_from_base, at).add_to(result);
   result.information = observed.system(result.map_from_base, at);
   result.information.add(link_system(result.map_from_base, links));
-  result.information.clear_side();
+  result.information.clear_rhs();
 }
 
 void bind(ParameterTable& table, BundleAdjustmentOptions& options) {

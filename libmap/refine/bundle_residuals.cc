@@ -15,8 +15,20 @@ struct Moving {
 
 }  // namespace
 
+Projection project(const Eigen::Vector3d& point, const Eigen::Vector2d& focal_px,
+                   const Eigen::Vector2d& ray, double depth_m) {
+  const Eigen::Vector2d seen = point.hnormalized();
+  const Eigen::Vector2d scale = focal_px / point.z();
+  Projection projection;
+  projection.residual << focal_px.cwiseProduct(seen - ray), point.z() - depth_m;
+  projection.by_point << scale.x(), 0.0, -scale.x() * seen.x(),  //
+      0.0, scale.y(), -scale.y() * seen.y(),                     //
+      0.0, 0.0, 1.0;
+  return projection;
+}
+
 bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& motion,
-                                 const double* numbers, const Eigen::Vector3d& point,
+                                 const double* camera_params, const Eigen::Vector3d& point,
                                  CalibratedResidual& result, bool with_derivatives) const {
   const Eigen::Matrix3d base_from_map = map_from_base.linear().transpose();
   const Eigen::Vector3d in_base = base_from_map * (point - map_from_base.translation());
@@ -25,8 +37,8 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
   Eigen::Matrix3d by_base = camera_from_base_;
   double added = calibrated_.added_m;
   if (calibrated_.timing) {
-    moving.time_s = numbers[timing_at + 1] * calibrated_.row_share;
-    moving.later_s = numbers[timing_at] - moving.time_s;
+    moving.time_s = camera_params[timing_at + 1] * calibrated_.row_share;
+    moving.later_s = camera_params[timing_at] - moving.time_s;
     moving.velocity = motion.head<3>() + motion.tail<3>().cross(in_base);
     by_base -= moving.time_s * camera_from_base_ * cross_matrix(motion.tail<3>());
     // The step of the registration that a motion makes: motion_in_camera, transposed.
@@ -41,37 +53,35 @@ bool CalibratedFeature::evaluate(const Pose& map_from_base, const Vector6d& moti
       camera_from_base_ * (in_base - moving.time_s * moving.velocity - base_from_camera_);
   if (!(p.z() > 1e-3)) return false;
   if (calibrated_.depth) {
-    const double* const spline = numbers + spline_at + calibrated_.terms.first;
+    const double* const spline = camera_params + spline_at + calibrated_.terms.first;
     for (std::size_t n = 0; n < 4; ++n) added += spline[n] * calibrated_.terms.spline[n];
     for (std::size_t n = 0; n < 3; ++n)
-      added += numbers[radial_at + static_cast<Eigen::Index>(n)] * calibrated_.terms.radial[n];
+      added +=
+          camera_params[radial_at + static_cast<Eigen::Index>(n)] * calibrated_.terms.radial[n];
   }
   if (calibrated_.registration)
-    added += calibrated_.by_step.dot(Eigen::Map<const Vector6d>(numbers + registration_at));
-  const Eigen::Vector2d seen = p.hnormalized();
+    added += calibrated_.by_step.dot(Eigen::Map<const Vector6d>(camera_params + registration_at));
   Eigen::Vector2d focal = focal_;
-  Eigen::Vector3d error(-focal_.x() * ray_.x(), -focal_.y() * ray_.y(), p.z() - depth_ - added);
-  if (calibrated_.intrinsics) {
-    focal.x() *= 1.0 + numbers[intrinsics_at];
-    focal.y() *= 1.0 + numbers[intrinsics_at + 1];
-    error.head<2>() += Eigen::Map<const Eigen::Vector2d>(numbers + intrinsics_at + 2);
-  }
-  error.head<2>() += focal.cwiseProduct(seen);
+  if (calibrated_.intrinsics)
+    focal = focal_.cwiseProduct(Eigen::Vector2d(1.0 + camera_params[intrinsics_at],
+                                                1.0 + camera_params[intrinsics_at + 1]));
+  const Projection projection = project(p, focal, ray_, depth_ + added);
+  Eigen::Vector3d error = projection.residual;
+  if (calibrated_.intrinsics)
+    error.head<2>() += (focal - focal_).cwiseProduct(ray_) +
+                       Eigen::Map<const Eigen::Vector2d>(camera_params + intrinsics_at + 2);
   result.residual = weight_.cwiseProduct(error);
   if (!with_derivatives) return true;
 
-  Eigen::Matrix3d by_camera;
-  by_camera << focal.x() / p.z(), 0.0, -focal.x() * seen.x() / p.z(),  //
-      0.0, focal.y() / p.z(), -focal.y() * seen.y() / p.z(),           //
-      0.0, 0.0, 1.0;
-  by_camera = weight_.asDiagonal() * by_camera;
-  const Eigen::Matrix3d by_place = by_camera * by_base;
+  const Eigen::Matrix3d by_camera = weight_.asDiagonal() * projection.by_point;
+  const Eigen::Matrix3d by_base_point = by_camera * by_base;
   // A step of the pose moves the point against it: d in_base = -t + [in_base]x r.
-  result.by_pose.leftCols<3>() = -by_place;
-  result.by_pose.rightCols<3>() = by_place * cross_matrix(in_base);
-  result.by_point = by_place * base_from_map;
+  result.by_pose.leftCols<3>() = -by_base_point;
+  result.by_pose.rightCols<3>() = by_base_point * cross_matrix(in_base);
+  result.by_point = by_base_point * base_from_map;
   result.by_camera.setZero();
   if (calibrated_.intrinsics) {
+    const Eigen::Vector2d seen = p.hnormalized();
     result.by_camera(0, intrinsics_at) = weight_.x() * focal_.x() * seen.x();
     result.by_camera(1, intrinsics_at + 1) = weight_.y() * focal_.y() * seen.y();
     result.by_camera(0, intrinsics_at + 2) = weight_.x();

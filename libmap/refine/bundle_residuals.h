@@ -3,11 +3,20 @@
 
 #include <Eigen/Core>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/image/depth_correction.h"
 #include "libmap/refine/frame_calibration.h"
-#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
+
+// fx (x/z - u) and fy (y/z - v), px, and z - depth, m, of a point in a camera's frame that was seen
+// along the ray (u, v).
+struct Projection {
+  Eigen::Vector3d residual;
+  Eigen::Matrix3d by_point;
+};
+Projection project(const Eigen::Vector3d& point, const Eigen::Vector2d& focal_px,
+                   const Eigen::Vector2d& ray, double depth_m);
 
 // What the calibration of its camera changes in one observation, linear about a calibration that is
 // known already.
@@ -24,8 +33,8 @@ struct CalibratedObservation {
   double row_share = 0.0;                  // row_share_of
 };
 
-// Numbers of a camera: a step of the intrinsics (4), one of the registration (6), its timing (2),
-// the radial ones of its depth correction (3), and then those of its spline.
+// Parameters of a camera: a step of the intrinsics (4), one of the registration (6), its timing
+// (2), the radial ones of its depth correction (3), and then those of its spline.
 inline constexpr Eigen::Index intrinsics_at = 0;
 inline constexpr Eigen::Index registration_at = 4;
 inline constexpr Eigen::Index timing_at = 10;
@@ -60,51 +69,24 @@ class CalibratedFeature {
         calibrated_(calibrated) {}
 
   const CalibratedObservation& calibrated() const { return calibrated_; }
-  // Seen from the pose, the base moving there by `motion`, by the numbers of its camera. False for
-  // a point that is not in front of the camera. The derivatives only if asked for.
-  bool evaluate(const Pose& map_from_base, const Vector6d& motion, const double* numbers,
+  // x and y, px, and depth, m, of a residual in standard deviations.
+  Eigen::Vector3d unweighted(const Eigen::Vector3d& residual) const {
+    return residual.cwiseQuotient(weight_);
+  }
+  // Seen from the pose, the base moving there by `motion`, by the parameters of its camera. False
+  // for a point that is not in front of the camera. The derivatives only if asked for.
+  bool evaluate(const Pose& map_from_base, const Vector6d& motion, const double* camera_params,
                 const Eigen::Vector3d& point, CalibratedResidual& result,
                 bool with_derivatives) const;
 
  private:
   Eigen::Matrix3d camera_from_base_;
-  Eigen::Vector3d base_from_camera_;  // the camera's place
+  Eigen::Vector3d base_from_camera_;  // the camera's position
   Eigen::Vector2d ray_;
   double depth_;
   Eigen::Vector2d focal_;
   Eigen::Vector3d weight_;
   CalibratedObservation calibrated_;
 };
-
-// Residual of an observation with its derivatives by a step of the pose and by the point.
-struct Linearized {
-  Eigen::Vector3d residual;
-  Eigen::Matrix<double, 3, 6> by_pose;
-  Eigen::Matrix3d by_point;
-};
-
-inline Linearized linearize(const Feature& feature, const Camera& camera, const Pose& map_from_base,
-                            const Eigen::Vector3d& point) {
-  const Pose camera_from_base = camera.base_from_camera.inverse();
-  const Eigen::Vector3d in_base = map_from_base.inverse() * point;
-  const Eigen::Vector3d p = camera_from_base * in_base;
-  Eigen::Matrix3d projection;
-  projection << camera.fx / p.z(), 0.0, -camera.fx * p.x() / (p.z() * p.z()), 0.0,
-      camera.fy / p.z(), -camera.fy * p.y() / (p.z() * p.z()), 0.0, 0.0, 1.0;
-  const double pixel = 1.0 / static_cast<double>(feature.pixel_noise_px);
-  const double depth = 1.0 / static_cast<double>(feature.depth_noise_m);
-  const Eigen::Vector3d weight(pixel, pixel, depth);
-  const Eigen::Matrix3d by_base = weight.asDiagonal() * projection * camera_from_base.linear();
-  Linearized result;
-  result.residual = weight.cwiseProduct(
-      Eigen::Vector3d(camera.fx * (p.x() / p.z() - static_cast<double>(feature.ray.x())),
-                      camera.fy * (p.y() / p.z() - static_cast<double>(feature.ray.y())),
-                      p.z() - static_cast<double>(feature.depth_m)));
-  // A step of the pose moves the point against it: d in_base = -t + [in_base]x r.
-  result.by_pose.leftCols<3>() = -by_base;
-  result.by_pose.rightCols<3>() = by_base * cross_matrix(in_base);
-  result.by_point = by_base * map_from_base.linear().transpose();
-  return result;
-}
 
 }  // namespace libmap

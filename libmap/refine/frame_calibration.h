@@ -7,9 +7,9 @@
 #include <map>
 #include <vector>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/image/depth_correction.h"
 #include "libmap/refine/features.h"
-#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 

@@ -22,29 +22,27 @@ class GraphCovariance {
   // component is held.
   GraphCovariance(const std::map<int, Pose>& map_from_base, const BlockSystem& information,
                   const std::vector<GraphComponent>& components);
-  ~GraphCovariance();
-  GraphCovariance(const GraphCovariance&) = delete;
-  GraphCovariance& operator=(const GraphCovariance&) = delete;
 
-  bool valid() const;                  // whether the graph determines its poses
-  bool connected(int a, int b) const;  // whether links lead from one node to the other
+  bool valid() const { return solver_->valid(); }  // whether the graph determines its poses
+  bool connected(int a, int b) const;              // whether links lead from one node to the other
   // Of a step of the node's pose against the gauge node of its component.
-  Matrix6d of_node(int node) const;
+  Matrix6d of_node(int node) const { return between(node, node); }
   // Of a step of a_from_b, of two nodes that are connected.
   Matrix6d of_relative(int a, int b) const;
 
  private:
-  struct Parts;
-  std::unique_ptr<Parts> parts_;
+  void factor(const BlockSystem& system, const std::vector<GraphComponent>& components);
+  Matrix6d between(int a, int b) const;  // covariance of steps of two nodes
+
+  std::map<int, Pose> poses_;
+  std::map<int, std::size_t> row_;        // among the unknowns; none if fixed
+  std::map<int, std::size_t> component_;  // by node
+  std::unique_ptr<BlockSolver> solver_;
+  BlockSystem inverse_{0};  // where there are links or nodes
 };
 
 // The system with the gauge node of each component held: what it is bound by is not asked.
-BlockSystem with_gauges(const BlockSystem& system, const std::map<int, Pose>& map_from_base,
-                        const std::vector<GraphComponent>& components);
-
-// The information of links between poses as a system over `map_from_base`'s nodes, in their order,
-// and its right-hand side: minus the gradient of half the weighted squares.
-BlockSystem link_system(const std::map<int, Pose>& map_from_base,
-                        const std::vector<GraphLinkResult>& links);
+BlockSystem fix_gauges(const BlockSystem& system, const std::map<int, Pose>& map_from_base,
+                       const std::vector<GraphComponent>& components);
 
 }  // namespace libmap

@@ -7,8 +7,8 @@
 #include <utility>
 
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/geometry/spatial_index.h"
-#include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/surface_samples.h"
 
 namespace libmap {

@@ -12,9 +12,10 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/least_squares.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/icp_pairs.h"
-#include "libmap/refine/rigid_motion.h"
 #include "libmap/refine/surface_samples.h"
 
 namespace libmap {
@@ -29,10 +30,21 @@ constexpr double graduated_fall = 0.8;
 constexpr double noise_reach = 4.0;
 constexpr double min_distance_m = 0.004;
 constexpr double settled_step = 2e-6;
-constexpr double farthest_step = 0.2;  // m and rad
-constexpr double cell_m = 0.25;        // residuals of one cell of the map depend on each other
+constexpr double max_step = 0.2;  // m and rad
+constexpr double cell_m = 0.25;   // residuals of one cell of the map depend on each other
 constexpr std::size_t max_cells = 400;
 constexpr std::size_t frames_per_cell_share = 100;
+
+// align_pair
+constexpr double guess_m = 0.15;  // standard deviations of a pair's guessed motion
+constexpr double guess_rad = 0.1;
+constexpr double pair_degenerate = 1e-4;
+constexpr std::size_t min_pair_samples = 300;  // that must match
+constexpr double min_pair_share = 0.4;         // of a pair's samples
+constexpr double max_pair_rms_m = 0.012;
+constexpr int pair_agreement_samples = 300;
+constexpr double pair_agreement_m = 0.005;
+constexpr double min_pair_agreement = 0.95;
 
 using Cell = std::array<int, 3>;
 
@@ -46,8 +58,8 @@ bool is_drawn(const Cell& cell, std::uint64_t share) {
 // Normal equations of one pair in steps of a_from_b.
 struct PairEquations {
   Matrix6d information = Matrix6d::Zero();
-  Vector6d side = Vector6d::Zero();
-  std::map<Cell, Vector6d> side_of_cell;  // only where asked for
+  Vector6d rhs = Vector6d::Zero();
+  std::map<Cell, Vector6d> rhs_of_cell;  // only where asked for
   double squares_m2 = 0.0;
   double weight = 0.0;
   std::size_t samples = 0;
@@ -55,9 +67,9 @@ struct PairEquations {
 
   void add(const PairEquations& other) {
     information += other.information;
-    side += other.side;
-    for (const auto& [cell, its] : other.side_of_cell)
-      side_of_cell.try_emplace(cell, Vector6d::Zero()).first->second += its;
+    rhs += other.rhs;
+    for (const auto& [cell, its] : other.rhs_of_cell)
+      rhs_of_cell.try_emplace(cell, Vector6d::Zero()).first->second += its;
     squares_m2 += other.squares_m2;
     weight += other.weight;
     samples += other.samples;
@@ -152,14 +164,14 @@ PairEquations Alignment::half_of(const std::vector<BaseElement>& samples, std::s
     const Vector6d by_sample = jacobian_by(normal);
     equations.information +=
         (0.5 * weight) * (by_sample * by_plane.transpose() + by_plane * by_sample.transpose());
-    equations.side -= weight * distance * by_sample;
+    equations.rhs -= weight * distance * by_sample;
     if (cell_share > 0) {
       const Eigen::Vector3d place = *pose_of(onto) * point / cell_m;
       const Cell cell = {static_cast<int>(std::floor(place.x())),
                          static_cast<int>(std::floor(place.y())),
                          static_cast<int>(std::floor(place.z()))};
       if (is_drawn(cell, cell_share))
-        equations.side_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
+        equations.rhs_of_cell.try_emplace(cell, Vector6d::Zero()).first->second -=
             weight * distance * by_sample;
     }
     equations.squares_m2 += distance * distance / (root * root);
@@ -184,20 +196,20 @@ void Alignment::drop_degenerate(PairEquations& equations) const {
     kept += eigen.vectors.col(n) * eigen.vectors.col(n).transpose();
   }
   equations.information = kept * equations.information * kept;
-  equations.side = kept * equations.side;
-  for (auto& [cell, side] : equations.side_of_cell) side = kept * side;
+  equations.rhs = kept * equations.rhs;
+  for (auto& [cell, rhs] : equations.rhs_of_cell) rhs = kept * rhs;
 }
 
 // What the prior asks of the poses as they are.
 void Alignment::add_prior(BlockSystem& system) const {
   system.add(prior_);
-  system.clear_side();
+  system.clear_rhs();
   std::vector<Vector6d> steps;
   for (const auto& [node, pose] : result_.map_from_base)
     steps.push_back(step_between(start_.at(node), pose));
   for (const auto& [key, block] : prior_.blocks()) {
-    system.add_side(key.first, -block * steps[key.second]);
-    if (key.first != key.second) system.add_side(key.second, -block.transpose() * steps[key.first]);
+    system.add_rhs(key.first, -block * steps[key.second]);
+    if (key.first != key.second) system.add_rhs(key.second, -block.transpose() * steps[key.first]);
   }
 }
 
@@ -243,12 +255,7 @@ double Alignment::add_pairs(double max_distance_m, BlockSystem& system) {
     const std::size_t b = place_.at(frames_[pairs_[n].second].node);
     const RelativeJacobian jacobian =
         relative_jacobian(pose_of(pairs_[n].first)->inverse() * *pose_of(pairs_[n].second));
-    const Matrix6d& information = equations[n].information;
-    system.add(a, a, jacobian.by_a.transpose() * information * jacobian.by_a);
-    system.add(a, b, jacobian.by_a.transpose() * information * jacobian.by_b);
-    system.add(b, b, jacobian.by_b.transpose() * information * jacobian.by_b);
-    system.add_side(a, jacobian.by_a.transpose() * equations[n].side);
-    system.add_side(b, jacobian.by_b.transpose() * equations[n].side);
+    system.add_pair(a, b, jacobian.by_a, jacobian.by_b, equations[n].information, equations[n].rhs);
     squares += equations[n].squares_m2;
     weight += equations[n].weight;
     result_.samples += equations[n].samples;
@@ -263,11 +270,11 @@ double Alignment::step(double max_distance_m, double& rms_m) {
   add_prior(system);
   rms_m = add_pairs(max_distance_m, system);
   result_.information = system;
-  result_.information.clear_side();
-  const BlockSystem bound = with_gauges(system, result_.map_from_base, components_);
+  result_.information.clear_rhs();
+  const BlockSystem bound = fix_gauges(system, result_.map_from_base, components_);
   const BlockSolver solver(bound, 1e-6);
   if (!solver.valid()) return std::numeric_limits<double>::infinity();
-  const std::vector<Vector6d> moves = solver.solve(bound.side());
+  const std::vector<Vector6d> moves = solver.solve(bound.rhs());
   double farthest = 0.0;
   std::size_t n = 0;
   std::set<int> held;
@@ -299,13 +306,13 @@ double Alignment::deviation_scale(double max_distance_m) const {
     const std::size_t b = place_.at(frames_[pairs_[n].second].node);
     const RelativeJacobian jacobian =
         relative_jacobian(pose_of(pairs_[n].first)->inverse() * *pose_of(pairs_[n].second));
-    for (const auto& [cell, side] : equations[n].side_of_cell) {
+    for (const auto& [cell, rhs] : equations[n].rhs_of_cell) {
       auto& of_cell = sides[cell];
-      of_cell.try_emplace(a, Vector6d::Zero()).first->second += jacobian.by_a.transpose() * side;
-      of_cell.try_emplace(b, Vector6d::Zero()).first->second += jacobian.by_b.transpose() * side;
+      of_cell.try_emplace(a, Vector6d::Zero()).first->second += jacobian.by_a.transpose() * rhs;
+      of_cell.try_emplace(b, Vector6d::Zero()).first->second += jacobian.by_b.transpose() * rhs;
     }
   }
-  const BlockSolver solver(with_gauges(result_.information, result_.map_from_base, components_),
+  const BlockSolver solver(fix_gauges(result_.information, result_.map_from_base, components_),
                            1e-6);
   if (!solver.valid() || sides.empty()) return 1.0;
   const auto square = [&](const std::vector<Vector6d>& side) {
@@ -331,14 +338,14 @@ double Alignment::deviation_scale(double max_distance_m) const {
   double way = 0.0;
   std::size_t place = 0;
   for (const auto& [node, pose] : result_.map_from_base)
-    way -= step_between(start_.at(node), pose).dot(system.side()[place++]);
+    way -= step_between(start_.at(node), pose).dot(system.rhs()[place++]);
   const BlockSystem inverse = solver.selected_inverse(prior_);
   double bound = unknowns;  // freedom of the way: what the prior does not decide
   for (const auto& [key, block] : prior_.blocks())
     bound -= (key.first == key.second ? 1.0 : 2.0) *
              block.cwiseProduct(inverse.block(key.first, key.second)).sum();
   const double by_way = bound > 1.0 ? way / bound : 0.0;
-  return std::sqrt(std::max({1.0, (squares + square(system.side())) / unknowns, by_way}));
+  return std::sqrt(std::max({1.0, (squares + square(system.rhs())) / unknowns, by_way}));
 }
 
 IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress) {
@@ -350,29 +357,26 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   if (pairs_.empty()) return std::move(result_);
   progress.begin("surfaces", static_cast<std::size_t>(options_.iterations));
   double max_distance_m = options_.max_distance_m;
-  for (int n = 0; n < options_.iterations; ++n) {
+  const GaussNewtonSummary summary = gauss_newton(options_.iterations, [&] {
     double rms_m = 0.0;
     const double farthest = step(max_distance_m, rms_m);
-    if (n == 0) result_.initial_rms_m = rms_m;
+    if (result_.iterations++ == 0) result_.initial_rms_m = rms_m;
     result_.final_rms_m = rms_m;
-    ++result_.iterations;
     progress.advance(1);
     const bool tight = max_distance_m <= min_distance_m + 4.0 * rms_m;
     max_distance_m = std::max({(options_.graduated ? graduated_fall : 0.6) * max_distance_m,
                                min_distance_m, options_.graduated ? 0.0 : 4.0 * rms_m});
-    if (!(farthest < farthest_step)) {
-      // What nothing binds runs away: not a refinement.
-      result_.map_from_base = start_;
-      result_.information = prior_;
-      progress.end();
-      return std::move(result_);
-    }
-    if (tight && farthest < settled_step) {
-      result_.converged = true;
-      break;
-    }
-  }
+    if (!(farthest < max_step)) return StepState::failed;
+    return tight && farthest < settled_step ? StepState::converged : StepState::moving;
+  });
   progress.end();
+  if (summary.state == StepState::failed) {
+    // What nothing binds runs away: not a refinement.
+    result_.map_from_base = start_;
+    result_.information = prior_;
+    return std::move(result_);
+  }
+  result_.converged = summary.state == StepState::converged;
   result_.deviation_scale = deviation_scale(max_distance_m);
   BlockSystem honest(place_.size());
   const double factor = 1.0 / (result_.deviation_scale * result_.deviation_scale);
@@ -382,6 +386,25 @@ IcpResult Alignment::run(const std::vector<PoseLink>& links, Progress& progress)
   result_.frame_pairs = std::move(pairs_);
   result_.max_distance_m = max_distance_m;
   return std::move(result_);
+}
+
+// Of what both frames see, the share that lies where both say; what lies behind a surface is
+// hidden.
+double agreement_of(const FrameFeatures& a, const FrameFeatures& b, const Pose& b_from_a) {
+  double seen = 0.0;
+  double agreed = 0.0;
+  for (const BaseElement& sample :
+       surface_samples(a, pair_agreement_samples, SampleUse::estimation)) {
+    BaseElement element;
+    const Eigen::Vector3d point = b_from_a * sample.point;
+    if (!seen_from_base(b, point, element)) continue;
+    const double above = element.normal.dot(point - element.point);
+    const double allowed = pair_agreement_m + 3.0 * std::hypot(element.noise_m, sample.noise_m);
+    if (above < -allowed) continue;
+    seen += 1.0;
+    if (above <= allowed) agreed += 1.0;
+  }
+  return seen > 0.0 ? agreed / seen : 0.0;
 }
 
 }  // namespace
@@ -420,6 +443,38 @@ BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
                            const IcpOptions& options) {
   const BlockSystem nothing(map_from_base.size());
   return Alignment(frames, map_from_base, nothing, {}, options).system_of(pairs, max_distance_m);
+}
+
+std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& b,
+                                   const Pose& a_from_b) {
+  IcpOptions options;
+  options.mode = IcpMode::links;
+  options.iterations = 40;
+  options.graduated = true;
+  options.max_distance_m = guess_m;
+  options.degenerate = pair_degenerate;
+  const std::size_t place_of_b = a.node < b.node ? 1 : 0;
+  BlockSystem prior(2);
+  Vector6d variances;
+  variances << Eigen::Vector3d::Constant(guess_m * guess_m),
+      Eigen::Vector3d::Constant(guess_rad * guess_rad);
+  prior.add(place_of_b, place_of_b, variances.cwiseInverse().asDiagonal());
+  PoseLink link{.from = a.node, .to = b.node, .type = LinkType::neighbor};
+  const std::map<int, Pose> poses = {{a.node, Pose::Identity()}, {b.node, a_from_b}};
+  const IcpResult aligned =
+      align_surfaces({a, b}, poses, prior, {{{a.node, b.node}, a.node}}, {link}, options);
+  const std::size_t all = surface_samples(a, options.samples, SampleUse::estimation).size() +
+                          surface_samples(b, options.samples, SampleUse::estimation).size();
+  if (aligned.samples < min_pair_samples ||
+      static_cast<double>(aligned.samples) < min_pair_share * static_cast<double>(all) ||
+      aligned.final_rms_m > max_pair_rms_m)
+    return std::nullopt;
+  link.from_from_to = aligned.map_from_base.at(b.node);
+  if (std::min(agreement_of(a, b, link.from_from_to.inverse()),
+               agreement_of(b, a, link.from_from_to)) < min_pair_agreement)
+    return std::nullopt;
+  link.information = aligned.information.block(place_of_b, place_of_b);
+  return link;
 }
 
 }  // namespace libmap

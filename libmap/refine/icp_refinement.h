@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <map>
+#include <optional>
 #include <vector>
 
 #include "libmap/core/parameters.h"
@@ -67,5 +68,10 @@ BlockSystem surface_system(const std::vector<FrameFeatures>& frames,
                            const std::map<int, Pose>& map_from_base,
                            const std::vector<FramePair>& pairs, double max_distance_m,
                            const IcpOptions& options);
+
+// How frame `b` moved from frame `a` by their depth alone. Directions that the surfaces do not bind
+// keep the guess `a_from_b`. Returns nullopt if the surfaces do not align.
+std::optional<PoseLink> align_pair(const FrameFeatures& a, const FrameFeatures& b,
+                                   const Pose& a_from_b);
 
 }  // namespace libmap

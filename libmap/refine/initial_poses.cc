@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
 
 namespace libmap {
 

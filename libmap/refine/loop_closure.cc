@@ -5,9 +5,9 @@
 #include <cmath>
 #include <numbers>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/geometry/spatial_index.h"
 #include "libmap/refine/graph_covariance.h"
-#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 

@@ -8,8 +8,8 @@
 #include <set>
 #include <utility>
 
-#include "libmap/refine/pair_alignment.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
+#include "libmap/refine/icp_refinement.h"
 
 namespace libmap {
 

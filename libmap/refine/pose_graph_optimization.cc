@@ -2,6 +2,7 @@
 
 #include <ceres/ceres.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -9,9 +10,11 @@
 #include <set>
 #include <utility>
 
+#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/core/median.h"
+#include "libmap/core/symmetric_eigen.h"
 #include "libmap/refine/graph_covariance.h"
-#include "libmap/refine/pose_residuals.h"
+#include "libmap/refine/graph_links.h"
 
 namespace libmap {
 
@@ -37,6 +40,122 @@ Matrix6d usable_information(const PoseLink& link) {
   }
   return information;
 }
+
+constexpr int pose_size = 16;  // numbers of a Pose in memory
+
+// The poses of a graph side by side, by ascending node: Ceres orders unknowns by their addresses,
+// and its sums must be the same on every run.
+class PoseBlocks {
+ public:
+  explicit PoseBlocks(const std::map<int, Pose>& poses) {
+    poses_.reserve(poses.size());
+    for (const auto& [node, pose] : poses) {
+      row_[node] = poses_.size();
+      poses_.push_back(pose);
+    }
+  }
+  double* at(int node) { return poses_[row_.at(node)].data(); }
+  const Pose& pose(int node) const { return poses_[row_.at(node)]; }
+
+ private:
+  std::vector<Pose> poses_;
+  std::map<int, std::size_t> row_;
+};
+
+Pose pose_of(const double* block) { return Pose(Eigen::Map<const Eigen::Matrix4d>(block)); }
+
+// Poses change by steps (rigid_motion.h). Costs give their derivatives by a step in its six first
+// columns, so that no derivative by the numbers of a pose is needed.
+class StepManifold : public ceres::Manifold {
+ public:
+  int AmbientSize() const override { return pose_size; }
+  int TangentSize() const override { return 6; }
+  bool Plus(const double* pose, const double* step, double* result) const override {
+    Eigen::Map<Eigen::Matrix4d> out(result);
+    out = moved(pose_of(pose), Eigen::Map<const Vector6d>(step)).matrix();
+    return true;
+  }
+  bool PlusJacobian(const double*, double* jacobian) const override {
+    Eigen::Map<Eigen::Matrix<double, pose_size, 6, Eigen::RowMajor>>(jacobian).setIdentity();
+    return true;
+  }
+  bool Minus(const double* to, const double* from, double* step) const override {
+    Eigen::Map<Vector6d> out(step);
+    out = step_between(pose_of(from), pose_of(to));
+    return true;
+  }
+  bool MinusJacobian(const double*, double* jacobian) const override {
+    Eigen::Map<Eigen::Matrix<double, 6, pose_size, Eigen::RowMajor>>(jacobian).setIdentity();
+    return true;
+  }
+};
+
+template <typename Derivative>
+void set_jacobian(const Derivative& by_step, double* jacobian) {
+  Eigen::Map<Eigen::Matrix<double, Eigen::Dynamic, pose_size, Eigen::RowMajor>> out(
+      jacobian, by_step.rows(), pose_size);
+  out.setZero();
+  out.leftCols<6>() = by_step;
+}
+
+// L^T of information = L L^T: carries residuals to unit variance.
+Matrix6d whitening(const Matrix6d& information) {
+  const Eigen::LLT<Matrix6d> root(information);
+  if (root.info() == Eigen::Success) return root.matrixL().transpose();
+  // Of a matrix that is only semidefinite.
+  const SymmetricEigen<6> eigen = symmetric_eigen(information);
+  return eigen.values.cwiseMax(0.0).cwiseSqrt().asDiagonal() * eigen.vectors.transpose();
+}
+
+// link_residual, whitened.
+class LinkCost : public ceres::CostFunction {
+ public:
+  explicit LinkCost(const PoseLink& link)
+      : link_(link), whitening_(whitening(link_information(link))) {
+    set_num_residuals(6);
+    mutable_parameter_block_sizes()->assign(is_absolute(link) ? 1 : 2, pose_size);
+  }
+  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
+    const Pose from = pose_of(blocks[0]);
+    const Pose to = is_absolute(link_) ? from : pose_of(blocks[1]);
+    Eigen::Map<Vector6d> out(residual);
+    out = whitening_ * link_residual(link_, from, to);
+    if (jacobians == nullptr) return true;
+    const LinkJacobian jacobian = link_jacobian(link_, from, to);
+    if (jacobians[0] != nullptr) set_jacobian(whitening_ * jacobian.by_from, jacobians[0]);
+    if (!is_absolute(link_) && jacobians[1] != nullptr)
+      set_jacobian(whitening_ * jacobian.by_to, jacobians[1]);
+    return true;
+  }
+
+ private:
+  PoseLink link_;
+  Matrix6d whitening_;
+};
+
+// Fixes the position of a node and its rotation about the map's z axis, which gravity leaves open.
+class YawGaugeCost : public ceres::SizedCostFunction<4, pose_size> {
+ public:
+  explicit YawGaugeCost(const Pose& fixed) : fixed_(fixed) {}
+  bool Evaluate(double const* const* blocks, double* residual, double** jacobians) const override {
+    constexpr double weight = 1e3;
+    const Pose pose = pose_of(blocks[0]);
+    const Eigen::Vector3d turn = rotation_vector_of(pose.linear() * fixed_.linear().transpose());
+    Eigen::Map<Eigen::Vector4d> out(residual);
+    out << pose.translation() - fixed_.translation(), turn.z();
+    out *= weight;
+    if (jacobians == nullptr || jacobians[0] == nullptr) return true;
+    Eigen::Matrix<double, 4, 6> by_step = Eigen::Matrix<double, 4, 6>::Zero();
+    by_step.topLeftCorner<3, 3>() = pose.linear();
+    by_step.bottomRightCorner<1, 3>() =
+        (rotation_vector_derivative(turn).transpose() * pose.linear()).row(2);
+    set_jacobian(weight * by_step, jacobians[0]);
+    return true;
+  }
+
+ private:
+  Pose fixed_;
+};
 
 struct Scales {
   double translation = 1.0;
@@ -72,7 +191,7 @@ class Optimization {
   void add_landmarks();
   void find_components();
   void solve();
-  void hold_gauges(ceres::Problem& problem, const PoseBlocks& blocks);
+  void fix_gauges(ceres::Problem& problem, PoseBlocks& blocks);
   void update_residuals();
   bool reject();
   bool recalibrate();
@@ -99,24 +218,19 @@ void Optimization::add_landmarks() {
 }
 
 void Optimization::find_components() {
-  std::map<int, int> parent;
-  for (const auto& [node, pose] : result_.map_from_base) parent[node] = node;
-  const auto root = [&](int node) {
-    while (parent[node] != node) node = parent[node] = parent[parent[node]];
-    return node;
-  };
+  std::map<int, std::size_t> rows;
+  for (const auto& [node, pose] : result_.map_from_base) rows.emplace(node, rows.size());
+  DisjointSets<std::size_t> sets(rows.size());
   std::set<int> linked;
   for (std::size_t n = 0; n < links_.size(); ++n) {
     if (!used_[n] || result_.links[n].rejected) continue;
     const PoseLink& link = links_[n].link;
     if (is_absolute(link)) continue;
     linked.insert({link.from, link.to});
-    const int a = root(link.from);
-    const int b = root(link.to);
-    parent[std::max(a, b)] = std::min(a, b);
+    sets.join(rows.at(link.from), rows.at(link.to));
   }
-  std::map<int, std::vector<int>> members;
-  for (const auto& [node, pose] : result_.map_from_base) members[root(node)].push_back(node);
+  std::map<std::size_t, std::vector<int>> members;
+  for (const auto& [node, row] : rows) members[sets.find(row)].push_back(node);
   result_.components.clear();
   result_.without_links.clear();
   for (auto& [first, nodes] : members) {
@@ -139,7 +253,7 @@ void Optimization::find_components() {
 
 // Relative links leave the whole component free to move: one node stands still. Priors hold it
 // already; gravity holds all but the place and the turn about the vertical.
-void Optimization::hold_gauges(ceres::Problem& problem, const PoseBlocks& blocks) {
+void Optimization::fix_gauges(ceres::Problem& problem, PoseBlocks& blocks) {
   std::set<int> with_prior;
   std::set<int> with_gravity;
   for (std::size_t n = 0; n < links_.size(); ++n) {
@@ -155,9 +269,7 @@ void Optimization::hold_gauges(ceres::Problem& problem, const PoseBlocks& blocks
     double* block = blocks.at(component.gauge_node);
     if (!problem.HasParameterBlock(block) || holds(with_prior)) continue;
     if (holds(with_gravity))
-      problem.AddResidualBlock(new ceres::AutoDiffCostFunction<YawGaugeResidual, 4, 7>(
-                                   new YawGaugeResidual(start_.at(component.gauge_node))),
-                               nullptr, block);
+      problem.AddResidualBlock(new YawGaugeCost(start_.at(component.gauge_node)), nullptr, block);
     else
       problem.SetParameterBlockConstant(block);
   }
@@ -165,23 +277,26 @@ void Optimization::hold_gauges(ceres::Problem& problem, const PoseBlocks& blocks
 
 void Optimization::solve() {
   find_components();
-  const PoseBlocks blocks(result_.map_from_base);
+  PoseBlocks blocks(result_.map_from_base);
   ceres::Problem problem;
-  bool any = false;
+  std::vector<double*> ends;
   for (std::size_t n = 0; n < links_.size(); ++n) {
     if (!used_[n] || result_.links[n].rejected) continue;
     const PoseLink& link = result_.links[n].link;
-    any = true;
-    add_link(problem, blocks, link, link.information, new_loss());
+    ends = {blocks.at(link.from)};
+    if (!is_absolute(link)) ends.push_back(blocks.at(link.to));
+    problem.AddResidualBlock(new LinkCost(link), new_loss(), ends);
   }
-  if (!any) return;
-  set_pose_manifolds(problem, blocks);
-  hold_gauges(problem, blocks);
+  if (ends.empty()) return;
+  auto* const manifold = new StepManifold;  // the problem's
+  for (const auto& [node, pose] : result_.map_from_base)
+    if (problem.HasParameterBlock(blocks.at(node))) problem.SetManifold(blocks.at(node), manifold);
+  fix_gauges(problem, blocks);
   ceres::Solver::Options settings;
   settings.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   // CHOLMOD's supernodes pay where much fills in.
   settings.sparse_linear_algebra_library_type =
-      blocks.all().size() < simplicial_below ? ceres::EIGEN_SPARSE : ceres::SUITE_SPARSE;
+      result_.map_from_base.size() < simplicial_below ? ceres::EIGEN_SPARSE : ceres::SUITE_SPARSE;
   settings.num_threads = 1;
   settings.max_num_iterations = 100;
   settings.function_tolerance = 1e-12;
@@ -190,7 +305,7 @@ void Optimization::solve() {
   settings.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(settings, &problem, &summary);
-  take_poses(problem, blocks, result_.map_from_base);
+  for (auto& [node, pose] : result_.map_from_base) pose = blocks.pose(node);
   result_.initial_cost = summary.initial_cost;
   result_.final_cost = summary.final_cost;
   result_.iterations += static_cast<int>(summary.iterations.size());
@@ -198,15 +313,8 @@ void Optimization::solve() {
 }
 
 Vector6d residual_of(const PoseLink& link, const std::map<int, Pose>& poses) {
-  if (link.type == LinkType::pose_prior)
-    return step_between(link.from_from_to, poses.at(link.from));
-  if (link.type == LinkType::gravity) {
-    Vector6d step = Vector6d::Zero();
-    const Eigen::Vector3d up = poses.at(link.from).linear().transpose() * Eigen::Vector3d::UnitZ();
-    step.tail<3>() = (link.from_from_to.linear().transpose() * Eigen::Vector3d::UnitZ()).cross(up);
-    return step;
-  }
-  return step_between(link.from_from_to, poses.at(link.from).inverse() * poses.at(link.to));
+  return link_residual(link, poses.at(link.from),
+                       poses.at(is_absolute(link) ? link.from : link.to));
 }
 
 void Optimization::update_residuals() {

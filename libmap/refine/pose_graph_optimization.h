@@ -9,8 +9,8 @@
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/graph_links.h"
-#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 
@@ -35,13 +35,6 @@ struct LinkGroupResult {
   double rotation_rms_before_deg = 0.0;
   double translation_rms_m = 0.0;  // ... and at the end
   double rotation_rms_deg = 0.0;
-};
-
-struct GraphLinkResult {
-  PoseLink link{};  // with the information that was used at the end
-  bool rejected = false;
-  double weight = 1.0;      // of the robust loss
-  double chi_square = 0.0;  // at the end
 };
 
 // Nodes that links bind together. Its gauge node stays where it is, but for what gravity and priors

@@ -191,10 +191,10 @@ CalibrationMoves calibration_moves(const RefinementInput& input, const Refinemen
     BlockSystem system = observed.system(state.poses, observed.points_at(state.poses));
     system.add(surface_system(*frames, state.poses, state.surface_pairs, state.surface_distance_m,
                               input.options.icp));
-    return system.side();
+    return system.rhs();
   };
   const std::vector<Vector6d> best = side_with(varied.calibration);
-  const BlockSolver solver(with_gauges(state.information, state.poses, state.graph.components),
+  const BlockSolver solver(fix_gauges(state.information, state.poses, state.graph.components),
                            1e-6);
   if (!solver.valid()) return moves;
   const double deviation =

@@ -7,7 +7,10 @@
 #include <cmath>
 
 #include "libmap/core/random_stream.h"
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/least_squares.h"
+#include "libmap/geometry/rigid_motion.h"
+#include "libmap/geometry/robust.h"
+#include "libmap/refine/bundle_residuals.h"
 
 namespace libmap {
 
@@ -47,21 +50,14 @@ struct PointPair {
   Eigen::Vector3d b;
 };
 
-// Of three points, by their centered coordinates and Kabsch's rotation.
 Pose motion_of(const std::array<const PointPair*, 3>& pairs) {
-  Eigen::Matrix3d a;
-  Eigen::Matrix3d b;
+  Eigen::Matrix3Xd a(3, 3);
+  Eigen::Matrix3Xd b(3, 3);
   for (int n = 0; n < 3; ++n) {
     a.col(n) = pairs[static_cast<std::size_t>(n)]->a;
     b.col(n) = pairs[static_cast<std::size_t>(n)]->b;
   }
-  const Eigen::Vector3d middle_a = a.rowwise().mean();
-  const Eigen::Vector3d middle_b = b.rowwise().mean();
-  Pose motion = Pose::Identity();
-  motion.linear() =
-      nearest_rotation((a.colwise() - middle_a) * (b.colwise() - middle_b).transpose());
-  motion.translation() = middle_a - motion.linear() * middle_b;
-  return motion;
+  return Pose(align_points(b, a, false));
 }
 
 // Three points that three others can be, as a rigid body.
@@ -93,7 +89,7 @@ class RelativePoseEstimate {
     if (inliers_.size() < least()) return result;
     result.spread = spread();
     result.outcome = !converged                            ? RelativePoseOutcome::not_converged
-                     : result.spread < options_.min_spread ? RelativePoseOutcome::narrow
+                     : result.spread < options_.min_spread ? RelativePoseOutcome::degenerate
                                                            : RelativePoseOutcome::found;
     return result;
   }
@@ -161,9 +157,8 @@ bool RelativePoseEstimate::sample(std::uint64_t seed) {
 
 bool RelativePoseEstimate::refine(RelativePose& result) {
   double limit = 3.0 * options_.max_chi_square;
-  for (int step = 0; step < max_steps; ++step) {
-    Matrix6d normal = Matrix6d::Zero();
-    Vector6d side = Vector6d::Zero();
+  const auto step = [&] {
+    NormalEquations<6> equations;
     double chi_square = 0.0;
     inliers_.clear();
     for (std::size_t n = 0; n < matches_.size(); ++n) {
@@ -175,27 +170,25 @@ bool RelativePoseEstimate::refine(RelativePose& result) {
       if (square > limit) continue;
       inliers_.push_back(n);
       const Eigen::Matrix<double, 3, 6> jacobian = root.matrixL().solve(r.jacobian);
-      // Cauchy's weight.
-      const double weight = 1.0 / (1.0 + square / options_.max_chi_square);
-      normal += weight * jacobian.transpose() * jacobian;
-      side -= weight * jacobian.transpose() * white;
+      const double weight = cauchy_weight(square / options_.max_chi_square);
+      equations.add(jacobian, white, weight);
       chi_square += weight * square;
     }
-    if (inliers_.size() < 6) return false;
-    const Eigen::LDLT<Matrix6d> solver(normal);
-    if (solver.info() != Eigen::Success || solver.rcond() < 1e-14) return false;
-    const Vector6d move = solver.solve(side);
+    if (inliers_.size() < 6) return StepState::failed;
+    const Eigen::LDLT<Matrix6d> solver(equations.matrix);
+    if (solver.info() != Eigen::Success || solver.rcond() < 1e-14) return StepState::failed;
+    const Vector6d move = solver.solve(equations.rhs);
     pose_ = moved(pose_, move);
     const bool last = limit <= options_.max_chi_square;
     limit = std::max(options_.max_chi_square, limit / 1.7);
-    if (last && move.head<3>().norm() < 1e-7 && move.tail<3>().norm() < 1e-7) {
-      const double freedom = 3.0 * static_cast<double>(inliers_.size()) - 6.0;
-      result.chi_square_per_freedom = chi_square / freedom;
-      result.information = normal / std::max(1.0, result.chi_square_per_freedom);
-      return true;
-    }
-  }
-  return false;
+    if (!last || !(move.head<3>().norm() < 1e-7) || !(move.tail<3>().norm() < 1e-7))
+      return StepState::moving;
+    const double freedom = 3.0 * static_cast<double>(inliers_.size()) - 6.0;
+    result.chi_square_per_freedom = chi_square / freedom;
+    result.information = equations.matrix / std::max(1.0, result.chi_square_per_freedom);
+    return StepState::converged;
+  };
+  return gauss_newton(max_steps, step).state == StepState::converged;
 }
 
 double RelativePoseEstimate::spread() const {
@@ -248,16 +241,9 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
   MatchResidual result;
   if (!(point.z() > 1e-6)) return result;
   result.in_front = true;
-  const double f = camera_a.fx;
-  const double inverse = 1.0 / point.z();
-  const double x = point.x() * inverse;
-  const double y = point.y() * inverse;
-  result.residual = {f * (x - static_cast<double>(in_a.ray.x())),
-                     f * (y - static_cast<double>(in_a.ray.y())),
-                     point.z() - static_cast<double>(in_a.depth_m)};
-  Eigen::Matrix3d projection;
-  projection << f * inverse, 0.0, -f * x * inverse, 0.0, f * inverse, -f * y * inverse, 0.0, 0.0,
-      1.0;
+  const Projection projection = project(point, Eigen::Vector2d::Constant(camera_a.fx),
+                                        in_a.ray.cast<double>(), static_cast<double>(in_a.depth_m));
+  result.residual = projection.residual;
   const Eigen::Matrix3d rotation = camera_from_base.linear() * a_from_b.linear();
   // Noise of b's point: across its ray by the pixel, along it by the depth.
   const double lateral =
@@ -267,7 +253,8 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
   Eigen::Matrix3d noise = depth_noise * depth_noise * ray_in_b * ray_in_b.transpose();
   noise(0, 0) += lateral * lateral;
   noise(1, 1) += lateral * lateral;
-  const Eigen::Matrix3d carried = projection * rotation * camera_b.base_from_camera.linear();
+  const Eigen::Matrix3d carried =
+      projection.by_point * rotation * camera_b.base_from_camera.linear();
   result.covariance = carried * noise * carried.transpose();
   const double pixel_noise = static_cast<double>(in_a.pixel_noise_px);
   const double depth_noise_a = static_cast<double>(in_a.depth_noise_m);
@@ -275,8 +262,8 @@ MatchResidual match_residual(const FrameFeatures& a, const FrameFeatures& b,
   result.covariance(1, 1) += pixel_noise * pixel_noise;
   result.covariance(2, 2) += depth_noise_a * depth_noise_a;
   if (with_jacobian) {
-    result.jacobian.leftCols<3>() = projection * rotation;
-    result.jacobian.rightCols<3>() = -projection * rotation * cross_matrix(point_in_b);
+    result.jacobian.leftCols<3>() = projection.by_point * rotation;
+    result.jacobian.rightCols<3>() = -projection.by_point * rotation * cross_matrix(point_in_b);
   }
   return result;
 }

@@ -45,7 +45,13 @@ struct RelativePoseOptions {
 };
 
 // Why a pair has no relative pose, or that it has.
-enum class RelativePoseOutcome { found, too_few_matches, too_few_inliers, narrow, not_converged };
+enum class RelativePoseOutcome {
+  found,
+  too_few_matches,
+  too_few_inliers,
+  degenerate,
+  not_converged
+};
 
 struct RelativePose {
   RelativePoseOutcome outcome = RelativePoseOutcome::too_few_matches;

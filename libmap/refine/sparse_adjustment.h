@@ -1,6 +1,6 @@
-// Bundle adjustment of long scans: Gauss and Newton's steps of the poses in the sparse system of
-// the links, each point where its observations agree best (variable projection). Memory and time go
-// with the observations, and with the fill-in of the graph of the links.
+// Bundle adjustment of long scans: the poses in the sparse system of the links, each point where
+// its observations agree best (variable projection). Memory and time are proportional to the number
+// of observations, and grow with the fill-in of the graph of the links.
 #pragma once
 
 #include <map>
@@ -10,16 +10,17 @@
 
 namespace libmap {
 
-// What tracks say about poses.
+// Observations of tracks as a system over poses.
 class TrackSystem {
  public:
   // All outlive it. `robust_scale` is of Cauchy's loss.
   TrackSystem(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
               double robust_scale);
 
-  // In the middle of where the frames see them, then where their observations agree best.
+  // The mean of where the frames see them, then where their observations agree best.
   std::vector<Eigen::Vector3d> points_at(const std::map<int, Pose>& map_from_base) const;
-  void settle(const std::map<int, Pose>& map_from_base, std::vector<Eigen::Vector3d>& points) const;
+  void optimize_points(const std::map<int, Pose>& map_from_base,
+                       std::vector<Eigen::Vector3d>& points) const;
 
   struct Totals {
     double cost = 0.0;

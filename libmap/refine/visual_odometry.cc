@@ -7,9 +7,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/refine/pair_alignment.h"
+#include "libmap/geometry/rigid_motion.h"
+#include "libmap/refine/icp_refinement.h"
 #include "libmap/refine/place_recognition.h"
-#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/features.h"
-#include "libmap/refine/rigid_motion.h"
 #include "tests/libmap/refine/textured_scan.h"
 
 namespace frame_calibration_test {
@@ -84,41 +84,6 @@ TEST(RegisteredDepth, IsUnknownWhereThereIsNoPlane) {
   }
   EXPECT_GT(unknown, 2U);
   EXPECT_LT(unknown, stored.features.size() / 4);
-}
-
-// Rounds of an adjustment meet other planes each time: a surface without jumps lets them converge.
-TEST(DepthSurface, HasNoJumpsBetweenItsElements) {
-  TexturedScan scan;
-  scan.see(graspmap_test::plane_z(0.0), around(0), Vector6d::Zero());
-  const FrameFeatures frame = frame_of(scan);
-  const libmap::DepthSurface& surface = frame.surfaces.front();
-  const Pose eye = *scan.graph_.nodes[0].truth_from_base * frame.cameras.front().base_from_camera;
-  double last_met = 0.0;
-  double last_nearest = 0.0;
-  double jump_of_met = 0.0;
-  double jump_of_nearest = 0.0;
-  for (int n = 0; n < 2000; ++n) {
-    const auto ray =
-        libmap::pixel_to_ray(surface.camera(), Eigen::Vector2d(20.0 + 0.1 * n, 40.0 + 0.05 * n));
-    const Eigen::Vector3d direction = ray->homogeneous();
-    const double truth = graspmap_test::plane_z(0.0)(eye.translation(), eye.linear() * direction);
-    libmap::SurfacePatch met;
-    libmap::SurfacePatch nearest;
-    ASSERT_TRUE(surface.met_at(direction, met));
-    ASSERT_TRUE(surface.seen_at(direction, nearest));
-    EXPECT_LT((met.point.hnormalized() - *ray).norm(), 1e-9);
-    const double met_error = met.point.z() - truth;
-    const double nearest_error =
-        nearest.normal.dot(nearest.point) / nearest.normal.dot(direction) - truth;
-    EXPECT_LT(std::abs(met_error), 0.02);
-    if (n > 0) {
-      jump_of_met = std::max(jump_of_met, std::abs(met_error - last_met));
-      jump_of_nearest = std::max(jump_of_nearest, std::abs(nearest_error - last_nearest));
-    }
-    last_met = met_error;
-    last_nearest = nearest_error;
-  }
-  EXPECT_LT(jump_of_met, 0.3 * jump_of_nearest);
 }
 
 }  // namespace frame_calibration_test

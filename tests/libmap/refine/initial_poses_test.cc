@@ -9,7 +9,7 @@
 #include <random>
 #include <set>
 
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "tests/support/test_support.h"
 
 namespace initial_poses_test {

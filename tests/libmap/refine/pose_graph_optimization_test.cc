@@ -6,8 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/graph_covariance.h"
-#include "libmap/refine/rigid_motion.h"
 #include "tests/libmap/refine/synthetic_features.h"
 
 namespace pose_graph_optimization_test {

@@ -6,7 +6,7 @@
 #include <functional>
 
 #include "libmap/core/parallel.h"
-#include "libmap/refine/pair_alignment.h"
+#include "libmap/refine/icp_refinement.h"
 #include "libmap/scan/trajectory_text.h"
 #include "tests/libmap/refine/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"

@@ -6,9 +6,9 @@
 #include <random>
 #include <vector>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/features.h"
 #include "libmap/refine/loop_closure.h"
-#include "libmap/refine/rigid_motion.h"
 #include "tests/support/test_support.h"
 
 namespace graspmap_test {

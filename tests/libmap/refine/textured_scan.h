@@ -8,8 +8,8 @@
 #include <random>
 
 #include "libmap/core/random_stream.h"
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/refinement.h"
-#include "libmap/refine/rigid_motion.h"
 #include "tests/libmap/cloud/depth_scenes.h"
 
 namespace graspmap_test {

@@ -1,27 +1,10 @@
-// Small motions of poses. A pose T moves by a step e = (x y z, rotation vector) in its own frame:
-// moved(T, e) = T * [exp(rotation) | translation]. Covariances and information matrices of this
-// folder are of such steps, in the order of PoseLink::information.
-#pragma once
+#include "libmap/geometry/rigid_motion.h"
 
-#include <Eigen/Core>
-#include <Eigen/Geometry>
 #include <cmath>
-
-#include "libmap/core/pose.h"
-#include "libmap/core/pose_graph.h"
 
 namespace libmap {
 
-using Vector6d = Eigen::Matrix<double, 6, 1>;
-
-// cross_matrix(a) * b = a x b.
-inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& a) {
-  Eigen::Matrix3d matrix;
-  matrix << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
-  return matrix;
-}
-
-inline Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector) {
+Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector) {
   const double angle = rotation_vector.norm();
   const double half = 0.5 * angle;
   const double scale = angle > 1e-8 ? std::sin(half) / angle : 0.5 - angle * angle / 48.0;
@@ -30,7 +13,7 @@ inline Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector) {
   return rotation.normalized();
 }
 
-inline Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation) {
+Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation) {
   Eigen::Quaterniond q(rotation);
   if (q.w() < 0.0) q.coeffs() *= -1.0;
   const double sine = q.vec().norm();
@@ -38,7 +21,15 @@ inline Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation) {
   return (2.0 * std::atan2(sine, q.w()) / sine) * q.vec();
 }
 
-inline Pose moved(const Pose& pose, const Vector6d& step) {
+Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vector) {
+  const double angle = rotation_vector.norm();
+  const double factor =
+      angle > 1e-4 ? (1.0 - 0.5 * angle / std::tan(0.5 * angle)) / (angle * angle) : 1.0 / 12.0;
+  const Eigen::Matrix3d cross = cross_matrix(rotation_vector);
+  return Eigen::Matrix3d::Identity() + 0.5 * cross + factor * cross * cross;
+}
+
+Pose moved(const Pose& pose, const Vector6d& step) {
   Pose result = pose;
   result.translation() += pose.linear() * step.head<3>();
   result.linear() = (Eigen::Quaterniond(pose.linear()) * rotation_of(step.tail<3>()))
@@ -47,26 +38,27 @@ inline Pose moved(const Pose& pose, const Vector6d& step) {
   return result;
 }
 
-// The step that carries `from` to `to`.
-inline Vector6d step_between(const Pose& from, const Pose& to) {
+Vector6d step_between(const Pose& from, const Pose& to) {
   Vector6d step;
   step.head<3>() = from.linear().transpose() * (to.translation() - from.translation());
   step.tail<3>() = rotation_vector_of(from.linear().transpose() * to.linear());
   return step;
 }
 
-// Whether two poses differ by no more than this.
-inline bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad) {
+bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad) {
   const Vector6d apart = step_between(a, b);
   return apart.head<3>().norm() <= distance_m && apart.tail<3>().norm() <= angle_rad;
 }
 
-// How the step of a_from_b = a^-1 b follows from steps of a and b, to first order.
-struct RelativeJacobian {
-  Matrix6d by_a;
-  Matrix6d by_b;
-};
-inline RelativeJacobian relative_jacobian(const Pose& a_from_b) {
+Matrix6d step_derivative(const Pose& from, const Pose& to) {
+  const Eigen::Matrix3d turn = from.linear().transpose() * to.linear();
+  Matrix6d derivative = Matrix6d::Zero();
+  derivative.topLeftCorner<3, 3>() = turn;
+  derivative.bottomRightCorner<3, 3>() = rotation_vector_derivative(rotation_vector_of(turn));
+  return derivative;
+}
+
+RelativeJacobian relative_jacobian(const Pose& a_from_b) {
   RelativeJacobian jacobian{Matrix6d::Zero(), Matrix6d::Identity()};
   const Eigen::Matrix3d b_from_a = a_from_b.linear().transpose();
   jacobian.by_a.topLeftCorner<3, 3>() = -b_from_a;

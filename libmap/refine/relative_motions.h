@@ -4,9 +4,9 @@
 #include <map>
 #include <vector>
 
+#include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/features.h"
 #include "libmap/refine/pose_graph_optimization.h"
-#include "libmap/refine/rigid_motion.h"
 
 namespace libmap {
 
@@ -19,8 +19,8 @@ struct KnownMotion {
 
 // Of the frames' nodes with a pose. Poses of different components are in different frames; without
 // components, all are in one.
-std::map<int, KnownMotion> motions_between(const std::vector<FrameFeatures>& frames,
-                                           const std::map<int, Pose>& poses,
-                                           const std::vector<GraphComponent>& components);
+std::map<int, KnownMotion> relative_motions(const std::vector<FrameFeatures>& frames,
+                                            const std::map<int, Pose>& poses,
+                                            const std::vector<GraphComponent>& components);
 
 }  // namespace libmap

@@ -1,4 +1,4 @@
-#include "libmap/refine/motions_between.h"
+#include "libmap/refine/relative_motions.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "libmap/refine/rigid_motion.h"
+#include "libmap/geometry/rigid_motion.h"
 
 namespace libmap {
 
@@ -74,9 +74,9 @@ void add_motions(std::vector<std::pair<double, int>> nodes, const std::map<int, 
 
 }  // namespace
 
-std::map<int, KnownMotion> motions_between(const std::vector<FrameFeatures>& frames,
-                                           const std::map<int, Pose>& poses,
-                                           const std::vector<GraphComponent>& components) {
+std::map<int, KnownMotion> relative_motions(const std::vector<FrameFeatures>& frames,
+                                            const std::map<int, Pose>& poses,
+                                            const std::vector<GraphComponent>& components) {
   std::map<int, std::size_t> component_of;
   for (std::size_t n = 0; n < components.size(); ++n)
     for (const int node : components[n].nodes) component_of.emplace(node, n);

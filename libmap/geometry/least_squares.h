@@ -1,0 +1,96 @@
+// Nonlinear least squares: the loops of Levenberg-Marquardt and Gauss-Newton. A problem brings its
+// normal equations and their solver, dense, sparse or of fixed size.
+#pragma once
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
+
+namespace libmap {
+
+// J^T W J x = -J^T W r.
+template <int size>
+struct NormalEquations {
+  Eigen::Matrix<double, size, size> matrix = Eigen::Matrix<double, size, size>::Zero();
+  Eigen::Matrix<double, size, 1> rhs = Eigen::Matrix<double, size, 1>::Zero();
+
+  template <typename Jacobian, typename Residual>
+  void add(const Jacobian& jacobian, const Residual& residual, double weight) {
+    matrix += weight * jacobian.transpose() * jacobian;
+    rhs -= weight * jacobian.transpose() * residual;
+  }
+};
+
+struct LevenbergMarquardtOptions {
+  int max_iterations = 100;
+  double tolerance = 1e-6;  // converged when a step lowers the cost by less than this share
+  double rounding = 1e-12;  // share by which rounding may raise the cost
+  int max_rejected = 8;     // consecutive steps that raise the cost
+  double first_damping = 1e-6;
+  double min_damping = 1e-9;     // divided by 10 after an accepted step
+  double raised_damping = 1e-4;  // minimum after a rejected step; multiplied by 100
+};
+
+struct LeastSquaresSummary {
+  double initial_cost = 0.0;
+  double final_cost = 0.0;
+  int iterations = 0;  // accepted and rejected
+  int accepted = 0;
+  bool converged = false;
+};
+
+// Levenberg-Marquardt (Marquardt 1963) from a state with the finite `cost`, which never rises by
+// more than rounding. The problem has
+//   void linearize();              normal equations at the state
+//   double propose(double damping) solves them; cost of the state after the step, infinite if there
+//                                  is none
+//   void accept();                 makes the proposed state the state
+template <typename Problem>
+LeastSquaresSummary levenberg_marquardt(Problem& problem, double cost,
+                                        const LevenbergMarquardtOptions& options) {
+  LeastSquaresSummary summary{.initial_cost = cost, .final_cost = cost};
+  double damping = options.first_damping;
+  problem.linearize();
+  for (int rejected = 0;
+       summary.iterations < options.max_iterations && rejected < options.max_rejected;) {
+    ++summary.iterations;
+    const double proposed = problem.propose(damping);
+    if (!(proposed <= (1.0 + options.rounding) * summary.final_cost)) {
+      damping = std::max(options.raised_damping, 100.0 * damping);
+      ++rejected;
+      continue;
+    }
+    rejected = 0;
+    damping = std::max(options.min_damping, 0.1 * damping);
+    problem.accept();
+    ++summary.accepted;
+    const double fall = summary.final_cost - proposed;
+    summary.final_cost = proposed;
+    summary.converged = fall < options.tolerance * proposed;
+    if (summary.converged) break;
+    problem.linearize();
+  }
+  return summary;
+}
+
+enum class StepState { moving, converged, failed };
+
+struct GaussNewtonSummary {
+  int iterations = 0;
+  StepState state = StepState::moving;
+};
+
+// Gauss-Newton for problems whose weights or correspondences change in each step (ICP, iteratively
+// reweighted least squares), so that costs cannot be compared. `step()` linearizes, moves the state
+// and returns a StepState; it is called until that is not `moving`.
+template <typename Step>
+GaussNewtonSummary gauss_newton(int max_iterations, const Step& step) {
+  GaussNewtonSummary summary;
+  while (summary.iterations < max_iterations && summary.state == StepState::moving) {
+    ++summary.iterations;
+    summary.state = step();
+  }
+  return summary;
+}
+
+}  // namespace libmap

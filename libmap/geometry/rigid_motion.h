@@ -1,0 +1,48 @@
+// Small rigid motions. A pose T moves by a step e = (x y z, rotation vector) in its own frame:
+// moved(T, e) = T * [exp(rotation) | translation]. Covariances and information matrices of poses
+// are of such steps, in the order of PoseLink::information.
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+
+#include "libmap/core/pose.h"
+#include "libmap/core/pose_graph.h"
+
+namespace libmap {
+
+using Vector6d = Eigen::Matrix<double, 6, 1>;
+
+// cross_matrix(a) * b = a x b.
+inline Eigen::Matrix3d cross_matrix(const Eigen::Vector3d& a) {
+  Eigen::Matrix3d matrix;
+  matrix << 0.0, -a.z(), a.y(), a.z(), 0.0, -a.x(), -a.y(), a.x(), 0.0;
+  return matrix;
+}
+
+// Exponential and logarithm of SO(3); the rotation vector is at most pi long.
+Eigen::Quaterniond rotation_of(const Eigen::Vector3d& rotation_vector);
+Eigen::Vector3d rotation_vector_of(const Eigen::Matrix3d& rotation);
+
+// Derivative of rotation_vector_of(R * exp(r)) by r at 0, for R = exp(rotation_vector): the inverse
+// right Jacobian of SO(3). The derivative of rotation_vector_of(exp(r) * R) is its transpose.
+Eigen::Matrix3d rotation_vector_derivative(const Eigen::Vector3d& rotation_vector);
+
+Pose moved(const Pose& pose, const Vector6d& step);
+
+// The step from `from` to `to`; its derivative by a step of `to`.
+Vector6d step_between(const Pose& from, const Pose& to);
+Matrix6d step_derivative(const Pose& from, const Pose& to);
+
+// True if the distance and the angle between two poses are at most these.
+bool is_near(const Pose& a, const Pose& b, double distance_m, double angle_rad);
+
+// Derivatives of the step of a_from_b = a^-1 b by steps of a and b: minus the adjoint of b_from_a,
+// and the identity.
+struct RelativeJacobian {
+  Matrix6d by_a;
+  Matrix6d by_b;
+};
+RelativeJacobian relative_jacobian(const Pose& a_from_b);
+
+}  // namespace libmap

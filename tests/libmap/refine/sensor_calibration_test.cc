@@ -1,0 +1,65 @@
+#include "libmap/refine/sensor_calibration.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/libmap/refine/bundle_scenes.h"
+
+namespace sensor_calibration_test {
+
+using graspmap_test::random_points;
+using graspmap_test::see_points;
+using graspmap_test::Way;
+using graspmap_test::way_with_rows;
+using libmap::FrameFeatures;
+using libmap::Pose;
+
+// A calibration rests on a part of a long scan. The frames that it does not rest on have motions
+// too; one that nothing joins has that of its neighbors.
+TEST(SensorCalibration, AllFramesHaveMotions) {
+  constexpr int count = 90;
+  constexpr int alone = 50;
+  const auto points = random_points(60);
+  Way way = way_with_rows(points, 0.06, count);
+  std::vector<libmap::FeatureLink> links;
+  for (std::size_t n = 0; n + 1 < way.frames.size(); ++n) {
+    if (n + 1 == alone || n + 2 == alone) continue;
+    libmap::FeatureLink link;
+    link.frames = {n, n + 1};
+    link.link = {way.frames[n].node, way.frames[n + 1].node, libmap::LinkType::neighbor,
+                 way.truth.at(way.frames[n].node).inverse() * way.truth.at(way.frames[n + 1].node),
+                 libmap::Matrix6d::Identity()};
+    link.matches = graspmap_test::same_numbers(points.size());
+    links.push_back(link);
+  }
+  std::erase(way.components[0].nodes, alone);
+  way.components.push_back({{alone}, alone});
+  way.truth.at(alone) = Pose::Identity();  // anywhere
+  libmap::SensorCalibration calibration;
+  calibration.timing = {{0.0, 0.06}};
+  for (const bool hold_poses : {false, true}) {
+    libmap::find_motions({way.frames, links, way.truth, {}, way.components, {}}, hold_poses,
+                         calibration);
+    ASSERT_EQ(calibration.motion.size(), way.frames.size());
+    for (const auto& [node, motion] : calibration.motion)
+      EXPECT_NEAR(motion.y(), 0.6 * std::cos(1.5 * 0.3 * node), node == alone ? 0.1 : 0.03) << node;
+  }
+}
+
+// A base that goes along x in front of a wall: depth that is late is nearer by the way it went.
+TEST(SensorCalibration, LateDepthIsMovedBack) {
+  libmap::SensorCalibration calibration;
+  calibration.timing = {{0.05, 0.0}};
+  calibration.motion[1] << 0.4, 0.0, 0.0, 0.0, 0.0, 0.0;
+  const FrameFeatures frame = see_points(1, Pose::Identity(), {{1.5, 0.1, 0.1}});
+  const Pose pose = libmap::color_from_depth_of(frame, frame.features[0], calibration);
+  // Forward is z in the camera: the depth's camera was 2 cm ahead.
+  EXPECT_LT((pose.translation() - Eigen::Vector3d(0.0, 0.0, 0.02)).norm(), 1e-12);
+  calibration.timing[0].rolling_shutter_s = 0.05;
+  const double row = libmap::row_share_of(frame.features[0], frame.cameras[0]);
+  EXPECT_NEAR(libmap::color_from_depth_of(frame, frame.features[0], calibration).translation().z(),
+              0.4 * (0.05 - 0.05 * row), 1e-12);
+}
+
+}  // namespace sensor_calibration_test
