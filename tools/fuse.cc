@@ -5,9 +5,9 @@
 #include "libmap/scan/scan_source.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
-#include "tools/support/fusion_facts.h"
 #include "tools/support/piece_folder.h"
 #include "tools/support/piece_progress.h"
+#include "tools/support/results.h"
 #include "tools/support/scan_poses.h"
 #include "tools/support/store_filling.h"
 #include "tools/support/usages.h"
@@ -50,30 +50,7 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
   const libmap::DepthPixelCounts& pixels = result.pixels;
-  run.add_results({{"frames", result.frames},
-                   {"skipped_frames", result.skipped.size()},
-                   {"pixels", pixels.pixels},
-                   {"measurements_used", pixels.used},
-                   {"rejected_unmeasured", pixels.unmeasured},
-                   {"rejected_out_of_range", pixels.out_of_range},
-                   {"rejected_without_ray", pixels.without_ray},
-                   {"rejected_flying", pixels.flying},
-                   {"rejected_grazing", pixels.grazing},
-                   {"registration_rounds", result.registration_rounds},
-                   {"registration_shift_m", result.registration_shift_m},
-                   {"registration_turn_deg", result.registration_turn_deg},
-                   {"disagreement_before_m", result.disagreement_before_m},
-                   {"disagreement_after_m", result.disagreement_after_m},
-                   {"occupied_voxels", result.occupied_voxels},
-                   {"surface_elements", result.elements},
-                   {"dropped_too_few_views", result.points.unconfirmed},
-                   {"dropped_seen_through", result.points.seen_through},
-                   {"dropped_missed", result.points.missed},
-                   {"dropped_beside", result.points.beside},
-                   {"dropped_beyond_edges", result.points.bent_away},
-                   {"merged", result.points.merged},
-                   {"points", result.points_made},
-                   {"points_beyond_edges", result.points.extended_points}});
+  run.add_results(libmap::described(result));
   run.add_timings(result.timings_s);
   run.detail(
       "{} of {} pixels used; {} unmeasured, {} out of range, {} flying, {} grazing, {} without a "
@@ -147,16 +124,67 @@ void fuse_whole(const FuseOptions& options, const libmap::ScanSource& scan,
   write_poses(options, result, run);
 }
 
+std::array<double, 3> numbers_of(const Eigen::Vector3d& v) { return {v.x(), v.y(), v.z()}; }
+
+Eigen::Vector3d vector_of(const nlohmann::json& json) {
+  const auto numbers = json.get<std::array<double, 3>>();
+  return Eigen::Vector3d(numbers.data());
+}
+
+nlohmann::json survey_facts(const libmap::FusionSurvey& survey) {
+  nlohmann::json frames = nlohmann::json::array();
+  for (const libmap::FusionFrame& frame : survey.frames) {
+    const Eigen::Matrix4d& pose = frame.grid_from_base.matrix();
+    frames.push_back({{"node", frame.node},
+                      {"grid_from_base", std::vector<double>(pose.data(), pose.data() + 16)},
+                      {"image_pixels", frame.image_pixels},
+                      {"reach_min_m", numbers_of(frame.reach.min())},
+                      {"reach_max_m", numbers_of(frame.reach.max())},
+                      {"max_ray_length", frame.max_ray_length},
+                      {"max_pixel_pitch", frame.max_pixel_pitch}});
+  }
+  nlohmann::json skipped = nlohmann::json::array();
+  for (const auto& [node, fault] : survey.skipped) skipped.push_back({node, fault.what()});
+  return {{"grid_origin_m", numbers_of(survey.grid_origin)},
+          {"frames", frames},
+          {"skipped", skipped},
+          {"registration_rounds", survey.registration_rounds},
+          {"disagreement_before_m", survey.disagreement_before_m},
+          {"disagreement_after_m", survey.disagreement_after_m}};
+}
+
+libmap::FusionSurvey survey_of(const nlohmann::json& facts) {
+  libmap::FusionSurvey survey;
+  survey.grid_origin = vector_of(facts.at("grid_origin_m"));
+  for (const nlohmann::json& its : facts.at("frames")) {
+    libmap::FusionFrame& frame = survey.frames.emplace_back();
+    its.at("node").get_to(frame.node);
+    const auto pose = its.at("grid_from_base").get<std::array<double, 16>>();
+    frame.grid_from_base.matrix() = Eigen::Map<const Eigen::Matrix4d>(pose.data());
+    its.at("image_pixels").get_to(frame.image_pixels);
+    frame.reach = {vector_of(its.at("reach_min_m")), vector_of(its.at("reach_max_m"))};
+    its.at("max_ray_length").get_to(frame.max_ray_length);
+    its.at("max_pixel_pitch").get_to(frame.max_pixel_pitch);
+  }
+  for (const auto& [node, fault] :
+       facts.at("skipped").get<std::vector<std::pair<int, std::string>>>())
+    survey.skipped.emplace_back(node, libmap::Error(fault));
+  facts.at("registration_rounds").get_to(survey.registration_rounds);
+  facts.at("disagreement_before_m").get_to(survey.disagreement_before_m);
+  facts.at("disagreement_after_m").get_to(survey.disagreement_after_m);
+  return survey;
+}
+
 // Each tile is made, written and forgotten.
 void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
                 const libmap::Trajectory& poses, PieceProgress& progress, Run& run) {
   std::optional<libmap::TileFusion> fusion;
   const PieceProgress::Facts found = progress.common_facts([&] {
     fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress());
-    return facts_of(fusion->survey());
+    return survey_facts(fusion->survey());
   });
   if (!fusion) {
-    const libmap::FusionSurvey survey = fusion_survey_of(found);
+    const libmap::FusionSurvey survey = survey_of(found);
     fusion.emplace(scan, poses, options.fusion, options.tile_m, run.progress(), &survey);
   }
   libmap::DepthFusionResult result = fusion->report();
@@ -173,8 +201,8 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
   const auto finish = [&](const fs::path& folder) {
     std::size_t written = 0;
     for (const std::string& piece : pieces) {
-      const libmap::FusionCounts counts = fusion_counts_of(progress.facts(piece));
-      result += counts;
+      const auto counts = result_of<libmap::FusionCounts>(progress.facts(piece));
+      libmap::merge_into<libmap::FusionCounts>(result, counts);
       if (counts.points_made == 0) continue;
       ++written;
       const fs::path file = progress.file(piece, ".pcd");

@@ -11,6 +11,7 @@
 #include "tools/support/map_frame.h"
 #include "tools/support/piece_folder.h"
 #include "tools/support/piece_progress.h"
+#include "tools/support/results.h"
 #include "tools/support/scan_poses.h"
 #include "tools/support/store_filling.h"
 
@@ -92,32 +93,6 @@ libmap::TextureResult textured(const TextureCommandOptions& options, const libma
   });
 }
 
-void add_results(const libmap::TextureReport& result, Run& run) {
-  std::vector<double> gains;
-  for (const Eigen::Vector3f& gain : result.exposure.gains)
-    for (const float channel : gain) gains.push_back(static_cast<double>(channel));
-  run.add_results({{"photographs", result.photos},
-                   {"skipped_frames", result.skipped.size()},
-                   {"triangles", result.seen_triangles + result.unseen_triangles},
-                   {"triangles_by_cutting", result.cut_triangles},
-                   {"seen_triangles", result.seen_triangles},
-                   {"unseen_triangles", result.unseen_triangles},
-                   {"seen_m2", result.seen_m2},
-                   {"unseen_m2", result.unseen_m2},
-                   {"charts", result.charts},
-                   {"split_charts", result.split_charts},
-                   {"shrunk_charts", result.shrunk_charts},
-                   {"pages", result.pages},
-                   {"texel_size_m", result.texel_size_m()},
-                   {"atlas_scale", result.atlas_scale},
-                   {"seams_before_m", result.seams_before_m},
-                   {"seams_m", result.seams_m},
-                   {"color_spread_before", result.exposure.spread_before},
-                   {"color_spread", result.exposure.spread},
-                   {"exposure_gains", gains},
-                   {"vignetting", result.exposure.vignetting}});
-}
-
 void say_result(const libmap::TextureReport& result, Run& run) {
   const std::size_t triangles = result.seen_triangles + result.unseen_triangles;
   for (const auto& [node, fault] : result.skipped)
@@ -141,7 +116,7 @@ void say_result(const libmap::TextureReport& result, Run& run) {
 }
 
 // Facts on pieces, as files between shares.
-PieceProgress::Facts facts_of(const libmap::TextureExposure& exposure) {
+PieceProgress::Facts exposure_facts(const libmap::TextureExposure& exposure) {
   std::vector<std::array<float, 3>> gains;
   for (const Eigen::Vector3f& gain : exposure.gains) gains.push_back({gain[0], gain[1], gain[2]});
   return {{"gains", gains},
@@ -160,19 +135,6 @@ libmap::TextureExposure exposure_of(const PieceProgress::Facts& facts) {
   facts.at("spread_before").get_to(exposure.spread_before);
   facts.at("spread").get_to(exposure.spread);
   return exposure;
-}
-
-PieceProgress::Facts facts_of(const libmap::TextureCounts& counts) {
-  PieceProgress::Facts facts;
-  libmap::for_each_count(counts, [&](const char* name, const auto& value) { facts[name] = value; });
-  return facts;
-}
-
-libmap::TextureCounts counts_of(const PieceProgress::Facts& facts) {
-  libmap::TextureCounts counts;
-  libmap::for_each_count(counts,
-                         [&](const char* name, auto& value) { facts.at(name).get_to(value); });
-  return counts;
 }
 
 // Pages of an earlier run that this one has not written anew.
@@ -215,7 +177,7 @@ void add_inputs(const TextureCommandOptions& options, Run& run) {
 }
 
 void report(const libmap::TextureReport& result, Run& run) {
-  add_results(result, run);
+  run.add_results(libmap::described(result));
   say_result(result, run);
 }
 
@@ -263,8 +225,8 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   std::optional<libmap::TextureExposure> exposure;
   const auto find_exposure = [&] {
     if (!exposure)
-      exposure =
-          exposure_of(progress.common_facts([&] { return facts_of(texturing.find_exposure()); }));
+      exposure = exposure_of(
+          progress.common_facts([&] { return exposure_facts(texturing.find_exposure()); }));
   };
   const auto make = [&](std::size_t n, const fs::path& to) {
     find_exposure();
@@ -277,7 +239,8 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
     find_exposure();
     whole.exposure = *exposure;
     for (const std::string& name : names) {
-      whole += counts_of(progress.facts(name));
+      libmap::merge_into<libmap::TextureCounts>(
+          whole, result_of<libmap::TextureCounts>(progress.facts(name)));
       PieceProgress::link_file(progress.file(name, model_extension),
                                folder / (name + model_extension));
     }

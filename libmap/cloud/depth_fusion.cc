@@ -165,8 +165,9 @@ class Fusion {
     for (const CameraView& view : camera_views(depth)) {
       const auto rays = images_.rays_of(view.depth_camera);
       const Pose grid_from_camera = grid_from_base * view.depth_camera.base_from_camera;
-      coarse.pixels += add_depth_planes(view.depth, *rays, grid_from_camera, options_.planes,
-                                        options_.voxel_size_m, cells, fitted, voxels);
+      merge_into(coarse.pixels,
+                 add_depth_planes(view.depth, *rays, grid_from_camera, options_.planes,
+                                  options_.voxel_size_m, cells, fitted, voxels));
     }
     coarse.voxels = std::move(voxels).take_frame();
   }
@@ -431,7 +432,7 @@ SurfaceVoxels Fusion::coarse_surface(const Members& members, const PlanCells& ar
   };
   each_frame(members.frames.size(), around, make, [&](const CoarseFrame& coarse) {
     voxels.merge(coarse.voxels, around);
-    counts.pixels += coarse.pixels;
+    merge_into(counts.pixels, coarse.pixels);
   });
   for (const std::uint64_t key : voxels.index().keys())
     if (cells.has_cell(unpack(key).cell.head<2>())) ++counts.occupied_voxels;
@@ -447,22 +448,13 @@ PointCloud Fusion::make_cloud(const PlanCells& cells, const RefinedSurface& surf
   options.max_missed = options_.max_missed;
   options.cells = cells;
   SurfacePoints points = make_surface_points(surface, options);
-  counts.points += points.counts;
-  counts.points_made += points.cloud.size();
+  counts.points = points.counts;
+  counts.points_made = points.cloud.size();
   for (Eigen::Vector3d& position : points.cloud.positions) position += survey_.grid_origin;
   return std::move(points.cloud);
 }
 
 }  // namespace
-
-FusionCounts& FusionCounts::operator+=(const FusionCounts& more) {
-  pixels += more.pixels;
-  occupied_voxels += more.occupied_voxels;
-  elements += more.elements;
-  points += more.points;
-  points_made += more.points_made;
-  return *this;
-}
 
 DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
                              const DepthFusionOptions& options, Progress& progress) {

@@ -258,15 +258,17 @@ void PlaneFit::finish(const UsePlaneRow& use) {
 
 }  // namespace
 
-DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
-  pixels += more.pixels;
-  unmeasured += more.unmeasured;
-  out_of_range += more.out_of_range;
-  without_ray += more.without_ray;
-  flying += more.flying;
-  grazing += more.grazing;
-  used += more.used;
-  return *this;
+void describe(ResultTable& table, const DepthPixelCounts& counts) {
+  table.add("pixels", counts.pixels, Merge::sum, "depth pixels of all frames");
+  table.add("measurements_used", counts.used, Merge::sum, "pixels that were fused");
+  table.add("rejected_unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
+  table.add("rejected_out_of_range", counts.out_of_range, Merge::sum,
+            "pixels outside the range of depth");
+  table.add("rejected_without_ray", counts.without_ray, Merge::sum,
+            "pixels outside the invertible lens distortion");
+  table.add("rejected_flying", counts.flying, Merge::sum,
+            "pixels that no surface around them explains");
+  table.add("rejected_grazing", counts.grazing, Merge::sum, "pixels seen at a grazing angle");
 }
 
 // The gate g s(z) / z^2 is of inverse depth: with d = g s(z) / z a plane is at most z d / (1 - d)

@@ -15,6 +15,7 @@
 #include "libmap/cloud/depth_plane_loops.h"
 #include "libmap/cloud/depth_projection.h"
 #include "libmap/core/image.h"
+#include "libmap/core/result_table.h"
 
 namespace libmap {
 
@@ -36,9 +37,8 @@ struct DepthPixelCounts {
   std::size_t flying = 0;       // no surface around them explains them
   std::size_t grazing = 0;
   std::size_t used = 0;
-
-  DepthPixelCounts& operator+=(const DepthPixelCounts& more);
 };
+void describe(ResultTable& table, const DepthPixelCounts& counts);
 
 // Each used pixel's plane, by row and column; support 0 elsewhere.
 struct DepthPlanes {

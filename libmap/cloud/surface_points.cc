@@ -266,18 +266,6 @@ SurfacePoints PointMaker::make_cloud() {
 
 }  // namespace
 
-SurfacePointCounts& SurfacePointCounts::operator+=(const SurfacePointCounts& more) {
-  unconfirmed += more.unconfirmed;
-  max_views = std::max(max_views, more.max_views);
-  seen_through += more.seen_through;
-  missed += more.missed;
-  beside += more.beside;
-  bent_away += more.bent_away;
-  merged += more.merged;
-  extended_points += more.extended_points;
-  return *this;
-}
-
 SurfacePoints make_surface_points(const RefinedSurface& surface,
                                   const SurfacePointOptions& options) {
   return PointMaker(surface, options).run();

@@ -15,6 +15,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/textured_mesh.h"
 #include "libmap/mesh/mesh_piece_index.h"
@@ -60,28 +61,10 @@ struct TextureCounts {
   double seams_before_m = 0.0;  // with the best photograph for every triangle
   double seams_m = 0.0;
 
-  TextureCounts& operator+=(const TextureCounts& more);
   // Root of the mean area of a texel on the surface.
   double texel_size_m() const;
 };
-
-// use(name, value) for each of them.
-template <typename Counts, typename Use>
-void for_each_count(Counts& counts, const Use& use) {
-  use("cut_triangles", counts.cut_triangles);
-  use("seen_triangles", counts.seen_triangles);
-  use("unseen_triangles", counts.unseen_triangles);
-  use("seen_m2", counts.seen_m2);
-  use("unseen_m2", counts.unseen_m2);
-  use("charts", counts.charts);
-  use("split_charts", counts.split_charts);
-  use("shrunk_charts", counts.shrunk_charts);
-  use("pages", counts.pages);
-  use("atlas_scale", counts.atlas_scale);
-  use("texels", counts.texels);
-  use("seams_before_m", counts.seams_before_m);
-  use("seams_m", counts.seams_m);
-}
+void describe(ResultTable& table, const TextureCounts& counts);
 
 struct TextureReport : TextureCounts {
   std::size_t photos = 0;
@@ -89,6 +72,7 @@ struct TextureReport : TextureCounts {
   TextureExposure exposure;
   StageTimings timings_s;
 };
+void describe(ResultTable& table, const TextureReport& report);
 
 struct TextureResult : TextureReport {
   TexturedMesh model;

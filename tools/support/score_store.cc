@@ -201,18 +201,16 @@ class StoreScoring {
     index.max = frame_.max;
     libmap::Manifest& manifest = index.manifest;
     libmap::Pose terrain_from_input = libmap::Pose::Identity();
-    add_results({{"lattice_origin_m", frame_.lattice.origin_m}, {"input_points", points}},
-                manifest);
+    manifest.add_results({{"lattice_origin_m", frame_.lattice.origin_m}, {"input_points", points}});
     if (frame_.plane) {
       plan.centroid = frame_.plane->centroid;
       terrain_from_input = frame_.plane->terrain_from_input;
-      add_results(
-          {{"plane_rmse_m", frame_.plane->rmse_m}, {"up_source", to_text(frame_.plane->up_source)}},
-          manifest);
+      manifest.add_results({{"plane_rmse_m", frame_.plane->rmse_m},
+                            {"up_source", to_text(frame_.plane->up_source)}});
       report_plane(*frame_.plane, options_.terrain, run_);
     }
     manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
-    add_results({{"mask_side_voxels", mask_.side}, {"mask_layers", mask_.layers}}, manifest);
+    manifest.add_results({{"mask_side_voxels", mask_.side}, {"mask_layers", mask_.layers}});
   }
 
   void restore_frame() {

@@ -1,19 +1,153 @@
-// graspmap convert ... -o BAG: a map and what belongs to it, or a rig's images, as a bag.
+// graspmap convert BAG, and ... -o BAG: bags of ROS 1 and ROS 2 in and out, offline.
 #include <variant>
 
 #include "libgtd/shape/convexity.h"
 #include "libgtd/shape/curvature.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/data_folder.h"
 #include "libmap/core/score_color.h"
+#include "libmap/ros/bag_cloud.h"
+#include "libmap/ros/bag_reader.h"
+#include "libmap/ros/bag_rig.h"
+#include "libmap/ros/bag_writer.h"
+#include "libmap/scan/frame_folder_files.h"
+#include "libmap/scan/rig_io.h"
 #include "libmap/view/color_map.h"
-#include "tools/support/convert_bag.h"
+#include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/option_values.h"
+#include "tools/support/usages.h"
 
-namespace graspmap_tools {
+using namespace graspmap_tools;
 
 namespace {
 
 namespace fs = std::filesystem;
+
+struct BagCommandOptions {
+  std::string input;
+  std::string output;
+  // Out of a bag.
+  std::vector<std::string> topics;
+  std::string rig;
+  std::string stamp = "auto";
+  bool strict = false;
+  libmap::BagRigOptions depth;
+  // Into a bag.
+  std::string terrain;
+  std::string curvature;
+  std::string footholds;
+  std::string frame = "auto";
+  double stamp_offset_s = 0.0;
+  double arrow_m = libmap::BagPlaces{}.arrow_m;
+  double cell_size_m = 0.0;
+  libmap::BagCompression compression = libmap::BagCompression::none;
+};
+
+void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
+  table.add("stamp_s", options.stamp,
+            "out of a bag: the moment, or the cloud, nearest to it alone (auto: all moments; the "
+            "cloud of most points); a map into a bag: of all messages (auto: the inputs' own)");
+  table.add("strict", options.strict, "end with an error if an image cannot be used");
+  bind(table, options.depth);
+  table.add("frame", options.frame,
+            "frame_id of the map's points in the bag; auto: as their manifest says");
+  table.add("stamp_offset_s", options.stamp_offset_s, libmap::any_number,
+            "added to the stamps of a rig's images, s");
+  table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
+  table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
+            "cells of the map's grids in a bag of ROS 2, m (0: the map's voxel size)");
+  table.add("compression", options.compression, libmap::bag_compression_names(),
+            "of the bag written: bz2 or lz4 in .bag, lz4 or zstd in .mcap");
+}
+
+// --stamp: nothing for auto. Throws Error.
+std::optional<double> bag_stamp(const BagCommandOptions& options) {
+  return parse_number_or("auto", options.stamp, "no such time", "--stamp",
+                         "a number of seconds, or auto");
+}
+
+libmap::CameraRig read_named_rig(const std::string& name, Run& run) {
+  const fs::path file = fs::exists(name) ? fs::path(name) : libmap::find_data_file("rigs", name);
+  libmap::CameraRig rig = libmap::read_rig(file);
+  run.add_input(file);
+  return rig;
+}
+
+void add_bag_input(const BagCommandOptions& options, Run& run) {
+  for (const fs::path& file : libmap::files_of_bag(options.input)) run.add_input(file);
+}
+
+void report(const libmap::BagRigPlan& plan, const libmap::BagRigExport& result,
+            const BagCommandOptions& options, Run& run) {
+  for (const std::string& warning : result.warnings) {
+    if (options.strict) throw libmap::Error(warning, {.file = options.input});
+    run.warn(options.input + ": " + warning);
+  }
+  if (result.pixels_beyond > 0)
+    run.warn("{}: {} pixels are deeper than 16 bits can represent and are left out (--depth-scale)",
+             options.input, result.pixels_beyond);
+  std::size_t fullest = 0;
+  for (const libmap::SynchronizedSet& set : result.sets) fullest = std::max(fullest, set.seen());
+  run.add_results({{"cameras", plan.rig.cameras.size()},
+                   {"images", result.images},
+                   {"images_broken", result.broken},
+                   {"moments", result.sets.size()},
+                   {"moments_in_bag", plan.all_sets},
+                   {"cameras_of_fullest_moment", fullest},
+                   {"pixels_beyond", result.pixels_beyond}});
+  for (std::size_t n = 0; n < plan.rig.cameras.size(); ++n) {
+    const libmap::RigCamera& camera = plan.rig.cameras[n];
+    run.add_results({{camera.name + ".topic", plan.topics[n]}});
+    run.manifest().transforms.emplace_back("robot_from_" + camera.name,
+                                           camera.camera.base_from_camera);
+    if (plan.topics[n].empty()) run.warn(camera.name + ": no topic of its images");
+  }
+  run.say("{} images of {} cameras, {} of {} moments, {} cameras at the fullest", result.images,
+          plan.rig.cameras.size(), result.sets.size(), plan.all_sets, fullest);
+}
+
+void read_bag_into_folder(const BagCommandOptions& options, Run& run) {
+  libmap::BagRigOptions depth = options.depth;
+  depth.topics = options.topics;
+  if (!options.rig.empty()) depth.rig = read_named_rig(options.rig, run);
+  const libmap::BagRigPlan plan = run.timed(
+      "survey", [&] { return libmap::plan_bag_rig(options.input, depth, bag_stamp(options)); });
+  const std::vector<std::string> names = libmap::names_in_rig_folder(plan);
+  run.claim_output_tree(options.output, names, {options.input});
+  for (const std::string& warning : plan.warnings) run.warn(options.input + ": " + warning);
+  add_bag_input(options, run);
+  run.manifest().frame = "robot";
+  run.write_output_tree(options.output, names, [&](const fs::path& temporary) {
+    report(plan, libmap::export_bag_rig(options.input, plan, temporary), options, run);
+  });
+}
+
+void read_bag_into_cloud(const BagCommandOptions& options, Run& run) {
+  if (options.topics.size() > 1)
+    throw libmap::Error("a cloud comes from one topic", {.field = "--topic"});
+  run.claim_output(options.output, {options.input});
+  const libmap::BagCloudResult result = run.timed("read", [&] {
+    return libmap::read_bag_cloud(options.input,
+                                  options.topics.empty() ? std::string() : options.topics.front(),
+                                  bag_stamp(options));
+  });
+  add_bag_input(options, run);
+  run.manifest().frame = result.frame;
+  run.add_results({{"topic", result.topic},
+                   {"stamp_s", result.stamp_s},
+                   {"messages", result.messages},
+                   {"points", result.cloud.size()},
+                   {"dropped_points", result.dropped_points}});
+  if (result.cloud.empty()) run.warn(options.input + ": " + result.topic + ": no finite points");
+  run.say("{} points of {} at {} s, one of {} messages; {} not finite", result.cloud.size(),
+          result.topic, libmap::to_fixed_text(result.stamp_s, 6), result.messages,
+          result.dropped_points);
+  run.write_output(options.output, [&](const fs::path& temporary) {
+    libmap::write_cloud(temporary, result.cloud);
+  });
+}
+
 using libmap::Manifest;
 using libmap::PointCloud;
 
@@ -206,8 +340,6 @@ void add_results(const libmap::BagContent& content, Run& run) {
   run.add_results({{"stamp_s", content.stamp_s}});
 }
 
-}  // namespace
-
 void write_map_bag(const BagCommandOptions& options, Run& run) {
   claim_bag(options, {options.input, options.terrain, options.curvature, options.footholds}, run);
   const CloudFile map = read(options.input, run);
@@ -271,4 +403,86 @@ void write_rig_folder_bag(const BagCommandOptions& options, Run& run) {
   run.say("{} images of {} cameras", images.size(), rig.cameras.size());
 }
 
-}  // namespace graspmap_tools
+void refuse_map_options(const BagCommandOptions& options, const std::string& reason) {
+  refuse_given({{"--terrain", !options.terrain.empty()},
+                {"--curvature", !options.curvature.empty()},
+                {"--footholds", !options.footholds.empty()}},
+               reason);
+}
+
+void write_bag(const BagCommandOptions& options, Run& run) {
+  const bool rig = fs::is_directory(options.input);
+  refuse_given({{"--topic", !options.topics.empty()}},
+               rig ? "is not for a rig's folder" : "is not for a map");
+  if (rig) {
+    refuse_map_options(options, "is not for a rig's folder");
+    refuse_given({{"--stamp", options.stamp != "auto"}},
+                 "is not for a rig's folder: --stamp-offset moves its stamps");
+    if (options.rig.empty() && !fs::exists(fs::path(options.input) / libmap::rig_file_name))
+      throw libmap::Error("a bag is made of a map's file, or of a folder with rig.yaml (--rig)",
+                          {.file = options.input});
+  } else {
+    refuse_given({{"--rig", !options.rig.empty()}}, "is not for a map");
+    libmap::require_readable_file(options.input);
+  }
+  libmap::bag_format_of(options.output);  // throws Error
+  try {
+    return rig ? write_rig_folder_bag(options, run) : write_map_bag(options, run);
+  } catch (const libmap::Error& error) {
+    throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(options.input) : error;
+  }
+}
+
+// A folder may be a bag or a rig and a scan at once, such as a data set beside its recording.
+void require_no_scan(const fs::path& input) {
+  namespace files = libmap::frame_folder_files;
+  for (const char* name : {files::nodes, files::associations, files::depth_list})
+    if (fs::exists(input / name))
+      throw libmap::Error(
+          fmt::format("is a scan by its {}, but also the folder of a rig or a bag", name),
+          {.file = input.string()});
+}
+
+void run_bag(const BagCommandOptions& options, Run& run) {
+  require_no_scan(options.input);
+  if (!libmap::is_bag_path(options.input)) return write_bag(options, run);
+  if (libmap::has_bag_extension(options.output))
+    throw libmap::Error("one of the two must be something else than a bag",
+                        {.file = options.input});
+  refuse_map_options(options, "is for a bag that is written");
+  if (fs::path(options.output).has_extension()) {
+    libmap::require_cloud_format(options.output);
+    refuse_given({{"--rig", !options.rig.empty()}}, "is not for a cloud");
+    return read_bag_into_cloud(options, run);
+  }
+  read_bag_into_folder(options, run);
+}
+
+}  // namespace
+
+int graspmap_tools::convert_bag(int argc, char** argv) {
+  BagCommandOptions options;
+  Command command("convert",
+                  "With a ROS bag: depth images or a cloud out of it, or a map or a rig's images "
+                  "into it.");
+  command.input(
+      "IN", options.input,
+      "out of a bag: .bag (ROS 1), .mcap, .db3 or its folder (ROS 2); into one: a map (.pcd, "
+      ".ply, .csv, .tif), or a rig's folder as `fuse` reads it");
+  command.output(
+      options.output,
+      "out of a bag: a rig's folder (no extension) of its depth images, or one of its "
+      "clouds (.pcd, .ply, .vtp, .csv); into one: OUT.bag (ROS 1), OUT.mcap, or a folder (no "
+      "extension) of .db3 (ROS 2)");
+  command.option("--topic", "[NAME=]TOPIC", options.topics,
+                 "topics of depth images, or of the cloud (repeatable); else all that are found");
+  command.option("--rig", "FILE|NAME", options.rig,
+                 "the rig, instead of the bag's camera infos and transforms, or of DIR/rig.yaml");
+  command.option("--terrain", "CLOUD", options.terrain, "cloud for /merged_pcd");
+  command.option("--curvature", "CLOUD", options.curvature,
+                 "cloud for /curvature_map, instead of the map with its own curvatures");
+  command.option("--footholds", "FOOTHOLDS", options.footholds,
+                 "footholds of the map for /footholds and /foothold_poses");
+  bind(command.parameters(), options);
+  return command.run(argc, argv, [&](Run& run) { run_bag(options, run); });
+}
