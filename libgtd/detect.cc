@@ -162,6 +162,7 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   result.map.voxels = std::move(detected.voxels);
   result.unoriented_voxels = detected.unoriented_voxels;
   result.map.content = content_of(scenario);
+  if (scenario.fits_normals()) result.normal_radius_m = normal_radius_m(result.mask, scenario);
   if (scenario.evaluates_obstacles() && options.share.count == 1)
     libmap::timed(result.timings_s, "obstacles", [&] { evaluate_obstacles(scenario, result); });
   for (const MapVoxel& voxel : result.map.voxels) {
@@ -169,6 +170,41 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
     result.border_voxels += voxel.border ? 1 : 0;
   }
   return result;
+}
+
+void describe(libmap::ResultTable& table, const DetectionResult& result) {
+  const auto only_if = [](bool is_there, const auto& value) {
+    return is_there ? std::optional(value) : std::nullopt;
+  };
+  const bool has_grid = result.grid_spacing_m > 0.0;
+  table.add("lattice_origin_m", result.map.lattice.origin_m, "corner of voxel (0, 0, 0)");
+  table.add("input_points", result.points, "points of the terrain");
+  table.add("plane_rmse_m", result.plane ? std::optional(result.plane->rmse_m) : std::nullopt,
+            "root mean square distance of the points from the regression plane");
+  table.add(
+      "up_source",
+      result.plane ? std::optional(std::string(to_text(result.plane->up_source))) : std::nullopt,
+      "what determined which side of the plane is up");
+  table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
+            "points after downsampling");
+  table.add("interpolated_points", only_if(has_grid, result.interpolated_points),
+            "points after interpolation");
+  table.add("interpolation_grid_m", only_if(has_grid, result.grid_spacing_m),
+            "spacing of the grid of interpolation");
+  table.add("occupied_voxels", result.occupied_voxels, "voxels with points");
+  table.add("mask_side_voxels", result.mask.side, "side of the gripper mask");
+  table.add("mask_layers", result.mask.layers, "layers of the gripper mask");
+  table.add("tiles", result.tiles, "tiles that were scored");
+  table.add("scored_voxels", result.map.voxels.size(), "voxels of the map");
+  table.add("border_voxels", result.border_voxels, "scored voxels at the border of the terrain");
+  table.add("curvature_points", result.curvature_points, "points with a curvature");
+  table.add("convex_points", result.convex_points, "points on convex ground");
+  table.add("graspable_voxels", result.graspable_voxels, "scored voxels that can be grasped");
+  table.add("normal_radius_m", result.normal_radius_m, "radius of the fit of normals");
+  table.add("unoriented_voxels", only_if(result.map.content.normals, result.unoriented_voxels),
+            "voxels without a normal, scored upright");
+  table.add("obstacle_voxels", only_if(result.map.content.obstacles, result.obstacle_voxels),
+            "voxels that are obstacles");
 }
 
 }  // namespace libgtd

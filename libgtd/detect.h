@@ -13,6 +13,7 @@
 #include "libgtd/terrain/regression_plane.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/tiles/tile_share.h"
 
@@ -51,8 +52,10 @@ struct DetectionResult {
   std::size_t border_voxels = 0;
   std::size_t unoriented_voxels = 0;  // orientation surface: without a normal, so evaluated upright
   std::size_t obstacle_voxels = 0;    // of the whole map alone, not of a share
-  libmap::StageTimings timings_s;     // wall time of each step
+  std::optional<double> normal_radius_m;  // of the surface, if normals were fitted
+  libmap::StageTimings timings_s;         // wall time of each step
 };
+void describe(libmap::ResultTable& table, const DetectionResult& result);
 
 // The gripper of `options`: its own, else the scenario's with its overrides. Throws as
 // find_gripper.

@@ -15,6 +15,7 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
+#include "tools/support/results.h"
 #include "tools/support/usages.h"
 
 using namespace graspmap_tools;
@@ -274,22 +275,21 @@ double moved_m(const Comparison& comparison) {
   return (comparison.alignment->surface_from_points.inverse() * middle - middle).norm();
 }
 
-Results distance_results(const Comparison& comparison) {
-  const libmap::DistanceStatistics& statistics = comparison.statistics;
-  return {{"points", statistics.count},  {"rmse_m", statistics.rmse_m},
-          {"mean_m", statistics.mean_m}, {"median_m", statistics.median_m},
-          {"p95_m", statistics.p95_m},   {"max_m", statistics.max_m},
-          {"bias_m", comparison.bias_m}};
+libmap::ResultTable distance_results(const Comparison& comparison) {
+  libmap::ResultTable table = {{"points", comparison.statistics.count}};
+  table.append("", libmap::described(comparison.statistics));
+  table.add("bias_m", comparison.bias_m);
+  return table;
 }
 
-Results share_results(const Comparison& comparison) {
-  Results results = {{"precision", comparison.precision},
-                     {"completeness", comparison.completeness}};
+libmap::ResultTable share_results(const Comparison& comparison) {
+  libmap::ResultTable table = {{"precision", comparison.precision},
+                               {"completeness", comparison.completeness}};
   if (const auto& within = comparison.within_deviations) {
-    results.emplace_back("within_one_deviation", within->at(0));
-    results.emplace_back("within_two_deviations", within->at(1));
+    table.add("within_one_deviation", within->at(0));
+    table.add("within_two_deviations", within->at(1));
   }
-  return results;
+  return table;
 }
 
 Json json_of(const Comparison& comparison, const Shape& a, const Shape& b,

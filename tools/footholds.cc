@@ -2,19 +2,157 @@
 #include "libgtd/score/footholds.h"
 
 #include <algorithm>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <utility>
+#include <variant>
 #include <vector>
 
+#include "libgtd/grasp/grasp_trials.h"
+#include "libgtd/gripper/gripper_io.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/data_folder.h"
+#include "libmap/core/error.h"
+#include "libmap/core/manifest.h"
+#include "libmap/core/parameters.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/text.h"
+#include "libmap/mesh/mesh_io.h"
 #include "tools/support/command_line.h"
-#include "tools/support/foothold_trials.h"
 #include "tools/support/map_frame.h"
 
 using namespace graspmap_tools;
 
 namespace {
+
+// Fewer draws than `grasp` makes at listed locations, and the limits of all directions.
+libgtd::GraspOptions foothold_grasp_options() {
+  libgtd::GraspOptions options;
+  options.draws = 8;
+  options.best_draws = 0;
+  options.pull_limits = true;
+  return options;
+}
+
+struct FootholdTrialsOptions {
+  std::string mesh;     // of the terrain; empty: no test. Not bound
+  std::string gripper;  // name or file; empty: that of the map's manifest, else scar-e
+  double min_probability = 0.5;
+  libgtd::GraspOptions grasp = foothold_grasp_options();
+};
+
+std::string gripper_of(const FootholdTrialsOptions& options,
+                       const std::optional<libmap::Manifest>& manifest) {
+  if (!options.gripper.empty()) return options.gripper;
+  const libmap::ManifestValue* value = manifest ? manifest->find_parameter("gripper") : nullptr;
+  const std::string* name = value != nullptr ? std::get_if<std::string>(value) : nullptr;
+  return name != nullptr ? *name : "scar-e";
+}
+
+// Drops the footholds that are not on the mesh, and returns where the others are in its frame.
+std::vector<Eigen::Vector3d> places_on(const libgtd::Ground& ground,
+                                       const libmap::Pose& mesh_from_map,
+                                       const libmap::PointCloud& map, double max_distance_m,
+                                       std::vector<libgtd::Foothold>& footholds) {
+  std::vector<Eigen::Vector3d> places;
+  std::erase_if(footholds, [&](const libgtd::Foothold& foothold) {
+    const Eigen::Vector3d place = mesh_from_map * map.positions[foothold.map_point];
+    const bool is_on_mesh = ground.distance(place, max_distance_m).has_value();
+    if (is_on_mesh) places.push_back(place);
+    return !is_on_mesh;
+  });
+  return places;
+}
+
+void bind(libmap::ParameterTable& table, FootholdTrialsOptions& options) {
+  table.add("gripper", options.gripper,
+            "of the test: scar-e, hubrobo, limbero or a gripper file; default: that of the map");
+  table.add("min_probability", options.min_probability, libmap::zero_to_one,
+            "least hold_probability of a foothold");
+  bind(table, options.grasp);
+}
+
+// Tests the footholds, leaves those in `result` that hold with min_probability, the one with the
+// largest hold_probability first, of equal ones that with the largest holding_force_n, at most
+// `max_count` (0: all), and returns their results in this order. Footholds that are not on the mesh
+// are left out with a warning. Throws Error: mesh, gripper or map (none of it on the mesh).
+std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& options,
+                                                   int max_count,
+                                                   const std::optional<libmap::Manifest>& manifest,
+                                                   const libmap::PointCloud& map,
+                                                   libgtd::FootholdResult& result, Run& run) {
+  const auto gripper_file = libmap::find_data_file("grippers", gripper_of(options, manifest));
+  const libgtd::Gripper gripper = libgtd::read_gripper(gripper_file, {});
+  if (!gripper.fingers)
+    throw libmap::Error("missing: a gripper is closed by its fingers",
+                        {.file = gripper_file.string(), .field = "fingers"});
+  const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
+  run.add_input(options.mesh);
+  for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
+  const auto ground = in_file(options.mesh, [&] { return libgtd::Ground(mesh); });
+  std::vector<libgtd::Foothold>& footholds = result.footholds;
+  const std::size_t found = footholds.size();
+  const std::vector<Eigen::Vector3d> places = places_on(
+      ground, map_from_input(manifest).inverse(), map, options.grasp.max_distance_m, footholds);
+  if (places.empty() && found > 0)
+    throw libmap::Error("none of the map's footholds is on the mesh", {.file = options.mesh});
+  if (places.size() < found)
+    run.warn("{}: {} of {} footholds are not on the mesh and are left out", options.mesh,
+             found - places.size(), found);
+  const std::vector<libgtd::LocationResult> trials = run.timed("grasp", [&] {
+    return libgtd::test_grasps(ground, gripper, places, options.grasp, run.progress());
+  });
+  std::vector<std::size_t> order(trials.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::erase_if(order, [&](std::size_t n) {
+    return !(trials[n].hold_probability >= options.min_probability);
+  });
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    if (trials[a].hold_probability != trials[b].hold_probability)
+      return trials[a].hold_probability > trials[b].hold_probability;
+    return trials[a].force_n[1] > trials[b].force_n[1];
+  });
+  run.add_results({{"footholds_tested", trials.size()}, {"footholds_holding", order.size()}});
+  run.say("{} of {} footholds hold {} N with a probability of at least {}", order.size(),
+          trials.size(), libmap::to_text(options.grasp.load_n),
+          libmap::to_text(options.min_probability));
+  if (max_count > 0 && order.size() > static_cast<std::size_t>(max_count))
+    order.resize(static_cast<std::size_t>(max_count));
+  std::vector<libgtd::Foothold> holding;
+  std::vector<libgtd::LocationResult> of_holding;
+  for (const std::size_t n : order) {
+    holding.push_back(footholds[n]);
+    of_holding.push_back(trials[n]);
+  }
+  footholds = std::move(holding);
+  return of_holding;
+}
+
+// Adds hold_probability, hold_low, hold_high, holding_force_n (the trials' median of what their
+// weakest direction holds) and for each direction pull_away_n, pull_45_0_n, ..., pull_90_315_n
+// (what nine of ten trials hold in it). Nothing without results.
+void add_trial_fields(const std::vector<libgtd::LocationResult>& trials,
+                      libmap::PointCloud& footholds) {
+  if (trials.empty()) return;
+  const auto add = [&](const std::string& name, const auto& value_of) {
+    libmap::ScalarField* field = footholds.find_field(name);
+    std::vector<double>& values =
+        field != nullptr ? field->values
+                         : footholds.add_field(name, libmap::ScalarType::float32).values;
+    for (std::size_t n = 0; n < values.size(); ++n) values[n] = value_of(trials[n]);
+  };
+  using Result = libgtd::LocationResult;
+  add("hold_probability", [](const Result& r) { return r.hold_probability; });
+  add("hold_low", [](const Result& r) { return r.hold_low; });
+  add("hold_high", [](const Result& r) { return r.hold_high; });
+  add("holding_force_n", [](const Result& r) { return r.force_n[1]; });
+  for (std::size_t d = 0; d < libgtd::pull_directions().size(); ++d) {
+    std::string name = libgtd::pull_directions()[d].name();
+    std::replace(name.begin(), name.end(), '@', '_');
+    add("pull_" + name + "_n", [d](const Result& r) { return r.pull_limits_n[d]; });
+  }
+}
 
 struct FootholdsCommandOptions {
   std::string map;
@@ -41,8 +179,7 @@ libgtd::FootholdResult search(const FootholdsCommandOptions& options, const libm
 }
 
 void find_footholds(const FootholdsCommandOptions& options, Run& run) {
-  if (options.trials.mesh.empty())
-    refuse_set(options.trials, &graspmap_tools::bind, "is for --mesh");
+  if (options.trials.mesh.empty()) refuse_set(options.trials, &bind, "is for --mesh");
   libmap::require_cloud_format(options.output);
   run.claim_output(options.output, {options.map, options.trials.mesh});
   const libmap::PointCloud map = libmap::read_cloud(options.map).cloud;
@@ -55,7 +192,7 @@ void find_footholds(const FootholdsCommandOptions& options, Run& run) {
     run.warn(options.map + ": no manifest beside it: the z axis is taken as up");
   }
   run.add_input(options.map);
-  run.add_results({{"candidates", result.candidates}, {"candidates_at_border", result.at_border}});
+  run.add_results(libmap::described(result));
   std::vector<libgtd::LocationResult> trials;
   if (!options.trials.mesh.empty() && !run.options().dry_run)
     trials =

@@ -7,6 +7,7 @@
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/scan_poses.h"
+#include "tools/support/results.h"
 #include "tools/support/tile_folder.h"
 #include "tools/support/usages.h"
 
@@ -17,12 +18,6 @@ NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixe
                                    max_ray_length, max_pixel_pitch)
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionSurvey, grid_origin, frames, skipped, registration_rounds,
                                    disagreement_before_m, disagreement_after_m)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(DepthPixelCounts, pixels, unmeasured, out_of_range, without_ray,
-                                   flying, grazing, used)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(SurfacePointCounts, unconfirmed, max_views, seen_through, missed,
-                                   beside, bent_away, merged, extended_points)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionCounts, pixels, occupied_voxels, elements, points,
-                                   points_made)
 
 }  // namespace libmap
 
@@ -64,30 +59,7 @@ void tell_results(const libmap::DepthFusionResult& result, const FuseOptions& op
   for (const auto& [node, fault] : result.skipped)
     run.warn(std::string("skipped: ") + fault.what());
   const libmap::DepthPixelCounts& pixels = result.pixels;
-  run.add_results({{"frames", result.frames},
-                   {"skipped_frames", result.skipped.size()},
-                   {"pixels", pixels.pixels},
-                   {"measurements_used", pixels.used},
-                   {"rejected_unmeasured", pixels.unmeasured},
-                   {"rejected_out_of_range", pixels.out_of_range},
-                   {"rejected_without_ray", pixels.without_ray},
-                   {"rejected_flying", pixels.flying},
-                   {"rejected_grazing", pixels.grazing},
-                   {"registration_rounds", result.registration_rounds},
-                   {"registration_shift_m", result.registration_shift_m},
-                   {"registration_turn_deg", result.registration_turn_deg},
-                   {"disagreement_before_m", result.disagreement_before_m},
-                   {"disagreement_after_m", result.disagreement_after_m},
-                   {"occupied_voxels", result.occupied_voxels},
-                   {"surface_elements", result.elements},
-                   {"dropped_too_few_views", result.points.unconfirmed},
-                   {"dropped_seen_through", result.points.seen_through},
-                   {"dropped_missed", result.points.missed},
-                   {"dropped_beside", result.points.beside},
-                   {"dropped_beyond_edges", result.points.bent_away},
-                   {"merged", result.points.merged},
-                   {"points", result.points_made},
-                   {"points_beyond_edges", result.points.extended_points}});
+  run.add_results(libmap::described(result));
   run.add_timings(result.timings_s);
   run.detail(
       "{} of {} pixels used; {} unmeasured, {} out of range, {} flying, {} grazing, {} without a "
@@ -171,7 +143,7 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
     return tile;
   };
   const auto add = [&](const libmap::FusionCounts& counts) {
-    result += counts;
+    libmap::merge_into<libmap::FusionCounts>(result, counts);
     result.timings_s = fusion->report().timings_s;
   };
   if (folder == nullptr) {
@@ -188,12 +160,12 @@ void make_tiles(const FuseOptions& options, const libmap::ScanSource& scan,
   const auto write = [&](std::size_t n, const fs::path& to) {
     const libmap::TileFusion::Tile tile = make(n);
     if (!tile.cloud.empty()) libmap::write_cloud(to, tile.cloud);
-    return TileFolder::Facts(tile.counts);
+    return facts_of(tile.counts);
   };
   const auto finish = [&](const fs::path& to) {
     std::size_t written = 0;
     for (const std::string& name : names) {
-      const auto counts = folder->facts(name).get<libmap::FusionCounts>();
+      const auto counts = result_of<libmap::FusionCounts>(folder->facts(name));
       add(counts);
       if (counts.points_made == 0) continue;
       ++written;

@@ -1,6 +1,9 @@
 // graspmap grasp: the virtual field test of a gripper at listed locations of a mesh.
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
@@ -9,6 +12,7 @@
 #include "libgtd/grasp/grasp_table.h"
 #include "libgtd/grasp/grasp_trials.h"
 #include "libgtd/grasp/surface_error.h"
+#include "libgtd/grasp/trial_scene.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
@@ -20,13 +24,143 @@
 #include "libmap/mesh/mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/grasp_map.h"
-#include "tools/support/grasp_scenes.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 
+using namespace graspmap_tools;
+
 namespace {
 
-using graspmap_tools::Run;
+struct GraspScenesOptions {
+  std::string folder;               // empty: no pictures
+  std::vector<std::string> places;  // none: all
+};
+
+struct GraspScene {
+  std::size_t row = 0;  // of the locations
+  std::string file;     // PLACE.ply
+};
+
+struct GraspScenesInput {
+  const libmap::TriangleMesh& mesh;
+  const libgtd::Ground& ground;
+  const libgtd::Gripper& gripper;
+  const libgtd::GraspOptions& options;
+  const std::vector<libgtd::LocationResult>& results;
+};
+
+constexpr std::size_t max_unlisted_scenes = 100;
+
+// As a file's name: what a shell or a file system could take for anything else becomes '_'.
+std::string file_of(const std::string& place) {
+  std::string name = place.substr(0, 100);
+  for (char& letter : name) {
+    const bool is_plain = (letter >= 'a' && letter <= 'z') || (letter >= 'A' && letter <= 'Z') ||
+                          (letter >= '0' && letter <= '9') || letter == '-' || letter == '.';
+    if (!is_plain) letter = '_';
+  }
+  if (name.empty() || name.front() == '.' || name.front() == '-') name.insert(0, "_");
+  return name + ".ply";
+}
+
+std::vector<std::string> places_of(const libmap::Table& locations) {
+  const auto column = locations.find_column("place");
+  std::vector<std::string> places;
+  for (std::size_t row = 0; row < locations.rows.size(); ++row)
+    places.push_back(column ? locations.rows[row][*column] : std::to_string(row + 1));
+  return places;
+}
+
+std::vector<std::size_t> rows_of(const libmap::Table& locations,
+                                 const std::vector<std::string>& listed) {
+  const std::vector<std::string> places = places_of(locations);
+  std::vector<std::size_t> rows;
+  for (const std::string& place : listed) {
+    const auto found = std::find(places.begin(), places.end(), place);
+    if (found == places.end())
+      throw libmap::Error("is no place of the locations" + libmap::did_you_mean(place, places),
+                          {.file = locations.file, .field = "--scene-of", .value = place});
+    const auto row = static_cast<std::size_t>(found - places.begin());
+    if (std::find(rows.begin(), rows.end(), row) == rows.end()) rows.push_back(row);
+  }
+  return rows;
+}
+
+std::string name_of(libgtd::TrialEnd end) {
+  for (const auto& [name, value] : libgtd::trial_end_names())
+    if (value == end) return name;
+  return "";
+}
+
+std::string description(const libgtd::LocationResult& result, const libgtd::Trial& trial,
+                        double load_n) {
+  const std::string verdict =
+      fmt::format("{} (probability {:.2f}); the trial shown ",
+                  result.holds() ? "holds" : "does not hold", result.hold_probability);
+  const std::string direction = libgtd::pull_directions()[trial.direction].name();
+  if (trial.end == libgtd::TrialEnd::holds)
+    return verdict + fmt::format("bears {:.1f} N in its weakest direction, {}; the load is {} N",
+                                 trial.force_n, direction, libmap::to_text(load_n));
+  const std::string failure = "fails by " + name_of(trial.end);
+  if (trial.gripper.approach != libgtd::ApproachEnd::on_ground) return verdict + failure;
+  return verdict + failure +
+         fmt::format(": {:.1f} N in its weakest direction, {}; the load is {} N", trial.force_n,
+                     direction, libmap::to_text(load_n));
+}
+
+// Before the work. Throws Error: a folder that is no output of this command, or places without it.
+void claim_scenes(const GraspScenesOptions& options, Run& run) {
+  if (!options.folder.empty()) return run.claim_output_folder(options.folder);
+  if (!options.places.empty())
+    throw libmap::Error("is for --scenes, which is not given", {.field = "--scene-of"});
+}
+
+// Throws Error: a place that is not in the table, two with one name, or too many without a list.
+std::vector<GraspScene> scenes_of(const libmap::Table& locations,
+                                  const GraspScenesOptions& options) {
+  if (options.folder.empty()) return {};
+  const std::vector<std::string> places = places_of(locations);
+  std::vector<std::size_t> rows = rows_of(locations, options.places);
+  if (options.places.empty()) {
+    if (places.size() > max_unlisted_scenes)
+      throw libmap::Error("too many locations for a picture of each: list some with --scene-of",
+                          {.file = locations.file,
+                           .field = "locations",
+                           .value = std::to_string(places.size()),
+                           .bound = "<= " + std::to_string(max_unlisted_scenes)});
+    for (std::size_t row = 0; row < places.size(); ++row) rows.push_back(row);
+  }
+  std::vector<GraspScene> scenes;
+  for (const std::size_t row : rows) {
+    const std::string file = file_of(places[row]);
+    for (const GraspScene& other : scenes)
+      if (other.file == file)
+        throw libmap::Error(
+            fmt::format("the pictures of rows {} and {} have one name", other.row + 1, row + 1),
+            {.file = locations.file, .field = "place", .value = "'" + places[row] + "'"});
+    scenes.push_back({row, file});
+  }
+  return scenes;
+}
+
+// Also a result of the run for each: FILE, what its location and the trial that it shows came to.
+void write_scenes(const GraspScenesOptions& options, const std::vector<GraspScene>& scenes,
+                  const GraspScenesInput& input, Run& run) {
+  if (options.folder.empty()) return;
+  const double load_n = input.options.load_n * input.options.safety;
+  Run::Files files;
+  for (const GraspScene& scene : scenes) {
+    const libgtd::LocationResult& result = input.results[scene.row];
+    const libgtd::Trial trial =
+        libgtd::repeat_trial(input.ground, input.gripper, result.location, input.options,
+                             result.shown_pose, result.shown_draw);
+    run.add_results({{scene.file, description(result, trial, load_n)}});
+    files.emplace_back(scene.file, [=, &input](const std::filesystem::path& temporary) {
+      libmap::write_mesh(temporary, libgtd::trial_scene(input.mesh, input.gripper, trial, load_n));
+    });
+  }
+  run.timed("scenes", [&] { run.write_output_folder(options.folder, files); });
+}
 
 enum class SequentialTest { automatic, on, off };
 
@@ -35,7 +169,7 @@ struct GraspCommandOptions {
   std::string points;
   std::string map;
   std::string output;
-  graspmap_tools::GraspScenesOptions scenes;
+  GraspScenesOptions scenes;
   std::string gripper = "scar-e";
   std::vector<std::pair<std::string, std::string>> overrides;
   libgtd::GraspOptions grasp;
@@ -110,7 +244,7 @@ libgtd::Gripper read_with_fingers(const std::filesystem::path& file,
 
 libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOptions& options) {
   const libgtd::SurfaceErrorOptions& bounds = options.grasp.surface;
-  return graspmap_tools::in_file(options.mesh, [&] {
+  return in_file(options.mesh, [&] {
     if (options.surface_error == "none") return libgtd::Ground(mesh);
     if (options.surface_error == "mesh")
       return libgtd::Ground(mesh, libgtd::errors_of(mesh, bounds));
@@ -125,26 +259,23 @@ libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOpt
 }
 
 void grasp_voxels(GraspCommandOptions& options, Run& run) {
-  graspmap_tools::refuse_given({{"--scenes", !options.scenes.folder.empty()},
-                                {"--scene-of", !options.scenes.places.empty()},
-                                {"--more-loads", !options.more_loads.empty()},
-                                {"--prefix", !options.prefix.empty()}},
-                               "is for --points");
-  graspmap_tools::GraspMapInput input{.mesh_file = options.mesh,
-                                      .map_file = options.map,
-                                      .output = options.output,
-                                      .share = libmap::parse_share(options.tile),
-                                      .parameters_hash = {}};
+  refuse_given({{"--scenes", !options.scenes.folder.empty()},
+                {"--scene-of", !options.scenes.places.empty()},
+                {"--more-loads", !options.more_loads.empty()},
+                {"--prefix", !options.prefix.empty()}},
+               "is for --points");
+  GraspMapInput input{.mesh_file = options.mesh,
+                      .map_file = options.map,
+                      .output = options.output,
+                      .share = libmap::parse_share(options.tile),
+                      .parameters_hash = {}};
   require_map_output(input, run);
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
-  graspmap_tools::GroundPieces ground(
-      options.mesh, gripper, options.grasp.closing.start_height_m,
-      [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
+  GroundPieces ground(options.mesh, gripper, options.grasp.closing.start_height_m,
+                      [&](const libmap::TriangleMesh& mesh) { return ground_of(mesh, options); });
   run.add_input(options.mesh);
-  run.add_input(graspmap_tools::is_tile_store(options.map)
-                    ? graspmap_tools::store_index_path(options.map).string()
-                    : options.map);
+  run.add_input(is_tile_store(options.map) ? store_index_path(options.map).string() : options.map);
   for (const auto& used : libgtd::gripper_files(file)) run.add_input(used);
   options.grasp.draws = options.map_draws;
   options.grasp.best_draws = 0;
@@ -156,8 +287,7 @@ void grasp_voxels(GraspCommandOptions& options, Run& run) {
 }
 
 void grasp_places(GraspCommandOptions& options, Run& run) {
-  graspmap_tools::refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}},
-                               "is for --map");
+  refuse_given({{"--tile", options.tile != GraspCommandOptions{}.tile}}, "is for --map");
   if (libmap::format_of(options.output) != ".csv")
     throw libmap::Error("results are written as .csv", {.file = options.output});
   run.claim_output(options.output, {options.mesh, options.points});
@@ -172,9 +302,9 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   const auto file = libmap::find_data_file("grippers", options.gripper);
   const libgtd::Gripper gripper = read_with_fingers(file, options);
   libmap::Table table = libmap::read_csv(options.points);
-  const std::vector<Eigen::Vector3d> locations = graspmap_tools::positions_of(table);
+  const std::vector<Eigen::Vector3d> locations = positions_of(table);
   if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
-  const auto scenes = graspmap_tools::scenes_of(table, options.scenes);
+  const auto scenes = scenes_of(table, options.scenes);
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);
   run.add_input(options.points);
@@ -207,8 +337,7 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
 
 void grasp(GraspCommandOptions& options, Run& run) {
   if (options.points.empty() == options.map.empty())
-    throw graspmap_tools::UsageError(options.map.empty()
-                                         ? "--points LOCATIONS.csv or --map MAP is missing"
+    throw UsageError(options.map.empty() ? "--points LOCATIONS.csv or --map MAP is missing"
                                          : "--points and --map exclude each other");
   options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);
 }
@@ -217,7 +346,7 @@ void grasp(GraspCommandOptions& options, Run& run) {
 
 int main(int argc, char** argv) {
   GraspCommandOptions options;
-  graspmap_tools::Command command("grasp");
+  Command command("grasp");
   command.input("MESH", options.mesh, "mesh or DEM (.tif) of the terrain, z up");
   command.option("--points", "LOCATIONS.csv", options.points,
                  "CSV with the columns x, y, z in meters in the mesh's frame, and any others");

@@ -9,10 +9,10 @@
 #include "libmap/ros/bag_reader.h"
 #include "libmap/surface/mesh_report.h"
 #include "tools/support/command_line.h"
-#include "tools/support/info_json.h"
 #include "tools/support/info_scan.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
+#include "tools/support/results.h"
 
 using namespace graspmap_tools;
 

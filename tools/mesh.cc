@@ -14,6 +14,7 @@
 #include "libmap/surface/surface_tiles.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/results.h"
 #include "tools/support/tile_folder.h"
 
 using namespace graspmap_tools;
@@ -92,13 +93,8 @@ libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::Poi
       libmap::reconstruct_surface(cloud, options.surface.reconstruction, run.progress());
   if (made.dropped_points > 0)
     run.warn("{} of {} points have no normal and are left out", made.dropped_points, cloud.size());
-  run.add_results({{"points", cloud.size()},
-                   {"dropped_points", made.dropped_points},
-                   {"cell_size_m", made.cell_size_m},
-                   {"spacing_m", made.spacing_m},
-                   {"samples", made.samples},
-                   {"octree_depth", made.octree_depth},
-                   {"trimmed_triangles", made.trimmed_triangles}});
+  run.add_results({{"points", cloud.size()}});
+  run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "reconstruction");
   run.say("{} points, cells of {:.4g} m -> {} triangles", cloud.size(), made.cell_size_m,
           made.mesh.triangles.size());
@@ -117,51 +113,18 @@ libmap::TriangleMesh cleaned(const MeshOptions& options, const libmap::TriangleM
                              Run& run) {
   libmap::MeshCleaningResult made =
       libmap::clean_mesh(mesh, options.surface.cleaning, run.progress());
-  run.add_results({{"cut_edges", made.cut_edges},
-                   {"split_vertices", made.split_vertices},
-                   {"degenerate_triangles", made.degenerate_triangles},
-                   {"islands", made.islands},
-                   {"island_area_m2", made.island_area_m2},
-                   {"intersecting_triangles", made.intersecting_triangles},
-                   {"remaining_intersecting_triangles", made.remaining_intersecting_triangles},
-                   {"filled_holes", made.filling.holes},
-                   {"filled_triangles", made.filling.triangles},
-                   {"filled_area_m2", made.filling.area_m2},
-                   {"unfilled_holes", made.filling.unfilled},
-                   {"decimated_triangles", made.decimation.removed_triangles},
-                   {"vertices", made.mesh.vertices.size()},
-                   {"triangles", made.mesh.triangles.size()},
-                   {"area_m2", libmap::surface_area(made.mesh)}});
+  run.add_results(libmap::described(made));
   run.add_timings(made.timings_s, "cleaning");
   run.say("{} islands dropped, {} holes filled -> {} triangles", made.islands, made.filling.holes,
           made.mesh.triangles.size());
   return std::move(made.mesh);
 }
 
-Results quality(const libmap::PointCloud& cloud, const libmap::TriangleMesh& mesh) {
-  const libmap::MeshReport report = libmap::report_mesh(mesh);
-  const auto distances =
-      libmap::distance_statistics(libmap::distances_to_surface(cloud.positions, mesh));
-  std::vector<double> boundaries;
-  for (const libmap::MeshBoundary& boundary : report.boundaries)
-    boundaries.push_back(boundary.length_m);
-  return {{"watertight", report.is_watertight()},
-          {"manifold", report.is_manifold()},
-          {"oriented", report.is_oriented()},
-          {"components", report.components},
-          {"genus", report.genus},
-          {"boundaries", boundaries.size()},
-          {"boundary_lengths_m", boundaries},
-          {"area_m2", report.area_m2},
-          {"non_manifold_edges", report.non_manifold_edges},
-          {"non_manifold_vertices", report.non_manifold_vertices},
-          {"self_intersections", report.self_intersections},
-          {"median_edge_m", report.edge_lengths.median_m},
-          {"cloud_to_mesh_rmse_m", distances.rmse_m},
-          {"cloud_to_mesh_mean_m", distances.mean_m},
-          {"cloud_to_mesh_median_m", distances.median_m},
-          {"cloud_to_mesh_p95_m", distances.p95_m},
-          {"cloud_to_mesh_max_m", distances.max_m}};
+libmap::ResultTable quality(const libmap::PointCloud& cloud, const libmap::TriangleMesh& mesh) {
+  libmap::ResultTable table = libmap::described(libmap::report_mesh(mesh));
+  table.append("cloud_to_mesh_", libmap::described(libmap::distance_statistics(
+                                     libmap::distances_to_surface(cloud.positions, mesh))));
+  return table;
 }
 
 void print_text(const Json& quality) {
@@ -181,9 +144,9 @@ void print_text(const Json& quality) {
 
 void report(const MeshOptions& options, const libmap::PointCloud& cloud,
             const libmap::TriangleMesh& mesh, Run& run) {
-  const Results found = run.timed("report", [&] { return quality(cloud, mesh); });
-  for (const Result& one : found)
-    if (run.manifest().find_result(one.name) == nullptr) run.add_results({one});
+  const libmap::ResultTable found = run.timed("report", [&] { return quality(cloud, mesh); });
+  for (const libmap::NamedResult& one : found.results())
+    if (run.manifest().find_result(one.key) == nullptr) run.add_results({one});
   if (options.json)
     print_json(to_json(found));
   else

@@ -61,27 +61,11 @@ void say_stage(const libmap::StageReport& stage, Run& run) {
 }
 
 void add_results(const libmap::RefinementResult& result, Run& run) {
-  run.add_results(
-      {{"poses", result.poses.size()},
-       {"links", result.links.size()},
-       {"closures_found", result.closures.size()},
-       {"parts", result.components.size()},
-       {"nodes_without_pose", result.without_pose.size()},
-       {"nodes_without_links", result.without_links.size()},
-       {"frames_skipped", result.skipped.size()},
-       {"features", result.features},
-       {"sensor", result.findings.empty() ? std::optional<std::string>()
-                                          : fmt::format("{}", fmt::join(result.findings, "; "))},
-       {"scale", result.scale},
-       {"stages_undone", std::count_if(result.stages.begin(), result.stages.end(),
-                                       [](const auto& stage) { return stage.rejected; })}});
+  run.add_results(libmap::described(result));
   for (const libmap::StageReport& stage : result.stages) {
     run.manifest().timings_s.emplace_back(stage.name, stage.seconds);
     run.manifest().timings_s.emplace_back(stage.name + ", processor", stage.processor_seconds);
   }
-  if (const auto& error = result.stages.back().error)
-    run.add_results({{"trajectory_rmse_m", error->absolute.rmse_m},
-                     {"trajectory_rotation_error_deg", error->absolute.mean_rotation_deg}});
 }
 
 const std::vector<std::string> model_names = {"cameras.txt", "images.txt", "points3D.txt"};

@@ -1,16 +1,297 @@
 // graspmap render: a picture of a cloud, a mesh or a map.
+#include <Eigen/Geometry>
+#include <limits>
+#include <variant>
+#include "libgtd/grasp/trial_scene.h"
+#include "libgtd/score/graspability_map.h"
+#include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/parameters.h"
+#include "libmap/tiles/xy_tile.h"
+#include "libmap/core/table.h"
 #include "libmap/image/image_codec.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/texture/textured_mesh_io.h"
 #include "libmap/view/picture_sheet.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"
+#include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 #include "tools/support/option_values.h"
-#include "tools/support/scene_file.h"
 
 using namespace graspmap_tools;
 
 namespace {
+
+// How a map lies in the picture. terrain: as in its terrain frame. input: turned about z and moved
+// level, so that x and y are those of the cloud that was scored; heights stay the terrain's.
+// automatic: terrain for one file, input for several.
+enum class MapHeading { automatic, terrain, input };
+
+// One file as a scene, with listed places on it.
+struct SceneFileOptions {
+  std::string points;  // CSV of marked places; empty: none
+  std::string label = "auto";
+  std::string verdict;
+  std::string zero_plane = "auto";
+  PointFrame points_frame = PointFrame::automatic;
+  std::string box;  // of the plan that is shown
+  std::uint64_t max_points = 1'000'000;
+  libmap::SceneLayer layer;  // its shape is the file's
+  MapHeading heading = MapHeading::automatic;
+};
+
+struct SceneFile {
+  libmap::Scene scene;
+  int columns_per_point = 0;  // of a tile store: side of the squares that became one point; else 0
+};
+
+libmap::Verdict verdict_of(const libmap::Table& table, std::size_t row, std::size_t column) {
+  const std::string& cell = table.rows[row][column];
+  if (libmap::trim(cell).empty()) return libmap::Verdict::none;
+  const auto verdict = libmap::parse_bool(cell);
+  if (!verdict)
+    throw libmap::Error("not a verdict", {.file = table.file,
+                                          .field = "row " + std::to_string(row + 1) + ", column '" +
+                                                   table.columns[column] + "'",
+                                          .value = "'" + cell + "'",
+                                          .bound = "1, 0 or empty"});
+  return *verdict ? libmap::Verdict::pass : libmap::Verdict::fail;
+}
+
+// In the frame in which they are listed.
+std::vector<libmap::Marker> read_markers(const SceneFileOptions& options) {
+  const libmap::Table table = libmap::read_csv(options.points);
+  const std::vector<Eigen::Vector3d> positions = positions_of(table);
+  const std::size_t label =
+      options.label == "auto" || options.label == "none" ? 0 : table.column(options.label);
+  const std::string& first = table.columns.front();
+  const bool nameless = first == "x" || first == "y" || first == "z";
+  const bool labeled = options.label != "none" && !(options.label == "auto" && nameless);
+  std::vector<libmap::Marker> markers;
+  for (std::size_t row = 0; row < positions.size(); ++row) {
+    libmap::Marker& marker = markers.emplace_back();
+    marker.position = positions[row];
+    if (labeled) marker.label = table.rows[row][label];
+    if (!options.verdict.empty())
+      marker.verdict = verdict_of(table, row, table.column(options.verdict));
+  }
+  return markers;
+}
+
+double zero_plane_of(const SceneFileOptions& options, const libmap::Manifest* manifest) {
+  constexpr double none = -std::numeric_limits<double>::infinity();
+  if (options.zero_plane == "none") return none;
+  if (options.zero_plane != "auto") {
+    const auto height = libmap::parse_double(options.zero_plane);
+    if (height) return *height;
+    throw libmap::Error(
+        "not a height",
+        {.field = "--zero-plane", .value = options.zero_plane, .bound = "auto, none or a number"});
+  }
+  if (manifest == nullptr) return none;
+  return libmap::number_of(manifest->find_parameter("zero_plane_m")).value_or(none);
+}
+
+// About z and along x and y alone: the input's x axis comes to lie above x, its origin above 0.
+libmap::Pose turned_back(const libmap::Pose& terrain_from_input) {
+  const Eigen::Vector3d x_axis = terrain_from_input.linear().col(0);
+  const Eigen::Vector3d origin = terrain_from_input.translation();
+  libmap::Pose pose = libmap::Pose::Identity();
+  pose.rotate(Eigen::AngleAxisd(-std::atan2(x_axis.y(), x_axis.x()), Eigen::Vector3d::UnitZ()));
+  pose.translate(Eigen::Vector3d(-origin.x(), -origin.y(), 0.0));
+  return pose;
+}
+
+// A tile that the window shows, and how much of its plan lies in it.
+struct SeenTile {
+  std::size_t tile = 0;
+  double share = 1.0;
+};
+
+std::vector<SeenTile> seen_tiles(const MapTiles& tiles,
+                                 const std::optional<Eigen::AlignedBox2d>& box) {
+  std::vector<SeenTile> seen;
+  for (std::size_t n = 0; n < tiles.index().tiles.size(); ++n) {
+    if (!box) {
+      seen.push_back({n, 1.0});
+      continue;
+    }
+    const double half = 0.5 * tiles.index().lattice.voxel_size_m;
+    const Eigen::AlignedBox3d around = tiles.box(n);
+    const Eigen::AlignedBox2d plan(around.min().head<2>().array() - half,
+                                   around.max().head<2>().array() + half);
+    const Eigen::AlignedBox2d common = plan.intersection(*box);
+    if (!common.isEmpty()) seen.push_back({n, common.volume() / plan.volume()});
+  }
+  return seen;
+}
+
+int columns_per_point(const MapTiles& tiles, const std::vector<SeenTile>& seen,
+                      std::uint64_t max_points) {
+  double points = 0.0;
+  for (const SeenTile& one : seen)
+    points += one.share * static_cast<double>(tiles.index().tiles[one.tile].voxels);
+  const double columns = std::ceil(std::sqrt(points / static_cast<double>(max_points)));
+  // The counts are the index's word; no map has more points than 2^40.
+  return columns >= 1.0 ? static_cast<int>(std::min(columns, 0x1p20)) : 1;
+}
+
+// "X0,Y0,X1,Y1" in meters, or nothing for an empty text. Throws Error naming --box.
+std::optional<Eigen::AlignedBox2d> parse_rectangle(const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const auto n = split_numbers(text, 4);
+  if (n && (*n)[0] < (*n)[2] && (*n)[1] < (*n)[3])
+    return Eigen::AlignedBox2d(Eigen::Vector2d(n->data()), Eigen::Vector2d(n->data() + 2));
+  throw libmap::Error(
+      "not a rectangle",
+      {.field = "--box", .value = text, .bound = "X0,Y0,X1,Y1 with X0 < X1 and Y0 < Y1"});
+}
+
+// The points within the box, level, in the cloud's own frame.
+libmap::PointCloud points_in_box(const libmap::PointCloud& cloud, const Eigen::AlignedBox2d& box) {
+  std::vector<std::size_t> inside;
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (box.contains(cloud.positions[n].head<2>())) inside.push_back(n);
+  return libmap::select_points(cloud, inside);
+}
+
+struct MapWindow {
+  libmap::PointCloud cloud;
+  int columns_per_point = 1;  // width of the squares of columns that became one point
+};
+
+// Loads the tiles that the box touches, a few at a time. Where they hold more than about
+// `max_points`, squares of columns become one point each (downsample_map). Throws Error if nothing
+// is in the box.
+MapWindow read_window(const MapTiles& tiles, const std::optional<Eigen::AlignedBox2d>& box,
+                      std::uint64_t max_points) {
+  const std::vector<SeenTile> seen = seen_tiles(tiles, box);
+  MapWindow window;
+  window.columns_per_point = columns_per_point(tiles, seen, max_points);
+  std::vector<libmap::PointCloud> parts(seen.size());
+  libmap::parallel_each(seen.size(), [&](std::size_t n) {
+    parts[n] = tiles.load(seen[n].tile);
+    if (box) parts[n] = points_in_box(parts[n], *box);
+    if (window.columns_per_point > 1)
+      parts[n] = libgtd::downsample_map(parts[n], window.columns_per_point);
+  });
+  if (!parts.empty()) window.cloud = libgtd::merge_map_clouds(parts);
+  if (window.cloud.empty())
+    throw libmap::Error("nothing of the map lies in it", {.field = "--box"});
+  if (window.columns_per_point > 1) {
+    window.cloud = libgtd::downsample_map(window.cloud, window.columns_per_point);
+    libgtd::center_in_squares(tiles.index(), window.columns_per_point, window.cloud);
+  }
+  return window;
+}
+
+// The files of a folder of textured pieces; none if it is another one, or a file.
+std::vector<std::filesystem::path> models_in(const std::string& file) {
+  std::vector<std::filesystem::path> models;
+  for (const std::string& name : libmap::tile_file_names(file))
+    if (libmap::format_of(name) == ".glb") models.push_back(std::filesystem::path(file) / name);
+  std::sort(models.begin(), models.end());
+  return models;
+}
+
+SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run& run) {
+  SceneFile read;
+  libmap::Scene& scene = read.scene;
+  libmap::SceneLayer layer = options.layer;
+  const auto box = parse_rectangle(options.box);
+  if (is_tile_store(file)) {
+    MapWindow window = read_window(MapTiles(file), box, options.max_points);
+    read.columns_per_point = window.columns_per_point;
+    layer.shape = std::move(window.cloud);
+  } else if (libmap::is_textured_format(file)) {
+    layer.shape = libmap::read_textured_mesh(file);
+  } else if (const std::vector<std::filesystem::path> models = models_in(file); !models.empty()) {
+    for (const std::filesystem::path& model : models) {
+      if (model != models.front()) scene.layers.push_back(std::move(layer));
+      layer = options.layer;
+      layer.shape = libmap::read_textured_mesh(model);
+    }
+  } else if (libmap::file_kind(file) == libmap::FileKind::mesh) {
+    layer.shape = libmap::read_mesh(file).mesh;
+  } else {
+    layer.shape = libmap::read_cloud(file).cloud;
+  }
+  if (auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape); box && cloud != nullptr)
+    *cloud = points_in_box(*cloud, *box);
+  else if (box)
+    throw libmap::Error("only clouds and maps are cut", {.file = file, .field = "--box"});
+  if (const auto* cloud = std::get_if<libmap::PointCloud>(&layer.shape);
+      cloud != nullptr && cloud->empty())
+    throw libmap::Error("there is nothing to draw: no point with finite coordinates",
+                        {.file = file});
+  const auto manifest = libmap::read_manifest_of(file);
+  if (const auto* mesh = std::get_if<libmap::TriangleMesh>(&layer.shape))
+    for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(*mesh))
+      layer.coloring.own_legend.entries.push_back({part.color, part.text});
+  layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
+  scene.layers.push_back(std::move(layer));
+  const libmap::Pose* terrain_from_input = terrain_from_input_of(manifest);
+  if (terrain_from_input != nullptr) {
+    if (manifest->frame == "input") scene.terrain_from_scene = *terrain_from_input;
+    if (options.heading == MapHeading::input)
+      scene.terrain_from_scene = turned_back(*terrain_from_input) * scene.terrain_from_scene;
+  }
+  if (!options.points.empty()) {
+    scene.markers = read_markers(options);
+    const PointFrame frame = frame_of_points(options.points, options.points_frame, file, run);
+    const libmap::Pose scene_from_points = map_from_points(file, frame, run);
+    for (libmap::Marker& marker : scene.markers)
+      marker.position = scene_from_points * marker.position;
+  }
+  return read;
+}
+
+// Of marked places alone.
+void bind_points(libmap::ParameterTable& table, SceneFileOptions& options) {
+  table.add("label", options.label,
+            "column of the marked points' names; auto: the first column, unless it is x, y or z; "
+            "none: no names");
+  table.add("verdict", options.verdict, "column of their verdict: 1 green, 0 red, empty neutral");
+  table.add("points_frame", options.points_frame, listed_point_frame_names(),
+            "frame of the marked points: of the cloud that was scored, the terrain's, or the map's "
+            "before it was cropped; auto: as their manifest says, else input");
+}
+
+// All but `points`, which is an option of its own.
+void bind(libmap::ParameterTable& table, SceneFileOptions& options) {
+  bind(table, options.layer);
+  table.add(
+      "zero_plane", options.zero_plane,
+      "height in the terrain frame below which ground is white, m; auto: the map's own, none");
+  table.add("box", options.box,
+            "show this rectangle of a cloud or map alone: X0,Y0,X1,Y1 in its frame, m");
+  table.add("max_points", options.max_points, libmap::Range{1'000.0, 1e9},
+            "of a tile store: larger parts are downsampled to about so many points");
+  bind_points(table, options);
+  table.add("heading", options.heading,
+            {{"auto", MapHeading::automatic},
+             {"terrain", MapHeading::terrain},
+             {"input", MapHeading::input}},
+            "which way a map lies: as in its terrain frame, or with the x and y of its input");
+}
+
+// A cloud, a mesh, a graspability map or a tile store. Throws Error naming the file.
+SceneFile read_scene(const std::string& file, const SceneFileOptions& options, Run& run) {
+  if (options.points.empty())
+    refuse_set(options, bind_points, "is for --points, which is not given");
+  try {
+    return scene_of(file, options, run);
+  } catch (const libmap::Error& error) {
+    throw error.kind() == libmap::ErrorKind::bad_input ? error.in_file(file) : error;
+  }
+}
+
+// The file that stands for it in a manifest: of a tile store its index.
+std::filesystem::path scene_input(const std::string& file) {
+  return is_tile_store(file) ? store_index_path(file) : std::filesystem::path(file);
+}
 
 struct RenderOptions {
   std::vector<std::string> files;

@@ -21,12 +21,7 @@ struct ResampleOptions {
 };
 
 void tell_results(const libmap::PoissonDiskResult& result, std::uint64_t wanted, Run& run) {
-  run.add_results({{"points", result.cloud.size()},
-                   {"area_m2", result.area_m2},
-                   {"radius_m", result.radius_m},
-                   {"smallest_distance_m", result.smallest_distance_m},
-                   {"relative_radius", result.relative_radius},
-                   {"radii_tried", result.tries}});
+  run.add_results(libmap::described(result));
   run.add_timings(result.timings_s);
   run.detail("radii tried: {}", result.tries);
   run.say("{:.2f} m2 -> {} points, radius {:.4g} mm, relative radius {:.3f}", result.area_m2,

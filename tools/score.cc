@@ -319,31 +319,7 @@ void add_results(const libgtd::DetectionResult& result, const ScoreOptions& opti
   libmap::Manifest& manifest = run.manifest();
   manifest.frame = options.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
   manifest.transforms.emplace_back("terrain_from_input", result.map.terrain_from_input);
-  run.add_results(
-      {{"lattice_origin_m", result.map.lattice.origin_m}, {"input_points", result.points}});
-  if (result.plane)
-    run.add_results(
-        {{"plane_rmse_m", result.plane->rmse_m}, {"up_source", to_text(result.plane->up_source)}});
-  if (result.downsampled_points > 0)
-    run.add_results({{"downsampled_points", result.downsampled_points}});
-  const libgtd::Scenario& scenario = options.detection.scenario;
-  if (scenario.interpolation)
-    run.add_results({{"interpolated_points", result.interpolated_points},
-                     {"interpolation_grid_m", result.grid_spacing_m}});
-  run.add_results({{"occupied_voxels", result.occupied_voxels},
-                   {"mask_side_voxels", result.mask.side},
-                   {"mask_layers", result.mask.layers},
-                   {"tiles", result.tiles},
-                   {"scored_voxels", result.map.voxels.size()},
-                   {"border_voxels", result.border_voxels},
-                   {"curvature_points", result.curvature_points},
-                   {"convex_points", result.convex_points},
-                   {"graspable_voxels", result.graspable_voxels}});
-  if (scenario.fits_normals())
-    run.add_results({{"normal_radius_m", libgtd::normal_radius_m(result.mask, scenario)}});
-  if (scenario.orientation == libgtd::Orientation::surface)
-    run.add_results({{"unoriented_voxels", result.unoriented_voxels}});
-  if (result.map.content.obstacles) run.add_results({{"obstacle_voxels", result.obstacle_voxels}});
+  run.add_results(libmap::described(result));
 }
 
 void say_result(const libgtd::DetectionResult& result, const ScoreOptions& options, Run& run) {
@@ -353,8 +329,7 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
           result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
   if (result.map.content.normals)
     run.say("mask tilted to the surface's normal within {:g} m, {} voxels without one",
-            libgtd::normal_radius_m(result.mask, options.detection.scenario),
-            result.unoriented_voxels);
+            *result.normal_radius_m, result.unoriented_voxels);
   if (result.map.content.obstacles)
     run.say("{} voxels are obstacles", result.obstacle_voxels);
   else if (result.map.content.slopes)

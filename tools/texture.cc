@@ -8,6 +8,7 @@
 #include "libmap/tiles/eigen_json.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
+#include "tools/support/results.h"
 #include "tools/support/scan_poses.h"
 #include "tools/support/tile_folder.h"
 
@@ -16,9 +17,6 @@ namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,
                                    spread)
-NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureCounts, cut_triangles, seen_triangles, unseen_triangles,
-                                   seen_m2, unseen_m2, charts, split_charts, shrunk_charts, pages,
-                                   atlas_scale, texels, seams_before_m, seams_m)
 
 }  // namespace libmap
 
@@ -100,32 +98,6 @@ libmap::TextureResult textured(const TextureCommandOptions& options, const libma
   });
 }
 
-void add_results(const libmap::TextureReport& result, Run& run) {
-  std::vector<double> gains;
-  for (const Eigen::Vector3f& gain : result.exposure.gains)
-    for (const float channel : gain) gains.push_back(static_cast<double>(channel));
-  run.add_results({{"photographs", result.photos},
-                   {"skipped_frames", result.skipped.size()},
-                   {"triangles", result.seen_triangles + result.unseen_triangles},
-                   {"triangles_by_cutting", result.cut_triangles},
-                   {"seen_triangles", result.seen_triangles},
-                   {"unseen_triangles", result.unseen_triangles},
-                   {"seen_m2", result.seen_m2},
-                   {"unseen_m2", result.unseen_m2},
-                   {"charts", result.charts},
-                   {"split_charts", result.split_charts},
-                   {"shrunk_charts", result.shrunk_charts},
-                   {"pages", result.pages},
-                   {"texel_size_m", result.texel_size_m()},
-                   {"atlas_scale", result.atlas_scale},
-                   {"seams_before_m", result.seams_before_m},
-                   {"seams_m", result.seams_m},
-                   {"color_spread_before", result.exposure.spread_before},
-                   {"color_spread", result.exposure.spread},
-                   {"exposure_gains", gains},
-                   {"vignetting", result.exposure.vignetting}});
-}
-
 void say_result(const libmap::TextureReport& result, Run& run) {
   const std::size_t triangles = result.seen_triangles + result.unseen_triangles;
   for (const auto& [node, fault] : result.skipped)
@@ -188,7 +160,7 @@ void add_inputs(const TextureCommandOptions& options, Run& run) {
 }
 
 void report(const libmap::TextureReport& result, Run& run) {
-  add_results(result, run);
+  run.add_results(libmap::described(result));
   say_result(result, run);
 }
 
@@ -240,13 +212,14 @@ void make_models(const TextureCommandOptions& options, const libmap::ScanSource&
   const auto make = [&](std::size_t n, const fs::path& to) {
     const libmap::PieceTexturing::Piece tile = texturing.make(n, exposure);
     libmap::textured_mesh_files(to, tile.model, options.writing).front().write(to);
-    return TileFolder::Facts(tile.counts);
+    return facts_of(tile.counts);
   };
   const auto finish = [&](const fs::path& folder) {
     libmap::TextureReport whole = texturing.report();
     whole.exposure = exposure;
     for (const std::string& name : names) {
-      whole += output.facts(name).get<libmap::TextureCounts>();
+      libmap::merge_into<libmap::TextureCounts>(
+          whole, result_of<libmap::TextureCounts>(output.facts(name)));
       TileFolder::link_file(output.file(name, model_extension), folder / (name + model_extension));
     }
     libmap::require_seen(whole);

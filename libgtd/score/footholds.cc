@@ -240,4 +240,10 @@ PointCloud to_cloud(const FootholdResult& result, const PointCloud& map) {
   return cloud;
 }
 
+void describe(libmap::ResultTable& table, const FootholdResult& result) {
+  table.add("candidates", result.candidates, "map points that may be a foothold");
+  table.add("candidates_at_border", result.at_border,
+            "candidates left out at the border of the scan");
+}
+
 }  // namespace libgtd

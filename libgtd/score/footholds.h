@@ -7,6 +7,7 @@
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/result_table.h"
 
 namespace libgtd {
 
@@ -52,6 +53,7 @@ struct FootholdResult {
   std::size_t candidates = 0;       // map points that may be one
   std::size_t at_border = 0;        // would be candidates, but for the option `edges`
 };
+void describe(libmap::ResultTable& table, const FootholdResult& result);
 
 // Local maxima of the score by non-maximum suppression: the best candidate is a foothold, those
 // nearer to it than the separation are none, and so on. Of equals, the order of the map's points

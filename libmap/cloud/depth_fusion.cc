@@ -156,8 +156,9 @@ class Fusion {
     for (const CameraView& view : camera_views(depth)) {
       const auto rays = images_.rays_of(view.depth_camera);
       const Pose grid_from_camera = grid_from_base * view.depth_camera.base_from_camera;
-      coarse.pixels += add_depth_planes(view.depth, *rays, grid_from_camera, options_.planes,
-                                        options_.voxel_size_m, cells, fitted, voxels);
+      merge_into(coarse.pixels,
+                 add_depth_planes(view.depth, *rays, grid_from_camera, options_.planes,
+                                  options_.voxel_size_m, cells, fitted, voxels));
     }
     coarse.voxels = std::move(voxels).take_frame();
   }
@@ -427,7 +428,7 @@ SurfaceVoxels Fusion::coarse_surface(const Members& members, const TileMask& aro
   };
   each_frame(members.frames.size(), around, make, [&](const CoarseFrame& coarse) {
     voxels.merge(coarse.voxels, around);
-    counts.pixels += coarse.pixels;
+    merge_into(counts.pixels, coarse.pixels);
   });
   for (const std::uint64_t key : voxels.index().keys())
     if (cells.has_cell(unpack(key).cell.head<2>())) ++counts.occupied_voxels;
@@ -438,22 +439,13 @@ PointCloud Fusion::make_cloud(const TileMask& cells, const RefinedSurface& surfa
                               FusionCounts& counts) const {
   SurfacePoints points =
       make_surface_points(surface, options_.voxel_size_m, cells, options_.points);
-  counts.points += points.counts;
-  counts.points_made += points.cloud.size();
+  counts.points = points.counts;
+  counts.points_made = points.cloud.size();
   for (Eigen::Vector3d& position : points.cloud.positions) position += survey_.grid_origin;
   return std::move(points.cloud);
 }
 
 }  // namespace
-
-FusionCounts& FusionCounts::operator+=(const FusionCounts& more) {
-  pixels += more.pixels;
-  occupied_voxels += more.occupied_voxels;
-  elements += more.elements;
-  points += more.points;
-  points_made += more.points_made;
-  return *this;
-}
 
 DepthFusionResult fuse_depth(const ScanSource& scan, const Trajectory& world_from_base,
                              const DepthFusionOptions& options, Progress& progress) {

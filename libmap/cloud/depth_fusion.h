@@ -58,9 +58,8 @@ struct FusionCounts {
   std::size_t elements = 0;  // of the surface, before points were made of them
   SurfacePointCounts points;
   std::size_t points_made = 0;
-
-  FusionCounts& operator+=(const FusionCounts& more);
 };
+void describe(ResultTable& table, const FusionCounts& counts);
 
 // The frames that can be used, where they are fused: what all tiles have in common.
 struct FusionSurvey {
@@ -94,6 +93,7 @@ struct DepthFusionResult : FusionCounts {
   std::vector<std::pair<int, Error>> skipped;
   StageTimings timings_s;
 };
+void describe(ResultTable& table, const DepthFusionResult& result);
 
 // The frames of `world_from_base` that have depth, by ascending node. The same bytes for any number
 // of threads. Frames without depth, with a pose that is not finite or that cannot be decoded are

@@ -2,6 +2,29 @@
 
 namespace libmap {
 
+namespace {
+
+void describe_surface(ResultTable& table, const FusionCounts& counts) {
+  const SurfacePointCounts& points = counts.points;
+  table.add("occupied_voxels", counts.occupied_voxels, Merge::sum, "voxels with measurements");
+  table.add("surface_elements", counts.elements, Merge::sum, "elements of the surface");
+  table.add("dropped_too_few_views", points.unconfirmed, Merge::sum,
+            "elements measured by fewer than min_views frames");
+  table.add("dropped_seen_through", points.seen_through, Merge::sum,
+            "elements that views see through");
+  table.add("dropped_missed", points.missed, Merge::sum, "elements where views measured nothing");
+  table.add("dropped_beside", points.beside, Merge::sum, "elements connected to contradicted ones");
+  table.add("dropped_beyond_edges", points.bent_away, Merge::sum,
+            "points beyond an edge where the surface ends");
+  table.add("merged", points.merged, Merge::sum, "elements merged with one of the same voxel");
+  table.add("points", counts.points_made, Merge::sum, "points of the cloud");
+  table.add("points_beyond_edges", points.extended_points, Merge::sum,
+            "points of the cloud beyond the measured edges");
+  table.add_hidden("max_views", points.max_views, Merge::max);
+}
+
+}  // namespace
+
 void bind(ParameterTable& table, DepthFusionOptions& options) {
   DepthPlaneOptions& planes = options.planes;
   table.add("voxel_size_m", options.voxel_size_m, positive, "one point per voxel of this size");
@@ -37,6 +60,28 @@ void bind(ParameterTable& table, DepthFusionOptions& options) {
   table.add("color", options.color, "colors, blended with the nearest front views ahead");
   table.add("stereo", options.stereo, "compute the depth of stereo pairs by semi-global matching");
   table.add("strict", options.strict, "end with an error if a frame cannot be used");
+}
+
+void describe(ResultTable& table, const FusionCounts& counts) {
+  describe(table, counts.pixels);
+  describe_surface(table, counts);
+}
+
+void describe(ResultTable& table, const DepthFusionResult& result) {
+  table.add("frames", result.frames, "frames that were fused");
+  table.add("skipped_frames", result.skipped.size(), "frames that could not be used");
+  describe(table, result.pixels);
+  table.add("registration_rounds", result.registration_rounds,
+            "rounds of registration that moved frames");
+  table.add("registration_shift_m", result.registration_shift_m,
+            "shift of the frames by registration, root mean square");
+  table.add("registration_turn_deg", result.registration_turn_deg,
+            "rotation of the frames by registration, root mean square");
+  table.add("disagreement_before_m", result.disagreement_before_m,
+            "deviation of the heights that frames measured from their mean, with the given poses");
+  table.add("disagreement_after_m", result.disagreement_after_m,
+            "deviation of the heights that frames measured from their mean, after registration");
+  describe_surface(table, result);
 }
 
 }  // namespace libmap

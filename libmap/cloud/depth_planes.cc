@@ -357,17 +357,6 @@ std::vector<std::uint8_t> pixels_around(const DepthImage& depth, const PixelRays
 
 }  // namespace
 
-DepthPixelCounts& DepthPixelCounts::operator+=(const DepthPixelCounts& more) {
-  pixels += more.pixels;
-  unmeasured += more.unmeasured;
-  out_of_range += more.out_of_range;
-  without_ray += more.without_ray;
-  flying += more.flying;
-  grazing += more.grazing;
-  used += more.used;
-  return *this;
-}
-
 DepthPlanes fit_depth_planes(const DepthImage& depth, const PixelRays& rays,
                              const DepthPlaneOptions& options) {
   const std::size_t size = depth.pixels.size();
@@ -421,6 +410,19 @@ DepthPixelCounts add_depth_planes(const DepthImage& depth, const PixelRays& rays
                  places.weight[x]);
     }
   });
+}
+
+void describe(ResultTable& table, const DepthPixelCounts& counts) {
+  table.add("pixels", counts.pixels, Merge::sum, "depth pixels of all frames");
+  table.add("measurements_used", counts.used, Merge::sum, "pixels that were fused");
+  table.add("rejected_unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
+  table.add("rejected_out_of_range", counts.out_of_range, Merge::sum,
+            "pixels outside the range of depth");
+  table.add("rejected_without_ray", counts.without_ray, Merge::sum,
+            "pixels outside the invertible lens distortion");
+  table.add("rejected_flying", counts.flying, Merge::sum,
+            "pixels that no surface around them explains");
+  table.add("rejected_grazing", counts.grazing, Merge::sum, "pixels seen at a grazing angle");
 }
 
 }  // namespace libmap

@@ -16,6 +16,7 @@
 #include "libmap/cloud/surface_voxels.h"
 #include "libmap/core/image.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/result_table.h"
 
 namespace libmap {
 
@@ -33,9 +34,8 @@ struct DepthPixelCounts {
   std::size_t flying = 0;       // no surface around them explains them
   std::size_t grazing = 0;
   std::size_t used = 0;
-
-  DepthPixelCounts& operator+=(const DepthPixelCounts& more);
 };
+void describe(ResultTable& table, const DepthPixelCounts& counts);
 
 // Each used pixel's plane, by row and column; support 0 elsewhere.
 struct DepthPlanes {

@@ -21,13 +21,7 @@ struct Part {
 void append(Part& to, Part&& more) {
   to.positions.insert(to.positions.end(), more.positions.begin(), more.positions.end());
   to.normals.insert(to.normals.end(), more.normals.begin(), more.normals.end());
-  to.counts.pixels += more.counts.pixels;
-  to.counts.unmeasured += more.counts.unmeasured;
-  to.counts.too_near += more.counts.too_near;
-  to.counts.too_far += more.counts.too_far;
-  to.counts.flying += more.counts.flying;
-  to.counts.without_ray += more.counts.without_ray;
-  to.counts.points += more.counts.points;
+  merge_into(to.counts, more.counts);
 }
 
 bool is_measured(double depth) { return depth > 0 && std::isfinite(depth); }
@@ -156,6 +150,17 @@ PanoramaResult make_panorama(const std::vector<PanoramaView>& views,
   }
   result.cloud.add_field("camera", ScalarType::int32).values = std::move(camera);
   return result;
+}
+
+void describe(ResultTable& table, const PanoramaCounts& counts) {
+  table.add_hidden("pixels", counts.pixels, Merge::sum);
+  table.add("points", counts.points, Merge::sum, "points of the view");
+  table.add("unmeasured", counts.unmeasured, Merge::sum, "pixels without depth");
+  table.add("too_near", counts.too_near, Merge::sum, "pixels nearer than near_m");
+  table.add("too_far", counts.too_far, Merge::sum, "pixels farther than far_m");
+  table.add("flying", counts.flying, Merge::sum, "pixels that differ from both neighbors");
+  table.add("without_ray", counts.without_ray, Merge::sum,
+            "pixels outside the invertible lens distortion");
 }
 
 }  // namespace libmap

@@ -10,6 +10,7 @@
 #include "libmap/core/image.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/result_table.h"
 
 namespace libmap {
 
@@ -44,6 +45,7 @@ struct PanoramaCounts {
   std::size_t without_ray = 0;  // outside what the lens distortion can undo
   std::size_t points = 0;
 };
+void describe(ResultTable& table, const PanoramaCounts& counts);
 
 struct PanoramaResult {
   PointCloud cloud;                   // robot's frame, by view, row and column; field `camera`

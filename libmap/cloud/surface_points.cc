@@ -390,18 +390,6 @@ void fit_normals(PointCloud& cloud, double radius_m, const std::vector<double>& 
   cloud.normals = std::move(fitted);
 }
 
-SurfacePointCounts& SurfacePointCounts::operator+=(const SurfacePointCounts& more) {
-  unconfirmed += more.unconfirmed;
-  max_views = std::max(max_views, more.max_views);
-  seen_through += more.seen_through;
-  missed += more.missed;
-  beside += more.beside;
-  bent_away += more.bent_away;
-  merged += more.merged;
-  extended_points += more.extended_points;
-  return *this;
-}
-
 SurfacePoints make_surface_points(const RefinedSurface& surface, double voxel_size_m,
                                   const TileMask& cells, const SurfacePointOptions& options) {
   return PointMaker(surface, voxel_size_m, cells, options).run();

@@ -36,8 +36,6 @@ struct SurfacePointCounts {
   std::size_t bent_away = 0;        // dropped: beyond an edge where the surface does not go on
   std::size_t merged = 0;           // with another one of the same voxel, or an echo of one
   std::size_t extended_points = 0;  // of the cloud: beyond the edges
-
-  SurfacePointCounts& operator+=(const SurfacePointCounts& more);
 };
 
 struct SurfacePoints {

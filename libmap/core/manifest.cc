@@ -148,6 +148,11 @@ void Manifest::add_parameters(const ParameterTable& table) {
   }
 }
 
+void Manifest::add_results(const ResultTable& table) {
+  for (const NamedResult& result : table.results())
+    if (result.value) results.emplace_back(result.key, *result.value);
+}
+
 void Manifest::add_input(const std::filesystem::path& path) {
   inputs.push_back({path.string(), sha256_of_file(path), std::filesystem::file_size(path)});
 }

@@ -7,16 +7,14 @@
 #include <optional>
 #include <string>
 #include <utility>
-#include <variant>
 #include <vector>
 
 #include "libmap/core/georeference.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose.h"
+#include "libmap/core/result_table.h"
 
 namespace libmap {
-
-using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
 
 // A real or whole number; nothing for another type and for no value.
 std::optional<double> number_of(const ManifestValue* value);
@@ -41,6 +39,7 @@ struct Manifest {
   unsigned threads = 0;                                        // in the section "run"
 
   void add_parameters(const ParameterTable& table);   // each key with the value in force
+  void add_results(const ResultTable& table);         // those with a value
   void add_input(const std::filesystem::path& path);  // reads and hashes the file
   const ManifestValue* find_parameter(std::string_view name) const;  // or nullptr
   const ManifestValue* find_result(std::string_view name) const;     // or nullptr

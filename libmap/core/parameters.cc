@@ -173,8 +173,7 @@ void ParameterTable::set(std::string_view key, std::string_view value) const {
     texts->emplace_back(name, value);
     return;
   }
-  if (parameter == nullptr)
-    throw Error("unknown key" + did_you_mean(key, keys()), {.field = std::string(key)});
+  if (parameter == nullptr) throw unknown_key(key, keys());
   parameter->set(value);
 }
 
@@ -209,8 +208,7 @@ std::vector<std::string> set_from_yaml(const ParameterTable& table, const std::s
             collect(entry.second, key + ".");
             continue;
           }
-          if (!table.knows(key))
-            throw Error("unknown key" + did_you_mean(key, table.keys()), {.field = key});
+          if (!table.knows(key)) throw unknown_key(key, known);
           if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
           if (!entry.second.IsScalar()) throw Error("not a single value", {.field = key});
           values.emplace_back(key, entry.second.as<std::string>());

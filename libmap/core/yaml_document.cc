@@ -92,6 +92,11 @@ void read_yaml(const std::string& text, const std::string& file,
   }
 }
 
+Error unknown_key(std::string_view key, const std::vector<std::string>& known,
+                  const std::string& whose) {
+  return Error("unknown key" + whose + did_you_mean(key, known), {.field = std::string(key)});
+}
+
 void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
                 const std::string& whose) {
   std::set<std::string> seen;
@@ -99,7 +104,7 @@ void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
     if (!entry.first.IsScalar()) throw Error("a key is not a name");
     const std::string& key = entry.first.Scalar();
     if (std::find(known.begin(), known.end(), key) == known.end())
-      throw Error("unknown key" + whose + did_you_mean(key, known), {.field = key});
+      throw unknown_key(key, known, whose);
     if (!seen.insert(key).second) throw Error("is a duplicate", {.field = key});
   }
 }

@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <functional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "libmap/core/error.h"
@@ -21,6 +22,10 @@ inline constexpr std::uint64_t max_yaml_bytes = std::uint64_t{16} << 20;
 // `file` where the text is no YAML or holds more documents, and names `file` in what `read` throws.
 void read_yaml(const std::string& text, const std::string& file,
                const std::function<void(const YAML::Node&)>& read);
+
+// "unknown key", then `whose`, then the nearest known key.
+Error unknown_key(std::string_view key, const std::vector<std::string>& known,
+                  const std::string& whose = "");
 
 // Each key of the map known and there once: YAML itself lets the first or the last of two stand.
 // Throws Error: another one, of which it says "unknown key" and then `whose`.

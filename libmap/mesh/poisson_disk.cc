@@ -202,4 +202,14 @@ PoissonDiskResult PieceSampler::sample(const TriangleMesh& mesh, std::size_t num
   return result;
 }
 
+void describe(ResultTable& table, const PoissonDiskResult& result) {
+  table.add("points", result.cloud.size(), "samples");
+  table.add("area_m2", result.area_m2, "area of the surface");
+  table.add("radius_m", result.radius_m, "minimum distance that was required of samples");
+  table.add("smallest_distance_m", result.smallest_distance_m, "minimum distance of two samples");
+  table.add("relative_radius", result.relative_radius,
+            "minimum distance relative to the densest packing of as many discs");
+  table.add("radii_tried", result.tries, "radii that were tried");
+}
+
 }  // namespace libmap

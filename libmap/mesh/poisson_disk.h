@@ -8,6 +8,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 
@@ -36,6 +37,7 @@ struct PoissonDiskResult {
   bool count_reached = true;  // within 1 %, if a number was asked for
   StageTimings timings_s;
 };
+void describe(ResultTable& table, const PoissonDiskResult& result);
 
 // Distances are Euclidean: two sheets of a thin plate share their samples. Every point of the
 // surface lies within 1.001 radii of a sample, and what single precision moves that. Darts are

@@ -202,4 +202,12 @@ double share_of(const std::vector<bool>& flags) {
          static_cast<double>(flags.size());
 }
 
+void describe(ResultTable& table, const DistanceStatistics& statistics) {
+  table.add("rmse_m", statistics.rmse_m, "root mean square distance");
+  table.add("mean_m", statistics.mean_m, "mean distance");
+  table.add("median_m", statistics.median_m, "median distance");
+  table.add("p95_m", statistics.p95_m, "95th percentile of the distances");
+  table.add("max_m", statistics.max_m, "maximum distance");
+}
+
 }  // namespace libmap

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "libmap/core/result_table.h"
 #include "libmap/mesh/embree_mesh.h"
 #include "libmap/mesh/mesh_parts.h"
 
@@ -47,6 +48,7 @@ struct DistanceStatistics {
   double p95_m = 0.0;  // 95 of 100 are as near
   double max_m = 0.0;
 };
+void describe(ResultTable& table, const DistanceStatistics& statistics);  // but for `count`
 // Mean, root mean square, median, 95th percentile and maximum; zeros of no distances.
 DistanceStatistics distance_statistics(std::vector<double> distances_m);
 

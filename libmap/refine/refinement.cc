@@ -463,4 +463,32 @@ RefinementResult refine_poses(const ScanSource& scan, const RefinementOptions& o
   return finish(run.input, std::move(run.state), std::move(run.result));
 }
 
+void describe(ResultTable& table, const RefinementResult& result) {
+  const auto rejected = std::count_if(result.stages.begin(), result.stages.end(),
+                                      [](const StageReport& stage) { return stage.rejected; });
+  std::optional<std::string> sensor;
+  for (const std::string& finding : result.findings)
+    sensor = sensor ? *sensor + "; " + finding : finding;
+  std::optional<double> rmse_m;
+  std::optional<double> rotation_deg;
+  if (!result.stages.empty() && result.stages.back().error) {
+    rmse_m = result.stages.back().error->absolute.rmse_m;
+    rotation_deg = result.stages.back().error->absolute.mean_rotation_deg;
+  }
+  table.add("poses", result.poses.size(), "poses");
+  table.add("links", result.links.size(), "links between poses");
+  table.add("closures_found", result.closures.size(), "links that were found");
+  table.add("parts", result.components.size(), "connected components of the pose graph");
+  table.add("nodes_without_pose", result.without_pose.size(), "nodes without a pose");
+  table.add("nodes_without_links", result.without_links.size(), "nodes without links");
+  table.add("frames_skipped", result.skipped.size(), "frames without features");
+  table.add("features", result.features, "features of all frames");
+  table.add("sensor", sensor, "findings about the sensor");
+  table.add("scale", result.scale, "source and uncertainty of the scale");
+  table.add("stages_undone", rejected, "stages that were rejected");
+  table.add("trajectory_rmse_m", rmse_m, "absolute error of the trajectory, of a scan with truth");
+  table.add("trajectory_rotation_error_deg", rotation_deg,
+            "mean rotation error of the trajectory, of a scan with truth");
+}
+
 }  // namespace libmap

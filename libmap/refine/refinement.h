@@ -14,6 +14,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/refine/board_scale.h"
 #include "libmap/refine/bundle_adjustment.h"
 #include "libmap/refine/feature_cache.h"
@@ -98,6 +99,7 @@ struct RefinementResult {
   std::string scale;                  // a sentence: what it comes from, and how certain it is
   std::vector<std::string> warnings;
 };
+void describe(ResultTable& table, const RefinementResult& result);
 
 // Nodes that neither poses nor links place are placed by visual odometry (StartPoses::automatic,
 // visual); those of its parts that nothing joins to the largest one are left out of the poses, for

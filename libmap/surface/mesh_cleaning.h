@@ -19,6 +19,7 @@
 
 #include "libmap/core/parameters.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/surface/hole_filling.h"
@@ -73,6 +74,7 @@ struct MeshCleaningResult {
   MeshDecimation decimation;  // its deviation is proved
   StageTimings timings_s;
 };
+void describe(ResultTable& table, const MeshCleaningResult& result);
 
 // The same bytes for any number of threads. A mesh that is clean comes back as it was but for
 // `filled` and normals. Throws Error: an option outside its range, arrays that do not fit, an index

@@ -126,4 +126,22 @@ MeshReport report_mesh(const TriangleMesh& mesh, const MeshReportOptions& option
   return report;
 }
 
+void describe(ResultTable& table, const MeshReport& report) {
+  std::vector<double> lengths_m;
+  for (const MeshBoundary& boundary : report.boundaries) lengths_m.push_back(boundary.length_m);
+  table.add("watertight", report.is_watertight(), "closed, manifold, oriented, not intersecting");
+  table.add("manifold", report.is_manifold(), "no edge and no vertex of several sheets");
+  table.add("oriented", report.is_oriented(), "neighboring triangles have the same orientation");
+  table.add("components", report.components, "parts connected over edges");
+  table.add("genus", report.genus, "handles of a manifold and oriented mesh, else -1");
+  table.add("boundaries", lengths_m.size(), "closed chains of boundary edges");
+  table.add("boundary_lengths_m", lengths_m, "length of each boundary, longest first");
+  table.add("area_m2", report.area_m2, "area of the mesh");
+  table.add("non_manifold_edges", report.non_manifold_edges, "edges of more than two triangles");
+  table.add("non_manifold_vertices", report.non_manifold_vertices,
+            "vertices whose triangles are not one fan");
+  table.add("self_intersections", report.self_intersections, "pairs of intersecting triangles");
+  table.add("median_edge_m", report.edge_lengths.median_m, "median length of the edges");
+}
+
 }  // namespace libmap

@@ -4,6 +4,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "libmap/core/result_table.h"
 #include "libmap/core/triangle_mesh.h"
 
 namespace libmap {
@@ -65,6 +66,7 @@ struct MeshReport {
   // Enclosed by a mesh that is closed, manifold and oriented, else 0. Negative: inside out.
   double volume_m3 = 0.0;
 };
+void describe(ResultTable& table, const MeshReport& report);
 
 // Throws Error: an index out of range, a vertex that is not finite. A mesh without triangles has a
 // report of zeros. The same for any number of threads.

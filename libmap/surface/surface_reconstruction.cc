@@ -454,4 +454,14 @@ double surface_margin_m(const SurfaceReconstructionOptions& options) {
   return cells * options.cell_size_m;
 }
 
+void describe(ResultTable& table, const SurfaceReconstructionResult& result) {
+  table.add("dropped_points", result.dropped_points, "points without a normal");
+  table.add("cell_size_m", result.cell_size_m, "side of the cells of the surface");
+  table.add("spacing_m", result.spacing_m, "median distance of neighboring points");
+  table.add("samples", result.samples, "samples that the points were reduced to");
+  table.add("octree_depth", result.octree_depth, "depth of the octree of method poisson, else 0");
+  table.add("trimmed_triangles", result.trimmed_triangles,
+            "triangles removed for their distance from all points");
+}
+
 }  // namespace libmap

@@ -10,6 +10,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 
@@ -75,6 +76,7 @@ struct SurfaceReconstructionResult {
   std::size_t trimmed_triangles = 0;
   StageTimings timings_s;
 };
+void describe(ResultTable& table, const SurfaceReconstructionResult& result);
 
 // Oriented; open where points end. What is not manifold is for clean_mesh, and with poisson the
 // holes of single faces that PCL leaves out. PCL runs on one thread, since its result depends on

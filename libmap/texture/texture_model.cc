@@ -291,21 +291,44 @@ TextureReport PieceTexturing::report() const {
   return report;
 }
 
-TextureCounts& TextureCounts::operator+=(const TextureCounts& more) {
-  cut_triangles += more.cut_triangles;
-  seen_triangles += more.seen_triangles;
-  unseen_triangles += more.unseen_triangles;
-  seen_m2 += more.seen_m2;
-  unseen_m2 += more.unseen_m2;
-  charts += more.charts;
-  split_charts += more.split_charts;
-  shrunk_charts += more.shrunk_charts;
-  pages += more.pages;
-  atlas_scale = std::min(atlas_scale, more.atlas_scale);
-  texels += more.texels;
-  seams_before_m += more.seams_before_m;
-  seams_m += more.seams_m;
-  return *this;
+void describe(ResultTable& table, const TextureCounts& counts) {
+  table.add("triangles", counts.seen_triangles + counts.unseen_triangles,
+            "triangles of the textured mesh");
+  table.add("triangles_by_cutting", counts.cut_triangles, Merge::sum,
+            "triangles added by cutting long ones");
+  table.add("seen_triangles", counts.seen_triangles, Merge::sum, "triangles with a photograph");
+  table.add("unseen_triangles", counts.unseen_triangles, Merge::sum,
+            "triangles without a photograph");
+  table.add("seen_m2", counts.seen_m2, Merge::sum, "area with a photograph");
+  table.add("unseen_m2", counts.unseen_m2, Merge::sum, "area without a photograph");
+  table.add("charts", counts.charts, Merge::sum, "charts of the texture");
+  table.add("split_charts", counts.split_charts, Merge::sum,
+            "charts that were split to fit a page");
+  table.add("shrunk_charts", counts.shrunk_charts, Merge::sum, "charts of reduced resolution");
+  table.add("pages", counts.pages, Merge::sum, "pages of the texture");
+  table.add("texel_size_m", counts.texel_size_m(), "root of the mean area of a texel");
+  table.add("atlas_scale", counts.atlas_scale, Merge::min,
+            "scale of the charts to fit max_pages; 1: not reduced");
+  table.add("seams_before_m", counts.seams_before_m, Merge::sum,
+            "length of seams with the best photograph for each triangle");
+  table.add("seams_m", counts.seams_m, Merge::sum, "length of seams between photographs");
+  table.add_hidden("texels", counts.texels, Merge::sum);
+}
+
+void describe(ResultTable& table, const TextureReport& report) {
+  const TextureExposure& exposure = report.exposure;
+  std::vector<double> gains;
+  for (const Eigen::Vector3f& gain : exposure.gains)
+    for (const float channel : gain) gains.push_back(static_cast<double>(channel));
+  table.add("photographs", report.photos, "photographs");
+  table.add("skipped_frames", report.skipped.size(), "frames that could not be used");
+  describe(table, static_cast<const TextureCounts&>(report));
+  table.add("color_spread_before", exposure.spread_before,
+            "spread of a location's colors between photographs");
+  table.add("color_spread", exposure.spread,
+            "spread of a location's colors between photographs, exposure corrected");
+  table.add("exposure_gains", gains, "gain of red, green and blue of each photograph");
+  table.add("vignetting", exposure.vignetting, "coefficients of vignetting");
 }
 
 double TextureCounts::texel_size_m() const {

@@ -15,6 +15,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 #include "libmap/core/stage_timer.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/mesh/mesh_piece_index.h"
@@ -60,10 +61,10 @@ struct TextureCounts {
   double seams_before_m = 0.0;  // with the best photograph for every triangle
   double seams_m = 0.0;
 
-  TextureCounts& operator+=(const TextureCounts& more);
   // Root of the mean area of a texel on the surface.
   double texel_size_m() const;
 };
+void describe(ResultTable& table, const TextureCounts& counts);
 
 struct TextureReport : TextureCounts {
   std::size_t photos = 0;
@@ -71,6 +72,7 @@ struct TextureReport : TextureCounts {
   TextureExposure exposure;
   StageTimings timings_s;
 };
+void describe(ResultTable& table, const TextureReport& report);
 
 struct TextureResult : TextureReport {
   TexturedMesh model;

@@ -5,6 +5,7 @@
 #include <cstddef>
 
 #include "libmap/core/pose_graph.h"
+#include "libmap/core/result_table.h"
 
 namespace libmap {
 
@@ -17,6 +18,7 @@ struct TrajectoryError {
   double mean_rotation_deg = 0.0;
   double max_rotation_deg = 0.0;
 };
+void describe(ResultTable& table, const TrajectoryError& error);
 
 struct AbsoluteTrajectoryError : TrajectoryError {
   Pose truth_from_estimate = Pose::Identity();  // the alignment that was used

@@ -263,8 +263,8 @@ class Results(unittest.TestCase):
     def test_named_fields_are_those_of_the_dict(self):
         result = graspmap.resample(square(), radius_m=0.05)
         self.assertEqual(set(result.as_dict()), {
-            "cloud", "radius_m", "area_m2", "smallest_distance_m", "relative_radius",
-            "count_reached", "timings_s"})
+            "cloud", "points", "radius_m", "area_m2", "smallest_distance_m", "relative_radius",
+            "radii_tried", "count_reached", "timings_s"})
         self.assertIs(result.as_dict()["cloud"], result.cloud)
         self.assertIn("radius_m = 0.05", repr(result))
 

@@ -5,6 +5,7 @@ documents_test.py BUILD_FOLDER EXAMPLE_FOLDER
 """
 
 import ast
+import dataclasses
 import inspect
 import os
 import shutil
@@ -76,6 +77,21 @@ class Stubs(unittest.TestCase):
             self.assertEqual(classes[name], [option["key"] for option in graspmap.options(stage)])
             annotation = inspect.signature(getattr(graspmap, stage)).parameters["values"].annotation
             self.assertIn(f"_options.{name}", annotation)
+
+    def test_results(self):
+        for stage in _core.stages():
+            described = {one["key"]: one for one in _core.results(stage)}
+            if not described:
+                continue
+            name = "Normals" if stage == "estimate_normals" else stage.capitalize()
+            fields = {field.name: field for field in
+                      dataclasses.fields(getattr(graspmap, name + "Result"))}
+            self.assertLessEqual(set(described), set(fields), stage)
+            for key, one in described.items():
+                self.assertTrue(one["description"], key)
+                kind = fields[key].type
+                self.assertEqual(kind.__name__ if isinstance(kind, type) else str(kind),
+                                 one["type"], key)
 
     def test_all_is_documented(self):
         for name in graspmap.__all__:

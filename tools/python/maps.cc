@@ -51,22 +51,13 @@ py::dict score(const PointCloud& terrain, const std::optional<std::string>& scen
     map = libgtd::to_cloud(found.map, options.frame);
     return found;
   });
-  py::dict made;
+  py::dict made = dict_of(libmap::described(result));
   made["map"] = shared(std::move(map));
   made["frame"] = options.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
   made["terrain_from_input"] = matrix_of(result.map.terrain_from_input);
   made["zero_plane_m"] = result.map.zero_plane_m;
   made["voxel_size_m"] = result.map.lattice.voxel_size_m;
-  const Eigen::Vector3d& origin = result.map.lattice.origin_m;
-  made["lattice_origin_m"] = py::make_tuple(origin.x(), origin.y(), origin.z());
-  made["plane_rmse_m"] = result.plane ? py::cast(result.plane->rmse_m) : py::none();
-  made["up_source"] =
-      result.plane ? py::cast(std::string(to_text(result.plane->up_source))) : py::none();
-  made["occupied_voxels"] = result.occupied_voxels;
-  made["graspable_voxels"] = result.graspable_voxels;
-  made["border_voxels"] = result.border_voxels;
   made["obstacle_voxels"] = result.obstacle_voxels;
-  made["tiles"] = result.tiles;
   made["timings_s"] = numbers_of(result.timings_s);
   return made;
 }
@@ -110,12 +101,10 @@ py::dict footholds(const PointCloud& map, const py::object& up, const py::dict& 
     cloud = libgtd::to_cloud(found, map);
     return found;
   });
-  py::dict made;
+  py::dict made = dict_of(libmap::described(result));
   made["cloud"] = shared(std::move(cloud));
   made["map_point"] = column<std::int64_t>(
       result.footholds, [](const libgtd::Foothold& foothold) { return foothold.map_point; });
-  made["candidates"] = result.candidates;
-  made["candidates_at_border"] = result.at_border;
   return made;
 }
 
@@ -168,9 +157,9 @@ void add_maps(py::module_& module) {
   module.def("lookup", &lookup);
   module.def("footholds", &footholds);
   module.def("evaluate", &evaluate);
-  add_stage<ScoreOptions>("score");
+  add_stage<ScoreOptions, libgtd::DetectionResult>("score", {"obstacle_voxels"});
   add_stage<libgtd::LookupOptions>("lookup");
-  add_stage<libgtd::FootholdOptions>("footholds");
+  add_stage<libgtd::FootholdOptions, libgtd::FootholdResult>("footholds");
   add_stage<libgtd::TableEvaluationOptions>("evaluate");
 }
 

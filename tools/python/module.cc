@@ -5,16 +5,16 @@
 
 namespace {
 
-pybind11::list options_of(const std::string& stage) {
+const graspmap_python::Stage& stage_of(const std::string& name) {
   std::vector<std::string> names;
-  for (const auto& [name, describe] : graspmap_python::stages()) {
-    if (name == stage) return describe();
-    names.push_back(name);
+  for (const graspmap_python::Stage& stage : graspmap_python::stages()) {
+    if (stage.name == name) return stage;
+    names.push_back(stage.name);
   }
   std::string known;
-  for (const std::string& name : names) known += (known.empty() ? "" : ", ") + name;
-  throw libmap::Error("takes no options" + libmap::did_you_mean(stage, names),
-                      {.field = "stage", .value = stage, .bound = "one of " + known});
+  for (const std::string& other : names) known += (known.empty() ? "" : ", ") + other;
+  throw libmap::Error("takes no options" + libmap::did_you_mean(name, names),
+                      {.field = "stage", .value = name, .bound = "one of " + known});
 }
 
 }  // namespace
@@ -27,10 +27,12 @@ PYBIND11_MODULE(_core, module) {
   graspmap_python::add_maps(module);
   graspmap_python::add_grasps(module);
   graspmap_python::add_pictures(module);
-  module.def("options", &options_of);
+  module.def("options", [](const std::string& stage) { return stage_of(stage).options(); });
+  module.def("results", [](const std::string& stage) { return stage_of(stage).results(); });
   module.def("stages", [] {
     std::vector<std::string> names;
-    for (const auto& [name, describe] : graspmap_python::stages()) names.push_back(name);
+    for (const graspmap_python::Stage& stage : graspmap_python::stages())
+      names.push_back(stage.name);
     return names;
   });
 }

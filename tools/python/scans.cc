@@ -268,20 +268,15 @@ py::dict refine(const ScanSource& scan, const std::vector<std::string>& known_le
   libmap::RefinementResult result = run(threads, progress, [&](libmap::Progress& bar) {
     return in_file(scan.path(), [&] { return libmap::refine_poses(scan, options, bar); });
   });
-  py::dict made;
+  py::dict made = dict_of(libmap::described(result));
   made["poses"] = shared(Poses{std::move(result.poses)});
-  made["links"] = result.links.size();
-  made["closures_found"] = result.closures.size();
-  made["parts"] = result.components.size();
   made["nodes_without_pose"] = result.without_pose;
   made["nodes_without_links"] = result.without_links;
   made["skipped"] = texts_of(result.skipped);
-  made["features"] = result.features;
   py::list reports;
   for (const libmap::StageReport& stage : result.stages) reports.append(report_of(stage));
   made["stages"] = reports;
   made["findings"] = result.findings;
-  made["scale"] = result.scale;
   made["warnings"] = result.warnings;
   return made;
 }
@@ -293,19 +288,10 @@ py::dict fuse(const ScanSource& scan, const Poses& poses, const py::dict& values
     return in_file(scan.path(),
                    [&] { return libmap::fuse_depth(scan, poses.poses, options, bar); });
   });
-  py::dict made;
+  py::dict made = dict_of(libmap::described(result));
   made["cloud"] = shared(std::move(result.cloud));
   made["poses"] = shared(Poses{std::move(result.poses)});
-  made["frames"] = result.frames;
   made["skipped"] = texts_of(result.skipped);
-  made["pixels"] = result.pixels.pixels;
-  made["measurements_used"] = result.pixels.used;
-  made["occupied_voxels"] = result.occupied_voxels;
-  made["registration_rounds"] = result.registration_rounds;
-  made["registration_shift_m"] = result.registration_shift_m;
-  made["registration_turn_deg"] = result.registration_turn_deg;
-  made["disagreement_before_m"] = result.disagreement_before_m;
-  made["disagreement_after_m"] = result.disagreement_after_m;
   made["timings_s"] = numbers_of(result.timings_s);
   return made;
 }
@@ -319,8 +305,9 @@ void add_scans(py::module_& module) {
   module.def("refine", &refine);
   module.def("fuse", &fuse);
   add_stage<libmap::PoseImportOptions>("read_poses");
-  add_stage<libmap::RefinementOptions>("refine");
-  add_stage<libmap::DepthFusionOptions>("fuse");
+  add_stage<libmap::RefinementOptions, libmap::RefinementResult>(
+      "refine", {"poses", "nodes_without_pose", "nodes_without_links"});
+  add_stage<libmap::DepthFusionOptions, libmap::DepthFusionResult>("fuse");
 }
 
 }  // namespace graspmap_python

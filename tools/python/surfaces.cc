@@ -48,16 +48,11 @@ py::dict mesh(const libmap::PointCloud& cloud, const py::dict& values, const py:
            .value = libmap::to_text(options.reconstruction.trim_distance_cells)});
     return libmap::clean_mesh(raw.mesh, options.cleaning, bar);
   });
-  py::dict made;
+  libmap::ResultTable table = libmap::described(raw);
+  table.append("", libmap::described(clean));
+  py::dict made = dict_of(table);
   made["mesh"] = shared(std::move(clean.mesh));
-  made["cell_size_m"] = raw.cell_size_m;
-  made["spacing_m"] = raw.spacing_m;
-  made["dropped_points"] = raw.dropped_points;
-  made["trimmed_triangles"] = raw.trimmed_triangles;
-  made["islands"] = clean.islands;
   made["holes_filled"] = clean.filling.holes;
-  made["filled_area_m2"] = clean.filling.area_m2;
-  made["intersecting_triangles"] = clean.intersecting_triangles;
   py::dict timings = numbers_of(raw.timings_s);
   timings.attr("update")(numbers_of(clean.timings_s));
   made["timings_s"] = timings;
@@ -70,12 +65,8 @@ py::dict resample(const libmap::TriangleMesh& mesh, const py::dict& values,
   libmap::PoissonDiskResult result = run(threads, progress, [&](libmap::Progress& bar) {
     return libmap::sample_poisson_disk(mesh, options, bar);
   });
-  py::dict made;
+  py::dict made = dict_of(libmap::described(result));
   made["cloud"] = shared(std::move(result.cloud));
-  made["radius_m"] = result.radius_m;
-  made["area_m2"] = result.area_m2;
-  made["smallest_distance_m"] = result.smallest_distance_m;
-  made["relative_radius"] = result.relative_radius;
   made["count_reached"] = result.count_reached;
   made["timings_s"] = numbers_of(result.timings_s);
   return made;
@@ -88,8 +79,8 @@ void add_surfaces(py::module_& module) {
   module.def("mesh", &mesh);
   module.def("resample", &resample);
   add_stage<libmap::NormalEstimationOptions>("estimate_normals");
-  add_stage<MeshOptions>("mesh");
-  add_stage<libmap::PoissonDiskOptions>("resample");
+  add_stage<MeshOptions, libmap::SurfaceReconstructionResult, libmap::MeshCleaningResult>("mesh");
+  add_stage<libmap::PoissonDiskOptions, libmap::PoissonDiskResult>("resample");
 }
 
 }  // namespace graspmap_python

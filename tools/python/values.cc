@@ -138,7 +138,32 @@ void set_options(const libmap::ParameterTable& table, const py::dict& values) {
   set_section(table, "", values);
 }
 
-py::list described(const libmap::ParameterTable& table) {
+py::dict dict_of(const libmap::ResultTable& table) {
+  py::dict dict;
+  for (const libmap::NamedResult& result : table.results()) {
+    py::object value = py::cast(result.value);
+    if (py::isinstance<py::list>(value)) value = py::tuple(value);
+    dict[result.key.c_str()] = value;
+  }
+  return dict;
+}
+
+py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects) {
+  constexpr std::array types = {"bool", "int", "float", "str", "tuple[float, ...]"};
+  static_assert(types.size() == std::variant_size_v<libmap::ManifestValue>);
+  py::list list;
+  for (const libmap::NamedResult& result : table.results()) {
+    if (std::find(objects.begin(), objects.end(), result.key) != objects.end()) continue;
+    py::dict one;
+    one["key"] = result.key;
+    one["type"] = std::string(types.at(result.type.index())) + (result.may_lack ? " | None" : "");
+    one["description"] = result.description;
+    list.append(one);
+  }
+  return list;
+}
+
+py::list list_of(const libmap::ParameterTable& table) {
   py::list list;
   for (const libmap::Parameter& parameter : table.parameters()) {
     py::dict one;
@@ -152,8 +177,8 @@ py::list described(const libmap::ParameterTable& table) {
   return list;
 }
 
-Stages& stages() {
-  static Stages all;
+std::vector<Stage>& stages() {
+  static std::vector<Stage> all;
   return all;
 }
 

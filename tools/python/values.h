@@ -24,6 +24,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/progress.h"
+#include "libmap/core/result_table.h"
 
 namespace graspmap_python {
 
@@ -82,18 +83,35 @@ Options options_from(const py::dict& values, Options options = {}) {
   return options;
 }
 
-// One dict for each parameter: key, type, default, choices, description.
-py::list described(const libmap::ParameterTable& table);
-using Stages = std::vector<std::pair<std::string, std::function<py::list()>>>;
-Stages& stages();
-template <typename Options>
-void add_stage(const std::string& name) {
-  stages().emplace_back(name, [] {
-    Options options;
+// By key; none is None.
+py::dict dict_of(const libmap::ResultTable& table);
+
+// One dict for each parameter: key, type, default, choices, description; for each result: key,
+// type, description.
+py::list list_of(const libmap::ParameterTable& table);
+py::list list_of(const libmap::ResultTable& table, const std::vector<std::string>& objects);
+
+struct Stage {
+  std::string name;
+  std::function<py::list()> options;
+  std::function<py::list()> results;
+};
+std::vector<Stage>& stages();
+// `objects`: described results that Python has as something else than a number or a text.
+template <typename Options, typename... Results>
+void add_stage(const std::string& name, const std::vector<std::string>& objects = {}) {
+  const auto options = [] {
+    Options defaults;
     libmap::ParameterTable table;
-    bind(table, options);
-    return described(table);
-  });
+    bind(table, defaults);
+    return list_of(table);
+  };
+  const auto results = [objects] {
+    libmap::ResultTable table;
+    (table.append("", libmap::described(Results{})), ...);
+    return list_of(table, objects);
+  };
+  stages().push_back({name, options, results});
 }
 
 // Calls callback(stage, done, total) when a stage begins, at most ten times a second, and when it

@@ -12,7 +12,7 @@
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
 #include "libmap/trajectory/trajectory_error.h"
-#include "tools/support/info_json.h"
+#include "tools/support/results.h"
 
 namespace graspmap_tools {
 
@@ -92,14 +92,10 @@ Json poses_json(const libmap::PoseGraph& graph, const Trajectory& trajectory) {
 Json error_json(const Trajectory& estimate, const Trajectory& truth) {
   const libmap::AbsoluteTrajectoryError error = absolute_trajectory_error(estimate, truth);
   const libmap::TrajectoryError steps = relative_trajectory_error(estimate, truth);
-  return {{"poses", error.poses},
-          {"rmse_m", error.rmse_m},
-          {"median_m", error.median_m},
-          {"max_m", error.max_m},
-          {"mean_rotation_deg", error.mean_rotation_deg},
-          {"max_rotation_deg", error.max_rotation_deg},
-          {"rmse_per_step_m", steps.rmse_m},
-          {"mean_rotation_per_step_deg", steps.mean_rotation_deg}};
+  Json json = to_json(libmap::described(error));
+  json["rmse_per_step_m"] = steps.rmse_m;
+  json["mean_rotation_per_step_deg"] = steps.mean_rotation_deg;
+  return json;
 }
 
 void add_error(Json& json, const std::string& name, const Trajectory& estimate,

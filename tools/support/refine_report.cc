@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "tools/support/results.h"
+
 namespace graspmap_tools {
 
 namespace {
@@ -56,15 +58,6 @@ Json groups_json(const std::map<std::string, libmap::LinkGroupResult>& groups) {
   return json;
 }
 
-Json error_json(const libmap::TrajectoryError& error) {
-  return {{"poses", error.poses},
-          {"rmse_m", error.rmse_m},
-          {"median_m", error.median_m},
-          {"max_m", error.max_m},
-          {"mean_rotation_deg", error.mean_rotation_deg},
-          {"max_rotation_deg", error.max_rotation_deg}};
-}
-
 Json held_out_json(const libmap::HeldOutEvaluation& held_out) {
   const auto part = [](const libmap::HeldOutChange& change) -> Json {
     return {{"count", change.count},
@@ -85,11 +78,11 @@ Json stage_json(const libmap::StageReport& stage) {
   if (!stage.groups.empty()) json["links"] = groups_json(stage.groups);
   for (const auto& [name, value] : stage.figures) json[name] = value;
   if (stage.error) {
-    json["absolute_error"] = error_json(stage.error->absolute);
-    json["relative_error"] = error_json(stage.error->relative);
+    json["absolute_error"] = to_json(libmap::described(stage.error->absolute));
+    json["relative_error"] = to_json(libmap::described(stage.error->relative));
   }
   if (stage.rejected_error)
-    json["absolute_error_given_up"] = error_json(stage.rejected_error->absolute);
+    json["absolute_error_given_up"] = to_json(libmap::described(stage.rejected_error->absolute));
   return json;
 }
 

@@ -1,54 +1,50 @@
-// What a run found, each figure named once: for the manifest, for --json and for text.
+// Results as JSON, and the facts on finished tiles.
 #pragma once
 
-#include <cstdint>
-#include <nlohmann/json_fwd.hpp>
-#include <optional>
-#include <string>
-#include <string_view>
-#include <type_traits>
-#include <utility>
+#include <nlohmann/json.hpp>
+#include <variant>
 #include <vector>
 
-#include "libmap/core/manifest.h"
+#include "libmap/core/point_cloud.h"
+#include "libmap/core/result_table.h"
 
 namespace graspmap_tools {
 
-// Any whole number, a number, a text, or several numbers. An empty std::optional is null in JSON
-// and left out of the manifest.
-struct Result {
-  template <typename Value>
-  Result(std::string result_name, const Value& found)
-      : name(std::move(result_name)), value(held(found)) {}
-
-  std::string name;
-  std::optional<libmap::ManifestValue> value;
-
- private:
-  template <typename Value>
-  static std::optional<libmap::ManifestValue> held(const Value& found) {
-    if constexpr (requires { found.has_value(); })
-      return found ? held(*found) : std::nullopt;
-    else if constexpr (std::is_same_v<Value, bool>)
-      return found;
-    else if constexpr (std::is_integral_v<Value>)
-      return static_cast<std::int64_t>(found);
-    else if constexpr (std::is_arithmetic_v<Value>)
-      return static_cast<double>(found);
-    else if constexpr (std::is_convertible_v<const Value&, std::string_view>)
-      return std::string(std::string_view(found));
-    else
-      return std::vector<double>(found.begin(), found.end());
-  }
-};
-using Results = std::vector<Result>;
-
-// Those with a value.
-void add_results(const Results& results, libmap::Manifest& manifest);
 nlohmann::ordered_json to_json(const libmap::ManifestValue& value);
-nlohmann::ordered_json to_json(const Results& results);
+nlohmann::ordered_json to_json(const libmap::ResultTable& table);  // null without a value
+
+inline nlohmann::ordered_json numbers_json(const Eigen::Vector3d& position) {
+  return {position.x(), position.y(), position.z()};
+}
+// null if there are no positions.
+inline nlohmann::ordered_json bounds_json(const std::vector<Eigen::Vector3d>& positions) {
+  if (positions.empty()) return nullptr;
+  const libmap::Bounds3d bounds = libmap::bounds_of(positions);
+  return {{"min", numbers_json(bounds.min)}, {"max", numbers_json(bounds.max)}};
+}
 
 // To standard output, with what is no UTF-8 replaced.
 void print_json(const nlohmann::ordered_json& json);
+
+// What each tile adds to the results of the whole (Merge), and back.
+template <typename Result>
+nlohmann::json facts_of(const Result& result) {
+  nlohmann::json facts;
+  for (const libmap::TileField& field : libmap::described(result).tile_fields())
+    facts[field.key] = to_json(field.value());
+  return facts;
+}
+
+template <typename Result>
+Result result_of(const nlohmann::json& facts) {
+  Result result;
+  for (const libmap::TileField& field : libmap::described(result).tile_fields()) {
+    if (std::holds_alternative<double>(field.value()))
+      field.set(facts.at(field.key).get<double>());
+    else
+      field.set(facts.at(field.key).get<std::int64_t>());
+  }
+  return result;
+}
 
 }  // namespace graspmap_tools

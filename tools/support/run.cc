@@ -2,13 +2,16 @@
 
 #include <spdlog/spdlog.h>
 
+#include <cstddef>
+#include <cstdint>
 #include <iostream>
 #include <nlohmann/json.hpp>
 #include <sstream>
+#include <string_view>
 
 #include "libmap/core/data_folder.h"
 #include "libmap/core/file_output.h"
-#include "tools/support/message_text.h"
+#include "tools/support/results.h"
 
 namespace graspmap_tools {
 
@@ -52,6 +55,42 @@ bool holds_outputs(const fs::path& folder) {
   });
 }
 
+constexpr std::size_t max_message_bytes = 1000;
+
+bool is_continuation(char c) { return (static_cast<std::uint8_t>(c) & 0xC0) == 0x80; }
+
+// Bytes of the printable UTF-8 character that `text` begins with (RFC 3629), 0 if there is none.
+std::size_t character_bytes(std::string_view text) {
+  const auto first = static_cast<std::uint8_t>(text[0]);
+  if (first < 0x80) return first >= 0x20 && first != 0x7F ? 1 : 0;
+  const std::size_t bytes = first >= 0xF0 ? 4 : first >= 0xE0 ? 3 : 2;
+  if (first < 0xC2 || first > 0xF4 || text.size() < bytes) return 0;
+  std::uint32_t code = first & (0xFFU >> (bytes + 1));
+  for (std::size_t i = 1; i < bytes; ++i) {
+    if (!is_continuation(text[i])) return 0;
+    code = code << 6 | (static_cast<std::uint8_t>(text[i]) & 0x3FU);
+  }
+  const bool is_overlong = bytes > 2 && code < (bytes == 3 ? 0x800U : 0x10000U);
+  const bool is_surrogate = code >= 0xD800 && code <= 0xDFFF;
+  const bool is_control = code < 0xA0;
+  return is_overlong || is_surrogate || is_control || code > 0x10FFFF ? 0 : bytes;
+}
+
+std::string printable(std::string_view text) {
+  std::string line;
+  while (!text.empty()) {
+    const std::size_t bytes = character_bytes(text);
+    if (bytes > 0)
+      line += text.substr(0, bytes);
+    else if (text[0] == '\n')
+      line += ' ';
+    else
+      line += fmt::format("\\x{:02x}", static_cast<std::uint8_t>(text[0]));
+    text.remove_prefix(bytes > 0 ? bytes : 1);
+  }
+  return line;
+}
+
 void make_folder(const fs::path& folder) {
   std::error_code code;
   fs::create_directories(folder, code);
@@ -62,9 +101,14 @@ void make_folder(const fs::path& folder) {
 
 }  // namespace
 
-void add_results(const Results& results, libmap::Manifest& manifest) {
-  for (const Result& result : results)
-    if (result.value) manifest.results.emplace_back(result.name, *result.value);
+std::string message_text(const std::string& text) {
+  if (text.size() <= max_message_bytes) return printable(text);
+  std::size_t head = max_message_bytes / 2;
+  std::size_t tail = text.size() - max_message_bytes / 2;
+  while (head > 0 && is_continuation(text[head])) --head;
+  while (tail < text.size() && is_continuation(text[tail])) ++tail;
+  return printable(std::string_view(text).substr(0, head)) + " ... " +
+         printable(std::string_view(text).substr(tail));
 }
 
 std::string without_trailing_slash(std::string path) {
@@ -76,10 +120,10 @@ nlohmann::ordered_json to_json(const libmap::ManifestValue& value) {
   return std::visit([](const auto& held) { return nlohmann::ordered_json(held); }, value);
 }
 
-nlohmann::ordered_json to_json(const Results& results) {
+nlohmann::ordered_json to_json(const libmap::ResultTable& table) {
   nlohmann::ordered_json json = nlohmann::ordered_json::object();
-  for (const Result& result : results)
-    json[result.name] = result.value ? to_json(*result.value) : nlohmann::ordered_json();
+  for (const libmap::NamedResult& result : table.results())
+    json[result.key] = result.value ? to_json(*result.value) : nlohmann::ordered_json();
   return json;
 }
 

@@ -22,7 +22,6 @@
 #include "libmap/core/manifest.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/text.h"
-#include "tools/support/results.h"
 
 namespace graspmap_tools {
 
@@ -35,6 +34,11 @@ auto in_file(const std::string& file, const Step& step) {
     throw error.in_file(file);
   }
 }
+
+// For a terminal, of a text that may come from a file: one line of printable UTF-8. Control
+// characters and bytes that are no UTF-8 become \xNN, line breaks spaces; the middle of a long text
+// is left out.
+std::string message_text(const std::string& text);
 
 // "maps/" and "maps" name the same folder, and its manifest stands beside it.
 std::string without_trailing_slash(std::string path);
@@ -55,7 +59,7 @@ class Run {
   libmap::Progress& progress() { return progress_; }
   libmap::Manifest& manifest() { return manifest_; }
 
-  void add_results(const Results& results) { graspmap_tools::add_results(results, manifest_); }
+  void add_results(const libmap::ResultTable& table) { manifest_.add_results(table); }
 
   // Hashes an input into the manifest, of a folder each file; the toolkit's own data by its place
   // among them, so that the manifest does not depend on where the toolkit lies.

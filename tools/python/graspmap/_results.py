@@ -1,4 +1,4 @@
-"""What the stages return."""
+"""What the stages return: objects, and the numbers and texts that the libraries describe."""
 
 import dataclasses
 from typing import Any, Literal
@@ -6,6 +6,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from . import _fields
 from ._core import Cloud, Mesh, Poses
 
 
@@ -30,43 +31,29 @@ class Result:
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class RefineResult(Result):
+class RefineResult(_fields.RefineFields, Result):
     """Refined poses and how they were found."""
 
     poses: Poses
-    links: int
-    closures_found: int
-    parts: int  # of the pose graph that nothing joins
     nodes_without_pose: list[int]
     nodes_without_links: list[int]
     skipped: list[tuple[int, str]]  # node and reason
-    features: int
     # Of each stage: name, rejected, seconds, figures; held_out_matches and held_out_surfaces
     # (before, after); trajectory_rmse_m and trajectory_rotation_error_deg of a scan with true poses.
     stages: list[dict[str, Any]]
     findings: list[str]  # about the sensor
-    scale: str
     warnings: list[str]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class FuseResult(Result):
+class FuseResult(_fields.FuseFields, Result):
     """One cloud of all frames."""
 
     # World frame of the poses, m; unit normals towards the cameras; colors if a frame has them;
     # fields `views` and `expected_error` (m, one standard deviation along the normal).
     cloud: Cloud
     poses: Poses  # that the frames were fused by
-    frames: int
     skipped: list[tuple[int, str]]  # node and reason
-    pixels: int
-    measurements_used: int
-    occupied_voxels: int
-    registration_rounds: int
-    registration_shift_m: float
-    registration_turn_deg: float
-    disagreement_before_m: float
-    disagreement_after_m: float
     timings_s: dict[str, float]
 
 
@@ -80,36 +67,25 @@ class NormalsResult(Result):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class MeshResult(Result):
+class MeshResult(_fields.MeshFields, Result):
     """A clean surface."""
 
     mesh: Mesh  # vertex normals; face field `filled`: 1 on triangles that close holes
-    cell_size_m: float
-    spacing_m: float  # median distance of neighboring points
-    dropped_points: int  # without a normal
-    trimmed_triangles: int
-    islands: int
-    holes_filled: int
-    filled_area_m2: float
-    intersecting_triangles: int
+    holes_filled: int  # as filled_holes
     timings_s: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ResampleResult(Result):
+class ResampleResult(_fields.ResampleFields, Result):
     """Poisson-disk samples."""
 
     cloud: Cloud
-    radius_m: float
-    area_m2: float
-    smallest_distance_m: float
-    relative_radius: float
     count_reached: bool
     timings_s: dict[str, float]
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class ScoreResult(Result):
+class ScoreResult(_fields.ScoreFields, Result):
     """A graspability map."""
 
     # A point for each voxel, at its center, with the fields score (0..1), graspable, border, i, j, k
@@ -119,14 +95,7 @@ class ScoreResult(Result):
     terrain_from_input: NDArray[np.float64]  # 4 x 4
     zero_plane_m: float
     voxel_size_m: float
-    lattice_origin_m: tuple[float, float, float]
-    plane_rmse_m: float | None  # None with plane="none"
-    up_source: str | None
-    occupied_voxels: int
-    graspable_voxels: int
-    border_voxels: int
     obstacle_voxels: int
-    tiles: int
     timings_s: dict[str, float]
 
 
@@ -158,15 +127,13 @@ class LookupResult(Result):
 
 
 @dataclasses.dataclass(frozen=True, repr=False)
-class FootholdsResult(Result):
+class FootholdsResult(_fields.FootholdsFields, Result):
     """The best places of a map, best first."""
 
     # With normals, and the fields approach_x, approach_y, approach_z, slope_deg, k1, k2 (1/m),
     # mean_score, graspable_points beside the map's own.
     cloud: Cloud
     map_point: NDArray[np.int64]  # index of each in the map
-    candidates: int
-    candidates_at_border: int
 
 
 @dataclasses.dataclass(frozen=True, repr=False)

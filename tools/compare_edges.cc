@@ -12,6 +12,7 @@
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"
+#include "tools/support/results.h"
 #include "tools/support/usages.h"
 
 using namespace graspmap_tools;
@@ -190,7 +191,7 @@ libmap::Table table_of(const libmap::SpotCheckResult& result) {
   return table;
 }
 
-Results results_of(const libmap::SpotCheckResult& result) {
+libmap::ResultTable results_of(const libmap::SpotCheckResult& result) {
   return {{"measured", result.measured},
           {"missing", result.missing},
           {"mean_m", result.mean_abs_error_m},

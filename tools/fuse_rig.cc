@@ -77,15 +77,11 @@ void add_rig_results(const libmap::CameraRig& rig, const SynchronizedSet& set,
     if (camera.state != State::missing) run.add_results({{name + ".offset_s", camera.offset_s}});
   }
   for (std::size_t n = 0; n < views.size(); ++n) {
-    const libmap::PanoramaCounts& counts = result.views[n];
     const std::string& name = views[n].name;
     run.manifest().transforms.emplace_back("robot_from_" + name, views[n].camera.base_from_camera);
-    run.add_results({{name + ".points", counts.points},
-                     {name + ".unmeasured", counts.unmeasured},
-                     {name + ".too_near", counts.too_near},
-                     {name + ".too_far", counts.too_far},
-                     {name + ".flying", counts.flying},
-                     {name + ".without_ray", counts.without_ray}});
+    libmap::ResultTable table;
+    table.append(name + ".", libmap::described(result.views[n]));
+    run.add_results(table);
   }
 }
 

@@ -1,0 +1,135 @@
+// A table of the named results of a stage, the twin of ParameterTable: describe(table, result) next
+// to a result struct is the single place where a field meets its key and its description. The
+// manifest, --json, printed lists, the progress of tiles and the Python module all go through it.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <initializer_list>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <type_traits>
+#include <utility>
+#include <variant>
+#include <vector>
+
+namespace libmap {
+
+using ManifestValue = std::variant<bool, std::int64_t, double, std::string, std::vector<double>>;
+
+struct NamedResult {
+  // `found`: a truth value, a number, a text, several numbers, or an optional of one of these.
+  template <typename Found>
+  NamedResult(std::string result_key, const Found& found, std::string text = {})
+      : key(std::move(result_key)),
+        description(std::move(text)),
+        type(type_of<Found>()),
+        may_lack(is_optional<Found>) {
+    if constexpr (is_optional<Found>)
+      value = found ? std::optional(held(*found)) : std::nullopt;
+    else
+      value = held(found);
+  }
+
+  std::string key;                     // with its unit: "radius_m"
+  std::string description;             // one line
+  ManifestValue type;                  // any value of the type of `value`
+  bool may_lack;                       // of an optional
+  std::optional<ManifestValue> value;  // none: null in JSON, left out of the manifest
+
+ private:
+  template <typename Found>
+  static constexpr bool is_optional = requires(const Found& found) {
+    found.has_value();
+  };
+
+  template <typename Found>
+  static ManifestValue held(const Found& found) {
+    if constexpr (std::is_same_v<Found, bool>)
+      return found;
+    else if constexpr (std::is_integral_v<Found>)
+      return static_cast<std::int64_t>(found);
+    else if constexpr (std::is_arithmetic_v<Found>)
+      return static_cast<double>(found);
+    else if constexpr (std::is_convertible_v<const Found&, std::string_view>)
+      return std::string(std::string_view(found));
+    else
+      return std::vector<double>(found.begin(), found.end());
+  }
+  template <typename Found>
+  static ManifestValue type_of() {
+    if constexpr (is_optional<Found>)
+      return type_of<typename Found::value_type>();
+    else if constexpr (std::is_same_v<Found, bool>)
+      return false;
+    else if constexpr (std::is_integral_v<Found>)
+      return std::int64_t{0};
+    else if constexpr (std::is_arithmetic_v<Found>)
+      return 0.0;
+    else if constexpr (std::is_convertible_v<const Found&, std::string_view>)
+      return std::string();
+    else
+      return std::vector<double>();
+  }
+};
+
+// How the fields of several tiles make that of the whole.
+enum class Merge { sum, max, min };
+
+// A field that each tile has, and that its progress stores.
+struct TileField {
+  std::string key;
+  std::variant<const std::size_t*, const double*> field;
+  Merge merge;
+
+  ManifestValue value() const;
+  void set(const ManifestValue& value) const;  // of a result that is not constant
+};
+
+class ResultTable {
+ public:
+  ResultTable() = default;
+  ResultTable(std::initializer_list<NamedResult> results) : results_(results) {}
+
+  template <typename Found>
+  void add(std::string key, const Found& found, std::string description = {}) {
+    results_.emplace_back(std::move(key), found, std::move(description));
+  }
+  template <typename Number>
+  void add(std::string key, const Number& field, Merge merge, std::string description) {
+    add_hidden(key, field, merge);
+    add(std::move(key), field, std::move(description));
+  }
+  // A field of tiles that is no result by itself.
+  template <typename Number>
+  void add_hidden(std::string key, const Number& field, Merge merge) {
+    tile_fields_.push_back({std::move(key), &field, merge});
+  }
+
+  void append(const std::string& prefix, ResultTable table);
+
+  const std::vector<NamedResult>& results() const { return results_; }
+  const std::vector<TileField>& tile_fields() const { return tile_fields_; }
+
+  // Merges the fields of a tile, a table of the same keys, into those of this one.
+  void merge(const ResultTable& tile) const;
+
+ private:
+  std::vector<NamedResult> results_;
+  std::vector<TileField> tile_fields_;
+};
+
+template <typename Result>
+ResultTable described(const Result& result) {
+  ResultTable table;
+  describe(table, result);
+  return table;
+}
+
+template <typename Result>
+void merge_into(Result& whole, const Result& tile) {
+  described(whole).merge(described(tile));
+}
+
+}  // namespace libmap
