@@ -36,7 +36,7 @@ struct ScoredVoxel {
 
 struct ScoringOptions {
   int solid_voxel_threshold = 120;
-  InstructionSet instructions = best_instruction_set();  // changes the time alone
+  libmap::InstructionSet instructions = libmap::best_instruction_set();  // changes the time alone
 };
 
 // Every pivot of the tiles, ascending by voxel, each once.

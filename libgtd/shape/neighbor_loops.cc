@@ -11,6 +11,8 @@ namespace {
 #include "libmap/core/instruction_set_loops.h"
 }  // namespace
 
-const NeighborLoops& neighbor_loops_of(InstructionSet instructions) { return all_of(instructions); }
+const NeighborLoops& neighbor_loops_of(libmap::InstructionSet instructions) {
+  return all_of(instructions);
+}
 
 }  // namespace libgtd

@@ -7,7 +7,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "libgtd/shape/instruction_set.h"
+#include "libmap/core/instruction_set.h"
 
 namespace libgtd {
 
@@ -45,6 +45,6 @@ struct NeighborLoops {
 };
 
 // Of instructions that the processor has.
-const NeighborLoops& neighbor_loops_of(InstructionSet instructions);
+const NeighborLoops& neighbor_loops_of(libmap::InstructionSet instructions);
 
 }  // namespace libgtd

@@ -1,4 +1,4 @@
-#include "libgtd/shape/thesis_curvature.h"
+#include "libgtd/shape/curvature.h"
 
 #include <pcl/common/eigen.h>
 
@@ -139,7 +139,7 @@ class NeighborSearch {
   const std::vector<Quad>& places_;
   const PointGrid& grid_;
   float limit_;
-  const NeighborLoops& loops_ = neighbor_loops_of(best_instruction_set());
+  const NeighborLoops& loops_ = neighbor_loops_of(libmap::best_instruction_set());
   std::vector<PointGrid::Range> runs_;
   std::vector<std::uint32_t> candidates_;
   std::vector<Quad> near_;

@@ -32,10 +32,10 @@ namespace avx512 {
 #endif
 
 // The table for instructions that the processor has.
-constexpr auto& all_of([[maybe_unused]] InstructionSet instructions) {
+constexpr auto& all_of([[maybe_unused]] libmap::InstructionSet instructions) {
 #if defined(GRASPMAP_X86_LOOPS)
-  if (instructions == InstructionSet::avx512) return avx512::all;
-  if (instructions == InstructionSet::avx2) return avx2::all;
+  if (instructions == libmap::InstructionSet::avx512) return avx512::all;
+  if (instructions == libmap::InstructionSet::avx2) return avx2::all;
 #endif
   return portable::all;
 }

@@ -9,7 +9,7 @@
 #include "libgtd/score/tile_progress_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "tools/support/map_frame.h"

@@ -15,8 +15,8 @@
 namespace neighbor_loops_test {
 
 using graspmap_test::uniform;
-using libgtd::InstructionSet;
 using libgtd::NeighborLoops;
+using libmap::InstructionSet;
 
 constexpr std::size_t lanes = NeighborLoops::lanes;
 
