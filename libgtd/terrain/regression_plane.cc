@@ -15,6 +15,7 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/core/symmetric_eigen.h"
 #include "libmap/geometry/plane_fit.h"
+#include "libmap/geometry/robust.h"
 
 namespace libgtd {
 
@@ -243,7 +244,7 @@ Plane weighted_fit(const std::vector<Vector3d>& places, const Plane& last, doubl
   const libmap::PlaneSpread spread = libmap::weighted_spread(
       places, Vector3d::Zero(), cells_per_chunk, [&](const Vector3d& place) {
         const double ratio = last.height(place) / limit;
-        return std::abs(ratio) < 1.0 ? libmap::tukey_weight(ratio) : 0.0;
+        return libmap::tukey_weight(ratio);
       });
   if (!spread.is_plane(1e-4)) return last;
   Plane plane;
@@ -304,7 +305,7 @@ Vector3d ground_normal(const libmap::PointStream& points, const FittedPlane& sta
   if (!(median < max_median_ratio * median_height(places, squares))) return start.axes.col(0);
   // Below this, heights are rounding.
   constexpr double min_limit = 1e-6;
-  const double limit = std::max(libmap::tukey_limit_per_median * median, min_limit);
+  const double limit = std::max(libmap::tukey_width_of(median), min_limit);
   Plane plane = found;
   for (int step = 0; step < max_steps; ++step) {
     const Plane next = weighted_fit(places, plane, limit);

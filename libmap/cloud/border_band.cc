@@ -14,7 +14,7 @@
 #include "libmap/core/image.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
-#include "libmap/geometry/plane_fit.h"
+#include "libmap/geometry/robust.h"
 
 namespace libmap {
 
@@ -298,12 +298,12 @@ Vector2d fit_line(const std::vector<Vector2d>& edges) {
     deviations.reserve(edges.size());
     for (const Vector2d& edge : edges)
       deviations.push_back(std::abs(edge.y() - line[0] - line[1] * edge.x()));
-    const double limit = std::max(tukey_limit_per_median * median(deviations), 1e-6);
+    const double limit = std::max(tukey_width_of(median(deviations)), 1e-6);
     Eigen::Matrix2d normal = Eigen::Matrix2d::Zero();
     Vector2d right = Vector2d::Zero();
     for (std::size_t n = 0; n < edges.size(); ++n) {
       const double ratio = deviations[n] / limit;
-      const double weight = ratio < 1.0 ? tukey_weight(ratio) : 0.0;
+      const double weight = tukey_weight(ratio);
       const Vector2d row(1.0, edges[n].x());
       normal += weight * row * row.transpose();
       right += weight * edges[n].y() * row;

@@ -12,6 +12,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/geometry/plane_fit.h"
+#include "libmap/geometry/robust.h"
 
 namespace libmap {
 
@@ -173,12 +174,12 @@ Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up,
       if (height <= tolerance) deviations.push_back(height);
     }
     if (deviations.size() < 3) return plane;
-    const double limit = std::clamp(tukey_limit_per_median * median(std::move(deviations)),
+    const double limit = std::clamp(tukey_width_of(median(std::move(deviations))),
                                     std::min(100.0 * exact, tolerance), tolerance);
     const PlaneSpread spread =
         weighted_spread(near, plane.center, points_per_chunk, [&](const Eigen::Vector3d& point) {
           const double ratio = plane.height(point) / limit;
-          return std::abs(ratio) < 1.0 ? tukey_weight(ratio) : 0.0;
+          return tukey_weight(ratio);
         });
     if (!is_plane(spread)) return plane;
     const Plane fitted = plane_of(spread, up);

@@ -9,12 +9,6 @@
 
 namespace libmap {
 
-// Tukey's biweight (Beaton and Tukey 1974) of a residual in units of its limit, |ratio| < 1.
-inline double tukey_weight(double ratio) { return (1.0 - ratio * ratio) * (1.0 - ratio * ratio); }
-// Its limit in units of the median absolute residual: 4.685 standard deviations (95 % efficiency
-// for normal residuals), of which the median is 1 / 1.4826.
-inline constexpr double tukey_limit_per_median = 4.685 * 1.4826;
-
 // Weighted sums over points about an origin near them.
 struct PlaneMoments {
   double weight = 0.0;
