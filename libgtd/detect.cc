@@ -30,82 +30,109 @@ PointCloud downsampled(const PointCloud& cloud, double leaf_m) {
   return thin;
 }
 
+// What each stage uses of the options, resolved once: no stage sees the scenario.
+struct DetectionStages {
+  int tile_voxels = 0;
+  std::optional<double> downsampling_leaf_m;    // only `thesis` downsamples
+  std::optional<RegressionPlaneOptions> plane;  // nothing: the cloud is in the terrain frame
+  std::optional<InterpolationOptions> interpolation;
+  double voxel_size_m = 0.01;
+  bool thesis_lattice = false;
+  TileDetectionOptions tiles;
+  std::optional<ObstacleOptions> obstacles;
+  GripperMask mask;
+};
+
+std::optional<InterpolationOptions> interpolation_of(const Scenario& scenario) {
+  if (!scenario.interpolation) return std::nullopt;
+  // A node in each voxel: below its edge, so that rounding leaves none out.
+  return InterpolationOptions{.method = follows_thesis(scenario.method)
+                                            ? InterpolationMethod::thesis
+                                            : InterpolationMethod::corrected,
+                              .max_edge_m = scenario.interpolation_max_edge_m,
+                              .max_grid_spacing_m = 0.9 * scenario.voxel_size_m};
+}
+
+DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
+  const Scenario& scenario = options.scenario;
+  const bool thesis = follows_thesis(scenario.method);
+  const bool fits_plane = options.plane == PlaneSource::fit;
+  // Obstacles of the whole map only: a face may cross any number of tiles.
+  const bool obstacles = scenario.evaluates_obstacles() && options.share.count == 1;
+  return {.tile_voxels = tile_voxels(scenario),
+          .downsampling_leaf_m =
+              thesis && fits_plane ? std::optional(scenario.voxel_size_m) : std::nullopt,
+          .plane = fits_plane ? std::optional(RegressionPlaneOptions{plane_method(scenario.method),
+                                                                     options.up})
+                              : std::nullopt,
+          .interpolation = interpolation_of(scenario),
+          .voxel_size_m = scenario.voxel_size_m,
+          .thesis_lattice = thesis,
+          .tiles = tile_detection_options(mask, scenario),
+          .obstacles = obstacles ? std::optional(ObstacleOptions{scenario.obstacle_slope_deg,
+                                                                 scenario.obstacle_height_m,
+                                                                 normal_radius_m(mask, scenario)})
+                                 : std::nullopt,
+          .mask = std::move(mask)};
+}
+
 // The terrain in the terrain frame.
-PointCloud prepare_terrain(const PointCloud& input, const DetectionOptions& options,
+PointCloud prepare_terrain(const PointCloud& input, const DetectionStages& stages,
                            DetectionResult& result) {
-  if (options.plane == PlaneSource::none) {
+  if (!stages.plane) {
     // No use is made of it, but points in one place or on a line are no terrain in any frame.
     fit_regression_plane(input, {.method = PlaneMethod::corrected});
     return input;
   }
-  const bool thesis = follows_thesis(options.scenario.method);
   PointCloud cloud = input;
-  if (thesis) {
+  if (stages.downsampling_leaf_m) {
     cloud = libmap::timed(result.timings_s, "downsampling",
-                          [&] { return downsampled(input, options.scenario.voxel_size_m); });
+                          [&] { return downsampled(input, *stages.downsampling_leaf_m); });
     result.downsampled_points = cloud.size();
   }
-  const PlaneMethod method = plane_method(options.scenario.method);
   return libmap::timed(result.timings_s, "regression plane", [&] {
-    result.plane = fit_regression_plane(cloud, {.method = method, .up = options.up});
+    result.plane = fit_regression_plane(cloud, *stages.plane);
     result.map.terrain_from_input = result.plane->terrain_from_input;
-    return transform_to_terrain(cloud, *result.plane, method);
+    return transform_to_terrain(cloud, *result.plane, stages.plane->method);
   });
 }
 
 // The terrain with its gaps filled.
-PointCloud interpolated_surface(const PointCloud& terrain, const Scenario& scenario,
+PointCloud interpolated_surface(const PointCloud& terrain, const InterpolationOptions& options,
                                 DetectionResult& result) {
-  return libmap::timed(result.timings_s, "interpolation", [&] {
-    InterpolationOptions options;
-    options.method = follows_thesis(scenario.method) ? InterpolationMethod::thesis
-                                                     : InterpolationMethod::corrected;
-    options.max_edge_m = scenario.interpolation_max_edge_m;
-    // A node in each voxel: below its edge, so that rounding leaves none out.
-    options.max_grid_spacing_m = 0.9 * scenario.voxel_size_m;
-    InterpolationResult filled = interpolate(terrain, options);
-    result.grid_spacing_m = filled.grid_spacing_m;
-    result.interpolated_points = filled.cloud.size();
-    PointCloud surface;
-    surface.positions = std::move(filled.cloud.positions);
-    // The author's program goes on with the grid alone; measured points are worth keeping.
-    if (follows_thesis(scenario.method)) return surface;
-    if (terrain.has_normals()) {
-      surface.normals.assign(surface.size(), Eigen::Vector3f::Zero());
-      surface.normals.insert(surface.normals.end(), terrain.normals.begin(), terrain.normals.end());
-    }
-    surface.positions.insert(surface.positions.end(), terrain.positions.begin(),
-                             terrain.positions.end());
-    return surface;
-  });
+  InterpolationResult filled = interpolate(terrain, options);
+  result.grid_spacing_m = filled.grid_spacing_m;
+  result.interpolated_points = filled.cloud.size();
+  PointCloud surface;
+  surface.positions = std::move(filled.cloud.positions);
+  // The author's program goes on with the grid alone; measured points are worth keeping.
+  if (options.method == InterpolationMethod::thesis) return surface;
+  if (terrain.has_normals()) {
+    surface.normals.assign(surface.size(), Eigen::Vector3f::Zero());
+    surface.normals.insert(surface.normals.end(), terrain.normals.begin(), terrain.normals.end());
+  }
+  surface.positions.insert(surface.positions.end(), terrain.positions.begin(),
+                           terrain.positions.end());
+  return surface;
 }
 
-VoxelGrid make_grid(const std::vector<Eigen::Vector3d>& points, const Scenario& scenario,
-                    DetectionResult& result) {
-  return libmap::timed(result.timings_s, "voxelization", [&] {
-    return follows_thesis(scenario.method)
-               ? voxelize_thesis(to_float(points), scenario.voxel_size_m)
-               : voxelize(points, scenario.voxel_size_m);
-  });
-}
-
-void evaluate_obstacles(const Scenario& scenario, DetectionResult& result) {
+// Returns their number.
+std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& map) {
   std::vector<Voxel> voxels;
   std::vector<float> slopes_deg;
-  for (const MapVoxel& one : result.map.voxels) {
+  for (const MapVoxel& one : map.voxels) {
     voxels.push_back(one.voxel);
     slopes_deg.push_back(one.slope_deg);
   }
   const std::vector<Obstacle> obstacles =
-      find_obstacles(voxels, slopes_deg, scenario.voxel_size_m,
-                     {.slope_deg = scenario.obstacle_slope_deg,
-                      .height_m = scenario.obstacle_height_m,
-                      .normal_radius_m = normal_radius_m(result.mask, scenario)});
+      find_obstacles(voxels, slopes_deg, map.lattice.voxel_size_m, options);
+  map.content.obstacles = true;
+  std::size_t count = 0;
   for (std::size_t n = 0; n < obstacles.size(); ++n) {
-    result.map.voxels[n].obstacle = obstacles[n];
-    result.obstacle_voxels += obstacles[n] == Obstacle::none ? 0 : 1;
+    map.voxels[n].obstacle = obstacles[n];
+    count += obstacles[n] == Obstacle::none ? 0 : 1;
   }
-  result.map.content.obstacles = true;
+  return count;
 }
 
 }  // namespace
@@ -130,41 +157,51 @@ Gripper gripper_of(const DetectionOptions& options) {
 
 DetectionResult detect(const PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress) {
-  const Scenario& scenario = options.scenario;
-  scenario.check();
+  options.scenario.check();
   if (terrain.empty()) throw libmap::Error("the cloud has no points");
+  const Scenario& scenario = options.scenario;
+  // Before any work: a voxel size that does not suit the gripper shows here.
+  const DetectionStages stages = stages_of(
+      options, make_gripper_mask(gripper_of(options), {scenario.method, scenario.voxel_size_m,
+                                                       scenario.extra_void_layers}));
   DetectionResult result;
   result.points = terrain.size();
-  // Before any work: a voxel size that does not suit the gripper shows here.
-  result.mask = make_gripper_mask(
-      gripper_of(options), {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
-  const int voxels_a_tile = tile_voxels(scenario);
-  const PointCloud in_frame = prepare_terrain(terrain, options, result);
-  const PointCloud filled =
-      scenario.interpolation ? interpolated_surface(in_frame, scenario, result) : PointCloud{};
-  const PointCloud& surface = scenario.interpolation ? filled : in_frame;
-  const VoxelGrid grid = make_grid(surface.positions, scenario, result);
+  result.mask = stages.mask;
+  const PointCloud in_frame = prepare_terrain(terrain, stages, result);
+  PointCloud filled;
+  if (stages.interpolation)
+    filled = libmap::timed(result.timings_s, "interpolation", [&] {
+      return interpolated_surface(in_frame, *stages.interpolation, result);
+    });
+  const PointCloud& surface = stages.interpolation ? filled : in_frame;
+  const VoxelGrid grid = libmap::timed(result.timings_s, "voxelization", [&] {
+    return stages.thesis_lattice ? voxelize_thesis(to_float(surface.positions), stages.voxel_size_m)
+                                 : voxelize(surface.positions, stages.voxel_size_m);
+  });
   result.occupied_voxels = grid.voxels.size();
   result.grid_min = grid.min;
   result.grid_max = grid.max;
   result.map.lattice = grid.lattice;
-  result.map.zero_plane_m = scenario.zero_plane_m;
-  const std::vector<TileBounds> tiles = share_of(make_tiles(grid, voxels_a_tile), options.share);
+  result.map.zero_plane_m = stages.tiles.graspable.zero_plane_m;
+  result.map.content = content_of(scenario);
+  if (scenario.fits_normals()) result.normal_radius_m = normal_radius_m(result.mask, scenario);
+  const std::vector<TileBounds> tiles =
+      share_of(make_tiles(grid, stages.tile_voxels), options.share);
   result.tiles = tiles.size();
   TileDetectionResult detected = detect_tiles(
-      {in_frame, surface, grid}, result.mask, tiles,
-      options.share.count == 1 ? CurvatureAt::all_points : CurvatureAt::points_near_tiles, scenario,
-      progress);
+      {in_frame, surface, grid}, stages.mask, tiles,
+      options.share.count == 1 ? CurvatureAt::all_points : CurvatureAt::points_near_tiles,
+      stages.tiles, progress);
   result.curvature_points = detected.curvature_points;
   result.convex_points = detected.convex_points;
   result.timings_s.insert(result.timings_s.end(), detected.timings_s.begin(),
                           detected.timings_s.end());
   result.map.voxels = std::move(detected.voxels);
   result.unoriented_voxels = detected.unoriented_voxels;
-  result.map.content = content_of(scenario);
-  if (scenario.fits_normals()) result.normal_radius_m = normal_radius_m(result.mask, scenario);
-  if (scenario.evaluates_obstacles() && options.share.count == 1)
-    libmap::timed(result.timings_s, "obstacles", [&] { evaluate_obstacles(scenario, result); });
+  if (stages.obstacles)
+    result.obstacle_voxels = libmap::timed(result.timings_s, "obstacles", [&] {
+      return evaluate_obstacles(*stages.obstacles, result.map);
+    });
   for (const MapVoxel& voxel : result.map.voxels) {
     result.graspable_voxels += voxel.graspable ? 1 : 0;
     result.border_voxels += voxel.border ? 1 : 0;

@@ -146,7 +146,8 @@ class StreamedDetection {
     grid.min = frame_.min;
     grid.max = frame_.max;
     const TileDetectionResult found =
-        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureAt::points_near_tiles, scenario_);
+        detect_tiles({cloud, cloud, grid}, mask_, parts, CurvatureAt::points_near_tiles,
+                     tile_detection_options(mask_, scenario_));
     for (const MapVoxel& voxel : found.voxels)
       results.at(tile_of(voxel.voxel, tile_voxels_)).voxels.push_back(voxel);
     for (const TileBounds& part : parts)

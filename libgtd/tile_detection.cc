@@ -5,9 +5,8 @@
 #include <numeric>
 
 #include "libgtd/score/closing_terms.h"
-#include "libgtd/score/scoring.h"
-#include "libgtd/score/surface_scoring.h"
 #include "libgtd/score/tilted_matching.h"
+#include "libgtd/score/voxel_matching.h"
 #include "libgtd/shape/convexity.h"
 #include "libgtd/shape/curvature.h"
 #include "libmap/core/error.h"
@@ -20,15 +19,18 @@ namespace {
 
 using libmap::PointCloud;
 
-CurvatureMethod curvature_method(const Scenario& scenario) {
-  return follows_thesis(scenario.method) ? CurvatureMethod::thesis : CurvatureMethod::corrected;
+// How far off the points are that decide on the curvature at a point: PCL's looks at the normals of
+// its neighbors, which have neighbors of their own.
+double curvature_reach_m(const CurvatureOptions& curvature) {
+  const double reach = curvature.radius_m * (1 + 1e-6);
+  return curvature.method == CurvatureMethod::thesis ? 2 * reach : reach;
 }
 
-// How far off the points lie that decide on the curvature at a point: PCL's looks at the normals
-// of its neighbors, which have neighbors of their own.
-double curvature_reach_m(const Scenario& scenario) {
-  const double reach = scenario.curvature_radius_m * (1 + 1e-6);
-  return curvature_method(scenario) == CurvatureMethod::thesis ? 2 * reach : reach;
+// A voxel that the reach of a tile cuts has another mean: it is farther away than the reach.
+constexpr double mean_margin_voxels = 2.0;
+
+double margin_voxels(const ConvexityStage& stage) {
+  return stage.of_voxel_means ? mean_margin_voxels : 0.0;
 }
 
 // The columns of each of the tiles grown by `margin_m` and a voxel more.
@@ -84,25 +86,16 @@ std::vector<std::size_t> points_within(const PointCloud& cloud, const VoxelLatti
   return within;
 }
 
-// A dense part of a scan has no more weight in the curvature than a sparse one.
-bool uses_voxel_means(Method method) { return plane_method(method) == PlaneMethod::robust; }
-
-// A voxel that the reach of a tile cuts has another mean: it is farther away than the reach.
-constexpr double mean_margin_voxels = 2.0;
-
-// The convex ones of the points `queries`.
+// The convex ones of the points `queries`, of all without them.
 std::vector<Eigen::Vector3d> convex_among(const PointCloud& cloud,
                                           const std::optional<std::vector<std::size_t>>& queries,
-                                          const Scenario& scenario, TileDetectionResult& result) {
-  const CurvatureResult curvature = estimate_curvature(
-      cloud, {.method = curvature_method(scenario), .radius_m = scenario.curvature_radius_m},
-      queries);
-  std::vector<Eigen::Vector3d> queried;
-  if (queries)
-    for (const std::size_t n : *queries) queried.push_back(cloud.positions[n]);
-  const std::vector<Eigen::Vector3d>& positions = queries ? queried : cloud.positions;
+                                          const ConvexityStage& stage,
+                                          TileDetectionResult& result) {
+  const CurvatureResult curvature = estimate_curvature(cloud, stage.curvature, queries);
+  const std::vector<Eigen::Vector3d> positions =
+      queries ? libmap::select_points(cloud, *queries).positions : cloud.positions;
   const std::vector<std::uint8_t> convex =
-      find_convex(curvature, positions, {.zero_plane_m = scenario.zero_plane_m});
+      find_convex(curvature, positions, {.zero_plane_m = stage.zero_plane_m});
   std::vector<Eigen::Vector3d> convex_points;
   for (std::size_t n = 0; n < positions.size(); ++n)
     if (convex[n] != 0) convex_points.push_back(positions[n]);
@@ -111,33 +104,33 @@ std::vector<Eigen::Vector3d> convex_among(const PointCloud& cloud,
   return convex_points;
 }
 
-std::vector<Eigen::Vector3d> find_convex_points(const PointCloud& terrain,
-                                                const VoxelLattice& lattice,
-                                                const std::vector<TileBounds>& tiles,
-                                                CurvatureAt curvature_at, const Scenario& scenario,
-                                                TileDetectionResult& result) {
-  const bool of_means = uses_voxel_means(scenario.method);
-  const double voxel_size_m = scenario.voxel_size_m;
+std::vector<Eigen::Vector3d> find_convex_points(
+    const PointCloud& terrain, const VoxelLattice& lattice, const std::vector<TileBounds>& tiles,
+    CurvatureAt curvature_at, const ConvexityStage& stage, TileDetectionResult& result) {
   if (curvature_at == CurvatureAt::all_points)
-    return convex_among(of_means ? voxel_means(terrain, voxel_size_m) : terrain, std::nullopt,
-                        scenario, result);
-  const double margin_m = scenario.intersection_distance_m;
-  const double reach_m =
-      margin_m + curvature_reach_m(scenario) + (of_means ? mean_margin_voxels * voxel_size_m : 0.0);
+    return convex_among(stage.of_voxel_means ? voxel_means(terrain, lattice.voxel_size_m) : terrain,
+                        std::nullopt, stage, result);
+  const double reach_m = stage.distance_m + curvature_reach_m(stage.curvature) +
+                         margin_voxels(stage) * lattice.voxel_size_m;
   PointCloud nearby =
       libmap::select_points(terrain, points_within(terrain, lattice, tiles, reach_m));
-  if (of_means) nearby = voxel_means(nearby, voxel_size_m);
-  return convex_among(nearby, points_within(nearby, lattice, tiles, margin_m), scenario, result);
+  if (stage.of_voxel_means) nearby = voxel_means(nearby, lattice.voxel_size_m);
+  return convex_among(nearby, points_within(nearby, lattice, tiles, stage.distance_m), stage,
+                      result);
+}
+
+bool is_graspable(const ScoredVoxel& scored, bool convex, double height_m,
+                  const GraspableRule& rule) {
+  return meets_threshold(scored.counts, scored.score, rule.method, rule.solid_voxel_threshold,
+                         rule.score_threshold) &&
+         height_m >= rule.zero_plane_m && (convex || !rule.needs_convexity);
 }
 
 // `surface` is empty if no normals were fitted.
 std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                                  const std::vector<SurfaceNormal>& surface,
                                  const std::vector<std::uint8_t>& convex,
-                                 const VoxelLattice& lattice, const Scenario& scenario) {
-  // A probability to hold needs no second opinion of the shape.
-  const bool needs_convexity =
-      scenario.curvature_radius_m > 0.0 && scenario.method != Method::calibrated;
+                                 const VoxelLattice& lattice, const TileDetectionOptions& options) {
   std::vector<MapVoxel> voxels;
   voxels.reserve(scored.size());
   for (std::size_t n = 0; n < scored.size(); ++n) {
@@ -145,40 +138,42 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .counts = scored[n].counts,
                    .score = scored[n].score,
                    .convex = convex[n] != 0,
-                   .graspable = false,
                    .border = scored[n].border,
                    .terms = scored[n].terms,
                    .falling_share = scored[n].falling_share};
     if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
-    if (scenario.orientation == Orientation::surface && surface[n].normal.allFinite())
-      voxel.normal = surface[n].normal;
-    const double height = lattice.center_of(voxel.voxel).z();
-    voxel.graspable =
-        meets_threshold(voxel.counts, voxel.score, scenario.method, scenario.solid_voxel_threshold,
-                        scenario.graspability_threshold) &&
-        height >= scenario.zero_plane_m && (voxel.convex || !needs_convexity);
+    if (options.tilts_mask && surface[n].normal.allFinite()) voxel.normal = surface[n].normal;
+    voxel.graspable = is_graspable(scored[n], voxel.convex, lattice.center_of(voxel.voxel).z(),
+                                   options.graspable);
     voxels.push_back(voxel);
   }
   return voxels;
 }
 
-// Of each pivot of the tiles, if the scenario needs them.
-std::vector<SurfaceNormal> surface_normals(const TileSurroundings& surroundings,
-                                           const GripperMask& mask,
-                                           const std::vector<TileBounds>& tiles,
-                                           const Scenario& scenario, TileDetectionResult& result) {
-  if (!scenario.fits_normals()) return {};
-  return libmap::timed(result.timings_s, "surface normals", [&] {
-    const VoxelGrid& grid = surroundings.grid;
-    std::vector<SurfaceNormal> normals =
-        normals_at(pivots_of(grid, mask, tiles), surroundings.surface, grid.lattice,
-                   normal_radius_m(mask, scenario));
-    if (scenario.orientation == Orientation::surface)
-      result.unoriented_voxels = static_cast<std::size_t>(
-          std::count_if(normals.begin(), normals.end(),
-                        [](const SurfaceNormal& one) { return !one.normal.allFinite(); }));
-    return normals;
-  });
+// For each scored voxel whether a convex point is near.
+std::vector<std::uint8_t> near_convex(const std::vector<ScoredVoxel>& scored,
+                                      const TileSurroundings& surroundings,
+                                      const std::vector<TileBounds>& tiles,
+                                      CurvatureAt curvature_at, const ConvexityStage& stage,
+                                      TileDetectionResult& result) {
+  const VoxelLattice& lattice = surroundings.grid.lattice;
+  const std::vector<Eigen::Vector3d> convex_points =
+      find_convex_points(surroundings.terrain, lattice, tiles, curvature_at, stage, result);
+  std::vector<Eigen::Vector3d> centers;
+  centers.reserve(scored.size());
+  for (const ScoredVoxel& one : scored) centers.push_back(lattice.center_of(one.voxel));
+  return mark_near_convex(centers, convex_points, stage.distance_m);
+}
+
+std::optional<ConvexityStage> convexity_of(const Scenario& scenario) {
+  if (!(scenario.curvature_radius_m > 0.0)) return std::nullopt;
+  return ConvexityStage{
+      .curvature = {.method = follows_thesis(scenario.method) ? CurvatureMethod::thesis
+                                                              : CurvatureMethod::corrected,
+                    .radius_m = scenario.curvature_radius_m},
+      .of_voxel_means = plane_method(scenario.method) == PlaneMethod::robust,
+      .zero_plane_m = scenario.zero_plane_m,
+      .distance_m = scenario.intersection_distance_m};
 }
 
 }  // namespace
@@ -201,29 +196,25 @@ int tile_voxels(const Scenario& scenario) {
 }
 
 int halo_voxels(const GripperMask& mask, const Scenario& scenario) {
-  const int window = std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1);
-  const int edges = mask.method == Method::corrected ? 2 * scan_gap_voxels : 0;
-  double convexity = 0.0;
-  if (scenario.curvature_radius_m > 0.0)
-    convexity =
-        (scenario.intersection_distance_m + curvature_reach_m(scenario)) / scenario.voxel_size_m +
-        1.0 + (uses_voxel_means(scenario.method) ? mean_margin_voxels : 0.0);
-  const auto require_moderate = [](double voxels, const char* field, double value) {
+  const TileDetectionOptions options = tile_detection_options(mask, scenario);
+  const double voxel_size_m = scenario.voxel_size_m;
+  const auto whole = [](double voxels, const char* field, double value) {
     if (voxels > 0x1p28)
       throw libmap::Error("too large for voxels of this size",
                           {.field = field, .value = libmap::to_text(value)});
+    return static_cast<int>(std::ceil(voxels));
   };
-  require_moderate(convexity, "curvature_radius_m", scenario.curvature_radius_m);
-  int halo = std::max(window + edges, static_cast<int>(std::ceil(convexity)));
-  if (mask.closing)
-    halo = std::max(halo, closing_reach_voxels(*mask.closing, scenario.voxel_size_m));
-  if (!scenario.fits_normals()) return halo;
-  const double radius_m = normal_radius_m(mask, scenario);
-  const double normals = radius_m / scenario.voxel_size_m + 1.0;
-  require_moderate(normals, "normal_radius_m", radius_m);
-  halo = std::max(halo, static_cast<int>(std::ceil(normals)));
-  return scenario.orientation == Orientation::surface ? std::max(halo, tilted_reach_voxels(mask))
-                                                      : halo;
+  const int window = std::max(mask.pivot_xy, mask.side - mask.pivot_xy - 1);
+  int halo = window + (mask.method == Method::corrected ? 2 * scan_gap_voxels : 0);
+  if (const auto& stage = options.convexity)
+    halo = std::max(
+        halo, whole((stage->distance_m + curvature_reach_m(stage->curvature)) / voxel_size_m + 1.0 +
+                        margin_voxels(*stage),
+                    "curvature_radius_m", stage->curvature.radius_m));
+  if (mask.closing) halo = std::max(halo, closing_reach_voxels(*mask.closing, voxel_size_m));
+  if (const auto& radius_m = options.normal_radius_m)
+    halo = std::max(halo, whole(*radius_m / voxel_size_m + 1.0, "normal_radius_m", *radius_m));
+  return options.tilts_mask ? std::max(halo, tilted_reach_voxels(mask)) : halo;
 }
 
 double normal_radius_m(const GripperMask& mask, const Scenario& scenario) {
@@ -238,32 +229,49 @@ MapContent content_of(const Scenario& scenario) {
               scenario.method == Method::corrected && scenario.orientation != Orientation::surface};
 }
 
+TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scenario& scenario) {
+  return {.tilts_mask = scenario.orientation == Orientation::surface,
+          .normal_radius_m = scenario.fits_normals()
+                                 ? std::optional(normal_radius_m(mask, scenario))
+                                 : std::nullopt,
+          .convexity = convexity_of(scenario),
+          .graspable = {.method = scenario.method,
+                        .solid_voxel_threshold = scenario.solid_voxel_threshold,
+                        .score_threshold = scenario.graspability_threshold,
+                        .zero_plane_m = scenario.zero_plane_m,
+                        // A probability to hold needs no second opinion of the shape.
+                        .needs_convexity = scenario.curvature_radius_m > 0.0 &&
+                                           scenario.method != Method::calibrated}};
+}
+
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
                                  const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
-                                 const Scenario& scenario, libmap::Progress& progress) {
+                                 const TileDetectionOptions& options, libmap::Progress& progress) {
   TileDetectionResult result;
   const VoxelGrid& grid = surroundings.grid;
-  const std::vector<SurfaceNormal> surface =
-      surface_normals(surroundings, mask, tiles, scenario, result);
+  std::vector<Voxel> pivots;
+  std::vector<SurfaceNormal> normals;
+  if (options.normal_radius_m)
+    normals = libmap::timed(result.timings_s, "surface normals", [&] {
+      pivots = pivots_of(grid, mask, tiles);
+      return normals_at(pivots, surroundings.surface, grid.lattice, *options.normal_radius_m);
+    });
+  if (options.tilts_mask)
+    result.unoriented_voxels = static_cast<std::size_t>(
+        std::count_if(normals.begin(), normals.end(),
+                      [](const SurfaceNormal& one) { return !one.normal.allFinite(); }));
   const std::vector<ScoredVoxel> scored = libmap::timed(result.timings_s, "voxel matching", [&] {
-    const ScoringOptions options{.solid_voxel_threshold = scenario.solid_voxel_threshold};
-    return scenario.orientation == Orientation::surface
-               ? score_on_surface(pivots_of(grid, mask, tiles), surface, surroundings.surface, grid,
-                                  mask, tiles, options, progress)
-               : score_tiles(grid, mask, tiles, options, progress);
+    const ScoringOptions scoring{.solid_voxel_threshold = options.graspable.solid_voxel_threshold};
+    return options.tilts_mask ? score_on_surface(pivots, normals, surroundings.surface, grid, mask,
+                                                 tiles, scoring, progress)
+                              : score_tiles(grid, mask, tiles, scoring, progress);
   });
   std::vector<std::uint8_t> convex(scored.size(), 0);
-  if (scenario.curvature_radius_m > 0.0 && !scored.empty()) {
+  if (options.convexity && !scored.empty())
     convex = libmap::timed(result.timings_s, "convexity", [&] {
-      const std::vector<Eigen::Vector3d> convex_points = find_convex_points(
-          surroundings.terrain, grid.lattice, tiles, curvature_at, scenario, result);
-      std::vector<Eigen::Vector3d> centers;
-      centers.reserve(scored.size());
-      for (const ScoredVoxel& one : scored) centers.push_back(grid.lattice.center_of(one.voxel));
-      return mark_near_convex(centers, convex_points, scenario.intersection_distance_m);
+      return near_convex(scored, surroundings, tiles, curvature_at, *options.convexity, result);
     });
-  }
-  result.voxels = map_voxels(scored, surface, convex, grid.lattice, scenario);
+  result.voxels = map_voxels(scored, normals, convex, grid.lattice, options);
   return result;
 }
 

@@ -4,12 +4,14 @@
 #pragma once
 
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/scenario.h"
+#include "libgtd/shape/curvature.h"
 #include "libgtd/terrain/regression_plane.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
@@ -37,6 +39,32 @@ double normal_radius_m(const GripperMask& mask, const Scenario& scenario);
 // What a detection with these parameters says beside its scores, but for obstacles.
 MapContent content_of(const Scenario& scenario);
 
+// Curvature near the scored voxels, and which of them are convex.
+struct ConvexityStage {
+  CurvatureOptions curvature;
+  bool of_voxel_means = true;  // a dense part of a scan has no more weight than a sparse one
+  double zero_plane_m = 0.0;   // of CurvatureMethod::thesis: convex points are above it
+  double distance_m = 0.01;    // a voxel this close to a convex point counts as convex
+};
+
+// Which scored voxels are graspable.
+struct GraspableRule {
+  Method method = Method::calibrated;
+  int solid_voxel_threshold = 120;
+  double score_threshold = 0.8;
+  double zero_plane_m = 0.0;
+  bool needs_convexity = false;
+};
+
+// What the stages of detect_tiles use of a scenario.
+struct TileDetectionOptions {
+  bool tilts_mask = false;                  // along the surface's normal
+  std::optional<double> normal_radius_m;    // nothing: no normals and slopes are fitted
+  std::optional<ConvexityStage> convexity;  // nothing: not evaluated
+  GraspableRule graspable;
+};
+TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scenario& scenario);
+
 // What is known around the tiles: at least what lies in them and their halo.
 struct TileSurroundings {
   const libmap::PointCloud& terrain;  // measured points, whose curvature is looked at
@@ -59,7 +87,7 @@ enum class CurvatureAt { points_near_tiles, all_points };
 // Throws what the steps throw.
 TileDetectionResult detect_tiles(const TileSurroundings& surroundings, const GripperMask& mask,
                                  const std::vector<TileBounds>& tiles, CurvatureAt curvature_at,
-                                 const Scenario& scenario,
+                                 const TileDetectionOptions& options,
                                  libmap::Progress& progress = libmap::no_progress());
 
 }  // namespace libgtd

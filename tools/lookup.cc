@@ -3,7 +3,6 @@
 
 #include "libgtd/evaluate/lookup.h"
 #include "libgtd/evaluate/roc.h"
-#include "libgtd/evaluate/tile_lookup.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
 #include "tools/support/command_line.h"

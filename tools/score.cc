@@ -1,6 +1,6 @@
 // graspmap score: graspability map of a terrain, tile by tile.
 #include "libgtd/detect.h"
-#include "libgtd/gripper/closing_path.h"
+#include "libgtd/gripper/gripper_mask.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/store_plan.h"

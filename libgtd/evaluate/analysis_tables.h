@@ -7,7 +7,6 @@
 #include "libgtd/evaluate/map_analysis.h"
 #include "libgtd/evaluate/map_change.h"
 #include "libgtd/evaluate/map_regions.h"
-#include "libgtd/evaluate/region_reach.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/table.h"
 

@@ -17,7 +17,7 @@ namespace {
 constexpr Eigen::Index weights = 5;  // of the constant and of each term
 constexpr double ridge = 1e-6;
 
-struct Sample {
+struct FitSample {
   std::vector<Eigen::Matrix<double, weights, 1>> terms;  // signs as in HoldModel
   std::vector<double> labels;                            // 0 or 1
 };
@@ -26,7 +26,7 @@ using Weights = Eigen::Matrix<double, weights, 1>;
 using Square = Eigen::Matrix<double, weights, weights>;
 
 // The weights that are not `free` are 0.
-Weights fit(const Sample& sample, const std::array<bool, weights>& free) {
+Weights fit(const FitSample& sample, const std::array<bool, weights>& free) {
   const auto count = static_cast<double>(sample.terms.size());
   Weights found = Weights::Zero();
   constexpr int max_steps = 100;
@@ -67,7 +67,7 @@ HoldModelFit fit_hold_model(const libmap::Table& table, const std::string& label
   const std::array columns = {table.column("closing_contact"), table.column("closing_bearing"),
                               table.column("closing_rise"), table.column("closing_depth")};
   HoldModelFit result;
-  Sample sample;
+  FitSample sample;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
     const std::string& cell = table.rows[row][target];
     const std::optional<bool> label = parse_label(cell);

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <string>
 
-#include "libgtd/gripper/hold_model.h"
+#include "libgtd/gripper/gripper.h"
 #include "libmap/core/table.h"
 
 namespace libgtd {

@@ -2,9 +2,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <tuple>
 #include <utility>
 
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/geometry/spatial_index.h"
@@ -13,70 +14,263 @@ namespace libgtd {
 
 namespace {
 
-std::vector<double> point_values(const libmap::PointCloud& map, std::size_t point) {
-  std::vector<double> values;
-  for (const libmap::ScalarField& field : map.fields) values.push_back(field.values[point]);
-  return values;
-}
+constexpr std::size_t points_at_once = std::size_t{1} << 16U;
+// Files contain positions to 1e-5 m.
+constexpr double rounding_m = 4e-5;
+// Far more than any lattice, and no overflow.
+constexpr double farthest_cell = 1e9;
 
-std::vector<double> mean_values(const libmap::PointCloud& map,
-                                const std::vector<std::size_t>& points) {
-  std::vector<double> values;
-  for (const libmap::ScalarField& field : map.fields) {
-    double sum = 0.0;
-    for (const std::size_t n : points) sum += field.values[n];
-    values.push_back(sum / static_cast<double>(points.size()));
+// Order of the map's points: by voxel across tiles, by index within a cloud.
+using MapOrder = std::pair<Voxel, std::size_t>;
+
+// A map, or one of its tiles, with a search tree. The cloud outlives it.
+class MapPart {
+ public:
+  // `voxels` of a tile's points; none for a whole map.
+  explicit MapPart(const libmap::PointCloud& cloud, std::vector<Voxel> voxels = {})
+      : cloud_(cloud), voxels_(std::move(voxels)), tree_(cloud.positions) {}
+
+  const libmap::PointCloud& cloud() const { return cloud_; }
+  const libmap::PointTree& tree() const { return tree_; }
+  MapOrder order_of(std::size_t n) const { return {voxels_.empty() ? Voxel{} : voxels_[n], n}; }
+  std::vector<double> values(std::size_t n) const {
+    std::vector<double> values;
+    values.reserve(cloud_.fields.size());
+    for (const libmap::ScalarField& field : cloud_.fields) values.push_back(field.values[n]);
+    return values;
   }
-  return values;
+
+ private:
+  const libmap::PointCloud& cloud_;
+  std::vector<Voxel> voxels_;
+  libmap::PointTree tree_;
+};
+
+std::vector<Voxel> voxels_of_tile(const libmap::PointCloud& tile) {
+  std::vector<Voxel> voxels = VoxelFields(tile).all();
+  if (voxels.empty()) throw libmap::Error("a tile has no points");
+  const auto is_not_before = [](const Voxel& a, const Voxel& b) { return !(a < b); };
+  if (std::adjacent_find(voxels.begin(), voxels.end(), is_not_before) != voxels.end())
+    throw libmap::Error("a tile's points are not in order");
+  return voxels;
 }
 
-std::size_t best_of(const libmap::PointCloud& map, const std::vector<double>& scores,
-                    const std::vector<std::size_t>& points, const Eigen::Vector3d& at) {
-  const auto rank = [&](std::size_t n) {
-    return std::pair(-scores[n], squared_distance(map.positions[n], at));
-  };
-  return *std::min_element(points.begin(), points.end(),
-                           [&](std::size_t a, std::size_t b) { return rank(a) < rank(b); });
+struct Place {
+  Eigen::Vector3d in_map;
+  Eigen::Vector3d in_terrain;
+};
+
+// What one part of the map, or all so far, contain near a point.
+struct Finding {
+  std::pair<double, MapOrder> nearest{HUGE_VAL, {}};                  // squared distance
+  std::tuple<double, double, MapOrder> best{HUGE_VAL, HUGE_VAL, {}};  // -score, squared distance
+  std::vector<double> values;                                 // of the nearest, or of the best
+  std::size_t members = 0;                                    // within the radius
+  std::vector<std::pair<MapOrder, std::vector<double>>> all;  // of the members, for their mean
+};
+
+Finding ask(const MapPart& part, const Eigen::Vector3d& at, const LookupOptions& options) {
+  Finding finding;
+  const libmap::NeighborPoint nearest = part.tree().first_of_nearest(at);
+  finding.nearest = {nearest.square_m2, part.order_of(nearest.index)};
+  if (options.mode == LookupMode::nearest) {
+    finding.values = part.values(nearest.index);
+    return finding;
+  }
+  const std::vector<double>* scores =
+      options.mode == LookupMode::maximum ? &values_of(part.cloud(), "score") : nullptr;
+  for (const libmap::NeighborPoint& near : part.tree().within(at, options.radius_m)) {
+    ++finding.members;
+    if (scores == nullptr)
+      finding.all.emplace_back(part.order_of(near.index), part.values(near.index));
+    else
+      finding.best = std::min(finding.best,
+                              {-(*scores)[near.index], near.square_m2, part.order_of(near.index)});
+  }
+  if (options.mode == LookupMode::maximum && finding.members > 0)
+    finding.values = part.values(std::get<2>(finding.best).second);
+  return finding;
 }
 
-void check(const libmap::PointCloud& map, const LookupOptions& options) {
-  libmap::check_parameters(options);
-  if (map.empty()) throw libmap::Error("the map has no points");
-  if (options.mode == LookupMode::maximum) values_of(map, "score");
+void join(Finding& sum, Finding&& other, LookupMode mode) {
+  const bool is_nearer = other.nearest < sum.nearest;
+  const bool is_better = other.best < sum.best;
+  if (is_nearer) sum.nearest = other.nearest;
+  if (is_better) sum.best = other.best;
+  if (mode == LookupMode::nearest ? is_nearer : is_better) sum.values = std::move(other.values);
+  sum.members += other.members;
+  std::move(other.all.begin(), other.all.end(), std::back_inserter(sum.all));
 }
 
-LookupAnswer answer_of(const libmap::PointCloud& map, const libmap::PointTree& tree,
-                       const Eigen::Vector3d& at, const LookupOptions& options) {
+// The mean of each field, summed in the map's order.
+std::vector<double> mean_of(std::vector<std::pair<MapOrder, std::vector<double>>> all) {
+  std::sort(all.begin(), all.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<double> sums(all.front().second.size(), 0.0);
+  for (const auto& [order, values] : all)
+    for (std::size_t f = 0; f < sums.size(); ++f) sums[f] += values[f];
+  for (double& sum : sums) sum /= static_cast<double>(all.size());
+  return sums;
+}
+
+LookupAnswer answer_of(Finding&& finding, const LookupOptions& options) {
   LookupAnswer answer;
-  if (!at.allFinite()) {
-    answer.distance_m = HUGE_VAL;
-    return answer;
-  }
-  const libmap::NeighborPoint nearest = tree.first_of_nearest(at);
-  answer.map_point = nearest.index;
-  answer.distance_m = std::sqrt(nearest.square_m2);
+  answer.distance_m = std::sqrt(finding.nearest.first);
+  answer.map_point = finding.nearest.second.second;
   if (options.mode == LookupMode::nearest) {
     answer.found = answer.distance_m <= options.max_distance_m;
-    if (!answer.found) return answer;
-    answer.map_points = 1;
-    answer.values = point_values(map, answer.map_point);
-    return answer;
-  }
-  // By index, so that a mean does not depend on the tree's order.
-  std::vector<std::size_t> points;
-  for (const libmap::NeighborPoint& near : tree.within(at, options.radius_m))
-    points.push_back(near.index);
-  answer.map_points = points.size();
-  answer.found = !points.empty();
-  if (!answer.found) return answer;
-  if (options.mode == LookupMode::mean) {
-    answer.values = mean_values(map, points);
+    answer.map_points = answer.found ? 1 : 0;
   } else {
-    answer.map_point = best_of(map, map.find_field("score")->values, points, at);
-    answer.values = point_values(map, answer.map_point);
+    answer.found = finding.members > 0;
+    answer.map_points = finding.members;
   }
+  if (!answer.found) return answer;
+  if (options.mode == LookupMode::maximum) answer.map_point = std::get<2>(finding.best).second;
+  answer.values = options.mode == LookupMode::mean ? mean_of(std::move(finding.all))
+                                                   : std::move(finding.values);
   return answer;
 }
+
+Voxel voxel_near(const VoxelLattice& lattice, const Eigen::Vector3d& point_in_terrain) {
+  const Eigen::Vector3d cell =
+      lattice.cell_of(point_in_terrain).cwiseMax(-farthest_cell).cwiseMin(farthest_cell);
+  return {floor_to<int>(cell.x()), floor_to<int>(cell.y()), floor_to<int>(cell.z())};
+}
+
+// Which tiles lie within a distance of a point.
+class TileFinder {
+ public:
+  explicit TileFinder(const TileStoreIndex& index) : index_(index) {
+    for (const StoredTile& tile : index.tiles) {
+      const Eigen::Vector3d margin = Eigen::Vector3d::Constant(rounding_m);
+      boxes_.emplace_back(index.lattice.center_of(tile.min) - margin,
+                          index.lattice.center_of(tile.max) + margin);
+    }
+    low_ = tile_of(index.min, index.tile_voxels);
+    high_ = tile_of(index.max, index.tile_voxels);
+  }
+
+  double distance(std::size_t tile, const Eigen::Vector3d& point_in_terrain) const {
+    return boxes_[tile].exteriorDistance(point_in_terrain);
+  }
+
+  // Any tile, a near one where that is easy.
+  std::size_t guess(const Eigen::Vector3d& point_in_terrain) const {
+    const TileNumber own = number_of(point_in_terrain);
+    if (const StoredTile* tile =
+            index_.find({std::clamp(own.i, low_.i, high_.i), std::clamp(own.j, low_.j, high_.j)}))
+      return position_of(*tile);
+    std::size_t nearest = 0;
+    for (std::size_t n = 1; n < boxes_.size(); ++n)
+      if (distance(n, point_in_terrain) < distance(nearest, point_in_terrain)) nearest = n;
+    return nearest;
+  }
+
+  // Ascending.
+  std::vector<std::size_t> within(const Eigen::Vector3d& point_in_terrain, double reach_m) const {
+    std::vector<std::size_t> tiles;
+    const auto add = [&](std::size_t tile) {
+      if (distance(tile, point_in_terrain) <= reach_m) tiles.push_back(tile);
+    };
+    const Eigen::Vector3d reach(reach_m + rounding_m, reach_m + rounding_m, 0.0);
+    TileNumber first = number_of(point_in_terrain - reach);
+    TileNumber last = number_of(point_in_terrain + reach);
+    first = {std::max(first.i, low_.i), std::max(first.j, low_.j)};
+    last = {std::min(last.i, high_.i), std::min(last.j, high_.j)};
+    if (first.i > last.i || first.j > last.j) return tiles;
+    const double numbers = (1.0 + last.i - first.i) * (1.0 + last.j - first.j);
+    if (numbers > static_cast<double>(boxes_.size())) {
+      for (std::size_t n = 0; n < boxes_.size(); ++n) add(n);
+      return tiles;
+    }
+    for (int i = first.i; i <= last.i; ++i)
+      for (int j = first.j; j <= last.j; ++j)
+        if (const StoredTile* tile = index_.find({i, j})) add(position_of(*tile));
+    return tiles;
+  }
+
+  TileNumber number_of(const Eigen::Vector3d& point_in_terrain) const {
+    return tile_of(voxel_near(index_.lattice, point_in_terrain), index_.tile_voxels);
+  }
+
+ private:
+  std::size_t position_of(const StoredTile& tile) const {
+    return static_cast<std::size_t>(&tile - index_.tiles.data());
+  }
+
+  const TileStoreIndex& index_;
+  std::vector<Eigen::AlignedBox3d> boxes_;  // in the terrain frame
+  TileNumber low_;
+  TileNumber high_;
+};
+
+class TileLookup {
+ public:
+  TileLookup(const TileStoreIndex& index, const TileLoader& load, const LookupOptions& options)
+      : index_(index), load_(load), options_(options), finder_(index) {
+    reach_m_ = index.lattice.voxel_size_m;
+    if (options.mode != LookupMode::nearest) reach_m_ = std::max(reach_m_, options.radius_m);
+  }
+
+  // Tiles that hold what is near first; then those that may hold something nearer.
+  std::vector<Finding> find(const std::vector<Place>& places) const {
+    std::vector<Finding> findings(places.size());
+    std::vector<Visit> visits;
+    for (std::size_t p = 0; p < places.size(); ++p)
+      for (const std::size_t tile : first_tiles(places[p])) visits.push_back({tile, p});
+    make(std::move(visits), places, findings);
+    std::vector<Visit> more;
+    for (std::size_t p = 0; p < places.size(); ++p) {
+      const double reach = std::sqrt(findings[p].nearest.first);
+      if (reach <= reach_m_) continue;
+      const std::vector<std::size_t> asked = first_tiles(places[p]);
+      for (const std::size_t tile : finder_.within(places[p].in_terrain, reach))
+        if (!std::binary_search(asked.begin(), asked.end(), tile)) more.push_back({tile, p});
+    }
+    make(std::move(more), places, findings);
+    return findings;
+  }
+
+  TileNumber number_of(const Place& place) const { return finder_.number_of(place.in_terrain); }
+
+ private:
+  struct Visit {
+    std::size_t tile = 0;
+    std::size_t place = 0;
+    auto operator<=>(const Visit&) const = default;
+  };
+
+  std::vector<std::size_t> first_tiles(const Place& place) const {
+    std::vector<std::size_t> tiles = finder_.within(place.in_terrain, reach_m_);
+    if (tiles.empty()) tiles.push_back(finder_.guess(place.in_terrain));
+    return tiles;
+  }
+
+  void make(std::vector<Visit> visits, const std::vector<Place>& places,
+            std::vector<Finding>& findings) const {
+    std::sort(visits.begin(), visits.end());
+    std::vector<std::size_t> starts;  // of each tile's visits
+    for (std::size_t v = 0; v < visits.size(); ++v)
+      if (v == 0 || visits[v].tile != visits[v - 1].tile) starts.push_back(v);
+    starts.push_back(visits.size());
+    std::vector<Finding> found(visits.size());
+    libmap::parallel_for(starts.size() - 1, 1, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t s = begin; s < end; ++s) {
+        const libmap::PointCloud cloud = load_(visits[starts[s]].tile);
+        const MapPart tile(cloud, voxels_of_tile(cloud));
+        for (std::size_t v = starts[s]; v < starts[s + 1]; ++v)
+          found[v] = ask(tile, places[visits[v].place].in_map, options_);
+      }
+    });
+    for (std::size_t v = 0; v < visits.size(); ++v)
+      join(findings[visits[v].place], std::move(found[v]), options_.mode);
+  }
+
+  const TileStoreIndex& index_;
+  const TileLoader& load_;
+  const LookupOptions& options_;
+  TileFinder finder_;
+  double reach_m_ = 0.0;
+};
 
 }  // namespace
 
@@ -99,12 +293,51 @@ void bind(libmap::ParameterTable& table, LookupOptions& options) {
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options) {
-  check(map, options);
-  const libmap::PointTree tree(map.positions);
+  libmap::check_parameters(options);
+  if (map.empty()) throw libmap::Error("the map has no points");
+  if (options.mode == LookupMode::maximum) values_of(map, "score");
+  const MapPart whole(map);
   std::vector<LookupAnswer> answers(points.size());
   libmap::parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) answers[n] = answer_of(map, tree, points[n], options);
+    for (std::size_t n = begin; n < end; ++n)
+      answers[n] =
+          answer_of(points[n].allFinite() ? ask(whole, points[n], options) : Finding{}, options);
   });
+  return answers;
+}
+
+std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileLoader& load,
+                                        const std::vector<Eigen::Vector3d>& points,
+                                        const LookupOptions& options, libmap::Progress& progress) {
+  libmap::check_parameters(options);
+  if (index.tiles.empty()) throw libmap::Error("the map has no points");
+  const libmap::Pose terrain_from_map = index.frame == MapFrame::input
+                                            ? index.terrain_from_input()
+                                            : libmap::Pose(libmap::Pose::Identity());
+  const TileLookup lookup(index, load, options);
+  std::vector<LookupAnswer> answers(points.size());
+  std::vector<std::pair<TileNumber, std::size_t>> order;  // of the points, by their tiles
+  for (std::size_t n = 0; n < points.size(); ++n) {
+    answers[n].distance_m = HUGE_VAL;
+    const Place place{points[n], terrain_from_map * points[n]};
+    if (place.in_map.allFinite() && place.in_terrain.allFinite())
+      order.emplace_back(lookup.number_of(place), n);
+  }
+  std::sort(order.begin(), order.end());
+  progress.begin("look-up", order.size());
+  for (std::size_t first = 0; first < order.size(); first += points_at_once) {
+    const std::size_t last = std::min(order.size(), first + points_at_once);
+    std::vector<Place> places;
+    for (std::size_t n = first; n < last; ++n) {
+      const Eigen::Vector3d& point = points[order[n].second];
+      places.push_back({point, terrain_from_map * point});
+    }
+    std::vector<Finding> findings = lookup.find(places);
+    for (std::size_t n = first; n < last; ++n)
+      answers[order[n].second] = answer_of(std::move(findings[n - first]), options);
+    progress.advance(last - first);
+  }
+  progress.end();
   return answers;
 }
 

@@ -1,14 +1,17 @@
-// A map's values at listed locations.
+// A map's values at listed locations, of a whole map or of one in tiles that are loaded one by one.
 #pragma once
 
 #include <Eigen/Core>
 #include <cstddef>
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
+#include "libgtd/score/tile_store.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/core/progress.h"
 
 namespace libgtd {
 
@@ -33,18 +36,23 @@ struct LookupAnswer {
   std::vector<double> values;  // one a field of the map; empty where nothing was found
 };
 
-// |a - b|^2, the same to the bit wherever two points are compared.
-inline double squared_distance(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
-  // In the order of PointTree (nanoflann's L2_Simple_Adaptor).
-  double sum = 0.0;
-  for (Eigen::Index axis = 0; axis < 3; ++axis) sum += (a[axis] - b[axis]) * (a[axis] - b[axis]);
-  return sum;
-}
-
 // One answer for each of `points`, which are in the map's frame. Throws Error for an empty map, a
 // map without the field "score" where the mode needs it, and options out of their bounds.
 std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
                                   const std::vector<Eigen::Vector3d>& points,
                                   const LookupOptions& options = {});
+
+// The points of index.tiles[tile], in the frame of index.frame, as to_cloud orders them. Called
+// from several threads at once.
+using TileLoader = std::function<libmap::PointCloud(std::size_t tile)>;
+
+// The answers of look_up over the whole map; `map_point` counts within its tile. Points are taken
+// by their tiles, some 10^5 at a time, so that no tile is loaded that no point needs, few twice,
+// and memory holds a tile a thread besides the answers. Throws Error as look_up does, and what
+// `load` throws.
+std::vector<LookupAnswer> look_up_tiles(const TileStoreIndex& index, const TileLoader& load,
+                                        const std::vector<Eigen::Vector3d>& points,
+                                        const LookupOptions& options = {},
+                                        libmap::Progress& progress = libmap::no_progress());
 
 }  // namespace libgtd

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
-#include "libgtd/evaluate/value_bins.h"
 #include "libmap/core/error.h"
 #include "libmap/core/score_color.h"
+#include "libmap/core/text.h"
 
 namespace libgtd {
 
@@ -14,6 +14,14 @@ namespace {
 
 constexpr double score_tolerance = 1e-6;  // as in score_color.h
 constexpr int largest_gap = 6;            // of empty columns inside the ground
+
+template <typename Bin>
+std::vector<Bin> empty_bins(const ValueBins& bins) {
+  std::vector<Bin> result;
+  for (std::size_t b = 0; b < bins.count; ++b)
+    result.push_back({.low = bins.low(b), .high = bins.high(b)});
+  return result;
+}
 
 class MapCounter {
  public:
@@ -38,8 +46,7 @@ class MapCounter {
       high = std::max(high, static_cast<double>(score));
     }
     scores_ = bins_over(low, high, options_.score_bin, "score_bin");
-    for (std::size_t b = 0; b < scores_.count; ++b)
-      result_.score_bins.push_back({.low = scores_.low(b), .high = scores_.high(b)});
+    result_.score_bins = empty_bins<ScoreBin>(scores_);
     double upper = std::numeric_limits<double>::infinity();
     for (const libmap::ScoreClass& one : libmap::score_classes) {
       result_.classes.push_back({.low = one.min_score, .high = upper});
@@ -57,14 +64,12 @@ class MapCounter {
       high = std::max(high, height);
     }
     slopes_ = bins_over(0.0, 90.0, options_.slope_bin_deg, "slope_bin_deg");
-    for (std::size_t b = 0; b < slopes_.count; ++b)
-      result_.by_slope.push_back({.low = slopes_.low(b), .high = slopes_.high(b)});
+    result_.by_slope = empty_bins<GroundBin>(slopes_);
     if (!(low <= high)) return;
     result_.ground.low = low;
     result_.ground.high = high;
     heights_ = bins_over(low, high, options_.height_bin_m, "height_bin_m");
-    for (std::size_t b = 0; b < heights_.count; ++b)
-      result_.by_height.push_back({.low = heights_.low(b), .high = heights_.high(b)});
+    result_.by_height = empty_bins<GroundBin>(heights_);
   }
 
   void count_voxel(std::size_t n) {
@@ -149,6 +154,9 @@ class MapCounter {
   MapAnalysis result_;
 };
 
+constexpr double max_bins = 100'000.0;
+constexpr double rounding = 1e-9;  // of a bin's width
+
 }  // namespace
 
 void bind(libmap::ParameterTable& table, MapAnalysisOptions& options) {
@@ -169,12 +177,37 @@ std::optional<double> GroundBin::mean_score() const {
   return voxels > 0 ? std::optional(score_sum / static_cast<double>(voxels)) : std::nullopt;
 }
 
+std::size_t nearest_rank(std::size_t count, double share) {
+  const double rank = std::ceil(share * static_cast<double>(count) - 1e-9);
+  return static_cast<std::size_t>(std::clamp(rank, 1.0, static_cast<double>(count))) - 1;
+}
+
 MapAnalysis analyze_map(const VoxelMap& map, const MapSurface& surface,
                         const MapAnalysisOptions& options) {
   libmap::check_parameters(options);
   if (surface.slope_deg.size() != map.size() || surface.area_m2.size() != map.size())
     throw libmap::Error("the surface is of another map", {.field = "slope_deg"});
   return MapCounter(map, surface, options).run();
+}
+
+std::size_t ValueBins::bin_of(double value) const {
+  const double bin = std::floor((value - first_edge) / width + rounding);
+  return bin > 0.0 ? std::min(static_cast<std::size_t>(bin), count - 1) : 0;
+}
+
+ValueBins bins_over(double low, double high, double width, const char* field) {
+  if (!(width > 0.0))
+    throw libmap::Error("no width of a bin",
+                        {.field = field, .value = libmap::to_text(width), .bound = "> 0"});
+  const double first = std::floor(low / width + rounding);
+  const double count = std::max(1.0, std::ceil(high / width - rounding) - first);
+  if (!(count <= max_bins))
+    throw libmap::Error(
+        "too narrow: there would be " + libmap::to_text(count) + " bins",
+        {.field = field,
+         .value = libmap::to_text(width),
+         .bound = ">= " + libmap::to_text(static_cast<float>((high - low) / max_bins))});
+  return {first * width, width, static_cast<std::size_t>(count)};
 }
 
 }  // namespace libgtd

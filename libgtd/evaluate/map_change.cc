@@ -5,7 +5,7 @@
 #include <cmath>
 #include <limits>
 
-#include "libgtd/evaluate/value_bins.h"
+#include "libgtd/evaluate/map_analysis.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/geometry/spatial_index.h"
@@ -89,20 +89,6 @@ std::vector<VoxelPair> pairs_by_distance(const VoxelMap& map, const VoxelMap& ot
   return pairs;
 }
 
-// All three turn their signs, and low and high change places, with the values' signs.
-double middle_of(const std::vector<double>& ordered) {
-  return (ordered[(ordered.size() - 1) / 2] + ordered[ordered.size() / 2]) / 2.0;
-}
-
-double low_of(const std::vector<double>& ordered, double share) {
-  const double rank = std::ceil(share * static_cast<double>(ordered.size()) - 1e-9);
-  return ordered[static_cast<std::size_t>(std::max(rank, 1.0)) - 1];
-}
-double high_of(const std::vector<double>& ordered, double share) {
-  const double rank = std::ceil((1.0 - share) * static_cast<double>(ordered.size()) - 1e-9);
-  return ordered[ordered.size() - static_cast<std::size_t>(std::max(rank, 1.0))];
-}
-
 ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
                               const std::vector<VoxelPair>& pairs) {
   ScoreDifference result;
@@ -126,9 +112,11 @@ ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
   result.mean_absolute /= n;
   result.rms = std::sqrt(result.rms / n);
   std::sort(differences.begin(), differences.end());
-  result.low_5 = low_of(differences, 0.05);
-  result.median = middle_of(differences);
-  result.high_95 = high_of(differences, 0.95);
+  // All three turn their signs, and low and high are exchanged, with the values' signs.
+  const std::size_t last = result.count - 1;
+  result.low_5 = differences[nearest_rank(result.count, 0.05)];
+  result.median = (differences[last / 2] + differences[result.count / 2]) / 2.0;
+  result.high_95 = differences[last - nearest_rank(result.count, 1.0 - 0.95)];
   result.min = differences.front();
   result.max = differences.back();
   const auto varies = [](const std::vector<double>& scores) {

@@ -7,8 +7,8 @@
 #include <string_view>
 #include <vector>
 
-#include "libgtd/evaluate/agreement.h"
 #include "libgtd/evaluate/map_surface.h"
+#include "libgtd/evaluate/roc.h"
 #include "libgtd/evaluate/voxel_map.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"

@@ -4,23 +4,21 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
+#include <utility>
 #include <variant>
 
+#include "libgtd/evaluate/named_cells.h"
 #include "libmap/core/text.h"
 
 namespace libgtd {
 namespace {
 
-using Cells = std::vector<std::string>;
-
-// Columns and, for each of them, a row's cell; both from one function, so that they fit.
+// Values of one row, with the columns' names.
 struct Row {
-  Cells names;
-  Cells cells;
+  NamedCells cells;
 
   void add(std::string name, std::string cell) {
-    names.push_back(std::move(name));
-    cells.push_back(std::move(cell));
+    cells.emplace_back(std::move(name), std::move(cell));
   }
   void add(std::string name, std::size_t count) { add(std::move(name), std::to_string(count)); }
   // Six decimals: no map has more voxels than they tell apart.
@@ -50,11 +48,8 @@ std::vector<double> quantiles_of(std::vector<double> values) {
   std::vector<double> result;
   if (values.empty()) return result;
   std::sort(values.begin(), values.end());
-  for (const double level : summary_quantiles) {
-    const auto rank =
-        static_cast<std::size_t>(std::ceil(level * static_cast<double>(values.size()) - 1e-9));
-    result.push_back(values[std::clamp<std::size_t>(rank, 1, values.size()) - 1]);
-  }
+  for (const double level : summary_quantiles)
+    result.push_back(values[nearest_rank(values.size(), level)]);
   return result;
 }
 
@@ -120,15 +115,6 @@ std::string yes_no(std::optional<bool> value) {
   return *value ? "1" : "0";
 }
 
-libmap::Table table_of(const std::vector<Row>& rows) {
-  libmap::Table table;
-  for (const Row& row : rows) {
-    table.columns = row.names;
-    table.rows.push_back(row.cells);
-  }
-  return table;
-}
-
 // For counts that need neither slopes nor areas.
 MapSurface unmeasured(const VoxelMap& map) {
   MapSurface surface;
@@ -178,14 +164,13 @@ MapSummaryOptions summary_options(const libmap::Manifest& manifest) {
 libmap::Table summary_table(const std::vector<SummarizedMap>& maps) {
   const bool with_expected = std::any_of(
       maps.begin(), maps.end(), [](const SummarizedMap& map) { return map.expected.has_value(); });
-  std::vector<Row> rows;
-  rows.reserve(maps.size());
-  for (const SummarizedMap& map : maps) rows.push_back(row_of(map, with_expected));
-  return table_of(rows);
+  libmap::Table table;
+  for (const SummarizedMap& map : maps) append(row_of(map, with_expected).cells, table);
+  return table;
 }
 
 libmap::Table region_table(const std::vector<SummarizedMap>& maps, const ExpectedMap& expected) {
-  std::vector<Row> rows;
+  libmap::Table table;
   for (const SummarizedMap& map : maps) {
     if (!map.expected) continue;
     for (std::size_t r = 0; r < expected.regions.size(); ++r) {
@@ -206,14 +191,14 @@ libmap::Table region_table(const std::vector<SummarizedMap>& maps, const Expecte
       row.add("agrees",
               yes_no(evaluated ? std::optional(*predicted == *region.graspable) : std::nullopt));
       row.add("why", region.why);
-      rows.push_back(std::move(row));
+      append(row.cells, table);
     }
   }
-  return table_of(rows);
+  return table;
 }
 
 libmap::Table histogram_table(const std::vector<SummarizedMap>& maps) {
-  std::vector<Row> rows;
+  libmap::Table table;
   for (const SummarizedMap& map : maps) {
     for (const ScoreBin& bin : map.summary.score_bins) {
       Row row;
@@ -221,10 +206,10 @@ libmap::Table histogram_table(const std::vector<SummarizedMap>& maps) {
       row.add("score", std::optional((bin.low + bin.high) / 2.0));
       row.add("voxels", bin.evaluated);
       row.add("share", share(bin.evaluated, map.summary.evaluated));
-      rows.push_back(std::move(row));
+      append(row.cells, table);
     }
   }
-  return table_of(rows);
+  return table;
 }
 
 MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
@@ -240,7 +225,7 @@ MapPair compare_pair(const VoxelMap& first, const VoxelMap& second,
 
 libmap::Table pair_table(const std::vector<SummarizedMap>& maps,
                          const std::vector<MapPair>& pairs) {
-  std::vector<Row> rows;
+  libmap::Table table;
   for (const MapPair& pair : pairs) {
     const Confusion& counts = pair.evaluated.graspable;
     const std::optional<Kappa>& kappa = pair.evaluated.kappa;
@@ -265,9 +250,9 @@ libmap::Table pair_table(const std::vector<SummarizedMap>& maps,
     row.add("score_difference_mean", where(difference.count > 0, difference.mean));
     row.add("score_difference_rms", where(difference.count > 0, difference.rms));
     row.add("score_correlation", difference.correlation);
-    rows.push_back(std::move(row));
+    append(row.cells, table);
   }
-  return table_of(rows);
+  return table;
 }
 
 }  // namespace libgtd

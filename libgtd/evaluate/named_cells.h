@@ -1,5 +1,5 @@
-// Rows of a table written together with the names of their columns, and rates as JSON; for
-// *_tables.cc alone.
+// Rows of a table written together with the names of their columns, and rates as JSON; for the
+// sources of this folder that make tables.
 #pragma once
 
 #include <nlohmann/json.hpp>
@@ -13,13 +13,13 @@
 
 namespace libgtd {
 
-using NamedCells = std::vector<std::pair<const char*, std::string>>;
+using NamedCells = std::vector<std::pair<std::string, std::string>>;
 
 inline void append(const NamedCells& row, libmap::Table& table) {
   table.columns.clear();
   table.rows.emplace_back();
   for (const auto& [name, cell] : row) {
-    table.columns.emplace_back(name);
+    table.columns.push_back(name);
     table.rows.back().push_back(cell);
   }
 }

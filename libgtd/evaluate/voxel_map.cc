@@ -5,7 +5,7 @@
 #include <numeric>
 #include <string>
 
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 
@@ -16,7 +16,6 @@ namespace {
 using libmap::PointCloud;
 using libmap::ScalarField;
 
-constexpr double index_bound = 0x1p29;
 // Of a voxel's edge: positions in files are rounded to single precision.
 constexpr double max_offset = 0.25;
 constexpr std::size_t voxels_per_chunk = 1 << 16;
@@ -192,7 +191,7 @@ VoxelMap voxel_map_of(const PointCloud& map, const MapFacts& facts) {
     for (const std::uint32_t n : kept) {
       const Eigen::Vector3d cell =
           result.lattice.cell_of(result.terrain_from_map * map.positions[n]);
-      if (!(cell.cwiseAbs().array() <= index_bound).all())
+      if (!(cell.cwiseAbs().array() <= max_voxel_index).all())
         throw libmap::Error("a point lies too far off for voxels of this size",
                             {.field = "point " + std::to_string(n + 1)});
       voxels.push_back(result.lattice.voxel_of(result.terrain_from_map * map.positions[n]));

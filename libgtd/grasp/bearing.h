@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "libgtd/grasp/gripper_closing.h"
-#include "libgtd/gripper/gripper_fingers.h"
+#include "libgtd/gripper/gripper.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/random_stream.h"
 

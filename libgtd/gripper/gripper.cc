@@ -1,4 +1,7 @@
 #include "libgtd/gripper/gripper.h"
+#include "libmap/core/error.h"
+
+#include <cmath>
 
 namespace libgtd {
 
@@ -45,6 +48,52 @@ void Gripper::check() const {
                         {.field = "closing_angle_deg",
                          .value = libmap::to_text(closing_angle_deg),
                          .bound = "< opening_angle_deg, " + libmap::to_text(opening_angle_deg)});
+}
+
+void bind(libmap::ParameterTable& table, GripperFingers& fingers) {
+  using libmap::positive;
+  table.add("fingers.count", fingers.count, {1, 64}, "number of fingers");
+  table.add("fingers.curl_deg", fingers.curl_deg, {0.0, 90.0},
+            "angle of the distal link to the proximal one, inward, of a free finger");
+  table.add("fingers.curl_limit_deg", fingers.curl_limit_deg, {0.0, 170.0},
+            "the same at most, once the proximal link is stopped");
+  table.add("fingers.spines_per_finger", fingers.spines_per_finger, {1, 1000},
+            "spines of one finger");
+  table.add("fingers.spine_tip_radius_um", fingers.spine_tip_radius_um, {0.0, 1000.0, true, false},
+            "radius of a spine's tip, micrometers");
+  table.add("fingers.spine_force_limit_n", fingers.spine_force_limit_n, positive,
+            "largest force on one spine, N");
+  table.add("fingers.closing_force_n", fingers.closing_force_n, positive,
+            "force of one finger toward the palm's axis, N");
+  table.add("fingers.holds_when_closed", fingers.holds_when_closed,
+            "the drive resists any opening force");
+}
+
+void GripperFingers::check() const {
+  libmap::check_parameters(*this);
+  if (curl_limit_deg < curl_deg)
+    throw libmap::Error("a stopped finger curls further than a free one",
+                        {.field = "fingers.curl_limit_deg",
+                         .value = libmap::to_text(curl_limit_deg),
+                         .bound = ">= fingers.curl_deg, " + libmap::to_text(curl_deg)});
+}
+
+double HoldModel::probability(const ClosingTerms& terms) const {
+  return 1.0 / (1.0 + std::exp(-(intercept + contact * terms.contact + bearing * terms.bearing -
+                                 rise * terms.rise - depth * terms.depth)));
+}
+
+void bind(libmap::ParameterTable& table, HoldModel& model) {
+  using libmap::not_negative;
+  table.add("hold_model.load_n", model.load_n, libmap::positive, "pull that the model is for, N");
+  table.add("hold_model.intercept", model.intercept, {-100.0, 100.0}, "logit without any term");
+  table.add("hold_model.contact", model.contact, not_negative,
+            "weight of the share of fingers whose spines meet the ground");
+  table.add("hold_model.bearing", model.bearing, not_negative, "weight of what these bear");
+  table.add("hold_model.rise", model.rise, not_negative,
+            "weight of the palm's height above the voxel");
+  table.add("hold_model.depth", model.depth, not_negative,
+            "weight of the depth of the contacts below the palm");
 }
 
 }  // namespace libgtd

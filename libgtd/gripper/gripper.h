@@ -4,11 +4,55 @@
 #include <optional>
 #include <string>
 
-#include "libgtd/gripper/gripper_fingers.h"
-#include "libgtd/gripper/hold_model.h"
 #include "libmap/core/parameters.h"
 
 namespace libgtd {
+
+// What the open and closing fingers meet around a voxel of a map; see libgtd/score/closing_terms.h.
+struct ClosingTerms {
+  double contact = 0.0;  // share of the azimuths, on the weakest side, where spines meet the ground
+  double bearing = 0.0;  // ln(1 + F / P) of the pull F that they bear there, on the weakest side
+  double rise = 0.0;     // of the palm above the voxel, in lengths of a finger
+  double depth = 0.0;    // of the contacts below the palm, mean, in lengths of a finger
+};
+
+// The section `hold_model` of a gripper file, which method `calibrated` needs: the probability that
+// the gripper holds. Logistic regression: ln(p / (1 - p)) = intercept + contact * C + bearing * B -
+// rise * R - depth * D, fitted to verdicts of the virtual field test for one load. More contact and
+// more bearing never lower the probability, more rise and depth never raise it.
+struct HoldModel {
+  double load_n = 0.0;
+  double intercept = 0.0;
+  double contact = 0.0;
+  double bearing = 0.0;
+  double rise = 0.0;
+  double depth = 0.0;
+
+  // In 0 .. 1, that the load is held.
+  double probability(const ClosingTerms& terms) const;
+};
+
+// The keys "hold_model.KEY" of a gripper file, bound to `model`.
+void bind(libmap::ParameterTable& table, HoldModel& model);
+
+// The section `fingers` of a gripper file: what the virtual field test (libgtd/grasp) needs beyond
+// the measures of the mask.
+struct GripperFingers {
+  int count = 0;                     // evenly around the palm's axis
+  double curl_deg = 0.0;             // distal against proximal link, inward, of a free finger
+  double curl_limit_deg = 0.0;       // the same at most, once the proximal link is stopped
+  int spines_per_finger = 0;         // on the outer half of the distal link
+  double spine_tip_radius_um = 0.0;  // of the tip's rounding, micrometers
+  double spine_force_limit_n = 0.0;  // that one spine or the asperity under it bears
+  double closing_force_n = 0.0;      // of one finger, toward the palm's axis
+  bool holds_when_closed = false;    // the drive resists any opening force, e.g. a ball screw
+
+  // Throws Error naming the key, its value and the bound that it breaks.
+  void check() const;
+};
+
+// The keys "fingers.KEY" of a gripper file, bound to `fingers`.
+void bind(libmap::ParameterTable& table, GripperFingers& fingers);
 
 // Millimeters and degrees.
 struct Gripper {

@@ -2,6 +2,7 @@
 // stands in its way (void), as a stack of voxel layers.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -9,11 +10,40 @@
 #include <utility>
 #include <vector>
 
-#include "libgtd/gripper/closing_path.h"
 #include "libgtd/gripper/gripper.h"
 #include "libmap/core/point_cloud.h"
 
 namespace libgtd {
+
+// The way of a closing finger over voxel columns, which method `calibrated` follows on a map:
+// places of the finger's parts relative to the palm. A finger turns from wide open to closed in
+// steps that move its tip by at most half a voxel; its places are the tip, the middle of the distal
+// link and the knuckle, in this order at each step.
+struct ClosingPath {
+  struct Place {
+    double radius_m = 0.0;  // from the palm's axis
+    double depth_m = 0.0;   // below the palm
+    bool has_spines = false;
+  };
+  std::vector<Place> closing;
+  std::vector<Place> open;  // of the open finger, from joint to tip
+  double palm_radius_m = 0.0;
+  double finger_length_m = 0.0;  // both links
+  // ln(1 + F / P) of a finger of closing force P on ground that falls outward by -90 .. 90 degrees:
+  // F is the mean over the leans psi of facets, uniform in 0 .. 90 degrees, of
+  // min(P tan(fall + psi + phi - 90 deg), what all its spines bear), phi = atan 0.39 (Chen et al.
+  // 2024).
+  std::array<double, 181> bearing{};
+  HoldModel model;
+
+  double reach_m() const;  // the largest radius
+};
+
+// Throws Error naming the section that the gripper does not have: `fingers` or `hold_model`.
+void require_hold_model(const Gripper& gripper);
+
+// Throws as require_hold_model.
+ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m);
 
 // thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), in which
 // what the fingers cannot reach is not counted. climblab: the base of both. corrected: the idea of

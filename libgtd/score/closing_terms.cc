@@ -19,19 +19,19 @@ namespace {
 
 constexpr int azimuths = 16;
 constexpr int gap_columns = 3;
-constexpr int block_columns = 64;
+constexpr int closing_block_columns = 64;
 // The open finger rests on the ground: only what rises more than rounding into its way is met.
-constexpr double clearance_m = 1e-5;
+constexpr double palm_clearance_m = 1e-5;
 constexpr double unknown = -std::numeric_limits<double>::infinity();
 // Of where the gripper comes to rest, in lengths of a finger: the standard deviation of a normal
 // distribution that is cut at twice of it. Pose and tilt of the palm, the azimuths of its fingers
 // and the width of a column all blur what it meets; this value makes the verdicts of the virtual
 // field test on the fitted sites nearly as likely as any larger one.
 constexpr double spread = 0.25;
-constexpr double cut = 2.0;
+constexpr double max_deviations = 2.0;
 
 // Places around a pivot as columns, for one azimuth.
-struct Cell {
+struct RayCell {
   int i = 0;
   int j = 0;
   double depth = 0.0;  // below the palm
@@ -39,27 +39,27 @@ struct Cell {
 };
 
 struct Rest {
-  Cell cell;
+  RayCell cell;
   double weight = 0.0;
 };
 
 struct Rays {
-  std::vector<Rest> rests;  // where the gripper may come to rest
-  std::vector<Cell> palm;   // depth 0
-  std::vector<Cell> open;   // of all azimuths
-  std::array<std::vector<Cell>, azimuths> closing;
+  std::vector<Rest> rests;    // where the gripper may come to rest
+  std::vector<RayCell> palm;  // depth 0
+  std::vector<RayCell> open;  // of all azimuths
+  std::array<std::vector<RayCell>, azimuths> closing;
   std::array<std::array<double, azimuths>, azimuths> weights{};  // side, azimuth; 1 in sum
 };
 
 // Whether a place in this column has not been as deep before: else it would have met the ground.
-bool is_new(const std::vector<Cell>& cells, const Cell& next) {
-  return std::none_of(cells.begin(), cells.end(), [&](const Cell& cell) {
+bool is_new(const std::vector<RayCell>& cells, const RayCell& next) {
+  return std::none_of(cells.begin(), cells.end(), [&](const RayCell& cell) {
     return cell.i == next.i && cell.j == next.j && cell.depth >= next.depth;
   });
 }
 
 int rest_columns(const ClosingPath& path, double voxel_size_m) {
-  return static_cast<int>(cut * spread * path.finger_length_m / voxel_size_m);
+  return static_cast<int>(max_deviations * spread * path.finger_length_m / voxel_size_m);
 }
 
 Rays make_rays(const ClosingPath& path, double voxel_size_m) {
@@ -68,7 +68,7 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   const int farthest = rest_columns(path, voxel_size_m);
   for (int i = -farthest; i <= farthest; ++i)
     for (int j = -farthest; j <= farthest; ++j)
-      if (const double distance = std::hypot(i, j) / sigma; distance <= cut)
+      if (const double distance = std::hypot(i, j) / sigma; distance <= max_deviations)
         rays.rests.push_back({{i, j}, std::exp(-0.5 * distance * distance)});
   const int palm = static_cast<int>(std::ceil(path.palm_radius_m / voxel_size_m));
   for (int i = -palm; i <= palm; ++i)
@@ -77,13 +77,13 @@ Rays make_rays(const ClosingPath& path, double voxel_size_m) {
   for (int a = 0; a < azimuths; ++a) {
     const double angle = 2.0 * std::numbers::pi * a / azimuths;
     const auto cell = [&](const ClosingPath::Place& place) {
-      return Cell{static_cast<int>(std::lround(place.radius_m * std::cos(angle) / voxel_size_m)),
-                  static_cast<int>(std::lround(place.radius_m * std::sin(angle) / voxel_size_m)),
-                  place.depth_m, place.has_spines};
+      return RayCell{static_cast<int>(std::lround(place.radius_m * std::cos(angle) / voxel_size_m)),
+                     static_cast<int>(std::lround(place.radius_m * std::sin(angle) / voxel_size_m)),
+                     place.depth_m, place.has_spines};
     };
     for (const ClosingPath::Place& place : path.open) rays.open.push_back(cell(place));
     for (const ClosingPath::Place& place : path.closing)
-      if (const Cell next = cell(place); is_new(rays.closing[static_cast<std::size_t>(a)], next))
+      if (const RayCell next = cell(place); is_new(rays.closing[static_cast<std::size_t>(a)], next))
         rays.closing[static_cast<std::size_t>(a)].push_back(next);
     double sum = 0.0;
     auto& weights = rays.weights[static_cast<std::size_t>(a)];
@@ -119,16 +119,16 @@ class Heights {
     return static_cast<std::size_t>(i - bounds_.i_begin) * static_cast<std::size_t>(width_) +
            static_cast<std::size_t>(j - bounds_.j_begin);
   }
-  std::ptrdiff_t step(const Cell& cell) const {
+  std::ptrdiff_t step(const RayCell& cell) const {
     return static_cast<std::ptrdiff_t>(cell.i) * width_ + cell.j;
   }
   std::size_t size() const { return heights_.size(); }
   double height(std::size_t at) const { return heights_[at]; }
   // From the first of the cells around a column that has ground to the lowest one.
-  double fall(std::size_t at, const std::vector<Cell>& cells) const {
+  double fall(std::size_t at, const std::vector<RayCell>& cells) const {
     double first = unknown;
     double lowest = std::numeric_limits<double>::infinity();
-    for (const Cell& cell : cells) {
+    for (const RayCell& cell : cells) {
       const double height = heights_[at + static_cast<std::size_t>(step(cell))];
       if (height == unknown) continue;
       if (first == unknown) first = height;
@@ -186,10 +186,10 @@ class BlockCloser {
  public:
   BlockCloser(const Heights& heights, const Rays& rays, const ClosingPath& path)
       : heights_(heights), rays_(rays), path_(path), met_(heights.size()) {
-    for (const Cell& cell : rays.palm) palm_.push_back(heights.step(cell));
-    for (const Cell& cell : rays.open) open_.push_back(heights.step(cell));
+    for (const RayCell& cell : rays.palm) palm_.push_back(heights.step(cell));
+    for (const RayCell& cell : rays.open) open_.push_back(heights.step(cell));
     for (std::size_t a = 0; a < azimuths; ++a)
-      for (const Cell& cell : rays.closing[a]) closing_[a].push_back(heights.step(cell));
+      for (const RayCell& cell : rays.closing[a]) closing_[a].push_back(heights.step(cell));
   }
 
   // The pivot's column must have ground.
@@ -235,7 +235,7 @@ class BlockCloser {
     double depths = 0.0;
     double touching = 0.0;
     for (std::size_t a = 0; a < azimuths; ++a) {
-      const Cell* cell = nullptr;
+      const RayCell* cell = nullptr;
       const std::size_t at = first_contact(at_rest, palm, a, cell);
       if (cell == nullptr || !cell->has_spines) continue;
       contacts[a] = 1.0;
@@ -264,11 +264,11 @@ class BlockCloser {
   }
 
   std::size_t first_contact(std::size_t pivot, double palm, std::size_t azimuth,
-                            const Cell*& cell) const {
-    const std::vector<Cell>& cells = rays_.closing[azimuth];
+                            const RayCell*& cell) const {
+    const std::vector<RayCell>& cells = rays_.closing[azimuth];
     for (std::size_t n = 0; n < cells.size(); ++n) {
       const std::size_t at = pivot + static_cast<std::size_t>(closing_[azimuth][n]);
-      if (!(heights_.height(at) > palm - cells[n].depth + clearance_m)) continue;
+      if (!(heights_.height(at) > palm - cells[n].depth + palm_clearance_m)) continue;
       cell = &cells[n];
       return at;
     }
@@ -295,12 +295,12 @@ class BlockCloser {
 };
 
 // From the circle of the closed spines outward, as columns around a pivot.
-std::vector<Cell> outward_cells(const GripperMask& mask, double angle) {
-  std::vector<Cell> cells;
+std::vector<RayCell> outward_cells(const GripperMask& mask, double angle) {
+  std::vector<RayCell> cells;
   const auto first = static_cast<int>(mask.closed_radius_m / mask.voxel_size_m);
   for (int step = first; step <= mask.pivot_xy; ++step) {
-    const Cell cell{static_cast<int>(std::lround(step * std::cos(angle))),
-                    static_cast<int>(std::lround(step * std::sin(angle)))};
+    const RayCell cell{static_cast<int>(std::lround(step * std::cos(angle))),
+                       static_cast<int>(std::lround(step * std::sin(angle)))};
     const double radius_m = std::hypot(cell.i, cell.j) * mask.voxel_size_m;
     if (radius_m < mask.closed_radius_m || radius_m > mask.open_radius_m) continue;
     if (cells.empty() || cells.back().i != cell.i || cells.back().j != cell.j)
@@ -317,18 +317,19 @@ void for_each_block(const VoxelGrid& grid, const std::vector<std::size_t>& pivot
   std::map<std::pair<int, int>, std::vector<std::size_t>> blocks;
   for (std::size_t n = 0; n < pivots.size(); ++n) {
     const Voxel& voxel = grid.voxels[pivots[n]];
-    blocks[{floor_divide(voxel.i, block_columns), floor_divide(voxel.j, block_columns)}].push_back(
-        n);
+    blocks[{floor_divide(voxel.i, closing_block_columns),
+            floor_divide(voxel.j, closing_block_columns)}]
+        .push_back(n);
   }
   const std::vector<std::pair<std::pair<int, int>, std::vector<std::size_t>>> listed(blocks.begin(),
                                                                                      blocks.end());
   libmap::parallel_for(listed.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t b = begin; b < end; ++b) {
       const auto& [place, members] = listed[b];
-      const int i = place.first * block_columns;
-      const int j = place.second * block_columns;
-      use(members,
-          Heights(grid, grown({i, i + block_columns, j, j + block_columns}, reach, reach)));
+      const int i = place.first * closing_block_columns;
+      const int j = place.second * closing_block_columns;
+      use(members, Heights(grid, grown({i, i + closing_block_columns, j, j + closing_block_columns},
+                                       reach, reach)));
     }
   });
 }
@@ -360,7 +361,7 @@ std::vector<ClosingTerms> closing_terms(const VoxelGrid& grid, const ClosingPath
 
 std::vector<double> outward_shares(const VoxelGrid& grid, const GripperMask& mask,
                                    const std::vector<std::size_t>& pivots) {
-  std::array<std::vector<Cell>, azimuths> rays;
+  std::array<std::vector<RayCell>, azimuths> rays;
   for (std::size_t a = 0; a < azimuths; ++a)
     rays[a] = outward_cells(mask, 2.0 * std::numbers::pi * static_cast<double>(a) / azimuths);
   std::vector<double> shares(pivots.size(), 0.0);

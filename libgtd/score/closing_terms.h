@@ -1,5 +1,5 @@
 // What a closing gripper would meet at a voxel, from the heights of the columns around it: the
-// terms of method `calibrated` (ClosingTerms in libgtd/gripper/hold_model.h).
+// terms of method `calibrated` (ClosingTerms in libgtd/gripper/gripper.h).
 //
 // The palm comes down upright on a column until it or an open finger meets ground. Each
 // of 16 fingers then follows its closing path until one of its places is in the ground. Where that

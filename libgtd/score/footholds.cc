@@ -7,9 +7,8 @@
 #include <numeric>
 
 #include "libgtd/shape/curvature.h"
-#include "libgtd/shape/place_order.h"
 #include "libgtd/shape/point_grid.h"
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 

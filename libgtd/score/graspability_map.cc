@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <numeric>
 
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/score_color.h"
 

@@ -5,7 +5,7 @@
 #include <cstdlib>
 #include <vector>
 
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 
 namespace libgtd {
 

@@ -14,28 +14,6 @@ namespace libgtd {
 
 namespace {
 
-// Calls visit(n, m) for each two voxels n < m at most `reach` apart along each axis.
-template <typename Visit>
-void for_each_pair(const std::vector<Voxel>& voxels, int reach, const Visit& visit) {
-  // In each of the rows i .. i + reach the first voxel of the columns j - reach .. j + reach: it
-  // moves on as the voxels do.
-  std::vector<std::vector<Voxel>::const_iterator> firsts(static_cast<std::size_t>(reach) + 1,
-                                                         voxels.begin());
-  constexpr int lowest = std::numeric_limits<int>::min();
-  for (std::size_t n = 0; n < voxels.size(); ++n) {
-    const Voxel& voxel = voxels[n];
-    for (int di = 0; di <= reach; ++di) {
-      auto& first = firsts[static_cast<std::size_t>(di)];
-      first = first_not_below(first, voxels.end(), {voxel.i + di, voxel.j - reach, lowest});
-      for (auto at = first; at != voxels.end() && at->i == voxel.i + di && at->j <= voxel.j + reach;
-           ++at) {
-        const auto m = static_cast<std::size_t>(at - voxels.begin());
-        if (m > n && std::abs(at->k - voxel.k) <= reach) visit(n, m);
-      }
-    }
-  }
-}
-
 // The most that two voxels are apart along an axis.
 int extent_of(const std::vector<Voxel>& voxels) {
   if (voxels.empty()) return 0;
@@ -97,7 +75,7 @@ std::vector<Rise> measure_faces(const std::vector<Voxel>& voxels,
     throw libmap::Error("spans too many voxels", {.field = "normal_radius_m",
                                                   .value = libmap::to_text(reach) + " voxels",
                                                   .bound = "<= 100000 voxels"});
-  for_each_pair(voxels, static_cast<int>(reach), [&](std::size_t n, std::size_t m) {
+  visit_pairs(voxels, static_cast<int>(reach), [&](std::size_t n, std::size_t m) {
     if (is_steep[n] == 0 && is_steep[m] == 0) return;
     const double di = voxels[m].i - voxels[n].i, dj = voxels[m].j - voxels[n].j,
                  dk = voxels[m].k - voxels[n].k;
@@ -132,7 +110,7 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
   for (std::size_t n = 0; n < voxels.size(); ++n)
     is_steep[n] = static_cast<double>(slopes_deg[n]) > options.slope_deg ? 1 : 0;
   VoxelSets faces(voxels.size());
-  for_each_pair(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
+  visit_pairs(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
     if (is_steep[n] != 0 && is_steep[m] != 0) faces.join(n, m);
   });
   const std::vector<Rise> rises =
@@ -144,7 +122,7 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
     if (static_cast<double>(rise.top) - rise.foot > limit) obstacles[n] = Obstacle::face;
   }
   VoxelSets regions(voxels.size());
-  for_each_pair(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
+  visit_pairs(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
     if (obstacles[n] == Obstacle::none && obstacles[m] == Obstacle::none) regions.join(n, m);
   });
   const std::size_t ground = find_ground(obstacles, regions);
@@ -156,7 +134,7 @@ std::vector<Obstacle> find_obstacles(const std::vector<Voxel>& voxels,
     const double below_top = static_cast<double>(rise.top) - voxels[place].k;
     if (above_foot > limit || above_foot > below_top) is_on_top[regions.find(place)] = 1;
   };
-  for_each_pair(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
+  visit_pairs(voxels, obstacle_link_voxels, [&](std::size_t n, std::size_t m) {
     meet(n, m);
     meet(m, n);
   });

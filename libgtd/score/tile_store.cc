@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 
 namespace libgtd {
 

@@ -6,7 +6,7 @@
 
 #include "libgtd/score/closing_terms.h"
 #include "libgtd/score/scanned_area.h"
-#include "libgtd/score/scoring.h"
+#include "libgtd/score/voxel_matching.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"

@@ -1,4 +1,4 @@
-// Voxel matching with the mask tilted to the surface: around each pivot the terrain's points are
+// Scoring with the mask tilted to the surface: around each pivot the terrain's points are
 // put into voxels of a lattice of its own, whose third axis is the surface's normal.
 #pragma once
 
@@ -8,6 +8,8 @@
 
 #include "libgtd/score/tiling.h"
 #include "libgtd/shape/point_grid.h"
+#include "libgtd/shape/surface_normal.h"
+#include "libmap/core/point_cloud.h"
 #include "libmap/core/progress.h"
 
 namespace libgtd {
@@ -54,5 +56,28 @@ class TiltedTerrain {
   PointGrid grid_;
   std::vector<Eigen::Vector3d> cells_;  // of the points, in voxels, in the order of the grid
 };
+
+// The pivots of the tiles, ascending, each once.
+std::vector<Voxel> pivots_of(const VoxelGrid& grid, const GripperMask& mask,
+                             const std::vector<TileBounds>& tiles);
+
+// The surface at the center of each voxel, facing where the normals of the voxel's own points do,
+// or +z where they have none.
+std::vector<SurfaceNormal> normals_at(const std::vector<Voxel>& voxels,
+                                      const libmap::PointCloud& surface,
+                                      const VoxelLattice& lattice, double radius_m);
+
+// Scores the pivots `voxels` with the mask along `normals`, along +z where there is none. The
+// pivot's tilted voxel has its center where the normal through the voxel's center meets the height
+// of the voxel's points along it: the mask's top layer holds a flat surface whole, whichever way it
+// faces and wherever it cuts through the terrain's voxels. Without a normal it is the voxel itself,
+// so that its counts are those of the upright mask. `surface` are the points that made the voxels.
+std::vector<ScoredVoxel> score_on_surface(const std::vector<Voxel>& voxels,
+                                          const std::vector<SurfaceNormal>& normals,
+                                          const libmap::PointCloud& surface, const VoxelGrid& grid,
+                                          const GripperMask& mask,
+                                          const std::vector<TileBounds>& tiles,
+                                          const ScoringOptions& options,
+                                          libmap::Progress& progress = libmap::no_progress());
 
 }  // namespace libgtd

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "libgtd/gripper/gripper_mask.h"
-#include "libgtd/score/bit_count.h"
 #include "libgtd/terrain/voxel_grid.h"
+#include "libmap/core/instruction_set.h"
 #include "libmap/core/progress.h"
 
 namespace libgtd {
@@ -33,5 +33,19 @@ std::vector<VoxelCounts> match_voxels(
     const VoxelGrid& grid, const GripperMask& mask, const std::vector<std::size_t>& pivots,
     libmap::InstructionSet instructions = libmap::best_instruction_set(),
     libmap::Progress& progress = libmap::no_progress());
+
+// Number of chunks of 64 bytes of the mask that are compared with the ground at each pivot.
+std::size_t solid_chunks(const GripperMask& mask);
+
+// Percent (eq. 3-17, 3-18): GSV / SSV, lowered by (TSV - SSV) / TSV * 100 where SSV <= TSV and the
+// quotient is at least 60. `thesis` and `envelope` divide in single precision as the author's
+// program does (which then cuts the result to an integer) and can be negative; `corrected` divides
+// in double precision and ends at 0. `climblab` has no penalty.
+double score_percent(const VoxelCounts& counts, Method method, int solid_voxel_threshold);
+
+// Whether the counts alone make a voxel graspable: its score (0..1) reaches the threshold, or, with
+// `climblab`, every solid voxel of the window lies in the mask and there are more than TSV of them.
+bool meets_threshold(const VoxelCounts& counts, double score, Method method,
+                     int solid_voxel_threshold, double graspability_threshold);
 
 }  // namespace libgtd

@@ -9,12 +9,9 @@
 #include <optional>
 #include <string>
 
-#include "libgtd/shape/cell_surroundings.h"
 #include "libgtd/shape/neighbor_loops.h"
-#include "libgtd/shape/place_order.h"
 #include "libgtd/shape/point_grid.h"
 #include "libgtd/shape/surface_normal.h"
-#include "libgtd/shape/thesis_curvature.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
@@ -97,17 +94,6 @@ std::array<double, 2> bending(const Vector6d& quadric) {
   return {middle + half, middle - half};
 }
 
-// +1 if `normal` faces outside, -1 if inside, 0 if that is not known.
-int side_of(const Vector3d& normal, const libmap::PointCloud& cloud, std::size_t point,
-            const Vector3d& up) {
-  Vector3d outside = Vector3d::Zero();
-  if (cloud.has_normals()) outside = cloud.normals[point].cast<double>();
-  double cosine = outside.allFinite() && outside.norm() > 0 ? normal.dot(outside.normalized()) : 0;
-  if (std::abs(cosine) < min_side_cosine) cosine = normal.dot(up);
-  if (std::abs(cosine) < min_side_cosine) return 0;
-  return cosine > 0 ? 1 : -1;
-}
-
 class QuadricFitter {
  public:
   // `in_order` are the cloud's points in the order of the grid.
@@ -131,8 +117,12 @@ class QuadricFitter {
       is_fitted_ = true;
     }
     if (!surface_) return {};
-    const int side = side_of(surface_->normal, cloud_, point, up_);
-    if (side == 0) return {};
+    double cosine = 0;
+    if (cloud_.has_normals())
+      cosine = side_of(surface_->normal, cloud_.normals[point].cast<double>());
+    if (cosine == 0) cosine = side_of(surface_->normal, up_);
+    if (cosine == 0) return {};
+    const int side = cosine > 0 ? 1 : -1;
     const auto [toward, away] = surface_->bending;
     Curvature result;
     result.k1 = static_cast<float>((side > 0 ? -away : toward) / radius_);

@@ -55,4 +55,11 @@ CurvatureResult estimate_curvature(
     const libmap::PointCloud& cloud, const CurvatureOptions& options = {},
     const std::optional<std::vector<std::size_t>>& queries = std::nullopt);
 
+// CurvatureMethod::thesis at the points `queries`, whose indices and radius have been checked: to
+// the bit what the Point Cloud Library's NormalEstimation and PrincipalCurvaturesEstimation yield
+// with its search::KdTree. They compute in single precision, so that the order of sums matters:
+// neighbors come by distance, then by index.
+std::vector<Curvature> estimate_thesis_curvature(const libmap::PointCloud& cloud, double radius_m,
+                                                 const std::vector<std::size_t>& queries);
+
 }  // namespace libgtd

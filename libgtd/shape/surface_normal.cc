@@ -6,7 +6,7 @@
 #include <numbers>
 #include <string>
 
-#include "libgtd/shape/cell_surroundings.h"
+#include "libgtd/shape/point_grid.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
@@ -16,12 +16,6 @@ namespace libgtd {
 namespace {
 
 using Eigen::Vector3d;
-
-double side_of(const Vector3d& normal, const Vector3d& outside) {
-  if (!outside.allFinite() || !(outside.norm() > 0)) return 0;
-  const double cosine = normal.dot(outside.normalized());
-  return std::abs(cosine) < min_side_cosine ? 0 : cosine;
-}
 
 SurfaceNormal facing(const Vector3d& fitted, const Vector3d& outside, const Vector3d& up) {
   double side = side_of(fitted, outside);
@@ -67,6 +61,13 @@ class PlaneFitter {
 };
 
 }  // namespace
+
+double side_of(const Vector3d& normal, const Vector3d& outside) {
+  constexpr double min_cosine = 1e-3;
+  if (!outside.allFinite() || !(outside.norm() > 0)) return 0;
+  const double cosine = normal.dot(outside.normalized());
+  return std::abs(cosine) < min_cosine ? 0 : cosine;
+}
 
 std::vector<SurfaceNormal> fit_surface_normals(const libmap::PointCloud& cloud,
                                                const std::vector<Vector3d>& places,

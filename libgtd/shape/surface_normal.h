@@ -26,8 +26,9 @@ struct SurfaceNormal {
   float slope_deg = nan;
 };
 
-// A surface this near to being along a direction (0.06 deg) does not face it.
-inline constexpr double min_side_cosine = 1e-3;
+// On which side of a surface with this unit normal `outside` is, a direction of any length: the
+// cosine between both. 0 if it is zero, not finite or within 0.06 deg of the surface.
+double side_of(const Eigen::Vector3d& normal, const Eigen::Vector3d& outside);
 
 // Whether points determine a plane, by the eigenvalues of their covariance in ascending order: they
 // are neither a line nor a lump that no plane fits better than another.

@@ -1,4 +1,4 @@
-#include "libgtd/shape/thesis_curvature.h"
+#include "libgtd/shape/curvature.h"
 
 #include <pcl/common/eigen.h>
 

@@ -1,13 +1,21 @@
 #include "libgtd/terrain/regression_plane.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <string>
+#include <utility>
+#include <vector>
 
-#include "libgtd/terrain/ground_normal.h"
 #include "libmap/core/error.h"
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/plane_fit.h"
+#include "libmap/geometry/robust.h"
+#include "libmap/geometry/voxel_key.h"
 
 namespace libgtd {
 
@@ -174,6 +182,138 @@ double side_of(const Vector3d& normal, const Vector3d& direction) {
   if (!(length > 0) || !std::isfinite(length)) return 0;
   const double cosine = normal.dot(direction / length);
   return std::abs(cosine) > in_plane_cosine ? cosine : 0;
+}
+
+// The least-squares plane of the points.
+struct FittedPlane {
+  Vector3d centroid;      // m
+  Matrix3d axes;          // columns: unit normal, then two unit vectors in the plane
+  double extent_m = 0.0;  // > 0: standard deviation of the points along the last axis
+};
+
+constexpr double cells_per_extent = 70.0;
+constexpr std::size_t cells_per_chunk = 4096;
+// The ground is a plane if half of the surface is so much nearer to it than to the start.
+constexpr double max_median_ratio = 0.5;
+constexpr double min_cosine = 0.7071067811865476;  // to the start's normal: 45 degrees
+constexpr int hypotheses = 500;
+constexpr std::size_t max_looked_at = 4000;
+constexpr int max_steps = 200;
+constexpr double converged_rad = 1e-9;
+
+struct Mean {
+  Vector3d sum = Vector3d::Zero();
+  double count = 0.0;
+};
+
+// Along the start's axes from its centroid, in its extents, in the order of the cells.
+std::vector<Vector3d> cell_means(const libmap::PointStream& points, const FittedPlane& start) {
+  libmap::VoxelIndex cells;
+  std::vector<Mean> sums;  // of the cells
+  points.for_each_block(libmap::PointStream::Need::positions, [&](const libmap::PointCloud& block) {
+    for (const Vector3d& position : block.positions) {
+      if (!position.allFinite()) continue;
+      const Vector3d place = start.axes.transpose() * (position - start.centroid) / start.extent_m;
+      libmap::VoxelPlace voxel;
+      for (int axis = 0; axis < 3; ++axis)
+        voxel.cell[axis] = static_cast<int>(std::llround(place[axis] * cells_per_extent));
+      const std::uint32_t cell = cells.find_or_add(pack(voxel));
+      if (cell == sums.size()) sums.emplace_back();
+      sums[cell].sum += place;
+      sums[cell].count += 1.0;
+    }
+  });
+  std::vector<std::pair<std::uint64_t, std::size_t>> order;
+  order.reserve(sums.size());
+  for (const std::uint64_t key : cells.keys()) order.emplace_back(key, order.size());
+  std::sort(order.begin(), order.end());
+  std::vector<Vector3d> means;
+  means.reserve(order.size());
+  for (const auto& [key, cell] : order) means.push_back(sums[cell].sum / sums[cell].count);
+  return means;
+}
+
+// Through places in the start's axes; at first the start itself.
+struct Plane {
+  Vector3d normal = Vector3d::UnitX();
+  double offset = 0.0;
+  double height(const Vector3d& place) const { return normal.dot(place) - offset; }
+};
+
+Plane weighted_fit(const std::vector<Vector3d>& places, const Plane& last, double limit) {
+  const libmap::PlaneSpread spread = libmap::weighted_spread(
+      places, Vector3d::Zero(), cells_per_chunk, [&](const Vector3d& place) {
+        const double ratio = last.height(place) / limit;
+        return libmap::tukey_weight(ratio);
+      });
+  if (!spread.is_plane(1e-4)) return last;
+  Plane plane;
+  plane.normal = spread.axes.col(0);
+  if (plane.normal.dot(last.normal) < 0.0) plane.normal = -plane.normal;
+  plane.offset = plane.normal.dot(spread.center);
+  return plane;
+}
+
+// Of the absolute heights.
+double median_height(const std::vector<Vector3d>& places, const Plane& plane) {
+  std::vector<double> heights;
+  heights.reserve(places.size());
+  for (const Vector3d& place : places) heights.push_back(std::abs(plane.height(place)));
+  return libmap::median(std::move(heights));
+}
+
+// Least median of squares (Rousseeuw 1984): of planes through three places, the one with the least
+// median of the absolute heights. Every so many-th place is looked at.
+Plane least_median(const std::vector<Vector3d>& places, const Plane& start) {
+  std::vector<Vector3d> looked_at;
+  const std::size_t step = places.size() / max_looked_at + 1;
+  for (std::size_t n = 0; n < places.size(); n += step) looked_at.push_back(places[n]);
+  libmap::RandomStream random(1, 0);
+  Plane best = start;
+  double least = median_height(looked_at, start);
+  for (int n = 0; n < hypotheses; ++n) {
+    const Vector3d& a = looked_at[random.below(looked_at.size())];
+    const Vector3d& b = looked_at[random.below(looked_at.size())];
+    const Vector3d& c = looked_at[random.below(looked_at.size())];
+    Plane plane;
+    plane.normal = (b - a).cross(c - a);
+    const double length = plane.normal.norm();
+    if (!(length > 0.0)) continue;
+    plane.normal /= plane.normal.dot(start.normal) < 0.0 ? -length : length;
+    if (!(plane.normal.dot(start.normal) > min_cosine)) continue;
+    plane.offset = plane.normal.dot(a);
+    const double median = median_height(looked_at, plane);
+    if (median >= least) continue;
+    least = median;
+    best = plane;
+  }
+  return best;
+}
+
+// Unit normal of the plane that most of the surface follows, on the side of the start's normal, at
+// most 45 degrees from it: the least-squares plane is tilted toward rocks. The points are replaced
+// by one mean per cube of extent_m / 70 (about 1/250 of the terrain's width), so that parts of the
+// surface that were scanned more densely have no more weight. The least median of squares of 500
+// planes (Rousseeuw 1984) is refined by reweighted least squares with Tukey's biweight. Equals the
+// start's normal if its median distance is not at least twice that of the plane found: such a
+// terrain has no level ground. The same for points in one or in many blocks, to the bit.
+Vector3d ground_normal(const libmap::PointStream& points, const FittedPlane& start) {
+  const std::vector<Vector3d> places = cell_means(points, start);
+  const Plane squares;
+  const Plane found = least_median(places, squares);
+  const double median = median_height(places, found);
+  if (!(median < max_median_ratio * median_height(places, squares))) return start.axes.col(0);
+  // Below this, heights are rounding.
+  constexpr double min_limit = 1e-6;
+  const double limit = std::max(libmap::tukey_width_of(median), min_limit);
+  Plane plane = found;
+  for (int step = 0; step < max_steps; ++step) {
+    const Plane next = weighted_fit(places, plane, limit);
+    const double turn = (next.normal - plane.normal).norm();
+    plane = next;
+    if (turn < converged_rad) break;
+  }
+  return start.axes * plane.normal;
 }
 
 // A fitted plane whose normal may still face either side.

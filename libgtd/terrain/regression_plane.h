@@ -16,7 +16,7 @@ namespace libgtd {
 // thesis: the heading is y = (c x n) / |c x n|, which turns with the distance to the input's
 // origin. corrected: x is the input frame's x axis laid into the plane, or, where that axis stands
 // on the plane, y is the input frame's y axis laid into it. robust: the same with the normal of the
-// ground, to which rocks do not tilt it (ground_normal.h).
+// ground, to which rocks do not tilt it.
 enum class PlaneMethod { thesis, corrected, robust };
 
 // What decided which side of the plane is up, in the order in which they are asked.

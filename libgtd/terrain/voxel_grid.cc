@@ -24,7 +24,7 @@ void require_voxel_size(double voxel_size_m) {
 template <typename Vector>
 void require_room(const Vector& extent_in_voxels, double voxel_size_m) {
   const Eigen::Vector3d extent = extent_in_voxels.template cast<double>();
-  if ((extent.cwiseAbs().array() < 0x1p29).all()) return;
+  if ((extent.cwiseAbs().array() < max_voxel_index).all()) return;
   const double gigabytes = (extent.cwiseAbs().array() + 1.0).prod() / 8.0 / 0x1p30;
   throw libmap::Error("too small for this cloud: the grid would take " +
                           libmap::to_text(static_cast<float>(gigabytes)) +
@@ -111,6 +111,8 @@ SortedCells sort_by_cell(const std::vector<Cell>& cells) {
   sorted.begins.push_back(sorted.order.size());
   return sorted;
 }
+
+constexpr std::array<const char*, 3> names = {"i", "j", "k"};
 
 }  // namespace
 
@@ -205,6 +207,37 @@ VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
   const Voxel size = lattice.size_to(high);
   grid.max = {size.i - 1, size.j - 1, size.k - 1};
   return grid;
+}
+
+const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name) {
+  if (const libmap::ScalarField* field = map.find_field(name)) return field->values;
+  throw libmap::Error("the map has no such field", {.field = name});
+}
+
+VoxelFields::VoxelFields(const libmap::PointCloud& map) {
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    const libmap::ScalarField* field = map.find_field(names[axis]);
+    if (field == nullptr)
+      throw libmap::Error("not a graspability map: it has no such field", {.field = names[axis]});
+    values_[axis] = &field->values;
+  }
+}
+
+int VoxelFields::index(std::size_t axis, std::size_t n) const {
+  const double value = (*values_[axis])[n];
+  if (!(std::abs(value) <= max_voxel_index) || value != std::floor(value))
+    throw libmap::Error("no index of a voxel", {.field = names[axis],
+                                                .value = libmap::to_text(value),
+                                                .bound = "a whole number within +-2^29"});
+  return static_cast<int>(value);
+}
+
+Voxel VoxelFields::at(std::size_t n) const { return {index(0, n), index(1, n), index(2, n)}; }
+
+std::vector<Voxel> VoxelFields::all() const {
+  std::vector<Voxel> voxels(values_[0]->size());
+  for (std::size_t n = 0; n < voxels.size(); ++n) voxels[n] = at(n);
+  return voxels;
 }
 
 }  // namespace libgtd

@@ -3,7 +3,9 @@
 
 #include <Eigen/Core>
 #include <algorithm>
+#include <array>
 #include <cstddef>
+#include <cstdlib>
 #include <iterator>
 #include <limits>
 #include <vector>
@@ -38,6 +40,29 @@ Iterator first_not_below(Iterator at, Iterator end, const Voxel& voxel) {
     step *= 2;
   }
   return std::lower_bound(at, step < end - at ? at + step : end, voxel);
+}
+
+// Calls visit(n, m) for each two of the ascending voxels, n < m, at most `reach` apart along each
+// axis.
+template <typename Visit>
+void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit) {
+  // In each of the rows i .. i + reach the first voxel of the columns j - reach .. j + reach: it
+  // moves on as the voxels do.
+  std::vector<std::vector<Voxel>::const_iterator> firsts(static_cast<std::size_t>(reach) + 1,
+                                                         voxels.begin());
+  constexpr int lowest = std::numeric_limits<int>::min();
+  for (std::size_t n = 0; n < voxels.size(); ++n) {
+    const Voxel& voxel = voxels[n];
+    for (int di = 0; di <= reach; ++di) {
+      auto& first = firsts[static_cast<std::size_t>(di)];
+      first = first_not_below(first, voxels.end(), {voxel.i + di, voxel.j - reach, lowest});
+      for (auto at = first; at != voxels.end() && at->i == voxel.i + di && at->j <= voxel.j + reach;
+           ++at) {
+        const auto m = static_cast<std::size_t>(at - voxels.begin());
+        if (m > n && std::abs(at->k - voxel.k) <= reach) visit(n, m);
+      }
+    }
+  }
 }
 
 // Calls visit(first, last) for each row of voxels of one i in the columns, ascending: positions
@@ -85,5 +110,24 @@ VoxelGrid voxelize_thesis(const std::vector<Eigen::Vector3f>& points_in_terrain,
 // ascending order of z, y, x (what the author's program does before and in the voxelization).
 std::vector<Eigen::Vector3f> thin_to_centroids(const std::vector<Eigen::Vector3f>& points,
                                                double leaf_m);
+
+// Throws Error naming the field if it is missing.
+const std::vector<double>& values_of(const libmap::PointCloud& map, const char* name);
+
+class VoxelFields {
+ public:
+  // Throws Error naming the field that is missing. The map outlives it and keeps its fields.
+  explicit VoxelFields(const libmap::PointCloud& map);
+
+  // Of point n. Throws Error naming the field whose value is no whole number within +-2^29.
+  Voxel at(std::size_t n) const;
+  // Of all points.
+  std::vector<Voxel> all() const;
+
+ private:
+  int index(std::size_t axis, std::size_t n) const;
+
+  std::array<const std::vector<double>*, 3> values_{};
+};
 
 }  // namespace libgtd

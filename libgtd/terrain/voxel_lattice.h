@@ -13,6 +13,9 @@ constexpr Integer floor_to(Real value) {
   return static_cast<Real>(whole) > value ? whole - 1 : whole;
 }
 
+// Indices of voxels are within +-2^29: windows around them and differences fit an int.
+inline constexpr double max_voxel_index = 0x1p29;
+
 // Ordered by i, then j, then k: the order of every list of voxels and of every map.
 struct Voxel {
   int i = 0;

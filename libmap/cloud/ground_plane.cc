@@ -11,7 +11,8 @@
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/plane_fit.h"
+#include "libmap/geometry/robust.h"
 
 namespace libmap {
 
@@ -36,65 +37,11 @@ struct Plane {
   double height(const Eigen::Vector3d& point) const { return normal.dot(point - center); }
 };
 
-// Weighted sums of a plane's points about a place near them.
-struct Moments {
-  double weight = 0.0;
-  Eigen::Vector3d first = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+constexpr std::size_t points_per_chunk = 8192;
 
-  void add(const Eigen::Vector3d& point, double w) {
-    weight += w;
-    first += w * point;
-    second += w * point * point.transpose();
-  }
-  Moments& operator+=(const Moments& other) {
-    weight += other.weight;
-    first += other.first;
-    second += other.second;
-    return *this;
-  }
-};
+bool is_plane(const PlaneSpread& spread) { return spread.is_plane(1e-12); }
 
-struct Spread {
-  Eigen::Vector3d center = Eigen::Vector3d::Zero();
-  Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // ascending
-  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
-
-  // Points in one place or on one line have no plane.
-  bool is_plane() const { return variances[1] > 1e-12 * variances[2] && variances[2] > 0.0; }
-};
-
-Spread spread_of(const Moments& moments) {
-  Spread spread;
-  if (!(moments.weight > 0.0)) return spread;
-  spread.center = moments.first / moments.weight;
-  const Eigen::Matrix3d covariance =
-      moments.second / moments.weight - spread.center * spread.center.transpose();
-  const SymmetricEigen<3> eigen = symmetric_eigen(covariance);
-  spread.variances = eigen.values;
-  spread.axes = eigen.vectors;
-  return spread;
-}
-
-// weight(point) of each, in chunks that do not depend on the number of threads.
-template <typename Weight>
-Spread weighted_spread(const Points& points, const Eigen::Vector3d& near, const Weight& weight) {
-  Spread spread = spread_of(parallel_reduce(
-      points.size(), 8192, Moments{},
-      [&](std::size_t begin, std::size_t end) {
-        Moments part;
-        for (std::size_t n = begin; n < end; ++n) {
-          const double w = weight(points[n]);
-          if (w > 0.0) part.add(points[n] - near, w);
-        }
-        return part;
-      },
-      [](Moments a, const Moments& b) { return a += b; }));
-  spread.center += near;
-  return spread;
-}
-
-Plane plane_of(const Spread& spread, const Eigen::Vector3d& up) {
+Plane plane_of(const PlaneSpread& spread, const Eigen::Vector3d& up) {
   Plane plane{spread.axes.col(0), spread.center};
   if (plane.normal.dot(up) < 0.0) plane.normal = -plane.normal;
   return plane;
@@ -149,10 +96,11 @@ std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& 
   const auto most = std::max_element(second.begin(), second.end()) - second.begin();
   Plane plane = planes[order[static_cast<std::size_t>(most)]];
   for (int round = 0; round < 5; ++round) {
-    const Spread spread = weighted_spread(points, plane.center, [&](const Eigen::Vector3d& point) {
-      return std::abs(plane.height(point)) <= options.tolerance_m ? 1.0 : 0.0;
-    });
-    if (!spread.is_plane()) return std::nullopt;
+    const PlaneSpread spread =
+        weighted_spread(points, plane.center, points_per_chunk, [&](const Eigen::Vector3d& point) {
+          return std::abs(plane.height(point)) <= options.tolerance_m ? 1.0 : 0.0;
+        });
+    if (!is_plane(spread)) return std::nullopt;
     plane = plane_of(spread, up);
   }
   return plane;
@@ -226,13 +174,14 @@ Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up,
       if (height <= tolerance) deviations.push_back(height);
     }
     if (deviations.size() < 3) return plane;
-    const double limit = std::clamp(4.685 * 1.4826 * median(std::move(deviations)),
+    const double limit = std::clamp(tukey_width_of(median(std::move(deviations))),
                                     std::min(100.0 * exact, tolerance), tolerance);
-    const Spread spread = weighted_spread(near, plane.center, [&](const Eigen::Vector3d& point) {
-      const double ratio = plane.height(point) / limit;
-      return std::abs(ratio) < 1.0 ? (1.0 - ratio * ratio) * (1.0 - ratio * ratio) : 0.0;
-    });
-    if (!spread.is_plane()) return plane;
+    const PlaneSpread spread =
+        weighted_spread(near, plane.center, points_per_chunk, [&](const Eigen::Vector3d& point) {
+          const double ratio = plane.height(point) / limit;
+          return tukey_weight(ratio);
+        });
+    if (!is_plane(spread)) return plane;
     const Plane fitted = plane_of(spread, up);
     const double moved = std::abs(fitted.height(plane.center)) +
                          (fitted.normal - plane.normal).norm() * std::sqrt(spread.variances[2]);
@@ -265,9 +214,9 @@ void require_plane_spread(const Points& points) {
   if (points.size() < 3)
     throw Error("too few points for a ground plane",
                 {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
-  const Spread spread =
-      weighted_spread(points, points.front(), [](const Eigen::Vector3d&) { return 1.0; });
-  if (!spread.is_plane()) throw Error("all points lie on one line: there is no ground plane");
+  const PlaneSpread spread = weighted_spread(points, points.front(), points_per_chunk,
+                                             [](const Eigen::Vector3d&) { return 1.0; });
+  if (!is_plane(spread)) throw Error("all points lie on one line: there is no ground plane");
 }
 
 std::string percent(double share) { return to_fixed_text(100.0 * share, 1) + " %"; }

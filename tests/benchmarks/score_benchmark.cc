@@ -8,7 +8,7 @@
 #include <string>
 
 #include "libgtd/gripper/gripper_io.h"
-#include "libgtd/score/level_window.h"
+#include "libgtd/score/matching_loops.h"
 #include "libgtd/score/tiling.h"
 #include "libmap/core/parallel.h"
 #include "libmap/simulate/scene_sampling.h"
@@ -96,7 +96,7 @@ double peak_bytes_per_s(libmap::InstructionSet instructions) {
   for (int round = 0; round < 30; ++round)
     graspmap_bench::time_once(
         [&] {
-          libgtd::loops_of(instructions)
+          libgtd::matching_loops_of(instructions)
               .count(window.front().bits, origins.data(), pivot_count, chunks.data(),
                      offsets.data(), chunk_count, counts.data());
           benchmark::DoNotOptimize(counts.data());
@@ -134,7 +134,7 @@ void matching(benchmark::State& state, const Set& set, libmap::InstructionSet in
     benchmark::DoNotOptimize(libgtd::score_tiles(work.grid, work.mask, tiles, options));
   });
   const double bytes = static_cast<double>(work.pivots.size()) *
-                       static_cast<double>(libgtd::plan_matching(work.mask).solid.chunks.size()) *
+                       static_cast<double>(libgtd::solid_chunks(work.mask)) *
                        sizeof(libgtd::MaskChunk);
   state.counters["pivots"] = static_cast<double>(work.pivots.size());
   if (work.baseline_s) state.counters["speedup"] = *work.baseline_s / times.min();

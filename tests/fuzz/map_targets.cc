@@ -1,7 +1,6 @@
 // Graspability maps, whole and in tiles.
 #include "libgtd/evaluate/expected_map.h"
 #include "libgtd/evaluate/lookup.h"
-#include "libgtd/evaluate/tile_lookup.h"
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/map_downsampling.h"

@@ -11,7 +11,7 @@
 #include "libgtd/grasp/finger_closing.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
-#include "libgtd/terrain/voxel_fields.h"
+#include "libgtd/terrain/voxel_grid.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "libmap/mesh/mesh_io.h"

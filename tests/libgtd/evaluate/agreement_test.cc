@@ -1,4 +1,4 @@
-#include "libgtd/evaluate/agreement.h"
+#include "libgtd/evaluate/roc.h"
 
 #include <gtest/gtest.h>
 

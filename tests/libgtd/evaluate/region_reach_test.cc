@@ -1,4 +1,4 @@
-#include "libgtd/evaluate/region_reach.h"
+#include "libgtd/evaluate/map_regions.h"
 
 #include <gtest/gtest.h>
 

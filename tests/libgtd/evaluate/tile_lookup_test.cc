@@ -1,5 +1,5 @@
 // A map in tiles answers as the whole map does, to the bit.
-#include "libgtd/evaluate/tile_lookup.h"
+#include "libgtd/evaluate/lookup.h"
 
 #include <gtest/gtest.h>
 

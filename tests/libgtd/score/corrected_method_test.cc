@@ -8,7 +8,7 @@
 #include <utility>
 
 #include "libgtd/detect.h"
-#include "libgtd/score/scoring.h"
+#include "libgtd/score/voxel_matching.h"
 #include "libmap/core/parallel.h"
 #include "tests/libgtd/plain_matching.h"
 #include "tests/libgtd/score/score_test_support.h"

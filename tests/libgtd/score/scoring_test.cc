@@ -1,4 +1,4 @@
-#include "libgtd/score/scoring.h"
+#include "libgtd/score/voxel_matching.h"
 
 #include <gtest/gtest.h>
 

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "libgtd/detect.h"
-#include "libgtd/score/tilted_cells.h"
+#include "libgtd/score/matching_loops.h"
 #include "libgtd/score/tilted_matching.h"
 #include "libmap/core/parallel.h"
 #include "tests/libgtd/instruction_sets.h"
@@ -350,7 +350,7 @@ TEST(SurfaceOrientation, AllInstructionSetsYieldTheSame) {
   std::array<std::vector<double>, 3> points;
   const std::size_t count = 1003;
   for (auto& axis : points)
-    for (std::size_t n = 0; n < count + TiltedLoops::lanes; ++n)
+    for (std::size_t n = 0; n < count + MatchingLoops::lanes; ++n)
       axis.push_back(n < count ? std::floor(uniform(-20.0, 20.0) * 4.0) / 4.0
                                : std::numeric_limits<double>::infinity());
   const double* const axes[3] = {points[0].data(), points[1].data(), points[2].data()};
@@ -361,9 +361,9 @@ TEST(SurfaceOrientation, AllInstructionSetsYieldTheSame) {
       for (int b = 0; b < 3; ++b) lattice.axes[a][b] = tilted_axes(normal)(b, a);
     std::vector<std::vector<int>> found;
     for (const auto instructions : graspmap_test::instruction_sets()) {
-      std::vector<int> cells(count + TiltedLoops::lanes);
+      std::vector<int> cells(count + MatchingLoops::lanes);
       cells.resize(
-          tilted_loops_of(instructions).find_cells(axes, count, lattice, box, cells.data()));
+          matching_loops_of(instructions).find_cells(axes, count, lattice, box, cells.data()));
       found.push_back(std::move(cells));
       EXPECT_EQ(found.back(), found.front());
     }

@@ -7,7 +7,6 @@
 #include <set>
 #include <sstream>
 
-#include "libgtd/score/scoring.h"
 #include "tests/libgtd/instruction_sets.h"
 #include "tests/libgtd/plain_matching.h"
 #include "tests/libgtd/score/score_test_support.h"

@@ -1,4 +1,4 @@
-#include "libgtd/score/tilted_cells.h"
+#include "libgtd/score/matching_loops.h"
 
 #if defined(GRASPMAP_X86_LOOPS)
 #include <immintrin.h>
@@ -7,11 +7,11 @@
 namespace libgtd {
 
 namespace {
-#define GRASPMAP_LOOPS "libgtd/score/tilted_cells_body.h"
+#define GRASPMAP_LOOPS "libgtd/score/matching_loops_body.h"
 #include "libmap/core/instruction_set_loops.h"
 }  // namespace
 
-const TiltedLoops& tilted_loops_of(libmap::InstructionSet instructions) {
+const MatchingLoops& matching_loops_of(libmap::InstructionSet instructions) {
   return all_of(instructions);
 }
 

@@ -1,0 +1,67 @@
+// Weighted least-squares planes, the step of every robust plane fit.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+#include "libmap/core/parallel.h"
+
+namespace libmap {
+
+// Weighted sums over points about an origin near them.
+struct PlaneMoments {
+  double weight = 0.0;
+  Eigen::Vector3d first = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d second = Eigen::Matrix3d::Zero();
+
+  void add(const Eigen::Vector3d& offset, double w) {
+    weight += w;
+    first += w * offset;
+    second += w * offset * offset.transpose();
+  }
+  PlaneMoments& operator+=(const PlaneMoments& other) {
+    weight += other.weight;
+    first += other.first;
+    second += other.second;
+    return *this;
+  }
+};
+
+// Principal axes of weighted points; the first one is the normal of their plane, of either sign.
+struct PlaneSpread {
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+  Eigen::Vector3d variances = Eigen::Vector3d::Zero();  // ascending
+  Eigen::Matrix3d axes = Eigen::Matrix3d::Identity();
+
+  // False for points in one place and for points whose second variance is at most `min_ratio` of
+  // the largest: on one line they have no plane.
+  bool is_plane(double min_ratio) const {
+    return variances[1] > min_ratio * variances[2] && variances[2] > 0.0;
+  }
+};
+
+// All zero without weight.
+PlaneSpread spread_of(const PlaneMoments& moments, const Eigen::Vector3d& origin);
+
+// Points count by weight(point) > 0. Sums run in chunks, so that the result does not depend on the
+// number of threads.
+template <typename Weight>
+PlaneSpread weighted_spread(const std::vector<Eigen::Vector3d>& points,
+                            const Eigen::Vector3d& origin, std::size_t points_per_chunk,
+                            const Weight& weight) {
+  return spread_of(parallel_reduce(
+                       points.size(), points_per_chunk, PlaneMoments{},
+                       [&](std::size_t begin, std::size_t end) {
+                         PlaneMoments part;
+                         for (std::size_t n = begin; n < end; ++n) {
+                           const double w = weight(points[n]);
+                           if (w > 0.0) part.add(points[n] - origin, w);
+                         }
+                         return part;
+                       },
+                       [](PlaneMoments a, const PlaneMoments& b) { return a += b; }),
+                   origin);
+}
+
+}  // namespace libmap
