@@ -36,7 +36,7 @@ install(DIRECTORY libmap libgtd DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap
   PATTERN rosbag2_metadata.h EXCLUDE
   PATTERN rtabmap_rows.h EXCLUDE
   PATTERN tile_store_json.h EXCLUDE)
-install(DIRECTORY data/cameras data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
+install(DIRECTORY data/cameras data/expected data/grippers data/report data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(FILES tools/completion/graspmap.bash
