@@ -8,12 +8,12 @@ set(CPACK_PACKAGING_INSTALL_PREFIX /usr)
 set(CPACK_STRIP_FILES ON)
 set(CPACK_DEBIAN_FILE_NAME DEB-DEFAULT)
 set(CPACK_DEBIAN_PACKAGE_SECTION science)
-# Of what the programs link, by dpkg-shlibdeps; then what they start: VTK's pictures without a
-# screen, and the pipelines.
+# Of what the programs link, by dpkg-shlibdeps; then what they read and start: fonts, VTK's scenes
+# without a screen, and the pipelines.
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_NAME graspmap)
-set(CPACK_DEBIAN_GRASPMAP_PACKAGE_DEPENDS "libgl1-mesa-dri, libjs-three, make, xvfb")
+set(CPACK_DEBIAN_GRASPMAP_PACKAGE_DEPENDS "fonts-dejavu-core, libgl1-mesa-dri, libjs-three, make, xvfb")
 # To build against the library.
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SUGGESTS "cmake, libeigen3-dev")
 set(CPACK_DEB_COMPONENT_INSTALL ON)

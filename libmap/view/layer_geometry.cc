@@ -1,4 +1,4 @@
-#include "libmap/view/scene_geometry.h"
+#include "libmap/view/layer_geometry.h"
 
 #include <algorithm>
 #include <cmath>
