@@ -23,7 +23,7 @@ foreach(header IN LISTS graspmap_public_headers)
   install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/graspmap/${folder}
     COMPONENT development)
 endforeach()
-install(DIRECTORY data/cameras data/expected data/grippers data/report data/reports data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
+install(DIRECTORY data/cameras data/expected data/grippers data/report data/rigs data/scenarios data/scenes data/sensors data/sites data/field_test
   DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(DIRECTORY pipelines DESTINATION ${CMAKE_INSTALL_DATADIR}/graspmap)
 install(FILES tools/completion/graspmap.bash

@@ -28,11 +28,11 @@ set(CPACK_COMPONENTS_ALL graspmap development)
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_NAME graspmap)
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SECTION science)
 set(CPACK_COMPONENT_GRASPMAP_DESCRIPTION "${package_text}")
-# Of what the programs link, by dpkg-shlibdeps; then what they start: VTK's pictures without a
-# screen, and the pipelines.
+# Of what the programs link, by dpkg-shlibdeps; then what they read and start: fonts, VTK's scenes
+# without a screen, and the pipelines.
 set(CPACK_DEBIAN_GRASPMAP_PACKAGE_SHLIBDEPS ON)
 set(CPACK_DEBIAN_PACKAGE_SHLIBDEPS_PRIVATE_DIRS ${CMAKE_LIBRARY_OUTPUT_DIRECTORY})
-set(CPACK_DEBIAN_GRASPMAP_PACKAGE_DEPENDS "libgl1-mesa-dri, libjs-three, make, xvfb")
+set(CPACK_DEBIAN_GRASPMAP_PACKAGE_DEPENDS "fonts-dejavu-core, libgl1-mesa-dri, libjs-three, make, xvfb")
 
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_NAME libgraspmap-dev)
 set(CPACK_DEBIAN_DEVELOPMENT_PACKAGE_SECTION libdevel)

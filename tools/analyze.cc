@@ -1,7 +1,8 @@
 // graspmap analyze: how much of a map can be held, where, what joins it; what differs from another.
 #include "libgtd/evaluate/analysis_tables.h"
 #include "libmap/cloud/cloud_io.h"
-#include "libmap/view/virtual_display.h"
+#include "libmap/view/image_io.h"
+#include "libmap/view/offscreen.h"
 #include "tools/support/analysis_pictures.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
@@ -239,7 +240,7 @@ std::string short_name(const std::string& file) {
 }
 
 void write_chart(const fs::path& folder, const std::string& name, const libmap::Chart& chart) {
-  libmap::write_chart_svg(folder / (name + ".svg"), chart);
+  libmap::write_text(folder / (name + ".svg"), libmap::chart_svg(chart));
   libmap::write_text(folder / (name + ".png"), libmap::to_png(libmap::draw_chart(chart)));
 }
 

@@ -8,7 +8,6 @@
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
 #include "libmap/view/image_io.h"
-#include "libmap/view/virtual_display.h"
 #include "tools/support/command_line.h"
 
 using namespace graspmap_tools;
@@ -79,7 +78,6 @@ void note_results(const TableEvaluation& evaluation, Run& run) {
 
 void write_results(const EvaluateOptions& options, const TableEvaluation& evaluation, Run& run) {
   const libmap::Chart chart = chart_of(evaluation, options.title);
-  const libmap::VirtualDisplay display;
   const libmap::ColorImage picture =
       run.timed("draw", [&] { return libmap::draw_chart(chart, libmap::roc_chart_size); });
   const auto text = &Run::text_writer;
@@ -92,10 +90,7 @@ void write_results(const EvaluateOptions& options, const TableEvaluation& evalua
                            {"accuracy.csv", csv(libgtd::accuracy_table(evaluation))},
                            {"summary.json", text(libgtd::to_json(evaluation))},
                            {"summary.md", text(libgtd::to_markdown(evaluation, options.title))},
-                           {"roc.svg",
-                            [&](const auto& temporary) {
-                              libmap::write_chart_svg(temporary, chart, libmap::roc_chart_size);
-                            }},
+                           {"roc.svg", text(libmap::chart_svg(chart, libmap::roc_chart_size))},
                            {"roc.png", text(libmap::to_png(picture))}});
 }
 

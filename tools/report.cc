@@ -2,20 +2,20 @@
 #include <system_error>
 
 #include "libgtd/evaluate/voxel_map.h"
+#include "libgtd/grasp/trial_scene.h"
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/map_downsampling.h"
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
-#include "libmap/report/found_outline.h"
-#include "libmap/report/outline_io.h"
+#include "libmap/mesh/mesh_io.h"
+#include "libmap/report/html.h"
 #include "libmap/report/report_page.h"
 #include "libmap/report/report_reader.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
-#include "tools/support/report_scene.h"
 
 using namespace graspmap_tools;
 
@@ -35,7 +35,7 @@ struct ReportCommandOptions {
 };
 
 void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
-  table.add("title", options.title, "heading of the report; empty: the outline's");
+  table.add("title", options.title, "heading of the report; empty: the name of the folder");
   table.add("max_size_mb", options.max_size_mb, libmap::Range{1.0, 1000.0},
             "size of the file, million bytes: pictures and maps are made smaller until they fit");
   table.add("max_cells", options.max_cells, libmap::Range{100.0, 10'000'000.0},
@@ -48,26 +48,8 @@ constexpr double bytes_a_cell = 28.0 / 3.0;
 constexpr double maps_share = 0.4;
 constexpr double scenes_share = 0.4;
 
-std::size_t count_items(const std::vector<libmap::OutlineItem>& items, libmap::ItemKind kind) {
-  return static_cast<std::size_t>(
-      std::count_if(items.begin(), items.end(),
-                    [&](const libmap::OutlineItem& item) { return item.kind == kind; }));
-}
-
-std::size_t count_items(const std::vector<libmap::OutlineSection>& sections,
-                        libmap::ItemKind kind) {
-  std::size_t count = 0;
-  for (const libmap::OutlineSection& section : sections)
-    count += count_items(section.items, kind) + count_items(section.sections, kind);
-  return count;
-}
-
-std::size_t count_items(const libmap::Outline& outline, libmap::ItemKind kind) {
-  return count_items(outline.items, kind) + count_items(outline.sections, kind);
-}
-
-std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::Outline& outline) {
-  const std::size_t maps = count_items(outline, libmap::ItemKind::map);
+std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::ReportPlan& plan) {
+  const std::size_t maps = plan.count(libmap::ItemKind::map);
   const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
   return static_cast<std::size_t>(std::min(affordable, static_cast<double>(options.max_cells)));
@@ -100,19 +82,6 @@ libmap::PageAssets read_assets(const ReportCommandOptions& options, bool with_vi
   }
   assets.library_notice = read_asset("three_license.txt", run);
   return assets;
-}
-
-libmap::Outline find_outline(const ReportCommandOptions& options, Run& run) {
-  libmap::Outline outline;
-  if (options.outline.empty()) {
-    outline = libmap::outline_of_folder(options.folder);
-  } else {
-    const fs::path file = libmap::find_data_file("reports", options.outline);
-    run.add_input(file);
-    outline = libmap::read_outline(file);
-  }
-  if (!options.title.empty()) outline.title = options.title;
-  return outline;
 }
 
 struct DownsampledMap {
@@ -199,7 +168,24 @@ libmap::MapView load_map_view(const fs::path& path, const std::optional<fs::path
   return view;
 }
 
+// A trial of the virtual field test. Subtracts its size from `bytes_left`.
+libmap::ReportScene load_report_scene(const fs::path& path, double& bytes_left) {
+  libmap::ReportScene scene;
+  scene.mesh = libmap::read_mesh(path).mesh;
+  const auto bytes = static_cast<double>(libmap::scene_bytes(scene.mesh));
+  if (bytes > bytes_left)
+    throw libmap::Error("the report has no room for it: --max-size-mb gives more");
+  bytes_left -= bytes;
+  for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(scene.mesh))
+    scene.legend.emplace_back(part.color, part.text);
+  return scene;
+}
+
 void make_report(ReportCommandOptions& options, Run& run) {
+  if (!options.outline.empty())
+    throw UsageError(
+        "--outline was removed: a report shows what its folder contains, in the order of the "
+        "names");
   std::error_code code;
   if (!fs::is_directory(options.folder, code))
     throw libmap::Error(fs::exists(options.folder, code) ? "is no folder" : "no such folder",
@@ -209,16 +195,17 @@ void make_report(ReportCommandOptions& options, Run& run) {
   if (extension != ".html" && extension != ".htm")
     throw libmap::Error("reports are written as .html", {.file = options.output});
   run.claim_output(options.output);
-  const libmap::Outline outline = find_outline(options, run);
-  const std::size_t max_cells = cells_a_map(options, outline);
-  const bool has_views = (max_cells > 0 && count_items(outline, libmap::ItemKind::map) > 0) ||
-                         count_items(outline, libmap::ItemKind::scene) > 0;
+  libmap::ReportPlan plan = libmap::plan_report(options.folder);
+  if (!options.title.empty()) plan.title = options.title;
+  const std::size_t max_cells = cells_a_map(options, plan);
+  const bool has_views = (max_cells > 0 && plan.count(libmap::ItemKind::map) > 0) ||
+                         plan.count(libmap::ItemKind::scene) > 0;
   const bool with_views = !options.no_views && has_views;
   const libmap::PageAssets assets = read_assets(options, with_views, run);
   double bytes_left = scenes_share * options.max_size_mb * 1e6;
   const libmap::ReportReadResult read = run.timed("read", [&] {
     return libmap::read_report_content(
-        outline, {.folder = options.folder, .left_out = options.output},
+        plan, {.folder = options.folder, .left_out = options.output},
         [&](const fs::path& map, const auto& lookup) {
           return load_map_view(map, lookup, max_cells, run);
         },
@@ -248,7 +235,7 @@ int main(int argc, char** argv) {
   command.input("DIR", options.folder, "folder of the run");
   command.output(options.output, "report (.html); default: report.html in DIR", false);
   command.option("--outline", "OUTLINE", options.outline,
-                 "what it shows: a YAML file or a name in data/reports; default: all in DIR");
+                 "removed: a report shows what DIR contains, in the order of the names");
   command.flag("--no-3d", options.no_views, "leave the 3-D views out");
   command.option("--three", "FOLDER", options.three, "where three.js lies");
   bind(command.parameters(), options);

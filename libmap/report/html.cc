@@ -6,7 +6,6 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/manifest.h"
-#include "libmap/core/text.h"
 
 namespace libmap {
 
@@ -85,28 +84,6 @@ std::string csp_hash(std::string_view code) {
   for (std::size_t n = 0; n + 1 < digits.size(); n += 2)
     bytes += static_cast<char>(std::stoi(digits.substr(n, 2), nullptr, 16));
   return "'sha256-" + to_base64(bytes) + "'";
-}
-
-std::string paragraphs(std::string_view text) {
-  std::string html;
-  std::string paragraph;
-  const auto end_paragraph = [&] {
-    if (!paragraph.empty()) html += "<p>" + escape_html(paragraph) + "</p>\n";
-    paragraph.clear();
-  };
-  while (!text.empty()) {
-    const std::size_t end = text.find('\n');
-    const std::string_view line = trim(text.substr(0, end));
-    text.remove_prefix(end == std::string_view::npos ? text.size() : end + 1);
-    if (line.empty()) {
-      end_paragraph();
-      continue;
-    }
-    if (!paragraph.empty()) paragraph += '\n';
-    paragraph += line;
-  }
-  end_paragraph();
-  return html;
 }
 
 std::string attribute(std::string_view name, std::string_view value) {

@@ -1,4 +1,4 @@
-#include "libmap/report/manifest_html.h"
+#include "libmap/report/html.h"
 
 #include <fmt/format.h>
 
@@ -9,8 +9,6 @@
 #include <vector>
 
 #include "libmap/core/text.h"
-#include "libmap/report/html.h"
-#include "libmap/report/table_html.h"
 
 namespace libmap {
 
@@ -132,13 +130,20 @@ std::string milliseconds(const std::optional<double>& seconds) {
   return cell_html({to_fixed_text(*seconds * 1e3, 1), to_text(*seconds) + " s"}, true);
 }
 
+// Of a case, over the rows of `command`, or over all for an empty name.
+double total_seconds(const TimingTable& table, std::size_t which, const std::string& command) {
+  double sum = 0.0;
+  for (const TimingRow& row : table.rows)
+    if (command.empty() || row.command == command) sum += row.seconds[which].value_or(0.0);
+  return sum;
+}
+
 std::string sum_row(const TimingTable& table, const std::string& name, const std::string& command) {
   std::string html = "<tr class=\"sum\"><th scope=\"row\">" + escape_html(name) + "</th>";
   for (std::size_t n = 0; n < table.cases.size(); ++n) {
     const double sum = total_seconds(table, n, command);
     html += milliseconds(sum > 0.0 ? std::optional(sum) : std::nullopt);
   }
-  for (std::size_t n = 0; n < table.published.size(); ++n) html += "<td></td>";
   return html + "</tr>\n";
 }
 
@@ -149,7 +154,6 @@ std::string thread_row(const TimingTable& table) {
     for (const unsigned one : threads) text += (text.empty() ? "" : ", ") + std::to_string(one);
     html += cell_html({text, ""}, true);
   }
-  for (std::size_t n = 0; n < table.published.size(); ++n) html += "<td></td>";
   return html + "</tr>\n";
 }
 
@@ -206,10 +210,8 @@ std::string timings_html(const TimingTable& table) {
   std::string html = "<table class=\"timings\"><thead><tr><th scope=\"col\">step, ms</th>";
   for (const std::string& name : table.cases)
     html += "<th scope=\"col\" class=\"number\">" + breakable_html(name) + "</th>";
-  for (const std::string& name : table.published)
-    html += "<th scope=\"col\" class=\"number published\">" + escape_html(name) + "</th>";
   html += "</tr></thead>\n";
-  const std::size_t width = 1 + table.cases.size() + table.published.size();
+  const std::size_t width = 1 + table.cases.size();
   for (std::size_t n = 0; n < table.rows.size(); ++n) {
     const TimingRow& row = table.rows[n];
     if (n == 0 || table.rows[n - 1].command != row.command)
@@ -219,7 +221,6 @@ std::string timings_html(const TimingTable& table) {
           width, escape_html(row.command));
     html += "<tr><th scope=\"row\">" + escape_html(row.step) + "</th>";
     for (const auto& seconds : row.seconds) html += milliseconds(seconds);
-    for (const auto& seconds : row.published_seconds) html += milliseconds(seconds);
     html += "</tr>\n";
     if (n + 1 == table.rows.size() || table.rows[n + 1].command != row.command)
       html += sum_row(table, "sum", row.command) + "</tbody>\n";
@@ -230,36 +231,6 @@ std::string timings_html(const TimingTable& table) {
   html += "<tbody>" + (several ? sum_row(table, "all steps", "") : "") + thread_row(table) +
           "</tbody></table>\n";
   return html;
-}
-
-std::string values_html(const ReportValues& values) {
-  bool published = false;
-  bool units = false;
-  std::vector<std::string> cells;
-  for (const ReportValue& value : values) {
-    published = published || !value.published.empty();
-    units = units || !value.unit.empty();
-    cells.push_back(value.value);
-  }
-  const NumberStyle style = number_style(cells);
-  std::string html =
-      "<table class=\"pairs\"><thead><tr><td></td><th scope=\"col\" class=\"number\">this run</th>";
-  if (published) html += "<th scope=\"col\" class=\"number\">published</th>";
-  if (units) html += "<th scope=\"col\">unit</th>";
-  html += "</tr></thead><tbody>\n";
-  for (const ReportValue& value : values) {
-    // A whole number among others keeps its form: it is a count.
-    const bool whole = value.value.find_first_of(".eE") == std::string::npos;
-    const std::string shown = whole ? value.value : shown_number(value.value, style);
-    html +=
-        "<tr><th scope=\"row\">" + escape_html(value.label) + "</th>" +
-        cell_html({shown.empty() ? "\xE2\x80\x93" : shown, shown == value.value ? "" : value.value},
-                  true);
-    if (published) html += cell_html({value.published, ""}, true);
-    if (units) html += cell_html({value.unit, ""}, false);
-    html += "</tr>\n";
-  }
-  return html + "</tbody></table>\n";
 }
 
 }  // namespace libmap

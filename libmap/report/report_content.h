@@ -13,8 +13,6 @@
 #include "libmap/core/table.h"
 #include "libmap/core/triangle_mesh.h"
 #include "libmap/report/map_view.h"
-#include "libmap/report/outline.h"
-#include "libmap/report/timing_table.h"
 
 namespace libmap {
 
@@ -29,10 +27,12 @@ struct ReportPicture {
   std::string change{};  // how it differs from the file: "JPEG, 1000 px wide"; empty: not at all
 };
 
+// Columns of a table that are shown, with their headings; none: all.
+using TableColumns = std::vector<std::pair<std::string, std::string>>;
+
 struct ReportTable {
   Table table{};                         // the columns and at most the rows that are shown
   std::vector<std::string> headings{};   // one a column
-  std::size_t open_rows = 40;            // the rest is folded away
   std::optional<std::uint64_t> lines{};  // of the whole file, if not all of it was read
 };
 
@@ -52,11 +52,21 @@ struct ReportParameters {
   std::vector<std::pair<std::string, Manifest>> outputs{};  // by the head of their column
 };
 
-struct ReportValue {
-  std::string label{};
-  std::string value{};
-  std::string unit{};
-  std::string published{};
+// Running times: each step by each case, as in tables 4-2 and 4-3 of the thesis.
+struct TimingRow {
+  std::string command;
+  std::string step;
+  std::vector<std::optional<double>> seconds;  // one per case
+};
+
+struct TimingTable {
+  std::vector<std::string> cases;
+  std::vector<TimingRow> rows;  // by command and step, as they first came
+  // For each case: the number of manifests, and the numbers of threads that they ran with.
+  std::vector<std::size_t> manifests;
+  std::vector<std::vector<unsigned>> threads;
+  // Steps that several manifests of one case name were added up.
+  bool sums = false;
 };
 
 struct ReportListing {
@@ -64,21 +74,15 @@ struct ReportListing {
   std::size_t left_out_lines = 0;
 };
 
-struct ReportNote {
-  std::string text{};
-};
-
-// A file that is not there (no reason) or cannot be shown.
+// A file that cannot be shown.
 struct ReportGap {
   std::string file{};
   std::string reason{};
 };
 
 using ReportPictures = std::vector<ReportPicture>;
-using ReportValues = std::vector<ReportValue>;
-using ReportBody =
-    std::variant<std::monostate, ReportPictures, ReportTable, ReportMap, ReportScene,
-                 ReportParameters, ReportValues, TimingTable, ReportListing, ReportNote>;
+using ReportBody = std::variant<std::monostate, ReportPictures, ReportTable, ReportMap, ReportScene,
+                                ReportParameters, TimingTable, ReportListing>;
 
 struct ReportItem {
   std::string caption{};
@@ -90,8 +94,6 @@ struct ReportItem {
 struct ReportSection {
   std::string heading{};
   std::string folder{};  // relative to the run's
-  std::string text{};
-  std::vector<ReportGap> gaps{};
   std::vector<ReportItem> items{};
   std::vector<ReportSection> sections{};
 };
@@ -105,7 +107,6 @@ struct ReportSource {
 
 struct ReportContent {
   std::string title{};
-  std::string text{};
   std::vector<ReportItem> items{};
   std::vector<ReportSection> sections{};
   std::vector<ReportSource> sources{};

@@ -8,11 +8,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/report/html.h"
-#include "libmap/report/manifest_html.h"
-#include "libmap/report/map_html.h"
 #include "libmap/report/picture_fit.h"
-#include "libmap/report/scene_html.h"
-#include "libmap/report/table_html.h"
 
 namespace libmap {
 
@@ -20,19 +16,11 @@ namespace fs = std::filesystem;
 
 namespace {
 
-// Files that are missing are mostly many: one line for all.
 std::string gaps_html(const std::vector<ReportGap>& gaps) {
   std::string html;
-  std::string missing;
-  for (const ReportGap& gap : gaps) {
-    const std::string file = "<code>" + escape_html(gap.file) + "</code>";
-    if (gap.reason.empty())
-      missing += (missing.empty() ? "" : ", ") + file;
-    else
-      html +=
-          "<p class=\"gap\">" + file + " cannot be shown: " + escape_html(gap.reason) + "</p>\n";
-  }
-  if (!missing.empty()) html += "<p class=\"gap\">Not made in this run: " + missing + "</p>\n";
+  for (const ReportGap& gap : gaps)
+    html += "<p class=\"gap\"><code>" + escape_html(gap.file) +
+            "</code> cannot be shown: " + escape_html(gap.reason) + "</p>\n";
   return html;
 }
 
@@ -54,7 +42,6 @@ class PageWriter {
     const int heading = std::min(level, 6);
     std::string html = fmt::format("<section aria-labeledby=\"{}\">\n<h{} id=\"{}\">{}</h{}>\n", id,
                                    heading, id, escape_html(section.heading), heading);
-    html += paragraphs(section.text) + gaps_html(section.gaps);
     for (const ReportItem& one : section.items) html += item(one);
     if (!section.sections.empty()) contents_ += "\n<ol>\n";
     for (const ReportSection& inner : section.sections) html += this->section(inner, level + 1);
@@ -161,11 +148,6 @@ class PageWriter {
     return figure("table", table_number(), item, html, "Parameters and results.");
   }
 
-  std::string body_html(const ReportValues& values, const ReportItem& item) {
-    return figure("table", table_number(), item, scroll_box(values_html(values), "Values"),
-                  "Results.");
-  }
-
   std::string body_html(const TimingTable& table, const ReportItem& item) {
     std::string html = scroll_box(timings_html(table), "Running times");
     html +=
@@ -186,10 +168,6 @@ class PageWriter {
       html += fmt::format("<p class=\"changed\">{} more lines are left out.</p>\n",
                           listing.left_out_lines);
     return figure("listing", "", item, html, "");
-  }
-
-  std::string body_html(const ReportNote& note, const ReportItem&) {
-    return "<aside class=\"note\">" + paragraphs(note.text) + "</aside>\n";
   }
 
   bool with_views_ = false;
@@ -251,7 +229,7 @@ void each_picture(std::vector<ReportSection>& sections, std::vector<ReportPictur
 
 std::string report_page(const ReportContent& content, const PageAssets& assets) {
   PageWriter writer(assets);
-  std::string main = paragraphs(content.text);
+  std::string main;
   for (const ReportItem& item : content.items) main += writer.item(item);
   for (const ReportSection& section : content.sections) main += writer.section(section, 2);
   main += writer.sources(content);

@@ -1,4 +1,4 @@
-// The files that an outline names, read.
+// The files of a report, read.
 #pragma once
 
 #include <filesystem>
@@ -6,8 +6,7 @@
 #include <optional>
 #include <vector>
 
-#include "libmap/report/outline.h"
-#include "libmap/report/report_content.h"
+#include "libmap/report/report_plan.h"
 
 namespace libmap {
 
@@ -32,8 +31,16 @@ struct ReportReadResult {
   std::vector<std::filesystem::path> files;  // that were shown, in their order, each once
 };
 
-// What is missing or broken stands in the content as a gap. Throws Error: no such folder.
-ReportReadResult read_report_content(const Outline& outline, const ReportReadOptions& options,
+// A damaged file is a gap in the content.
+ReportReadResult read_report_content(const ReportPlan& plan, const ReportReadOptions& options,
                                      const MapLoader& load_map, const SceneLoader& load_scene);
+
+// The first `max_rows` rows of a CSV file, however large it is. Throws Error: no table, a column
+// that does not exist.
+ReportTable read_report_table(const std::filesystem::path& path, const TableColumns& columns,
+                              std::size_t max_rows);
+
+// The steps of each case's manifests; those of one name and command are added up.
+TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Manifest>>>& cases);
 
 }  // namespace libmap

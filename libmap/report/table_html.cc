@@ -1,4 +1,4 @@
-#include "libmap/report/table_html.h"
+#include "libmap/report/html.h"
 
 #include <fmt/format.h>
 
@@ -6,13 +6,13 @@
 #include <cmath>
 
 #include "libmap/core/text.h"
-#include "libmap/report/html.h"
 
 namespace libmap {
 
 namespace {
 
 constexpr int max_decimals = 3;
+constexpr std::size_t open_rows = 40;
 
 bool has_fraction(std::string_view cell) {
   return cell.find_first_of(".eE") != std::string_view::npos;
@@ -106,7 +106,7 @@ std::string table_html(const ReportTable& table, const std::string& row_attribut
   }
   const std::size_t rows = table.table.rows.size();
   // A few rows more are not worth a fold.
-  const std::size_t open = rows <= table.open_rows + 5 ? rows : table.open_rows;
+  const std::size_t open = rows <= open_rows + 5 || !row_attribute.empty() ? rows : open_rows;
   const std::string head = head_html(table, styles);
   std::string html =
       "<table>" + head + rows_html(table, styles, 0, open, row_attribute) + "</table>\n";

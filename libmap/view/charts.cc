@@ -1,37 +1,12 @@
 #include "libmap/view/charts.h"
 
-#include <sys/mman.h>
-#include <unistd.h>
-#include <vtkAxis.h>
-#include <vtkBrush.h>
-#include <vtkChartLegend.h>
-#include <vtkChartXY.h>
-#include <vtkContextActor.h>
-#include <vtkContextScene.h>
-#include <vtkDoubleArray.h>
-#include <vtkNew.h>
-#include <vtkPen.h>
-#include <vtkPlotArea.h>
-#include <vtkPlotLine.h>
-#include <vtkRenderWindow.h>
-#include <vtkRenderer.h>
-#include <vtkSVGExporter.h>
-#include <vtkStringArray.h>
-#include <vtkTable.h>
-#include <vtkTextProperty.h>
-
 #include <algorithm>
 #include <array>
-#include <cerrno>
-#include <charconv>
 #include <cmath>
-#include <cstring>
-#include <locale>
 
 #include "libmap/core/error.h"
-#include "libmap/core/file_output.h"
 #include "libmap/core/text.h"
-#include "libmap/view/offscreen.h"
+#include "libmap/view/canvas.h"
 
 namespace libmap {
 namespace {
@@ -45,30 +20,17 @@ constexpr std::array<Color, 7> palette = {{{0, 114, 178},
                                            {86, 180, 233},
                                            {0, 0, 0}}};
 constexpr Color diagonal_color = {150, 150, 150};
+constexpr Color grid_color = {210, 210, 210};
+constexpr Color axis_color = {60, 60, 60};
+constexpr Color legend_color = {255, 255, 255};
+constexpr TextStyle title_style{.size_px = 22, .align = TextAlign::center};
+constexpr TextStyle axis_style{.size_px = 18, .align = TextAlign::center};
+constexpr TextStyle label_style{.size_px = 15};
 
-// Around the frame, in pixels. VTK's SVG writer turns the clipping frame upside down: nothing shows
-// of it if `above` and `below` are the same.
-struct Margins {
-  int left = 105, right = 45, above = 82, below = 82;
-};
-constexpr Margins margins;
-
-// Plain digits for numbers of everyday size, powers of ten for others.
-std::string tick_text(double value, double largest) {
-  if (largest >= 1e7 || largest < 1e-3) return to_text(value);
-  std::array<char, 400> buffer;
-  const auto end =
-      std::to_chars(buffer.data(), buffer.data() + buffer.size(), value, std::chars_format::fixed);
-  return std::string(buffer.data(), end.ptr);
-}
-
-// More letters than any chart has room for; VTK draws all, in seconds where there are thousands.
-std::string shown(const std::string& text) {
-  std::size_t most = 400;
-  if (text.size() <= most) return text;
-  while (most > 0 && (static_cast<unsigned char>(text[most]) & 0xC0U) == 0x80U) --most;
-  return text.substr(0, most) + "...";
-}
+// Around the frame, in pixels; `left` grows with the numbers of the y axis.
+constexpr double left_px = 105, right_px = 45, above_px = 82, below_px = 82;
+constexpr double edge_px = 5.0;  // beyond the frame
+constexpr int max_axis_ticks = 10;
 
 void check_numbers(const std::vector<double>& values, const std::string& field) {
   for (const double value : values)
@@ -126,9 +88,7 @@ std::pair<double, double> y_range(const Chart& chart, std::vector<double> values
 
 namespace {
 
-// One axis of the drawing: the numbers low..high over the pixels from..to. VTK is given pixels and
-// nothing else: its SVG writer clips before it transforms, rounds to six digits after it subtracts
-// from the height, and scales the pen with the data; none of it shows if its transform is none.
+// Numbers low..high at the pixels from..to.
 struct PixelAxis {
   double low, high;
   double from_px, to_px;
@@ -136,186 +96,201 @@ struct PixelAxis {
   double pixel(double value) const {
     return from_px + (value - low) / (high - low) * (to_px - from_px);
   }
-  std::vector<double> pixels(const std::vector<double>& values) const {
-    std::vector<double> result;
-    result.reserve(values.size());
-    for (const double value : values) result.push_back(pixel(value));
-    return result;
-  }
 };
 
-// Ticks are placed and written here, not by VTK: the same under every locale.
-void set_axis(vtkAxis* axis, const std::string& title, const PixelAxis& range) {
-  axis->SetBehavior(vtkAxis::FIXED);
-  axis->SetRange(range.from_px, range.to_px);
-  axis->SetTitle(shown(title));
-  vtkNew<vtkDoubleArray> positions;
-  vtkNew<vtkStringArray> labels;
-  const std::vector<double> ticks = round_ticks(range.low, range.high, 10);
-  const double largest = std::max(std::abs(range.low), std::abs(range.high));
-  for (const double tick : ticks) {
-    positions->InsertNextValue(range.pixel(tick));
-    labels->InsertNextValue(tick_text(tick, largest));
-  }
-  axis->SetCustomTickPositions(positions, labels);
-  axis->GetTitleProperties()->SetFontSize(20);
-  axis->GetTitleProperties()->SetBold(false);
-  axis->GetLabelProperties()->SetFontSize(17);
-  axis->GetGridPen()->SetColor(210, 210, 210, 255);
-  axis->GetPen()->SetColor(60, 60, 60, 255);
-}
+struct LegendLine {
+  std::string name;
+  Color color;
+  const ChartCurve* curve;  // null: a histogram
+};
 
-vtkNew<vtkDoubleArray> column_of(const char* name, const std::vector<double>& values) {
-  vtkNew<vtkDoubleArray> column;
-  column->SetName(name);
-  for (const double value : values) column->InsertNextValue(value);
-  return column;
-}
-
-// The legend writes its text against its symbol.
-std::string legend_text(const std::string& name) { return " " + shown(name); }
-
-void add_line(vtkChartXY* chart, std::vector<double> x_px, std::vector<double> y_px,
-              const ChartCurve& look, const Color& color) {
-  if (x_px.size() == 1) {  // VTK complains of a line with one point
-    x_px.push_back(x_px[0]);
-    y_px.push_back(y_px[0]);
-  }
-  vtkNew<vtkTable> table;
-  table->AddColumn(column_of("x", x_px));
-  table->AddColumn(column_of("y", y_px));
-  vtkNew<vtkPlotLine> line;
-  line->SetInputData(table, 0, 1);
-  line->SetLabel(legend_text(look.name));
-  line->SetLegendVisibility(!look.name.empty());
-  line->SetColor(color[0], color[1], color[2], 255);
-  line->GetPen()->SetWidth(static_cast<float>(look.width_px));
-  line->GetPen()->SetLineType(look.dashed ? vtkPen::DASH_LINE : vtkPen::SOLID_LINE);
-  line->SetMarkerStyle(look.markers ? vtkPlotPoints::CIRCLE : vtkPlotPoints::NONE);
-  line->SetMarkerSize(static_cast<float>(look.width_px) * 3.5F);
-  chart->AddPlot(line);
-}
-
-// A filled step curve with an outline: bars that stand on zero.
-void add_histogram(vtkChartXY* chart, const ChartHistogram& histogram, const Color& color,
-                   const PixelAxis& x_axis, const PixelAxis& y_axis) {
-  const double zero = y_axis.pixel(0.0);
-  std::vector<double> x, y, outline_x, outline_y;
-  for (std::size_t i = 0; i < histogram.heights.size(); ++i) {
-    const double edge = histogram.first_edge + static_cast<double>(i) * histogram.bin_width;
-    const double left = x_axis.pixel(edge), right = x_axis.pixel(edge + histogram.bin_width);
-    const double height = y_axis.pixel(histogram.heights[i]);
-    x.insert(x.end(), {left, right});
-    y.insert(y.end(), {height, height});
-    outline_x.insert(outline_x.end(), {left, left, right, right});
-    outline_y.insert(outline_y.end(), {zero, height, height, zero});
-  }
-  vtkNew<vtkTable> table;
-  table->AddColumn(column_of("x", x));
-  table->AddColumn(column_of("zero", std::vector<double>(x.size(), zero)));
-  table->AddColumn(column_of("height", y));
-  vtkNew<vtkPlotArea> area;
-  area->SetInputData(table);
-  area->SetInputArray(0, "x");
-  area->SetInputArray(1, "zero");
-  area->SetInputArray(2, "height");
-  area->SetLabel(legend_text(histogram.name));
-  area->SetLegendVisibility(!histogram.name.empty());
-  area->GetBrush()->SetColor(color[0], color[1], color[2], 110);
-  area->GetPen()->SetColor(color[0], color[1], color[2], 255);
-  chart->AddPlot(area);
-  ChartCurve outline;
-  outline.width_px = 1.0;
-  add_line(chart, outline_x, outline_y, outline, color);
-}
-
-void set_legend(vtkChartXY* chart, LegendCorner corner, bool any_name) {
-  if (corner == LegendCorner::none || !any_name) {
-    chart->SetShowLegend(false);
-    return;
-  }
-  const bool left = corner == LegendCorner::top_left || corner == LegendCorner::bottom_left;
-  const bool top = corner == LegendCorner::top_left || corner == LegendCorner::top_right;
-  chart->SetShowLegend(true);
-  vtkChartLegend* legend = chart->GetLegend();
-  legend->SetInline(true);
-  legend->SetHorizontalAlignment(left ? vtkChartLegend::LEFT : vtkChartLegend::RIGHT);
-  legend->SetVerticalAlignment(top ? vtkChartLegend::TOP : vtkChartLegend::BOTTOM);
-  legend->SetLabelSize(17);
-  legend->SetPadding(8);
-  legend->SetSymbolWidth(40);
-  legend->GetPen()->SetColor(150, 150, 150, 255);
-}
-
-vtkNew<vtkChartXY> build(const Chart& chart, const ChartSize& size) {
-  const auto [x_low, x_high] = x_range(chart);
-  const auto [y_low, y_high] = y_range(chart);
-  const PixelAxis x_axis = {x_low, x_high, margins.left,
-                            static_cast<double>(size.width_px - margins.right)};
-  const PixelAxis y_axis = {y_low, y_high, margins.below,
-                            static_cast<double>(size.height_px - margins.above)};
-  vtkNew<vtkChartXY> built;
-  built->SetAutoSize(false);
-  built->SetLayoutStrategy(vtkChart::AXES_TO_RECT);
-  built->SetSize(vtkRectf(static_cast<float>(x_axis.from_px), static_cast<float>(y_axis.from_px),
-                          static_cast<float>(x_axis.to_px - x_axis.from_px),
-                          static_cast<float>(y_axis.to_px - y_axis.from_px)));
-  // The second line lifts the title off the frame.
-  if (!chart.title.empty()) built->SetTitle(shown(chart.title) + "\n ");
-  built->GetTitleProperties()->SetFontSize(23);
-  set_axis(built->GetAxis(vtkAxis::BOTTOM), chart.x_axis.title, x_axis);
-  set_axis(built->GetAxis(vtkAxis::LEFT), chart.y_axis.title, y_axis);
-  std::size_t next_color = 0;
-  const auto color_of = [&](const std::optional<Color>& wanted) {
-    return wanted ? *wanted : palette[next_color++ % palette.size()];
-  };
-  for (const ChartHistogram& histogram : chart.histograms) {
-    const Color color = color_of(histogram.color);
-    if (!histogram.heights.empty()) add_histogram(built, histogram, color, x_axis, y_axis);
-  }
-  for (const ChartCurve& curve : chart.curves) {
-    const Color color = color_of(curve.color);
-    if (!curve.x.empty())
-      add_line(built, x_axis.pixels(curve.x), y_axis.pixels(curve.y), curve, color);
-  }
-  const auto has_name = [](const auto& drawn) { return !drawn.name.empty(); };
-  set_legend(built, chart.legend,
-             std::any_of(chart.curves.begin(), chart.curves.end(), has_name) ||
-                 std::any_of(chart.histograms.begin(), chart.histograms.end(), has_name));
-  return built;
-}
-
-class ChartView {
+class ChartDrawing {
  public:
-  ChartView(const Chart& chart, const ChartSize& size) {
-    chart.check();
-    if (size.width_px < 200 || size.height_px < 200 || size.width_px > 16384 ||
-        size.height_px > 16384)
-      throw Error("cannot be drawn", {.field = "chart size",
-                                      .value = size_text(size.width_px, size.height_px) + " pixels",
-                                      .bound = "from 200 to 16384 each"});
-    window_->SetOffScreenRendering(1);
-    window_->SetMultiSamples(8);
-    window_->SetSize(size.width_px, size.height_px);
-    renderer_->SetBackground(1.0, 1.0, 1.0);
-    window_->AddRenderer(renderer_);
-    vtkNew<vtkContextActor> actor;
-    actor->GetScene()->SetRenderer(renderer_);
-    actor->GetScene()->AddItem(build(chart, size));
-    renderer_->AddActor(actor);
+  ChartDrawing(const Chart& chart, const ChartSize& size, Canvas& canvas)
+      : chart_(chart), canvas_(canvas) {
+    const auto [x_low, x_high] = x_range(chart);
+    const auto [y_low, y_high] = y_range(chart);
+    const double height = size.height_px - above_px - below_px;
+    constexpr double tick_px = 24.0;
+    x_ticks_ = round_ticks(x_low, x_high, max_axis_ticks);
+    y_ticks_ = round_ticks(y_low, y_high,
+                           std::clamp(static_cast<int>(height / tick_px), 1, max_axis_ticks));
+    double widest = 0.0;
+    for (const std::string& text : tick_texts(y_ticks_))
+      widest = std::max(widest, text_size(text, label_style).x());
+    const double left = std::max(left_px, std::ceil(widest) + 52.0);
+    frame_ = {left, above_px, std::max(1.0, size.width_px - left - right_px), height};
+    x_axis_ = {x_low, x_high, frame_.left, frame_.right()};
+    y_axis_ = {y_low, y_high, frame_.bottom(), frame_.top};
   }
 
-  vtkRenderWindow* render() {
-    window_->Render();
-    return window_;
+  void draw() {
+    draw_titles();
+    draw_ticks();
+    canvas_.polyline({{frame_.left, frame_.top},
+                      {frame_.left, frame_.bottom()},
+                      {frame_.right(), frame_.bottom()}},
+                     1.5, axis_color);
+    // Lines and markers on the edge are seen whole.
+    const PixelRect edge{frame_.left - edge_px, frame_.top - edge_px, frame_.width + 2 * edge_px,
+                         frame_.height + 2 * edge_px};
+    canvas_.clipped(edge, [&] {
+      std::size_t next_color = 0;
+      const auto color_of = [&](const std::optional<Color>& wanted) {
+        return wanted ? *wanted : palette[next_color++ % palette.size()];
+      };
+      for (const ChartHistogram& histogram : chart_.histograms) {
+        const Color color = color_of(histogram.color);
+        draw_histogram(histogram, color);
+        add_to_legend({histogram.name, color, nullptr});
+      }
+      for (const ChartCurve& curve : chart_.curves) {
+        const Color color = color_of(curve.color);
+        draw_curve(curve, color);
+        add_to_legend({curve.name, color, &curve});
+      }
+    });
+    if (chart_.legend != LegendCorner::none && !legend_.empty()) draw_legend();
   }
 
  private:
-  vtkNew<vtkRenderer> renderer_;
-  vtkNew<vtkRenderWindow> window_;
+  Eigen::Vector2d pixel_of(double x, double y) const {
+    return {x_axis_.pixel(x), y_axis_.pixel(y)};
+  }
+
+  void draw_titles() {
+    const double middle = frame_.left + frame_.width / 2.0;
+    const double width = frame_.right() + right_px;
+    canvas_.text({width / 2.0, 0.5 * above_px},
+                 shortened_text(chart_.title, title_style, width - 20.0), title_style);
+    canvas_.text({middle, frame_.bottom() + 56.0},
+                 shortened_text(chart_.x_axis.title, axis_style, frame_.width), axis_style);
+    TextStyle upward = axis_style;
+    upward.upward = true;
+    canvas_.text({22.0, frame_.top + frame_.height / 2.0},
+                 shortened_text(chart_.y_axis.title, upward, frame_.height), upward);
+  }
+
+  // Labels of the x axis that would touch the one before are left out.
+  void draw_ticks() {
+    TextStyle style = label_style;
+    style.align = TextAlign::center;
+    double taken = 0.0;
+    std::vector<std::string> texts = tick_texts(x_ticks_);
+    for (std::size_t i = 0; i < texts.size(); ++i) {
+      const double x = x_axis_.pixel(x_ticks_[i]);
+      canvas_.polyline({{x, frame_.top}, {x, frame_.bottom()}}, 1.0, grid_color);
+      canvas_.polyline({{x, frame_.bottom()}, {x, frame_.bottom() + 6.0}}, 1.5, axis_color);
+      const double half = text_size(texts[i], style).x() / 2.0;
+      if (x - half < taken) continue;
+      canvas_.text({x, frame_.bottom() + 21.0}, texts[i], style);
+      taken = x + half + 8.0;
+    }
+    style.align = TextAlign::right;
+    texts = tick_texts(y_ticks_);
+    for (std::size_t i = 0; i < texts.size(); ++i) {
+      const double y = y_axis_.pixel(y_ticks_[i]);
+      canvas_.polyline({{frame_.left, y}, {frame_.right(), y}}, 1.0, grid_color);
+      canvas_.polyline({{frame_.left - 6.0, y}, {frame_.left, y}}, 1.5, axis_color);
+      canvas_.text({frame_.left - 11.0, y}, texts[i], style);
+    }
+  }
+
+  // Bars on zero, with an outline around all of them.
+  void draw_histogram(const ChartHistogram& histogram, const Color& color) {
+    std::vector<Eigen::Vector2d> outline;
+    for (std::size_t i = 0; i < histogram.heights.size(); ++i) {
+      const double left = histogram.first_edge + static_cast<double>(i) * histogram.bin_width;
+      const double right = left + histogram.bin_width;
+      const double height = histogram.heights[i];
+      outline.insert(outline.end(), {pixel_of(left, 0.0), pixel_of(left, height),
+                                     pixel_of(right, height), pixel_of(right, 0.0)});
+    }
+    canvas_.polygon(outline, color, bar_opacity);
+    canvas_.polyline(outline, 1.0, color);
+  }
+
+  void draw_curve(const ChartCurve& curve, const Color& color) {
+    std::vector<Eigen::Vector2d> points;
+    points.reserve(curve.x.size());
+    for (std::size_t i = 0; i < curve.x.size(); ++i)
+      points.push_back(pixel_of(curve.x[i], curve.y[i]));
+    canvas_.polyline(points, curve.width_px, color, curve.dashed);
+    if (curve.markers)
+      for (const Eigen::Vector2d& point : points)
+        canvas_.disc(point, marker_radius * curve.width_px, color);
+  }
+
+  void add_to_legend(LegendLine line) {
+    if (!line.name.empty()) legend_.push_back(std::move(line));
+  }
+
+  void draw_legend() {
+    constexpr double padding = 10.0, symbol = 40.0, row = 24.0, margin = 12.0;
+    const double room = frame_.width - 2.0 * margin - 3.0 * padding - symbol;
+    double widest = 0.0;
+    for (LegendLine& line : legend_) {
+      line.name = shortened_text(line.name, label_style, room);
+      widest = std::max(widest, text_size(line.name, label_style).x());
+    }
+    const double width = 3.0 * padding + symbol + widest;
+    const double height = padding + row * static_cast<double>(legend_.size());
+    const bool at_left =
+        chart_.legend == LegendCorner::top_left || chart_.legend == LegendCorner::bottom_left;
+    const bool at_top =
+        chart_.legend == LegendCorner::top_left || chart_.legend == LegendCorner::top_right;
+    const PixelRect box{at_left ? frame_.left + margin : frame_.right() - margin - width,
+                        at_top ? frame_.top + margin : frame_.bottom() - margin - height, width,
+                        height};
+    canvas_.rectangle(box, diagonal_color);
+    canvas_.rectangle({box.left + 1.0, box.top + 1.0, box.width - 2.0, box.height - 2.0},
+                      legend_color);
+    double y = box.top + padding / 2.0 + row / 2.0;
+    for (const LegendLine& line : legend_) {
+      draw_symbol(line, {box.left + padding, y}, symbol);
+      canvas_.text({box.left + 2.0 * padding + symbol, y}, line.name, label_style);
+      y += row;
+    }
+  }
+
+  void draw_symbol(const LegendLine& line, const Eigen::Vector2d& left, double width) {
+    const Eigen::Vector2d right = left + Eigen::Vector2d(width, 0.0);
+    if (line.curve != nullptr) {
+      canvas_.polyline({left, right}, line.curve->width_px, line.color, line.curve->dashed);
+      if (line.curve->markers)
+        canvas_.disc((left + right) / 2.0, marker_radius * line.curve->width_px, line.color);
+      return;
+    }
+    const Eigen::Vector2d up(0.0, 7.0);
+    const std::vector<Eigen::Vector2d> corners{left - up, right - up, right + up, left + up,
+                                               left - up};
+    canvas_.polygon(corners, line.color, bar_opacity);
+    canvas_.polyline(corners, 1.0, line.color);
+  }
+
+  static constexpr double bar_opacity = 0.43;
+  static constexpr double marker_radius = 1.75;  // in line widths
+
+  const Chart& chart_;
+  Canvas& canvas_;
+  std::vector<double> x_ticks_;
+  std::vector<double> y_ticks_;
+  PixelRect frame_;
+  PixelAxis x_axis_{};
+  PixelAxis y_axis_{};
+  std::vector<LegendLine> legend_;
 };
 
-// What the picture says, for those who search or cannot see it.
+void check(const Chart& chart, const ChartSize& size) {
+  chart.check();
+  if (size.width_px < 200 || size.height_px < 200 || size.width_px > 16384 ||
+      size.height_px > 16384)
+    throw Error("cannot be drawn", {.field = "chart size",
+                                    .value = size_text(size.width_px, size.height_px) + " pixels",
+                                    .bound = "from 200 to 16384 each"});
+}
+
+// For readers who search, or who cannot see the picture.
 std::string description(const Chart& chart) {
   std::string text = chart.y_axis.title + " over " + chart.x_axis.title;
   for (const ChartHistogram& histogram : chart.histograms)
@@ -323,64 +298,6 @@ std::string description(const Chart& chart) {
   for (const ChartCurve& curve : chart.curves)
     if (!curve.name.empty()) text += "; " + curve.name;
   return text;
-}
-
-// VTK writes its numbers into SVG files through streams of the global locale.
-class PlainLocale {
- public:
-  PlainLocale() : before_(std::locale::global(std::locale::classic())) {}
-  ~PlainLocale() { std::locale::global(before_); }
-  PlainLocale(const PlainLocale&) = delete;
-  PlainLocale& operator=(const PlainLocale&) = delete;
-
- private:
-  std::locale before_;
-};
-
-// A file in memory: VTK does not say when the disk is full.
-class MemoryFile {
- public:
-  MemoryFile() : descriptor_(memfd_create("graspmap", MFD_CLOEXEC)) {
-    if (descriptor_ < 0)
-      throw Error(std::string("no file in memory: ") + std::strerror(errno), {}, ErrorKind::failed);
-  }
-  ~MemoryFile() { close(descriptor_); }
-  MemoryFile(const MemoryFile&) = delete;
-  MemoryFile& operator=(const MemoryFile&) = delete;
-  std::string path() const { return "/proc/self/fd/" + std::to_string(descriptor_); }
-
- private:
-  int descriptor_;
-};
-
-std::string exported_svg(const Chart& chart, vtkRenderWindow* window) {
-  const PlainLocale plain;
-  const MemoryFile file;
-  vtkNew<vtkSVGExporter> exporter;
-  exporter->SetRenderWindow(window);
-  exporter->SetTitle(chart.title.c_str());
-  exporter->SetDescription(description(chart).c_str());
-  // VTK's own text elements come out displaced, in points for pixels, and turned the wrong way.
-  exporter->SetTextAsPath(true);
-  exporter->SetFileName(file.path().c_str());
-  exporter->Write();
-  return read_whole_file(file.path());
-}
-
-// VTK 9.1 defines the frame that clips the curves only where it defines markers as well.
-std::string with_clipping_frame(std::string svg, const ChartSize& size) {
-  const std::string name = "vtkClipRect1";
-  const std::size_t head = svg.find("</desc>");
-  if (head == std::string::npos || svg.find("url(#" + name + ")") == std::string::npos ||
-      svg.find("<clipPath id=\"" + name + "\"") != std::string::npos)
-    return svg;
-  const std::string frame =
-      "\n  <defs>\n    <clipPath id=\"" + name + "\">\n      <rect x=\"" +
-      std::to_string(margins.left) + "\" y=\"" + std::to_string(margins.above) + "\" width=\"" +
-      std::to_string(size.width_px - margins.left - margins.right) + "\" height=\"" +
-      std::to_string(size.height_px - margins.above - margins.below) +
-      "\"/>\n    </clipPath>\n  </defs>";
-  return svg.insert(head + std::string("</desc>").size(), frame);
 }
 
 }  // namespace
@@ -409,12 +326,17 @@ void Chart::check() const {
 }
 
 ColorImage draw_chart(const Chart& chart, const ChartSize& size) {
-  return pixels_of(*ChartView(chart, size).render(), size.width_px, size.height_px);
+  check(chart, size);
+  Canvas canvas(size.width_px, size.height_px);
+  ChartDrawing(chart, size, canvas).draw();
+  return canvas.pixels();
 }
 
-void write_chart_svg(const std::filesystem::path& path, const Chart& chart, const ChartSize& size) {
-  ChartView view(chart, size);
-  write_text(path, with_clipping_frame(exported_svg(chart, view.render()), size));
+std::string chart_svg(const Chart& chart, const ChartSize& size) {
+  check(chart, size);
+  Canvas canvas(size.width_px, size.height_px, CanvasFormat::svg);
+  ChartDrawing(chart, size, canvas).draw();
+  return canvas.svg(chart.title, description(chart));
 }
 
 Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title) {
@@ -466,6 +388,23 @@ std::vector<double> round_ticks(double low, double high, int most) {
   const int count = static_cast<int>(std::floor(high / step + slack) - first) + 1;
   for (int i = 0; i < count; ++i) ticks.push_back(scaled((first + i) * multiple) + 0.0);
   return ticks;
+}
+
+std::vector<std::string> tick_texts(const std::vector<double>& ticks) {
+  std::vector<std::string> texts;
+  texts.reserve(ticks.size());
+  const double step = ticks.size() > 1 ? std::abs(ticks[1] - ticks[0]) : 1.0;
+  const auto is_round = [](double value) { return std::abs(value - std::round(value)) < 1e-6; };
+  // Without the noise of sums; double where float would be infinite.
+  const auto short_text = [](double value) {
+    return std::abs(value) < 1e38 ? to_text(static_cast<float>(value)) : to_text(value);
+  };
+  int decimals = 0;
+  while (decimals < 6 && !is_round(step * std::pow(10.0, decimals))) ++decimals;
+  for (const double tick : ticks)
+    texts.push_back(step < 1e-6 || std::abs(tick) >= 1e7 ? short_text(tick)
+                                                         : to_fixed_text(tick, decimals));
+  return texts;
 }
 
 }  // namespace libmap

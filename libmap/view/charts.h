@@ -1,16 +1,12 @@
-// Charts of curves and histograms, drawn by VTK: as an image, and as SVG, whose letters are drawn
-// as outlines (every viewer shows them alike) and whose <title> and <desc> hold the names. Both
-// need an X display; hold a VirtualDisplay while calling.
+// Charts of curves and histograms, as an image and as SVG. No display is needed.
 #pragma once
 
-#include <filesystem>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "libmap/core/point_cloud.h"
-#include "libmap/view/image_io.h"
+#include "libmap/core/image.h"
 
 namespace libmap {
 
@@ -67,9 +63,9 @@ struct ChartSize {
 // The chart as a picture. Throws Error as Chart::check does.
 ColorImage draw_chart(const Chart& chart, const ChartSize& size = {});
 
-// The same as an SVG file at `path`.
-void write_chart_svg(const std::filesystem::path& path, const Chart& chart,
-                     const ChartSize& size = {});
+// The same drawing as SVG. Letters are outlines, so that all viewers show them alike; <title> and
+// <desc> contain the names.
+std::string chart_svg(const Chart& chart, const ChartSize& size = {});
 
 // A receiver operating characteristic: false positive rates on x, true positive rates on y.
 struct RocCurve {
@@ -86,5 +82,8 @@ inline constexpr ChartSize roc_chart_size{900, 900};
 
 // At most `most` + 1 round numbers (1, 2 or 5 times a power of ten apart) within low..high.
 std::vector<double> round_ticks(double low, double high, int most);
+
+// Round numbers in a row as texts with the same number of decimals.
+std::vector<std::string> tick_texts(const std::vector<double>& ticks);
 
 }  // namespace libmap

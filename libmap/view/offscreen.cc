@@ -1,5 +1,11 @@
 #include "libmap/view/offscreen.h"
 
+#include <X11/Xlib.h>
+#include <fcntl.h>
+#include <poll.h>
+#include <sys/prctl.h>
+#include <sys/wait.h>
+#include <unistd.h>
 #include <vtkLogger.h>
 #include <vtkNew.h>
 #include <vtkObjectFactory.h>
@@ -9,16 +15,93 @@
 #include <vtkUnsignedCharArray.h>
 
 #include <algorithm>
+#include <array>
+#include <cerrno>
+#include <chrono>
+#include <csignal>
+#include <cstdlib>
 #include <cstring>
 #include <mutex>
 #include <string>
+#include <string_view>
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/view/virtual_display.h"
 
 namespace libmap {
 namespace {
+
+using Clock = std::chrono::steady_clock;
+constexpr auto start_patience = std::chrono::seconds(30);
+constexpr auto stop_patience = std::chrono::seconds(5);
+
+// Whether the X server named by DISPLAY answers and speaks GLX.
+bool display_answers() {
+  const char* name = std::getenv("DISPLAY");
+  if (name == nullptr || *name == '\0') return false;
+  ::Display* display = XOpenDisplay(name);
+  if (display == nullptr) return false;
+  int opcode = 0;
+  int event = 0;
+  int error = 0;
+  const bool has_glx = XQueryExtension(display, "GLX", &opcode, &event, &error) != 0;
+  XCloseDisplay(display);
+  return has_glx;
+}
+
+std::string find_in_path(std::string_view program) {
+  const char* path = std::getenv("PATH");
+  std::string_view rest = path != nullptr ? path : "/usr/bin:/bin";
+  while (!rest.empty()) {
+    const std::size_t colon = rest.find(':');
+    const std::string folder(rest.substr(0, colon));
+    rest = colon == std::string_view::npos ? std::string_view{} : rest.substr(colon + 1);
+    std::string candidate = (folder.empty() ? "." : folder) + "/" + std::string(program);
+    if (access(candidate.c_str(), X_OK) == 0) return candidate;
+  }
+  return {};
+}
+
+// In the child: only calls that are safe between fork and exec.
+[[noreturn]] void become_server(const char* program, char* const* arguments, int number_pipe,
+                                pid_t parent) {
+  constexpr int number_fd = 3;
+  sigset_t none;
+  sigemptyset(&none);
+  sigprocmask(SIG_SETMASK, &none, nullptr);
+  setsid();  // Ctrl-C is for the program, which ends its server itself
+  prctl(PR_SET_PDEATHSIG, SIGTERM);
+  if (getppid() != parent) _exit(127);
+  const int null = open("/dev/null", O_RDWR);
+  // First out of the way of 0 to 3, wherever the pipe happens to be.
+  const int pipe_copy = fcntl(number_pipe, F_DUPFD, number_fd + 1);
+  for (int fd = 0; fd < number_fd; ++fd) dup2(null, fd);
+  dup2(pipe_copy, number_fd);
+  close_range(number_fd + 1, ~0U, 0);
+  execv(program, arguments);
+  _exit(127);
+}
+
+// What the server writes once it is ready: its display number and a newline. Empty: it never did.
+std::string read_display_number(int number_pipe) {
+  std::string text;
+  const Clock::time_point end = Clock::now() + start_patience;
+  while (text.find('\n') == std::string::npos) {
+    const auto left =
+        std::chrono::duration_cast<std::chrono::milliseconds>(end - Clock::now()).count();
+    if (left <= 0) return {};
+    pollfd waiting{.fd = number_pipe, .events = POLLIN, .revents = 0};
+    const int ready = poll(&waiting, 1, static_cast<int>(left));
+    if (ready < 0 && errno == EINTR) continue;
+    if (ready <= 0) return {};
+    std::array<char, 64> buffer{};
+    const ssize_t count = read(number_pipe, buffer.data(), buffer.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count <= 0) return {};
+    text.append(buffer.data(), static_cast<std::size_t>(count));
+  }
+  return text.substr(0, text.find('\n'));
+}
 
 // Above it the multisampled buffers would take gigabytes.
 constexpr double max_multisampled_pixels = 1.7e7;
@@ -66,8 +149,6 @@ class QuietScope {
   vtkNew<QuietOutput> quiet_;
 };
 
-}  // namespace
-
 ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
   ColorImage image(width, height);
   vtkNew<vtkUnsignedCharArray> pixels;
@@ -82,6 +163,89 @@ ColorImage pixels_of(vtkRenderWindow& window, int width, int height) {
                 pixels->GetPointer(0) + (static_cast<std::size_t>(height) - 1 - row) * row_bytes,
                 row_bytes);
   return image;
+}
+
+}  // namespace
+
+VirtualDisplay::VirtualDisplay() {
+  if (display_answers()) return;
+  try {
+    start();
+  } catch (...) {
+    stop();
+    throw;
+  }
+}
+
+VirtualDisplay::~VirtualDisplay() { stop(); }
+
+void VirtualDisplay::start() {
+  const std::string program = find_in_path("Xvfb");
+  if (program.empty())
+    throw Error("no X display answers and Xvfb is not installed (Debian package xvfb)", {},
+                ErrorKind::failed);
+  // The environment is the child's too.
+  set_variable("LIBGL_ALWAYS_SOFTWARE", "1");
+  set_variable("GALLIUM_DRIVER", "llvmpipe");
+
+  std::array<std::string, 13> words{"Xvfb",         "-displayfd", "3",       "-screen",    "0",
+                                    "1280x1024x24", "-dpi",       "96",      "+extension", "GLX",
+                                    "-nolisten",    "tcp",        "-noreset"};
+  std::array<char*, words.size() + 1> arguments{};
+  for (std::size_t i = 0; i < words.size(); ++i) arguments[i] = words[i].data();
+
+  std::array<int, 2> number_pipe{};
+  if (pipe2(number_pipe.data(), O_CLOEXEC) != 0)
+    throw Error(std::string("no pipe to Xvfb: ") + std::strerror(errno), {}, ErrorKind::failed);
+  const pid_t parent = getpid();
+  const pid_t child = fork();
+  if (child == 0) become_server(program.c_str(), arguments.data(), number_pipe[1], parent);
+  close(number_pipe[1]);
+  if (child < 0) {
+    close(number_pipe[0]);
+    throw Error(std::string("Xvfb could not be started: ") + std::strerror(errno), {},
+                ErrorKind::failed);
+  }
+  server_ = child;
+  const std::string number = read_display_number(number_pipe[0]);
+  close(number_pipe[0]);
+  if (number.empty())
+    throw Error("Xvfb did not come up (Debian package xvfb): " + program, {}, ErrorKind::failed);
+  set_variable("DISPLAY", ":" + number);
+  if (!display_answers())
+    throw Error("Xvfb answers without OpenGL (Debian package libgl1-mesa-dri)", {},
+                ErrorKind::failed);
+}
+
+void VirtualDisplay::stop() {
+  if (server_ > 0) {
+    kill(server_, SIGTERM);
+    const Clock::time_point end = Clock::now() + stop_patience;
+    int status = 0;
+    while (waitpid(server_, &status, WNOHANG) == 0) {
+      if (Clock::now() > end) {
+        kill(server_, SIGKILL);
+        waitpid(server_, &status, 0);
+        break;
+      }
+      usleep(5000);
+    }
+    server_ = 0;
+  }
+  for (auto former = former_variables_.rbegin(); former != former_variables_.rend(); ++former) {
+    if (former->second)
+      setenv(former->first.c_str(), former->second->c_str(), 1);
+    else
+      unsetenv(former->first.c_str());
+  }
+  former_variables_.clear();
+}
+
+void VirtualDisplay::set_variable(const std::string& name, const std::string& value) {
+  const char* former = std::getenv(name.c_str());
+  former_variables_.emplace_back(
+      name, former != nullptr ? std::optional<std::string>(former) : std::nullopt);
+  setenv(name.c_str(), value.c_str(), 1);
 }
 
 ColorImage draw_offscreen(int width, int height,

@@ -1,21 +1,11 @@
 #include "libmap/view/picture_sheet.h"
 
-#include <vtkImageData.h>
-#include <vtkImageResize.h>
-#include <vtkImageSincInterpolator.h>
-#include <vtkNew.h>
-#include <vtkRenderWindow.h>
-#include <vtkRenderer.h>
-
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 
 #include "libmap/core/error.h"
 #include "libmap/view/offscreen.h"
-#include "libmap/view/overlay.h"
 #include "libmap/view/scene_page.h"
-#include "libmap/view/virtual_display.h"
 
 namespace libmap {
 namespace {
@@ -218,37 +208,13 @@ void share_ranges(const std::vector<Legend>& legends, Scene& scene) {
 
 // --- pixels ------------------------------------------------------------------------------------
 
-// Fitted into `width` x `height`, never larger than it is.
-ColorImage fitted(const ColorImage& image, int width, int height) {
-  if (image.width <= width && image.height <= height) return image;
-  const double scale = std::min(1.0 * width / image.width, 1.0 * height / image.height);
-  const int new_width = std::clamp(static_cast<int>(std::lround(scale * image.width)), 1, width);
-  const int new_height = std::clamp(static_cast<int>(std::lround(scale * image.height)), 1, height);
-  vtkNew<vtkImageData> data;
-  data->SetDimensions(image.width, image.height, 1);
-  data->AllocateScalars(VTK_UNSIGNED_CHAR, 3);
-  std::memcpy(data->GetScalarPointer(), image.pixels.data(), image.pixels.size() * sizeof(Color));
-  vtkNew<vtkImageSincInterpolator> filter;
-  filter->AntialiasingOn();
-  vtkNew<vtkImageResize> resize;
-  resize->SetInputData(data);
-  resize->SetInterpolator(filter);
-  resize->SetOutputDimensions(new_width, new_height, 1);
-  resize->Update();
-  ColorImage result(new_width, new_height);
-  std::memcpy(result.pixels.data(), resize->GetOutput()->GetScalarPointer(),
-              result.pixels.size() * sizeof(Color));
-  return result;
-}
-
-// In the middle of `cell`.
-void paste(const ColorImage& image, const PixelRect& cell, ColorImage& page) {
-  const int left = static_cast<int>(cell.left + std::floor((cell.width - image.width) / 2.0));
-  const int top = static_cast<int>(cell.top + std::floor((cell.height - image.height) / 2.0));
-  for (int row = 0; row < image.height; ++row)
-    std::copy_n(image.pixels.begin() + static_cast<std::ptrdiff_t>(image.index(0, row)),
-                image.width,
-                page.pixels.begin() + static_cast<std::ptrdiff_t>(page.index(left, top + row)));
+// In the middle of `cell`, whole pixels; made smaller where it is larger.
+PixelRect fitted(const ColorImage& image, const PixelRect& cell) {
+  const double scale = std::min({1.0, cell.width / image.width, cell.height / image.height});
+  const double width = std::max(1.0, std::round(scale * image.width));
+  const double height = std::max(1.0, std::round(scale * image.height));
+  return {cell.left + std::floor((cell.width - width) / 2.0),
+          cell.top + std::floor((cell.height - height) / 2.0), width, height};
 }
 
 ScenePage page_around(const PixelRect& cell, const SheetLayout& layout) {
@@ -258,30 +224,30 @@ ScenePage page_around(const PixelRect& cell, const SheetLayout& layout) {
   return page;
 }
 
-void draw_text(const PixelRect& rect, const std::string& text, TextStyle style, Overlay& overlay) {
+void draw_text(const PixelRect& rect, const std::string& text, TextStyle style, Canvas& canvas) {
   const double x = style.align == TextAlign::center ? rect.left + rect.width / 2.0
                                                     : rect.left + 0.4 * style.size_px;
-  overlay.text({x, rect.top + rect.height / 2.0},
-               shortened_text(text, style, rect.width - 0.4 * style.size_px), style);
+  canvas.text({x, rect.top + rect.height / 2.0},
+              shortened_text(text, style, rect.width - 0.4 * style.size_px), style);
 }
 
 void draw_page(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
-               const std::vector<Legend>& legends, const SheetLayout& layout, Overlay& overlay) {
+               const std::vector<Legend>& legends, const SheetLayout& layout, Canvas& canvas) {
   const TextStyle plain{.size_px = layout.font_px};
   TextStyle head = plain;
   head.bold = true;
   ScenePage page = page_around({}, layout);
   page.title = layout.title;
-  draw_title(page, options.title, overlay);
+  draw_title(page, options.title, canvas);
   page.legend = layout.legend;
-  draw_legends(page, legends, overlay);
+  draw_legends(page, legends, canvas);
   for (std::size_t i = 0; i < layout.captions.size(); ++i)
-    draw_text(layout.captions[i], cells[i].caption, plain, overlay);
+    draw_text(layout.captions[i], cells[i].caption, plain, canvas);
   for (std::size_t i = 0; i < layout.row_titles.size(); ++i)
-    draw_text(layout.row_titles[i], options.row_titles[i], head, overlay);
+    draw_text(layout.row_titles[i], options.row_titles[i], head, canvas);
   head.align = TextAlign::center;
   for (std::size_t i = 0; i < layout.column_titles.size(); ++i)
-    draw_text(layout.column_titles[i], options.column_titles[i], head, overlay);
+    draw_text(layout.column_titles[i], options.column_titles[i], head, canvas);
 }
 
 struct DrawnCell {
@@ -294,7 +260,7 @@ DrawnCell draw_cell(const SheetCell& cell, const PixelRect& rect,
                     const PictureSheetOptions& options, int font_px) {
   const int width = static_cast<int>(rect.width);
   const int height = static_cast<int>(rect.height);
-  if (!cell.scene) return {fitted(cell.picture, width, height), {}};
+  if (!cell.scene) return {cell.picture, {}};
   Scene scene = cell.scene();
   share_ranges(legends, scene);
   SceneViewOptions view;
@@ -361,33 +327,27 @@ ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOpt
   const SheetLayout layout =
       plan_sheet(cells, options, contents.legends, common_aspect(cells, contents));
   const auto extents = shared_extents(contents, layout.columns, options.shared_view);
-  const VirtualDisplay display;
-  Overlay overlay;
-  draw_page(cells, options, contents.legends, layout, overlay);
-  std::vector<ColorImage> images;
+  // One X server for all scenes.
+  std::optional<VirtualDisplay> display;
+  if (any_scene(cells)) display.emplace();
+  Canvas canvas(layout.width, layout.height);
+  draw_page(cells, options, contents.legends, layout, canvas);
   std::size_t bars = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    DrawnCell drawn =
+    const DrawnCell drawn =
         draw_cell(cells[i], layout.cells[i], extents[i], contents.legends, options, layout.font_px);
-    images.push_back(std::move(drawn.image));
-    // The bar of a row stands below its first scene that has one.
+    canvas.image(drawn.image, fitted(drawn.image, layout.cells[i]));
+    // The bar of a row is below its first scene that has one.
     const std::size_t row = i / static_cast<std::size_t>(layout.columns);
     const bool wanted = options.shared_view == SharedView::sheet ? bars == 0 : bars <= row;
     if (!drawn.camera || layout.scale_bars.empty() || !wanted) continue;
     ScenePage page = page_around(layout.cells[i], layout);
     page.scale_bar = layout.scale_bars[options.shared_view == SharedView::sheet ? 0 : row];
     const Bounds3d& box = *extents[i];
-    draw_scale_bar(page, *drawn.camera, (box.min + box.max) / 2.0, overlay);
+    draw_scale_bar(page, *drawn.camera, (box.min + box.max) / 2.0, canvas);
     bars = row + 1;
   }
-  ColorImage page = draw_offscreen(layout.width, layout.height, [&](vtkRenderWindow& window) {
-    vtkNew<vtkRenderer> renderer;
-    renderer->SetBackground(1.0, 1.0, 1.0);
-    overlay.add_to(*renderer, layout.height);
-    window.AddRenderer(renderer);
-  });
-  for (std::size_t i = 0; i < cells.size(); ++i) paste(images[i], layout.cells[i], page);
-  return page;
+  return canvas.pixels();
 }
 
 }  // namespace libmap

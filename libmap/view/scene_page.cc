@@ -3,12 +3,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <set>
 #include <tuple>
 
 #include "libmap/core/text.h"
 #include "libmap/view/charts.h"
-#include "libmap/view/label_layout.h"
 
 namespace libmap {
 namespace {
@@ -90,35 +90,35 @@ bool roomy(const SceneViewOptions& options, const ScenePage& page) {
          (!page.axes || page.axes->right() <= page.plot.right());
 }
 
-void draw_scalar_bar(const Legend& legend, double left, double top, int font, Overlay& overlay) {
+void draw_scalar_bar(const Legend& legend, double left, double top, int font, Canvas& canvas) {
   const double height = bar_height * font;
   const PixelRect bar{left, top, bar_width * font, height};
   const double hair = std::max(1.0, font / 14.0);
-  overlay.rectangle({bar.left - hair, bar.top - hair, bar.width + 2 * hair, bar.height + 2 * hair},
-                    frame_color);
+  canvas.rectangle({bar.left - hair, bar.top - hair, bar.width + 2 * hair, bar.height + 2 * hair},
+                   frame_color);
   constexpr int strips = 128;
   for (int strip = 0; strip < strips; ++strip) {
     const double share = static_cast<double>(strip) / strips;
     // Each reaches up to the next ones, so that no seam shows.
-    overlay.rectangle({bar.left, bar.top, bar.width, height * (1.0 - share)},
-                      color_at(legend.scale, (strip + 0.5) / strips));
+    canvas.rectangle({bar.left, bar.top, bar.width, height * (1.0 - share)},
+                     color_at(legend.scale, (strip + 0.5) / strips));
   }
   const std::vector<double> ticks = ticks_of(legend);
   const std::vector<std::string> texts = tick_texts(ticks);
   for (std::size_t i = 0; i < ticks.size(); ++i) {
     const double y = bar.bottom() - height * (ticks[i] - legend.min) / (legend.max - legend.min);
-    overlay.rectangle({bar.right(), y - hair / 2.0, 0.3 * font, hair}, frame_color);
-    overlay.text({bar.right() + 0.5 * font, y}, texts[i], {.size_px = font});
+    canvas.rectangle({bar.right(), y - hair / 2.0, 0.3 * font, hair}, frame_color);
+    canvas.text({bar.right() + 0.5 * font, y}, texts[i], {.size_px = font});
   }
 }
 
 void draw_arrow(const Eigen::Vector2d& from, const Eigen::Vector2d& to, double width,
-                const Color& color, Overlay& overlay) {
+                const Color& color, Canvas& canvas) {
   const Eigen::Vector2d along = (to - from).normalized();
   const Eigen::Vector2d across(-along.y(), along.x());
   const Eigen::Vector2d neck = to - 2.6 * width * along;
-  overlay.line(from, neck, width, color);
-  overlay.polygon({to, neck + 1.7 * width * across, neck - 1.7 * width * across}, color);
+  canvas.polyline({from, neck}, width, color);
+  canvas.polygon({to, neck + 1.7 * width * across, neck - 1.7 * width * across}, color);
 }
 
 Color verdict_color(Verdict verdict) {
@@ -171,6 +171,41 @@ bool have_room_for_labels(const std::vector<SeenMarker>& seen, const PixelRect& 
   return static_cast<double>(labels) * height_px * height_px <= plot.width * plot.height;
 }
 
+constexpr int rings = 9;
+// To the right first, then left, above, below and the corners.
+constexpr std::array<std::array<double, 2>, 8> directions{{{1.0, 0.0},
+                                                           {-1.0, 0.0},
+                                                           {0.0, -1.0},
+                                                           {0.0, 1.0},
+                                                           {1.0, -1.0},
+                                                           {-1.0, -1.0},
+                                                           {1.0, 1.0},
+                                                           {-1.0, 1.0}}};
+
+double overlap_area(const PixelRect& a, const PixelRect& b) {
+  const double width = std::min(a.right(), b.right()) - std::max(a.left, b.left);
+  const double height = std::min(a.bottom(), b.bottom()) - std::max(a.top, b.top);
+  return width > 0.0 && height > 0.0 ? width * height : 0.0;
+}
+
+// The box whose edge or corner toward the point is `gap` pixels away from it.
+PixelRect box_beside(const LabelRequest& request, const std::array<double, 2>& direction,
+                     double gap) {
+  const Eigen::Vector2d toward(direction[0], direction[1]);
+  const Eigen::Vector2d half(request.width_px / 2.0, request.height_px / 2.0);
+  const Eigen::Vector2d middle =
+      request.anchor + toward.cwiseProduct(half + Eigen::Vector2d::Constant(gap));
+  return {middle.x() - half.x(), middle.y() - half.y(), request.width_px, request.height_px};
+}
+
+// Area of `box` that lies on taken boxes or points, or outside the bounds.
+double covered_area(const PixelRect& box, const std::vector<PixelRect>& taken,
+                    const PixelRect& bounds) {
+  double area = box.width * box.height - overlap_area(box, bounds);
+  for (const PixelRect& other : taken) area += overlap_area(box, other);
+  return area;
+}
+
 }  // namespace
 
 Eigen::Vector2d legends_size(const std::vector<Legend>& legends, int font_px) {
@@ -201,19 +236,6 @@ ScenePage plan_page(const SceneViewOptions& options, const std::vector<Legend>& 
   return page;
 }
 
-std::vector<std::string> tick_texts(const std::vector<double>& ticks) {
-  std::vector<std::string> texts;
-  texts.reserve(ticks.size());
-  const double step = ticks.size() > 1 ? std::abs(ticks[1] - ticks[0]) : 1.0;
-  const auto is_round = [](double value) { return std::abs(value - std::round(value)) < 1e-6; };
-  int decimals = 0;
-  while (decimals < 6 && !is_round(step * std::pow(10.0, decimals))) ++decimals;
-  for (const double tick : ticks)
-    texts.push_back(step < 1e-6 || std::abs(tick) >= 1e7 ? to_text(static_cast<float>(tick))
-                                                         : to_fixed_text(tick, decimals));
-  return texts;
-}
-
 double round_length_m(double longest_m) {
   const double decade = std::pow(10.0, std::floor(std::log10(longest_m) + 1e-9));
   for (const double factor : {5.0, 2.0})
@@ -234,46 +256,46 @@ std::string length_text(double length_m) {
   return to_text(static_cast<float>(length_m * 1000.0)) + " mm";
 }
 
-void draw_title(const ScenePage& page, const std::string& title, Overlay& overlay) {
+void draw_title(const ScenePage& page, const std::string& title, Canvas& canvas) {
   if (!page.title) return;
   TextStyle style{.size_px = static_cast<int>(1.3 * page.font_px), .bold = true};
   const double room = page.title->width - 1.6 * page.font_px;
   while (style.size_px > min_font_px && text_size(title, style).x() > room) --style.size_px;
-  overlay.text({0.8 * page.font_px, page.title->height / 2.0}, shortened_text(title, style, room),
-               style);
+  canvas.text({0.8 * page.font_px, page.title->height / 2.0}, shortened_text(title, style, room),
+              style);
 }
 
-void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Overlay& overlay) {
+void draw_legends(const ScenePage& page, const std::vector<Legend>& legends, Canvas& canvas) {
   if (!page.legend) return;
   const int font = page.legend_font_px;
   const double left = std::round(page.legend->left + 0.9 * font);
   const double hair = std::max(1.0, font / 14.0);
   double y = page.legend->top + 0.4 * font;
   for (const Legend& legend : legends) {
-    overlay.text({left, y + title_row_height * font / 2.0}, legend.title,
-                 {.size_px = font, .bold = true});
+    canvas.text({left, y + title_row_height * font / 2.0}, legend.title,
+                {.size_px = font, .bold = true});
     y += title_row_height * font;
     if (legend.continuous) {
-      draw_scalar_bar(legend, left, y + 0.3 * font, font, overlay);
+      draw_scalar_bar(legend, left, y + 0.3 * font, font, canvas);
       y += (bar_height + 0.9) * font;
     }
     for (const LegendEntry& entry : legend.entries) {
       const double side = std::round(swatch * font);
       const PixelRect box{left, std::round(y + (row_height * font - side) / 2.0),
                           std::round(bar_width * font), side};
-      overlay.rectangle(
+      canvas.rectangle(
           {box.left - hair, box.top - hair, box.width + 2 * hair, box.height + 2 * hair},
           frame_color);
-      overlay.rectangle(box, entry.color);
-      overlay.text({box.right() + 0.5 * font, y + row_height * font / 2.0}, entry.text,
-                   {.size_px = font});
+      canvas.rectangle(box, entry.color);
+      canvas.text({box.right() + 0.5 * font, y + row_height * font / 2.0}, entry.text,
+                  {.size_px = font});
       y += row_height * font;
     }
     y += legend_gap * font;
   }
 }
 
-void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overlay) {
+void draw_axes(const ScenePage& page, const SceneCamera& camera, Canvas& canvas) {
   if (!page.axes) return;
   const double f = page.font_px;
   const double length = 2.3 * f;
@@ -302,17 +324,17 @@ void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overla
     TextStyle style{
         .size_px = page.font_px, .bold = true, .color = colors[k], .align = TextAlign::center};
     if (tips[k].norm() > 0.15 * length) {
-      draw_arrow(origin, origin + tips[k], width, colors[k], overlay);
-      overlay.text(origin + tips[k] + 0.6 * f * tips[k].normalized(), names[k], style);
+      draw_arrow(origin, origin + tips[k], width, colors[k], canvas);
+      canvas.text(origin + tips[k] + 0.6 * f * tips[k].normalized(), names[k], style);
       continue;
     }
     // Along the view: a ring with a dot toward the viewer, without away from it.
-    overlay.disc(origin, 0.38 * f, colors[k]);
-    overlay.disc(origin, 0.38 * f - std::max(1.0, 0.1 * f), paper);
+    canvas.disc(origin, 0.38 * f, colors[k]);
+    canvas.disc(origin, 0.38 * f - std::max(1.0, 0.1 * f), paper);
     if (camera.forward[static_cast<Eigen::Index>(k)] < 0.0)
-      overlay.disc(origin, 0.14 * f, colors[k]);
+      canvas.disc(origin, 0.14 * f, colors[k]);
     const Eigen::Vector2d free_side = -(low + high) / 2.0;
-    overlay.text(
+    canvas.text(
         origin + 0.85 * f *
                      (free_side.norm() > 0.0 ? free_side.normalized() : Eigen::Vector2d(0.0, 1.0)),
         names[k], style);
@@ -320,7 +342,7 @@ void draw_axes(const ScenePage& page, const SceneCamera& camera, Overlay& overla
 }
 
 void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
-                    const Eigen::Vector3d& reference, Overlay& overlay) {
+                    const Eigen::Vector3d& reference, Canvas& canvas) {
   if (!page.scale_bar) return;
   const double depth = camera.depth_of(reference);
   if (!(depth > 0.0)) return;
@@ -336,19 +358,46 @@ void draw_scale_bar(const ScenePage& page, const SceneCamera& camera,
   const double y = std::round(band.top + band.height / 2.0);
   const double thickness = std::max(2.0, std::round(0.16 * f));
   const double tick = 0.45 * f;
-  overlay.rectangle({left, y - thickness / 2.0, length_px, thickness}, ink);
+  canvas.rectangle({left, y - thickness / 2.0, length_px, thickness}, ink);
   for (const double x : {left, left + length_px - thickness})
-    overlay.rectangle({x, y - tick, thickness, 2.0 * tick}, ink);
+    canvas.rectangle({x, y - tick, thickness, 2.0 * tick}, ink);
   std::string text = length_text(length_m);
   const double room = band.width - length_px - 2.2 * f;
   if (camera.perspective && text_size(text + " at the center", style).x() <= room)
     text += " at the center";
-  if (text_size(text, style).x() <= room)
-    overlay.text({left + length_px + 0.6 * f, y}, text, style);
+  if (text_size(text, style).x() <= room) canvas.text({left + length_px + 0.6 * f, y}, text, style);
+}
+
+std::vector<PixelRect> place_labels(const std::vector<LabelRequest>& requests,
+                                    double point_radius_px, const PixelRect& bounds) {
+  std::vector<PixelRect> taken;
+  taken.reserve(2 * requests.size());
+  for (const LabelRequest& request : requests)
+    taken.push_back({request.anchor.x() - point_radius_px, request.anchor.y() - point_radius_px,
+                     2.0 * point_radius_px, 2.0 * point_radius_px});
+  std::vector<PixelRect> boxes;
+  for (const LabelRequest& request : requests) {
+    PixelRect best;
+    double least = std::numeric_limits<double>::infinity();
+    for (int ring = 0; ring < rings && least > 1e-6; ++ring) {
+      const double gap = point_radius_px * 1.25 + ring * 0.6 * request.height_px;
+      for (const auto& direction : directions) {
+        const PixelRect box = box_beside(request, direction, gap);
+        const double covered = covered_area(box, taken, bounds);
+        if (covered >= least) continue;
+        least = covered;
+        best = box;
+        if (least <= 1e-6) break;
+      }
+    }
+    boxes.push_back(best);
+    taken.push_back(best);
+  }
+  return boxes;
 }
 
 void draw_markers(const ScenePage& page, const SceneCamera& camera,
-                  const std::vector<Marker>& markers, Overlay& overlay) {
+                  const std::vector<Marker>& markers, Canvas& canvas) {
   const double f = page.font_px;
   const double radius = std::max(3.0, 0.32 * f);
   const double border = std::max(1.0, std::round(0.1 * f));
@@ -371,25 +420,25 @@ void draw_markers(const ScenePage& page, const SceneCamera& camera,
     if (requests[i].width_px == 0.0) continue;
     const PixelRect& box = boxes[i];
     const Eigen::Vector2d middle(box.left + box.width / 2.0, box.top + box.height / 2.0);
-    overlay.line(requests[i].anchor, middle, border, ink);
+    canvas.polyline({requests[i].anchor, middle}, border, ink);
   }
   for (std::size_t i = 0; i < seen.size(); ++i) {
     const Color color = verdict_color(seen[i].marker->verdict);
-    overlay.disc(seen[i].pixel, radius + border, paper);
-    overlay.disc(seen[i].pixel, radius, color);
+    canvas.disc(seen[i].pixel, radius + border, paper);
+    canvas.disc(seen[i].pixel, radius, color);
     if (!labeled || seen[i].marker->label.empty()) continue;
     const PixelRect& box = boxes[i];
-    overlay.rectangle(box, color);
-    overlay.rectangle(
+    canvas.rectangle(box, color);
+    canvas.rectangle(
         {box.left + border, box.top + border, box.width - 2.0 * border, box.height - 2.0 * border},
         paper);
-    overlay.text({box.left + box.width / 2.0, box.top + box.height / 2.0}, seen[i].marker->label,
-                 style);
+    canvas.text({box.left + box.width / 2.0, box.top + box.height / 2.0}, seen[i].marker->label,
+                style);
   }
 }
 
 void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
-                          const std::vector<DimensionLine>& lines, Overlay& overlay) {
+                          const std::vector<DimensionLine>& lines, Canvas& canvas) {
   const double f = page.font_px;
   const double width = std::max(1.0, std::round(0.09 * f));
   for (const DimensionLine& line : lines) {
@@ -398,8 +447,8 @@ void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
     const Eigen::Vector2d to = camera.pixel_of(line.to);
     const Eigen::Vector2d middle = (from + to) / 2.0;
     if ((to - from).norm() < 1.0) continue;
-    draw_arrow(middle, from, width, ink, overlay);
-    draw_arrow(middle, to, width, ink, overlay);
+    draw_arrow(middle, from, width, ink, canvas);
+    draw_arrow(middle, to, width, ink, canvas);
     const Eigen::Vector2d along = (to - from).normalized();
     TextStyle style{.size_px = page.font_px, .align = TextAlign::center};
     Eigen::Vector2d place = middle - Eigen::Vector2d(0.0, 0.8 * f);
@@ -407,7 +456,7 @@ void draw_dimension_lines(const ScenePage& page, const SceneCamera& camera,
       style.align = TextAlign::left;
       place = middle + Eigen::Vector2d(0.6 * f, 0.0);
     }
-    overlay.text(place, line.text, style);
+    canvas.text(place, line.text, style);
   }
 }
 

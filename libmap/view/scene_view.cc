@@ -25,10 +25,9 @@
 #include <variant>
 
 #include "libmap/core/error.h"
+#include "libmap/view/layer_geometry.h"
 #include "libmap/view/offscreen.h"
-#include "libmap/view/overlay.h"
 #include "libmap/view/scene_page.h"
-#include "libmap/view/scene_triangles.h"
 
 namespace libmap {
 namespace {
@@ -224,43 +223,19 @@ void aim(const Setup& setup, vtkCamera& target) {
   target.SetClippingRange(nearest, farthest);
 }
 
-Overlay overlay_of(const Setup& setup, const SceneViewOptions& options) {
-  Overlay overlay;
-  draw_title(setup.page, options.title, overlay);
-  draw_legends(setup.page, setup.legends, overlay);
-  draw_axes(setup.page, setup.camera, overlay);
-  draw_scale_bar(setup.page, setup.camera, setup.center, overlay);
-  draw_dimension_lines(setup.page, setup.camera, setup.dimension_lines, overlay);
-  draw_markers(setup.page, setup.camera, setup.markers, overlay);
-  return overlay;
-}
-
-void fill(vtkRenderWindow& window, const Setup& setup, const SceneViewOptions& options) {
-  window.SetNumberOfLayers(3);
-
-  vtkNew<vtkRenderer> page;
-  page->SetBackground(1.0, 1.0, 1.0);
-  window.AddRenderer(page);
-
-  vtkNew<vtkRenderer> plot;
-  const PixelRect& rect = setup.page.plot;
-  plot->SetLayer(1);
-  plot->SetViewport(rect.left / options.width, 1.0 - rect.bottom() / options.height,
-                    rect.right() / options.width, 1.0 - rect.top / options.height);
-  for (const PreparedLayer& layer : setup.layers)
-    plot->AddActor(actor_of(triangles_of(layer, setup.camera, setup.center)));
-  aim(setup, *plot->GetActiveCamera());
-  window.AddRenderer(plot);
-
-  vtkNew<vtkRenderer> front;
-  front->SetLayer(2);
-  overlay_of(setup, options).add_to(*front, options.height);
-  window.AddRenderer(front);
-
-  // Behind the scene, on the page.
-  Overlay behind;
-  behind.rectangle(rect, parse_color(options.background, "background"));
-  behind.add_to(*page, options.height);
+// The scene alone, as it fills the page's plot.
+ColorImage draw_plot(const Setup& setup, const Color& background) {
+  const PixelRect& plot = setup.page.plot;
+  return draw_offscreen(
+      static_cast<int>(plot.width), static_cast<int>(plot.height), [&](vtkRenderWindow& window) {
+        vtkNew<vtkRenderer> renderer;
+        renderer->SetBackground(background[0] / 255.0, background[1] / 255.0,
+                                background[2] / 255.0);
+        for (const PreparedLayer& layer : setup.layers)
+          renderer->AddActor(actor_of(triangles_of(layer, setup.camera, setup.center)));
+        aim(setup, *renderer->GetActiveCamera());
+        window.AddRenderer(renderer);
+      });
 }
 
 }  // namespace
@@ -311,8 +286,15 @@ ColorImage render_scene(Scene scene, const SceneViewOptions& options) {
   // Only the pages of textures are not copied; drawing takes hundreds of bytes per point itself.
   for (SceneLayer& layer : scene.layers)
     if (!std::holds_alternative<TexturedMesh>(layer.shape)) layer.shape = PointCloud();
-  return draw_offscreen(options.width, options.height,
-                        [&](vtkRenderWindow& window) { fill(window, setup, options); });
+  Canvas canvas(options.width, options.height);
+  canvas.image(draw_plot(setup, parse_color(options.background, "background")), setup.page.plot);
+  draw_title(setup.page, options.title, canvas);
+  draw_legends(setup.page, setup.legends, canvas);
+  draw_axes(setup.page, setup.camera, canvas);
+  draw_scale_bar(setup.page, setup.camera, setup.center, canvas);
+  draw_dimension_lines(setup.page, setup.camera, setup.dimension_lines, canvas);
+  draw_markers(setup.page, setup.camera, setup.markers, canvas);
+  return canvas.pixels();
 }
 
 SceneContents contents_of(const Scene& scene) {

@@ -40,5 +40,8 @@ endif
 ifneq ($(filter report,$(STAGES)),)
 all: $(OUT)/report.html
 endif
-$(OUT)/report.html: $(data)/reports/study.yaml $(results)
-	@exec $(GRASPMAP) report $(OUT) --outline study -o $@
+$(OUT)/findings.txt: $(here)study/findings.txt
+	@mkdir -p $(@D)
+	@cp $< $@
+$(OUT)/report.html: $(OUT)/findings.txt $(results)
+	@exec $(GRASPMAP) report $(OUT) --title 'The study of the thesis' --max-size-mb 40 -o $@

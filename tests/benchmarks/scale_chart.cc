@@ -9,7 +9,7 @@
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
-#include "libmap/view/virtual_display.h"
+#include "libmap/view/image_io.h"
 
 namespace {
 
@@ -81,7 +81,6 @@ int main(int argc, char** argv) {
     return 2;
   }
   const libmap::Table table = libmap::read_csv(argv[1]);
-  const libmap::VirtualDisplay display;
   const libmap::ChartSize size{800, 600};
   libmap::write_whole_file(
       argv[2], libmap::to_png(side_by_side(libmap::draw_chart(time_chart(table), size),

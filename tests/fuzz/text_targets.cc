@@ -7,7 +7,6 @@
 #include "libgtd/score/scenario.h"
 #include "libmap/core/table.h"
 #include "libmap/image/camera_io.h"
-#include "libmap/report/outline_io.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/simulate/primitive_scene.h"
 #include "libmap/simulate/rock_site.h"
@@ -80,24 +79,6 @@ Seeds yaml_seeds() {
                                   pose));
   add_data(seeds, 4, "scenes");
   add_data(seeds, 5, "sites");
-  return seeds;
-}
-
-bool run_outline(std::string_view bytes) {
-  return accepts([&] { libmap::parse_outline(std::string(bytes), file_name); });
-}
-
-Seeds outline_seeds() {
-  Seeds seeds;
-  add_data(seeds, 0, "reports");
-  for (std::string& seed : seeds) seed.erase(0, 1);
-  seeds.emplace_back(
-      "title: A run\ntext: Of a day\nitems:\n  - map: map.pcd\n    lookup: points.csv\n"
-      "    verdict: found\n    picture: map.png\n  - values: [{label: a, file: b.json, at: /c}]\n"
-      "  - table: t.csv\n    columns: [x, {y: height}]\n    rows: 3\n"
-      "sections:\n  - heading: One\n    folder: one\n    items:\n      - note: a text\n"
-      "      - timings: [{name: a, folder: b}]\n        commands: [score]\n"
-      "        published: {file: p.csv, name: step, columns: {a: b}, rows: {c: d}}\n");
   return seeds;
 }
 
@@ -180,7 +161,6 @@ Seeds manifest_seeds() { return {libmap::to_json(small_manifest())}; }
 std::vector<FuzzTarget> text_targets() {
   return {
       {"manifest", "manifests", run_manifest, manifest_seeds},
-      {"outline", "outlines of reports", run_outline, outline_seeds},
       {"points", "tables to look up, evaluate and expect", run_points, points_seeds},
       {"table", "CSV tables", run_table, table_seeds},
       {"yaml", "grippers, scenarios, rigs, cameras, scenes and sites", run_yaml, yaml_seeds},

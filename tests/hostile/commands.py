@@ -97,8 +97,6 @@ USES = [
     use(f"render {{good}}/map.pcd --points {{x}} --verdict graspable {SMALL} -o out.png", "points", "points.csv"),
     use("render {x} {good}/map.pcd --cell-width 160 -o out.png", "picture map tiles", "picture.png"),
     use("report {x} -o out.html", "run-folder", "run", main=True),
-    use("report {good}/run --outline {x} -o out.html", "outline", "outline.yaml", main=True),
-    use("report {x} --outline {good}/outline.yaml -o out.html", "run-folder", "run"),
     use("convert -o out {x}", "bag", "rig.bag", main=True),
     use("convert {x} --topic /merged_pcd -o out.pcd", "bag", "map.bag"),
     use("info --json {x}", "bag", "rig.bag", main=True),

@@ -7,7 +7,7 @@ from corpus import damage_file, damage_text, damaged_bytes
 from damage_scans import in_folder
 
 YAML = {"gripper": "gripper.yaml", "scenario": "scenario.yaml", "rig": "rig.yaml", "camera": "camera.yaml",
-        "site": "site.yaml", "scene": "scene.yaml", "outline": "outline.yaml"}
+        "site": "site.yaml", "scene": "scene.yaml"}
 
 
 def yaml(corpus):

@@ -44,17 +44,6 @@ gripper: scar-e
 voxel_size_m: 0.02
 curvature_radius_m: 0
 """
-OUTLINE = """title: A run
-sections:
-  - heading: Map
-    items:
-      - map: map.pcd
-        lookup: lookup.csv
-      - table: lookup.csv
-        columns: [place, score]
-      - picture: picture.png
-      - parameters: map.pcd
-"""
 TERRAIN = "seed: 2\n"
 POINTS = """place,x,y,z,graspable
 A,0.1,-0.1,0.1,1
@@ -72,7 +61,7 @@ TRANSFORM = "1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n"
 TEXTS = {
     "scene.yaml": SCENE, "site.yaml": SITE, "camera.yaml": CAMERA, "rig.yaml": RIG,
     "scenario.yaml": SCENARIO, "terrain.yaml": TERRAIN,
-    "outline.yaml": OUTLINE, "points.csv": POINTS,
+    "points.csv": POINTS,
     "expected.csv": EXPECTED, "polygon.csv": POLYGON, "transform.txt": TRANSFORM,
 }
 

@@ -13,6 +13,7 @@ using graspmap_test::json_of;
 using graspmap_test::scratch;
 using graspmap_test::succeeded;
 using graspmap_test::write_terrain;
+using graspmap_test::wrong_usage;
 
 // run/map.pcd with two looked-up points.
 void make_run() {
@@ -74,19 +75,11 @@ TEST(Report, AStoreIsShownAsItsMap) {
   EXPECT_TRUE(view_of("store", "map.tiles") == view);
 }
 
-TEST(Report, AnOutlineSaysWhatIsMissing) {
+TEST(Report, TheRemovedOutlineNamesTheNewWay) {
   make_run();
-  graspmap_test::write_text(
-      scratch("o.yaml"),
-      "title: T\nsections:\n  - heading: H\n    items:\n      - picture: no.png\n"
-      "      - {map: map.pcd, lookup: lookup.csv}\n");
-  ASSERT_TRUE(succeeded(graspmap({"report", "run", "--outline", "o.yaml", "-o", "r.html"})));
-  EXPECT_NE(content("r.html").find("Not made in this run: <code>no.png</code>"), std::string::npos);
-  EXPECT_TRUE(
-      bad_input(graspmap({"report", "run", "--outline", "no.yaml", "-o", "r.html"}), {"no.yaml"}));
-  graspmap_test::write_text(scratch("o.yaml"), "title: T\nsection: []\n");
-  EXPECT_TRUE(bad_input(graspmap({"report", "run", "--outline", "o.yaml", "-o", "r.html"}),
-                        {"o.yaml", "line 2", "did you mean 'sections'?"}));
+  EXPECT_TRUE(wrong_usage(graspmap({"report", "run", "--outline", "study", "-o", "r.html"}),
+                          {"--outline", "shows what its folder contains"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("r.html")));
 }
 
 TEST(Report, WithoutThreeJs) {

@@ -4,7 +4,7 @@
 #include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
-#include "libmap/view/virtual_display.h"
+#include "libmap/view/image_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"
 
@@ -137,12 +137,8 @@ libmap::Chart chart_of(const libmap::Table& table, const std::string& x, const s
 
 void add_chart(Run::Files& files, const std::string& name, const libmap::Chart& chart) {
   if (chart.curves.empty()) return;
-  files.emplace_back(name + ".svg", [chart](const std::filesystem::path& temporary) {
-    libmap::write_chart_svg(temporary, chart);
-  });
-  files.emplace_back(name + ".png", [chart](const std::filesystem::path& temporary) {
-    libmap::write_text(temporary, libmap::to_png(libmap::draw_chart(chart)));
-  });
+  files.emplace_back(name + ".svg", Run::text_writer(libmap::chart_svg(chart)));
+  files.emplace_back(name + ".png", Run::text_writer(libmap::to_png(libmap::draw_chart(chart))));
 }
 
 void add_charts(Run::Files& files, const libmap::Table& maps, const libmap::Table& histograms,
@@ -197,14 +193,12 @@ void tabulate_maps(const std::vector<std::string>& map_files, const std::string&
                          return compare_all(maps, voxels);
                        }))));
   if (expected) files.emplace_back("regions.csv", table(libgtd::region_table(maps, *expected)));
-  std::optional<libmap::VirtualDisplay> display;
   if (options.pictures) {
     try {
       add_charts(files, rows, histograms, options);
     } catch (const libmap::Error& error) {
       throw libmap::Error(error.reason(), {.file = "maps.csv", .field = error.context().field});
     }
-    if (!run.options().dry_run) display.emplace();
   }
   run.write_output_folder(folder, files);
 }

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 
 #include "libmap/core/score_color.h"
-#include "libmap/report/map_html.h"
+#include "libmap/report/html.h"
 #include "tests/support/test_support.h"
 
 namespace map_view_test {

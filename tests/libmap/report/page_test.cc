@@ -5,6 +5,7 @@
 #include "libmap/image/image_codec.h"
 #include "libmap/report/html.h"
 #include "libmap/report/picture_fit.h"
+#include "libmap/report/report_reader.h"
 #include "tests/support/test_support.h"
 
 namespace page_test {
@@ -40,13 +41,12 @@ const PageAssets assets{.style = "p { color: red }",
 TEST(ReportPage, NothingFromTheRunCanRun) {
   const std::string attack = "\"'><script>alert(1)</script><img src=x onerror=alert(2)>";
   ReportContent content;
-  content.title = content.text = attack;
+  content.title = attack;
   libmap::ReportSection section;
-  section.heading = section.text = section.folder = attack;
-  section.gaps.push_back({attack, attack});
+  section.heading = section.folder = attack;
   libmap::ReportItem item;
   item.caption = item.source = attack;
-  item.gaps.push_back({attack, ""});
+  item.gaps.push_back({attack, attack});
   libmap::ReportTable table;
   table.table.columns = table.headings = {attack, attack};
   table.table.rows = {{attack, attack}};
@@ -59,11 +59,9 @@ TEST(ReportPage, NothingFromTheRunCanRun) {
   parameters.outputs = {{attack, manifest}};
   for (const libmap::ReportBody& body :
        {libmap::ReportBody(table), libmap::ReportBody(parameters),
-        libmap::ReportBody(libmap::ReportValues{{attack, attack, attack, attack}}),
         libmap::ReportBody(libmap::timing_table({{attack, {manifest}}})),
         libmap::ReportBody(libmap::ReportScene{{}, {{libmap::Color{1, 2, 3}, attack}}}),
-        libmap::ReportBody(libmap::ReportListing{attack, 3}),
-        libmap::ReportBody(libmap::ReportNote{attack})}) {
+        libmap::ReportBody(libmap::ReportListing{attack, 3})}) {
     item.body = body;
     section.items.push_back(item);
   }

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <memory>
 
+#include "libmap/view/offscreen.h"
 #include "libmap/view/scene_page.h"
-#include "libmap/view/virtual_display.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

@@ -1,13 +1,13 @@
 #include "libmap/view/scene_page.h"
 
-#include <gmock/gmock.h>
+#include <gtest/gtest.h>
 
 #include "tests/support/test_support.h"
 
 namespace libmap {
 namespace scene_page_test {
 
-using ::testing::ElementsAre;
+using graspmap_test::uniform;
 
 SceneViewOptions options_of(int width, int height) {
   SceneViewOptions options;
@@ -63,7 +63,7 @@ TEST(ScaleBar, LengthsAreRound) {
   EXPECT_DOUBLE_EQ(round_length_m(0.31), 0.2);
   EXPECT_DOUBLE_EQ(round_length_m(7300.0), 5000.0);
   for (int k = 0; k < 200; ++k) {
-    const double longest = std::pow(10.0, graspmap_test::uniform(-5, 5));
+    const double longest = std::pow(10.0, uniform(-5, 5));
     EXPECT_LE(round_length_m(longest), longest * (1.0 + 1e-9));
     EXPECT_GE(round_length_m(longest), 0.39 * longest);
   }
@@ -75,32 +75,56 @@ TEST(ScaleBar, LengthsAreRound) {
   EXPECT_EQ(length_text(0.0002), "0.2 mm");
 }
 
-TEST(TickTexts, HaveTheSameDecimals) {
-  EXPECT_THAT(tick_texts({0.0, 0.5, 1.0}), ElementsAre("0.0", "0.5", "1.0"));
-  EXPECT_THAT(tick_texts({-0.05, 0.0, 0.05}), ElementsAre("-0.05", "0.00", "0.05"));
-  EXPECT_THAT(tick_texts({0.0, 20.0, 40.0}), ElementsAre("0", "20", "40"));
+PixelRect around(const Eigen::Vector2d& point, double radius) {
+  return {point.x() - radius, point.y() - radius, 2.0 * radius, 2.0 * radius};
 }
 
-TEST(Text, IsMeasuredAndShortened) {
-  const TextStyle style{.size_px = 20};
-  const double wide = text_size("graspability", style).x();
-  EXPECT_GT(wide, 60.0);
-  EXPECT_LT(wide, 200.0);
-  EXPECT_GT(text_size("graspability", {.size_px = 40}).x(), 1.8 * wide);
-  EXPECT_EQ(shortened_text("graspability", style, 1000.0), "graspability");
-  const std::string shorter = shortened_text("graspability", style, 0.6 * wide);
-  EXPECT_LE(text_size(shorter, style).x(), 0.6 * wide);
-  EXPECT_TRUE(shorter.starts_with("gra")) << shorter;
-  EXPECT_TRUE(shorter.ends_with("...")) << shorter;
-  EXPECT_EQ(shortened_text("graspability", style, 3.0), "");
-  // Whole characters only.
-  for (double width = 20.0; width < 120.0; width += 3.0) {
-    const std::string text =
-        shortened_text("\u00e4\u00f6\u00fc\u00e4\u00f6\u00fc\u00e4", style, width);
-    if (text.size() > 3) {
-      EXPECT_EQ(text.size() % 2, text.ends_with("...") ? 1U : 0U);
+TEST(PlaceLabels, RightBesideALonePoint) {
+  const auto boxes = place_labels({{{100.0, 100.0}, 60.0, 20.0}}, 8.0, {0.0, 0.0, 400.0, 300.0});
+  ASSERT_EQ(boxes.size(), 1U);
+  EXPECT_GT(boxes[0].left, 108.0);
+  EXPECT_LT(boxes[0].left, 120.0);
+  EXPECT_DOUBLE_EQ(boxes[0].top + boxes[0].height / 2.0, 100.0);
+}
+
+TEST(PlaceLabels, StaysInsideAtTheEdges) {
+  const PixelRect bounds{0.0, 0.0, 400.0, 300.0};
+  for (const Eigen::Vector2d& corner :
+       {Eigen::Vector2d(2, 2), Eigen::Vector2d(398, 2), Eigen::Vector2d(2, 298),
+        Eigen::Vector2d(398, 298), Eigen::Vector2d(398, 150)}) {
+    const PixelRect box = place_labels({{corner, 60.0, 20.0}}, 8.0, bounds).front();
+    EXPECT_GE(box.left, bounds.left);
+    EXPECT_GE(box.top, bounds.top);
+    EXPECT_LE(box.right(), bounds.right());
+    EXPECT_LE(box.bottom(), bounds.bottom());
+  }
+}
+
+TEST(PlaceLabels, ThirtyLabelsCoverNothing) {
+  for (int round = 0; round < 20; ++round) {
+    std::vector<LabelRequest> requests;
+    for (int i = 0; i < 30; ++i)
+      requests.push_back({{uniform(100, 1100), uniform(50, 850)}, uniform(30, 90), 24.0});
+    const std::vector<PixelRect> boxes = place_labels(requests, 9.0, {0.0, 0.0, 1200.0, 900.0});
+    ASSERT_EQ(boxes.size(), requests.size());
+    for (std::size_t a = 0; a < boxes.size(); ++a) {
+      EXPECT_DOUBLE_EQ(boxes[a].width, requests[a].width_px);
+      for (std::size_t b = 0; b < boxes.size(); ++b) {
+        EXPECT_FALSE(boxes[a].overlaps(around(requests[b].anchor, 8.9)))
+            << round << ": " << a << " on point " << b;
+        if (a != b) {
+          EXPECT_FALSE(boxes[a].overlaps(boxes[b])) << round << ": " << a << ", " << b;
+        }
+      }
     }
   }
+}
+
+TEST(PlaceLabels, ACrowdInOnePlaceGetsABoxEach) {
+  const std::vector<LabelRequest> requests(200, {{50.0, 50.0}, 40.0, 15.0});
+  const std::vector<PixelRect> boxes = place_labels(requests, 5.0, {0.0, 0.0, 100.0, 100.0});
+  ASSERT_EQ(boxes.size(), 200U);
+  for (const PixelRect& box : boxes) EXPECT_DOUBLE_EQ(box.height, 15.0);
 }
 
 }  // namespace scene_page_test

@@ -1,4 +1,4 @@
-#include "libmap/view/scene_triangles.h"
+#include "libmap/view/layer_geometry.h"
 
 #include <gtest/gtest.h>
 

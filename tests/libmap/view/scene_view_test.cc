@@ -9,7 +9,7 @@
 #include <set>
 
 #include "libmap/view/image_io.h"
-#include "libmap/view/virtual_display.h"
+#include "libmap/view/offscreen.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

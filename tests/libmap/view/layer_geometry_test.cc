@@ -1,4 +1,4 @@
-#include "libmap/view/scene_triangles.h"
+#include "libmap/view/layer_geometry.h"
 
 #include <gtest/gtest.h>
 
@@ -7,7 +7,7 @@
 #include "tests/support/test_support.h"
 
 namespace libmap {
-namespace scene_triangles_test {
+namespace layer_geometry_test {
 
 using graspmap_test::uniform;
 
@@ -137,5 +137,5 @@ TEST(TrianglesOf, CountsFromTheGivenOrigin) {
   EXPECT_NEAR(triangles.vertices[4].x() - triangles.vertices[0].x(), 0.001, 1e-8);
 }
 
-}  // namespace scene_triangles_test
+}  // namespace layer_geometry_test
 }  // namespace libmap

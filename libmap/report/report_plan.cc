@@ -1,22 +1,78 @@
-#include "libmap/report/found_outline.h"
+#include "libmap/report/report_plan.h"
 
 #include <algorithm>
+#include <cstring>
 #include <map>
 #include <optional>
 #include <set>
-#include <string>
 #include <system_error>
 
 #include "libmap/core/error.h"
-#include "libmap/core/manifest.h"
-#include "libmap/report/run_folder.h"
-#include "libmap/report/table_reader.h"
+#include "libmap/report/report_reader.h"
 
 namespace libmap {
 
 namespace fs = std::filesystem;
 
 namespace {
+
+constexpr int max_folder_depth = 12;  // below a run's folder
+
+struct FolderListing {
+  std::vector<fs::path> files;
+  std::vector<fs::path> folders;
+};
+
+// In natural order, without hidden names and links to folders, which may form circles. A folder
+// that cannot be read is empty.
+FolderListing list_folder(const fs::path& folder) {
+  FolderListing listing;
+  std::error_code code;
+  for (auto entry = fs::directory_iterator(folder, code);
+       !code && entry != fs::directory_iterator(); entry.increment(code)) {
+    std::error_code ignored;
+    if (entry->path().filename().string().starts_with('.')) continue;
+    if (entry->is_directory(ignored)) {
+      if (!entry->is_symlink(ignored)) listing.folders.push_back(entry->path());
+    } else if (entry->is_regular_file(ignored)) {
+      listing.files.push_back(entry->path());
+    }
+  }
+  const auto by_name = [](const fs::path& a, const fs::path& b) {
+    return natural_less(a.filename().string(), b.filename().string());
+  };
+  std::sort(listing.files.begin(), listing.files.end(), by_name);
+  std::sort(listing.folders.begin(), listing.folders.end(), by_name);
+  return listing;
+}
+
+// Whether it contains the tiles of a map: a store, or the shares that were merged to one.
+bool is_folder_of_tiles(const fs::path& folder) {
+  return folder.extension() == ".tiles" || folder.filename() == "tiles";
+}
+
+void add_manifests(const fs::path& folder, bool tiles, int depth,
+                   std::vector<ReportSource>& sources) {
+  const FolderListing listing = list_folder(folder);
+  for (const fs::path& file : listing.files) {
+    if (file.extension() != ".json") continue;
+    fs::path output = file;
+    output.replace_extension();
+    std::error_code code;
+    if (!fs::exists(output, code)) continue;
+    ReportSource& source = sources.emplace_back();
+    source.output = output.string();
+    try {
+      if (auto manifest = read_manifest_of(output)) source.manifest = std::move(*manifest);
+    } catch (const Error& error) {
+      source.error = error.reason();
+    }
+  }
+  if (depth == max_folder_depth) return;
+  for (const fs::path& inner : listing.folders)
+    if (inner.extension() != ".tiles" && (tiles || !is_folder_of_tiles(inner)))
+      add_manifests(inner, tiles, depth + 1, sources);
+}
 
 bool has_extension(const fs::path& file, const std::set<fs::path>& extensions) {
   return extensions.contains(file.extension());
@@ -43,12 +99,12 @@ std::string heading_of(const fs::path& folder) {
 
 class Finder {
  public:
-  explicit Finder(const fs::path& folder) : root_(folder) {}
+  Finder(fs::path folder, fs::path name) : root_(std::move(folder)), root_name_(std::move(name)) {}
 
-  OutlineSection section_of(const fs::path& folder, int depth) {
-    OutlineSection section;
+  PlannedSection section_of(const fs::path& folder, int depth) {
+    PlannedSection section;
     section.heading = heading_of(folder);
-    section.folder = folder.filename().string();
+    section.folder = folder;
     const FolderListing listing = list_folder(folder);
     add_maps(listing, section);
     add_scenes(folder, listing, section);
@@ -59,7 +115,7 @@ class Finder {
     if (depth == max_folder_depth) return section;
     for (const fs::path& inner : listing.folders) {
       if (is_folder_of_tiles(inner)) continue;
-      OutlineSection part = section_of(inner, depth + 1);
+      PlannedSection part = section_of(inner, depth + 1);
       if (!part.items.empty() || !part.sections.empty())
         section.sections.push_back(std::move(part));
     }
@@ -67,11 +123,11 @@ class Finder {
   }
 
   // The parameters of all maps side by side.
-  std::vector<OutlineItem> overview() const {
+  std::vector<PlannedItem> overview() const {
     if (maps_.empty()) return {};
-    OutlineItem parameters{.kind = ItemKind::parameters};
+    PlannedItem parameters{.kind = ItemKind::parameters};
     for (const fs::path& map : maps_) {
-      parameters.files.push_back(map.lexically_relative(root_).string());
+      parameters.files.push_back(map);
       parameters.labels.push_back(place_of(map));
     }
     parameters.caption = maps_.size() == 1 ? "The map of this run." : "The maps of this run.";
@@ -79,25 +135,21 @@ class Finder {
   }
 
   // A case for each folder with a map: what lies in it and below, but for lower folders with maps.
-  std::vector<OutlineSection> running_times() const {
-    OutlineItem timings{.kind = ItemKind::timings};
+  std::vector<PlannedSection> running_times() const {
+    PlannedItem timings{.kind = ItemKind::timings};
     std::set<fs::path> known;
     for (const fs::path& map : maps_) {
       const fs::path folder = map.parent_path();
       if (!known.insert(folder).second) continue;
-      OutlineCase one{.name = maps_in(folder) == 1 ? place_of(map) : name_of(folder)};
+      auto& [name, outputs] = timings.cases.emplace_back();
+      name = maps_in(folder) == 1 ? place_of(map) : name_of(folder);
       for (const ReportSource& source : manifests_below(folder, true))
         if (source.error.empty() && folder_with_map_of(source.output) == folder)
-          one.files.push_back(fs::path(source.output).lexically_relative(root_).string());
-      timings.cases.push_back(std::move(one));
+          outputs.emplace_back(source.output);
     }
     if (timings.cases.empty()) return {};
-    timings.commands = {"simulate scene", "simulate site", "simulate cameras", "fuse",
-                        "mesh",           "crop",          "resample",         "score",
-                        "convert",        "lookup",        "evaluate",         "footholds",
-                        "analyze"};
     timings.caption = "Running times.";
-    return {{.heading = "Running times", .items = {std::move(timings)}}};
+    return {{.heading = "Running times", .folder = root_, .items = {std::move(timings)}}};
   }
 
  private:
@@ -127,7 +179,7 @@ class Finder {
   }
 
   std::string name_of(const fs::path& folder) const {
-    return folder == root_ ? folder.filename().string() : folder.lexically_relative(root_).string();
+    return folder == root_ ? root_name_.string() : folder.lexically_relative(root_).string();
   }
 
   // A map by its folder; in the run's own, or beside others, by its name.
@@ -136,7 +188,7 @@ class Finder {
     return alone ? name_of(map.parent_path()) : map.lexically_relative(root_).string();
   }
 
-  void add_maps(const FolderListing& listing, OutlineSection& section) {
+  void add_maps(const FolderListing& listing, PlannedSection& section) {
     std::vector<fs::path> candidates = listing.files;
     candidates.insert(candidates.end(), listing.folders.begin(), listing.folders.end());
     std::set<std::string> stems;
@@ -146,16 +198,16 @@ class Finder {
     for (const fs::path& file : candidates) {
       maps_.push_back(file);
       ++maps_in_[file.parent_path()];
-      OutlineItem item{.kind = ItemKind::map, .files = {file.filename().string()}};
+      PlannedItem item{.kind = ItemKind::map, .files = {file}};
       item.lookup = lookup_of(file, listing);
-      if (!item.lookup.empty()) item.columns = columns_of(file.parent_path() / item.lookup);
+      if (!item.lookup.empty()) item.columns = columns_of(item.lookup);
       item.picture = still_of(file, listing, candidates.size() == 1);
       section.items.push_back(std::move(item));
     }
   }
 
   // Of the trials of `grasp`: the folder's manifest says of each what came out.
-  void add_scenes(const fs::path& folder, const FolderListing& listing, OutlineSection& section) {
+  void add_scenes(const fs::path& folder, const FolderListing& listing, PlannedSection& section) {
     const auto& manifest = manifest_of(folder);
     if (!manifest || manifest->command != "grasp") return;
     for (const fs::path& file : listing.files) {
@@ -164,38 +216,38 @@ class Finder {
       const auto* text = result == nullptr ? nullptr : std::get_if<std::string>(result);
       if (text != nullptr)
         section.items.push_back({.kind = ItemKind::scene,
-                                 .files = {name},
+                                 .files = {file},
                                  .caption = file.stem().string() + ": " + *text + "."});
     }
   }
 
   // The looked-up points whose manifest names this map.
-  std::string lookup_of(const fs::path& map, const FolderListing& listing) {
+  fs::path lookup_of(const fs::path& map, const FolderListing& listing) {
     for (const fs::path& file : listing.files) {
       if (file.extension() != ".csv") continue;
       const auto& manifest = manifest_of(file);
       if (manifest && manifest->command == "lookup" && !manifest->inputs.empty() &&
           fs::path(manifest->inputs.front().path).filename() == map.filename())
-        return file.filename().string();
+        return file;
     }
-    return "";
+    return {};
   }
 
   // What a reader asks of a place first; the rest stands in the file.
-  static std::vector<OutlineColumn> columns_of(const fs::path& lookup) {
+  static TableColumns columns_of(const fs::path& lookup) {
     try {
-      const Table table = read_report_table(lookup, {}, 1, 1).table;
+      const Table table = read_report_table(lookup, {}, 1).table;
       // Where the points brought verdicts of their own, the map's is `map_graspable`.
       const bool verdicts = table.find_column("map_graspable").has_value();
-      const std::vector<OutlineColumn> wanted = {
-          {"graspable", verdicts ? "verdict" : "graspable on the map"},
-          {"score", "score"},
-          {"convex", "convex"},
-          {"map_graspable", "graspable on the map"}};
-      std::vector<OutlineColumn> columns = {{table.columns.front(), table.columns.front()}};
-      for (const OutlineColumn& column : wanted)
-        if (table.find_column(column.name).value_or(0) > 0) columns.push_back(column);
-      return columns.size() > 1 ? columns : std::vector<OutlineColumn>{};
+      const std::string& name = table.columns.front();
+      TableColumns columns = {{name, name}};
+      for (const auto& [column, heading] :
+           {std::pair{"graspable", verdicts ? "verdict" : "graspable on the map"},
+            {"score", "score"},
+            {"convex", "convex"},
+            {"map_graspable", "graspable on the map"}})
+        if (table.find_column(column).value_or(0) > 0) columns.emplace_back(column, heading);
+      return columns.size() > 1 ? columns : TableColumns{};
     } catch (const Error&) {
       return {};
     }
@@ -203,7 +255,7 @@ class Finder {
 
   // One that was made from this map, as its manifest says; a folder's only map is what one without
   // a manifest shows.
-  std::string still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
+  fs::path still_of(const fs::path& map, const FolderListing& listing, bool only_map) {
     const auto shows = [&](const fs::path& picture) {
       const auto& manifest = manifest_of(picture);
       if (!manifest || manifest->inputs.empty()) return only_map;
@@ -213,15 +265,15 @@ class Finder {
          {map.stem().string() + ".png", std::string("oblique.png"), std::string("top.png")})
       for (const fs::path& file : listing.files)
         if (file.filename() == name && (name == map.stem().string() + ".png" || shows(file)))
-          return name;
-    return "";
+          return file;
+    return {};
   }
 
   // One figure of all pictures and one a chart. A picture that is there as a drawing too is left
   // out.
-  static void add_pictures(const FolderListing& listing, OutlineSection& section) {
-    OutlineItem pictures{.kind = ItemKind::picture};
-    std::vector<OutlineItem> charts;
+  static void add_pictures(const FolderListing& listing, PlannedSection& section) {
+    PlannedItem pictures{.kind = ItemKind::picture};
+    std::vector<PlannedItem> charts;
     const auto drawn = [&](const fs::path& file) {
       const fs::path drawing = fs::path(file).replace_extension(".svg");
       return drawing != file &&
@@ -237,12 +289,11 @@ class Finder {
           drawn_below(file))
         continue;
       if (file.extension() == ".svg") {
-        charts.push_back({.kind = ItemKind::picture,
-                          .files = {file.filename().string()},
-                          .caption = heading_of(file.stem()) + "."});
+        charts.push_back(
+            {.kind = ItemKind::picture, .files = {file}, .caption = heading_of(file.stem()) + "."});
         continue;
       }
-      pictures.files.push_back(file.filename().string());
+      pictures.files.push_back(file);
       pictures.labels.push_back(heading_of(file.stem()));
     }
     // The names of several stand below each.
@@ -251,59 +302,86 @@ class Finder {
     if (!pictures.caption.empty()) pictures.caption += '.';
     if (pictures.files.size() == 1) pictures.labels.clear();
     if (!pictures.files.empty()) section.items.push_back(std::move(pictures));
-    for (OutlineItem& chart : charts) section.items.push_back(std::move(chart));
+    for (PlannedItem& chart : charts) section.items.push_back(std::move(chart));
   }
 
   // Without the look-ups that stand beside a map, and clouds.
-  static void add_tables(const FolderListing& listing, OutlineSection& section) {
+  static void add_tables(const FolderListing& listing, PlannedSection& section) {
     for (const fs::path& file : listing.files) {
-      const std::string name = file.filename().string();
       const bool beside_map =
-          std::any_of(section.items.begin(), section.items.end(), [&](const OutlineItem& item) {
-            return item.lookup == name ||
-                   (item.kind == ItemKind::map && item.files.front() == name);
+          std::any_of(section.items.begin(), section.items.end(), [&](const PlannedItem& item) {
+            return item.lookup == file ||
+                   (item.kind == ItemKind::map && item.files.front() == file);
           });
       if (file.extension() == ".csv" && !beside_map)
         section.items.push_back(
-            {.kind = ItemKind::table, .files = {name}, .caption = heading_of(file.stem()) + "."});
+            {.kind = ItemKind::table, .files = {file}, .caption = heading_of(file.stem()) + "."});
     }
   }
 
-  static void add_texts(const FolderListing& listing, OutlineSection& section) {
+  static void add_texts(const FolderListing& listing, PlannedSection& section) {
     for (const fs::path& file : listing.files)
       if (file.extension() == ".txt")
-        section.items.push_back({.kind = ItemKind::listing,
-                                 .files = {file.filename().string()},
-                                 .caption = heading_of(file.stem()) + "."});
+        section.items.push_back(
+            {.kind = ItemKind::listing, .files = {file}, .caption = heading_of(file.stem()) + "."});
   }
 
   fs::path root_;
+  fs::path root_name_;
   std::vector<fs::path> maps_;
   std::map<fs::path, int> maps_in_;
   std::map<fs::path, std::optional<Manifest>> manifests_;  // of the folder at hand
 };
 
+std::size_t count_kind(const std::vector<PlannedItem>& items, ItemKind kind) {
+  return static_cast<std::size_t>(std::count_if(
+      items.begin(), items.end(), [&](const PlannedItem& item) { return item.kind == kind; }));
+}
+
+std::size_t count_kind(const std::vector<PlannedSection>& sections, ItemKind kind) {
+  std::size_t count = 0;
+  for (const PlannedSection& section : sections)
+    count += count_kind(section.items, kind) + count_kind(section.sections, kind);
+  return count;
+}
+
 }  // namespace
 
-Outline outline_of_folder(const fs::path& folder) {
+std::size_t ReportPlan::count(ItemKind kind) const {
+  return count_kind(items, kind) + count_kind(sections, kind);
+}
+
+bool natural_less(const std::string& a, const std::string& b) {
+  return strverscmp(a.c_str(), b.c_str()) < 0;
+}
+
+std::vector<ReportSource> manifests_below(const fs::path& folder, bool tiles) {
+  std::vector<ReportSource> sources;
+  add_manifests(folder, tiles, 0, sources);
+  return sources;
+}
+
+ReportPlan plan_report(const fs::path& folder) {
   std::error_code code;
   if (!fs::is_directory(folder, code))
     throw Error(fs::exists(folder, code) ? "is no folder" : "no such folder",
                 {.file = folder.string()});
-  const fs::path root = (fs::absolute(folder) / "").lexically_normal().parent_path();
-  Finder finder(root);
-  OutlineSection found = finder.section_of(root, 0);
+  const fs::path name = (fs::absolute(folder) / "").lexically_normal().parent_path().filename();
+  fs::path root = folder.lexically_normal();
+  if (!root.has_filename()) root = root.parent_path();
+  Finder finder(root, name);
+  PlannedSection found = finder.section_of(root, 0);
   if (found.items.empty() && found.sections.empty())
     throw Error("contains nothing that a report could show: no map, picture, table or text",
                 {.file = folder.string()});
-  Outline outline;
-  outline.title = found.heading.empty() ? "Report" : found.heading;
-  outline.items = finder.overview();
-  for (OutlineItem& item : found.items) outline.items.push_back(std::move(item));
-  outline.sections = std::move(found.sections);
-  for (OutlineSection& section : finder.running_times())
-    outline.sections.push_back(std::move(section));
-  return outline;
+  ReportPlan plan;
+  plan.title = name.empty() ? "Report" : heading_of(name);
+  plan.items = finder.overview();
+  for (PlannedItem& item : found.items) plan.items.push_back(std::move(item));
+  plan.sections = std::move(found.sections);
+  for (PlannedSection& section : finder.running_times())
+    plan.sections.push_back(std::move(section));
+  return plan;
 }
 
 }  // namespace libmap
