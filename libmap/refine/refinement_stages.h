@@ -28,8 +28,10 @@ struct RefinementInput {
   KnownMatches* known_matches = nullptr;
 };
 
+// Frames are shared between states; a stage that changes frames makes others.
 using SharedFrames = std::shared_ptr<std::vector<FrameFeatures>>;
 
+// What stages change.
 struct RefinementState {
   std::map<int, Pose> poses{};            // of nodes and, below 0, of landmarks
   std::vector<std::vector<int>> parts{};  // nodes whose poses are in one frame
@@ -57,8 +59,11 @@ struct RefinementState {
 
 inline constexpr const char* depth_link_group = "depth odometry";
 
+// What a calibration is estimated from; it refers to the state and to `other_links`.
 CalibrationInput calibration_input(const RefinementInput& input, const RefinementState& state,
                                    const std::vector<GraphLinkResult>& other_links);
+
+// The frames as if they had been recorded with the calibration.
 SharedFrames calibrated(const std::vector<FrameFeatures>& stored,
                         const SensorCalibration& calibration);
 
@@ -109,6 +114,7 @@ struct ScaleResult {
   std::string sentence{};              // source and uncertainty of the scale
   std::optional<StageResult> stage{};  // with the corrected scale
 };
+// The scale by known lengths, a board, a given factor or odometry; else that of the depth camera.
 ScaleResult scale_stage(const RefinementInput& input, const RefinementState& state,
                         const std::map<int, Matrix6d>& covariance, const CalibrationMoves& moves);
 

@@ -35,6 +35,7 @@ struct CalibrationParts {
   bool operator==(const CalibrationParts&) const = default;
   std::string name() const;  // "intrinsics_depth"; empty for none
 };
+// The parts that a calibration has.
 CalibrationParts parts_of(const SensorCalibration& calibration);
 
 struct CalibrationChoice {
