@@ -30,7 +30,8 @@ void print_json(const nlohmann::ordered_json& json);
 template <typename Result>
 nlohmann::json facts_of(const Result& result) {
   nlohmann::json facts;
-  for (const libmap::TileField& field : libmap::described(result).tile_fields())
+  const libmap::ResultTable table = libmap::described(result);
+  for (const libmap::TileField& field : table.tile_fields())
     facts[field.key] = to_json(field.value());
   return facts;
 }
@@ -38,7 +39,8 @@ nlohmann::json facts_of(const Result& result) {
 template <typename Result>
 Result result_of(const nlohmann::json& facts) {
   Result result;
-  for (const libmap::TileField& field : libmap::described(result).tile_fields()) {
+  const libmap::ResultTable table = libmap::described(result);
+  for (const libmap::TileField& field : table.tile_fields()) {
     if (std::holds_alternative<double>(field.value()))
       field.set(facts.at(field.key).get<double>());
     else
