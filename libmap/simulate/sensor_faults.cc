@@ -18,7 +18,7 @@ namespace libmap {
 namespace {
 
 constexpr int grid_px = 6;
-constexpr int directions = 64;
+constexpr int bounces = 64;
 // By which rays begin off the surface that they leave.
 constexpr double lift_m = 1e-4;
 // Direct light at least, however flat the surface is seen.
@@ -29,8 +29,8 @@ const std::vector<Eigen::Vector3d>& cosine_directions() {
   static const std::vector<Eigen::Vector3d> all = [] {
     std::vector<Eigen::Vector3d> list;
     const double golden_angle = std::numbers::pi * (3.0 - std::sqrt(5.0));
-    for (int n = 0; n < directions; ++n) {
-      const double square = (n + 0.5) / directions;
+    for (int n = 0; n < bounces; ++n) {
+      const double square = (n + 0.5) / bounces;
       const double radius = std::sqrt(square);
       list.emplace_back(radius * std::cos(n * golden_angle), radius * std::sin(n * golden_angle),
                         std::sqrt(1.0 - square));
@@ -63,7 +63,7 @@ class Reflections {
     for (const Eigen::Vector3d& around : cosine_directions()) {
       const Bounce bounce = bounce_from(point + lift_m * normal, turn * around);
       if (!(bounce.light > 0.0)) continue;
-      const double part = bounce.light * range * range / cosine / directions;
+      const double part = bounce.light * range * range / cosine / bounces;
       light += part;
       sum += part * 0.5 * (bounce.way_m - range);
     }

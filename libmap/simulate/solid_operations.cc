@@ -180,7 +180,6 @@ Solid subtract(const Solid& solid, const Solid& removed) {
 
 namespace {
 
-using Kernel = CGAL::Exact_predicates_inexact_constructions_kernel;
 constexpr std::uint32_t no_vertex = std::numeric_limits<std::uint32_t>::max();
 struct VertexInfo {
   std::uint32_t vertex = no_vertex;
