@@ -6,8 +6,8 @@
 #include "libmap/tiles/eigen_json.h"
 #include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
-#include "tools/support/scan_poses.h"
 #include "tools/support/results.h"
+#include "tools/support/scan_poses.h"
 #include "tools/support/tile_folder.h"
 #include "tools/support/usages.h"
 

@@ -12,8 +12,8 @@
 
 #include "libmap/cloud/depth_noise.h"
 #include "libmap/cloud/depth_projection.h"
-#include "libmap/cloud/tile_mask.h"
 #include "libmap/cloud/surface_voxels.h"
+#include "libmap/cloud/tile_mask.h"
 #include "libmap/core/image.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/result_table.h"

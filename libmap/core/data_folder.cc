@@ -14,7 +14,8 @@ namespace libmap {
 namespace fs = std::filesystem;
 
 fs::path data_folder() {
-  // PREFIX/lib/.../graspmap/libgraspmap_core.so: the number of folders below PREFIX differs between systems.
+  // PREFIX/lib/.../graspmap/libgraspmap_core.so: the number of folders below PREFIX differs between
+  // systems.
   Dl_info library;
   if (dladdr(reinterpret_cast<void*>(&data_folder), &library) != 0) {
     std::error_code code;

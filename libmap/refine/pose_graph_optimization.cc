@@ -10,9 +10,9 @@
 #include <set>
 #include <utility>
 
-#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/core/median.h"
 #include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/disjoint_sets.h"
 #include "libmap/refine/graph_covariance.h"
 #include "libmap/refine/graph_links.h"
 

@@ -11,7 +11,6 @@
 
 #include "libmap/core/file_output.h"
 #include "libmap/core/point_cloud.h"
-#include "libmap/core/file_output.h"
 #include "libmap/tiles/xy_tile.h"
 
 namespace libmap {
