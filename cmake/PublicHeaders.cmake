@@ -18,8 +18,8 @@ set(graspmap_public_headers
   libgtd/terrain/regression_plane.h
   libgtd/terrain/voxel_grid.h
   libgtd/terrain/voxel_lattice.h
-  libmap/cloud/cloud_io.h
-  libmap/cloud/geometry_file.h
+  libmap/io/cloud_io.h
+  libmap/io/geometry_file.h
   libmap/core/error.h
   libmap/core/instruction_set.h
   libmap/core/parameters.h

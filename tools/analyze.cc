@@ -1,6 +1,6 @@
 // graspmap analyze: how much of a map can be held, where, what joins it; what differs from another.
 #include "libgtd/evaluate/analysis_tables.h"
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/view/image_io.h"
 #include "libmap/view/offscreen.h"
 #include "tools/support/analysis_pictures.h"

@@ -1,9 +1,9 @@
 // graspmap calibrate: pictures of a chessboard -> intrinsics and lens distortion of the camera.
-#include "libmap/calibration/camera_calibration.h"
+#include "libmap/camera/camera_calibration.h"
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/table.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/image_codec.h"
 #include "libmap/view/charts.h"
 #include "libmap/view/image_io.h"
 #include "tools/support/command_line.h"

@@ -4,9 +4,9 @@
 #include <nlohmann/json.hpp>
 #include <numbers>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/pose.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/reference_surface.h"
 #include "libmap/mesh/surface_alignment.h"

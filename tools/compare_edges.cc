@@ -2,13 +2,13 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/ground_plane.h"
 #include "libmap/core/table.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
-#include "libmap/mesh/spot_check.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/site/ground_plane.h"
+#include "libmap/site/spot_check.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/placement.h"

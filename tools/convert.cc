@@ -2,14 +2,14 @@
 #include <algorithm>
 #include <set>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/bag/bag_reader.h"
 #include "libmap/core/single_precision.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/raster/dem_reader.h"
-#include "libmap/ros/bag_reader.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/texture/textured_mesh_io.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"

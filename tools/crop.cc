@@ -1,12 +1,12 @@
 // graspmap crop: a map levelled and cut to the test site.
-#include "libmap/mesh/crop.h"
+#include "libmap/site/crop.h"
 
 #include <limits>
 #include <numbers>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/option_values.h"

@@ -11,14 +11,14 @@
 
 #include "libgtd/grasp/grasp_trials.h"
 #include "libgtd/gripper/gripper_io.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/core/error.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/text.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 

@@ -1,10 +1,10 @@
 // graspmap fuse: the depth images of a scan -> one oriented, colored cloud.
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/depth_fusion.h"
+#include "libmap/fusion/depth_fusion.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/tiles/eigen_json.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/results.h"
 #include "tools/support/scan_poses.h"

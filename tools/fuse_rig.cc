@@ -1,7 +1,7 @@
 // graspmap fuse RIG_FOLDER: one cloud in the robot's frame.
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/panorama.h"
 #include "libmap/core/data_folder.h"
+#include "libmap/fusion/panorama.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/scan/rig_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"

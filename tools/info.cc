@@ -3,10 +3,10 @@
 #include <nlohmann/json.hpp>
 #include <set>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/bag/bag_reader.h"
 #include "libmap/core/parallel.h"
-#include "libmap/mesh/mesh_io.h"
-#include "libmap/ros/bag_reader.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/surface/mesh_report.h"
 #include "tools/support/command_line.h"
 #include "tools/support/info_scan.h"

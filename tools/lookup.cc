@@ -3,8 +3,8 @@
 
 #include "libgtd/evaluate/lookup.h"
 #include "libgtd/evaluate/roc.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
+#include "libmap/io/cloud_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"

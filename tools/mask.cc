@@ -4,8 +4,8 @@
 
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/view/picture_sheet.h"
 #include "libmap/view/scene_view.h"
 #include "tools/support/command_line.h"

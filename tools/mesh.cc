@@ -2,10 +2,10 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/normals.h"
-#include "libmap/cloud/piece_index.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/fusion/normals.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
+#include "libmap/io/piece_index.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"

@@ -1,9 +1,9 @@
 // graspmap refine: poses of a scan by loop closures, pose graph, bundle adjustment and depth.
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/scan/colmap_builder.h"
 #include "libmap/scan/picture_file.h"
 #include "libmap/scan/rtabmap_writer.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/command_line.h"
 #include "tools/support/refine_report.h"
 #include "tools/support/scan_poses.h"

@@ -1,8 +1,8 @@
 // graspmap resample: Poisson-disk samples of a surface.
 #include <limits>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/poisson_disk.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"

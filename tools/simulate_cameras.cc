@@ -1,7 +1,7 @@
 // graspmap simulate cameras: what the depth cameras of a robot see from one place.
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/data_folder.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/scan/rig_io.h"
 #include "libmap/simulate/robot_cameras.h"
 #include "tools/support/command_line.h"

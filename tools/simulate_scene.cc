@@ -1,12 +1,12 @@
 // graspmap simulate scene: scenes of primitive shapes with their closed-form truth.
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/yaml_document.h"
-#include "libmap/mesh/mesh_io.h"
-#include "libmap/simulate/primitive_scene.h"
-#include "libmap/simulate/scene_mesh.h"
-#include "libmap/simulate/scene_sampling.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
+#include "libmap/scenes/primitive_scene.h"
+#include "libmap/scenes/scene_mesh.h"
+#include "libmap/scenes/scene_sampling.h"
 #include "tools/support/command_line.h"
 #include "tools/support/usages.h"
 

@@ -2,7 +2,7 @@
 #include "libmap/core/data_folder.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/yaml_document.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/simulate/field_points.h"
 #include "libmap/simulate/rock_site.h"
 #include "libmap/simulate/site_mesh.h"

@@ -1,6 +1,6 @@
 // graspmap simulate terrain: rocky ground of any size, as a folder of pieces.
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/simulate/terrain_pieces.h"
 #include "tools/support/command_line.h"
 #include "tools/support/option_values.h"

@@ -1,7 +1,7 @@
 // graspmap texture: a mesh and the photographs of a scan -> a textured mesh.
 #include <malloc.h>
 
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/texture_model.h"
 #include "libmap/texture/textured_mesh_io.h"

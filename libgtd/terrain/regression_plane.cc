@@ -12,9 +12,9 @@
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/core/symmetric_eigen.h"
 #include "libmap/geometry/plane_fit.h"
 #include "libmap/geometry/robust.h"
+#include "libmap/geometry/symmetric_eigen.h"
 #include "libmap/geometry/voxel_key.h"
 
 namespace libgtd {

@@ -1,6 +1,6 @@
 #include "libmap/geometry/plane_fit.h"
 
-#include "libmap/core/symmetric_eigen.h"
+#include "libmap/geometry/symmetric_eigen.h"
 
 namespace libmap {
 

@@ -1,7 +1,7 @@
 // Neighbor search among points: PointTree for points that are all known, GrowingGrid for points
 // that are added between searches. Other structures exist where these are measurably slower or
 // where sums depend on the order of the neighbors; each states its measurement:
-// libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/cloud/surface_points.cc (3
+// libgtd/shape/point_grid.h (8 times as fast for 27 neighbors), libmap/fusion/surface_points.cc (3
 // times), libmap/surface/self_intersections.cc (boxes of triangles), Embree for rays and distances.
 #pragma once
 

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {

@@ -9,11 +9,11 @@
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 #include "libmap/geometry/least_squares.h"
 #include "libmap/geometry/rigid_motion.h"
 #include "libmap/geometry/robust.h"
+#include "libmap/geometry/symmetric_eigen.h"
 
 namespace libmap {
 

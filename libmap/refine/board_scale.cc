@@ -8,15 +8,15 @@
 #include <set>
 #include <utility>
 
+#include "libmap/camera/stereo_depth.h"
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
+#include "libmap/features/bundle_residuals.h"
 #include "libmap/geometry/least_squares.h"
 #include "libmap/geometry/rigid_motion.h"
-#include "libmap/refine/bundle_residuals.h"
 #include "libmap/scan/picture_file.h"
-#include "libmap/scan/stereo_depth.h"
 
 namespace libmap {
 

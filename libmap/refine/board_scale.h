@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "libmap/calibration/camera_calibration.h"
+#include "libmap/camera/camera_calibration.h"
 #include "libmap/core/progress.h"
 #include "libmap/refine/scan_scale.h"
 #include "libmap/scan/scan_source.h"

@@ -7,7 +7,7 @@
 
 #include "libmap/geometry/rigid_motion.h"
 #include "libmap/geometry/spatial_index.h"
-#include "libmap/refine/graph_covariance.h"
+#include "libmap/optimize/graph_covariance.h"
 
 namespace libmap {
 

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "libmap/core/parameters.h"
-#include "libmap/refine/feature_tracks.h"
-#include "libmap/refine/place_recognition.h"
-#include "libmap/refine/pose_graph_optimization.h"
+#include "libmap/features/feature_tracks.h"
+#include "libmap/features/place_recognition.h"
+#include "libmap/optimize/pose_graph_optimization.h"
 
 namespace libmap {
 

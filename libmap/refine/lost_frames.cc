@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "libmap/geometry/rigid_motion.h"
-#include "libmap/refine/icp_refinement.h"
+#include "libmap/optimize/icp_refinement.h"
 
 namespace libmap {
 

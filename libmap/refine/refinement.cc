@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "libmap/core/error.h"
-#include "libmap/refine/graph_covariance.h"
+#include "libmap/optimize/graph_covariance.h"
 #include "libmap/refine/refinement_stages.h"
 
 namespace libmap {

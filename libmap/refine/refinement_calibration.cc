@@ -4,9 +4,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/refine/graph_covariance.h"
+#include "libmap/optimize/graph_covariance.h"
+#include "libmap/optimize/sparse_adjustment.h"
 #include "libmap/refine/refinement_stages.h"
-#include "libmap/refine/sparse_adjustment.h"
 
 namespace libmap {
 

@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "libmap/refine/frame_calibration.h"
-#include "libmap/refine/pose_graph_optimization.h"
+#include "libmap/features/frame_calibration.h"
+#include "libmap/optimize/pose_graph_optimization.h"
 
 namespace libmap {
 

@@ -8,10 +8,10 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/camera/camera_io.h"
 #include "libmap/core/pose_graph.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/refine/bundle_adjustment.h"
-#include "libmap/refine/held_out.h"
+#include "libmap/features/held_out.h"
+#include "libmap/optimize/bundle_adjustment.h"
 
 namespace libmap {
 

@@ -7,9 +7,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/features/place_recognition.h"
 #include "libmap/geometry/rigid_motion.h"
-#include "libmap/refine/icp_refinement.h"
-#include "libmap/refine/place_recognition.h"
+#include "libmap/optimize/icp_refinement.h"
 
 namespace libmap {
 

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/image/image_codec.h"
 
 namespace libmap {
 

@@ -7,10 +7,10 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose.h"
-#include "libmap/scan/colmap_io.h"
-#include "libmap/scan/rgbd_frame.h"
+#include "libmap/poses/colmap_io.h"
 
 namespace libmap {
 

@@ -9,17 +9,17 @@
 #include <optional>
 #include <system_error>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/depth_correction.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
 #include "libmap/core/text_lines.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/depth_correction.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/scan/stamp_pairing.h"
-#include "libmap/scan/trajectory_text.h"
+#include "libmap/poses/stamp_pairing.h"
+#include "libmap/poses/trajectory_text.h"
 
 namespace libmap {
 

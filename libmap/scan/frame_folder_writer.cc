@@ -5,16 +5,16 @@
 #include <set>
 #include <utility>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/image_codec.h"
+#include "libmap/poses/trajectory_text.h"
 #include "libmap/scan/frame_folder.h"
 #include "libmap/scan/picture_file.h"
-#include "libmap/scan/trajectory_text.h"
 
 namespace libmap {
 

@@ -8,8 +8,8 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/pose_graph.h"
-#include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
 

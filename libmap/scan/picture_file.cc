@@ -5,9 +5,9 @@
 #include <numbers>
 #include <numeric>
 
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
-#include "libmap/image/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 
 namespace libmap {

@@ -6,10 +6,10 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/camera.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose.h"
-#include "libmap/scan/rgbd_frame.h"
 #include "libmap/scan/scan_source.h"
 
 namespace libmap {

@@ -11,13 +11,13 @@
 #include <sstream>
 #include <system_error>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
 #include "libmap/core/yaml_document.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/image_codec.h"
 
 namespace libmap {
 

@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
-#include "libmap/image/matrix_codec.h"
 
 namespace libmap {
 

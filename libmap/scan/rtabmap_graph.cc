@@ -9,8 +9,8 @@
 #include <tuple>
 #include <utility>
 
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
-#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/sqlite_file.h"
 

@@ -6,8 +6,8 @@
 #include <limits>
 #include <utility>
 
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
-#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_graph.h"
 #include "libmap/scan/sqlite_file.h"

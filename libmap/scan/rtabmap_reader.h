@@ -16,10 +16,10 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/calibration_codec.h"
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/error.h"
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/scan/calibration_codec.h"
 #include "libmap/scan/rtabmap_schema.h"
 #include "libmap/scan/scan_source.h"
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/camera/calibration_codec.h"
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
-#include "libmap/image/matrix_codec.h"
-#include "libmap/scan/calibration_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_schema.h"

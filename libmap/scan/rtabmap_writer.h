@@ -8,11 +8,11 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/image_codec.h"
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/pose_graph.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
 

@@ -7,9 +7,9 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/pose_graph.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/scan/rgbd_frame.h"
 
 namespace libmap {
 

@@ -12,11 +12,11 @@
 #include <utility>
 #include <vector>
 
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/error.h"
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
-#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"

@@ -11,8 +11,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/symmetric_eigen.h"
 
 namespace libmap {
 

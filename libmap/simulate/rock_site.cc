@@ -12,7 +12,7 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/core/yaml_document.h"
-#include "libmap/simulate/solid_noise.h"
+#include "libmap/scenes/solid_noise.h"
 
 namespace libmap {
 

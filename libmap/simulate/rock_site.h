@@ -16,8 +16,8 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/pose.h"
-#include "libmap/simulate/primitive_scene.h"
-#include "libmap/simulate/scene_geometry.h"
+#include "libmap/scenes/primitive_scene.h"
+#include "libmap/scenes/scene_geometry.h"
 
 namespace libmap {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "libmap/simulate/solid_noise.h"
+#include "libmap/scenes/solid_noise.h"
 
 namespace libmap {
 

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
+#include "libmap/scenes/solid.h"
 #include "libmap/simulate/camera_trajectory.h"
 #include "libmap/simulate/robot_cameras.h"
-#include "libmap/simulate/solid.h"
 
 namespace libmap {
 

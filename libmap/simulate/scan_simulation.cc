@@ -7,10 +7,10 @@
 #include <string>
 #include <utility>
 
+#include "libmap/camera/depth_correction.h"
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/image/depth_correction.h"
 #include "libmap/simulate/sensor_faults.h"
 
 namespace libmap {

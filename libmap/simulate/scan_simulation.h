@@ -7,12 +7,12 @@
 #include <functional>
 #include <vector>
 
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/camera.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose_graph.h"
 #include "libmap/core/progress.h"
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/scan/rgbd_frame.h"
 #include "libmap/simulate/camera_trajectory.h"
 #include "libmap/simulate/depth_camera.h"
 #include "libmap/simulate/scan_events.h"

@@ -7,10 +7,10 @@
 #include <numbers>
 #include <vector>
 
+#include "libmap/camera/depth_correction.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/image/depth_correction.h"
-#include "libmap/image/image_codec.h"
 #include "libmap/mesh/ray_caster.h"
 
 namespace libmap {

@@ -14,10 +14,10 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
 #include "libmap/mesh/mesh_parts.h"
+#include "libmap/scenes/scene_geometry.h"
+#include "libmap/scenes/solid.h"
+#include "libmap/scenes/solid_noise.h"
 #include "libmap/simulate/rock_texture.h"
-#include "libmap/simulate/scene_geometry.h"
-#include "libmap/simulate/solid.h"
-#include "libmap/simulate/solid_noise.h"
 
 namespace libmap {
 

@@ -4,8 +4,8 @@
 #include <cstdint>
 
 #include "libmap/core/triangle_mesh.h"
+#include "libmap/scenes/solid.h"
 #include "libmap/simulate/rock_site.h"
-#include "libmap/simulate/solid.h"
 
 namespace libmap {
 

@@ -8,8 +8,8 @@
 #include "libmap/core/error.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
+#include "libmap/scenes/solid_noise.h"
 #include "libmap/simulate/rock_site.h"
-#include "libmap/simulate/solid_noise.h"
 
 namespace libmap {
 

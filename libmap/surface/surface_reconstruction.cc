@@ -10,9 +10,9 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/core/symmetric_eigen.h"
 #include "libmap/core/text.h"
 #include "libmap/geometry/spatial_index.h"
+#include "libmap/geometry/symmetric_eigen.h"
 #include "libmap/geometry/voxel_key.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/surface_solvers.h"

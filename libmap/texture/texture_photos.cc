@@ -5,10 +5,10 @@
 #include <cmath>
 #include <limits>
 
+#include "libmap/camera/color_image.h"
 #include "libmap/core/error.h"
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
-#include "libmap/image/color_image.h"
 
 namespace libmap {
 

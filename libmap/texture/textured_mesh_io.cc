@@ -4,13 +4,13 @@
 #include <limits>
 #include <ostream>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/memory_budget.h"
 #include "libmap/core/text.h"
-#include "libmap/mesh/assimp_codec.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/assimp_codec.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 
 namespace libmap {
 

@@ -14,8 +14,8 @@
 #include <functional>
 #include <vector>
 
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/image/image_codec.h"
 
 namespace libmap {
 

@@ -9,8 +9,8 @@
 #include "libgtd/terrain/interpolation.h"
 #include "libgtd/terrain/regression_plane.h"
 #include "libgtd/terrain/voxel_grid.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/benchmarks/benchmark_table.h"
 
 namespace {

@@ -13,16 +13,16 @@
 #include <tuple>
 #include <vector>
 
-#include "libmap/cloud/depth_fusion.h"
-#include "libmap/cloud/depth_projection.h"
 #include "libmap/core/error.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/fusion/depth_fusion.h"
+#include "libmap/fusion/depth_projection.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/ray_caster.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/poses/trajectory_error.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/surface_reconstruction.h"
-#include "libmap/trajectory/trajectory_error.h"
 
 namespace {
 

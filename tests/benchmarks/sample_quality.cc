@@ -7,11 +7,11 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
 #include "libmap/geometry/spatial_index.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/surface_distance.h"
 
 namespace {

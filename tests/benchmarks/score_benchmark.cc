@@ -11,7 +11,7 @@
 #include "libgtd/score/matching_loops.h"
 #include "libgtd/score/tiling.h"
 #include "libmap/core/parallel.h"
-#include "libmap/simulate/scene_sampling.h"
+#include "libmap/scenes/scene_sampling.h"
 #include "tests/benchmarks/benchmark_table.h"
 #include "tests/libgtd/plain_matching.h"
 #include "tests/support/reference_data.h"

@@ -1,20 +1,20 @@
 // Bags, and the messages in them.
 #include <filesystem>
 
-#include "libmap/image/image_codec.h"
-#include "libmap/ros/bag_cloud.h"
-#include "libmap/ros/bag_reader.h"
-#include "libmap/ros/bag_rig.h"
-#include "libmap/ros/bag_storage.h"
-#include "libmap/ros/bag_writer.h"
-#include "libmap/ros/depth_message.h"
-#include "libmap/ros/message_codec.h"
-#include "libmap/ros/message_encoding.h"
-#include "libmap/ros/transform_tree.h"
+#include "libmap/bag/bag_cloud.h"
+#include "libmap/bag/bag_reader.h"
+#include "libmap/bag/bag_rig.h"
+#include "libmap/bag/bag_storage.h"
+#include "libmap/bag/bag_writer.h"
+#include "libmap/bag/depth_message.h"
+#include "libmap/bag/message_codec.h"
+#include "libmap/bag/message_encoding.h"
+#include "libmap/bag/transform_tree.h"
+#include "libmap/camera/image_codec.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
 #ifdef GRASPMAP_FUZZ_ROS
-#include "tests/libmap/ros/bag_samples.h"
+#include "tests/libmap/bag/bag_samples.h"
 #endif
 
 namespace graspmap_fuzz {

@@ -1,7 +1,7 @@
 // Files of clouds, read whole and in pieces.
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/cloud_pieces.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
 

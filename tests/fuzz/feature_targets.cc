@@ -1,6 +1,6 @@
 // Features kept between runs of `refine`.
 #include "libmap/core/manifest.h"
-#include "libmap/refine/feature_cache.h"
+#include "libmap/features/feature_cache.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"
 

@@ -5,7 +5,7 @@
 #include "libgtd/score/graspability_map.h"
 #include "libgtd/score/map_downsampling.h"
 #include "libgtd/score/tile_store_io.h"
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/report/map_view.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"

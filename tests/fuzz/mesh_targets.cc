@@ -1,8 +1,8 @@
 // Files that hold meshes alone, and models with pictures.
 #include <map>
 
-#include "libmap/image/image_codec.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/camera/image_codec.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/fuzz/scratch_file.h"
 #include "tests/fuzz/target_support.h"

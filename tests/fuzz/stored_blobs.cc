@@ -2,9 +2,9 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
+#include "libmap/camera/image_codec.h"
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/file_output.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/image/matrix_codec.h"
 #include "tests/libmap/scan/sample_database.h"
 
 namespace graspmap_fuzz {

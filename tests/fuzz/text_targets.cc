@@ -5,10 +5,10 @@
 #include "libgtd/evaluate/voxel_map.h"
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/score/scenario.h"
+#include "libmap/camera/camera_io.h"
 #include "libmap/core/table.h"
-#include "libmap/image/camera_io.h"
 #include "libmap/scan/rig_io.h"
-#include "libmap/simulate/primitive_scene.h"
+#include "libmap/scenes/primitive_scene.h"
 #include "libmap/simulate/rock_site.h"
 #include "tests/fuzz/target_support.h"
 

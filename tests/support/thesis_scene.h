@@ -2,7 +2,7 @@
 
 #include <array>
 
-#include "libmap/simulate/primitive_scene.h"
+#include "libmap/scenes/primitive_scene.h"
 
 namespace graspmap_test {
 

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace analyze_test {

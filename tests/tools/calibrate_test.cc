@@ -2,9 +2,9 @@
 
 #include <cmath>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/table.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/image_codec.h"
 #include "tests/support/chessboard_picture.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -3,10 +3,10 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/pose.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace compare_test {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/libmap/texture/textured_samples.h"

@@ -3,10 +3,10 @@
 #include <cmath>
 #include <sstream>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/pose.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -8,7 +8,7 @@
 #include <string>
 #include <vector>
 
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/scan/scan_source.h"

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <sstream>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace fuse_test {

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <filesystem>
 
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace grasp_scenes_test {

@@ -8,10 +8,10 @@
 #include <csignal>
 #include <thread>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
 #include "libmap/core/text.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace info_test {

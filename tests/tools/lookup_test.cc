@@ -2,8 +2,8 @@
 
 #include <set>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace lookup_test {

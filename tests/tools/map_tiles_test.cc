@@ -1,8 +1,8 @@
 // The commands that read a tile store say of it what they say of the map in one file.
 #include <gtest/gtest.h>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace map_tiles_test {

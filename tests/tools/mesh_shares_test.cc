@@ -7,7 +7,7 @@
 #include <filesystem>
 #include <thread>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 

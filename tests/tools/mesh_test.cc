@@ -4,9 +4,9 @@
 #include <limits>
 #include <numbers>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace mesh_test {

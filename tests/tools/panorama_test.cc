@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/image_codec.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/scan/rig_io.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -7,10 +7,10 @@
 #include <filesystem>
 #include <fstream>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/geometry/spatial_index.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/texture/textured_mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 

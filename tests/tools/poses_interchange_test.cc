@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "libmap/image/image_codec.h"
-#include "libmap/scan/colmap_io.h"
+#include "libmap/camera/image_codec.h"
+#include "libmap/poses/colmap_io.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/rtabmap_writer.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tests/libmap/scan/colmap_reader.h"
 #include "tests/libmap/scan/example_scan.h"
 #include "tests/tools/tool_test_support.h"

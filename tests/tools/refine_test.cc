@@ -5,12 +5,12 @@
 #include <sstream>
 #include <utility>
 
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/file_output.h"
-#include "libmap/image/camera_io.h"
-#include "libmap/image/image_codec.h"
+#include "libmap/poses/trajectory_error.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/trajectory/trajectory_error.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace refine_test {

@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"
 

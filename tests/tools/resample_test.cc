@@ -3,9 +3,9 @@
 #include <cmath>
 #include <limits>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/manifest.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace resample_test {

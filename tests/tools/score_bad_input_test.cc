@@ -3,7 +3,7 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace score_bad_input_test {

@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace score_orientation_test {

@@ -1,8 +1,8 @@
 // The author's program, through the command line: the same score of every voxel.
 #include <gtest/gtest.h>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/reference_data.h"
 #include "tests/tools/tool_test_support.h"
 

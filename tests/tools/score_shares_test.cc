@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/pose.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace score_shares_test {

@@ -13,8 +13,8 @@
 #include <thread>
 
 #include "libgtd/score/tile_store_io.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/output_lock.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace score_store_test {

@@ -7,8 +7,8 @@
 #include <set>
 #include <tuple>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/score_color.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace score_test {

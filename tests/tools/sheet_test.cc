@@ -3,9 +3,9 @@
 
 #include "libgtd/gripper/gripper_io.h"
 #include "libgtd/gripper/gripper_mask.h"
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/table.h"
-#include "libmap/image/image_codec.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace sheet_test {

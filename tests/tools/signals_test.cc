@@ -12,7 +12,7 @@
 #include <ostream>
 #include <thread>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 

@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/scan/rig_io.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/tools/tool_test_support.h"

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
-#include "libmap/image/camera_io.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/camera/camera_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/simulate/terrain_pieces.h"
 #include "tests/libmap/mesh/mesh_samples.h"

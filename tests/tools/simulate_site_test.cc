@@ -1,7 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "libmap/core/table.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace simulate_site_test {

@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace simulate_terrain_test {

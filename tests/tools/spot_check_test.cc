@@ -2,10 +2,10 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/pose.h"
 #include "libmap/core/table.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace spot_check_test {

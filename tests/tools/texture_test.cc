@@ -3,17 +3,17 @@
 #include <cmath>
 #include <set>
 
+#include "libmap/camera/image_codec.h"
 #include "libmap/core/file_output.h"
 #include "libmap/core/manifest.h"
 #include "libmap/core/triangle_mesh.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/ray_caster.h"
 #include "libmap/mesh/surface_distance.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/scan_source.h"
 #include "libmap/texture/textured_mesh_io.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/libmap/texture/textured_samples.h"

@@ -2,7 +2,7 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/file_names.h"
 
 namespace graspmap_test {

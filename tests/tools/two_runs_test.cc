@@ -8,8 +8,8 @@
 #include <optional>
 #include <thread>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/output_lock.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/running_program.h"
 #include "tests/tools/tool_test_support.h"
 

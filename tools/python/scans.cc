@@ -1,10 +1,10 @@
 #include <algorithm>
 
-#include "libmap/cloud/depth_fusion.h"
 #include "libmap/core/error.h"
+#include "libmap/fusion/depth_fusion.h"
 #include "libmap/refine/refinement.h"
+#include "libmap/scan/pose_import.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/trajectory/pose_import.h"
 #include "tools/python/values.h"
 
 namespace graspmap_python {

@@ -1,9 +1,9 @@
 #include <algorithm>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/error.h"
 #include "libmap/core/manifest.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tools/python/values.h"
 
 namespace graspmap_python {

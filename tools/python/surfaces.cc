@@ -1,5 +1,5 @@
-#include "libmap/cloud/normals.h"
 #include "libmap/core/error.h"
+#include "libmap/fusion/normals.h"
 #include "libmap/mesh/poisson_disk.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/surface_reconstruction.h"

@@ -12,9 +12,9 @@
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/streamed_detection.h"
 #include "libgtd/terrain/voxel_grid.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
 

@@ -7,11 +7,11 @@
 #include <set>
 #include <tuple>
 
+#include "libmap/camera/camera_io.h"
 #include "libmap/core/error.h"
-#include "libmap/image/camera_io.h"
+#include "libmap/poses/trajectory_error.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/sqlite_file.h"
-#include "libmap/trajectory/trajectory_error.h"
 #include "tools/support/results.h"
 
 namespace graspmap_tools {

@@ -1,8 +1,8 @@
 #include "tools/support/map_table.h"
 
 #include "libgtd/evaluate/map_summary.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/table.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/view/charts.h"
 #include "libmap/view/image_io.h"
 #include "tools/support/command_line.h"

@@ -9,8 +9,8 @@
 #include <vector>
 
 #include "libgtd/score/tile_store_io.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/point_cloud.h"
+#include "libmap/io/cloud_io.h"
 #include "tools/support/run.h"
 
 namespace graspmap_tools {

@@ -2,10 +2,10 @@
 
 #include <set>
 
+#include "libmap/poses/trajectory_error.h"
+#include "libmap/poses/trajectory_io.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/trajectory/trajectory_error.h"
-#include "libmap/trajectory/trajectory_io.h"
 #include "tools/support/map_frame.h"
 
 namespace graspmap_tools {

@@ -3,10 +3,10 @@
 
 #include <optional>
 
+#include "libmap/camera/camera_io.h"
 #include "libmap/core/pose_graph.h"
-#include "libmap/image/camera_io.h"
+#include "libmap/scan/pose_import.h"
 #include "libmap/scan/scan_source.h"
-#include "libmap/trajectory/pose_import.h"
 #include "tools/support/command_line.h"
 
 namespace graspmap_tools {

@@ -11,8 +11,8 @@
 #include <numbers>
 
 #include "libgtd/terrain/regression_plane.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/test_support.h"
 
 namespace curvature_test {

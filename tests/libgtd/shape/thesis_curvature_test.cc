@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "libgtd/shape/curvature.h"
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/test_support.h"
 
 namespace thesis_curvature_test {

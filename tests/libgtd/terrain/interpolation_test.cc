@@ -13,8 +13,8 @@
 
 #include "libgtd/terrain/planar_delaunay.h"
 #include "libgtd/terrain/regression_plane.h"
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/reference_data.h"
 #include "tests/support/test_support.h"
 

@@ -6,8 +6,8 @@
 #include <random>
 #include <set>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/support/test_support.h"
 
 namespace planar_delaunay_test {

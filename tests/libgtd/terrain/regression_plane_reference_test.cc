@@ -8,7 +8,7 @@
 #include <string>
 
 #include "libgtd/terrain/regression_plane.h"
-#include "libmap/cloud/cloud_io.h"
+#include "libmap/io/cloud_io.h"
 #include "tests/libgtd/terrain/regression_plane_test_support.h"
 #include "tests/support/reference_data.h"
 #include "tests/support/test_support.h"

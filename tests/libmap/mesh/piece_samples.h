@@ -6,7 +6,7 @@
 #include <string>
 #include <vector>
 
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/tiles/xy_tile.h"
 

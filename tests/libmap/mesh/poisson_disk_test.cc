@@ -13,10 +13,10 @@
 #include <random>
 #include <set>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
 #include "libmap/geometry/spatial_index.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/support/test_support.h"

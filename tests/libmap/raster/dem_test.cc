@@ -2,9 +2,9 @@
 
 #include <cmath>
 
-#include "libmap/cloud/cloud_io.h"
-#include "libmap/cloud/cloud_pieces.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/cloud_io.h"
+#include "libmap/io/cloud_pieces.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/raster/dem_reader.h"
 #include "tests/libmap/raster/gdal_programs.h"
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "tests/libmap/refine/synthetic_features.h"
+#include "tests/libmap/features/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
 
 namespace refinement_stages_test {

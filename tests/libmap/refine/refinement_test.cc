@@ -6,9 +6,9 @@
 #include <functional>
 
 #include "libmap/core/parallel.h"
-#include "libmap/refine/icp_refinement.h"
-#include "libmap/scan/trajectory_text.h"
-#include "tests/libmap/refine/synthetic_features.h"
+#include "libmap/optimize/icp_refinement.h"
+#include "libmap/poses/trajectory_text.h"
+#include "tests/libmap/features/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
 #include "tests/support/test_support.h"
 

@@ -9,11 +9,11 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
+#include "libmap/poses/trajectory_text.h"
 #include "libmap/refine/initial_poses.h"
 #include "libmap/refine/refinement.h"
 #include "libmap/refine/visual_odometry.h"
-#include "libmap/scan/trajectory_text.h"
-#include "tests/libmap/refine/synthetic_features.h"
+#include "tests/libmap/features/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
 
 namespace refinement_without_poses_test {

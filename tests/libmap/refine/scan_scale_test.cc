@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "libmap/core/error.h"
-#include "tests/libmap/refine/synthetic_features.h"
+#include "tests/libmap/features/synthetic_features.h"
 #include "tests/libmap/refine/textured_scan.h"
 #include "tests/support/test_support.h"
 

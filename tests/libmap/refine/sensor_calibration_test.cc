@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "tests/libmap/refine/bundle_scenes.h"
+#include "tests/libmap/optimize/bundle_scenes.h"
 
 namespace sensor_calibration_test {
 

@@ -10,7 +10,7 @@
 #include "libmap/core/random_stream.h"
 #include "libmap/geometry/rigid_motion.h"
 #include "libmap/refine/refinement.h"
-#include "tests/libmap/cloud/depth_scenes.h"
+#include "tests/libmap/fusion/depth_scenes.h"
 
 namespace graspmap_test {
 

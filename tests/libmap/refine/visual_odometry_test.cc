@@ -4,8 +4,8 @@
 
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
-#include "libmap/scan/trajectory_text.h"
-#include "tests/libmap/refine/synthetic_features.h"
+#include "libmap/poses/trajectory_text.h"
+#include "tests/libmap/features/synthetic_features.h"
 
 namespace visual_odometry_test {
 

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/report/html.h"
 #include "libmap/report/picture_fit.h"
 #include "libmap/report/report_reader.h"

@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "tests/libmap/report/report_test_support.h"
 #include "tests/support/lower_limit.h"
 #include "tests/support/sanitizers.h"

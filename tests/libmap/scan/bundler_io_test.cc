@@ -6,7 +6,7 @@
 #include <cmath>
 #include <sstream>
 
-#include "libmap/image/color_image.h"
+#include "libmap/camera/color_image.h"
 #include "libmap/scan/picture_file.h"
 #include "tests/support/test_support.h"
 

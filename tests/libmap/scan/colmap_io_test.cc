@@ -1,5 +1,5 @@
 // Models of COLMAP: the texts, the cameras, and the points that a scan's depth gives.
-#include "libmap/scan/colmap_io.h"
+#include "libmap/poses/colmap_io.h"
 
 #include <gmock/gmock.h>
 

@@ -3,7 +3,7 @@
 
 #include <filesystem>
 
-#include "libmap/scan/colmap_io.h"
+#include "libmap/poses/colmap_io.h"
 
 namespace graspmap_test {
 

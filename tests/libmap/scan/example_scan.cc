@@ -3,7 +3,7 @@
 #include <SQLiteCpp/SQLiteCpp.h>
 #include <gtest/gtest.h>
 
-#include "libmap/image/depth_codec.h"
+#include "libmap/camera/depth_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "tests/support/test_support.h"
 

@@ -5,8 +5,8 @@
 #include <map>
 #include <vector>
 
+#include "libmap/camera/rgbd_frame.h"
 #include "libmap/core/pose_graph.h"
-#include "libmap/scan/rgbd_frame.h"
 #include "libmap/scan/rtabmap_writer.h"
 #include "libmap/scan/scan_source.h"
 

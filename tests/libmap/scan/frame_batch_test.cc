@@ -1,4 +1,4 @@
-#include "libmap/scan/rgbd_frame.h"
+#include "libmap/camera/rgbd_frame.h"
 
 #include <gtest/gtest.h>
 

@@ -9,9 +9,9 @@
 #include <string>
 #include <vector>
 
-#include "libmap/image/camera_io.h"
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/camera_io.h"
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/scan/frame_folder_writer.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/example_scan.h"

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "libmap/image/matrix_codec.h"
+#include "libmap/camera/matrix_codec.h"
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/test_support.h"
 

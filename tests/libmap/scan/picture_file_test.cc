@@ -2,7 +2,7 @@
 
 #include <gtest/gtest.h>
 
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/sample_checks.h"
 #include "tests/libmap/scan/sample_database.h"

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <set>
 
-#include "libmap/image/image_codec.h"
+#include "libmap/camera/image_codec.h"
 #include "tests/support/test_support.h"
 
 namespace rig_images_test {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "libmap/image/camera_io.h"
+#include "libmap/camera/camera_io.h"
 #include "tests/support/test_support.h"
 
 namespace rig_io_test {

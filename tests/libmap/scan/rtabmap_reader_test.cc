@@ -5,8 +5,8 @@
 #include <atomic>
 #include <cmath>
 
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/parallel.h"
-#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/scan_verification.h"
 #include "tests/libmap/scan/sample_checks.h"

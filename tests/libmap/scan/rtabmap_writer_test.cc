@@ -7,8 +7,8 @@
 #include <string>
 #include <vector>
 
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/file_output.h"
-#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_blobs.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/database_rows.h"

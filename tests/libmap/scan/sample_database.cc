@@ -2,9 +2,9 @@
 
 #include <SQLiteCpp/SQLiteCpp.h>
 
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/image_codec.h"
-#include "libmap/image/matrix_codec.h"
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/image_codec.h"
+#include "libmap/camera/matrix_codec.h"
 
 namespace graspmap_test {
 

@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <cstring>
 
+#include "libmap/camera/depth_codec.h"
+#include "libmap/camera/matrix_codec.h"
 #include "libmap/core/parallel.h"
-#include "libmap/image/depth_codec.h"
-#include "libmap/image/matrix_codec.h"
 #include "libmap/scan/rtabmap_reader.h"
 #include "tests/libmap/scan/sample_database.h"
 #include "tests/support/sanitizers.h"

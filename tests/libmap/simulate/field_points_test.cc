@@ -9,10 +9,10 @@
 #include <set>
 
 #include "libmap/core/parallel.h"
+#include "libmap/scenes/solid.h"
 #include "libmap/simulate/rock_site.h"
 #include "libmap/simulate/site_mesh.h"
-#include "libmap/simulate/solid.h"
-#include "tests/libmap/simulate/scene_test_support.h"
+#include "tests/libmap/scenes/scene_test_support.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "tests/libmap/simulate/scene_test_support.h"
+#include "tests/libmap/scenes/scene_test_support.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

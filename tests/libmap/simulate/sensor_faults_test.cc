@@ -7,8 +7,8 @@
 #include <cmath>
 #include <vector>
 
+#include "libmap/camera/depth_correction.h"
 #include "libmap/core/random_stream.h"
-#include "libmap/image/depth_correction.h"
 #include "libmap/mesh/ray_caster.h"
 #include "libmap/simulate/scan_simulation.h"
 #include "tests/libmap/mesh/mesh_samples.h"

@@ -5,7 +5,7 @@
 
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/mesh_report.h"
-#include "tests/libmap/simulate/mesh_topology.h"
+#include "tests/libmap/scenes/mesh_topology.h"
 
 namespace graspmap_test {
 

@@ -9,7 +9,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/parameters.h"
 #include "libmap/core/pose.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_report.h"

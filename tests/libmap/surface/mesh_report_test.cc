@@ -10,7 +10,7 @@
 #include "libmap/surface/self_intersections.h"
 #include "tests/libmap/mesh/mesh_samples.h"
 #include "tests/libmap/mesh/surface_samples.h"
-#include "tests/libmap/simulate/mesh_topology.h"
+#include "tests/libmap/scenes/mesh_topology.h"
 #include "tests/support/test_support.h"
 
 namespace mesh_report_test {

@@ -10,8 +10,8 @@
 #include <numeric>
 #include <thread>
 
-#include "libmap/cloud/cloud_io.h"
 #include "libmap/core/parallel.h"
+#include "libmap/io/cloud_io.h"
 #include "libmap/mesh/surface_distance.h"
 #include "libmap/surface/mesh_cleaning.h"
 #include "libmap/surface/mesh_report.h"

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
-#include "libmap/mesh/mesh_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/libmap/texture/painted_scan.h"
 #include "tests/libmap/texture/textured_samples.h"
 #include "tests/support/test_support.h"

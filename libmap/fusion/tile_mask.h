@@ -1,0 +1,35 @@
+// Columns of voxels chosen by their place in the x-y plane. Inner part of depth_fusion.
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+
+#include "libmap/core/random_stream.h"
+#include "libmap/fusion/surface_voxels.h"
+#include "libmap/tiles/xy_tile.h"
+
+namespace libmap {
+
+struct TileMask {
+  Eigen::Array2i low = Eigen::Array2i::Constant(-voxel_cell_limit);
+  Eigen::Array2i high = Eigen::Array2i::Constant(voxel_cell_limit);  // excluded
+  // Of squares of 4 x 4 columns, one in 2^thinning, by chance; those of a larger number are among
+  // those of a smaller one.
+  unsigned thinning = 0;
+
+  bool has_cell(const Eigen::Array2i& cell) const {
+    if (!((cell >= low).all() && (cell < high).all())) return false;
+    if (thinning == 0) return true;
+    const auto square = [&](int axis) { return static_cast<std::uint64_t>(cell[axis] >> 2); };
+    return mix_bits(square(0), square(1)) >> (64U - thinning) == 0;
+  }
+  // The place is in voxels.
+  bool has_place(const Eigen::Vector2f& place) const {
+    return (place.array().abs() < static_cast<float>(voxel_cell_limit)).all() &&
+           has_cell(place.array().floor().cast<int>());
+  }
+
+  TileMask grown(int cells) const { return {low - cells, high + cells, thinning}; }
+};
+
+}  // namespace libmap

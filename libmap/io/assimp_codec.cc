@@ -1,0 +1,493 @@
+#include "libmap/io/assimp_codec.h"
+
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <array>
+#include <assimp/Exporter.hpp>
+#include <assimp/Importer.hpp>
+#include <bit>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <functional>
+#include <limits>
+#include <memory>
+#include <new>
+#include <numeric>
+#include <optional>
+#include <stdexcept>
+#include <string_view>
+#include <unordered_map>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/guarded_process.h"
+#include "libmap/core/output_lock.h"
+#include "libmap/core/text.h"
+
+namespace libmap {
+namespace {
+
+// A corner's numbers, bit for bit: position, normal, color.
+using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
+
+struct CornerHash {
+  std::size_t operator()(const Corner& corner) const {
+    // FNV-1a, a word at a time.
+    std::uint64_t hash = 14695981039346656037ULL;
+    for (const std::uint32_t word : corner) hash = (hash ^ word) * 1099511628211ULL;
+    return static_cast<std::size_t>(hash ^ (hash >> 32));
+  }
+};
+
+Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& normal,
+                 const Color& color) {
+  Corner corner{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // Adding 0 makes -0 equal to 0.
+    const auto word = std::bit_cast<std::uint64_t>(position[static_cast<int>(axis)] + 0.0);
+    corner[2 * axis] = static_cast<std::uint32_t>(word);
+    corner[2 * axis + 1] = static_cast<std::uint32_t>(word >> 32);
+    corner[6 + axis] = std::bit_cast<std::uint32_t>(normal[static_cast<int>(axis)] + 0.0F);
+    corner[9] = corner[9] << 8 | color[axis];
+  }
+  return corner;
+}
+
+std::uint8_t to_byte(float fraction) {
+  return static_cast<std::uint8_t>(std::lround(std::clamp(fraction, 0.0F, 1.0F) * 255.0F));
+}
+
+// glTF's vertex colors are linear (glTF 2.0, 3.9.2), ours sRGB (IEC 61966-2-1).
+float linear_of(std::uint8_t byte) {
+  const double srgb = byte / 255.0;
+  return static_cast<float>(srgb <= 0.04045 ? srgb / 12.92 : std::pow((srgb + 0.055) / 1.055, 2.4));
+}
+
+float srgb_of(float linear) {
+  const double light = std::clamp(static_cast<double>(linear), 0.0, 1.0);
+  return static_cast<float>(light <= 0.0031308 ? 12.92 * light
+                                               : 1.055 * std::pow(light, 1.0 / 2.4) - 0.055);
+}
+
+Eigen::Affine3d to_eigen(const aiMatrix4x4& m) {
+  Eigen::Affine3d affine = Eigen::Affine3d::Identity();
+  affine.matrix().topRows<3>() =
+      Eigen::Map<const Eigen::Matrix<ai_real, 3, 4, Eigen::RowMajor>>(&m.a1).cast<double>();
+  return affine;
+}
+
+// z up from y up.
+Eigen::Matrix3d z_up_from_y_up() {
+  Eigen::Matrix3d rotation;
+  rotation << 1, 0, 0, 0, 0, -1, 0, 1, 0;
+  return rotation;
+}
+
+// Of a triangle without texture coordinates.
+constexpr unsigned no_material = 0xffffffff;
+
+// Gathers the parts of a scene into one mesh.
+class MeshBuilder {
+ public:
+  MeshBuilder(const aiScene& scene, const std::string& format)
+      : scene_(scene), has_linear_colors_(format == "glb") {
+    has_normals_ = format != "stl";
+    has_colors_ = true;
+    for (unsigned i = 0; i < scene.mNumMeshes; ++i) {
+      has_normals_ = has_normals_ && scene.mMeshes[i]->HasNormals();
+      has_colors_ = has_colors_ && scene.mMeshes[i]->HasVertexColors(0);
+    }
+  }
+
+  void add_node(const aiNode& node, const Eigen::Affine3d& root_from_parent) {
+    const Eigen::Affine3d root_from_node = root_from_parent * to_eigen(node.mTransformation);
+    for (unsigned i = 0; i < node.mNumMeshes; ++i) {
+      if (node.mMeshes[i] >= scene_.mNumMeshes) throw Error("a node names no mesh");
+      add_mesh(*scene_.mMeshes[node.mMeshes[i]], root_from_node);
+    }
+    for (unsigned i = 0; i < node.mNumChildren; ++i) add_node(*node.mChildren[i], root_from_node);
+  }
+  TriangleMesh take() { return std::move(mesh_); }
+
+  // One a triangle, from the top left; and the material of each.
+  const std::vector<TextureCorners>& coordinates() const { return coordinates_; }
+  const std::vector<unsigned>& materials() const { return materials_; }
+
+ private:
+  TextureCorners coordinates_of(const aiMesh& part, const std::array<unsigned, 3>& corners) const {
+    TextureCorners result;
+    result.fill(Eigen::Vector2f::Zero());
+    if (!part.HasTextureCoords(0)) return result;
+    for (std::size_t k = 0; k < 3; ++k) {
+      // assimp counts from the bottom in every format.
+      const aiVector3D& c = part.mTextureCoords[0][corners[k]];
+      result[k] = {c.x, 1.0F - c.y};
+    }
+    return result;
+  }
+  void add_mesh(const aiMesh& part, const Eigen::Affine3d& root_from_node) {
+    const Eigen::Matrix3d normal_matrix = root_from_node.linear().inverse().transpose();
+    const bool mirrored = root_from_node.linear().determinant() < 0.0;
+    std::vector<std::uint32_t> corners;
+    for (unsigned i = 0; i < part.mNumFaces; ++i) {
+      const aiFace& face = part.mFaces[i];
+      if (face.mNumIndices < 3) continue;
+      corners.clear();
+      for (unsigned k = 0; k < face.mNumIndices; ++k) {
+        if (face.mIndices[k] >= part.mNumVertices)
+          throw Error("a corner is no vertex", {.field = "face " + std::to_string(i),
+                                                .value = std::to_string(face.mIndices[k])});
+        corners.push_back(vertex(part, face.mIndices[k], root_from_node, normal_matrix));
+      }
+      std::vector<unsigned> indices(face.mIndices, face.mIndices + face.mNumIndices);
+      if (mirrored) std::reverse(corners.begin(), corners.end());
+      if (mirrored) std::reverse(indices.begin(), indices.end());
+      for (std::size_t k = 2; k < corners.size(); ++k) {
+        mesh_.triangles.push_back({corners[0], corners[k - 1], corners[k]});
+        coordinates_.push_back(coordinates_of(part, {indices[0], indices[k - 1], indices[k]}));
+        materials_.push_back(part.HasTextureCoords(0) ? part.mMaterialIndex : no_material);
+      }
+    }
+  }
+
+  // The vertex of a corner: a new one, or the one that is equal.
+  std::uint32_t vertex(const aiMesh& part, unsigned index, const Eigen::Affine3d& root_from_node,
+                       const Eigen::Matrix3d& normal_matrix) {
+    const aiVector3D& p = part.mVertices[index];
+    const Eigen::Vector3d position = root_from_node * Eigen::Vector3f(p.x, p.y, p.z).cast<double>();
+    if (!position.allFinite())
+      throw Error("position is not finite", {.field = "vertex " + std::to_string(index)});
+    Eigen::Vector3f normal = Eigen::Vector3f::Zero();
+    if (has_normals_) {
+      const aiVector3D& n = part.mNormals[index];
+      normal = (normal_matrix * Eigen::Vector3f(n.x, n.y, n.z).cast<double>()).cast<float>();
+    }
+    Color color{};
+    if (has_colors_) {
+      const aiColor4D& c = part.mColors[0][index];
+      const auto byte = [&](float value) {
+        return to_byte(has_linear_colors_ ? srgb_of(value) : value);
+      };
+      color = {byte(c.r), byte(c.g), byte(c.b)};
+    }
+    const Corner corner = corner_of(position, normal, color);
+    const auto [found, is_new] =
+        known_.try_emplace(corner, static_cast<std::uint32_t>(mesh_.vertices.size()));
+    if (is_new) {
+      mesh_.vertices.push_back(position);
+      if (has_normals_) mesh_.vertex_normals.push_back(normal);
+      if (has_colors_) mesh_.vertex_colors.push_back(color);
+    }
+    return found->second;
+  }
+
+  const aiScene& scene_;
+  bool has_normals_ = false;
+  bool has_colors_ = false;
+  bool has_linear_colors_;
+  TriangleMesh mesh_;
+  std::vector<TextureCorners> coordinates_;
+  std::vector<unsigned> materials_;
+  std::unordered_map<Corner, std::uint32_t, CornerHash> known_;
+};
+
+std::unique_ptr<aiNode> make_root(std::size_t parts, bool y_up) {
+  auto root = std::make_unique<aiNode>();
+  root->mNumMeshes = static_cast<unsigned>(parts);
+  root->mMeshes = new unsigned[parts];
+  std::iota(root->mMeshes, root->mMeshes + parts, 0U);
+  // y up from z up, as glTF's readers expect.
+  if (y_up) root->mTransformation = aiMatrix4x4(1, 0, 0, 0, 0, 0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1);
+  return root;
+}
+
+void copy_vertices(const TriangleMesh& mesh, aiMesh& part) {
+  const std::size_t count = mesh.vertices.size();
+  part.mNumVertices = static_cast<unsigned>(count);
+  part.mVertices = new aiVector3D[count];
+  for (std::size_t i = 0; i < count; ++i) {
+    const Eigen::Vector3f p = mesh.vertices[i].cast<float>();
+    part.mVertices[i] = aiVector3D(p.x(), p.y(), p.z());
+  }
+  if (!mesh.vertex_normals.empty()) {
+    part.mNormals = new aiVector3D[count];
+    for (std::size_t i = 0; i < count; ++i) {
+      const Eigen::Vector3f& n = mesh.vertex_normals[i];
+      part.mNormals[i] = aiVector3D(n.x(), n.y(), n.z());
+    }
+  }
+  if (mesh.vertex_colors.empty()) return;
+  part.mColors[0] = new aiColor4D[count];
+  for (std::size_t i = 0; i < count; ++i) {
+    const Color& c = mesh.vertex_colors[i];
+    // STL keeps none.
+    part.mColors[0][i] = aiColor4D(linear_of(c[0]), linear_of(c[1]), linear_of(c[2]), 1.0F);
+  }
+}
+
+void copy_faces(const TriangleMesh& mesh, aiMesh& part) {
+  part.mPrimitiveTypes = aiPrimitiveType_TRIANGLE;
+  part.mNumFaces = static_cast<unsigned>(mesh.triangles.size());
+  part.mFaces = new aiFace[mesh.triangles.size()];
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    part.mFaces[i].mNumIndices = 3;
+    part.mFaces[i].mIndices = new unsigned[3];
+    std::copy(mesh.triangles[i].begin(), mesh.triangles[i].end(), part.mFaces[i].mIndices);
+  }
+}
+
+// Unlit: photographs hold the light that fell.
+std::unique_ptr<aiMaterial> make_material(std::int32_t page) {
+  auto material = std::make_unique<aiMaterial>();
+  // Not as an int: the exporter looks for the enumeration's own type.
+  const aiShadingMode unlit = aiShadingMode_Unlit;
+  material->AddProperty(&unlit, 1, AI_MATKEY_SHADING_MODEL);
+  if (page == no_page) {
+    const float gray_128 = linear_of(128);
+    const aiColor4D gray(gray_128, gray_128, gray_128, 1.0F);
+    material->AddProperty(&gray, 1, AI_MATKEY_BASE_COLOR);
+    return material;
+  }
+  const aiString picture("*" + std::to_string(page));
+  material->AddProperty(&picture, AI_MATKEY_TEXTURE(aiTextureType_BASE_COLOR, 0));
+  const int clamp = aiTextureMapMode_Clamp;
+  material->AddProperty(&clamp, 1, AI_MATKEY_MAPPINGMODE_U(aiTextureType_BASE_COLOR, 0));
+  material->AddProperty(&clamp, 1, AI_MATKEY_MAPPINGMODE_V(aiTextureType_BASE_COLOR, 0));
+  return material;
+}
+
+// A compressed picture has no height; its width counts bytes.
+std::unique_ptr<aiTexture> make_texture(const EncodedPicture& picture) {
+  auto texture = std::make_unique<aiTexture>();
+  texture->mWidth = static_cast<unsigned>(picture.bytes.size());
+  texture->pcData = new aiTexel[picture.bytes.size() / sizeof(aiTexel) + 1];
+  std::memcpy(static_cast<void*>(texture->pcData), picture.bytes.data(), picture.bytes.size());
+  picture.format.copy(texture->achFormatHint, sizeof(texture->achFormatHint) - 1);
+  return texture;
+}
+
+void copy_coordinates(const std::vector<Eigen::Vector2f>& coordinates, aiMesh& part) {
+  if (coordinates.empty()) return;
+  part.mTextureCoords[0] = new aiVector3D[coordinates.size()];
+  part.mNumUVComponents[0] = 2;
+  // assimp counts from the bottom.
+  for (std::size_t i = 0; i < coordinates.size(); ++i)
+    part.mTextureCoords[0][i] = aiVector3D(coordinates[i].x(), 1.0F - coordinates[i].y(), 0.0F);
+}
+
+// The scene owns all that is hung into it.
+template <typename T>
+T** hang(std::vector<std::unique_ptr<T>>& things, unsigned& count) {
+  count = static_cast<unsigned>(things.size());
+  T** hung = new T*[things.size()];
+  for (std::size_t i = 0; i < things.size(); ++i) hung[i] = things[i].release();
+  return hung;
+}
+
+std::unique_ptr<aiScene> scene_of(std::vector<std::unique_ptr<aiMesh>> meshes,
+                                  std::vector<std::unique_ptr<aiMaterial>> materials, bool y_up) {
+  auto scene = std::make_unique<aiScene>();
+  scene->mRootNode = make_root(meshes.size(), y_up).release();
+  scene->mMeshes = hang(meshes, scene->mNumMeshes);
+  scene->mMaterials = hang(materials, scene->mNumMaterials);
+  return scene;
+}
+
+std::unique_ptr<aiMesh> mesh_of(const TriangleMesh& mesh, unsigned material) {
+  auto part = std::make_unique<aiMesh>();
+  part->mMaterialIndex = material;
+  copy_vertices(mesh, *part);
+  copy_faces(mesh, *part);
+  return part;
+}
+
+std::string first_line(const char* text) {
+  const std::string_view reason = text == nullptr ? "" : text;
+  return std::string(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
+}
+
+// The picture of a material's own color, or nothing.
+std::optional<TexturePicture> picture_of(const aiScene& scene, const aiMaterial& material) {
+  for (const aiTextureType type : {aiTextureType_BASE_COLOR, aiTextureType_DIFFUSE}) {
+    aiString path;
+    if (material.GetTexture(type, 0, &path) != aiReturn_SUCCESS) continue;
+    const aiTexture* const embedded = scene.GetEmbeddedTexture(path.C_Str());
+    // However it is named, a picture is read once.
+    if (embedded == nullptr)
+      return TexturePicture{{}, std::filesystem::path(path.C_Str()).lexically_normal().string()};
+    // Compressed pictures have no height; their width counts bytes.
+    if (embedded->mHeight != 0) continue;
+    return TexturePicture{
+        std::string(reinterpret_cast<const char*>(embedded->pcData), embedded->mWidth), {}};
+  }
+  return std::nullopt;
+}
+
+DecodedModel model_of(const aiScene& scene, MeshBuilder& builder) {
+  DecodedModel result;
+  // Pages in the order of the materials; several materials may have one picture.
+  std::vector<std::int32_t> page_of_material(scene.mNumMaterials, no_page);
+  for (unsigned m = 0; m < scene.mNumMaterials; ++m) {
+    std::optional<TexturePicture> picture = picture_of(scene, *scene.mMaterials[m]);
+    if (!picture) continue;
+    const auto same = std::find_if(
+        result.pictures.begin(), result.pictures.end(), [&](const TexturePicture& other) {
+          return other.path == picture->path && other.bytes == picture->bytes;
+        });
+    page_of_material[m] = static_cast<std::int32_t>(same - result.pictures.begin());
+    if (same == result.pictures.end()) result.pictures.push_back(std::move(*picture));
+  }
+  result.model.texture_coordinates = builder.coordinates();
+  for (const unsigned material : builder.materials())
+    result.model.page_of_triangle.push_back(
+        material < page_of_material.size() ? page_of_material[material] : no_page);
+  result.model.mesh = builder.take();
+  return result;
+}
+
+// assimp takes memory for the length of the text before it compares it with the file's.
+void require_sound_glb(std::string_view header, std::uint64_t bytes) {
+  constexpr std::size_t text_length_at = 12;
+  constexpr std::size_t text_at = 20;
+  std::uint32_t length = 0;
+  if (header.size() < text_at || !header.starts_with("glTF"))
+    throw Error("not a readable glb file: no header");
+  std::memcpy(&length, header.data() + text_length_at, sizeof length);
+  if (text_at + std::uint64_t{length} > bytes)
+    throw Error("not a readable glb file",
+                {.field = "length of its text",
+                 .value = std::to_string(length),
+                 .bound = "within its " + std::to_string(bytes) + " bytes"});
+}
+
+// read(importer) gives the scene, take(scene, builder) the result.
+template <typename Read, typename Take>
+auto decode(const std::string& format, const Read& read, const Take& take) {
+  try {
+    Assimp::Importer importer;
+    // No aiProcess_Triangulate: on some broken files it ends the program by an assertion.
+    const aiScene* const scene = read(importer);
+    if (scene == nullptr || scene->mRootNode == nullptr)
+      throw Error("not a readable " + format + " file: " + first_line(importer.GetErrorString()));
+    Eigen::Affine3d root = Eigen::Affine3d::Identity();
+    if (format == "glb") root.linear() = z_up_from_y_up();
+    MeshBuilder builder(*scene, format);
+    builder.add_node(*scene->mRootNode, root);
+    return take(*scene, builder);
+  } catch (const std::bad_alloc&) {
+    throw Error("claims more data than there is memory");
+  } catch (const std::length_error&) {
+    throw Error("claims more data than there is memory");
+  }
+}
+
+// What decode() returns or throws in a process of its own: assimp crashes on some broken files.
+DecodedModel decode_guarded(std::uint64_t file_bytes, const std::function<DecodedModel()>& decode) {
+  // assimp's scene, our mesh and its bytes; a line of OBJ becomes some hundred bytes.
+  const std::uint64_t memory = (std::uint64_t{1} << 30) + 100 * file_bytes;
+  return run_guarded<DecodedModel>(memory, "is broken: the library for its format crashed on it",
+                                   decode, [](auto& pipe, DecodedModel& decoded) {
+                                     TexturedMesh& model = decoded.model;
+                                     pipe.array(model.mesh.vertices);
+                                     pipe.array(model.mesh.triangles);
+                                     pipe.array(model.mesh.vertex_normals);
+                                     pipe.array(model.mesh.vertex_colors);
+                                     pipe.array(model.texture_coordinates);
+                                     pipe.array(model.page_of_triangle);
+                                     pipe.size(decoded.pictures);
+                                     for (TexturePicture& picture : decoded.pictures) {
+                                       pipe.array(picture.bytes);
+                                       pipe.array(picture.path);
+                                     }
+                                   });
+}
+
+Error not_written(const Assimp::Exporter& exporter) {
+  return Error("assimp cannot write it: " + first_line(exporter.GetErrorString()), {},
+               ErrorKind::failed);
+}
+
+}  // namespace
+
+TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& format) {
+  if (format == "glb") require_sound_glb(bytes, bytes.size());
+  const auto read = [&](Assimp::Importer& importer) {
+    return importer.ReadFileFromMemory(bytes.data(), bytes.size(), 0, format.c_str());
+  };
+  const auto take = [](const aiScene&, MeshBuilder& builder) {
+    DecodedModel result;
+    result.model.mesh = builder.take();
+    return result;
+  };
+  return decode_guarded(bytes.size(), [&] { return decode(format, read, take); }).model.mesh;
+}
+
+DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format) {
+  if (format == "glb") {
+    std::string header(20, '\0');
+    std::ifstream file(path, std::ios::binary);
+    file.read(header.data(), static_cast<std::streamsize>(header.size()));
+    header.resize(static_cast<std::size_t>(file.gcount()));
+    require_sound_glb(header, std::filesystem::file_size(path));
+  }
+  const auto read = [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); };
+  return decode_guarded(std::filesystem::file_size(path),
+                        [&] { return decode(format, read, model_of); });
+}
+
+std::string encode_by_assimp(const TriangleMesh& mesh, const std::string& format, bool ascii) {
+  if (mesh.triangles.empty())
+    throw Error("a mesh without triangles cannot be written as " + format);
+  const bool is_glb = format == "glb";
+  std::vector<std::unique_ptr<aiMesh>> meshes;
+  meshes.push_back(mesh_of(mesh, 0));
+  std::vector<std::unique_ptr<aiMaterial>> materials;
+  materials.push_back(std::make_unique<aiMaterial>());
+  const auto scene = scene_of(std::move(meshes), std::move(materials), is_glb);
+  Assimp::Exporter exporter;
+  const aiExportDataBlob* const blob = exporter.ExportToBlob(scene.get(), is_glb  ? "glb2"
+                                                                          : ascii ? "stl"
+                                                                                  : "stlb");
+  if (blob == nullptr) throw not_written(exporter);
+  return std::string(static_cast<const char*>(blob->data), blob->size);
+}
+
+void write_model_by_assimp(const std::filesystem::path& path, std::vector<ModelPart> parts,
+                           std::vector<EncodedPicture> pictures) {
+  std::vector<std::unique_ptr<aiMesh>> meshes;
+  std::vector<std::unique_ptr<aiMaterial>> materials;
+  std::vector<std::unique_ptr<aiTexture>> textures;
+  // The exporter copies the scene: what it replaces is given back at once.
+  for (ModelPart& part : parts) {
+    meshes.push_back(mesh_of(part.mesh, static_cast<unsigned>(materials.size())));
+    copy_coordinates(part.texture_coordinates, *meshes.back());
+    materials.push_back(make_material(part.page));
+    part = {};
+  }
+  for (EncodedPicture& picture : pictures) {
+    textures.push_back(make_texture(picture));
+    picture = {};
+  }
+  const auto scene = scene_of(std::move(meshes), std::move(materials), true);
+  scene->mTextures = hang(textures, scene->mNumTextures);
+  Assimp::Exporter exporter;
+  errno = 0;
+  if (exporter.Export(scene.get(), "glb2", path.string()) != aiReturn_SUCCESS) {
+    if (errno != 0) throw system_failure(path, "cannot be written", errno);
+    throw not_written(exporter);
+  }
+  const int failure = errno;
+  // The second number of the header (glTF 2.0, 4.4.2) is the file's length; assimp does not see
+  // what fails when the file is closed.
+  std::ifstream file(path, std::ios::binary);
+  std::array<std::uint32_t, 3> header{};
+  file.read(reinterpret_cast<char*>(header.data()), sizeof header);
+  if (!file || header[2] != std::filesystem::file_size(path))
+    throw system_failure(path, "cannot be written", failure != 0 ? failure : EIO);
+}
+
+}  // namespace libmap

@@ -1,0 +1,69 @@
+#include "libmap/io/piece_index.h"
+
+#include <algorithm>
+
+#include "libmap/core/error.h"
+#include "libmap/io/cloud_io.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t max_kept_points = 4'000'000;
+
+}  // namespace
+
+PieceIndex::PieceIndex(std::vector<std::filesystem::path> pieces, const Visit& visit) {
+  for (std::filesystem::path& path : pieces) {
+    CloudReadResult read = read_cloud(path);
+    dropped_ += read.dropped_points;
+    const PointCloud& cloud = read.cloud;
+    if (cloud.empty()) continue;
+    if (pieces_.empty()) {
+      has_normals_ = cloud.has_normals();
+    } else if (cloud.has_normals() != has_normals_) {
+      const std::string first = pieces_.front().path.string();
+      throw Error(has_normals_ ? "has no normals, but " + first + " has"
+                               : "has normals, but " + first + " has none",
+                  {.file = path.string()});
+    }
+    points_ += cloud.size();
+    visit(cloud);
+    pieces_.push_back({std::move(path), bounds_of(cloud.positions)});
+  }
+}
+
+const PointCloud& PieceIndex::cloud_of(const Piece& piece) {
+  const auto kept = std::find_if(kept_.begin(), kept_.end(),
+                                 [&](const auto& one) { return one.first == &piece; });
+  if (kept != kept_.end()) {
+    kept_.splice(kept_.begin(), kept_, kept);
+    return kept_.front().second;
+  }
+  kept_.emplace_front(&piece, read_cloud(piece.path).cloud);
+  std::size_t points = 0;
+  for (auto one = kept_.begin(); one != kept_.end();) {
+    points += one->second.size();
+    one = points > max_kept_points && one != kept_.begin() ? kept_.erase(one) : std::next(one);
+  }
+  return kept_.front().second;
+}
+
+PointCloud PieceIndex::points_in(const Eigen::Vector2d& low, const Eigen::Vector2d& high) {
+  PointCloud found;
+  for (const Piece& piece : pieces_) {
+    if ((piece.box.max.head<2>().array() < low.array()).any() ||
+        (piece.box.min.head<2>().array() >= high.array()).any())
+      continue;
+    const PointCloud& cloud = cloud_of(piece);
+    std::vector<std::size_t> inside;
+    for (std::size_t n = 0; n < cloud.size(); ++n) {
+      const auto place = cloud.positions[n].head<2>().array();
+      if ((place >= low.array()).all() && (place < high.array()).all()) inside.push_back(n);
+    }
+    append_cloud(select_points(cloud, inside), found);
+  }
+  return found;
+}
+
+}  // namespace libmap

@@ -1,0 +1,484 @@
+#include "libmap/optimize/bundle_adjustment.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <utility>
+
+#include "libmap/features/bundle_residuals.h"
+#include "libmap/geometry/rigid_motion.h"
+#include "libmap/geometry/symmetric_eigen.h"
+#include "libmap/optimize/graph_covariance.h"
+#include "libmap/optimize/joint_adjustment.h"
+#include "libmap/optimize/relative_motions.h"
+#include "libmap/optimize/sparse_adjustment.h"
+
+namespace libmap {
+
+namespace {
+
+constexpr std::size_t dense_below = 120;  // poses: the Schur complement of more is never formed
+constexpr double registration_prior_m = 0.02;
+constexpr double registration_prior_rad = 0.03;
+constexpr double timing_prior_s = 0.03;
+// Keeps a pose that nothing binds from making the system singular.
+constexpr double pose_damping = 1e-6;
+
+std::size_t max_cameras(const std::vector<FrameFeatures>& frames) {
+  std::size_t cameras = 0;
+  for (const FrameFeatures& frame : frames) cameras = std::max(cameras, frame.cameras.size());
+  return cameras;
+}
+
+// Of the cameras' numbers, as residuals a x - b.
+class Priors {
+ public:
+  explicit Priors(Eigen::Index numbers) : numbers_(numbers) {}
+
+  // Returns a row, to be filled.
+  Eigen::VectorXd& add(double mean = 0.0) {
+    means_.push_back(mean);
+    return rows_.emplace_back(Eigen::VectorXd::Zero(numbers_));
+  }
+  void add_near(Eigen::Index first, const Eigen::VectorXd& means,
+                const Eigen::VectorXd& deviations) {
+    for (Eigen::Index n = 0; n < means.size(); ++n)
+      add(means[n] / deviations[n])[first + n] = 1.0 / deviations[n];
+  }
+  void add_to(JointProblem& problem) const {
+    problem.prior.resize(static_cast<Eigen::Index>(rows_.size()), numbers_);
+    for (std::size_t n = 0; n < rows_.size(); ++n)
+      problem.prior.row(static_cast<Eigen::Index>(n)) = rows_[n];
+    problem.prior_mean =
+        Eigen::Map<const Eigen::VectorXd>(means_.data(), static_cast<Eigen::Index>(means_.size()));
+  }
+
+ private:
+  Eigen::Index numbers_;
+  std::vector<Eigen::VectorXd> rows_;
+  std::vector<double> means_;
+};
+
+// Rows of normal equations.
+struct FreeRows {
+  std::vector<Eigen::Index> poses;   // the first of six each: of a step (rigid_motion.h)
+  std::vector<Eigen::Index> params;  // of cameras and motions
+};
+
+// Changes of the parameters by one standard deviation in independent directions, poses being
+// unknown (Schur complement): the `count` ones that move the positions of the poses most. Points
+// are eliminated from the information already.
+std::vector<Eigen::VectorXd> calibration_modes(const Eigen::MatrixXd& information,
+                                               const FreeRows& rows, std::size_t count) {
+  if (rows.params.empty()) return {};
+  std::vector<Eigen::Index> steps;
+  for (const Eigen::Index first : rows.poses)
+    for (Eigen::Index n = 0; n < 6; ++n) steps.push_back(first + n);
+  Eigen::MatrixXd of_poses = information(steps, steps);
+  of_poses.diagonal().array() += pose_damping;
+  // How poses follow the cameras.
+  const Eigen::MatrixXd mixed = information(steps, rows.params);
+  const Eigen::MatrixXd follow = -of_poses.ldlt().solve(mixed);
+  const Eigen::MatrixXd of_params =
+      information(rows.params, rows.params) + mixed.transpose() * follow;
+  const Eigen::LLT<Eigen::MatrixXd> root(of_params);
+  if (root.info() != Eigen::Success) return {};
+  const Eigen::Index params = of_params.rows();
+  const Eigen::MatrixXd deviations =
+      root.matrixU().solve(Eigen::MatrixXd::Identity(params, params));
+  Eigen::MatrixXd squares = Eigen::MatrixXd::Zero(params, params);
+  for (Eigen::Index pose = 0; pose < follow.rows(); pose += 6) {
+    const Eigen::MatrixXd moves = follow.middleRows<3>(pose) * deviations;
+    squares += moves.transpose() * moves;
+  }
+  const SymmetricEigen<Eigen::Dynamic> effects = symmetric_eigen<Eigen::Dynamic>(squares);
+  std::vector<Eigen::VectorXd> changes;
+  for (Eigen::Index n = params - 1; n >= 0 && changes.size() < count; --n)
+    changes.emplace_back(deviations * effects.vectors.col(n));
+  return changes;
+}
+
+class Adjustment {
+ public:
+  Adjustment(const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
+             const std::map<int, Pose>& poses, const std::vector<GraphComponent>& components,
+             const BundleAdjustmentOptions& options, const SensorCalibration& start);
+
+  BundleAdjustmentResult run(const std::vector<GraphLinkResult>& links);
+
+ private:
+  const Feature& feature(const Observation& seen) const {
+    return frames_[seen.frame].features[seen.feature];
+  }
+  bool has_pose(const Observation& seen) const { return place_.contains(frames_[seen.frame].node); }
+  void start_numbers(const SensorCalibration& start, const std::vector<GraphComponent>& components);
+  void add_observations();
+  CalibratedObservation calibrated(const Observation& seen) const;
+  void add_camera_priors(std::size_t camera, Priors& priors);
+  void add_depth_priors(std::size_t camera, Priors& priors);
+  double motion_scale() const;
+  SensorCalibration calibration(const JointState& state, double motion_scale) const;
+  void find_alternatives();
+
+  const std::vector<FrameFeatures>& frames_;
+  const std::vector<FeatureTrack>& tracks_;
+  const BundleAdjustmentOptions& options_;
+  BundleAdjustmentResult result_;
+  std::size_t cameras_ = 0;                   // with something to refine
+  std::vector<DepthCorrection> corrections_;  // of 0: their knots
+  SensorCalibration start_;
+  std::map<int, std::size_t> place_;  // of each node among the poses
+  std::vector<Eigen::Index> first_;   // number of each camera
+  std::vector<bool> sees_;            // of each camera, anything
+  std::vector<Eigen::Index> free_;    // numbers
+  std::vector<std::size_t> points_;   // their tracks
+  JointProblem problem_;
+  JointState state_;
+};
+
+Adjustment::Adjustment(const std::vector<FrameFeatures>& frames,
+                       const std::vector<FeatureTrack>& tracks, const std::map<int, Pose>& poses,
+                       const std::vector<GraphComponent>& components,
+                       const BundleAdjustmentOptions& options, const SensorCalibration& start)
+    : frames_(frames),
+      tracks_(tracks),
+      options_(options),
+      cameras_(options.refines_cameras() ? max_cameras(frames) : 0),
+      corrections_(
+          corrections_for(frames, options.refine_depth ? cameras_ : 0, options.depth_knot_m)),
+      sees_(cameras_, false) {
+  state_.poses = poses;
+  for (const auto& [node, pose] : poses) place_.emplace(node, place_.size());
+  problem_.robust_scale = options.robust_scale;
+  problem_.fix_cameras = options.hold_cameras;
+  problem_.fixed.assign(place_.size(), options.hold_poses);
+  for (const GraphComponent& component : components)
+    if (const auto place = place_.find(component.gauge_node); place != place_.end())
+      problem_.fixed[place->second] = true;
+  start_numbers(start, components);
+  add_observations();
+  Priors priors(state_.camera_params.size());
+  for (std::size_t n = 0; n < cameras_; ++n) add_camera_priors(n, priors);
+  priors.add_to(problem_);
+}
+
+void Adjustment::start_numbers(const SensorCalibration& start,
+                               const std::vector<GraphComponent>& components) {
+  if (options_.refine_registration) start_.color_from_depth = start.color_from_depth;
+  if (options_.refine_timing) {
+    start_.timing = start.timing;
+    start_.motion = start.motion;
+  }
+  start_.color_from_depth.resize(cameras_, Pose::Identity());
+  start_.timing.resize(cameras_);
+  Eigen::Index numbers = 0;
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    first_.push_back(numbers);
+    numbers += spline_at;
+    if (n < corrections_.size())
+      numbers += static_cast<Eigen::Index>(corrections_[n].spline_m.size());
+  }
+  state_.camera_params = Eigen::VectorXd::Zero(numbers);
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    double* const own = state_.camera_params.data() + first_[n];
+    own[timing_at] = start_.timing[n].depth_delay_s;
+    own[timing_at + 1] = start_.timing[n].rolling_shutter_s;
+    if (options_.refine_intrinsics && n < start.intrinsics.size()) {
+      const IntrinsicsStep& step = start.intrinsics[n];
+      Eigen::Map<Eigen::Vector4d>(own + intrinsics_at) << step.fx_share, step.fy_share, step.cx_px,
+          step.cy_px;
+    }
+    if (n >= corrections_.size() || n >= start.depth.size() ||
+        !has_same_knots(corrections_[n], start.depth[n]))
+      continue;
+    std::copy(start.depth[n].radial.begin(), start.depth[n].radial.end(), own + radial_at);
+    std::copy(start.depth[n].spline_m.begin(), start.depth[n].spline_m.end(), own + spline_at);
+  }
+  if (!options_.refine_timing) return;
+  problem_.moving = true;
+  const std::map<int, KnownMotion> between = relative_motions(frames_, state_.poses, components);
+  for (const auto& [node, pose] : state_.poses) {
+    const auto found = between.find(node);
+    const KnownMotion known = found == between.end() ? KnownMotion{} : found->second;
+    problem_.motion_mean.push_back(known.mean);
+    problem_.motion_deviation.push_back(known.deviation);
+    state_.motions.push_back(start_.motion.emplace(node, known.mean).first->second);
+  }
+}
+
+// In the middle of where the frames see them.
+void Adjustment::add_observations() {
+  for (std::size_t t = 0; t < tracks_.size(); ++t) {
+    const std::vector<Observation>& all = tracks_[t].observations;
+    const auto views = std::count_if(all.begin(), all.end(),
+                                     [&](const Observation& seen) { return has_pose(seen); });
+    if (views < 2) continue;
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    for (const Observation& seen : all) {
+      if (!has_pose(seen)) continue;
+      const FrameFeatures& frame = frames_[seen.frame];
+      const Feature& its = feature(seen);
+      sum += state_.poses.at(frame.node) * frame.point_in_base(seen.feature);
+      problem_.observations.push_back(
+          {place_.at(frame.node), cameras_ > 0 ? first_[its.camera] : 0,
+           CalibratedFeature(its, frame.cameras[its.camera], calibrated(seen))});
+      if (cameras_ > 0) sees_[its.camera] = true;
+    }
+    points_.push_back(t);
+    problem_.begin.push_back(problem_.observations.size());
+    state_.points.emplace_back(sum / static_cast<double>(views));
+  }
+  result_.observations = problem_.observations.size();
+}
+
+CalibratedObservation Adjustment::calibrated(const Observation& seen) const {
+  CalibratedObservation calibrated;
+  if (cameras_ == 0) return calibrated;
+  const FrameFeatures& frame = frames_[seen.frame];
+  const Feature& its = feature(seen);
+  const Camera& camera = frame.cameras[its.camera];
+  calibrated.intrinsics = options_.refine_intrinsics;
+  calibrated.registration = options_.refine_registration;
+  calibrated.timing = options_.refine_timing;
+  if (options_.refine_depth && !corrections_[its.camera].empty()) {
+    calibrated.depth = true;
+    calibrated.terms = corrections_[its.camera].terms(static_cast<double>(its.depth_m),
+                                                      squared_radius_of(its, camera));
+  }
+  if (options_.refine_registration || options_.refine_timing) {
+    const RegisteredDepth depth =
+        registered_depth(frame, its, color_from_depth_of(frame, its, start_));
+    calibrated.knows_depth = depth.known;
+    calibrated.added_m = depth.added_m;
+    calibrated.by_step = depth.by_step;
+  }
+  if (options_.refine_timing) {
+    const CameraTiming& timing = start_.timing[its.camera];
+    calibrated.row_share = row_share_of(its, camera);
+    calibrated.known_step =
+        (timing.depth_delay_s - timing.rolling_shutter_s * calibrated.row_share) *
+        motion_in_camera(camera, start_.motion.at(frame.node));
+  }
+  return calibrated;
+}
+
+void Adjustment::add_camera_priors(std::size_t camera, Priors& priors) {
+  const auto add = [&](bool wanted, Eigen::Index at, const Eigen::VectorXd& means,
+                       const Eigen::VectorXd& deviations) {
+    if (!wanted || !sees_[camera]) return;
+    priors.add_near(first_[camera] + at, means, deviations);
+    for (Eigen::Index n = 0; n < means.size(); ++n) free_.push_back(first_[camera] + at + n);
+  };
+  add(options_.refine_intrinsics, intrinsics_at, Eigen::Vector4d::Zero(),
+      Eigen::Vector4d(options_.focal_prior, options_.focal_prior, options_.center_prior_px,
+                      options_.center_prior_px));
+  Vector6d registration;
+  registration << Eigen::Vector3d::Constant(registration_prior_m),
+      Eigen::Vector3d::Constant(registration_prior_rad);
+  add(options_.refine_registration, registration_at,
+      step_between(start_.color_from_depth[camera], Pose::Identity()), registration);
+  add(options_.refine_timing, timing_at, Eigen::Vector2d::Zero(),
+      Eigen::Vector2d::Constant(timing_prior_s));
+  if (options_.refine_depth && !corrections_[camera].empty()) add_depth_priors(camera, priors);
+}
+
+// Each number is small, the spline bends little, and depths keep their mean (depth_gauge).
+void Adjustment::add_depth_priors(std::size_t camera, Priors& priors) {
+  const DepthCorrection& depth = corrections_[camera];
+  const auto knots = static_cast<Eigen::Index>(depth.spline_m.size());
+  const Eigen::Index radial = first_[camera] + radial_at;
+  const Eigen::Index spline = first_[camera] + spline_at;
+  static_assert(radial_at + 3 == spline_at);
+  priors.add_near(radial, Eigen::VectorXd::Zero(3 + knots),
+                  Eigen::VectorXd::Constant(3 + knots, options_.depth_prior_m));
+  for (Eigen::Index n = 0; n < 3 + knots; ++n) free_.push_back(radial + n);
+  for (Eigen::Index n = 0; n + 2 < knots; ++n)
+    priors.add().segment<3>(spline + n) = Eigen::Vector3d(1.0, -2.0, 1.0) / options_.depth_bend_m;
+  Eigen::VectorXd& gauge = priors.add();
+  double count = 0.0;
+  for (const FrameFeatures& frame : frames_)
+    for (const Feature& its : frame.features) {
+      if (its.camera != camera) continue;
+      const auto z = static_cast<double>(its.depth_m);
+      const DepthCorrection::Terms terms =
+          depth.terms(z, squared_radius_of(its, frame.cameras[camera]));
+      gauge.segment<4>(spline + static_cast<Eigen::Index>(terms.first)) +=
+          Eigen::Map<const Eigen::Vector4d>(terms.spline.data()) / z;
+      gauge.segment<3>(radial) += Eigen::Map<const Eigen::Vector3d>(terms.radial.data()) / z;
+      count += 1.0;
+    }
+  gauge /= count * depth_gauge;
+}
+
+// Only the product of time and motion is seen: the motions are right on average if their regression
+// on those between poses has the slope 1. The hand's tremor is missing in the latter, so that least
+// squares with both as measurements makes times too long.
+double Adjustment::motion_scale() const {
+  if (!problem_.moving || problem_.fix_cameras) return 1.0;
+  double mixed = 0.0;
+  double squares = 0.0;
+  for (std::size_t n = 0; n < state_.motions.size(); ++n) {
+    const Vector6d weight = problem_.motion_deviation[n].array().square().inverse();
+    const Vector6d& between = problem_.motion_mean[n];
+    mixed += between.dot(weight.cwiseProduct(state_.motions[n]));
+    squares += between.dot(weight.cwiseProduct(between));
+  }
+  return mixed > 0.0 && squares > 0.0 ? mixed / squares : 1.0;
+}
+
+SensorCalibration Adjustment::calibration(const JointState& state, double motion_scale) const {
+  SensorCalibration found;
+  for (std::size_t n = 0; n < cameras_; ++n) {
+    const double* own = state.camera_params.data() + first_[n];
+    const double* step = own + intrinsics_at;
+    if (options_.refine_intrinsics)
+      found.intrinsics.push_back({step[0], step[1], step[2], step[3]});
+    if (options_.refine_registration)
+      found.color_from_depth.push_back(
+          moved(Pose::Identity(), Eigen::Map<const Vector6d>(own + registration_at)) *
+          start_.color_from_depth[n]);
+    if (options_.refine_timing)
+      found.timing.push_back({motion_scale * own[timing_at], motion_scale * own[timing_at + 1]});
+    if (options_.refine_depth) {
+      found.depth.push_back(corrections_[n]);
+      std::copy_n(own + radial_at, 3, found.depth[n].radial.begin());
+      std::copy_n(own + spline_at, corrections_[n].spline_m.size(),
+                  found.depth[n].spline_m.begin());
+    }
+  }
+  for (const FrameFeatures& frame : frames_)
+    if (const auto place = place_.find(frame.node); problem_.moving && place != place_.end())
+      found.motion.emplace(frame.node, state.motions[place->second] / motion_scale);
+  return found;
+}
+
+void Adjustment::find_alternatives() {
+  const Eigen::Index size = problem_.moving ? 12 : 6;
+  const auto poses = static_cast<Eigen::Index>(state_.poses.size());
+  FreeRows rows;
+  for (Eigen::Index n = 0; n < poses; ++n) {
+    if (!problem_.fixed[static_cast<std::size_t>(n)]) rows.poses.push_back(size * n);
+    for (Eigen::Index k = 6; k < size; ++k) rows.params.push_back(size * n + k);
+  }
+  for (const Eigen::Index number : free_) rows.params.push_back(size * poses + number);
+  const double scale = motion_scale();
+  const Eigen::MatrixXd information =
+      joint_system(problem_, state_).matrix.selfadjointView<Eigen::Lower>();
+  for (const Eigen::VectorXd& change :
+       calibration_modes(information, rows, options_.alternatives)) {
+    JointState other = state_;
+    for (std::size_t n = 0; n < rows.params.size(); ++n) {
+      const Eigen::Index row = rows.params[n];
+      const double by = change[static_cast<Eigen::Index>(n)];
+      if (row < size * poses)
+        other.motions[static_cast<std::size_t>(row / size)][row % size - 6] += by;
+      else
+        other.camera_params[row - size * poses] += by;
+    }
+    result_.alternatives.push_back(calibration(other, scale));
+  }
+}
+
+BundleAdjustmentResult Adjustment::run(const std::vector<GraphLinkResult>& links) {
+  problem_.links = links;
+  if (result_.observations > 0) {
+    const LeastSquaresSummary summary =
+        adjust_jointly(problem_, state_, options_.max_iterations, options_.tolerance);
+    result_.initial_cost = summary.initial_cost;
+    result_.final_cost = summary.final_cost;
+    result_.iterations = summary.iterations;
+    result_.converged = true;  // the cost has not risen
+  }
+  result_.map_from_base = state_.poses;
+  result_.points.assign(tracks_.size(), Eigen::Vector3d::Zero());
+  for (std::size_t n = 0; n < points_.size(); ++n) result_.points[points_[n]] = state_.points[n];
+  if (cameras_ > 0) result_.calibration = calibration(state_, motion_scale());
+  if (options_.alternatives > 0 && cameras_ > 0) find_alternatives();
+  return std::move(result_);
+}
+
+}  // namespace
+
+void add_information(const std::vector<FrameFeatures>& frames,
+                     const std::vector<FeatureTrack>& tracks,
+                     const std::vector<GraphLinkResult>& links,
+                     const BundleAdjustmentOptions& options, BundleAdjustmentResult& result,
+                     const std::vector<Eigen::Vector3d>& points) {
+  std::vector<FrameFeatures> calibrated;
+  if (!result.calibration.empty())
+    for (const FrameFeatures& frame : frames)
+      calibrated.push_back(calibrated_features(frame, result.calibration));
+  const TrackSystem observed(calibrated.empty() ? frames : calibrated, tracks,
+                             options.robust_scale);
+  const std::vector<Eigen::Vector3d> at =
+      points.empty() ? observed.points_at(result.map_from_base) : points;
+  observed.totals(result.map_from_base, at).add_to(result);
+  result.information = observed.system(result.map_from_base, at);
+  result.information.add(link_system(result.map_from_base, links));
+  result.information.clear_rhs();
+}
+
+void bind(ParameterTable& table, BundleAdjustmentOptions& options) {
+  table.add("observation_scale", options.robust_scale, positive,
+            "of Cauchy's loss, standard deviations of an observation");
+  table.add("bundle_iterations", options.max_iterations, {1, 10000},
+            "of the bundle adjustment, at most");
+  table.add("focal_prior", options.focal_prior, positive,
+            "standard deviation of the focal length, of itself");
+  table.add("center_prior_px", options.center_prior_px, positive,
+            "standard deviation of the principal point");
+  table.add("depth_prior_m", options.depth_prior_m, positive,
+            "standard deviation of a correction of depth");
+  table.add("depth_bend_m", options.depth_bend_m, positive,
+            "standard deviation of its second difference from knot to knot");
+  table.add("depth_knot_m", options.depth_knot_m, {0.02}, "between its knots");
+}
+
+BundleAdjustmentResult adjust_bundle(
+    const std::vector<FrameFeatures>& frames, const std::vector<FeatureTrack>& tracks,
+    const std::map<int, Pose>& map_from_base, const std::vector<GraphLinkResult>& links,
+    const std::vector<GraphComponent>& components, const BundleAdjustmentOptions& options,
+    const std::vector<FeatureTrack>& system_tracks, const SensorCalibration& start) {
+  check_parameters(options);
+  BundleAdjustmentResult result =
+      Adjustment(frames, tracks, map_from_base, components, options, start).run(links);
+  if (!options.with_information) return result;
+  if (system_tracks.empty())
+    add_information(frames, tracks, links, options, result, result.points);
+  else
+    add_information(frames, system_tracks, links, options, result);
+  return result;
+}
+
+FeatureTracks information_tracks(const std::vector<FrameFeatures>& frames,
+                                 const std::vector<FeatureLink>& feature_links, std::size_t poses) {
+  return build_tracks(frames, feature_links,
+                      poses < dense_below ? TrackFrames::any : TrackFrames::linked);
+}
+
+BundleAdjustmentResult adjust_bundle(const std::vector<FrameFeatures>& frames,
+                                     const std::vector<FeatureLink>& feature_links,
+                                     const std::map<int, Pose>& map_from_base,
+                                     const std::vector<GraphLinkResult>& links,
+                                     const std::vector<GraphComponent>& components,
+                                     const BundleAdjustmentOptions& options,
+                                     const SensorCalibration& start, Progress& progress) {
+  check_parameters(options);
+  FeatureTracks sparse;
+  if (map_from_base.size() >= dense_below)
+    sparse = build_tracks(frames, feature_links, TrackFrames::linked);
+  if (map_from_base.size() >= dense_below && !options.refines_cameras()) {
+    BundleAdjustmentResult result =
+        adjust_sparse(frames, sparse.tracks, map_from_base, links, components, options, progress);
+    result.conflicts = sparse.conflicts;
+    return result;
+  }
+  const FeatureTracks tracks = build_tracks(frames, feature_links);
+  BundleAdjustmentResult result = adjust_bundle(frames, tracks.tracks, map_from_base, links,
+                                                components, options, sparse.tracks, start);
+  result.conflicts = tracks.conflicts;
+  return result;
+}
+
+}  // namespace libmap

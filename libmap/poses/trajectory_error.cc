@@ -1,0 +1,171 @@
+#include "libmap/poses/trajectory_error.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/pose.h"
+#include "libmap/geometry/symmetric_eigen.h"
+#include "libmap/poses/stamp_pairing.h"
+
+namespace libmap {
+
+namespace {
+
+struct PosePair {
+  Pose estimate;
+  Pose truth;
+};
+
+bool knows_nodes(const Trajectory& trajectory) {
+  return std::all_of(trajectory.begin(), trajectory.end(),
+                     [](const TrajectoryPose& pose) { return pose.node > 0; });
+}
+
+std::vector<PosePair> pair_by_node(const Trajectory& estimate, const Trajectory& truth) {
+  std::map<int, const Pose*> truth_of_node;
+  for (const TrajectoryPose& pose : truth) truth_of_node.emplace(pose.node, &pose.world_from_base);
+  std::vector<PosePair> pairs;
+  for (const TrajectoryPose& pose : estimate) {
+    const auto place = truth_of_node.find(pose.node);
+    if (place != truth_of_node.end()) pairs.push_back({pose.world_from_base, *place->second});
+  }
+  return pairs;
+}
+
+std::vector<double> stamps_of(const Trajectory& trajectory) {
+  std::vector<double> stamps;
+  for (const TrajectoryPose& pose : trajectory) stamps.push_back(pose.stamp_s);
+  return stamps;
+}
+
+std::vector<PosePair> pair_poses(const Trajectory& estimate, const Trajectory& truth) {
+  if (knows_nodes(estimate) && knows_nodes(truth)) return pair_by_node(estimate, truth);
+  std::vector<PosePair> pairs;
+  for (const auto& [i, j] :
+       pair_by_stamp(stamps_of(estimate), stamps_of(truth), pairing_tolerance_s))
+    pairs.push_back({estimate[i].world_from_base, truth[j].world_from_base});
+  return pairs;
+}
+
+double angle_deg(const Eigen::Matrix3d& a, const Eigen::Matrix3d& b) {
+  return Eigen::Quaterniond(a).angularDistance(Eigen::Quaterniond(b)) * 180.0 / M_PI;
+}
+
+double median_of(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  const std::size_t half = values.size() / 2;
+  return values.size() % 2 == 1 ? values[half] : 0.5 * (values[half - 1] + values[half]);
+}
+
+// At least one of each, equally many.
+TrajectoryError summarize(const std::vector<double>& distances_m,
+                          const std::vector<double>& angles_deg) {
+  TrajectoryError error;
+  error.poses = distances_m.size();
+  const double count = static_cast<double>(error.poses);
+  for (const double distance : distances_m) {
+    error.mean_m += distance / count;
+    error.rmse_m += distance * distance / count;
+    error.max_m = std::max(error.max_m, distance);
+  }
+  error.rmse_m = std::sqrt(error.rmse_m);
+  error.median_m = median_of(distances_m);
+  for (const double angle : angles_deg) {
+    error.mean_rotation_deg += angle / count;
+    error.max_rotation_deg = std::max(error.max_rotation_deg, angle);
+  }
+  return error;
+}
+
+// Whether the positions lie so near to a line that they do not tell a turn about it.
+bool is_straight(const Eigen::Matrix3Xd& positions) {
+  constexpr double min_width = 0.05;  // of the length
+  const Eigen::Matrix3Xd centered = positions.colwise() - positions.rowwise().mean();
+  const Eigen::Vector3d spreads =
+      symmetric_eigen(Eigen::Matrix3d(centered * centered.transpose())).values;
+  return spreads[1] <= min_width * min_width * spreads[2];
+}
+
+// Least squares of the positions (Umeyama 1991).
+Pose best_alignment(const std::vector<PosePair>& pairs) {
+  const auto count = static_cast<Eigen::Index>(pairs.size());
+  Eigen::Matrix3Xd from(3, count);
+  Eigen::Matrix3Xd to(3, count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const PosePair& pair = pairs[static_cast<std::size_t>(i)];
+    from.col(i) = pair.estimate.translation();
+    to.col(i) = pair.truth.translation();
+  }
+  Pose alignment = Pose::Identity();
+  if (!is_straight(from) && !is_straight(to)) {
+    alignment.matrix() = align_points(from, to, false);
+    return alignment;
+  }
+  // Positions on a line leave the turn about it open: the rotations tell it.
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
+  for (const PosePair& pair : pairs)
+    turns += pair.truth.linear() * pair.estimate.linear().transpose();
+  alignment.linear() = nearest_rotation(turns);
+  alignment.translation() = to.rowwise().mean() - alignment.linear() * from.rowwise().mean();
+  return alignment;
+}
+
+Error too_few(std::size_t count, std::size_t least) {
+  return Error("too few poses are in both trajectories", {.field = "common poses",
+                                                          .value = std::to_string(count),
+                                                          .bound = ">= " + std::to_string(least)});
+}
+
+}  // namespace
+
+AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
+                                                  const Trajectory& truth) {
+  const std::vector<PosePair> pairs = pair_poses(estimate, truth);
+  if (pairs.size() < 3) throw too_few(pairs.size(), 3);
+  const Pose alignment = best_alignment(pairs);
+  std::vector<double> distances_m;
+  std::vector<double> angles_deg;
+  for (const PosePair& pair : pairs) {
+    const Pose aligned = alignment * pair.estimate;
+    distances_m.push_back((aligned.translation() - pair.truth.translation()).norm());
+    angles_deg.push_back(angle_deg(aligned.linear(), pair.truth.linear()));
+  }
+  AbsoluteTrajectoryError error;
+  static_cast<TrajectoryError&>(error) = summarize(distances_m, angles_deg);
+  error.truth_from_estimate = alignment;
+  return error;
+}
+
+TrajectoryError relative_trajectory_error(const Trajectory& estimate, const Trajectory& truth) {
+  const std::vector<PosePair> pairs = pair_poses(estimate, truth);
+  if (pairs.size() < 2) throw too_few(pairs.size(), 2);
+  std::vector<double> distances_m;
+  std::vector<double> angles_deg;
+  for (std::size_t i = 0; i + 1 < pairs.size(); ++i) {
+    const PosePair& begin = pairs[i];
+    const PosePair& end = pairs[i + 1];
+    const Pose estimated_motion = begin.estimate.inverse() * end.estimate;
+    const Pose true_motion = begin.truth.inverse() * end.truth;
+    const Pose error = true_motion.inverse() * estimated_motion;
+    distances_m.push_back(error.translation().norm());
+    angles_deg.push_back(angle_deg(estimated_motion.linear(), true_motion.linear()));
+  }
+  return summarize(distances_m, angles_deg);
+}
+
+void describe(ResultTable& table, const TrajectoryError& error) {
+  table.add("poses", error.poses, "poses compared");
+  table.add("rmse_m", error.rmse_m, "root mean square error of the positions");
+  table.add("median_m", error.median_m, "median error of the positions");
+  table.add("max_m", error.max_m, "maximum error of the positions");
+  table.add("mean_rotation_deg", error.mean_rotation_deg, "mean error of the rotations");
+  table.add("max_rotation_deg", error.max_rotation_deg, "maximum error of the rotations");
+}
+
+}  // namespace libmap

@@ -1,0 +1,315 @@
+#include "libmap/site/ground_plane.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <optional>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/core/median.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
+#include "libmap/geometry/plane_fit.h"
+#include "libmap/geometry/robust.h"
+
+namespace libmap {
+
+namespace {
+
+using Points = std::vector<Eigen::Vector3d>;
+
+constexpr std::size_t max_drawn = 20000;  // points that hypotheses are drawn from
+constexpr std::size_t first_look = 2000;  // of them, that every hypothesis is counted on
+constexpr std::size_t second_look = 20;   // hypotheses that are counted on all of them
+constexpr int max_rounds = 10;            // planes that are looked for, walls included
+constexpr std::uint64_t points_stream = 0, hypotheses_stream = 1;  // of random numbers
+
+double degrees_between(const Eigen::Vector3d& a, const Eigen::Vector3d& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180.0 / std::numbers::pi;
+}
+
+struct Plane {
+  Eigen::Vector3d normal = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d center = Eigen::Vector3d::Zero();
+
+  double height(const Eigen::Vector3d& point) const { return normal.dot(point - center); }
+};
+
+constexpr std::size_t points_per_chunk = 8192;
+
+bool is_plane(const PlaneSpread& spread) { return spread.is_plane(1e-12); }
+
+Plane plane_of(const PlaneSpread& spread, const Eigen::Vector3d& up) {
+  Plane plane{spread.axes.col(0), spread.center};
+  if (plane.normal.dot(up) < 0.0) plane.normal = -plane.normal;
+  return plane;
+}
+
+std::size_t count_near(const Points& points, std::size_t count, const Plane& plane,
+                       double tolerance) {
+  std::size_t near = 0;
+  for (std::size_t n = 0; n < count; ++n)
+    near += std::abs(plane.height(points[n])) <= tolerance ? 1U : 0U;
+  return near;
+}
+
+// Planes through three points each that do not lie steeper than allowed.
+std::vector<Plane> draw_hypotheses(const Points& points, const GroundPlaneOptions& options,
+                                   const Eigen::Vector3d& up, RandomStream& random) {
+  const auto draw = [&] { return random.below(points.size()); };
+  std::vector<Plane> planes;
+  for (int n = 0; n < options.hypotheses; ++n) {
+    const Eigen::Vector3d& a = points[draw()];
+    const Eigen::Vector3d ab = points[draw()] - a;
+    const Eigen::Vector3d ac = points[draw()] - a;
+    Eigen::Vector3d normal = ab.cross(ac);
+    if (!(normal.norm() > 1e-6 * ab.norm() * ac.norm())) continue;
+    normal.normalize();
+    if (normal.dot(up) < 0.0) normal = -normal;
+    if (degrees_between(normal, up) <= options.max_tilt_deg) planes.push_back({normal, a});
+  }
+  return planes;
+}
+
+// The hypothesis with the most points, fitted to them.
+std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& options,
+                                const Eigen::Vector3d& up, RandomStream& random) {
+  const std::vector<Plane> planes = draw_hypotheses(points, options, up, random);
+  if (planes.empty()) return std::nullopt;
+  const auto counts_on = [&](const std::vector<std::size_t>& which, std::size_t count) {
+    std::vector<std::size_t> counts(which.size());
+    parallel_for(which.size(), 16, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t n = begin; n < end; ++n)
+        counts[n] = count_near(points, count, planes[which[n]], options.tolerance_m);
+    });
+    return counts;
+  };
+  std::vector<std::size_t> order(planes.size());
+  for (std::size_t n = 0; n < order.size(); ++n) order[n] = n;
+  const std::vector<std::size_t> first = counts_on(order, std::min(first_look, points.size()));
+  std::stable_sort(order.begin(), order.end(),
+                   [&](std::size_t a, std::size_t b) { return first[a] > first[b]; });
+  order.resize(std::min(second_look, order.size()));
+  const std::vector<std::size_t> second = counts_on(order, points.size());
+  const auto most = std::max_element(second.begin(), second.end()) - second.begin();
+  Plane plane = planes[order[static_cast<std::size_t>(most)]];
+  for (int round = 0; round < 5; ++round) {
+    const PlaneSpread spread =
+        weighted_spread(points, plane.center, points_per_chunk, [&](const Eigen::Vector3d& point) {
+          return std::abs(plane.height(point)) <= options.tolerance_m ? 1.0 : 0.0;
+        });
+    if (!is_plane(spread)) return std::nullopt;
+    plane = plane_of(spread, up);
+  }
+  return plane;
+}
+
+struct Candidate {
+  Plane plane;
+  Points points;  // that lie on it
+};
+
+std::vector<Candidate> find_candidates(Points points, const GroundPlaneOptions& options,
+                                       const Eigen::Vector3d& up, double& largest_share) {
+  const auto total = static_cast<double>(points.size());
+  RandomStream random(options.seed, hypotheses_stream);
+  std::vector<Candidate> candidates;
+  for (int round = 0; round < max_rounds && points.size() >= 3; ++round) {
+    const std::optional<Plane> plane = best_plane(points, options, up, random);
+    if (!plane) break;
+    Candidate candidate{*plane, {}};
+    Points rest;
+    for (const Eigen::Vector3d& point : points) {
+      const double height = std::abs(plane->height(point));
+      if (height <= options.tolerance_m) candidate.points.push_back(point);
+      // What lies just beside a plane is its own noise.
+      if (height > 2.0 * options.tolerance_m) rest.push_back(point);
+    }
+    points = std::move(rest);
+    // One that turned to the wall or slope that it had cut into.
+    if (degrees_between(plane->normal, up) > options.max_tilt_deg) continue;
+    const double share = static_cast<double>(candidate.points.size()) / total;
+    largest_share = std::max(largest_share, share);
+    const double least = std::max(options.min_share, options.min_share_of_largest * largest_share);
+    if (candidate.points.size() < 3 || share < least) break;
+    candidates.push_back(std::move(candidate));
+  }
+  return candidates;
+}
+
+double share_above(const Plane& plane, const Points& points) {
+  std::size_t above = 0;
+  for (const Eigen::Vector3d& point : points) above += plane.height(point) > 0.0 ? 1U : 0U;
+  return static_cast<double>(above) / static_cast<double>(points.size());
+}
+
+// Whether `other` is the ground below `ground`, which holds more points.
+bool lies_under(const Candidate& other, const Candidate& ground, const Eigen::Vector3d& up,
+                double tolerance) {
+  const double above_other = share_above(other.plane, ground.points);
+  const double above_ground = share_above(ground.plane, other.points);
+  if (std::abs(above_other - above_ground) > 0.25) return above_other > above_ground;
+  // Both rise from, or fall off, a line between them.
+  const double tilt_of_other = degrees_between(other.plane.normal, up);
+  const double tilt_of_ground = degrees_between(ground.plane.normal, up);
+  if (std::abs(tilt_of_other - tilt_of_ground) > 5.0) return tilt_of_other < tilt_of_ground;
+  return up.dot(ground.plane.center - other.plane.center) > tolerance;
+}
+
+// Iterated least squares with Tukey's biweight (Beaton and Tukey 1974); its scale is that of the
+// inliers' median deviation.
+Plane fit_robustly(const Points& points, Plane plane, const Eigen::Vector3d& up, double tolerance) {
+  Points near;
+  for (const Eigen::Vector3d& point : points)
+    if (std::abs(plane.height(point)) <= 3.0 * tolerance) near.push_back(point);
+  const double exact = 1e-12 * (1.0 + bounds_of(near).max.cwiseAbs().maxCoeff() +
+                                bounds_of(near).min.cwiseAbs().maxCoeff());
+  std::vector<double> deviations;
+  for (int round = 0; round < 100; ++round) {
+    deviations.clear();
+    for (const Eigen::Vector3d& point : near) {
+      const double height = std::abs(plane.height(point));
+      if (height <= tolerance) deviations.push_back(height);
+    }
+    if (deviations.size() < 3) return plane;
+    const double limit = std::clamp(tukey_width_of(median(std::move(deviations))),
+                                    std::min(100.0 * exact, tolerance), tolerance);
+    const PlaneSpread spread =
+        weighted_spread(near, plane.center, points_per_chunk, [&](const Eigen::Vector3d& point) {
+          const double ratio = plane.height(point) / limit;
+          return tukey_weight(ratio);
+        });
+    if (!is_plane(spread)) return plane;
+    const Plane fitted = plane_of(spread, up);
+    const double moved = std::abs(fitted.height(plane.center)) +
+                         (fitted.normal - plane.normal).norm() * std::sqrt(spread.variances[2]);
+    plane = fitted;
+    if (moved <= exact) break;
+  }
+  return plane;
+}
+
+void require_ranges(const GroundPlaneOptions& options) {
+  check_parameters(options);
+  if (!options.up.allFinite() || !(options.up.norm() > 0.0))
+    throw Error("not a direction", {.field = "up", .bound = "finite, of some length"});
+}
+
+// Evenly drawn points in random order.
+Points drawn_points(const Points& points, std::uint64_t seed) {
+  RandomStream random(seed, points_stream);
+  Points drawn;
+  if (points.size() <= max_drawn) {
+    drawn = points;
+    for (std::size_t n = drawn.size(); n > 1; --n) std::swap(drawn[n - 1], drawn[random.below(n)]);
+    return drawn;
+  }
+  for (std::size_t n = 0; n < max_drawn; ++n) drawn.push_back(points[random.below(points.size())]);
+  return drawn;
+}
+
+void require_plane_spread(const Points& points) {
+  if (points.size() < 3)
+    throw Error("too few points for a ground plane",
+                {.field = "points", .value = std::to_string(points.size()), .bound = ">= 3"});
+  const PlaneSpread spread = weighted_spread(points, points.front(), points_per_chunk,
+                                             [](const Eigen::Vector3d&) { return 1.0; });
+  if (!is_plane(spread)) throw Error("all points lie on one line: there is no ground plane");
+}
+
+std::string percent(double share) { return to_fixed_text(100.0 * share, 1) + " %"; }
+
+}  // namespace
+
+void bind(ParameterTable& table, GroundPlaneOptions& options) {
+  constexpr Range share{0.0, 1.0, true, false};
+  table.add("plane_tolerance_m", options.tolerance_m, positive,
+            "points this near to a plane lie on it, m");
+  table.add("max_tilt_deg", options.max_tilt_deg, {0.0, 90.0, true, true},
+            "of the ground from up, degrees");
+  table.add("min_ground_share", options.min_share, share,
+            "of all points (of a mesh: of its area) that the ground must contain");
+  table.add("min_share_of_largest", options.min_share_of_largest, share,
+            "of the largest plane's points that a lower plane must contain to be the ground");
+  table.add("plane_hypotheses", options.hypotheses, {1.0, 1e6},
+            "planes through three points that are tried for each plane");
+  table.add("seed", options.seed, not_negative, "of what is drawn at random");
+}
+
+GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
+                              const GroundPlaneOptions& options) {
+  require_ranges(options);
+  const Eigen::Vector3d up = options.up.normalized();
+  require_plane_spread(points);
+  double largest_share = 0.0;
+  const std::vector<Candidate> candidates =
+      find_candidates(drawn_points(points, options.seed), options, up, largest_share);
+  if (candidates.empty())
+    throw Error("no plane within " + to_text(options.max_tilt_deg) + " degrees of up, (" +
+                    to_text(up.x()) + ", " + to_text(up.y()) + ", " + to_text(up.z()) +
+                    "), is large enough to be the ground",
+                {.field = "share of the points on the largest",
+                 .value = percent(largest_share),
+                 .bound = ">= " + percent(options.min_share)});
+  const Candidate* ground = &candidates.front();
+  for (const Candidate& other : candidates)
+    if (&other != ground && lies_under(other, *ground, up, options.tolerance_m)) ground = &other;
+  const Plane plane = fit_robustly(points, ground->plane, up, options.tolerance_m);
+  GroundPlane result;
+  result.normal = plane.normal;
+  double squares = 0.0;
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const Eigen::Vector3d& point : points) {
+    const double height = plane.height(point);
+    if (std::abs(height) > options.tolerance_m) continue;
+    ++result.inliers;
+    squares += height * height;
+    sum += point - plane.center;
+  }
+  const auto count = static_cast<double>(result.inliers);
+  result.center = plane.center;
+  if (result.inliers > 0) {
+    result.rmse_m = std::sqrt(squares / count);
+    const Eigen::Vector3d mean = sum / count;
+    result.center += mean - plane.normal.dot(mean) * plane.normal;
+  }
+  result.offset_m = result.normal.dot(result.center);
+  result.share = count / static_cast<double>(points.size());
+  result.tilt_deg = degrees_between(result.normal, up);
+  return result;
+}
+
+Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals) {
+  Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
+  // From wide to narrow: walls and rocks fall away, the ground stays.
+  for (const double within_deg : {180.0, 60.0, 45.0, 30.0, 30.0}) {
+    const double least = std::cos(within_deg * std::numbers::pi / 180.0);
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    std::size_t count = 0;
+    for (const Eigen::Vector3f& each : normals) {
+      const Eigen::Vector3d normal = each.cast<double>();
+      const double length = normal.norm();
+      if (!(length > 0.0) || !std::isfinite(length)) continue;
+      if (within_deg < 180.0 && normal.dot(direction) < least * length) continue;
+      sum += normal / length;
+      ++count;
+    }
+    if (count == 0 || sum.norm() < 0.2 * static_cast<double>(count)) return z;
+    direction = sum.normalized();
+  }
+  return degrees_between(direction, z) <= 20.0 ? z : direction;
+}
+
+Pose level_from_map(const GroundPlane& plane) {
+  const Eigen::Vector3d pivot =
+      plane.center - (plane.normal.dot(plane.center) - plane.offset_m) * plane.normal;
+  Pose level = Pose::Identity();
+  level.linear() = shortest_rotation(plane.normal, Eigen::Vector3d::UnitZ());
+  level.translation() = Eigen::Vector3d(pivot.x(), pivot.y(), 0.0) - level.linear() * pivot;
+  return level;
+}
+
+}  // namespace libmap

@@ -1,0 +1,76 @@
+#include "libmap/bag/transform_tree.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/support/test_support.h"
+
+namespace transform_tree_test {
+
+using graspmap_test::error_of;
+using libmap::make_pose_from_rpy;
+using libmap::Pose;
+using libmap::TransformTree;
+using testing::HasSubstr;
+
+Pose random_pose() {
+  using graspmap_test::uniform;
+  return make_pose_from_rpy({uniform(-1, 1), uniform(-1, 1), uniform(-1, 1)},
+                            {uniform(-180, 180), uniform(-80, 80), uniform(-180, 180)});
+}
+
+TEST(TransformTree, UpToACommonFrameAndDownAgain) {
+  const Pose mast = random_pose();
+  const Pose left = random_pose();
+  const Pose right = random_pose();
+  const Pose lens = random_pose();
+  TransformTree tree;
+  tree.add("right", "lens", lens);
+  tree.add("/mast", "/left", left);  // names of old programs
+  tree.add("mast", "right", right);
+  tree.add("base", "mast", mast);
+  EXPECT_TRUE(tree.target_from_source("base", "lens").isApprox(mast * right * lens, 1e-12));
+  EXPECT_TRUE(
+      tree.target_from_source("left", "lens").isApprox(left.inverse() * right * lens, 1e-12));
+  EXPECT_TRUE(
+      tree.target_from_source("lens", "base").isApprox((mast * right * lens).inverse(), 1e-12));
+  EXPECT_TRUE(tree.target_from_source("lens", "lens").isApprox(Pose::Identity(), 1e-12));
+  EXPECT_EQ(tree.root_of("lens"), "base");
+  EXPECT_EQ(tree.frames(), (std::vector<std::string>{"base", "left", "lens", "mast", "right"}));
+}
+
+TEST(TransformTree, WhatLeadsNowhereIsSaid) {
+  TransformTree tree;
+  tree.add("base_link", "camera", Pose::Identity());
+  tree.add("map", "odom", Pose::Identity());
+  EXPECT_THAT(error_of([&] { tree.target_from_source("base_lnk", "camera"); }).what(),
+              HasSubstr("did you mean 'base_link'"));
+  EXPECT_THAT(error_of([&] { tree.target_from_source("odom", "camera"); }).what(),
+              HasSubstr("no transforms lead from it to odom"));
+}
+
+TEST(TransformTree, CirclesEnd) {
+  TransformTree tree;
+  tree.add("a", "b", Pose::Identity());
+  tree.add("b", "c", Pose::Identity());
+  tree.add("c", "a", Pose::Identity());
+  tree.add("c", "d", Pose::Identity());
+  EXPECT_THAT(error_of([&] { tree.target_from_source("a", "d"); }).what(), HasSubstr("lead back"));
+  EXPECT_THAT(error_of([&] { tree.root_of("b"); }).what(), HasSubstr("lead back"));
+  EXPECT_THROW(tree.add("e", "e", Pose::Identity()), libmap::Error);
+}
+
+TEST(TransformTree, FramesStandStill) {
+  TransformTree tree;
+  Pose pose = Pose::Identity();
+  tree.add("a", "b", pose);
+  tree.add("a", "b", pose);  // said twice
+  pose.translation().x() = 0.001;
+  EXPECT_THAT(error_of([&] { tree.add("a", "b", pose); }).what(), HasSubstr("is not static"));
+  EXPECT_THROW(tree.add("c", "b", Pose::Identity()), libmap::Error);
+  pose.translation().x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_THROW(tree.add("a", "d", pose), libmap::Error);
+  EXPECT_THROW(tree.add("", "d", Pose::Identity()), libmap::Error);
+}
+
+}  // namespace transform_tree_test

@@ -1,0 +1,106 @@
+#include "libmap/features/relative_pose.h"
+
+#include <gtest/gtest.h>
+
+#include "tests/libmap/features/synthetic_features.h"
+#include "tests/support/test_support.h"
+
+namespace relative_pose_test {
+
+using graspmap_test::random_points;
+using graspmap_test::random_step;
+using graspmap_test::same_numbers;
+using graspmap_test::see_points;
+using graspmap_test::uniform;
+using libmap::FeatureMatch;
+using libmap::FrameFeatures;
+using libmap::Pose;
+using libmap::RelativePose;
+using libmap::RelativePoseOutcome;
+using libmap::Vector6d;
+
+Pose some_motion() { return libmap::moved(Pose::Identity(), random_step(0.3, 0.2)); }
+
+TEST(MatchFeatures, FindsEachOnesBestAndLeavesDoubtfulOnesOut) {
+  const auto points = random_points(50);
+  const FrameFeatures a = see_points(1, Pose::Identity(), points);
+  FrameFeatures b = see_points(2, some_motion(), points);
+  const auto vectors = libmap::descriptor_vectors(a);
+  EXPECT_EQ(libmap::match_features(vectors, libmap::descriptor_vectors(b), 0.8), same_numbers(50));
+  // Twice the same descriptor: neither is clearly the best.
+  std::copy_n(b.descriptors.begin(), 128, b.descriptors.begin() + 128);
+  const auto matches = libmap::match_features(vectors, libmap::descriptor_vectors(b), 0.8);
+  EXPECT_EQ(matches.size(), 48U);
+  EXPECT_EQ(matches.front(), (FeatureMatch{2, 2}));
+  EXPECT_TRUE(libmap::match_features(vectors, Eigen::MatrixXf(128, 0), 0.8).empty());
+}
+
+TEST(RelativePose, ExactMatchesGiveTheExactMotionDespiteOutliers) {
+  const auto points = random_points(120);
+  const Pose motion = some_motion();
+  const FrameFeatures a = see_points(1, Pose::Identity(), points);
+  const FrameFeatures b = see_points(2, motion, points);
+  std::vector<FeatureMatch> matches = same_numbers(120);
+  for (std::size_t n = 0; n < 48; ++n) matches[n].b = static_cast<int>((n + 17) % 120);
+  const RelativePose pose = libmap::estimate_relative_pose(a, b, matches, {}, 3);
+  ASSERT_EQ(pose.outcome, RelativePoseOutcome::found);
+  EXPECT_LT(libmap::step_between(motion, pose.a_from_b).norm(), 1e-5);
+  EXPECT_EQ(pose.inliers.size(), 72U);
+}
+
+// With the stated noise the squared errors are chi-square of six.
+TEST(RelativePose, CovarianceIsThatOfTheErrors) {
+  double sum = 0.0;
+  constexpr int trials = 200;
+  for (int n = 0; n < trials; ++n) {
+    const auto points = random_points(80);
+    const Pose motion = some_motion();
+    const FrameFeatures a = see_points(1, Pose::Identity(), points, {.apply = true});
+    const FrameFeatures b = see_points(2, motion, points, {.apply = true});
+    const RelativePose pose = libmap::estimate_relative_pose(a, b, same_numbers(80), {}, 1);
+    ASSERT_EQ(pose.outcome, RelativePoseOutcome::found);
+    const Vector6d error = libmap::step_between(motion, pose.a_from_b);
+    sum += error.dot(pose.information * error);
+  }
+  EXPECT_GT(sum / trials, 4.0);
+  EXPECT_LT(sum / trials, 8.0);
+}
+
+TEST(RelativePose, JacobianIsTheDerivative) {
+  const auto points = random_points(5);
+  const Pose motion = some_motion();
+  const FrameFeatures a = see_points(1, Pose::Identity(), points, {.apply = true});
+  const FrameFeatures b = see_points(2, motion, points, {.apply = true});
+  for (const FeatureMatch& match : same_numbers(5)) {
+    const auto at = libmap::match_residual(a, b, match, motion, true);
+    for (int n = 0; n < 6; ++n) {
+      const Vector6d step = 1e-6 * Vector6d::Unit(n);
+      const Eigen::Vector3d difference =
+          libmap::match_residual(a, b, match, libmap::moved(motion, step)).residual -
+          libmap::match_residual(a, b, match, libmap::moved(motion, -step)).residual;
+      EXPECT_LT((difference / 2e-6 - at.jacobian.col(n)).norm(), 1e-4 * at.jacobian.col(n).norm());
+    }
+  }
+}
+
+TEST(RelativePose, RefusesTooLittle) {
+  auto points = random_points(60);
+  const Pose motion = some_motion();
+  const FrameFeatures a = see_points(1, Pose::Identity(), points);
+  const FrameFeatures b = see_points(2, motion, points);
+  EXPECT_EQ(libmap::estimate_relative_pose(a, b, same_numbers(20), {}, 1).outcome,
+            RelativePoseOutcome::too_few_matches);
+  std::vector<FeatureMatch> shuffled = same_numbers(60);
+  for (std::size_t n = 0; n < 60; ++n) shuffled[n].b = static_cast<int>((7 * n + 11) % 60);
+  EXPECT_EQ(libmap::estimate_relative_pose(a, b, shuffled, {}, 1).outcome,
+            RelativePoseOutcome::too_few_inliers);
+  // All on one line of the picture.
+  for (Eigen::Vector3d& point : points) point = {1.5, uniform(-0.8, 0.8), 0.02};
+  const FrameFeatures on_line = see_points(1, Pose::Identity(), points);
+  const FrameFeatures from_elsewhere = see_points(2, motion, points);
+  EXPECT_NE(
+      libmap::estimate_relative_pose(on_line, from_elsewhere, same_numbers(60), {}, 1).outcome,
+      RelativePoseOutcome::found);
+}
+
+}  // namespace relative_pose_test

@@ -1,0 +1,38 @@
+// Cloud files from bytes that a test gives.
+#pragma once
+
+#include <gmock/gmock.h>
+
+#include <cstring>
+#include <filesystem>
+#include <string>
+
+#include "libmap/core/error.h"
+#include "libmap/io/cloud_io.h"
+#include "tests/support/test_support.h"
+
+namespace graspmap_test {
+
+inline libmap::CloudReadResult read_as(const std::string& extension, const std::string& bytes) {
+  const std::filesystem::path path = scratch_folder() / ("given" + extension);
+  write_text(path, bytes);
+  return libmap::read_cloud(path);
+}
+
+// The message of the bad input that the reader finds in them.
+inline std::string error_as(const std::string& extension, const std::string& bytes) {
+  const libmap::Error error = error_of([&] { read_as(extension, bytes); });
+  EXPECT_EQ(error.kind(), libmap::ErrorKind::bad_input);
+  EXPECT_THAT(error.context().file, testing::HasSubstr("given" + extension));
+  return error.what();
+}
+
+// The bytes of a number, little-endian as the machine's.
+template <typename T>
+std::string raw(T value) {
+  std::string bytes(sizeof(T), '\0');
+  std::memcpy(bytes.data(), &value, sizeof(T));
+  return bytes;
+}
+
+}  // namespace graspmap_test

@@ -1,0 +1,98 @@
+// YAML there and back, and every way in which a file can be wrong.
+#include "libmap/scenes/primitive_scene.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "libmap/scenes/scene_geometry.h"
+#include "scene_test_support.h"
+#include "tests/libmap/scenes/scene_query.h"
+#include "tests/support/test_support.h"
+#include "tests/support/thesis_scene.h"
+
+namespace libmap {
+namespace primitive_scene_io_test {
+
+using graspmap_test::error_of;
+using graspmap_test::from_above;
+using graspmap_test::shipped_scene;
+using graspmap_test::thesis_primitive_scene;
+using testing::AllOf;
+using testing::HasSubstr;
+
+std::string message_of(const std::string& text) {
+  return error_of([&] { parse_scene(text, "scene.yaml"); }).what();
+}
+
+TEST(SceneYaml, the_primitive_shapes_file_is_the_thesis_scene) {
+  EXPECT_EQ(shipped_scene("primitive_shapes.yaml"), thesis_primitive_scene());
+}
+
+TEST(SceneYaml, the_slopes_file_is_a_hollow_with_bumps) {
+  const PrimitiveScene scene = shipped_scene("slopes_and_bumps.yaml");
+  const SceneGeometry geometry(scene);
+  EXPECT_LT(from_above(geometry, 0.25, -0.2)->height, -0.5);
+  EXPECT_GT(from_above(geometry, 1.4, 1.4)->height, 0.1);
+  EXPECT_GT(from_above(geometry, -1.4, 1.4)->height, -0.05);
+  EXPECT_GT(from_above(geometry, 0.4, 0.75)->curvature_min, 1.0);
+}
+
+TEST(SceneYaml, reads_flow_and_block_style_and_defaults) {
+  const PrimitiveScene scene = parse_scene(
+      "shapes:\n"
+      "  - shape: sphere\n"
+      "    radius_m: 0.5\n"
+      "  - {shape: plane, size_x_m: 1, size_y_m: 2e0, yaw_deg: 45}\n"
+      "  - {height_m: -0.1, shape: bump, radius_m: 0.2, profile: gaussian}\n",
+      "scene.yaml");
+  ASSERT_EQ(scene.shapes.size(), 3U);
+  EXPECT_EQ(scene.shapes[0], (SceneShape{Sphere{0.5}, {}, {}}));
+  EXPECT_EQ(scene.shapes[1], (SceneShape{Plane{1.0, 2.0}, {.yaw_deg = 45.0}, {}}));
+  EXPECT_EQ(scene.shapes[2], (SceneShape{Bump{-0.1, 0.2, BumpProfile::gaussian}, {}, {}}));
+}
+
+TEST(SceneYaml, unknown_names_are_errors_that_name_the_nearest_known) {
+  EXPECT_THAT(message_of("shapes: [{shape: spere, radius_m: 1}]"),
+              AllOf(HasSubstr("scene.yaml"), HasSubstr("shapes[0].shape"), HasSubstr("is spere"),
+                    HasSubstr("did you mean 'sphere'?"), HasSubstr("one of sphere capsule")));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius: 1}]"),
+              AllOf(HasSubstr("unknown key of a sphere"), HasSubstr("did you mean 'radius_m'?")));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: 1, height_m: 1}]"),
+              HasSubstr("shapes[0].height_m"));
+  EXPECT_THAT(message_of("shape: []"), HasSubstr("did you mean 'shapes'?"));
+  EXPECT_THAT(message_of("shapes: [{shape: plane, size_x_m: 1, size_y_m: 1},"
+                         "{shape: bump, radius_m: 1, height_m: 1, profile: cosin}]"),
+              AllOf(HasSubstr("shapes[1].profile"), HasSubstr("did you mean 'cosine'?")));
+}
+
+TEST(SceneYaml, wrong_values_are_errors_that_name_key_value_and_bound) {
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: -0.5}]"),
+              AllOf(HasSubstr("radius_m"), HasSubstr("is -0.5"), HasSubstr("must be > 0")));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: .nan}]"), HasSubstr("radius_m"));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: 1, x_m: .inf}]"), HasSubstr("x_m"));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: big}]"), HasSubstr("not a number"));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: [1]}]"),
+              HasSubstr("not a single value"));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: }]"), HasSubstr("radius_m"));
+  EXPECT_THAT(message_of("shapes: [{shape: sphere, radius_m: 1, radius_m: 2}]"),
+              HasSubstr("is a duplicate"));
+  EXPECT_THAT(message_of("shapes: [{shape: cone, radius_m: 1}]"),
+              AllOf(HasSubstr("shapes[0].height_m"), HasSubstr("a cone needs it")));
+  EXPECT_THAT(message_of("shapes: [{radius_m: 1}]"), HasSubstr("shape"));
+  EXPECT_THAT(message_of("shapes: [{shape: capsule, radius_m: 1, length_m: 1}]"),
+              HasSubstr("shorter than wide"));
+}
+
+TEST(SceneYaml, documents_of_another_form_are_errors) {
+  for (const std::string text :
+       {"", "shapes", "[]", "shapes: []", "shapes:", "shapes: 3", "shapes: {a: 1}", "shapes: [3]",
+        "shapes: [[1]]", "shapes: [~]", "{}", "shapes: [", "shapes: &a [*a]", "? [1]\n: 2",
+        "shapes: [{? [1] : 2}]", "shapes: []\nshapes: []", "\t- a", "\xff\xfe", "*x"}) {
+    EXPECT_THAT(message_of(text), HasSubstr("scene.yaml")) << text;
+  }
+  EXPECT_THAT(message_of(std::string(100'000, '[')), HasSubstr("scene.yaml"));
+  EXPECT_THAT(message_of("shapes:\n  - {shape: sphere\n"), HasSubstr("line"));
+}
+
+}  // namespace primitive_scene_io_test
+}  // namespace libmap
