@@ -1,7 +1,7 @@
 // graspmap score: graspability map of a terrain, tile by tile.
 #include "libgtd/detect.h"
-#include "libgtd/gripper/gripper_mask.h"
 #include "libgtd/gripper/gripper_io.h"
+#include "libgtd/gripper/gripper_mask.h"
 #include "libgtd/score/tile_store_io.h"
 #include "libgtd/tile_detection.h"
 #include "libmap/cloud/cloud_io.h"
