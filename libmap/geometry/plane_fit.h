@@ -41,7 +41,7 @@ struct PlaneSpread {
   }
 };
 
-// All zero without weight.
+// Without weight the center is the origin and the variances are zero.
 PlaneSpread spread_of(const PlaneMoments& moments, const Eigen::Vector3d& origin);
 
 // Points count by weight(point) > 0. Sums run in chunks, so that the result does not depend on the
