@@ -76,8 +76,8 @@ std::string sources_html(const ReportContent& content);
 // Milliseconds of each step and case, with sums per command and in total.
 std::string timings_html(const TimingTable& table);
 
-// Legend, picture, canvas, looked-up points and data. Canvas and data only if `with_view`. `still` is
-// the picture that replaces the view, as <img>, or empty.
+// Legend, picture, canvas, looked-up points and data. Canvas and data only if `with_view`. `still`
+// is the picture that replaces the view, as <img>, or empty.
 std::string map_html(const ReportMap& map, const std::string& still, bool with_view);
 
 // Colors of the classes and flags, for the page's script.
