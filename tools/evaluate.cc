@@ -38,21 +38,20 @@ void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
 }
 
 libmap::Chart chart_of(const TableEvaluation& evaluation, const std::string& title) {
-  std::vector<libmap::RocCurve> curves;
+  std::vector<libmap::ChartCurve> curves;
   for (const ColumnEvaluation& column : evaluation.columns) {
     if (!column.result.area) continue;
-    libmap::RocCurve curve;
-    curve.name = column.name;
-    curve.area = column.result.area->trapezoid;
+    libmap::ChartCurve& curve = curves.emplace_back();
+    curve.name = column.name + ", AUC " + libmap::to_fixed_text(column.result.area->trapezoid, 3) +
+                 " (trapezoid)";
     for (const libgtd::RocPoint& point : column.result.at_scores) {
-      curve.false_positive_rates.push_back(*point.counts.false_positive_rate().value());
-      curve.true_positive_rates.push_back(*point.counts.true_positive_rate().value());
+      curve.x.push_back(*point.counts.false_positive_rate().value());
+      curve.y.push_back(*point.counts.true_positive_rate().value());
     }
-    curve.false_positive_rates.push_back(0.0);
-    curve.true_positive_rates.push_back(0.0);
-    curves.push_back(std::move(curve));
+    curve.x.push_back(0.0);
+    curve.y.push_back(0.0);
   }
-  return libmap::roc_chart(curves, title);
+  return libmap::roc_chart(std::move(curves), title);
 }
 
 std::string rounded_text(double value) {

@@ -16,6 +16,9 @@ namespace fs = std::filesystem;
 
 namespace {
 
+// Of a page that is too large otherwise.
+constexpr std::size_t short_table_rows = 100;
+
 std::string gaps_html(const std::vector<ReportGap>& gaps) {
   std::string html;
   for (const ReportGap& gap : gaps)
@@ -209,20 +212,35 @@ std::string count_text(const ReportContent& content, const PageAssets& assets) {
   return text + ".";
 }
 
-void each_picture(std::vector<ReportItem>& items, std::vector<ReportPicture*>& found) {
-  for (ReportItem& item : items) {
+template <typename Visit>
+void each_item(std::vector<ReportItem>& items, std::vector<ReportSection>& sections,
+               const Visit& visit) {
+  for (ReportItem& item : items) visit(item);
+  for (ReportSection& section : sections) each_item(section.items, section.sections, visit);
+}
+
+std::vector<ReportPicture*> pictures_of(ReportContent& content) {
+  std::vector<ReportPicture*> found;
+  each_item(content.items, content.sections, [&](ReportItem& item) {
     if (auto* pictures = std::get_if<ReportPictures>(&item.body))
       for (ReportPicture& picture : *pictures) found.push_back(&picture);
     auto* map = std::get_if<ReportMap>(&item.body);
     if (map != nullptr && map->still) found.push_back(&*map->still);
-  }
+  });
+  return found;
 }
 
-void each_picture(std::vector<ReportSection>& sections, std::vector<ReportPicture*>& found) {
-  for (ReportSection& section : sections) {
-    each_picture(section.items, found);
-    each_picture(section.sections, found);
-  }
+// Keeps the first rows of each table. Returns whether a table was longer.
+bool cut_tables(ReportContent& content, std::size_t max_rows) {
+  bool any = false;
+  each_item(content.items, content.sections, [&](ReportItem& item) {
+    auto* table = std::get_if<ReportTable>(&item.body);
+    if (table == nullptr || table->table.rows.size() <= max_rows) return;
+    any = true;
+    if (!table->lines) table->lines = table->table.rows.size() + 1;
+    table->table.rows.resize(max_rows);
+  });
+  return any;
 }
 
 }  // namespace
@@ -256,26 +274,27 @@ std::string report_page(const ReportContent& content, const PageAssets& assets) 
 }
 
 FittedPage fit_report_page(ReportContent content, const PageAssets& assets, std::size_t max_bytes) {
-  std::vector<ReportPicture*> pictures;
-  each_picture(content.items, pictures);
-  each_picture(content.sections, pictures);
+  const std::vector<ReportPicture*> pictures = pictures_of(content);
   std::vector<ReportPicture> originals;
   originals.reserve(pictures.size());
   for (const ReportPicture* picture : pictures) originals.push_back(*picture);
   FittedPage page;
-  for (page.picture_level = 0; page.picture_level <= max_picture_level; ++page.picture_level) {
-    parallel_each(pictures.size(), [&](std::size_t n) {
-      *pictures[n] = fit_picture(originals[n], page.picture_level);
-    });
-    page.html = report_page(content, assets);
-    if (page.html.size() <= max_bytes) {
-      page.changed_pictures = static_cast<std::size_t>(std::count_if(
-          pictures.begin(), pictures.end(), [](const auto* one) { return !one->change.empty(); }));
-      return page;
+  do {
+    for (page.picture_level = 0; page.picture_level <= max_picture_level; ++page.picture_level) {
+      parallel_each(pictures.size(), [&](std::size_t n) {
+        *pictures[n] = fit_picture(originals[n], page.picture_level);
+      });
+      page.html = report_page(content, assets);
+      if (page.html.size() <= max_bytes) {
+        page.changed_pictures = static_cast<std::size_t>(
+            std::count_if(pictures.begin(), pictures.end(),
+                          [](const auto* one) { return !one->change.empty(); }));
+        return page;
+      }
+      if (pictures.empty()) break;  // none that could be smaller
     }
-    if (pictures.empty()) break;  // none that could be smaller
-  }
-  throw Error("the report is too large, even with small pictures",
+  } while (cut_tables(content, short_table_rows));
+  throw Error("the report is too large, even with small pictures and short tables",
               {.field = "size",
                .value = fmt::format("{:.1f} MB", static_cast<double>(page.html.size()) / 1e6),
                .bound = fmt::format("<= {:.1f} MB", static_cast<double>(max_bytes) / 1e6)});

@@ -21,8 +21,9 @@ struct PageAssets {
 // that stands in the run's files can run.
 std::string report_page(const ReportContent& content, const PageAssets& assets);
 
-// The page with its pictures changed as little as keeps it below `max_bytes` (fit_picture). Throws
-// Error naming the bound: not even small pictures do.
+// The page with its pictures changed as little as keeps it below `max_bytes` (fit_picture). If not
+// even small pictures do, tables are cut to 100 rows. Throws Error naming the bound if it is still
+// too large.
 struct FittedPage {
   std::string html;
   int picture_level = 0;

@@ -10,6 +10,7 @@
 
 namespace libmap {
 
+// What an item shows.
 enum class ItemKind { picture, table, map, scene, parameters, timings, listing };
 
 struct PlannedItem {
@@ -37,6 +38,7 @@ struct ReportPlan {
   std::vector<PlannedItem> items{};  // before the first section
   std::vector<PlannedSection> sections{};
 
+  // Number of items of that kind, in all sections.
   std::size_t count(ItemKind kind) const;
 };
 

@@ -31,15 +31,18 @@ Eigen::Vector2d text_size(const std::string& text, const TextStyle& style);
 // `width_px` wide; empty if not even the dots are.
 std::string shortened_text(const std::string& text, const TextStyle& style, double width_px);
 
+// Result of a canvas: an image or an SVG document.
 enum class CanvasFormat { pixels, svg };
 
-// White at first. Each call covers what earlier calls have drawn.
+// Each call covers what earlier calls have drawn.
 class Canvas {
  public:
+  // A white page.
   Canvas(int width, int height, CanvasFormat format = CanvasFormat::pixels);
   Canvas(const Canvas&) = delete;
   Canvas& operator=(const Canvas&) = delete;
 
+  // Filled shapes, and lines of the given width.
   void rectangle(const PixelRect& rect, const Color& color);
   void disc(const Eigen::Vector2d& center, double radius_px, const Color& color);
   void polyline(const std::vector<Eigen::Vector2d>& points, double width_px, const Color& color,

@@ -339,28 +339,20 @@ std::string chart_svg(const Chart& chart, const ChartSize& size) {
   return canvas.svg(chart.title, description(chart));
 }
 
-Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title) {
+Chart roc_chart(std::vector<ChartCurve> curves, const std::string& title) {
   Chart chart;
   chart.title = title;
   chart.x_axis = {"false positive rate", std::pair(0.0, 1.0)};
   chart.y_axis = {"true positive rate", std::pair(0.0, 1.0)};
   chart.legend = LegendCorner::bottom_right;
-  ChartCurve diagonal;
-  diagonal.name = "chance";
-  diagonal.x = diagonal.y = {0.0, 1.0};
-  diagonal.color = diagonal_color;
-  diagonal.width_px = 1.5;
-  diagonal.dashed = true;
-  chart.curves.push_back(std::move(diagonal));
-  for (const RocCurve& curve : curves) {
-    ChartCurve drawn;
-    drawn.name = curve.name;
-    if (curve.area) drawn.name += ", AUC " + to_fixed_text(*curve.area, 3) + " (trapezoid)";
-    drawn.x = curve.false_positive_rates;
-    drawn.y = curve.true_positive_rates;
-    drawn.markers = curve.false_positive_rates.size() <= 50;
-    chart.curves.push_back(std::move(drawn));
-  }
+  for (ChartCurve& curve : curves) curve.markers = curve.x.size() <= 50;
+  chart.curves = std::move(curves);
+  chart.curves.insert(chart.curves.begin(), {.name = "chance",
+                                             .x = {0.0, 1.0},
+                                             .y = {0.0, 1.0},
+                                             .color = diagonal_color,
+                                             .width_px = 1.5,
+                                             .dashed = true});
   return chart;
 }
 

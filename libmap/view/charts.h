@@ -11,11 +11,11 @@
 namespace libmap {
 
 struct ChartCurve {
-  std::string name;  // in the legend; empty: not in it
-  std::vector<double> x;
-  std::vector<double> y;
-  std::optional<Color> color;  // default: the next of a palette that color-blind people can tell
-                               // apart (Okabe and Ito 2008)
+  std::string name{};  // in the legend; empty: not in it
+  std::vector<double> x{};
+  std::vector<double> y{};
+  std::optional<Color> color{};  // default: the next of a palette that color-blind people can tell
+                                 // apart (Okabe and Ito 2008)
   double width_px = 2.5;
   bool dashed = false;
   bool markers = false;  // a dot at each point
@@ -67,16 +67,9 @@ ColorImage draw_chart(const Chart& chart, const ChartSize& size = {});
 // <desc> contain the names.
 std::string chart_svg(const Chart& chart, const ChartSize& size = {});
 
-// A receiver operating characteristic: false positive rates on x, true positive rates on y.
-struct RocCurve {
-  std::string name;
-  std::vector<double> false_positive_rates;
-  std::vector<double> true_positive_rates;
-  std::optional<double> area;  // of the trapezoid, for the legend
-};
-
-// All curves in one chart, 0 to 1 on both axes, with the diagonal of a score that knows nothing.
-Chart roc_chart(const std::vector<RocCurve>& curves, const std::string& title);
+// Receiver operating characteristics, false positive rates on x, in one chart: 0 to 1 on both axes,
+// with the diagonal of a score without information. Curves of at most 50 points have markers.
+Chart roc_chart(std::vector<ChartCurve> curves, const std::string& title);
 // The size at which a ROC chart is square.
 inline constexpr ChartSize roc_chart_size{900, 900};
 

@@ -44,4 +44,4 @@ $(OUT)/findings.txt: $(here)study/findings.txt
 	@mkdir -p $(@D)
 	@cp $< $@
 $(OUT)/report.html: $(OUT)/findings.txt $(results)
-	@exec $(GRASPMAP) report $(OUT) --title 'The study of the thesis' --max-size-mb 40 -o $@
+	@exec $(GRASPMAP) report $(OUT) --title 'The study of the thesis' --max-size-mb 60 -o $@

@@ -140,6 +140,34 @@ TEST(ReportPage, PicturesAreMadeSmallerUntilThePageFits) {
             std::string::npos);
 }
 
+TEST(ReportPage, TablesAreCutIfSmallPicturesAreNotEnough) {
+  libmap::ReportTable table;
+  table.table.columns = table.headings = std::vector<std::string>(20, "score");
+  for (int n = 0; n < 1000; ++n) {
+    table.table.rows.emplace_back(20, "0.5");
+    table.table.rows.back().front() = "P" + std::to_string(n);
+  }
+  ReportContent content;
+  content.title = "a";
+  libmap::ReportSection section;
+  section.items.push_back({.body = table});
+  section.items.push_back({.body = ReportPictures{picture_of(noise(400, 300))}});
+  content.sections.push_back(section);
+  const std::size_t whole = libmap::report_page(content, assets).size();
+  const libmap::FittedPage page = libmap::fit_report_page(content, assets, whole);
+  EXPECT_NE(page.html.find(">P999<"), std::string::npos);
+  // The picture alone has no room beside the whole table, and is whole beside the short one.
+  content.sections[0].items.pop_back();
+  const std::size_t alone = libmap::report_page(content, assets).size();
+  content.sections[0] = section;
+  ASSERT_GT(whole, alone + 300'000);
+  const libmap::FittedPage cut = libmap::fit_report_page(content, assets, alone);
+  EXPECT_EQ(cut.html.find(">P100<"), std::string::npos);
+  EXPECT_NE(cut.html.find(">P99<"), std::string::npos);
+  EXPECT_NE(cut.html.find("The first 100 rows of 1000."), std::string::npos);
+  EXPECT_EQ(cut.picture_level, 0);
+}
+
 TEST(Picture, ShrinkingTakesMeans) {
   ColorImage image(4, 2);
   for (int x = 0; x < 4; ++x)

@@ -214,15 +214,15 @@ TEST(Charts, EqualChartsGiveEqualPicturesAndFiles) {
 }
 
 TEST(Charts, SvgIsWellFormedAndCarriesItsNames) {
-  Chart chart = libmap::roc_chart({{"before & <after>", {1, 0.25, 0}, {1, 0.5, 0}, 0.6449}},
-                                  "Rocks \"A\" & <B>");
+  Chart chart = libmap::roc_chart(
+      {{.name = "before & <after>", .x = {1, 0.25, 0}, .y = {1, 0.5, 0}}}, "Rocks \"A\" & <B>");
   const Svg svg = svg_of(chart, libmap::roc_chart_size);
   EXPECT_STREQ(svg.root->GetName(), "svg");
   EXPECT_STREQ(svg.root->GetAttribute("width"), "900px");
   EXPECT_THAT(svg.all("title").at(0)->GetCharacterData(), HasSubstr("Rocks \"A\" & <B>"));
   EXPECT_THAT(svg.all("desc").at(0)->GetCharacterData(),
               testing::AllOf(HasSubstr("true positive rate over false positive rate"),
-                             HasSubstr("before & <after>, AUC 0.645 (trapezoid)")));
+                             HasSubstr("chance; before & <after>")));
   // 11 + 11 ticks, two axis titles, the title, and two legend names.
   EXPECT_EQ(texts(svg).size(), 27U);
   EXPECT_TRUE(svg.all("text").empty());
@@ -337,8 +337,9 @@ TEST(Charts, EveryReferenceInTheSvgIsDefined) {
   std::size_t references = 0;
   Chart cut = unit_chart();
   cut.curves = {curve_of({-1, 2}, {0, 1}, red)};
-  for (const Chart& chart : {cut, unit_chart(), libmap::roc_chart({{"a", {1, 0}, {1, 0}, {}}}, "a"),
-                             libmap::roc_chart({}, "")}) {
+  for (const Chart& chart :
+       {cut, unit_chart(), libmap::roc_chart({{.name = "a", .x = {1, 0}, .y = {1, 0}}}, "a"),
+        libmap::roc_chart({}, "")}) {
     const Svg svg = svg_of(chart);
     std::size_t at = 0;
     while ((at = svg.text.find("url(#", at)) != std::string::npos) {
@@ -374,7 +375,7 @@ TEST(Charts, NumbersDoNotDependOnTheLocale) {
     char do_thousands_sep() const override { return '.'; }
     std::string do_grouping() const override { return "\3"; }
   };
-  Chart chart = libmap::roc_chart({{"map", {1, 0.25, 0}, {1, 0.5, 0}, 0.625}}, "locale");
+  Chart chart = libmap::roc_chart({{.name = "map", .x = {1, 0.25, 0}, .y = {1, 0.5, 0}}}, "locale");
   ChartHistogram histogram;
   histogram.heights = {1234.5, 12345.25};
   Chart large;
