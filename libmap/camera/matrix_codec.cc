@@ -21,7 +21,7 @@ void append_int32(std::string& bytes, std::int32_t value) {
   bytes.append(reinterpret_cast<const char*>(&value), sizeof value);
 }
 
-std::string size_text(const StoredMatrix& matrix) {
+std::string matrix_size_text(const StoredMatrix& matrix) {
   return std::to_string(matrix.rows) + " x " + std::to_string(matrix.columns) + " x " +
          std::to_string(static_cast<std::size_t>(matrix.channels) * bytes_of(matrix.element)) +
          " bytes";
@@ -36,7 +36,7 @@ std::uint64_t checked_bytes(const StoredMatrix& matrix, std::uint64_t stream_byt
   if (cells > most / cell_bytes)
     throw Error(
         "compressed matrix of more than its " + std::to_string(stream_bytes) + " bytes can hold",
-        {.value = size_text(matrix)});
+        {.value = matrix_size_text(matrix)});
   return cells * cell_bytes;
 }
 
@@ -96,7 +96,7 @@ void each_matrix_piece(std::string_view blob,
     const std::size_t bytes = piece.size() - stream.avail_out;
     done += bytes;
     if (done > wanted)
-      throw Error("compressed matrix is longer than its size", {.value = size_text(matrix)});
+      throw Error("compressed matrix is longer than its size", {.value = matrix_size_text(matrix)});
     const bool is_at_end = result == Z_BUF_ERROR || (result == Z_OK && stream.avail_out > 0);
     if (is_at_end || (result == Z_STREAM_END && done < wanted))
       throw Error("compressed matrix is broken: ends after " + std::to_string(done) + " of " +
@@ -113,7 +113,7 @@ StoredMatrix decode_matrix(std::string_view blob) {
   if (wanted > max_matrix_bytes)
     throw Error(
         "compressed matrix too large",
-        {.value = size_text(matrix), .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
+        {.value = matrix_size_text(matrix), .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
   matrix.bytes.reserve(wanted);
   each_matrix_piece(blob, [&](std::string_view bytes) { matrix.bytes += bytes; });
   return matrix;
