@@ -279,9 +279,8 @@ class Fusion {
       disc_m =
           std::max(disc_m, frame.max_pixel_pitch * min_disc_pixels * options_.planes.max_depth_m);
     }
-    const double far = 1e15;
-    if (!((survey_.grid_origin.cwiseAbs() / std::min(tile_m, options_.voxel_size_m)).maxCoeff() <
-          far))
+    const double unit = std::min(tile_m, options_.voxel_size_m);
+    if (!(survey_.grid_origin.cwiseAbs().maxCoeff() / unit < 1e15))
       throw Error("poses are too far from the origin for tiles",
                   {.field = node_name(frames().front().node)});
     return {tile_m, options_.voxel_size_m, survey_.grid_origin, shift_m, disc_m};

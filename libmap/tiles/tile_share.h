@@ -14,7 +14,8 @@ struct TileShare {
   int count = 1;
 };
 
-TileShare parse_share(const std::string& text);  // "K/N"; throws Error naming --tile
+// "K/N". parse_share throws Error naming --tile.
+TileShare parse_share(const std::string& text);
 std::string to_text(const TileShare& share);
 
 // The share's first tile, and the one after its last. Throws Error naming `tile`.

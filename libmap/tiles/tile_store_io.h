@@ -43,11 +43,13 @@ class TileJournal {
   int file_ = -1;
 };
 
+// A tile store, as one run sees it.
 class TileStore {
  public:
   // Nothing is read or made yet.
   explicit TileStore(std::filesystem::path folder);
 
+  // The folder, and what is in it.
   const std::filesystem::path& folder() const { return folder_; }
   std::filesystem::path tiles() const { return folder_ / "tiles"; }
   std::filesystem::path index_path() const { return folder_ / "index.json"; }  // of finished stores

@@ -10,6 +10,7 @@
 
 namespace libmap {
 
+// Index of a tile.
 struct XyTile {
   std::int64_t i = 0;  // x of its lower corner, in sides
   std::int64_t j = 0;

@@ -78,6 +78,7 @@ TEST(TileStore, NothingIsLeftOfAPlanThatFails) {
 }
 
 TEST(TileStore, OtherFoldersAreNotTouched) {
+  fs::create_directory(scratch_folder() / "a");
   write_text(scratch_folder() / "a/diary.txt", "dear");
   EXPECT_EQ(error_of([&] { TileStore(scratch_folder() / "a").begin({}, nothing); }).reason(),
             "is not empty and is no tile store");
