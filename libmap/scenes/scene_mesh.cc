@@ -23,10 +23,7 @@ namespace {
 
 using std::numbers::pi;
 
-struct TriangleSoup {
-  std::vector<Eigen::Vector3d> vertices;
-  std::vector<Triangle> triangles;  // counter-clockwise from outside
-};
+using TriangleSoup = TriangleMesh;  // vertices and triangles alone, from outside
 
 // What counts as lying on a surface, meters.
 constexpr double on_surface_m = 1e-9;
@@ -425,17 +422,13 @@ class GroundMesher {
 
   // A grid, without the points that are hidden or crowd a footprint.
   void insert_grid() {
-    const auto columns =
-        static_cast<std::size_t>(std::ceil(2.0 * face_.half_x / options_.edge_length_m - 1e-9));
-    const auto rows =
-        static_cast<std::size_t>(std::ceil(2.0 * face_.half_y / options_.edge_length_m - 1e-9));
+    const std::size_t columns = pieces(2.0 * face_.half_x, options_.edge_length_m, 1);
+    const std::size_t rows = pieces(2.0 * face_.half_y, options_.edge_length_m, 1);
     std::vector<Triangulation::Point> points;
     for (std::size_t j = 0; j <= rows; ++j) {
       for (std::size_t i = 0; i <= columns; ++i) {
-        const double x =
-            face_.half_x * (2.0 * static_cast<double>(i) / static_cast<double>(columns) - 1.0);
-        const double y =
-            face_.half_y * (2.0 * static_cast<double>(j) / static_cast<double>(rows) - 1.0);
+        const double x = lattice_coordinate(face_.half_x, i, columns);
+        const double y = lattice_coordinate(face_.half_y, j, rows);
         const bool on_border = i == 0 || j == 0 || i == columns || j == rows;
         if (on_border || is_clear(x, y)) points.emplace_back(x, y);
       }
@@ -475,19 +468,15 @@ class GroundMesher {
   Triangulation triangulation_;
 };
 
-void check(const SceneGeometry& geometry, const SceneMeshOptions& options) {
+}  // namespace
+
+TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options) {
+  const SceneGeometry geometry(scene);
   double triangles = 0.0;
   for (const SceneSolid& solid : geometry.solids())
     triangles += estimated_triangles(solid, options);
   require_count(triangles, options.max_triangles, "triangles", "edge_length_m",
                 to_text(options.edge_length_m));
-}
-
-}  // namespace
-
-TriangleMesh scene_mesh(const PrimitiveScene& scene, const SceneMeshOptions& options) {
-  const SceneGeometry geometry(scene);
-  check(geometry, options);
   TriangleMesh mesh;
   std::vector<double> shapes;
   std::optional<GroundMesher> ground;
