@@ -121,7 +121,7 @@ TEST(DepthSurface, CellsMustFitTheCamera) {
   EXPECT_EQ(a.normal, b.normal);
   EXPECT_EQ(
       error_of([&] { DepthSurface(surface.camera(), surface.step_px() + 1, surface.cells()); })
-          .details()
+          .context()
           .field,
       "cells");
 }

@@ -26,10 +26,10 @@ TEST(IcpPairs, LinkedFramesOnce) {
     if (n != 3) poses[10 * (n + 1)] = Pose::Identity();
   }
   const auto link = [](int from, int to) {
-    libmap::PoseLink link;
-    link.from = from;
-    link.to = to;
-    return link;
+    libmap::PoseLink made;
+    made.from = from;
+    made.to = to;
+    return made;
   };
   EXPECT_EQ(libmap::linked_pairs(frames, poses,
                                  {link(30, 20), link(20, 10), link(20, 30), link(10, 10),

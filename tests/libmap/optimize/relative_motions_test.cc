@@ -33,8 +33,8 @@ TEST(RelativeMotions, ASteadyMotionIsFound) {
   const auto motions = libmap::relative_motions(path.frames, path.poses, {});
   ASSERT_EQ(motions.size(), 4U);
   for (const auto& [node, motion] : motions) {
-    // To first order in the turn of half a second.
-    EXPECT_LT((motion.mean - some_motion()).norm(), 0.03) << node;
+    // To first order in the turn of half a second; at the ends from one side only.
+    EXPECT_LT((motion.mean - some_motion()).norm(), 0.05) << node;
     EXPECT_EQ(motion.deviation, KnownMotion{}.deviation) << "poses that far apart";
   }
 }
