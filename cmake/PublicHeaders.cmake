@@ -1,31 +1,73 @@
-# The public API: the headers that are installed. All other headers are private to this project.
+# The public API: the headers that are installed, each with all that it includes. All other headers are
+# private to this project and may change without notice. scripts/include-graph --check holds the list.
 set(graspmap_public_headers
   libgtd/detect.h
-  libgtd/gripper/closing_path.h
+  libgtd/evaluate/lookup.h
+  libgtd/evaluate/roc.h
+  libgtd/grasp/bearing.h
+  libgtd/grasp/finger_closing.h
+  libgtd/grasp/grasp_trials.h
+  libgtd/grasp/gripper_closing.h
+  libgtd/grasp/ground.h
+  libgtd/grasp/holding_force.h
+  libgtd/grasp/surface_error.h
   libgtd/gripper/gripper.h
-  libgtd/gripper/gripper_fingers.h
+  libgtd/gripper/gripper_io.h
   libgtd/gripper/gripper_mask.h
-  libgtd/gripper/hold_model.h
   libgtd/scenario_io.h
-  libgtd/score/bit_count.h
+  libgtd/score/footholds.h
   libgtd/score/graspability_map.h
   libgtd/score/obstacles.h
   libgtd/score/scanned_area.h
   libgtd/score/scenario.h
+  libgtd/score/tile_store.h
   libgtd/score/tiling.h
   libgtd/score/voxel_matching.h
-  libgtd/shape/instruction_set.h
   libgtd/terrain/regression_plane.h
   libgtd/terrain/voxel_grid.h
   libgtd/terrain/voxel_lattice.h
-  libmap/io/cloud_io.h
-  libmap/io/geometry_file.h
+  libmap/camera/calibration_codec.h
+  libmap/camera/camera_io.h
+  libmap/camera/depth_codec.h
+  libmap/camera/depth_correction.h
+  libmap/camera/image_codec.h
+  libmap/camera/rgbd_frame.h
+  libmap/core/camera.h
   libmap/core/error.h
+  libmap/core/georeference.h
+  libmap/core/image.h
   libmap/core/instruction_set.h
+  libmap/core/manifest.h
   libmap/core/parameters.h
   libmap/core/point_cloud.h
   libmap/core/point_stream.h
   libmap/core/pose.h
+  libmap/core/pose_graph.h
   libmap/core/progress.h
+  libmap/core/random_stream.h
+  libmap/core/result_table.h
   libmap/core/stage_timer.h
-  libmap/core/text.h)
+  libmap/core/text.h
+  libmap/core/triangle_mesh.h
+  libmap/fusion/depth_fusion.h
+  libmap/fusion/depth_noise.h
+  libmap/fusion/depth_planes.h
+  libmap/fusion/depth_projection.h
+  libmap/fusion/fusion_frames.h
+  libmap/fusion/surface_points.h
+  libmap/fusion/surface_refinement.h
+  libmap/fusion/surface_voxels.h
+  libmap/fusion/tile_mask.h
+  libmap/geometry/voxel_key.h
+  libmap/io/cloud_io.h
+  libmap/io/geometry_file.h
+  libmap/io/mesh_io.h
+  libmap/mesh/poisson_disk.h
+  libmap/poses/trajectory_io.h
+  libmap/scan/frame_folder.h
+  libmap/scan/rtabmap_reader.h
+  libmap/scan/rtabmap_schema.h
+  libmap/scan/scan_source.h
+  libmap/surface/surface_reconstruction.h
+  libmap/tiles/tile_share.h
+  libmap/tiles/xy_tile.h)

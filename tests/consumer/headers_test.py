@@ -115,7 +115,7 @@ def main(build, source, eigen, compiler):
         root = scratch / "include" / "graspmap"
         texts = {str(path.relative_to(root)): path.read_text(encoding="utf-8")
                  for path in sorted(root.rglob("*.h"))}
-        assert len(texts) >= 100, f"only {len(texts)} headers are installed"
+        assert len(texts) >= 50, f"only {len(texts)} headers are installed"
         includes = {header: set(INCLUDE.findall(text)) for header, text in texts.items()}
         standard = set()
         for header, names in includes.items():
