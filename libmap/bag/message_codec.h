@@ -1,4 +1,4 @@
-// Messages as the bytes that bags store. Inside libmap/ros alone.
+// Messages as the bytes that bags store. Private to libmap/bag.
 //
 // ROS 1 (http://wiki.ros.org/msg#Fields): little-endian, without padding; a text or an array begins
 // with its length as uint32. ROS 2: CDR, version 1 (DDS-XTypes 7.4.1): 4 bytes that tell the byte

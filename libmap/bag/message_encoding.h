@@ -1,4 +1,4 @@
-// Plain data as messages, most without their headers. Inside libmap/ros alone.
+// Plain data as messages, most without their headers. Private to libmap/bag.
 #pragma once
 
 #include <cstdint>

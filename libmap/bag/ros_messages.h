@@ -1,5 +1,5 @@
 // The ROS messages that bags contain, as plain data without their encoding (message_codec.h).
-// Inside libmap/ros alone.
+// Private to libmap/bag.
 //
 // fields(message, visit) calls visit(name, field) for each field in the order of its definition;
 // visit.ros2 says of which generation. Definitions of ROS 1 (Noetic):

@@ -19,8 +19,6 @@ using Eigen::Vector2d;
 constexpr double on_border_m = 1e-9;
 constexpr std::size_t max_strips = 1024;
 
-double cross(const Vector2d& a, const Vector2d& b) { return a.x() * b.y() - a.y() * b.x(); }
-
 double distance_to_segment(const Vector2d& point, const Vector2d& a, const Vector2d& b) {
   const Vector2d along = b - a;
   const double t = std::clamp((point - a).dot(along) / along.squaredNorm(), 0.0, 1.0);

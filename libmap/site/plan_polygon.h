@@ -11,6 +11,11 @@
 
 namespace libmap {
 
+// z of the cross product: twice the signed area of the triangle (0, a, b), counter-clockwise > 0.
+inline double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+  return a.x() * b.y() - a.y() * b.x();
+}
+
 class PlanPolygon {
  public:
   // Corners in order, either way round; a last one equal to the first is dropped. Throws Error:

@@ -10,6 +10,7 @@
 #include "libmap/core/text.h"
 #include "libmap/geometry/spatial_index.h"
 #include "libmap/mesh/ray_caster.h"
+#include "libmap/site/plan_polygon.h"
 
 namespace libmap {
 
@@ -19,10 +20,6 @@ void bind(ParameterTable& table, SpotCheckOptions& options) {
 }
 
 namespace {
-
-double cross(const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
-  return a.x() * b.y() - a.y() * b.x();
-}
 
 // Andrew's monotone chain (1979); counter-clockwise.
 std::vector<Eigen::Vector2d> convex_hull(std::vector<Eigen::Vector2d> points) {

@@ -33,7 +33,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 fs::path sample_bag(const std::string& name) {
-  return graspmap_test::source_folder() / "tests/libmap/ros/ros2_bags" / name;
+  return graspmap_test::source_folder() / "tests/libmap/bag/ros2_bags" / name;
 }
 
 // Bytes of CDR (XCDR1), written down as the rule is: a number at a multiple of its size, counted
