@@ -1,4 +1,4 @@
-// Residuals of observations by poses, points and cameras. Inner part of libmap/refine.
+// Residuals of observations by poses, points and cameras.
 #pragma once
 
 #include <Eigen/Core>

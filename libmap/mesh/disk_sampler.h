@@ -1,4 +1,4 @@
-// One maximal set of Poisson-disk samples of a given radius. Inner part of libmap/mesh.
+// One maximal set of Poisson-disk samples of a given radius. Private to libmap/mesh.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// A triangle mesh in Embree, about its center. Inner part of libmap/mesh: rays and distances stand
+// A triangle mesh in Embree, about its center. Private to libmap/mesh: rays and distances stand
 // on it.
 #pragma once
 

@@ -1,5 +1,5 @@
 // Points of a bundle adjustment at given poses and cameras: where they fit best, and their
-// elimination from the normal equations (Schur complement). Inner part of libmap/refine.
+// elimination from the normal equations (Schur complement). Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Cholesky>

@@ -1,5 +1,5 @@
 // Bundle adjustment with all that is unknown in one dense system: poses, motions, points and the
-// parameters of cameras, the points eliminated. Inner part of libmap/refine.
+// parameters of cameras, the points eliminated. Private to libmap/optimize.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,4 +1,4 @@
-// The solids of a scene, posed and ready to be asked. Inner part of libmap/simulate: sampling and
+// The solids of a scene, posed and ready to be asked. Private to libmap/scenes: sampling and
 // meshing use it.
 #pragma once
 

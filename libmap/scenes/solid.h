@@ -1,4 +1,4 @@
-// Closed surfaces of triangles from which sites are built. Inner part of libmap/simulate.
+// Closed surfaces of triangles from which sites are built.
 #pragma once
 
 #include <Eigen/Core>

@@ -1,5 +1,5 @@
 // A surface from a cloud of oriented points, in cells of the wanted size: by an algebraic point
-// set surface (implicit_surface.h), or by PCL's screened Poisson reconstruction (Kazhdan and Hoppe
+// set surface (surface_solvers.h), or by PCL's screened Poisson reconstruction (Kazhdan and Hoppe
 // 2013).
 #pragma once
 
@@ -22,7 +22,7 @@ enum class SurfaceMethod { implicit, poisson };
 
 struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
-  double support_cells = 2.5;  // >= 1.5: of a sample, with `implicit`; see implicit_surface.h
+  double support_cells = 2.5;  // >= 1.5: of a sample, with `implicit`; see surface_solvers.h
   // >= 0: of the grid, or of the octree's finest cells; edges of the mesh are about as long. 0: the
   // median distance of points to their nearest neighbors.
   double cell_size_m = 0.0;
