@@ -1,5 +1,4 @@
-// The solids of a scene, posed and ready to be asked. Private to libmap/scenes: sampling and
-// meshing use it.
+// The solids of a scene, posed and ready to be asked: for sampling, meshing and sites.
 #pragma once
 
 #include <Eigen/Core>
