@@ -73,7 +73,7 @@ TEST(DepthFusionTiles, SamePointsAsAtOnceBitForBit) {
       for (std::size_t n = 0; n < again.tiles().size(); ++n) {
         const XyTile& tile = again.tiles()[n];
         const auto [cloud, of_tile] = (n % 2 == 0 ? again : fusion).make(n);
-        parts += of_tile;
+        libmap::merge_into<libmap::FusionCounts>(parts, of_tile);
         cloud.check();
         tiles += cloud.empty() ? 0 : 1;
         for (const Eigen::Vector3d& place : cloud.positions) {
@@ -117,7 +117,8 @@ TEST(DepthFusionTiles, FramesThatCannotBeUsedAreNamedOnce) {
   options.registration_rounds = 0;
   TileFusion fusion(scan, scan.poses, options, 0.3);
   DepthFusionResult result = fusion.report();
-  for (std::size_t n = 0; n < fusion.tiles().size(); ++n) result += fusion.make(n).counts;
+  for (std::size_t n = 0; n < fusion.tiles().size(); ++n)
+    libmap::merge_into<libmap::FusionCounts>(result, fusion.make(n).counts);
   ASSERT_EQ(result.skipped.size(), 1U);
   EXPECT_EQ(result.skipped.front().first, 3);
   EXPECT_EQ(result.frames, 9U);

@@ -5,7 +5,7 @@
 
 #include <algorithm>
 
-#include "mesh_topology.h"
+#include "tests/libmap/scenes/mesh_topology.h"
 #include "tests/support/test_support.h"
 
 namespace libmap {

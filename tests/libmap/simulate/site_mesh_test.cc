@@ -9,7 +9,7 @@
 
 #include "libmap/core/parallel.h"
 #include "libmap/simulate/rock_site.h"
-#include "mesh_topology.h"
+#include "tests/libmap/scenes/mesh_topology.h"
 #include "tests/libmap/scenes/scene_test_support.h"
 #include "tests/support/test_support.h"
 

@@ -55,7 +55,7 @@ std::vector<TexturedMesh> textured(const TriangleMesh& mesh, const PaintedScan& 
   for (std::size_t n = 0; n < index.size(); ++n) {
     libmap::PieceTexturing::Piece piece = texturing.make(n, exposure);
     piece.model.check();
-    report += piece.counts;
+    libmap::merge_into<libmap::TextureCounts>(report, piece.counts);
     models.push_back(std::move(piece.model));
   }
   libmap::require_seen(report);
