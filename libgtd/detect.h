@@ -55,6 +55,7 @@ struct DetectionResult {
   std::optional<double> normal_radius_m;  // of the surface, if normals were fitted
   libmap::StageTimings timings_s;         // wall time of each step
 };
+// Names the results of a detection (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const DetectionResult& result);
 
 // The gripper of `options`: its own, else the scenario's with its overrides. Throws as

@@ -15,6 +15,7 @@ namespace libgtd {
 
 // Tiles and halo of a detection with these options.
 struct StoreTiling {
+  // Makes the mask and derives both sizes from it and the scenario.
   explicit StoreTiling(const DetectionOptions& detection);
 
   GripperMask mask;

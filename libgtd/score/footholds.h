@@ -53,6 +53,7 @@ struct FootholdResult {
   std::size_t candidates = 0;       // map points that may be one
   std::size_t at_border = 0;        // would be candidates, but for the option `edges`
 };
+// Names the results of a search (libmap/core/result_table.h).
 void describe(libmap::ResultTable& table, const FootholdResult& result);
 
 // Local maxima of the score by non-maximum suppression: the best candidate is a foothold, those

@@ -75,6 +75,7 @@ class MapTileStore : public libmap::TileStore {
     std::size_t done = 0;
     std::size_t tiles = 0;
   };
+  // Counts the finished tiles of the plan; lists them if all are done.
   Completion complete(const TilePlan& plan) const;
   // Writes the index unless it exists, and before it a manifest beside the store: that of the index
   // with times and threads of `run`.

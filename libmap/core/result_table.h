@@ -83,8 +83,9 @@ struct TileField {
   std::variant<const std::size_t*, const double*> field;
   Merge merge;
 
+  // Reads or sets the field; set() only of a result that is not constant.
   ManifestValue value() const;
-  void set(const ManifestValue& value) const;  // of a result that is not constant
+  void set(const ManifestValue& value) const;
 };
 
 class ResultTable {
@@ -107,6 +108,7 @@ class ResultTable {
     tile_fields_.push_back({std::move(key), &field, merge});
   }
 
+  // Adds the results of another table, their keys after `prefix`.
   void append(const std::string& prefix, ResultTable table);
 
   const std::vector<NamedResult>& results() const { return results_; }
@@ -120,6 +122,7 @@ class ResultTable {
   std::vector<TileField> tile_fields_;
 };
 
+// The table that describe(table, result) fills. It points into the result.
 template <typename Result>
 ResultTable described(const Result& result) {
   ResultTable table;
@@ -127,6 +130,7 @@ ResultTable described(const Result& result) {
   return table;
 }
 
+// Merges the fields of a tile into those of the whole, each by its Merge.
 template <typename Result>
 void merge_into(Result& whole, const Result& tile) {
   described(whole).merge(described(tile));

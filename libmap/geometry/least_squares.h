@@ -73,6 +73,7 @@ LeastSquaresSummary levenberg_marquardt(Problem& problem, double cost,
   return summary;
 }
 
+// Outcome of a step of gauss_newton.
 enum class StepState { moving, converged, failed };
 
 struct GaussNewtonSummary {

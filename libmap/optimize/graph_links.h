@@ -43,6 +43,7 @@ std::vector<GraphLink> odometry_links(const PoseGraph& graph);
 // `to`.
 Vector6d link_residual(const PoseLink& link, const Pose& from, const Pose& to);
 
+// Derivatives of link_residual by steps of both poses.
 struct LinkJacobian {
   Matrix6d by_from = Matrix6d::Zero();  // by a step of the pose
   Matrix6d by_to = Matrix6d::Zero();

@@ -61,7 +61,8 @@ class TileStore {
   TileJournal begin(const TileShare& share, const std::function<void()>& agree_on_plan) const;
   void open() const;  // makes the folders alone
 
-  std::optional<std::string> plan_text() const;  // nothing if there is no plan
+  // The plan as text; nothing if there is none.
+  std::optional<std::string> plan_text() const;
   void write_plan(const std::string& text) const;
 
   // Place of a line in a journal.

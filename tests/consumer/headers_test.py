@@ -27,6 +27,7 @@ HEADERS = {
     "chrono": "chrono",
     "cstdio": "FILE",
     "cstdint": "int8_t int16_t int32_t int64_t uint8_t uint16_t uint32_t uint64_t",
+    "cstdlib": "abs",
     "cstring": "memcpy",
     "algorithm": "copy find_if lower_bound max min nth_element",
     "bit": "bit_cast",
@@ -42,7 +43,7 @@ HEADERS = {
     "optional": "nullopt",
     "stdexcept": "runtime_error",
     "string": "basic_string char_traits to_string",
-    "type_traits": "is_same_v is_trivially_copyable_v",
+    "type_traits": "is_arithmetic_v is_convertible_v is_integral_v is_same_v is_trivially_copyable_v",
     "utility": "in_range",
     "variant": "monostate",
 }
