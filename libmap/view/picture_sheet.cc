@@ -250,17 +250,16 @@ void draw_page(const std::vector<SheetCell>& cells, const PictureSheetOptions& o
     draw_text(layout.column_titles[i], options.column_titles[i], head, canvas);
 }
 
-struct DrawnCell {
+struct DrawnScene {
   ColorImage image;
   std::optional<SceneCamera> camera;  // of an orthographic view
 };
 
-DrawnCell draw_cell(const SheetCell& cell, const PixelRect& rect,
-                    const std::optional<Bounds3d>& extent, const std::vector<Legend>& legends,
-                    const PictureSheetOptions& options, int font_px) {
+DrawnScene draw_scene(const SheetCell& cell, const PixelRect& rect,
+                      const std::optional<Bounds3d>& extent, const std::vector<Legend>& legends,
+                      const PictureSheetOptions& options, int font_px) {
   const int width = static_cast<int>(rect.width);
   const int height = static_cast<int>(rect.height);
-  if (!cell.scene) return {cell.picture, {}};
   Scene scene = cell.scene();
   share_ranges(legends, scene);
   SceneViewOptions view;
@@ -271,7 +270,7 @@ DrawnCell draw_cell(const SheetCell& cell, const PixelRect& rect,
   view.background = options.background;
   view.extent = extent;
   view.font_px = font_px;
-  DrawnCell drawn;
+  DrawnScene drawn;
   drawn.camera = camera_of(scene, view);
   drawn.image = render_scene(std::move(scene), view);
   if (drawn.camera->perspective) drawn.camera.reset();
@@ -334,9 +333,12 @@ ColorImage draw_sheet(const std::vector<SheetCell>& cells, const PictureSheetOpt
   draw_page(cells, options, contents.legends, layout, canvas);
   std::size_t bars = 0;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    const DrawnCell drawn =
-        draw_cell(cells[i], layout.cells[i], extents[i], contents.legends, options, layout.font_px);
-    canvas.image(drawn.image, fitted(drawn.image, layout.cells[i]));
+    DrawnScene drawn;
+    if (cells[i].scene)
+      drawn = draw_scene(cells[i], layout.cells[i], extents[i], contents.legends, options,
+                         layout.font_px);
+    const ColorImage& image = cells[i].scene ? drawn.image : cells[i].picture;
+    canvas.image(image, fitted(image, layout.cells[i]));
     // The bar of a row is below its first scene that has one.
     const std::size_t row = i / static_cast<std::size_t>(layout.columns);
     const bool wanted = options.shared_view == SharedView::sheet ? bars == 0 : bars <= row;
