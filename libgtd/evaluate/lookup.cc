@@ -206,7 +206,7 @@ class TileFinder {
 class TileLookup {
  public:
   TileLookup(const TileStoreIndex& index, const TileLoader& load, const LookupOptions& options)
-      : index_(index), load_(load), options_(options), finder_(index) {
+      : load_(load), options_(options), finder_(index) {
     reach_m_ = index.lattice.voxel_size_m;
     if (options.mode != LookupMode::nearest) reach_m_ = std::max(reach_m_, options.radius_m);
   }
@@ -265,7 +265,6 @@ class TileLookup {
       join(findings[visits[v].place], std::move(found[v]), options_.mode);
   }
 
-  const TileStoreIndex& index_;
   const TileLoader& load_;
   const LookupOptions& options_;
   TileFinder finder_;
