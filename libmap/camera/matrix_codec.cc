@@ -111,9 +111,9 @@ StoredMatrix decode_matrix(std::string_view blob) {
   StoredMatrix matrix = read_matrix_header(blob);
   const std::uint64_t wanted = checked_bytes(matrix, blob.size() - trailer_bytes);
   if (wanted > max_matrix_bytes)
-    throw Error(
-        "compressed matrix too large",
-        {.value = matrix_size_text(matrix), .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
+    throw Error("compressed matrix too large",
+                {.value = matrix_size_text(matrix),
+                 .bound = "<= " + std::to_string(max_matrix_bytes) + " bytes"});
   matrix.bytes.reserve(wanted);
   each_matrix_piece(blob, [&](std::string_view bytes) { matrix.bytes += bytes; });
   return matrix;
