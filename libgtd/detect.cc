@@ -30,7 +30,7 @@ PointCloud downsampled(const PointCloud& cloud, double leaf_m) {
   return thin;
 }
 
-// What each stage uses of the options, resolved once: no stage sees the scenario.
+// Inputs of each stage, resolved once from the options. No stage sees the scenario.
 struct DetectionStages {
   int tile_voxels = 0;
   std::optional<double> downsampling_leaf_m;    // only `thesis` downsamples

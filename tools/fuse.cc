@@ -11,7 +11,7 @@
 #include "tools/support/tile_folder.h"
 #include "tools/support/usages.h"
 
-// What shares and resumed runs have in common, bit for bit.
+// The plan that shares and resumed runs have in common, bit for bit.
 namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(FusionFrame, node, grid_from_base, image_pixels, reach,

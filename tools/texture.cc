@@ -12,7 +12,7 @@
 #include "tools/support/scan_poses.h"
 #include "tools/support/tile_folder.h"
 
-// What shares and resumed runs have in common, bit for bit.
+// The plan that shares and resumed runs have in common, bit for bit.
 namespace libmap {
 
 NLOHMANN_DEFINE_TYPE_NON_INTRUSIVE(TextureExposure, gains, vignetting, observations, spread_before,

@@ -60,7 +60,7 @@ struct Place {
   Eigen::Vector3d in_terrain;
 };
 
-// What one part of the map, or all so far, contain near a point.
+// Points near a position, of one part of the map or of all parts so far.
 struct Finding {
   std::pair<double, MapOrder> nearest{HUGE_VAL, {}};                  // squared distance
   std::tuple<double, double, MapOrder> best{HUGE_VAL, HUGE_VAL, {}};  // -score, squared distance
