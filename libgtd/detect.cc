@@ -161,9 +161,8 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
   if (terrain.empty()) throw libmap::Error("the cloud has no points");
   const Scenario& scenario = options.scenario;
   // Before any work: a voxel size that does not suit the gripper shows here.
-  const DetectionStages stages = stages_of(
-      options, make_gripper_mask(gripper_of(options), {scenario.method, scenario.voxel_size_m,
-                                                       scenario.extra_void_layers}));
+  const DetectionStages stages =
+      stages_of(options, make_gripper_mask(gripper_of(options), mask_options(scenario)));
   DetectionResult result;
   result.points = terrain.size();
   result.mask = stages.mask;

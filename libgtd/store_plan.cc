@@ -28,9 +28,7 @@ bool is_same_file(const TerrainFile& a, const TerrainFile& b) {
 }  // namespace
 
 StoreTiling::StoreTiling(const DetectionOptions& detection)
-    : mask(make_gripper_mask(gripper_of(detection),
-                             {detection.scenario.method, detection.scenario.voxel_size_m,
-                              detection.scenario.extra_void_layers})),
+    : mask(make_gripper_mask(gripper_of(detection), mask_options(detection.scenario))),
       tile_voxels(libgtd::tile_voxels(detection.scenario)),
       halo_voxels(libgtd::halo_voxels(mask, detection.scenario)) {}
 

@@ -41,8 +41,7 @@ class StreamedDetection {
         points_(points),
         scenario_(options.scenario),
         max_points_(std::max<std::size_t>(streaming.max_points, 1)),
-        mask_(make_gripper_mask(gripper_of(options), {scenario_.method, scenario_.voxel_size_m,
-                                                      scenario_.extra_void_layers})),
+        mask_(make_gripper_mask(gripper_of(options), mask_options(scenario_))),
         tile_voxels_(tile_voxels(scenario_)),
         halo_(halo_voxels(mask_, scenario_)) {}
 

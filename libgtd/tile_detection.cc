@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numeric>
 
-#include "libgtd/score/closing_terms.h"
+#include "libgtd/score/closing_force.h"
 #include "libgtd/score/tilted_matching.h"
 #include "libgtd/score/voxel_matching.h"
 #include "libgtd/shape/convexity.h"
@@ -139,7 +139,7 @@ std::vector<MapVoxel> map_voxels(const std::vector<ScoredVoxel>& scored,
                    .score = scored[n].score,
                    .convex = convex[n] != 0,
                    .border = scored[n].border,
-                   .terms = scored[n].terms,
+                   .force = scored[n].force,
                    .falling_share = scored[n].falling_share};
     if (!surface.empty()) voxel.slope_deg = surface[n].slope_deg;
     if (options.tilts_mask && surface[n].normal.allFinite()) voxel.normal = surface[n].normal;
@@ -172,7 +172,7 @@ std::optional<ConvexityStage> convexity_of(const Scenario& scenario) {
                                                               : CurvatureMethod::corrected,
                     .radius_m = scenario.curvature_radius_m},
       .of_voxel_means = plane_method(scenario.method) == PlaneMethod::robust,
-      .zero_plane_m = scenario.zero_plane_m,
+      .zero_plane_m = scenario.lowest_target_m(),
       .distance_m = scenario.intersection_distance_m};
 }
 
@@ -224,7 +224,7 @@ double normal_radius_m(const GripperMask& mask, const Scenario& scenario) {
 MapContent content_of(const Scenario& scenario) {
   return {.normals = scenario.orientation == Orientation::surface,
           .slopes = scenario.evaluates_obstacles(),
-          .terms = scenario.method == Method::calibrated,
+          .forces = scenario.method == Method::calibrated,
           .falling_shares =
               scenario.method == Method::corrected && scenario.orientation != Orientation::surface};
 }
@@ -237,8 +237,8 @@ TileDetectionOptions tile_detection_options(const GripperMask& mask, const Scena
           .convexity = convexity_of(scenario),
           .graspable = {.method = scenario.method,
                         .solid_voxel_threshold = scenario.solid_voxel_threshold,
-                        .score_threshold = scenario.graspability_threshold,
-                        .zero_plane_m = scenario.zero_plane_m,
+                        .score_threshold = scenario.score_threshold(),
+                        .zero_plane_m = scenario.lowest_target_m(),
                         // A probability to hold needs no second opinion of the shape.
                         .needs_convexity = scenario.curvature_radius_m > 0.0 &&
                                            scenario.method != Method::calibrated}};

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "libgtd/evaluate/hold_model_fit.h"
 #include "libgtd/evaluate/roc_tables.h"
 #include "libmap/core/table.h"
 #include "libmap/view/charts.h"
@@ -23,8 +22,6 @@ struct EvaluateOptions {
   std::string scores;  // names with commas between
   std::string title = "ROC";
   libgtd::TableEvaluationOptions evaluation;
-  std::string hold_model;  // file of the fitted section
-  double load_n = 10.0;
 };
 
 void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
@@ -32,8 +29,6 @@ void bind(libmap::ParameterTable& parameters, EvaluateOptions& options) {
   parameters.add("score", options.scores,
                  "columns of scores, with commas between; none: every numeric column that is no "
                  "identity, position or length");
-  parameters.add("load_n", options.load_n, libmap::positive,
-                 "load of the verdicts, noted in the hold model, N");
   parameters.add("title", options.title, "title of the plot and of the summary");
 }
 
@@ -110,16 +105,8 @@ libmap::Table join_tables(std::vector<libmap::Table> tables) {
   return joined;
 }
 
-void write_hold_model(const EvaluateOptions& options, const libmap::Table& table, Run& run) {
-  const libgtd::HoldModelFit fit =
-      libgtd::fit_hold_model(table, options.evaluation.label_column, options.load_n);
-  run.say("hold model of {} places, {} left out", fit.places, fit.left_out);
-  run.write_text(options.hold_model, to_yaml_section(fit.model));
-}
-
 void evaluate(EvaluateOptions& options, Run& run) {
   run.claim_output_folder(options.folder);
-  if (!options.hold_model.empty()) run.claim_output(options.hold_model, options.tables);
   options.evaluation.score_columns = libmap::split_list(options.scores);
   std::vector<libmap::Table> tables;
   for (const std::string& file : options.tables) {
@@ -130,7 +117,6 @@ void evaluate(EvaluateOptions& options, Run& run) {
   const TableEvaluation evaluation =
       run.timed("evaluate", [&] { return libgtd::evaluate_table(table, options.evaluation); });
   note_results(evaluation, run);
-  if (!options.hold_model.empty()) write_hold_model(options, table, run);
   write_results(options, evaluation, run);
 }
 
@@ -144,8 +130,6 @@ int main(int argc, char** argv) {
   command.output(
       options.folder,
       "folder of roc.csv, rates.csv, accuracy.csv, summary.json, summary.md, roc.png and roc.svg");
-  command.option("--hold-model", "FILE.yaml", options.hold_model,
-                 "also fit the section hold_model of a gripper file to the labels");
   bind(command.parameters(), options);
   return command.run(argc, argv, [&](Run& run) { evaluate(options, run); });
 }

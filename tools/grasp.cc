@@ -203,15 +203,11 @@ void bind(libmap::ParameterTable& table, GraspCommandOptions& options) {
 // Of all that the results depend on but mesh, locations and seed.
 std::string parameters_hash(const libgtd::Gripper& gripper, const GraspCommandOptions& command) {
   libgtd::GraspOptions options = command.grasp;
-  libgtd::Gripper measures = gripper;
-  libgtd::GripperFingers fingers = *gripper.fingers;
   options.seed = 0;
   libmap::ParameterTable table;
-  bind(table, measures);
-  bind(table, fingers);
   bind(table, options);
-  return libmap::sha256_of(to_yaml(table) + (options.sequential ? "sequential" : "") +
-                           command.surface_error);
+  return libmap::sha256_of(libgtd::to_yaml(gripper) + to_yaml(table) +
+                           (options.sequential ? "sequential" : "") + command.surface_error);
 }
 
 void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) {
@@ -235,10 +231,8 @@ void note_results(const std::vector<libgtd::LocationResult>& results, Run& run) 
 
 libgtd::Gripper read_with_fingers(const std::filesystem::path& file,
                                   const GraspCommandOptions& options) {
-  libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
-  if (!gripper.fingers)
-    throw libmap::Error("missing: a gripper is closed by its fingers",
-                        {.file = file.string(), .field = "fingers"});
+  const libgtd::Gripper gripper = libgtd::read_gripper(file, options.overrides);
+  in_file(file.string(), [&] { libgtd::require_fingers(gripper); });
   return gripper;
 }
 

@@ -246,7 +246,7 @@ class StoreScoring {
       libgtd::GraspabilityMap map;
       map.lattice = frame_.lattice;
       if (frame_.plane) map.terrain_from_input = frame_.plane->terrain_from_input;
-      map.zero_plane_m = options_.detection.scenario.zero_plane_m;
+      map.zero_plane_m = options_.detection.scenario.lowest_target_m();
       map.content = libgtd::content_of(options_.detection.scenario);
       map.voxels = std::move(tiles[n].voxels);
       if (!map.voxels.empty())
@@ -350,6 +350,7 @@ void score(ScoreOptions& options, Run& run) {
   options.detection.share = libmap::parse_share(options.tile);
   if (options.up != "auto") options.detection.up = parse_vector(options.up, "--up");
   scenario.check();
+  scenario.set_defaults();
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
     throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
                         {.field = "--up", .value = options.up});
@@ -357,9 +358,8 @@ void score(ScoreOptions& options, Run& run) {
   // Before any work: a voxel size that does not suit the gripper shows here.
   const libgtd::Gripper gripper = libgtd::gripper_of(options.detection);
   if (scenario.method == libgtd::Method::calibrated)
-    in_file(gripper_file.string(), [&] { libgtd::require_hold_model(gripper); });
-  libgtd::make_gripper_mask(gripper,
-                            {scenario.method, scenario.voxel_size_m, scenario.extra_void_layers});
+    in_file(gripper_file.string(), [&] { libgtd::require_fingers(gripper); });
+  libgtd::make_gripper_mask(gripper, mask_options(scenario));
   if (libgtd::is_tile_store_name(options.output)) {
     score_into_store({.terrain = options.terrain,
                       .store = options.output,

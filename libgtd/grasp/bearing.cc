@@ -7,17 +7,12 @@
 #include <functional>
 #include <numbers>
 
-#include "libgtd/grasp/cloned_loops.h"
+#include "libgtd/gripper/cloned_loops.h"
 #include "libmap/core/angle.h"
 
 namespace libgtd {
 
 namespace {
-
-// Chen et al. 2024: share of a concrete's asperities that a spine tip can use.
-double usable_asperities(double tip_radius_um) {
-  return std::max(0.0, 2.49 * std::pow(tip_radius_um + 39.44, -0.7116) - 0.01212);
-}
 
 constexpr std::size_t chunk = 12;  // facets at once
 
@@ -89,19 +84,9 @@ const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names()
 }
 
 void bind(libmap::ParameterTable& table, EngagementOptions& options) {
-  using libmap::not_negative;
   using libmap::positive;
-  constexpr libmap::Range lean{0.0, 90.0};
   constexpr libmap::Range cone{0.0, 89.0};
   table.add("law", options.law, engagement_law_names(), "of the engagement of spines");
-  table.add("friction", options.friction, not_negative, "coefficient of Coulomb friction");
-  table.add("asperity_min_deg", options.asperity_min_deg, lean,
-            "smallest lean of a facet against the drag");
-  table.add("asperity_max_deg", options.asperity_max_deg, lean,
-            "largest lean of a facet against the drag");
-  table.add("engagement_rate", options.engagement_rate, not_negative,
-            "rate at which a dragged spine meets facets, 1/mm");
-  table.add("drag_mm", options.drag_mm, not_negative, "distance that spines are dragged");
   table.add("adhesion_limit_n", options.adhesion_limit_n, positive,
             "law adhesion: largest tension of all fingers, N");
   table.add("adhesion_lateral_deg", options.adhesion_lateral_deg, cone,
@@ -141,8 +126,8 @@ BearingContact::BearingContact(const GripContact& contact, std::vector<double> l
 }
 
 BearingContact::BearingContact(const GripContact& contact, const EngagementOptions& options,
-                               double limit_n)
-    : BearingContact(contact, std::vector<double>{}, options.friction, limit_n) {
+                               double friction, double limit_n)
+    : BearingContact(contact, std::vector<double>{}, friction, limit_n) {
   const double side = std::tan(options.adhesion_lateral_deg * libmap::radians_per_degree);
   const double pull = std::tan(options.adhesion_pull_deg * libmap::radians_per_degree);
   adhesion_ = {{1.0, 0.0, 0.0}, {-pull, -1.0, side}, {-pull, -1.0, -side}};
@@ -242,33 +227,29 @@ std::vector<Eigen::Vector3d> BearingContact::cone() const {
   return edges;
 }
 
-double engagement_share(const EngagementOptions& options, const GripperFingers& fingers) {
-  const double scale = usable_asperities(fingers.spine_tip_radius_um) / usable_asperities(25.0);
-  return -std::expm1(-scale * options.engagement_rate * options.drag_mm);
-}
-
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
-                                         const GripperFingers& fingers,
-                                         const EngagementOptions& options,
+                                         const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random) {
-  const double share = engagement_share(options, fingers);
+  const GripperFingers& fingers = *gripper.fingers;
+  const Engagement& its = gripper.engagement;
+  const double share = engagement_share(its, fingers.spine_tip_radius_um);
   std::vector<BearingContact> bearing;
   for (const GripContact& contact : contacts) {
     if (!contact.by_spines) {
-      bearing.emplace_back(contact, std::vector<double>{0.0}, options.friction,
+      bearing.emplace_back(contact, std::vector<double>{0.0}, its.friction,
                            fingers.spines_per_finger * fingers.spine_force_limit_n);
     } else if (options.law == EngagementLaw::adhesion) {
-      bearing.emplace_back(contact, options, options.adhesion_limit_n / fingers.count);
+      bearing.emplace_back(contact, options, its.friction,
+                           options.adhesion_limit_n / fingers.count);
     } else {
       std::vector<double> leans;
       for (int spine = 0; spine < fingers.spines_per_finger; ++spine) {
         const bool engages = random.uniform() < share;
-        const double lean = random.uniform(options.asperity_min_deg, options.asperity_max_deg);
+        const double lean = random.uniform(its.asperity_min_deg, its.asperity_max_deg);
         if (engages) leans.push_back(lean * libmap::radians_per_degree);
       }
       if (!leans.empty())
-        bearing.emplace_back(contact, std::move(leans), options.friction,
-                             fingers.spine_force_limit_n);
+        bearing.emplace_back(contact, std::move(leans), its.friction, fingers.spine_force_limit_n);
     }
   }
   return bearing;

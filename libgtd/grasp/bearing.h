@@ -15,8 +15,7 @@
 
 namespace libgtd {
 
-// asperities: each spine meets a facet that leans against its drag by a random angle psi, with
-// Coulomb friction on it (Asbeck et al. 2006; Chen et al. 2024, arXiv 2407.00973). adhesion: a
+// asperities: as the section `engagement` of the gripper says. adhesion: a
 // finger bears a tension T along its drag up to a limit, and in proportion to T lateral force and
 // pull-off (LORIS).
 enum class EngagementLaw { asperities, adhesion };
@@ -24,11 +23,6 @@ const std::vector<std::pair<std::string, EngagementLaw>>& engagement_law_names()
 
 struct EngagementOptions {
   EngagementLaw law = EngagementLaw::asperities;
-  double friction = 0.39;         // Coulomb's mu, of spines and links
-  double asperity_min_deg = 0.0;  // psi is uniform between the two
-  double asperity_max_deg = 90.0;
-  double engagement_rate = 0.6;  // a spine meets a facet with 1 - exp(-rate * drag)
-  double drag_mm = 5.0;
   double adhesion_limit_n = 20.0;      // T of all fingers of the gripper
   double adhesion_lateral_deg = 45.0;  // lateral force: at most T tan of it
   double adhesion_pull_deg = 20.0;     // pull-off: at most T tan of it
@@ -48,7 +42,8 @@ class BearingContact {
   BearingContact(const GripContact& contact, std::vector<double> leans_rad, double friction,
                  double limit_n);
   // Adhesion: `limit_n` of this finger.
-  BearingContact(const GripContact& contact, const EngagementOptions& options, double limit_n);
+  BearingContact(const GripContact& contact, const EngagementOptions& options, double friction,
+                 double limit_n);
 
   const Eigen::Vector3d& point() const { return point_; }      // m
   const Eigen::Vector3d& normal() const { return normal_; }    // out of the ground
@@ -96,16 +91,10 @@ class BearingContact {
   std::vector<Eigen::Vector3d> adhesion_;  // edges for `limit_n_`; not empty: the law is adhesion
 };
 
-// The share of spines that meet a facet. The rate is scaled by the share of asperities that a tip
-// of this radius can use, relative to a tip of 25 micrometers: 2.49 (r + 39.44)^-0.7116 - 0.01212
-// (fitted to concrete, Chen et al. 2024).
-double engagement_share(const EngagementOptions& options, const GripperFingers& fingers);
-
 // The contacts of a closed gripper with spines drawn at random. Contacts on which no spine engages
 // are left out. Law `adhesion` draws nothing.
 std::vector<BearingContact> draw_bearing(const std::vector<GripContact>& contacts,
-                                         const GripperFingers& fingers,
-                                         const EngagementOptions& options,
+                                         const Gripper& gripper, const EngagementOptions& options,
                                          libmap::RandomStream& random);
 
 }  // namespace libgtd

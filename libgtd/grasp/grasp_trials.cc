@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <tuple>
 
@@ -50,6 +51,26 @@ ApproachPose draw_pose(std::uint64_t key, const Gripper& gripper, const GraspOpt
     tilt = options.tilt_deg * libmap::radians_per_degree * normal();
   return pose;
 }
+
+// The parameter sets of the trials, each with a gripper of these parameters.
+struct TrialParameters {
+  std::vector<ParameterSet> sets;
+  std::vector<Gripper> grippers;
+
+  TrialParameters(const Gripper& gripper, const GraspOptions& options)
+      : sets(options.ensemble ? parameter_sets(gripper)
+                              : std::vector<ParameterSet>{{1.0, parameters_of(gripper)}}) {
+    for (const ParameterSet& set : sets) grippers.push_back(with_parameters(gripper, set.values));
+  }
+
+  // The same for the same trial, whatever trials are made: two steps of Roberts' sequence of two
+  // dimensions, in proportion to the weights.
+  std::size_t set_of(std::uint64_t key, int pose, int draw) const {
+    const double at =
+        libmap::unit_noise(key, 5) + 0.7548776662466927 * pose + 0.5698402909980532 * draw;
+    return set_at(sets, at - std::floor(at));
+  }
+};
 
 // What all trials of one location share: poses, and the ground around it that these may meet.
 class Site {
@@ -122,7 +143,7 @@ std::vector<BearingContact> draw_asperities(const ClosedGripper& closed, const S
   const std::uint64_t number =
       (static_cast<std::uint64_t>(pose) << 32U) | (static_cast<std::uint64_t>(draw) + 1);
   libmap::RandomStream random(options.seed, libmap::mix_bits(~site.key(), number));
-  return draw_bearing(closed.contacts, *gripper.fingers, options.engagement, random);
+  return draw_bearing(closed.contacts, gripper, options.engagement, random);
 }
 
 TrialEnd end_of(const ClosedGripper& closed, std::size_t bearing, double force_n,
@@ -173,9 +194,9 @@ struct PoseTrials {
 // All trials of one location, made in rounds.
 class LocationTrials {
  public:
-  LocationTrials(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
-                 const GraspOptions& options)
-      : site_(ground, gripper, location, options), gripper_(gripper), options_(options) {
+  LocationTrials(const Ground& ground, const Gripper& gripper, const TrialParameters& parameters,
+                 const Eigen::Vector3d& location, const GraspOptions& options)
+      : site_(ground, gripper, location, options), parameters_(parameters), options_(options) {
     result_.location = location;
   }
 
@@ -226,15 +247,20 @@ class LocationTrials {
 
   void draw(int number, int draws) {
     PoseTrials& pose = poses_[static_cast<std::size_t>(number)];
-    const HoldingOptions equally = holding_of(pose.closed, gripper_, SpineSharing::equally);
-    const HoldingOptions best = holding_of(pose.closed, gripper_, SpineSharing::best);
     for (int n = static_cast<int>(pose.forces.size()); n < draws; ++n) {
-      const auto bearing = draw_asperities(pose.closed, site_, gripper_, options_, number, n);
+      const std::size_t set = parameters_.set_of(site_.key(), number, n);
+      const Gripper& gripper = parameters_.grippers[set];
+      const HoldingOptions equally = holding_of(pose.closed, gripper, SpineSharing::equally);
+      const auto bearing = draw_asperities(pose.closed, site_, gripper, options_, number, n);
       const LeastForce least = least_holding_force(bearing, equally, pose.guess);
       pose.guess = least.direction;
       pose.forces.push_back(least.force_n);
       if (n < options_.best_draws)
-        best_forces_.push_back(least_holding_force(bearing, best, pose.guess).force_n);
+        best_forces_.push_back(
+            least_holding_force(bearing, holding_of(pose.closed, gripper, SpineSharing::best),
+                                pose.guess)
+                .force_n);
+      if (least.force_n > 0.0) log_forces_[set].push_back(std::log(least.force_n));
       if (options_.pull_limits) add_pulls(bearing, equally);
       if (least.force_n > 0.0) ++limiting_[least.direction];
       ++result_.ends[static_cast<std::size_t>(
@@ -248,14 +274,44 @@ class LocationTrials {
   }
 
   Site site_;
-  const Gripper& gripper_;
+  const TrialParameters& parameters_;
   const GraspOptions& options_;
   LocationResult result_;
   std::vector<PoseTrials> poses_;
   std::vector<double> best_forces_;
+  std::vector<std::vector<double>> log_forces_{parameters_.sets.size()};  // by set; of forces > 0
   std::vector<std::size_t> limiting_ = std::vector<std::size_t>(pull_directions().size(), 0);
   std::vector<std::vector<double>> pulls_{pull_directions().size()};  // of all trials
 };
+
+// Analysis of variance of one factor, groups of unlike sizes.
+void find_spreads(const std::vector<std::vector<double>>& groups, LocationResult& result) {
+  double count = 0.0;
+  double sum = 0.0;
+  double within = 0.0;
+  double squares = 0.0;  // of the groups' sizes
+  double groups_used = 0.0;
+  double between = 0.0;
+  for (const std::vector<double>& group : groups) {
+    if (group.empty()) continue;
+    const auto size = static_cast<double>(group.size());
+    const double mean = std::accumulate(group.begin(), group.end(), 0.0) / size;
+    for (const double value : group) within += (value - mean) * (value - mean);
+    // The mean of all so far moves by this group (Chan et al. 1979).
+    if (count > 0.0)
+      between += (mean - sum / count) * (mean - sum / count) * count * size / (count + size);
+    count += size;
+    sum += size * mean;
+    squares += size * size;
+    groups_used += 1.0;
+  }
+  const double within_mean = count > groups_used ? within / (count - groups_used) : 0.0;
+  result.trial_spread = std::sqrt(within_mean);
+  if (groups_used < 2.0) return;
+  const double size = (count - squares / count) / (groups_used - 1.0);
+  result.parameter_spread =
+      std::sqrt(std::max(0.0, between / (groups_used - 1.0) - within_mean) / size);
+}
 
 LocationResult LocationTrials::result() && {
   LocationResult& result = result_;
@@ -277,7 +333,11 @@ LocationResult LocationTrials::result() && {
                           [&](double force) { return force >= load * options.safety; })) /
         static_cast<double>(result.trials));
   result.force_n = quantiles(forces);
+  std::vector<double> sorted = forces;
+  std::sort(sorted.begin(), sorted.end());
+  result.force_range_n = {sorted_quantile(sorted, 0.05), sorted_quantile(sorted, 0.95)};
   result.best_force_n = quantiles(best_forces_);
+  find_spreads(log_forces_, result);
   result.limiting_direction = static_cast<std::size_t>(
       std::max_element(limiting_.begin(), limiting_.end()) - limiting_.begin());
   result.has_force = limiting_[result.limiting_direction] > 0;
@@ -295,8 +355,9 @@ LocationResult LocationTrials::result() && {
 }
 
 LocationResult test_location(const Ground& ground, const Gripper& gripper,
-                             const Eigen::Vector3d& location, const GraspOptions& options) {
-  LocationTrials trials(ground, gripper, location, options);
+                             const TrialParameters& parameters, const Eigen::Vector3d& location,
+                             const GraspOptions& options) {
+  LocationTrials trials(ground, gripper, parameters, location, options);
   for (const SequentialRound& round : sequential_rounds(options)) {
     trials.go_on(round);
     if (options.sequential && trials.is_clear()) break;
@@ -325,12 +386,6 @@ void GraspOptions::check() const {
       throw libmap::Error(
           "out of range",
           {.field = "more_loads_n", .value = libmap::to_text(load), .bound = "> 0"});
-  if (engagement.asperity_min_deg > engagement.asperity_max_deg)
-    throw libmap::Error(
-        "is beyond the largest lean",
-        {.field = "asperity_min_deg",
-         .value = libmap::to_text(engagement.asperity_min_deg),
-         .bound = "<= asperity_max_deg, " + libmap::to_text(engagement.asperity_max_deg)});
 }
 
 void bind(libmap::ParameterTable& table, GraspOptions& options) {
@@ -350,6 +405,9 @@ void bind(libmap::ParameterTable& table, GraspOptions& options) {
   table.add("tilt_deg", options.tilt_deg, {0.0, 15.0}, "standard deviation of the palm's tilt");
   table.add("max_distance_m", options.max_distance_m, positive,
             "largest distance of a location from the mesh, m");
+  table.add("ensemble", options.ensemble,
+            "trials take turns over the parameter sets of the gripper; else all have its middle "
+            "parameters");
   bind(table, options.closing);
   bind(table, options.engagement);
   bind(table, options.surface);
@@ -392,11 +450,12 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
   gripper.check();
   finger_geometry(gripper);  // throws without fingers
   require_ground(ground, locations, options.max_distance_m);
+  const TrialParameters parameters(gripper, options);
   std::vector<LocationResult> results(locations.size());
   progress.begin("grasp", locations.size());
   libmap::parallel_for(locations.size(), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) {
-      results[n] = test_location(ground, gripper, locations[n], options);
+      results[n] = test_location(ground, gripper, parameters, locations[n], options);
       progress.advance(1);
     }
   });
@@ -411,9 +470,11 @@ Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Ve
   Trial trial;
   trial.mesh_from_patch = site.patch().mesh_from_patch;
   trial.gripper = site.close(static_cast<std::size_t>(pose));
-  trial.bearing = draw_asperities(trial.gripper, site, gripper, options, pose, draw);
+  const TrialParameters parameters(gripper, options);
+  const Gripper& drawn = parameters.grippers[parameters.set_of(site.key(), pose, draw)];
+  trial.bearing = draw_asperities(trial.gripper, site, drawn, options, pose, draw);
   const LeastForce least =
-      least_holding_force(trial.bearing, holding_of(trial.gripper, gripper, SpineSharing::equally));
+      least_holding_force(trial.bearing, holding_of(trial.gripper, drawn, SpineSharing::equally));
   trial.force_n = least.force_n;
   trial.direction = least.direction;
   trial.end = end_of(trial.gripper, trial.bearing.size(), least.force_n, options);

@@ -39,6 +39,8 @@ struct GraspOptions {
   double offset_m = 0.005;       // standard deviation of the palm's place, each of x and y
   double tilt_deg = 3.0;         // standard deviation of its tilt, about each of x and y
   double max_distance_m = 0.05;  // of a location from the ground
+  // Trials take turns over parameter_sets(gripper); else all have the gripper file's parameters.
+  bool ensemble = true;
   ClosingOptions closing;
   EngagementOptions engagement;
   SurfaceErrorOptions surface;  // of a ground with errors: each pose is on a surface drawn anew
@@ -76,6 +78,11 @@ struct LocationResult {
   std::array<double, 3> best_force_n{};    // the same of the best sharing
   std::size_t limiting_direction = 0;      // most often the weakest; of trials with any force
   bool has_force = false;                  // some trial has one
+  std::array<double, 2> force_range_n{};   // quantiles 0.05 and 0.95 of the trials
+  // Standard deviations of ln(force) of trials with a force (analysis of variance): between trials
+  // of one parameter set, and between the sets.
+  double trial_spread = 0.0;
+  double parameter_spread = 0.0;
   // Of each of pull_directions(): the pull that nine of ten trials hold (equal sharing), N.
   std::vector<double> pull_limits_n;
   // Means over the poses.

@@ -8,7 +8,7 @@
 #include <numbers>
 #include <utility>
 
-#include "libgtd/grasp/cloned_loops.h"
+#include "libgtd/gripper/cloned_loops.h"
 
 namespace libgtd {
 

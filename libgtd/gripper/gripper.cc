@@ -1,7 +1,9 @@
 #include "libgtd/gripper/gripper.h"
-#include "libmap/core/error.h"
 
-#include <cmath>
+#include <algorithm>
+#include <tuple>
+
+#include "libmap/core/error.h"
 
 namespace libgtd {
 
@@ -43,6 +45,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
 void Gripper::check() const {
   libmap::check_parameters(*this);
   if (fingers) fingers->check();
+  engagement.check();
   if (closing_angle_deg >= opening_angle_deg)
     throw libmap::Error("the fingers close inward",
                         {.field = "closing_angle_deg",
@@ -78,22 +81,42 @@ void GripperFingers::check() const {
                          .bound = ">= fingers.curl_deg, " + libmap::to_text(curl_deg)});
 }
 
-double HoldModel::probability(const ClosingTerms& terms) const {
-  return 1.0 / (1.0 + std::exp(-(intercept + contact * terms.contact + bearing * terms.bearing -
-                                 rise * terms.rise - depth * terms.depth)));
+void require_fingers(const Gripper& gripper) {
+  if (!gripper.fingers)
+    throw libmap::Error("missing: forces need it, method corrected does not", {.field = "fingers"});
 }
 
-void bind(libmap::ParameterTable& table, HoldModel& model) {
-  using libmap::not_negative;
-  table.add("hold_model.load_n", model.load_n, libmap::positive, "pull that the model is for, N");
-  table.add("hold_model.intercept", model.intercept, {-100.0, 100.0}, "logit without any term");
-  table.add("hold_model.contact", model.contact, not_negative,
-            "weight of the share of fingers whose spines meet the ground");
-  table.add("hold_model.bearing", model.bearing, not_negative, "weight of what these bear");
-  table.add("hold_model.rise", model.rise, not_negative,
-            "weight of the palm's height above the voxel");
-  table.add("hold_model.depth", model.depth, not_negative,
-            "weight of the depth of the contacts below the palm");
+ParameterValues parameters_of(const Gripper& gripper) {
+  const Engagement& its = gripper.engagement;
+  return {gripper.fingers->spine_force_limit_n,
+          gripper.fingers->closing_force_n,
+          its.friction,
+          its.asperity_min_deg,
+          its.asperity_max_deg,
+          its.engagement_rate};
+}
+
+Gripper with_parameters(Gripper gripper, const ParameterValues& values) {
+  std::tie(gripper.fingers->spine_force_limit_n, gripper.fingers->closing_force_n,
+           gripper.engagement.friction, gripper.engagement.asperity_min_deg,
+           gripper.engagement.asperity_max_deg, gripper.engagement.engagement_rate) =
+      std::tuple_cat(values);
+  return gripper;
+}
+
+std::vector<ParameterSet> parameter_sets(const Gripper& gripper) {
+  if (!gripper.ensemble.empty()) return gripper.ensemble;
+  const ParameterValues middle = parameters_of(gripper);
+  const bool is_known = std::none_of(gripper.ranges.begin(), gripper.ranges.end(),
+                                     [](const auto& range) { return range.has_value(); });
+  if (is_known) return {{.weight = 1.0, .values = middle}};
+  constexpr std::size_t count = 64;
+  constexpr std::uint64_t seed = 1;
+  std::vector<ParameterSet> sets;
+  for (const ParameterValues& quantiles : low_discrepancy_quantiles(count, seed))
+    sets.push_back(
+        {.weight = 1.0 / count, .values = prior_values(gripper.ranges, middle, quantiles)});
+  return sets;
 }
 
 }  // namespace libgtd

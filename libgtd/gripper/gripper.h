@@ -3,37 +3,12 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
+#include "libgtd/gripper/engagement.h"
 #include "libmap/core/parameters.h"
 
 namespace libgtd {
-
-// What the open and closing fingers meet around a voxel of a map; see libgtd/score/closing_terms.h.
-struct ClosingTerms {
-  double contact = 0.0;  // share of the azimuths, on the weakest side, where spines meet the ground
-  double bearing = 0.0;  // ln(1 + F / P) of the pull F that they bear there, on the weakest side
-  double rise = 0.0;     // of the palm above the voxel, in lengths of a finger
-  double depth = 0.0;    // of the contacts below the palm, mean, in lengths of a finger
-};
-
-// The section `hold_model` of a gripper file, which method `calibrated` needs: the probability that
-// the gripper holds. Logistic regression: ln(p / (1 - p)) = intercept + contact * C + bearing * B -
-// rise * R - depth * D, fitted to verdicts of the virtual field test for one load. More contact and
-// more bearing never lower the probability, more rise and depth never raise it.
-struct HoldModel {
-  double load_n = 0.0;
-  double intercept = 0.0;
-  double contact = 0.0;
-  double bearing = 0.0;
-  double rise = 0.0;
-  double depth = 0.0;
-
-  // In 0 .. 1, that the load is held.
-  double probability(const ClosingTerms& terms) const;
-};
-
-// The keys "hold_model.KEY" of a gripper file, bound to `model`.
-void bind(libmap::ParameterTable& table, HoldModel& model);
 
 // The section `fingers` of a gripper file: what the virtual field test (libgtd/grasp) needs beyond
 // the measures of the mask.
@@ -69,8 +44,10 @@ struct Gripper {
   double closing_height_mm = 0.0;         // palm to spine tips, closed
   double top_solid_margin_mm = 0.0;       // added to the palm's diameter on top of the mask
   double bottom_void_margin_mm = 0.0;     // taken off the radius of the void at the bottom
-  std::optional<GripperFingers> fingers;  // none: there is no virtual field test of it
-  std::optional<HoldModel> hold_model;    // none: method `calibrated` is not for it
+  std::optional<GripperFingers> fingers;  // none: forces are unknown
+  Engagement engagement;
+  ParameterRanges ranges;              // prior of the uncertain parameters
+  std::vector<ParameterSet> ensemble;  // fitted to pull tests; empty: the prior holds
 
   // Throws Error naming the field, its value and the bound that it breaks, also between fields:
   // the closing angle lies below the opening angle.
@@ -79,5 +56,16 @@ struct Gripper {
 
 // The keys of a gripper file but those of its sections, bound to `gripper`.
 void bind(libmap::ParameterTable& table, Gripper& gripper);
+
+// Throws Error if the gripper has no `fingers`: forces need them.
+void require_fingers(const Gripper& gripper);
+
+// The uncertain parameters of a gripper with `fingers`, and a gripper with other ones.
+ParameterValues parameters_of(const Gripper& gripper);
+Gripper with_parameters(Gripper gripper, const ParameterValues& values);
+
+// The sets over which forces are predicted: the fitted ensemble; else 64 sets of the prior, of
+// equal weights, the same for the same file; without ranges the gripper's own parameters alone.
+std::vector<ParameterSet> parameter_sets(const Gripper& gripper);
 
 }  // namespace libgtd

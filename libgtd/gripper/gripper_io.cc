@@ -1,6 +1,8 @@
 #include "libgtd/gripper/gripper_io.h"
 
 #include <algorithm>
+#include <array>
+#include <sstream>
 
 #include "libgtd/gripper/gripper_urdf.h"
 #include "libmap/core/data_folder.h"
@@ -22,18 +24,66 @@ void require_all_keys(const libmap::ParameterTable& table, const std::vector<std
 struct GripperKeys {
   Gripper gripper;
   GripperFingers fingers;
-  HoldModel hold_model;
+  std::array<std::string, uncertain_parameters> ranges;
+  std::string sets;
   UrdfMapping urdf;
 
   libmap::ParameterTable all() {
     libmap::ParameterTable table;
     bind(table, gripper);
     bind(table, fingers);
-    bind(table, hold_model);
     bind(table, urdf);
+    bind_engagement(table);
     return table;
   }
+
+  void bind_engagement(libmap::ParameterTable& table) {
+    bind(table, gripper.engagement);
+    for (std::size_t n = 0; n < uncertain_parameters; ++n)
+      table.add("ranges." + uncertain_parameter_names()[n], ranges[n],
+                "bounds of the parameter's prior: LOW, HIGH");
+    table.add("ensemble.sets", sets,
+              "parameter sets, a line each: weight and the uncertain parameters");
+  }
 };
+
+std::optional<ParameterRange> parse_range(const std::string& name, const std::string& text) {
+  if (text.empty()) return std::nullopt;
+  const std::vector<std::string> parts = libmap::split_list(text);
+  const auto low = libmap::parse_double(parts.front());
+  const auto high = libmap::parse_double(parts.back());
+  const bool is_angle = name.ends_with("_deg");
+  if (parts.size() == 2 && low && high && *low <= *high && (is_angle ? *low >= 0.0 : *low > 0.0) &&
+      (!is_angle || *high <= 90.0))
+    return ParameterRange{*low, *high};
+  throw libmap::Error("is no range", {.field = "ranges." + name,
+                                      .value = text,
+                                      .bound = is_angle ? "LOW, HIGH within 0 and 90 degrees"
+                                                        : "LOW, HIGH above 0"});
+}
+
+std::vector<ParameterSet> parse_sets(const std::string& text) {
+  std::vector<ParameterSet> sets;
+  std::istringstream lines(text);
+  double sum = 0.0;
+  for (std::string line; std::getline(lines, line);) {
+    std::istringstream cells(line);
+    ParameterSet set;
+    cells >> set.weight;
+    for (double& value : set.values) cells >> value;
+    const bool is_whole = !cells.fail() && (cells >> std::ws).eof();
+    if (!is_whole || !(set.weight >= 0.0))
+      throw libmap::Error(
+          "is no parameter set",
+          {.field = "ensemble.sets", .value = line, .bound = "a weight >= 0 and six values"});
+    sum += set.weight;
+    sets.push_back(set);
+  }
+  if (!sets.empty() && !(sum > 0.0))
+    throw libmap::Error("has no weight", {.field = "ensemble.sets", .bound = "> 0 in sum"});
+  for (ParameterSet& set : sets) set.weight /= sum;
+  return sets;
+}
 
 bool has_section(const std::vector<std::string>& given, const std::string& section) {
   return std::any_of(given.begin(), given.end(),
@@ -80,12 +130,16 @@ Gripper parse_gripper(const std::string& yaml, const std::string& file,
     libmap::ParameterTable present;
     bind(present, gripper);
     if (has_section(given, "fingers")) bind(present, keys.fingers);
-    if (has_section(given, "hold_model")) bind(present, keys.hold_model);
     require_all_keys(present, given);
+    keys.bind_engagement(present);
     for (const auto& [key, value] : overrides) present.set(key, value);
     if (has_section(given, "fingers")) gripper.fingers = keys.fingers;
-    if (has_section(given, "hold_model")) gripper.hold_model = keys.hold_model;
+    for (std::size_t n = 0; n < uncertain_parameters; ++n)
+      gripper.ranges[n] = parse_range(uncertain_parameter_names()[n], keys.ranges[n]);
+    gripper.ensemble = parse_sets(keys.sets);
     gripper.check();
+    for (const ParameterSet& set : gripper.ensemble)
+      if (gripper.fingers) with_parameters(gripper, set.values).check();
   } catch (const libmap::Error& error) {
     throw error.in_file(file);
   }
@@ -96,6 +150,43 @@ Gripper read_gripper(const std::filesystem::path& path,
                      const std::vector<std::pair<std::string, std::string>>& overrides) {
   return parse_gripper(libmap::read_whole_file(path, std::uint64_t{1} << 20), path.string(),
                        overrides);
+}
+
+std::string to_yaml(const Gripper& gripper) {
+  GripperKeys keys;
+  keys.gripper = gripper;
+  libmap::ParameterTable measures;
+  bind(measures, keys.gripper);
+  std::string text = libmap::to_yaml(measures);
+  const auto add_section = [&](const std::string& name, const libmap::ParameterTable& table) {
+    text += name + ":\n";
+    for (const auto& [key, value] : table.values())
+      text += "  " + key.substr(name.size() + 1) + ": " + value + "\n";
+  };
+  libmap::ParameterTable section;
+  if (gripper.fingers) {
+    keys.fingers = *gripper.fingers;
+    bind(section, keys.fingers);
+    add_section("fingers", section);
+  }
+  section = {};
+  bind(section, keys.gripper.engagement);
+  add_section("engagement", section);
+  text += "ranges:\n";
+  for (std::size_t n = 0; n < uncertain_parameters; ++n)
+    if (const auto& range = gripper.ranges[n])
+      text += "  " + uncertain_parameter_names()[n] + ": " + libmap::to_text(range->low) + ", " +
+              libmap::to_text(range->high) + "\n";
+  if (gripper.ensemble.empty()) return text;
+  text += "ensemble:  # weight";
+  for (const std::string& name : uncertain_parameter_names()) text += ", " + name;
+  text += "\n  sets: |\n";
+  for (const ParameterSet& set : gripper.ensemble) {
+    text += "    " + libmap::to_text(set.weight);
+    for (const double value : set.values) text += " " + libmap::to_text(value);
+    text += "\n";
+  }
+  return text;
 }
 
 std::vector<std::filesystem::path> gripper_files(const std::filesystem::path& path) {

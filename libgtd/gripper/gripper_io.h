@@ -1,5 +1,5 @@
-// Gripper files: a YAML map of measures and optional sections `fingers`, `hold_model` and `urdf`,
-// see data/README.md.
+// Gripper files: a YAML map of measures and optional sections `fingers`, `engagement`, `ranges`,
+// `ensemble` and `urdf`; see data/README.md.
 #pragma once
 
 #include <filesystem>
@@ -20,6 +20,9 @@ Gripper read_gripper(const std::filesystem::path& path,
 // The same of the text of such a file, called `file` in errors; its folder is that of the URDF.
 Gripper parse_gripper(const std::string& yaml, const std::string& file,
                       const std::vector<std::pair<std::string, std::string>>& overrides = {});
+
+// The gripper as the text of a file, without the section `urdf`.
+std::string to_yaml(const Gripper& gripper);
 
 // The gripper of this name in the toolkit's data (libmap::find_data_file), or of a file.
 Gripper find_gripper(const std::string& name,

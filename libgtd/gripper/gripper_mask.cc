@@ -211,24 +211,7 @@ GripperMask make_corrected(const Gripper& gripper, const GripperMaskOptions& opt
   return mask;
 }
 
-constexpr double friction = 0.39;
 constexpr double degree = libmap::radians_per_degree;
-
-// Mean over the leans of facets.
-double mean_pull_n(double fall_deg, const GripperFingers& fingers) {
-  const double most = fingers.spines_per_finger * fingers.spine_force_limit_n;
-  const double phi = std::atan(friction);
-  constexpr int leans = 91;
-  double sum = 0.0;
-  for (int psi = 0; psi < leans; ++psi) {
-    const double angle = (fall_deg + psi - 90.0) * degree + phi;
-    if (angle <= 0.0) continue;
-    sum += angle < std::numbers::pi / 2.0
-               ? std::min(most, fingers.closing_force_n * std::tan(angle))
-               : most;
-  }
-  return sum / leans;
-}
 
 }  // namespace
 
@@ -265,7 +248,7 @@ GripperMask make_mask(const Gripper& gripper, const GripperMaskOptions& options)
   GripperMask mask = make_corrected(gripper, options);
   mask.method = Method::corrected;
   if (options.method == Method::calibrated)
-    mask.closing = make_closing_path(gripper, options.voxel_size_m);
+    mask.closing = make_closing_path(gripper, options.voxel_size_m, options.load_n);
   return mask;
 }
 
@@ -334,18 +317,13 @@ double ClosingPath::reach_m() const {
   return reach;
 }
 
-void require_hold_model(const Gripper& gripper) {
-  for (const auto& [section, is_there] : {std::pair{"fingers", gripper.fingers.has_value()},
-                                          {"hold_model", gripper.hold_model.has_value()}})
-    if (!is_there)
-      throw libmap::Error("missing: method calibrated needs it, corrected does not",
-                          {.field = section});
-}
-
-ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
-  require_hold_model(gripper);
+ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, double load_n) {
+  require_fingers(gripper);
   ClosingPath path;
-  path.model = *gripper.hold_model;
+  path.load_n = load_n;
+  path.sets = parameter_sets(gripper);
+  path.pulls = finger_pulls(gripper, path.sets);
+  path.reference = finger_pulls(gripper, {{.weight = 1.0, .values = parameters_of(gripper)}});
   path.palm_radius_m = 0.0005 * gripper.palm_diameter_mm;
   const double joint = 0.0005 * gripper.finger_joint_diameter_mm;
   const double proximal = 0.001 * gripper.finger_length_mm;
@@ -374,9 +352,6 @@ ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m) {
     const double along = path.finger_length_m * n / parts;
     path.open.push_back(place(opening, std::min(along, proximal), std::max(0.0, along - proximal)));
   }
-  for (std::size_t n = 0; n < path.bearing.size(); ++n)
-    path.bearing[n] = std::log1p(mean_pull_n(static_cast<double>(n) - 90.0, *gripper.fingers) /
-                                 gripper.fingers->closing_force_n);
   return path;
 }
 

@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "libgtd/gripper/finger_pull.h"
 #include "libgtd/gripper/gripper.h"
 #include "libmap/core/point_cloud.h"
 
@@ -28,27 +29,22 @@ struct ClosingPath {
   std::vector<Place> closing;
   std::vector<Place> open;  // of the open finger, from joint to tip
   double palm_radius_m = 0.0;
-  double finger_length_m = 0.0;  // both links
-  // ln(1 + F / P) of a finger of closing force P on ground that falls outward by -90 .. 90 degrees:
-  // F is the mean over the leans psi of facets, uniform in 0 .. 90 degrees, of
-  // min(P tan(fall + psi + phi - 90 deg), what all its spines bear), phi = atan 0.39 (Chen et al.
-  // 2024).
-  std::array<double, 181> bearing{};
-  HoldModel model;
+  double finger_length_m = 0.0;    // both links
+  double load_n = 0.0;             // whose hold probability is asked for
+  std::vector<ParameterSet> sets;  // over which forces are predicted
+  FingerPulls pulls;               // of these
+  FingerPulls reference;           // of the gripper file's own parameters
 
   double reach_m() const;  // the largest radius
 };
 
-// Throws Error naming the section that the gripper does not have: `fingers` or `hold_model`.
-void require_hold_model(const Gripper& gripper);
-
-// Throws as require_hold_model.
-ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m);
+// Throws Error if the gripper has no `fingers`.
+ClosingPath make_closing_path(const Gripper& gripper, double voxel_size_m, double load_n);
 
 // thesis: the author's program (eq. 3-6..3-16). envelope: its alternative design (5.1), in which
 // what the fingers cannot reach is not counted. climblab: the base of both. corrected: the idea of
 // `thesis` with an odd side, centered on the pivot's voxel, radii not rounded. calibrated: the mask
-// of `corrected`, and a score that is the probability to hold (HoldModel).
+// of `corrected`, and a score that is the probability to hold the load (closing_force.h).
 enum class Method { thesis, envelope, climblab, corrected, calibrated };
 
 const std::vector<std::pair<std::string, Method>>& method_names();
@@ -58,6 +54,7 @@ struct GripperMaskOptions {
   Method method = Method::corrected;
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;  // H_add; ClimbLab's mask has none
+  double load_n = 10.0;       // of method calibrated
 };
 
 // side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; the layers with

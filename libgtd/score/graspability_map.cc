@@ -78,11 +78,16 @@ PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame) {
   add("k", ScalarType::int32, [](const MapVoxel& one) { return one.voxel.k; });
   if (map.content.falling_shares)
     add("falling_share", ScalarType::float32, [](const auto& one) { return one.falling_share; });
-  if (map.content.terms) {
-    add("closing_contact", ScalarType::float32, [](const auto& one) { return one.terms.contact; });
-    add("closing_bearing", ScalarType::float32, [](const auto& one) { return one.terms.bearing; });
-    add("closing_rise", ScalarType::float32, [](const auto& one) { return one.terms.rise; });
-    add("closing_depth", ScalarType::float32, [](const auto& one) { return one.terms.depth; });
+  if (map.content.forces) {
+    const auto add_force = [&](const char* name, float ForceEstimate::*value) {
+      add(name, ScalarType::float32, [value](const MapVoxel& one) { return one.force.*value; });
+    };
+    add_force("hold_probability", &ForceEstimate::hold_probability);
+    add_force("holding_force_n", &ForceEstimate::median_n);
+    add_force("holding_force_low_n", &ForceEstimate::low_n);
+    add_force("holding_force_high_n", &ForceEstimate::high_n);
+    add_force("trial_spread", &ForceEstimate::trial_spread);
+    add_force("parameter_spread", &ForceEstimate::parameter_spread);
   }
   if (map.content.slopes)
     add("slope_deg", ScalarType::float32, [](const MapVoxel& one) { return one.slope_deg; });

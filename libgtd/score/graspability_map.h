@@ -18,7 +18,7 @@ struct MapVoxel {
   bool graspable = false;  // score, zero plane and, if it was evaluated, convexity say yes
   bool border = false;     // the mask's window leaves the scanned area
   Obstacle obstacle = Obstacle::none;
-  ClosingTerms terms{};                               // of method calibrated
+  ForceEstimate force{};                              // of method calibrated
   double falling_share = 1.0;                         // of method corrected, upright masks
   float slope_deg = 0.0F;                             // of the surface, as SurfaceNormal
   Eigen::Vector3f normal = Eigen::Vector3f::UnitZ();  // in the terrain frame: the mask's axis
@@ -28,7 +28,7 @@ struct MapVoxel {
 struct MapContent {
   bool normals = false;         // the mask was tilted
   bool slopes = false;          // obstacles are evaluated
-  bool terms = false;           // the method is calibrated
+  bool forces = false;          // the method is calibrated
   bool falling_shares = false;  // the method is corrected, its masks upright
   bool obstacles = false;       // and the whole map is there to evaluate them
 };
@@ -49,8 +49,9 @@ const std::vector<std::pair<std::string, MapFrame>>& map_frame_names();
 // fields score, ssv, gsv, convex, graspable, border and the voxel's i, j, k on the lattice. As the
 // content says: the mask's axis as the point's normal, from which the gripper comes; the fields
 // slope_deg and obstacle (the number of an Obstacle); falling_share, by which a score of method
-// `corrected` is multiplied; the ClosingTerms closing_contact, closing_bearing, closing_rise and
-// closing_depth.
+// `corrected` is multiplied; the ForceEstimate as hold_probability (the score again),
+// holding_force_n (median), holding_force_low_n, holding_force_high_n, trial_spread and
+// parameter_spread.
 libmap::PointCloud to_cloud(const GraspabilityMap& map, MapFrame frame);
 
 // Evaluates the obstacles of a map that has slopes, once all of it is there: sets each point's

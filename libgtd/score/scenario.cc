@@ -1,5 +1,7 @@
 #include "libgtd/score/scenario.h"
 
+#include <limits>
+
 #include "libmap/core/error.h"
 
 namespace libgtd {
@@ -22,13 +24,16 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
             "void layers on top of the gripper mask (H_add), voxels");
   table.add("solid_voxel_threshold", scenario.solid_voxel_threshold, {1, 2147483647},
             "fewer solid voxels around a pivot lower its score (TSV)");
+  table.add("load_n", scenario.load_n, positive,
+            "pull in any direction whose hold probability method calibrated predicts, N");
   table.add("zero_plane_m", scenario.zero_plane_m, libmap::any_number,
-            "height in the terrain frame below which nothing is a target, m");
+            "height in the terrain frame below which nothing is a target, m; auto: 0, with method "
+            "calibrated none");
   table.add("interpolation", scenario.interpolation, "fill gaps by Delaunay interpolation");
   table.add("interpolation_max_edge_m", scenario.interpolation_max_edge_m, not_negative,
             "longest edge of a triangle that is filled, m; 0 for no limit");
   table.add("graspability_threshold", scenario.graspability_threshold, libmap::zero_to_one,
-            "least score of a graspable voxel");
+            "least score of a graspable voxel; auto: 0.8, with method calibrated 0.5");
   table.add("curvature_radius_m", scenario.curvature_radius_m, not_negative,
             "radius in which curvature is measured, m; 0: convexity is not evaluated");
   table.add("intersection_distance_m", scenario.intersection_distance_m, positive,
@@ -43,6 +48,27 @@ void bind(libmap::ParameterTable& table, Scenario& scenario) {
             "slope beyond which a face is steep, degrees; 0: not evaluated");
   table.add("tile_size_m", scenario.tile_size_m, positive, "edge of a tile, m");
   table.add_overrides("gripper", scenario.gripper_overrides);
+}
+
+double Scenario::lowest_target_m() const {
+  return zero_plane_m.value_or(
+      method == Method::calibrated ? -std::numeric_limits<double>::infinity() : 0.0);
+}
+
+double Scenario::score_threshold() const {
+  return graspability_threshold.value_or(method == Method::calibrated ? 0.5 : 0.8);
+}
+
+void Scenario::set_defaults() {
+  graspability_threshold = score_threshold();
+  if (method != Method::calibrated) zero_plane_m = lowest_target_m();
+}
+
+GripperMaskOptions mask_options(const Scenario& scenario) {
+  return {.method = scenario.method,
+          .voxel_size_m = scenario.voxel_size_m,
+          .extra_void_layers = scenario.extra_void_layers,
+          .load_n = scenario.load_n};
 }
 
 void Scenario::check() const {

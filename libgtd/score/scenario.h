@@ -1,6 +1,7 @@
 // One set of parameters of a detection, as a scenario file gives it (tab. B 2-1 of the thesis).
 #pragma once
 
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -22,10 +23,14 @@ struct Scenario {
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;        // H_add
   int solid_voxel_threshold = 120;  // TSV
-  double zero_plane_m = 0.0;        // height in the terrain frame; what lies below is no target
+  double load_n = 10.0;             // of method calibrated: the pull whose hold probability counts
+  // Height in the terrain frame; ground below it is no target. Nothing: 0, or with method
+  // calibrated, which has a force for level ground too, no limit.
+  std::optional<double> zero_plane_m;
   bool interpolation = false;
   double interpolation_max_edge_m = 0.0;  // 0: no limit
-  double graspability_threshold = 0.8;
+  // Nothing: 0.8, or 0.5 with method calibrated.
+  std::optional<double> graspability_threshold;
   double curvature_radius_m = 0.09;  // 0: convexity is not evaluated
   double intersection_distance_m = 0.01;
   Orientation orientation = Orientation::plane;
@@ -36,6 +41,10 @@ struct Scenario {
   double obstacle_slope_deg = 60.0;  // steeper than this is steep; 0: not evaluated
   double tile_size_m = 1.0;
 
+  double lowest_target_m() const;
+  double score_threshold() const;
+  // Sets what is nothing where it has a value, so that files of parameters state it.
+  void set_defaults();
   bool evaluates_obstacles() const { return obstacle_height_m > 0.0 && obstacle_slope_deg > 0.0; }
   bool fits_normals() const { return orientation == Orientation::surface || evaluates_obstacles(); }
 
@@ -43,6 +52,8 @@ struct Scenario {
   // that prepares the cloud as the author's program does, on a lattice of its own.
   void check() const;
 };
+
+GripperMaskOptions mask_options(const Scenario& scenario);
 
 // The keys of a scenario file, bound to `scenario`; "gripper.KEY" overrides a gripper's measure.
 void bind(libmap::ParameterTable& table, Scenario& scenario);

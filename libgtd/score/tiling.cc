@@ -4,7 +4,6 @@
 #include <map>
 #include <utility>
 
-#include "libgtd/score/closing_terms.h"
 #include "libgtd/score/scanned_area.h"
 #include "libgtd/score/voxel_matching.h"
 #include "libmap/core/error.h"
@@ -113,10 +112,10 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
     if (flags[at] != 0) pivots.push_back(at);
   const std::vector<VoxelCounts> counts =
       match_voxels(grid, mask, pivots, options.instructions, progress);
-  std::vector<ClosingTerms> terms;
+  std::vector<ForceEstimate> forces;
   std::vector<double> shares;  // of method corrected
   if (mask.closing)
-    terms = closing_terms(grid, *mask.closing, pivots);
+    forces = closing_forces(grid, *mask.closing, pivots);
   else if (mask.method == Method::corrected)
     shares = outward_shares(grid, mask, pivots);
   std::vector<ScoredVoxel> scored(pivots.size());
@@ -126,8 +125,8 @@ std::vector<ScoredVoxel> score_tiles(const VoxelGrid& grid, const GripperMask& m
       one.voxel = grid.voxels[pivots[n]];
       one.counts = counts[n];
       if (mask.closing) {
-        one.terms = terms[n];
-        one.score = mask.closing->model.probability(terms[n]);
+        one.force = forces[n];
+        one.score = forces[n].hold_probability;
       } else {
         if (!shares.empty()) one.falling_share = shares[n];
         one.score = score_percent(counts[n], mask.method, options.solid_voxel_threshold) / 100.0 *

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "libgtd/score/closing_force.h"
 #include "libgtd/score/scanned_area.h"
 #include "libgtd/score/voxel_matching.h"
 #include "libmap/core/progress.h"
@@ -22,7 +23,7 @@ struct ScoredVoxel {
   VoxelCounts counts;
   double score = 0.0;          // score_percent / 100
   bool border = false;         // the mask's window leaves the scanned area
-  ClosingTerms terms{};        // of method calibrated
+  ForceEstimate force{};       // of method calibrated
   double falling_share = 1.0;  // of method corrected, see outward_shares
 };
 

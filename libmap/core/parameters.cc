@@ -85,6 +85,21 @@ void ParameterTable::add(std::string key, double& field, Range range, std::strin
   parameters_.push_back(number_parameter(key, field, range, std::move(description)));
 }
 
+void ParameterTable::add(std::string key, std::optional<double>& field, Range range,
+                         std::string description) {
+  const auto get = [&field] { return field ? to_text(*field) : std::string("auto"); };
+  const auto set = [&field, key, range](std::string_view text) {
+    field = text == "auto" ? std::nullopt : std::optional(parse_number<double>(key, text, range));
+  };
+  parameters_.push_back({.key = key,
+                         .description = std::move(description),
+                         .type = ParameterType::text,
+                         .choices = {},
+                         .get = get,
+                         .set = set,
+                         .check = [get, set] { set(get()); }});
+}
+
 void ParameterTable::add(std::string key, int& field, Range range, std::string description) {
   parameters_.push_back(number_parameter(key, field, range, std::move(description)));
 }

@@ -45,6 +45,8 @@ struct Parameter {
 class ParameterTable {
  public:
   void add(std::string key, double& field, Range range, std::string description);
+  // "auto" for no value.
+  void add(std::string key, std::optional<double>& field, Range range, std::string description);
   void add(std::string key, int& field, Range range, std::string description);
   void add(std::string key, std::uint64_t& field, Range range, std::string description);
   void add(std::string key, bool& field, std::string description);

@@ -1,0 +1,105 @@
+#include "libgtd/gripper/finger_pull.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <functional>
+#include <numbers>
+
+#include "libmap/core/angle.h"
+#include "libmap/core/parallel.h"
+#include "libmap/core/random_stream.h"
+
+namespace libgtd {
+
+namespace {
+
+constexpr int draws = 24;
+constexpr std::size_t step_deg = 3;  // linear between
+
+// Leans of the facets that the spines of one finger meet, rad, the largest first.
+std::vector<double> draw_leans(const Gripper& gripper, double share, std::uint64_t draw) {
+  constexpr std::uint64_t seed = 0x66696e676572;
+  libmap::RandomStream random(seed, draw);
+  std::vector<double> leans;
+  for (int spine = 0; spine < gripper.fingers->spines_per_finger; ++spine) {
+    const bool engages = random.uniform() < share;
+    const double lean = random.uniform();
+    const Engagement& its = gripper.engagement;
+    if (engages)
+      leans.push_back(
+          (its.asperity_min_deg + lean * (its.asperity_max_deg - its.asperity_min_deg)) *
+          libmap::radians_per_degree);
+  }
+  std::sort(leans.begin(), leans.end(), std::greater<>());
+  return leans;
+}
+
+// In closing forces; `limit` of one spine too.
+double pull_of(const std::vector<double>& leans, double fall, double phi, double limit,
+               bool drive_holds) {
+  constexpr double right_angle = std::numbers::pi / 2.0;
+  const double sine = std::sin(fall);
+  const double reaction =
+      drive_holds ? std::max(0.0, sine * std::cos(fall)) / (1.0 + sine * sine) : 0.0;
+  double most = 0.0;
+  for (std::size_t k = 0; k < leans.size(); ++k) {
+    const double angle = fall + leans[k] + phi - right_angle;
+    if (angle <= 0.0) break;
+    double pull = static_cast<double>(k + 1) * limit * std::sin(std::min(angle, right_angle));
+    if (angle < right_angle) {
+      const double slope = std::tan(angle);
+      if (reaction * slope < 1.0) pull = std::min(pull, slope / (1.0 - reaction * slope));
+    }
+    most = std::max(most, pull);
+  }
+  return most;
+}
+
+// At falls of -90 .. 90 degrees.
+std::array<double, 181> pulls_of(const Gripper& gripper) {
+  const GripperFingers& fingers = *gripper.fingers;
+  const double share = engagement_share(gripper.engagement, fingers.spine_tip_radius_um);
+  const double phi = std::atan(gripper.engagement.friction);
+  std::array<double, 181> sums{};
+  for (int draw = 0; draw < draws; ++draw) {
+    const std::vector<double> leans = draw_leans(gripper, share, static_cast<std::uint64_t>(draw));
+    for (std::size_t n = 0; n < sums.size(); n += step_deg)
+      sums[n] += pull_of(leans, (static_cast<double>(n) - 90.0) * libmap::radians_per_degree, phi,
+                         fingers.spine_force_limit_n / fingers.closing_force_n,
+                         fingers.holds_when_closed) /
+                 draws;
+  }
+  for (std::size_t n = 0; n + step_deg < sums.size(); n += step_deg)
+    for (std::size_t step = 1; step < step_deg; ++step)
+      sums[n + step] =
+          sums[n] + (sums[n + step_deg] - sums[n]) * static_cast<double>(step) / step_deg;
+  return sums;
+}
+
+}  // namespace
+
+FingerPulls finger_pulls(const Gripper& gripper, const std::vector<ParameterSet>& sets) {
+  FingerPulls result;
+  result.sets = sets.size();
+  result.pulls.resize(181 * sets.size());
+  result.pushes.resize(sets.size());
+  result.all_fingers.resize(sets.size());
+  libmap::parallel_for(sets.size(), 1, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t s = begin; s < end; ++s) {
+      const Gripper its = with_parameters(gripper, sets[s].values);
+      const std::array<double, 181> pulls = pulls_of(its);
+      for (std::size_t n = 0; n < pulls.size(); ++n)
+        result.pulls[n * sets.size() + s] = static_cast<float>(pulls[n]);
+      const GripperFingers& fingers = *its.fingers;
+      result.pushes[s] =
+          static_cast<float>(fingers.spines_per_finger *
+                             engagement_share(its.engagement, fingers.spine_tip_radius_um) *
+                             fingers.spine_force_limit_n / fingers.closing_force_n);
+      result.all_fingers[s] = fingers.count * fingers.closing_force_n;
+    }
+  });
+  return result;
+}
+
+}  // namespace libgtd
