@@ -11,6 +11,7 @@
 
 #include "libgtd/grasp/grasp_table.h"
 #include "libgtd/grasp/grasp_trials.h"
+#include "libgtd/grasp/pull_fit.h"
 #include "libgtd/grasp/surface_error.h"
 #include "libgtd/grasp/trial_scene.h"
 #include "libgtd/gripper/gripper_io.h"
@@ -168,6 +169,8 @@ struct GraspCommandOptions {
   std::string mesh;
   std::string points;
   std::string map;
+  std::string pulls;
+  std::string plan;  // number of pulls
   std::string output;
   GraspScenesOptions scenes;
   std::string gripper = "scar-e";
@@ -236,6 +239,15 @@ libgtd::Gripper read_with_fingers(const std::filesystem::path& file,
   return gripper;
 }
 
+// Of a location of a pull: the fit repeats them for each of its parameter sets.
+constexpr int max_pull_poses = 12;
+constexpr int max_pull_draws = 2;
+constexpr const char* level_mesh = "level";
+
+libmap::TriangleMesh mesh_of(const GraspCommandOptions& options) {
+  return options.mesh == level_mesh ? libgtd::level_ground() : libmap::read_mesh(options.mesh).mesh;
+}
+
 libgtd::Ground ground_of(const libmap::TriangleMesh& mesh, const GraspCommandOptions& options) {
   const libgtd::SurfaceErrorOptions& bounds = options.grasp.surface;
   return in_file(options.mesh, [&] {
@@ -299,8 +311,8 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   const std::vector<Eigen::Vector3d> locations = positions_of(table);
   if (locations.empty()) throw libmap::Error("no locations", {.file = options.points});
   const auto scenes = scenes_of(table, options.scenes);
-  const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
-  run.add_input(options.mesh);
+  const libmap::TriangleMesh mesh = mesh_of(options);
+  if (options.mesh != level_mesh) run.add_input(options.mesh);
   run.add_input(options.points);
   for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
   options.grasp.check();
@@ -329,10 +341,125 @@ void grasp_places(GraspCommandOptions& options, Run& run) {
   run.write_text(options.output, libmap::to_csv(table));
 }
 
+libgtd::PullFitOptions pull_options(const GraspCommandOptions& command) {
+  libgtd::PullFitOptions options;
+  options.grasp = command.grasp;
+  options.grasp.poses = std::min(options.grasp.poses, max_pull_poses);
+  options.grasp.draws = std::min(options.grasp.draws, max_pull_draws);
+  return options;
+}
+
+void say_fit(const libgtd::PullFit& fit, std::size_t tests, Run& run) {
+  const auto text = [](const libgtd::PredictedForce& force) {
+    return fmt::format("{:.2g} N (90 %: {:.2g} to {:.2g})", force.median_n, force.low_n,
+                       force.high_n);
+  };
+  run.say("{} pull tests; level ground holds {}, before the fit {}", tests, text(fit.level_after),
+          text(fit.level_before));
+  for (const libgtd::FittedParameter& one : fit.parameters)
+    run.say("{}: {:.3g} ({:.3g} to {:.3g}), before {:.3g} ({:.3g} to {:.3g}); {}", one.name,
+            one.fitted[1], one.fitted[0], one.fitted[2], one.prior[1], one.prior[0], one.prior[2],
+            one.is_determined() ? "determined by the tests" : "not determined by the tests");
+  std::string rows;
+  for (const std::size_t row : fit.outliers)
+    rows += (rows.empty() ? "" : ", ") + std::to_string(row);
+  if (!fit.explains_tests())
+    run.warn(
+        "the model does not explain the tests: each predicted from the others has a mean squared "
+        "score of {:.2f} instead of 1 (probability {:.1g}){}; the ranges are too narrow",
+        fit.mean_squared_score, fit.chance, rows.empty() ? "" : ", most of all rows " + rows);
+  else if (!rows.empty())
+    run.warn("tests that the others do not predict: rows {}", rows);
+  for (const auto& [name, force] :
+       {std::pair{"level_before", &fit.level_before}, {"level_after", &fit.level_after}})
+    run.add_results({{std::string(name) + "_low_n", force->low_n},
+                     {std::string(name) + "_median_n", force->median_n},
+                     {std::string(name) + "_high_n", force->high_n}});
+  for (const libgtd::FittedParameter& one : fit.parameters)
+    run.add_results({{one.name + ".low", one.fitted[0]},
+                     {one.name + ".median", one.fitted[1]},
+                     {one.name + ".high", one.fitted[2]},
+                     {one.name + ".spread_ratio", one.spread_ratio}});
+  run.add_results({{"pull_tests", tests},
+                   {"effective_sets", fit.effective_sets},
+                   {"mean_squared_score", fit.mean_squared_score},
+                   {"chance", fit.chance},
+                   {"outlier_rows", rows}});
+}
+
+void fit_gripper(const GraspCommandOptions& options, Run& run) {
+  run.claim_output(options.output, {options.mesh, options.pulls});
+  const auto file = libmap::find_data_file("grippers", options.gripper);
+  libgtd::Gripper gripper = read_with_fingers(file, options);
+  const auto tests = libgtd::pull_tests_of(libmap::read_csv(options.pulls));
+  const libmap::TriangleMesh mesh = mesh_of(options);
+  const libgtd::Ground ground = ground_of(mesh, options);
+  if (options.mesh != level_mesh) run.add_input(options.mesh);
+  run.add_input(options.pulls);
+  for (const auto& input : libgtd::gripper_files(file)) run.add_input(input);
+  const libgtd::PullFit fit = run.timed("fit", [&] {
+    return in_file(options.pulls, [&] {
+      return libgtd::fit_pulls(options.mesh == level_mesh ? nullptr : &ground, gripper, tests,
+                               pull_options(options), run.progress());
+    });
+  });
+  say_fit(fit, tests.size(), run);
+  gripper.ensemble = fit.ensemble;
+  run.write_text(options.output, libgtd::to_yaml(gripper));
+}
+
+void plan_next_pulls(const GraspCommandOptions& options, Run& run) {
+  const auto count = libmap::parse_integer(options.plan);
+  if (!count || *count < 1)
+    throw libmap::Error("is no number of pulls",
+                        {.field = "--plan", .value = options.plan, .bound = ">= 1"});
+  run.claim_output(options.output, {options.mesh, options.points});
+  const auto file = libmap::find_data_file("grippers", options.gripper);
+  const libgtd::Gripper gripper = read_with_fingers(file, options);
+  const libmap::Table table = libmap::read_csv(options.points);
+  const std::vector<Eigen::Vector3d> locations = positions_of(table);
+  const libmap::TriangleMesh mesh = mesh_of(options);
+  const libgtd::Ground ground = ground_of(mesh, options);
+  if (options.mesh != level_mesh) run.add_input(options.mesh);
+  run.add_input(options.points);
+  const auto plans = run.timed("plan", [&] {
+    return libgtd::plan_pulls(ground, gripper, locations, static_cast<std::size_t>(*count),
+                              pull_options(options), run.progress());
+  });
+  if (plans.empty()) throw libmap::Error("no pull there tells anything", {.file = options.points});
+  libmap::Table planned;
+  planned.columns = {"place",    "x",           "y",      "z",
+                     "tilt_deg", "azimuth_deg", "load_n", "information_bits"};
+  const std::vector<std::string> places = places_of(table);
+  for (const libgtd::PlannedPull& plan : plans) {
+    std::vector<std::string> row{places[plan.location]};
+    for (const double value : locations[plan.location]) row.push_back(libmap::to_text(value));
+    row.push_back(std::to_string(plan.direction.tilt_deg));
+    row.push_back(std::to_string(plan.direction.azimuth_deg));
+    row.push_back(fmt::format("{:.2g}", plan.load_n));
+    row.push_back(fmt::format("{:.3f}", plan.information_bits));
+    planned.rows.push_back(std::move(row));
+  }
+  run.say("{} pulls; the first tells {:.2f} bits", plans.size(), plans.front().information_bits);
+  run.write_text(options.output, libmap::to_csv(planned));
+}
+
 void grasp(GraspCommandOptions& options, Run& run) {
+  if (!options.pulls.empty()) {
+    refuse_given({{"--points", !options.points.empty()},
+                  {"--map", !options.map.empty()},
+                  {"--plan", !options.plan.empty()}},
+                 "excludes --fit");
+    return fit_gripper(options, run);
+  }
   if (options.points.empty() == options.map.empty())
-    throw UsageError(options.map.empty() ? "--points LOCATIONS.csv or --map MAP is missing"
-                                         : "--points and --map exclude each other");
+    throw UsageError(options.map.empty()
+                         ? "--points LOCATIONS.csv, --map MAP or --fit PULLS.csv is missing"
+                         : "--points and --map exclude each other");
+  if (!options.plan.empty()) {
+    refuse_given({{"--map", !options.map.empty()}}, "excludes --plan");
+    return plan_next_pulls(options, run);
+  }
   options.map.empty() ? grasp_places(options, run) : grasp_voxels(options, run);
 }
 
@@ -341,7 +468,8 @@ void grasp(GraspCommandOptions& options, Run& run) {
 int main(int argc, char** argv) {
   GraspCommandOptions options;
   Command command("grasp");
-  command.input("MESH", options.mesh, "mesh or DEM (.tif) of the terrain, z up");
+  command.input("MESH", options.mesh,
+                "mesh or DEM (.tif) of the terrain, z up; level: level ground, for --fit");
   command.option("--points", "LOCATIONS.csv", options.points,
                  "CSV with the columns x, y, z in meters in the mesh's frame, and any others");
   command.option(
@@ -351,7 +479,14 @@ int main(int argc, char** argv) {
   command.output(
       options.output,
       "with --points a CSV: the locations, each with the results of its trials; with "
-      "--map the map with more fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles)");
+      "--map the map with more fields (.pcd, .ply, .vtp, .csv), or a tile store (.tiles); with "
+      "--fit a gripper file (.yaml) with the fitted ensemble; with --plan a CSV of pulls");
+  command.option("--fit", "PULLS.csv", options.pulls,
+                 "fit the gripper's parameters to pull tests: rows of x, y, z or ground = level, "
+                 "tilt_deg, azimuth_deg, and force_n at slip, or load_n and held (0 or 1)");
+  command.option("--plan", "N", options.plan,
+                 "with --points: the N pulls at these locations that would tell most about the "
+                 "parameters");
   command.option("--tile", "K/N", options.tile,
                  "with --map: test only share K of N of the tiles, into a tile store");
   command.option("--scenes", "FOLDER", options.scenes.folder,

@@ -137,12 +137,12 @@ HoldingOptions holding_of(const ClosedGripper& closed, const Gripper& gripper,
   return holding;
 }
 
-std::vector<BearingContact> draw_asperities(const ClosedGripper& closed, const Site& site,
+std::vector<BearingContact> draw_asperities(const ClosedGripper& closed, std::uint64_t key,
                                             const Gripper& gripper, const GraspOptions& options,
                                             int pose, int draw) {
   const std::uint64_t number =
       (static_cast<std::uint64_t>(pose) << 32U) | (static_cast<std::uint64_t>(draw) + 1);
-  libmap::RandomStream random(options.seed, libmap::mix_bits(~site.key(), number));
+  libmap::RandomStream random(options.seed, libmap::mix_bits(~key, number));
   return draw_bearing(closed.contacts, gripper, options.engagement, random);
 }
 
@@ -251,7 +251,7 @@ class LocationTrials {
       const std::size_t set = parameters_.set_of(site_.key(), number, n);
       const Gripper& gripper = parameters_.grippers[set];
       const HoldingOptions equally = holding_of(pose.closed, gripper, SpineSharing::equally);
-      const auto bearing = draw_asperities(pose.closed, site_, gripper, options_, number, n);
+      const auto bearing = draw_asperities(pose.closed, site_.key(), gripper, options_, number, n);
       const LeastForce least = least_holding_force(bearing, equally, pose.guess);
       pose.guess = least.direction;
       pose.forces.push_back(least.force_n);
@@ -463,6 +463,33 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
   return results;
 }
 
+ClosedPoses::ClosedPoses(const Ground& ground, const Gripper& gripper,
+                         const Eigen::Vector3d& location, const GraspOptions& options)
+    : options_(options), key_(key_of(location)) {
+  Site site(ground, gripper, location, options);
+  const auto count = static_cast<std::size_t>(options.poses);
+  site.draw_poses(count);
+  for (std::size_t pose = 0; pose < count; ++pose) poses_.push_back(site.close(pose));
+}
+
+bool ClosedPoses::touch_ground() const {
+  return std::any_of(poses_.begin(), poses_.end(),
+                     [](const ClosedGripper& closed) { return closed.contacts.size() >= 2; });
+}
+
+std::vector<double> ClosedPoses::pull_forces(const Gripper& gripper,
+                                             const Eigen::Vector3d& direction, int draws) const {
+  std::vector<double> forces;
+  for (std::size_t pose = 0; pose < poses_.size(); ++pose) {
+    const HoldingOptions holding = holding_of(poses_[pose], gripper, SpineSharing::equally);
+    for (int draw = 0; draw < draws; ++draw)
+      forces.push_back(holding_force(
+          draw_asperities(poses_[pose], key_, gripper, options_, static_cast<int>(pose), draw),
+          direction, holding));
+  }
+  return forces;
+}
+
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw) {
   Site site(ground, gripper, location, options);
@@ -472,7 +499,7 @@ Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Ve
   trial.gripper = site.close(static_cast<std::size_t>(pose));
   const TrialParameters parameters(gripper, options);
   const Gripper& drawn = parameters.grippers[parameters.set_of(site.key(), pose, draw)];
-  trial.bearing = draw_asperities(trial.gripper, site, drawn, options, pose, draw);
+  trial.bearing = draw_asperities(trial.gripper, site.key(), drawn, options, pose, draw);
   const LeastForce least =
       least_holding_force(trial.bearing, holding_of(trial.gripper, drawn, SpineSharing::equally));
   trial.force_n = least.force_n;

@@ -23,7 +23,7 @@ namespace libgtd {
 enum class ApproachDirection { up, normal };
 
 struct GraspOptions {
-  double load_n = 10.0;  // a trial holds if its force is at least load * safety in all directions
+  double load_n = 5.0;  // a trial holds if its force is at least load * safety in all directions
   double safety = 1.0;
   std::vector<double> more_loads_n;  // whose probabilities are computed too
   ApproachDirection approach = ApproachDirection::up;
@@ -122,6 +122,28 @@ std::vector<LocationResult> test_grasps(const Ground& ground, const Gripper& gri
 // One trial of a location again, for a picture of it.
 Trial repeat_trial(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
                    const GraspOptions& options, int pose, int draw);
+
+// A gripper closed at drawn poses of one location (GraspOptions::poses), to be pulled with any
+// parameters.
+class ClosedPoses {
+ public:
+  // Throws nothing of the location: see touch_ground().
+  ClosedPoses(const Ground& ground, const Gripper& gripper, const Eigen::Vector3d& location,
+              const GraspOptions& options);
+
+  // Whether some pose has two contacts.
+  bool touch_ground() const;
+  // The largest pulls (N) along a unit vector in the location's frame (GroundPatch) that `draws`
+  // draws of asperities at each pose hold, with the parameters of this gripper. The same draws for
+  // all parameters.
+  std::vector<double> pull_forces(const Gripper& gripper, const Eigen::Vector3d& direction,
+                                  int draws) const;
+
+ private:
+  std::vector<ClosedGripper> poses_;
+  GraspOptions options_;
+  std::uint64_t key_ = 0;
+};
 
 // Wilson's score interval of a share (Wilson 1927): {low, high}; z is a
 // quantile of the normal distribution, by default that of 95 %.

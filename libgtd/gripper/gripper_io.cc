@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <sstream>
 
 #include "libgtd/gripper/gripper_urdf.h"
@@ -183,7 +184,8 @@ std::string to_yaml(const Gripper& gripper) {
   text += "\n  sets: |\n";
   for (const ParameterSet& set : gripper.ensemble) {
     text += "    " + libmap::to_text(set.weight);
-    for (const double value : set.values) text += " " + libmap::to_text(value);
+    for (const double value : set.values)
+      text += " " + libmap::to_text(std::round(1e4 * value) / 1e4);
     text += "\n";
   }
   return text;

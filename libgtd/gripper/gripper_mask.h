@@ -54,7 +54,7 @@ struct GripperMaskOptions {
   Method method = Method::corrected;
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;  // H_add; ClimbLab's mask has none
-  double load_n = 10.0;       // of method calibrated
+  double load_n = 5.0;        // of method calibrated
 };
 
 // side x side x layers voxels. z = 0 is the lowest layer, farthest from the palm; the layers with

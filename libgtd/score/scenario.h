@@ -23,7 +23,7 @@ struct Scenario {
   double voxel_size_m = 0.01;
   int extra_void_layers = 1;        // H_add
   int solid_voxel_threshold = 120;  // TSV
-  double load_n = 10.0;             // of method calibrated: the pull whose hold probability counts
+  double load_n = 5.0;              // of method calibrated: the pull whose hold probability counts
   // Height in the terrain frame; ground below it is no target. Nothing: 0, or with method
   // calibrated, which has a force for level ground too, no limit.
   std::optional<double> zero_plane_m;
