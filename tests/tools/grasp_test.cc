@@ -76,7 +76,7 @@ TEST(GraspCommand, TableManifestAndEvaluation) {
   EXPECT_EQ(json_of("other.csv.json").at("results").at("parameters_sha256"),
             results.at("parameters_sha256"));
   EXPECT_NE(content("other.csv"), content("trials.csv"));
-  ASSERT_TRUE(succeeded(graspmap(with({"-o", "rough.csv", "--friction", "0.6"}))));
+  ASSERT_TRUE(succeeded(graspmap(with({"-o", "rough.csv", "--set", "gripper.engagement.friction=0.6"}))));
   EXPECT_NE(json_of("rough.csv.json").at("results").at("parameters_sha256"),
             results.at("parameters_sha256"));
   // The verdicts are a field test: beside a second run's probabilities.
@@ -96,7 +96,7 @@ TEST(GraspCommand, BadInputIsOneLine) {
     return bad_input(graspmap(with(words)), parts);
   };
   for (const auto& [flag, value] :
-       {std::pair{"--friction", "-0.1"}, {"--load", "0"}, {"--more-loads", "x"}})
+       {std::pair{"--load", "0"}, {"--more-loads", "x"}})
     EXPECT_TRUE(refused({"-o", "t.csv", flag, value}, {flag, value}));
   for (const char* flag : {"--trials", "--draws"})
     EXPECT_TRUE(bad_input(

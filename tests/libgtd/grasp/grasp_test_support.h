@@ -15,11 +15,22 @@
 
 namespace grasp_test {
 
-inline libgtd::Gripper gripper(
-    const std::vector<std::pair<std::string, std::string>>& overrides = {},
-    const std::string& name = "scar-e") {
-  return libgtd::read_gripper(graspmap_test::source_folder() / "data/grippers" / (name + ".yaml"),
-                              overrides);
+// With known parameters: 10 N per spine and closing force, whatever the file says.
+inline libgtd::Gripper gripper(std::vector<std::pair<std::string, std::string>> overrides = {},
+                               const std::string& name = "scar-e") {
+  for (const char* key : {"fingers.closing_force_n", "fingers.spine_force_limit_n"})
+    overrides.insert(overrides.begin(), {key, "10"});
+  libgtd::Gripper made = libgtd::read_gripper(
+      graspmap_test::source_folder() / "data/grippers" / (name + ".yaml"), overrides);
+  made.ranges = {};
+  return made;
+}
+
+// Each spine meets a facet of this lean.
+inline libgtd::Gripper with_lean(libgtd::Gripper gripper, double psi_deg) {
+  gripper.engagement.asperity_min_deg = gripper.engagement.asperity_max_deg = psi_deg;
+  gripper.engagement.engagement_rate = 100;
+  return gripper;
 }
 
 // z = height(x, y) on a square of this half side, with 2 * cells squares along each edge.

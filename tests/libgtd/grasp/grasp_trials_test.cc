@@ -14,6 +14,7 @@ namespace grasp_trials_test {
 
 using grasp_test::gripper;
 using grasp_test::height_mesh;
+using grasp_test::with_lean;
 using graspmap_test::error_of;
 using libgtd::GraspOptions;
 using libgtd::LocationResult;
@@ -22,15 +23,13 @@ using libgtd::TrialEnd;
 constexpr double degree = libmap::radians_per_degree;
 const double phi = std::atan(0.39);
 
-// No chance: each spine meets a facet of this lean, the palm comes down on the location.
-GraspOptions certain(double psi_deg) {
+// The palm comes down on the location.
+GraspOptions certain() {
   GraspOptions options;
   options.poses = 2;
   options.draws = 2;
   options.offset_m = 0;
   options.tilt_deg = 0;
-  options.engagement.asperity_min_deg = options.engagement.asperity_max_deg = psi_deg;
-  options.engagement.engagement_rate = 100;
   options.closing.max_unseen = 1;  // a shape without ground around it
   return options;
 }
@@ -47,7 +46,8 @@ std::vector<LocationResult> test_on(const libmap::TriangleMesh& mesh,
 double pull_away(const libmap::TriangleMesh& mesh, const Eigen::Vector3d& location,
                  const libgtd::Gripper& of, double psi_deg) {
   const libgtd::Ground ground(mesh);
-  const libgtd::Trial trial = libgtd::repeat_trial(ground, of, location, certain(psi_deg), 0, 0);
+  const libgtd::Trial trial =
+      libgtd::repeat_trial(ground, with_lean(of, psi_deg), location, certain(), 0, 0);
   return libgtd::holding_force(trial.bearing, Eigen::Vector3d::UnitZ(),
                                {.load_point = trial.gripper.patch_from_gripper.translation(),
                                 .closing_force_n = of.fingers->closing_force_n,
@@ -84,8 +84,8 @@ TEST(GraspTrials, ClosedFormsFromMeshToForce) {
                         0.1 * (std::cos(n * std::numbers::pi / 400) - 1));
   const auto ball = grasp_test::revolved(sphere, 720);
   for (const double psi : {20.0, 45.0}) {
-    const libgtd::Trial trial =
-        libgtd::repeat_trial(libgtd::Ground(ball), of, {0, 0, -0.0002}, certain(psi), 0, 0);
+    const libgtd::Trial trial = libgtd::repeat_trial(libgtd::Ground(ball), with_lean(of, psi),
+                                                     {0, 0, -0.0002}, certain(), 0, 0);
     ASSERT_EQ(trial.gripper.contacts.size(), 8u);
     ASSERT_TRUE(trial.gripper.contacts[0].by_spines);
     const double polar = std::acos(trial.gripper.contacts[0].normal.z()) / degree;
@@ -206,6 +206,60 @@ TEST(GraspTrials, ALargerLoadHoldsLess) {
   EXPECT_LT(last, 0.1);
 }
 
+// Two sets: the trials of the ensemble are trials of the one or the other.
+TEST(GraspTrials, AnEnsembleMixesItsSets) {
+  const auto mesh = bumps();
+  const auto places = places_on(mesh, 8);
+  GraspOptions options;
+  options.poses = 32;
+  options.draws = 8;
+  options.load_n = 8;
+  libgtd::Gripper weak = gripper({{"fingers.spine_force_limit_n", "1"}});
+  libgtd::Gripper both = weak;
+  libgtd::ParameterValues strong = parameters_of(weak);
+  strong[0] = 10;
+  both.ensemble = {{0.25, parameters_of(weak)}, {0.75, strong}};
+  const auto of_weak = test_on(mesh, places, options, weak);
+  const auto of_strong = test_on(mesh, places, options, with_parameters(weak, strong));
+  const auto of_both = test_on(mesh, places, options, both);
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    const double expected =
+        0.25 * of_weak[n].hold_probability + 0.75 * of_strong[n].hold_probability;
+    EXPECT_NEAR(of_both[n].hold_probability, expected, 0.06) << n;
+    EXPECT_EQ(of_weak[n].parameter_spread, 0);
+    EXPECT_EQ(of_both[n].has_force, of_strong[n].has_force);
+  }
+  // One set of any weight, and one without weight.
+  both.ensemble = {{1.0, strong}};
+  EXPECT_EQ(text_of(test_on(mesh, places, options, both)), text_of(of_strong));
+  both.ensemble = {{1.0, strong}, {0.0, parameters_of(weak)}};
+  EXPECT_EQ(text_of(test_on(mesh, places, options, both)), text_of(of_strong));
+  options.ensemble = false;
+  EXPECT_EQ(text_of(test_on(mesh, places, options, both)), text_of(of_weak));
+}
+
+// On level ground all forces are proportional to closing force and spine limit: two sets that
+// differ by a factor of four have a spread of ln 4 / sqrt 2 between them, and that within is
+// unchanged.
+TEST(GraspTrials, SpreadsOfTrialsAndSets) {
+  const auto mesh = height_mesh(0.4, 4, [](double, double) { return 0.0; });
+  GraspOptions options;
+  options.poses = 32;
+  options.draws = 16;
+  const libgtd::Gripper one = gripper({{"fingers.spine_force_limit_n", "2"}});
+  libgtd::Gripper two = one;
+  libgtd::ParameterValues larger = parameters_of(one);
+  larger[0] *= 4;
+  larger[1] *= 4;
+  two.ensemble = {{0.5, parameters_of(one)}, {0.5, larger}};
+  const LocationResult of_one = test_on(mesh, {{0, 0, 0}}, options, one)[0];
+  const LocationResult of_two = test_on(mesh, {{0, 0, 0}}, options, two)[0];
+  EXPECT_NEAR(of_two.parameter_spread, std::log(4.0) / std::sqrt(2.0), 0.1);
+  EXPECT_NEAR(of_two.trial_spread, of_one.trial_spread, 0.05);
+  EXPECT_LT(of_one.force_range_n[0], of_one.force_n[1]);
+  EXPECT_GT(of_two.force_range_n[1], 3 * of_one.force_n[1]);
+}
+
 TEST(GraspTrials, ATrialIsRepeated) {
   const auto mesh = bumps();
   const auto places = places_on(mesh, 6);
@@ -220,27 +274,28 @@ TEST(GraspTrials, ATrialIsRepeated) {
 }
 
 TEST(GraspTrials, FailuresAreNamed) {
-  const auto end_on = [](const libmap::TriangleMesh& mesh, GraspOptions options) {
-    const LocationResult result = test_on(mesh, {{0, 0, 0}}, options)[0];
+  const auto end_on = [](const libmap::TriangleMesh& mesh, const GraspOptions& options,
+                         double psi_deg = 88, double drag_mm = 5) {
+    libgtd::Gripper of = with_lean(gripper(), psi_deg);
+    of.engagement.drag_mm = drag_mm;
+    const LocationResult result = test_on(mesh, {{0, 0, 0}}, options, of)[0];
     const auto most = std::max_element(result.ends.begin(), result.ends.end());
     EXPECT_EQ(*most, result.trials);
     return static_cast<TrialEnd>(most - result.ends.begin());
   };
   const auto flat = height_mesh(0.3, 60, [](double, double) { return 0.0; });
-  EXPECT_EQ(end_on(flat, certain(30)), TrialEnd::engagement);
-  GraspOptions strong = certain(88);
+  EXPECT_EQ(end_on(flat, certain(), 30), TrialEnd::engagement);
+  GraspOptions strong = certain();
   strong.load_n = 1000;
   EXPECT_EQ(end_on(flat, strong), TrialEnd::load);
-  GraspOptions blunt = certain(88);
-  blunt.engagement.drag_mm = 0;
-  EXPECT_EQ(end_on(flat, blunt), TrialEnd::contact);
+  EXPECT_EQ(end_on(flat, certain(), 88, 0), TrialEnd::contact);
   const auto step = height_mesh(0.3, 60, [](double x, double) { return x > 0.08 ? 0.6 : 0.0; });
-  EXPECT_EQ(end_on(step, certain(88)), TrialEnd::approach);
+  EXPECT_EQ(end_on(step, certain()), TrialEnd::approach);
   auto hole = flat;
   std::erase_if(hole.triangles, [&](const libmap::Triangle& triangle) {
     return hole.vertices[triangle[0]].head<2>().norm() > 0.06;
   });
-  GraspOptions usual = certain(88);
+  GraspOptions usual = certain();
   usual.closing.max_unseen = 0.1;
   EXPECT_EQ(end_on(hole, usual), TrialEnd::unseen);
 }
@@ -252,12 +307,13 @@ TEST(GraspTrials, AlongTheGroundsNormal) {
   auto tilted = wall;
   for (Eigen::Vector3d& vertex : tilted.vertices)
     vertex = Eigen::AngleAxisd(80 * degree, Eigen::Vector3d::UnitX()) * vertex;
-  GraspOptions options = certain(60);
+  GraspOptions options = certain();
+  const libgtd::Gripper rough = with_lean(gripper(), 60);
   options.approach = libgtd::ApproachDirection::normal;
   const Eigen::Vector3d top(0, 0, 0.04);
   const Eigen::Vector3d there = Eigen::AngleAxisd(80 * degree, Eigen::Vector3d::UnitX()) * top;
-  const LocationResult level = test_on(wall, {top}, options)[0];
-  const LocationResult steep = test_on(tilted, {there}, options)[0];
+  const LocationResult level = test_on(wall, {top}, options, rough)[0];
+  const LocationResult steep = test_on(tilted, {there}, options, rough)[0];
   EXPECT_GT(level.spine_fingers, 4);
   EXPECT_NEAR(steep.spine_fingers, level.spine_fingers, 1.1);
   EXPECT_NEAR(steep.clearance_m, level.clearance_m, 8e-3);  // at another yaw
@@ -401,16 +457,15 @@ TEST(GraspTrials, BadInputIsNamed) {
   EXPECT_EQ(field({}, {0, 0, 0.2}), "location 2");
   EXPECT_EQ(field({}, {5, 0, 0}), "location 2");
   GraspOptions options;
-  options.engagement.friction = -0.1;
-  EXPECT_EQ(field(options, {0, 0, 0.05}), "friction");
-  options = {};
   options.poses = 0;
   EXPECT_EQ(field(options, {0, 0, 0.05}), "trials");
   options = {};
-  options.engagement.asperity_min_deg = 60;
-  options.engagement.asperity_max_deg = 30;
-  EXPECT_EQ(field(options, {0, 0, 0.05}), "asperity_min_deg");
   libgtd::Gripper without = gripper();
+  without.engagement.friction = -0.1;
+  EXPECT_EQ(field(options, {0, 0, 0.05}, without), "engagement.friction");
+  without.engagement = {.asperity_min_deg = 60, .asperity_max_deg = 30};
+  EXPECT_EQ(field(options, {0, 0, 0.05}, without), "engagement.asperity_min_deg");
+  without = gripper();
   without.fingers.reset();
   EXPECT_EQ(field({}, {0, 0, 0.05}, without), "fingers");
 }

@@ -186,7 +186,7 @@ TEST(HoldingForce, AdhesionLaw) {
   options.law = libgtd::EngagementLaw::adhesion;
   std::vector<BearingContact> contacts;
   for (const GripContact& contact : ring_of_contacts(8, 0.1, 0))
-    contacts.emplace_back(contact, options, 2.5);
+    contacts.emplace_back(contact, options, 0.39, 2.5);
   EXPECT_NEAR(libgtd::holding_force(contacts, away, limited(1e3)), 8 * 2.5 * std::tan(20 * degree),
               1e-9);
   EXPECT_NEAR(libgtd::holding_force(contacts, away, limited(1.0)), 8 * 1.0 * std::tan(20 * degree),
@@ -229,19 +229,15 @@ TEST(HoldingForce, TheLeastOfTheDirections) {
 }
 
 TEST(Engagement, ShareOfSpines) {
-  const auto fingers = *grasp_test::gripper().fingers;
-  libgtd::EngagementOptions options;
-  EXPECT_NEAR(libgtd::engagement_share(options, fingers), 1 - std::exp(-3.0), 1e-12);
-  options.drag_mm = 0;
-  EXPECT_EQ(libgtd::engagement_share(options, fingers), 0);
-  options.drag_mm = 5;
-  auto blunt = fingers;
-  blunt.spine_tip_radius_um = 100;
-  EXPECT_LT(libgtd::engagement_share(options, blunt), 0.9);
+  libgtd::Engagement engagement;
+  EXPECT_NEAR(libgtd::engagement_share(engagement, 25), 1 - std::exp(-3.0), 1e-12);
+  EXPECT_LT(libgtd::engagement_share(engagement, 100), 0.9);
+  engagement.drag_mm = 0;
+  EXPECT_EQ(libgtd::engagement_share(engagement, 25), 0);
   // Drawn: of 10000 spines.
   libmap::RandomStream random(1, 1);
-  auto many = fingers;
-  many.spines_per_finger = 10000;
+  libgtd::Gripper many = grasp_test::gripper();
+  many.fingers->spines_per_finger = 10000;
   const auto drawn = libgtd::draw_bearing(ring_of_contacts(1, 0.1, 0), many, {}, random);
   ASSERT_EQ(drawn.size(), 1u);
   EXPECT_NEAR(static_cast<double>(drawn[0].spines()), 10000 * (1 - std::exp(-3.0)), 100);

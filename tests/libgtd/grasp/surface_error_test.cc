@@ -101,8 +101,6 @@ libgtd::GraspOptions options_of(double load_n) {
   options.draws = 1;
   options.best_draws = 0;
   options.offset_m = options.tilt_deg = 0;
-  options.engagement.asperity_min_deg = options.engagement.asperity_max_deg = 60;
-  options.engagement.engagement_rate = 100;
   options.closing.max_unseen = 1;
   options.load_n = load_n;
   return options;
@@ -110,7 +108,8 @@ libgtd::GraspOptions options_of(double load_n) {
 
 std::vector<libgtd::LocationResult> test_on(const Ground& ground,
                                             const libgtd::GraspOptions& options) {
-  return libgtd::test_grasps(ground, gripper(), {{0, 0, -0.002}}, options, libmap::no_progress());
+  return libgtd::test_grasps(ground, grasp_test::with_lean(gripper(), 60), {{0, 0, -0.002}},
+                             options, libmap::no_progress());
 }
 
 libmap::TriangleMesh cone() {
@@ -172,7 +171,8 @@ TEST(SurfaceError, UnsureGroundIsUnseen) {
   options.closing.max_unseen = 0.1;
   const auto unseen = [&] {
     const Ground ground(mesh, libgtd::errors_of(mesh, {}));
-    return libgtd::test_grasps(ground, gripper(), {{0, 0, 0}}, options, libmap::no_progress())
+    return libgtd::test_grasps(ground, grasp_test::with_lean(gripper(), 60), {{0, 0, 0}}, options,
+                               libmap::no_progress())
         .front();
   };
   EXPECT_EQ(unseen().unseen, 0.0);

@@ -143,7 +143,7 @@ TEST(TrialScene, TheConesAreThoseOfTheSteepestFacet) {
   const Eigen::Vector3d force = libgtd::BearingContact(contact, {1.1}, mu, 10.0)
                                     .best_force({-1.0, 0.0, 0.1}, libgtd::SpineSharing::equally);
   EXPECT_LE(std::acos(force.normalized().dot(axis)), std::atan(mu) + 1e-9);
-  const libgtd::BearingContact adhesion(contact, libgtd::EngagementOptions{}, 2.5);
+  const libgtd::BearingContact adhesion(contact, libgtd::EngagementOptions{}, 0.39, 2.5);
   EXPECT_EQ(adhesion.cone().size(), 3U);
 }
 

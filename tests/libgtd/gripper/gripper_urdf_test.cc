@@ -40,7 +40,7 @@ std::vector<std::pair<std::string, std::string>> values_of(libgtd::Gripper gripp
   libmap::ParameterTable table;
   bind(table, gripper);
   bind(table, *gripper.fingers);
-  bind(table, *gripper.hold_model);
+  bind(table, gripper.engagement);
   return table.values();
 }
 

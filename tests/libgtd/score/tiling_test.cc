@@ -14,7 +14,7 @@ namespace libgtd {
 
 bool operator==(const ScoredVoxel& a, const ScoredVoxel& b) {
   return a.voxel == b.voxel && a.counts == b.counts && a.score == b.score && a.border == b.border &&
-         a.terms.rise == b.terms.rise && a.terms.depth == b.terms.depth;
+         a.force.median_n == b.force.median_n && a.force.high_n == b.force.high_n;
 }
 
 namespace tiling_test {
