@@ -126,6 +126,9 @@ Prediction predict(const PullTest& test, const std::vector<double>& log_forces,
     }
     prediction.likelihood =
         (1.0 - options.outlier_share) * density + options.outlier_share / log_force_range;
+    const double share = (observed - std::log(least_force_n)) / log_force_range;
+    prediction.below = (1.0 - options.outlier_share) * prediction.below +
+                       options.outlier_share * std::clamp(share, 0.0, 1.0);
   } else {
     double held = 0.0;
     for (const double log_force : log_forces)
