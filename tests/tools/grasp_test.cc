@@ -138,8 +138,8 @@ const libmap::PointCloud& write_map() {
   write_ground();
   const auto cloud = libmap::read_cloud(scratch("ground.ply")).cloud;
   libmap::write_cloud(scratch("terrain.pcd"), cloud);
-  EXPECT_TRUE(succeeded(graspmap(
-      {"score", "terrain.pcd", "--voxel-size", "0.04", "--up", "0,0,1", "-o", "map.pcd"})));
+  EXPECT_TRUE(succeeded(graspmap({"score", "terrain.pcd", "--voxel-size", "0.04", "--up", "0,0,1",
+                                  "--method", "corrected", "-o", "map.pcd"})));
   map = libmap::read_cloud(scratch("map.pcd")).cloud;
   return map;
 }
@@ -169,11 +169,12 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
   const libmap::PointCloud held = libmap::read_cloud(scratch("held.pcd")).cloud;
   EXPECT_EQ(held.positions, map.positions);
   EXPECT_EQ(held.colors, map.colors);
-  ASSERT_EQ(held.fields.size(), map.fields.size() + 5);
+  ASSERT_EQ(held.fields.size(), map.fields.size() + 9);
   for (std::size_t n = 0; n < map.fields.size(); ++n) EXPECT_EQ(held.fields[n], map.fields[n]);
-  const char* names[] = {"hold_probability", "holding_force_n", "limiting_direction",
-                         "grasp_unseen", "grasp_trials"};
-  for (std::size_t n = 0; n < 5; ++n) {
+  const char* names[] = {"hold_probability",     "holding_force_n", "holding_force_low_n",
+                         "holding_force_high_n", "trial_spread",    "parameter_spread",
+                         "limiting_direction",   "grasp_unseen",    "grasp_trials"};
+  for (std::size_t n = 0; n < 9; ++n) {
     EXPECT_EQ(held.fields[map.fields.size() + n].name, names[n]);
     EXPECT_EQ(held.fields[map.fields.size() + n].type, libmap::ScalarType::float32);
   }
@@ -217,6 +218,10 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
                 value("hold_probability", voxels[row]), 1e-6);
     EXPECT_NEAR(table.number(row, table.column("force_median_n")),
                 value("holding_force_n", voxels[row]), 1e-4);
+    EXPECT_NEAR(table.number(row, table.column("force_p95_n")),
+                value("holding_force_high_n", voxels[row]), 1e-4);
+    EXPECT_NEAR(table.number(row, table.column("parameter_spread")),
+                value("parameter_spread", voxels[row]), 1e-4);
     EXPECT_NEAR(table.number(row, table.column("unseen")), value("grasp_unseen", voxels[row]),
                 1e-6);
   }
