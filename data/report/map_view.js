@@ -126,7 +126,8 @@ class MapView {
     const reading = this.figure.querySelector('.reading');
     slider.addEventListener('input', () => {
       const load = Number((this.data.load_n * 10 ** (slider.value / 40)).toPrecision(2));
-      this.cells.setLoad(slider.value === '0' ? this.data.load_n : load);
+      this.cells.forces.load = slider.value === '0' ? this.data.load_n : load;
+      this.cells.setMode(this.cells.mode);
       slider.setAttribute('aria-valuetext', inNewtons(load));
       for (const output of this.figure.querySelectorAll('output')) output.value = inNewtons(load);
       reading.hidden = true;
