@@ -73,5 +73,5 @@ $(OUT)/%/$(map_bag): $(OUT)/%/map.pcd $(OUT)/%/footholds.csv
 	@exec $(GRASPMAP) convert $< -o $(@:.json=) --terrain $(OUT)/$*/panorama.pcd --footholds $(OUT)/$*/footholds.csv
 
 $(OUT)/%/top.png: $(OUT)/%/map.pcd
-	@exec $(GRASPMAP) render $< -o $@ --view top --color score --title "$* s" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view top --title "$* s" --quiet
 endif

@@ -150,7 +150,7 @@ $(OUT)/map.tiles/index.json: $(OUT)/map.begun
 	@exec $(GRASPMAP) score $(terrain) -o $(OUT)/map.tiles $(score_flags)
 
 $(OUT)/map.png: $(OUT)/map.tiles/index.json
-	@exec $(GRASPMAP) render $(OUT)/map.tiles -o $@ --view top --color score --title "$$TITLE" --quiet
+	@exec $(GRASPMAP) render $(OUT)/map.tiles -o $@ --view top --title "$$TITLE" --quiet
 
 map: $(OUT)/map.png
 else

@@ -91,10 +91,10 @@ $(OUT)/roc.png: $(OUT)/lookup.csv
 	@cp $(OUT)/evaluation/roc.png $@.partial && mv $@.partial $@
 
 $(OUT)/top.png: $(OUT)/map.pcd $(POINTS) $(OUT)/shown_with
-	@exec $(GRASPMAP) render $< -o $@ --view top --color score $(markers) --title "$$TITLE" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view top $(markers) --title "$$TITLE" --quiet
 
 $(OUT)/oblique.png: $(OUT)/map.pcd $(OUT)/shown_with
-	@exec $(GRASPMAP) render $< -o $@ --view oblique --color score --title "$$TITLE" --quiet
+	@exec $(GRASPMAP) render $< -o $@ --view oblique --title "$$TITLE" --quiet
 
 $(OUT)/curvature.png: $(OUT)/map.pcd $(OUT)/shown_with
 	@exec $(GRASPMAP) render $< -o $@ --view top --color flags --title "$$TITLE: convex areas" --quiet

@@ -84,9 +84,7 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
                                                    libgtd::FootholdResult& result, Run& run) {
   const auto gripper_file = libmap::find_data_file("grippers", gripper_of(options, manifest));
   const libgtd::Gripper gripper = libgtd::read_gripper(gripper_file, {});
-  if (!gripper.fingers)
-    throw libmap::Error("missing: a gripper is closed by its fingers",
-                        {.file = gripper_file.string(), .field = "fingers"});
+  in_file(gripper_file.string(), [&] { libgtd::require_fingers(gripper); });
   const libmap::TriangleMesh mesh = libmap::read_mesh(options.mesh).mesh;
   run.add_input(options.mesh);
   for (const auto& input : libgtd::gripper_files(gripper_file)) run.add_input(input);
@@ -129,9 +127,10 @@ std::vector<libgtd::LocationResult> test_footholds(const FootholdTrialsOptions& 
   return of_holding;
 }
 
-// Adds hold_probability, hold_low, hold_high, holding_force_n (the trials' median of what their
-// weakest direction holds) and for each direction pull_away_n, pull_45_0_n, ..., pull_90_315_n
-// (what nine of ten trials hold in it). Nothing without results.
+// Adds hold_probability, hold_low, hold_high, holding_force_n, holding_force_low_n and
+// holding_force_high_n (quantiles 0.5, 0.05 and 0.95 of the force that the trials' weakest
+// direction holds), trial_spread, parameter_spread, and for each direction pull_away_n,
+// pull_45_0_n, ..., pull_90_315_n (what nine of ten trials hold in it). Nothing without results.
 void add_trial_fields(const std::vector<libgtd::LocationResult>& trials,
                       libmap::PointCloud& footholds) {
   if (trials.empty()) return;
@@ -147,6 +146,10 @@ void add_trial_fields(const std::vector<libgtd::LocationResult>& trials,
   add("hold_low", [](const Result& r) { return r.hold_low; });
   add("hold_high", [](const Result& r) { return r.hold_high; });
   add("holding_force_n", [](const Result& r) { return r.force_n[1]; });
+  add("holding_force_low_n", [](const Result& r) { return r.force_range_n[0]; });
+  add("holding_force_high_n", [](const Result& r) { return r.force_range_n[1]; });
+  add("trial_spread", [](const Result& r) { return r.trial_spread; });
+  add("parameter_spread", [](const Result& r) { return r.parameter_spread; });
   for (std::size_t d = 0; d < libgtd::pull_directions().size(); ++d) {
     std::string name = libgtd::pull_directions()[d].name();
     std::replace(name.begin(), name.end(), '@', '_');

@@ -231,6 +231,8 @@ SceneFile scene_of(const std::string& file, const SceneFileOptions& options, Run
     for (const libgtd::ScenePartStyle& part : libgtd::shown_parts(*mesh))
       layer.coloring.own_legend.entries.push_back({part.color, part.text});
   layer.coloring.zero_plane_m = zero_plane_of(options, manifest ? &*manifest : nullptr);
+  if (manifest && !layer.coloring.load_n)
+    layer.coloring.load_n = libmap::number_of(manifest->find_parameter("load_n"));
   scene.layers.push_back(std::move(layer));
   const libmap::Pose* terrain_from_input = terrain_from_input_of(manifest);
   if (terrain_from_input != nullptr) {

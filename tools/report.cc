@@ -42,8 +42,8 @@ void bind(libmap::ParameterTable& table, ReportCommandOptions& options) {
             "cells of a map's 3-D view: of larger maps cubes of voxels become one");
 }
 
-// Bytes of a cell in the page: seven, in base64.
-constexpr double bytes_a_cell = 28.0 / 3.0;
+// Bytes of a cell in the page: eleven at most, in base64.
+constexpr double bytes_a_cell = 44.0 / 3.0;
 // The share of the page that maps may take, and that scenes may.
 constexpr double maps_share = 0.4;
 constexpr double scenes_share = 0.4;
@@ -90,8 +90,9 @@ struct DownsampledMap {
   libmap::MapViewOptions options;
 };
 
-std::optional<double> zero_plane_of(const libmap::Manifest& manifest) {
-  return libmap::number_of(manifest.find_parameter("zero_plane_m"));
+void set_parameters(const libmap::Manifest& manifest, libmap::MapViewOptions& options) {
+  options.zero_plane_m = libmap::number_of(manifest.find_parameter("zero_plane_m"));
+  options.load_n = libmap::number_of(manifest.find_parameter("load_n"));
 }
 
 // Of cubes, for a map of that many voxels if it is even ground.
@@ -116,7 +117,7 @@ DownsampledMap read_cloud_map(const fs::path& path, std::size_t max_cells) {
   do {
     map.points = width == 1 ? whole : libgtd::thin_map_in_cubes(whole, width);
   } while (map.points.size() > max_cells && ++width > 0);
-  if (manifest) map.options.zero_plane_m = zero_plane_of(*manifest);
+  if (manifest) set_parameters(*manifest, map.options);
   return map;
 }
 
@@ -144,7 +145,7 @@ DownsampledMap read_store_map(const fs::path& path, std::size_t max_cells) {
   } while (map.points.size() > max_cells && ++width > 0);
   map.points = libmap::transform_cloud(map.points, terrain_from_map(manifest));
   map.options.lattice = {index.lattice.voxel_size_m, index.lattice.origin_m};
-  map.options.zero_plane_m = zero_plane_of(index.manifest);
+  set_parameters(index.manifest, map.options);
   return map;
 }
 

@@ -351,6 +351,9 @@ void score(ScoreOptions& options, Run& run) {
   if (options.up != "auto") options.detection.up = parse_vector(options.up, "--up");
   scenario.check();
   scenario.set_defaults();
+  libmap::ParameterTable in_force;
+  bind(in_force, options);
+  run.manifest().add_parameters(in_force);
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
     throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
                         {.field = "--up", .value = options.up});

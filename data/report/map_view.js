@@ -14,7 +14,7 @@ class MapView {
     this.labels = true;
     this.selected = -1;
     this.pending = false;
-    this.cells = this.data.mesh ? new SceneMesh(this.data) : new MapCells(this.data.cells);
+    this.cells = this.data.mesh ? new SceneMesh(this.data) : new MapCells(this.data);
     this.marks = new MapMarks(this.canvas, this.data.markers, this.data.cell_size_m);
     this.size = this.cells.size;
     this.middle = this.size.clone().multiplyScalar(0.5);
@@ -23,6 +23,7 @@ class MapView {
     this.setUpTools();
     this.setUpTable();
     this.setUpPicking();
+    if (this.cells.forces) this.setUpForces();
     this.show();
   }
 
@@ -117,6 +118,31 @@ class MapView {
         labels.setAttribute('aria-pressed', String(this.labels));
         this.ask();
       });
+  }
+
+  // A slider of the load, on a logarithmic scale around the map's own, and readings at the pointer.
+  setUpForces() {
+    const slider = this.figure.querySelector('.tools input');
+    const reading = this.figure.querySelector('.reading');
+    slider.addEventListener('input', () => {
+      const load = Number((this.data.load_n * 10 ** (slider.value / 40)).toPrecision(2));
+      this.cells.forces.load = slider.value === '0' ? this.data.load_n : load;
+      this.cells.setMode(this.cells.mode);
+      slider.setAttribute('aria-valuetext', inNewtons(load));
+      for (const output of this.figure.querySelectorAll('output')) output.value = inNewtons(load);
+      reading.hidden = true;
+      this.ask();
+    });
+    this.canvas.addEventListener('pointermove', (event) => {
+      const box = this.canvas.getBoundingClientRect();
+      const scale = this.canvas.width / box.width;
+      const cell = this.cells.pick(
+        this.camera, this.canvas.width, this.canvas.height,
+        Math.floor((event.clientX - box.left) * scale), Math.floor((event.clientY - box.top) * scale));
+      reading.hidden = cell < 0;
+      if (cell >= 0) reading.textContent = this.cells.forces.text(cell);
+    });
+    this.canvas.addEventListener('pointerleave', () => { reading.hidden = true; });
   }
 
   setMode(mode) {

@@ -24,7 +24,7 @@ const SCENE_FRAGMENT = `
 
 class SceneMesh extends MapCells {
   constructor(data) {
-    super('');
+    super({cells: ''});
     const buffer = bytesOf(data.mesh).buffer;
     const vertices = data.vertices;
     const Index = vertices > 65536 ? Uint32Array : Uint16Array;

@@ -2,6 +2,7 @@
 
 #include <openssl/evp.h>
 
+#include <algorithm>
 #include <array>
 #include <fstream>
 #include <limits>
@@ -143,8 +144,14 @@ void Manifest::add_parameters(const ParameterTable& table) {
     ManifestValue value = text;
     if (type == ParameterType::boolean) value = parse_bool(text).value_or(false);
     if (type == ParameterType::integer) value = parse_integer(text).value_or(0);
-    if (type == ParameterType::real) value = parse_double(text).value_or(0.0);
-    parameters.emplace_back(key, value);
+    if (const auto number = parse_double(text); type == ParameterType::real && number)
+      value = *number;
+    const auto known = std::find_if(parameters.begin(), parameters.end(),
+                                    [&](const auto& one) { return one.first == key; });
+    if (known == parameters.end())
+      parameters.emplace_back(key, value);
+    else
+      known->second = value;
   }
 }
 

@@ -93,7 +93,7 @@ void ParameterTable::add(std::string key, std::optional<double>& field, Range ra
   };
   parameters_.push_back({.key = key,
                          .description = std::move(description),
-                         .type = ParameterType::text,
+                         .type = ParameterType::real,
                          .choices = {},
                          .get = get,
                          .set = set,

@@ -38,9 +38,32 @@ std::uint8_t class_of(double score, bool below_plane) {
   return no_value_class;
 }
 
+void add_forces(const PointCloud& map, double load_n, MapView& view) {
+  const Field median = optional_field(map, "holding_force_n");
+  const Field low = optional_field(map, "holding_force_low_n");
+  const Field high = optional_field(map, "holding_force_high_n");
+  const Field probability = optional_field(map, "hold_probability");
+  if (median == nullptr || low == nullptr || high == nullptr || probability == nullptr) return;
+  for (std::size_t n = 0; n < map.size(); ++n)
+    view.forces.push_back(
+        {force_byte((*median)[n]), force_byte((*low)[n]), force_byte((*high)[n]),
+         static_cast<std::uint8_t>(std::lround(255.0 * std::clamp((*probability)[n], 0.0, 1.0)))});
+  std::vector<double> forces = *median;
+  const auto rank = static_cast<std::ptrdiff_t>(0.995 * static_cast<double>(forces.size() - 1));
+  std::nth_element(forces.begin(), forces.begin() + rank, forces.end());
+  view.max_force_n = std::max(forces[static_cast<std::size_t>(rank)], 1.0);
+  view.load_n = load_n;
+}
+
 bool is_set(Field field, std::size_t n) { return field != nullptr && (*field)[n] > 0.0; }
 
 }  // namespace
+
+std::uint8_t force_byte(double force_n) {
+  if (!(force_n > 0.0)) return 0;
+  return static_cast<std::uint8_t>(
+      std::lround(std::clamp(1.0 + (std::log(force_n) + 3.0) / 0.04, 1.0, 255.0)));
+}
 
 MapLattice lattice_of(const PointCloud& map) {
   const std::array<Field, 3> voxels = voxel_fields(map);
@@ -102,7 +125,9 @@ MapView make_map_view(const PointCloud& map, const MapViewOptions& options) {
       view.cells[n].place[axis] = static_cast<std::uint16_t>(place);
     }
   }
-  const Field score = field_of(map, "score");
+  if (options.load_n) add_forces(map, *options.load_n, view);
+  const Field held = optional_field(map, "hold_probability");
+  const Field score = held != nullptr ? held : field_of(map, "score");
   const Field convex = optional_field(map, "convex");
   const Field graspable = optional_field(map, "graspable");
   const Field obstacle = optional_field(map, "obstacle");

@@ -41,6 +41,9 @@ std::vector<Swatch> swatches() {
   return all;
 }
 
+// Colors of the scale of forces.
+constexpr int scale_steps = 64;
+
 // Three 16-bit numbers a cell, little-endian, then a byte per cell.
 std::string cell_bytes(const MapView& view) {
   std::string bytes;
@@ -77,8 +80,22 @@ std::string view_json(const MapView& view) {
   json["convex"] = view.has_convex;
   json["graspable"] = view.has_graspable;
   json["obstacle"] = view.has_obstacle;
+  if (!view.forces.empty()) {
+    std::string planes;
+    for (const auto value :
+         {&CellForce::median, &CellForce::low, &CellForce::high, &CellForce::probability})
+      for (const CellForce& force : view.forces) planes += static_cast<char>(force.*value);
+    json["forces"] = to_base64(planes);
+    json["load_n"] = view.load_n;
+    json["max_force_n"] = view.max_force_n;
+  }
   json["markers"] = markers_json(view);
   return escape_json_in_script(json.dump(-1, ' ', true, Json::error_handler_t::replace));
+}
+
+// No style of its own is allowed on an element, but a drawing may have any color.
+std::string fill_of(const Color& color) {
+  return fmt::format("fill=\"#{:02x}{:02x}{:02x}\"", color[0], color[1], color[2]);
 }
 
 std::string legend_html(const MapView& view) {
@@ -95,9 +112,22 @@ std::string legend_html(const MapView& view) {
   };
   const std::vector<Swatch> all = swatches();
   std::string html = group("score", "Score", false);
+  if (!view.forces.empty())
+    html += "<li>Probability to hold <output>" + short_number(view.load_n) + " N</output></li>";
   for (std::size_t n = 0; n < 9; ++n)
     if (n < score_classes.size() || used[n]) html += entry(all[n]);
   html += "</ul>\n";
+  if (!view.forces.empty()) {
+    html += group("force", "Holding force", true) + "<li>Median of the holding force: 0 <svg " +
+            fmt::format("class=\"scale\" viewBox=\"0 0 {} 1\" preserveAspectRatio=\"none\">",
+                        scale_steps);
+    for (int n = 0; n < scale_steps; ++n) {
+      const Color color = viridis(n / (scale_steps - 1.0));
+      html += fmt::format("<rect x=\"{}\" width=\"1.1\" height=\"1\" {}/>", n, fill_of(color));
+    }
+    html += "</svg> " + short_number(view.max_force_n) + " N and above</li>" +
+            (used[8] ? entry(all[8]) : "") + "</ul>\n";
+  }
   const auto flags = [&](const std::string& mode, std::vector<std::size_t> shown) {
     html += group(mode, mode, true);
     for (const std::size_t n : shown) html += entry(all[n]);
@@ -117,7 +147,8 @@ std::string tools_html(const MapView& view) {
            (mode == "score" ? "true" : "false") + "\">" + text + "</button>";
   };
   std::string html = "<div class=\"tools\" hidden><div role=\"group\" aria-label=\"Colors\">" +
-                     button("score", "Score");
+                     button("score", view.forces.empty() ? "Score" : "Probability");
+  if (!view.forces.empty()) html += button("force", "Force");
   if (view.has_convex) html += button("convex", "Convex");
   if (view.has_graspable) html += button("graspable", "Graspable");
   if (view.has_obstacle) html += button("obstacle", "Obstacles");
@@ -127,7 +158,11 @@ std::string tools_html(const MapView& view) {
       "<button type=\"button\" data-camera=\"top\">Top</button>";
   if (!view.markers.empty())
     html += "<button type=\"button\" data-labels aria-pressed=\"true\">Labels</button>";
-  return html + "</div></div>\n";
+  html += "</div>";
+  if (!view.forces.empty())
+    html += "<label>Load <input type=\"range\" min=\"-60\" max=\"60\" value=\"0\"> <output>" +
+            short_number(view.load_n) + " N</output></label>";
+  return html + "</div>\n";
 }
 
 std::string description(const MapView& view) {
@@ -181,14 +216,11 @@ std::string scene_json(const TriangleMesh& mesh) {
   return escape_json_in_script(json.dump());
 }
 
-// No style of its own is allowed on an element, but a drawing may have any color.
 std::string scene_legend_html(const ReportScene& scene) {
   std::string html = "<ul class=\"legend\" aria-label=\"Colors\">";
   for (const auto& [color, text] : scene.legend)
-    html += fmt::format(
-        "<li><svg class=\"swatch\"><rect width=\"100%\" height=\"100%\" "
-        "fill=\"#{:02x}{:02x}{:02x}\"/></svg>{}</li>",
-        color[0], color[1], color[2], escape_html(text));
+    html += "<li><svg class=\"swatch\"><rect width=\"100%\" height=\"100%\" " + fill_of(color) +
+            "/></svg>" + escape_html(text) + "</li>";
   return html + "</ul>\n";
 }
 
@@ -203,6 +235,7 @@ std::string map_html(const ReportMap& map, const std::string& still, bool with_v
         "<noscript><p>The 3-D view needs JavaScript.</p></noscript>"
         "<canvas tabindex=\"0\" role=\"img\" hidden aria-label=\"Graspability map, 3-D view: "
         "arrow keys turn it, plus and minus zoom\"></canvas>";
+  if (!map.view.forces.empty()) html += "<p class=\"reading\" hidden></p>";
   html += "</div>\n" + legend_html(map.view);
   if (std::any_of(map.view.markers.begin(), map.view.markers.end(),
                   [](const MapMarker& marker) { return marker.verdict.has_value(); }))
@@ -260,6 +293,9 @@ std::string scene_html(const ReportScene& scene, bool with_view) {
 std::string palette_json() {
   Json json;
   for (const Swatch& swatch : swatches()) json[swatch.name] = swatch.color;
+  for (const ScoreClass& one : score_classes)
+    json["bounds"].push_back(std::max(0.0, one.min_score));
+  for (int n = 0; n < scale_steps; ++n) json["scale"].push_back(viridis(n / (scale_steps - 1.0)));
   return escape_json_in_script(json.dump());
 }
 

@@ -133,12 +133,28 @@ void add_no_value(const std::vector<double>& values, Legend& legend) {
     legend.entries.push_back({no_value_color, "no value"});
 }
 
+constexpr const char* hold_probability = "hold_probability";
+
+bool is_score(const std::string& name) { return name == "score" || name == hold_probability; }
+
+// Forces with their unit, a probability with its load, other fields by their names.
+std::string title_of(std::string name, const Coloring& coloring) {
+  if (name == hold_probability)
+    return "probability to hold" + (coloring.load_n ? " " + to_text(*coloring.load_n) + " N" : "");
+  if (!name.ends_with("_n")) return name;
+  std::replace(name.begin(), name.end(), '_', ' ');
+  return name.substr(0, name.size() - 1) + "[N]";
+}
+
 void color_by_score(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
-  const std::string name = coloring.field.empty() ? "score" : coloring.field;
+  const bool is_held = coloring.mode == ColorMode::automatic && find(source, hold_probability);
+  const std::string name = !coloring.field.empty() ? coloring.field
+                           : is_held               ? hold_probability
+                                                   : "score";
   const std::vector<double> values = values_of(source, name);
   for (const double value : values) result.colors.push_back(score_color(value));
   result.legend = score_legend();
-  result.legend.title = name;
+  result.legend.title = title_of(name, coloring);
   add_no_value(values, result.legend);
   finish(source, coloring, result);
 }
@@ -201,8 +217,9 @@ void color_by_flags(const ColorSource& source, const Coloring& coloring, Colored
   finish(source, coloring, result);
 }
 
-ColorMode automatic_mode(const ColorSource& source) {
-  if (find(source, "score") != nullptr) return ColorMode::score;
+ColorMode automatic_mode(const ColorSource& source, const std::string& field) {
+  if (!field.empty()) return is_score(field) ? ColorMode::score : ColorMode::field;
+  if (find(source, "score") || find(source, hold_probability)) return ColorMode::score;
   const auto& own = source.own_colors;
   const bool varied = std::any_of(own.begin(), own.end(),
                                   [&own](const Color& color) { return color != own.front(); });
@@ -251,7 +268,8 @@ std::vector<std::pair<std::string, ColorScale>> color_scale_names() {
 
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) {
   ColoredPoints result;
-  result.mode = coloring.mode == ColorMode::automatic ? automatic_mode(source) : coloring.mode;
+  result.mode = coloring.mode == ColorMode::automatic ? automatic_mode(source, coloring.field)
+                                                      : coloring.mode;
   result.colors.reserve(source.positions.size());
   switch (result.mode) {
     case ColorMode::own:
@@ -266,7 +284,7 @@ ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) 
       break;
     case ColorMode::field:
       if (coloring.field.empty()) throw_unknown_field(source, coloring.field);
-      color_by_field(source, coloring, coloring.field, coloring.field, result);
+      color_by_field(source, coloring, coloring.field, title_of(coloring.field, coloring), result);
       break;
     case ColorMode::flags:
       color_by_flags(source, coloring, result);

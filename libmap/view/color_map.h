@@ -3,6 +3,7 @@
 
 #include <Eigen/Core>
 #include <limits>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -13,8 +14,8 @@
 
 namespace libmap {
 
-// automatic: score where there is a field "score", else own colors where they are not all the
-//   same, else height.
+// automatic: the given field; else "hold_probability", else "score" in the classes of mode score,
+//   else own colors where they are not all the same, else height.
 // own:    the colors that the data bring.
 // score:  the seven classes of the graspability map's legend.
 // field:  any scalar field, or "x", "y", "z", on a color scale.
@@ -55,7 +56,8 @@ struct Legend {
 
 struct Coloring {
   ColorMode mode = ColorMode::automatic;
-  std::string field;  // of mode `field`; another field than "score" in mode `score`
+  std::string field{};             // of mode `field`; another field than "score" in mode `score`
+  std::optional<double> load_n{};  // of hold_probability, for the legend
   ColorScale scale = ColorScale::viridis;  // of the modes field and height
   // Values at the ends of the scale. Both equal: the data's 2nd and 98th percentile; of a diverging
   // scale plus and minus the 98th percentile of their sizes.

@@ -253,7 +253,9 @@ std::vector<std::pair<std::string, Shading>> shading_names() {
 void bind(ParameterTable& table, SceneLayer& layer) {
   Coloring& coloring = layer.coloring;
   table.add("color", coloring.mode, color_mode_names(), "what colors show");
-  table.add("field", coloring.field, "field that is shown with color: field");
+  table.add("field", coloring.field, "field that is shown with color: field or automatic");
+  table.add("load_n", coloring.load_n, positive,
+            "load of hold_probability, for the legend, N; auto: the map's own");
   table.add("color_scale", coloring.scale, color_scale_names(),
             "colors of continuous values; diverging: blue below and red above 0");
   table.add("range_min", coloring.range_min, any_number, "value at the lower end of the colors");

@@ -127,7 +127,7 @@ define grasp_sweep
 $(OUT)/grasp_sweep/$(1)/accuracy.csv: $(grasp_mesh_4) $(folder_4)/grasp/again.csv
 	@mkdir -p $(OUT)/grasp_sweep
 	@$$(GRASPMAP) grasp $$< --points $$(word 2,$$^) -o $(OUT)/grasp_sweep/$(1).csv $$(TRIALS) \
-	  --best-draws 0 $(2) --quiet && \
+	  --best-draws 0 --no-ensemble $(2) --quiet && \
 	exec $$(GRASPMAP) evaluate $(OUT)/grasp_sweep/$(1).csv -o $$(@D) --label graspable \
 	  --score $(call commas,$(grasp_score) nz) --bootstrap 1000 --title '$(1)' --quiet
 results += $(OUT)/grasp_sweep/$(1)/accuracy.csv
@@ -136,11 +136,11 @@ endef
 ifneq ($(filter grasp,$(STAGES)),)
 $(foreach n,$(SCENARIOS) $(if $(clouds),5 6 7),$(eval $(call grasp_study,$(n))))
 ifneq ($(filter 4,$(SCENARIOS)),)
-$(eval $(call grasp_sweep,friction_0.25,--friction 0.25))
-$(eval $(call grasp_sweep,friction_0.6,--friction 0.6))
-$(eval $(call grasp_sweep,steeper_asperities,--asperity-min 30))
-$(eval $(call grasp_sweep,flatter_asperities,--asperity-max 60))
-$(eval $(call grasp_sweep,drag_2mm,--drag 2))
+$(eval $(call grasp_sweep,friction_0.25,--set gripper.engagement.friction=0.25))
+$(eval $(call grasp_sweep,friction_0.6,--set gripper.engagement.friction=0.6))
+$(eval $(call grasp_sweep,steeper_asperities,--set gripper.engagement.asperity_min_deg=30))
+$(eval $(call grasp_sweep,flatter_asperities,--set gripper.engagement.asperity_max_deg=60))
+$(eval $(call grasp_sweep,drag_2mm,--set gripper.engagement.drag_mm=2))
 $(eval $(call grasp_sweep,closing_force_5,--set gripper.fingers.closing_force_n=5))
 $(eval $(call grasp_sweep,closing_force_20,--set gripper.fingers.closing_force_n=20))
 $(eval $(call grasp_sweep,four_fingers,--set gripper.fingers.count=4))

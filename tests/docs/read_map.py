@@ -44,6 +44,8 @@ def matched_of(point, threshold):
 def check_map(points, manifest):
     parameters, results = manifest["parameters"], manifest["results"]
     origin, size = results["lattice_origin_m"], parameters["voxel_size_m"]
+    plane = parameters["zero_plane_m"]
+    lowest = float("-inf") if plane == "auto" else plane
     assert [(p["i"], p["j"], p["k"]) for p in points] == sorted({(p["i"], p["j"], p["k"])
                                                                 for p in points}), "ascending"
     for point in points:
@@ -53,7 +55,7 @@ def check_map(points, manifest):
         azimuths = 16 * point["falling_share"]
         assert azimuths == int(azimuths) and 0 <= azimuths <= 16, "falling_share"
         assert abs(point["score"] - matched * point["falling_share"]) < 1e-6, "score"
-        above = point["z"] >= parameters["zero_plane_m"]
+        above = point["z"] >= lowest
         color = next(c for least, c in COLORS if point["score"] >= least - 1e-6) if above else (255,) * 3
         assert (point["rgb"] >> 16 & 255, point["rgb"] >> 8 & 255, point["rgb"] & 255) == color
         holds = above and point["score"] >= parameters["graspability_threshold"]

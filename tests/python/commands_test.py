@@ -100,6 +100,8 @@ class Commands(unittest.TestCase):
         self.assertEqual(scored.up_source, manifest["results"]["up_source"])
         matrix = np.reshape(manifest["transforms"]["terrain_from_input"], (3, 4))
         np.testing.assert_array_equal(scored.terrain_from_input[:3], matrix)
+        self.assertEqual(scored.zero_plane_m, manifest["parameters"]["zero_plane_m"])
+        self.assertIsNone(graspmap.score(terrain, voxel_size_m=0.05).zero_plane_m)
 
     def test_lookup(self):
         self.copied("map.pcd")
@@ -124,8 +126,7 @@ class Commands(unittest.TestCase):
         best = graspmap.footholds(map_, separation_m=0.3)
         self.assert_same_bytes(self.folder / "footholds.ply", graspmap.write_cloud, best.cloud)
         self.run_command("render", "map.pcd", "--width", 400, "--height", 300, "-o", "map.png")
-        zero_plane_m = graspmap.read_manifest(self.folder / "map.pcd")["parameters"]["zero_plane_m"]
-        image = graspmap.render(map_, width_px=400, height_px=300, zero_plane_m=zero_plane_m)
+        image = graspmap.render(map_, width_px=400, height_px=300, load_n=10)
         self.assertEqual(image.shape, (300, 400, 3))
         self.assertEqual(graspmap.to_png(image), (self.folder / "map.png").read_bytes())
 

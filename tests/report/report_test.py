@@ -159,6 +159,24 @@ def on_a_desk(report):
             check(page.picture() != before, f'{mode} shows the same picture')
             check(browser.run(f'return {FIGURE}.querySelector(".legend[data-mode={mode}]").hidden')
                   is False, f'the legend of {mode} is not shown')
+        # Forces: as a color, at the pointer, and the probability of another load.
+        for mode in ('force', 'score'):
+            before = page.picture()
+            browser.run(f'{FIGURE}.querySelector("button[data-mode={mode}]").click()')
+            page.settle()
+            check(page.picture() != before, f'{mode} shows the same picture')
+        at = page.middle()
+        browser.drag(at, (0, 0))
+        page.settle()
+        reading = browser.run(f'return {FIGURE}.querySelector(".reading").textContent')
+        check('probability to hold 10 N' in reading, f'at the pointer: {reading}')
+        before = page.picture()
+        browser.run(f'const slider = {FIGURE}.querySelector("input"); slider.value = "-40";'
+                    'slider.dispatchEvent(new Event("input"))')
+        page.settle()
+        check(page.picture() != before, 'another load shows the same picture')
+        check(browser.run(f'return {FIGURE}.querySelector(".legend output").textContent') == '1 N',
+              'the legend has another load')
         before = page.picture()
         browser.run('document.querySelector("figure.map canvas").dispatchEvent('
                     'new KeyboardEvent("keydown", {key: "ArrowLeft"}))')

@@ -92,6 +92,9 @@ TEST(Footholds, TestedOnAMesh) {
     EXPECT_LE(values("hold_low")[n], values("hold_probability")[n]);
     EXPECT_GE(values("hold_high")[n], values("hold_probability")[n]);
     EXPECT_GE(values("holding_force_n")[n], 20.0);
+    EXPECT_LT(values("holding_force_low_n")[n], values("holding_force_n")[n]);
+    EXPECT_GT(values("holding_force_high_n")[n], values("holding_force_n")[n]);
+    EXPECT_GT(values("parameter_spread")[n], 0.0);
     // Of the 17 limits the least is at most what half of the trials hold in any direction.
     double least = values("pull_away_n")[n];
     for (const char* tilt : {"45", "90"})

@@ -6,6 +6,8 @@
 
 #include <chrono>
 #include <csignal>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "libmap/core/table.h"
@@ -76,7 +78,8 @@ TEST(GraspCommand, TableManifestAndEvaluation) {
   EXPECT_EQ(json_of("other.csv.json").at("results").at("parameters_sha256"),
             results.at("parameters_sha256"));
   EXPECT_NE(content("other.csv"), content("trials.csv"));
-  ASSERT_TRUE(succeeded(graspmap(with({"-o", "rough.csv", "--set", "gripper.engagement.friction=0.6"}))));
+  ASSERT_TRUE(
+      succeeded(graspmap(with({"-o", "rough.csv", "--set", "gripper.engagement.friction=0.6"}))));
   EXPECT_NE(json_of("rough.csv.json").at("results").at("parameters_sha256"),
             results.at("parameters_sha256"));
   // The verdicts are a field test: beside a second run's probabilities.
@@ -95,8 +98,7 @@ TEST(GraspCommand, BadInputIsOneLine) {
                           const std::vector<std::string>& parts) {
     return bad_input(graspmap(with(words)), parts);
   };
-  for (const auto& [flag, value] :
-       {std::pair{"--load", "0"}, {"--more-loads", "x"}})
+  for (const auto& [flag, value] : {std::pair{"--load", "0"}, {"--more-loads", "x"}})
     EXPECT_TRUE(refused({"-o", "t.csv", flag, value}, {flag, value}));
   for (const char* flag : {"--trials", "--draws"})
     EXPECT_TRUE(bad_input(
@@ -104,6 +106,8 @@ TEST(GraspCommand, BadInputIsOneLine) {
         {flag, "0"}));
   EXPECT_TRUE(refused({"-o", "t.txt"}, {"t.txt", ".csv"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.count=0"}, {"fingers.count"}));
+  EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.engagement.friction=-0.1"},
+                      {"engagement.friction", "-0.1"}));
   EXPECT_TRUE(refused({"-o", "t.csv", "--set", "gripper.fingers.cuont=3"}, {"fingers.cuont"}));
   std::string gripper =
       graspmap_test::read_text(graspmap_test::source_folder() / "data/grippers/scar-e.yaml");
@@ -169,11 +173,17 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
   const libmap::PointCloud held = libmap::read_cloud(scratch("held.pcd")).cloud;
   EXPECT_EQ(held.positions, map.positions);
   EXPECT_EQ(held.colors, map.colors);
-  ASSERT_EQ(held.fields.size(), map.fields.size() + 5);
-  for (std::size_t n = 0; n < map.fields.size(); ++n) EXPECT_EQ(held.fields[n], map.fields[n]);
-  const char* names[] = {"hold_probability", "holding_force_n", "limiting_direction",
-                         "grasp_unseen", "grasp_trials"};
-  for (std::size_t n = 0; n < 5; ++n) {
+  // What the map predicted is replaced; its score is not.
+  ASSERT_EQ(held.fields.size(), map.fields.size() + 3);
+  const std::set<std::string> replaced = {"hold_probability",    "holding_force_n",
+                                          "holding_force_low_n", "holding_force_high_n",
+                                          "trial_spread",        "parameter_spread"};
+  for (std::size_t n = 0; n < map.fields.size(); ++n) {
+    EXPECT_EQ(held.fields[n].name, map.fields[n].name);
+    EXPECT_EQ(held.fields[n] == map.fields[n], replaced.count(map.fields[n].name) == 0);
+  }
+  const char* names[] = {"limiting_direction", "grasp_unseen", "grasp_trials"};
+  for (std::size_t n = 0; n < 3; ++n) {
     EXPECT_EQ(held.fields[map.fields.size() + n].name, names[n]);
     EXPECT_EQ(held.fields[map.fields.size() + n].type, libmap::ScalarType::float32);
   }
@@ -217,6 +227,10 @@ TEST(GraspCommand, EveryVoxelOfAMap) {
                 value("hold_probability", voxels[row]), 1e-6);
     EXPECT_NEAR(table.number(row, table.column("force_median_n")),
                 value("holding_force_n", voxels[row]), 1e-4);
+    EXPECT_NEAR(table.number(row, table.column("force_p95_n")),
+                value("holding_force_high_n", voxels[row]), 1e-4);
+    EXPECT_NEAR(table.number(row, table.column("parameter_spread")),
+                value("parameter_spread", voxels[row]), 1e-4);
     EXPECT_NEAR(table.number(row, table.column("unseen")), value("grasp_unseen", voxels[row]),
                 1e-6);
   }

@@ -65,6 +65,20 @@ TEST(Render, FootholdsOfTheMap) {
   EXPECT_NE(content("a.png"), content("c.png"));
 }
 
+TEST(Render, LegendHasTheLoadOfTheMap) {
+  ASSERT_TRUE(succeeded(graspmap({"score", graspmap_test::write_terrain(), "-o", "map.pcd",
+                                  "--voxel-size", "0.04", "--load", "4"})));
+  const auto drawn = [](const std::vector<std::string>& more) {
+    std::vector<std::string> words = {"render",  "map.pcd", "-o",       "a.png", "--force",
+                                      "--width", "400",     "--height", "300"};
+    words.insert(words.end(), more.begin(), more.end());
+    EXPECT_TRUE(succeeded(graspmap(words)));
+    return content("a.png");
+  };
+  EXPECT_EQ(drawn({}), drawn({"--load", "4"}));
+  EXPECT_NE(drawn({}), drawn({"--load", "5"}));
+}
+
 TEST(Render, NeedsNoDisplay) {
   graspmap_test::write_terrain();
   ASSERT_TRUE(succeeded(

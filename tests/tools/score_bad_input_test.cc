@@ -162,13 +162,13 @@ TEST_F(ScoreBadInput, VoxelSizes) {
   }
 }
 
-TEST_F(ScoreBadInput, GripperWithoutHoldModel) {
+TEST_F(ScoreBadInput, GripperWithoutFingers) {
   graspmap_test::write_terrain();
-  const std::string gripper = gripper_with("hold_model:", "ignored:");
+  const std::string gripper = gripper_with("fingers:", "ignored:");
   std::string text = read_text(scratch(gripper));
   text.erase(text.find("ignored:"));
   write_text(scratch(gripper), text);
-  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", gripper}), {gripper, "hold_model"}));
+  EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", gripper}), {gripper, "fingers"}));
 }
 
 TEST_F(ScoreBadInput, CloudTooWideForTheVoxelSize) {

@@ -37,6 +37,18 @@ double value(const PointCloud& map, const char* field, std::size_t point) {
   return map.find_field(field)->values[point];
 }
 
+TEST(Score, DefaultsOfTheMethodAreInTheManifest) {
+  scored("map.pcd", {"--load", "4"});
+  const nlohmann::json forces = graspmap_test::json_of("map.pcd.json").at("parameters");
+  EXPECT_EQ(forces.at("load_n"), 4.0);
+  EXPECT_EQ(forces.at("zero_plane_m"), "auto");
+  EXPECT_EQ(forces.at("graspability_threshold"), 0.5);
+  scored("map.pcd", {"--method", "corrected"});
+  const nlohmann::json shapes = graspmap_test::json_of("map.pcd.json").at("parameters");
+  EXPECT_EQ(shapes.at("zero_plane_m"), 0.0);
+  EXPECT_EQ(shapes.at("graspability_threshold"), 0.8);
+}
+
 TEST(Score, MapKeepsItsPromises) {
   const PointCloud map = scored("map.pcd", {"--zero-plane", "-0.005", "--method", "corrected"});
   ASSERT_GT(map.size(), 4000U);

@@ -73,6 +73,10 @@ py::dict results_of(const Results& results, const libgtd::GraspOptions& options)
   made["hold_low"] = column<double>(results, [](const Result& r) { return r.hold_low; });
   made["hold_high"] = column<double>(results, [](const Result& r) { return r.hold_high; });
   made["force_n"] = table_of(results, 3, [](const Result& r) { return r.force_n; });
+  made["force_range_n"] = table_of(results, 2, [](const Result& r) { return r.force_range_n; });
+  made["trial_spread"] = column<double>(results, [](const Result& r) { return r.trial_spread; });
+  made["parameter_spread"] =
+      column<double>(results, [](const Result& r) { return r.parameter_spread; });
   made["best_force_n"] = table_of(results, 3, [](const Result& r) { return r.best_force_n; });
   made["unseen"] = column<double>(results, [](const Result& r) { return r.unseen; });
   made["trials"] = column<std::int64_t>(results, [](const Result& r) { return r.trials; });
@@ -98,9 +102,6 @@ py::dict grasp(const libmap::TriangleMesh& mesh, const py::object& points,
   options.trials.pull_limits = pull_limits;
   options.trials.check();
   const libgtd::Gripper gripper = libgtd::find_gripper(options.gripper, options.overrides);
-  if (!gripper.fingers)
-    throw libmap::Error("missing: a gripper is closed by its fingers",
-                        {.file = options.gripper, .field = "fingers"});
   const std::vector<Eigen::Vector3d> places = positions_from(points, "points");
   const libgtd::Ground ground(mesh, errors_of(mesh, surface_error, options.trials.surface));
   const Results results = run(threads, progress, [&](libmap::Progress& bar) {

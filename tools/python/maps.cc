@@ -1,4 +1,5 @@
 #include <algorithm>
+#include <cmath>
 
 #include "libgtd/detect.h"
 #include "libgtd/evaluate/lookup.h"
@@ -55,7 +56,9 @@ py::dict score(const PointCloud& terrain, const std::optional<std::string>& scen
   made["map"] = shared(std::move(map));
   made["frame"] = options.frame == libgtd::MapFrame::terrain ? "terrain" : "input";
   made["terrain_from_input"] = matrix_of(result.map.terrain_from_input);
-  made["zero_plane_m"] = result.map.zero_plane_m;
+  made["zero_plane_m"] = std::isfinite(result.map.zero_plane_m)
+                             ? py::object(py::float_(result.map.zero_plane_m))
+                             : py::none();
   made["voxel_size_m"] = result.map.lattice.voxel_size_m;
   made["obstacle_voxels"] = result.obstacle_voxels;
   made["timings_s"] = numbers_of(result.timings_s);

@@ -31,13 +31,19 @@ constexpr std::size_t kept_pieces = 3;
 // More than offset, tilt and blur of a pose move a gripper, whose size counts twice.
 constexpr double extra_margin_m = 0.2;
 
-constexpr std::size_t field_count = 5;
+constexpr std::size_t field_count = 9;
 using Values = std::array<double, field_count>;  // of one voxel, as grasp_fields
-constexpr Values no_candidate = {0.0, 0.0, -1.0, 0.0, 0.0};
+constexpr Values no_candidate = {0.0, 0.0, 0.0, 0.0, 0.0, 0.0, -1.0, 0.0, 0.0};
 
 Values values_of(const libgtd::LocationResult& result) {
-  return {result.hold_probability, result.force_n[1],
-          result.has_force ? static_cast<double>(result.limiting_direction) : -1.0, result.unseen,
+  return {result.hold_probability,
+          result.force_n[1],
+          result.force_range_n[0],
+          result.force_range_n[1],
+          result.trial_spread,
+          result.parameter_spread,
+          result.has_force ? static_cast<double>(result.limiting_direction) : -1.0,
+          result.unseen,
           static_cast<double>(result.trials)};
 }
 
@@ -159,9 +165,8 @@ class MapGrasping {
     std::size_t on_mesh = 0;
     for (std::size_t n = 0; n < tiles.size(); ++n) {
       const libmap::PointCloud points = map_.load(n);
-      for (const std::string& name : grasp_fields())
-        if (points.find_field(name) != nullptr)
-          throw libmap::Error("the map has this field already", {.field = name});
+      if (points.find_field("grasp_trials") != nullptr)
+        throw libmap::Error("the map has this field already", {.field = "grasp_trials"});
       voxels += points.size();
       for (const auto& [piece, members] : by_piece(points))
         for (const std::size_t voxel : members)
@@ -385,7 +390,9 @@ const GroundPieces::Piece& GroundPieces::piece(std::size_t number) {
 
 const std::vector<std::string>& grasp_fields() {
   static const std::vector<std::string> names = {
-      "hold_probability", "holding_force_n", "limiting_direction", "grasp_unseen", "grasp_trials"};
+      "hold_probability",     "holding_force_n", "holding_force_low_n",
+      "holding_force_high_n", "trial_spread",    "parameter_spread",
+      "limiting_direction",   "grasp_unseen",    "grasp_trials"};
   return names;
 }
 

@@ -113,6 +113,22 @@ TEST(ManifestTest, ParametersKeepTheirTypes) {
   EXPECT_EQ(manifest.parameters, wanted);
 }
 
+TEST(ManifestTest, ParametersWithoutAValueAreAuto) {
+  std::optional<double> plane_m;
+  std::optional<double> threshold = 0.25;
+  libmap::ParameterTable table;
+  table.add("plane_m", plane_m, libmap::any_number, "");
+  table.add("threshold", threshold, libmap::zero_to_one, "");
+  Manifest manifest;
+  manifest.add_parameters(table);
+  EXPECT_EQ(*manifest.find_parameter("plane_m"), ManifestValue(std::string("auto")));
+  EXPECT_EQ(*manifest.find_parameter("threshold"), ManifestValue(0.25));
+  plane_m = -0.5;  // a value that is found later
+  manifest.add_parameters(table);
+  EXPECT_EQ(*manifest.find_parameter("plane_m"), ManifestValue(-0.5));
+  EXPECT_EQ(manifest.parameters.size(), 2U);
+}
+
 TEST(ManifestTest, InputIsHashed) {
   const fs::path path = scratch_folder() / "in.txt";
   graspmap_test::write_text(path, "abc");

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -83,6 +84,32 @@ TEST(MapView, ColorsAreTheClassesOfTheLegend) {
   }
   const MapView above = libmap::make_map_view(map, {.zero_plane_m = 1.0});
   EXPECT_EQ(above.cells[3].colors_and_flags & 15U, libmap::below_plane_class);
+}
+
+TEST(MapView, ForcesOfItsLoad) {
+  PointCloud map = map_of(voxels, 0.01, {0, 0, 0});
+  map.add_field("hold_probability", libmap::ScalarType::float32).values = {0.0, 0.4, 1.0};
+  map.add_field("holding_force_n", libmap::ScalarType::float32).values = {0.0, 9.0, 1e4};
+  map.add_field("holding_force_low_n", libmap::ScalarType::float32).values = {0.0, 0.01, 40.0};
+  EXPECT_TRUE(libmap::make_map_view(map, {.load_n = 12.5}).forces.empty());
+  map.add_field("holding_force_high_n", libmap::ScalarType::float32).values = {0.0, 20.0, 1e4};
+  EXPECT_TRUE(libmap::make_map_view(map, {}).forces.empty());
+  const MapView view = libmap::make_map_view(map, {.load_n = 12.5});
+  ASSERT_EQ(view.forces.size(), 3U);
+  EXPECT_EQ(view.load_n, 12.5);
+  EXPECT_EQ(view.forces[0].median, 0);
+  EXPECT_NEAR(std::exp(0.04 * (view.forces[1].median - 1) - 3.0), 9.0, 0.2);
+  EXPECT_NEAR(std::exp(0.04 * (view.forces[1].high - 1) - 3.0), 20.0, 0.4);
+  EXPECT_EQ(view.forces[1].low, 1);
+  EXPECT_EQ(view.forces[2].median, 255);
+  EXPECT_EQ(view.forces[1].probability, 102);
+  // The class of hold_probability, not of score.
+  EXPECT_EQ(view.cells[2].colors_and_flags & 15U, 0U);
+  libmap::ReportMap shown;
+  shown.view = view;
+  const std::string html = libmap::map_html(shown, "", true);
+  EXPECT_NE(html.find("Probability to hold <output>12.5 N</output>"), std::string::npos);
+  EXPECT_NE(html.find("\"load_n\":12.5"), std::string::npos);
 }
 
 TEST(MapView, WhatIsNoMapIsSaid) {

@@ -130,6 +130,23 @@ TEST(ColorPoints, BelowThePlaneIsWhiteAndOnItIsNot) {
   EXPECT_EQ(result.legend.entries[8].text, "below zero plane");
 }
 
+TEST(ColorPoints, ProbabilitiesTellTheirLoadAndForcesTheirUnit) {
+  PointCloud cloud = row_of_points(3);
+  cloud.add_field("score", ScalarType::float32).values = {0.1, 0.1, 0.1};
+  cloud.add_field("hold_probability", ScalarType::float32).values = {0.95, 0.5, 0.1};
+  cloud.add_field("holding_force_n", ScalarType::float32).values = {30.0, 10.0, 0.0};
+  const ColoredPoints held = color(cloud, {.load_n = 12.5});
+  EXPECT_EQ(held.mode, ColorMode::score);
+  EXPECT_EQ(held.legend.title, "probability to hold 12.5 N");
+  EXPECT_EQ(held.colors[0], score_color(0.95));
+  EXPECT_EQ(color(cloud, {.mode = ColorMode::score}).colors[0], score_color(0.1));
+  const ColoredPoints forces = color(cloud, {.field = "holding_force_n"});
+  EXPECT_EQ(forces.mode, ColorMode::field);
+  EXPECT_TRUE(forces.legend.continuous);
+  EXPECT_EQ(forces.legend.title, "holding force [N]");
+  EXPECT_EQ(forces.legend.max, 30.0);
+}
+
 TEST(ColorPoints, FlagsGraspableBeforeConvex) {
   PointCloud cloud = row_of_points(4);
   cloud.add_field("convex", ScalarType::uint8).values = {1, 1, 0, 0};

@@ -93,7 +93,7 @@ class ScoreResult(_fields.ScoreFields, Result):
     map: Cloud
     frame: Literal["terrain", "input"]
     terrain_from_input: NDArray[np.float64]  # 4 x 4
-    zero_plane_m: float
+    zero_plane_m: float | None  # None: no zero plane
     voxel_size_m: float
     obstacle_voxels: int
     timings_s: dict[str, float]
@@ -108,6 +108,10 @@ class GraspResult(Result):
     hold_low: NDArray[np.float64]  # (N,): Wilson's interval of 95 %
     hold_high: NDArray[np.float64]
     force_n: NDArray[np.float64]  # (N, 3): quantiles 0.1, 0.5, 0.9 of the trials, N
+    force_range_n: NDArray[np.float64]  # (N, 2): quantiles 0.05 and 0.95, N
+    # (N,): standard deviations of ln(force), between trials of one parameter set and between sets
+    trial_spread: NDArray[np.float64]
+    parameter_spread: NDArray[np.float64]
     best_force_n: NDArray[np.float64]  # (N, 3): the same with the best sharing of the load
     unseen: NDArray[np.float64]  # (N,): share of unseen ground under the fingers
     trials: NDArray[np.int64]  # (N,)
