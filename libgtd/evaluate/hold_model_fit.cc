@@ -69,11 +69,7 @@ HoldModelFit fit_hold_model(const libmap::Table& table, const std::string& label
   HoldModelFit result;
   FitSample sample;
   for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    const std::string& cell = table.rows[row][target];
-    const std::optional<bool> label = parse_label(cell);
-    if (!label && !cell.empty())
-      throw libmap::Error("is no label",
-                          {.file = table.file, .field = label_column, .value = cell});
+    const std::optional<bool> label = label_at(table, row, target);
     Weights terms = Weights::Ones();
     bool is_whole = label.has_value();
     for (std::size_t n = 0; n < columns.size(); ++n) {
