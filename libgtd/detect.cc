@@ -137,15 +137,9 @@ std::size_t evaluate_obstacles(const ObstacleOptions& options, GraspabilityMap& 
 
 }  // namespace
 
-const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names() {
-  static const std::vector<std::pair<std::string, PlaneSource>> names = {
-      {"fit", PlaneSource::fit}, {"none", PlaneSource::none}};
-  return names;
-}
-
 void bind(libmap::ParameterTable& table, DetectionOptions& options) {
   bind(table, options.scenario);
-  table.add("plane", options.plane, plane_source_names(),
+  table.add("plane", options.plane, {{"fit", PlaneSource::fit}, {"none", PlaneSource::none}},
             "fit: regression plane; none: the cloud is already in the terrain frame");
 }
 

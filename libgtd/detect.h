@@ -22,7 +22,6 @@ namespace libgtd {
 // fit: thin the cloud (`thesis` alone), fit the regression plane and carry the cloud into its
 // frame. none: the cloud is already in the terrain frame and taken as it is.
 enum class PlaneSource { fit, none };
-const std::vector<std::pair<std::string, PlaneSource>>& plane_source_names();
 
 struct DetectionOptions {
   Scenario scenario;

@@ -15,11 +15,7 @@ DetectionOptions read_scenario(const std::string& name) {
   libmap::ParameterTable table;
   bind(table, options.scenario);
   libmap::set_from_yaml(table, libmap::read_whole_file(file, max_bytes), file.string());
-  try {
-    options.scenario.check();
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file.string());
-  }
+  libmap::in_file(file, [&] { options.scenario.check(); });
   options.gripper = gripper_of(options);
   return options;
 }

@@ -28,8 +28,7 @@ struct ConvertOptions {
   std::vector<std::string> inputs;
   std::string input;  // the only one, or the first of the shares of a map
   std::string output;
-  FileEncoding encoding = FileEncoding::binary;
-  bool big_endian = false;
+  libmap::GeometryWriteOptions writing;
   double pixel_size_m = 0.0;
   TrajectoryFormat poses_format = TrajectoryFormat::automatic;
   TrajectoryFormat output_poses_format = TrajectoryFormat::automatic;
@@ -66,13 +65,13 @@ void add_input(const ConvertOptions& options, Run& run) {
 // Encodings that a format does not have.
 void refuse_ignored(const ConvertOptions& options) {
   const std::string format = libmap::format_of(options.output);
-  if (options.encoding == FileEncoding::binary_compressed && format != ".pcd")
+  if (options.writing.encoding == FileEncoding::binary_compressed && format != ".pcd")
     throw libmap::Error(
         "is an encoding of .pcd",
         {.file = options.output, .field = "--encoding", .value = "binary_compressed"});
   if (options.pixel_size_m > 0.0 && !libmap::is_dem_path(options.output))
     throw libmap::Error("is for .tif", {.file = options.output, .field = "--pixel-size"});
-  if (options.big_endian && format != ".ply")
+  if (options.writing.big_endian && format != ".ply")
     throw libmap::Error("is for .ply", {.file = options.output, .field = "--big-endian"});
 }
 
@@ -119,7 +118,7 @@ void convert_cloud(const ConvertOptions& options, Run& run) {
         run);
   }
   run.write_output(options.output, [&](const auto& temporary) {
-    libmap::write_cloud(temporary, read.cloud, {options.encoding, options.big_endian});
+    libmap::write_cloud(temporary, read.cloud, options.writing);
   });
 }
 
@@ -170,9 +169,9 @@ void convert_mesh(const ConvertOptions& options, Run& run) {
   add_input(options, run);
   run.write_output(options.output, [&](const auto& temporary) {
     if (to_cloud)
-      libmap::write_cloud(temporary, vertices_of(mesh), {options.encoding, options.big_endian});
+      libmap::write_cloud(temporary, vertices_of(mesh), options.writing);
     else
-      libmap::write_mesh(temporary, mesh, {options.encoding, options.big_endian});
+      libmap::write_mesh(temporary, mesh, options.writing);
   });
 }
 
@@ -211,8 +210,8 @@ void convert(ConvertOptions& options, Run& run) {
   options.input = options.inputs.front();
   if (options.inputs.size() > 1 || is_part_of_map(options.input)) {
     refuse_ignored(options);
-    return merge_tiles(options.inputs, options.output,
-                       {{options.encoding, options.big_endian}, options.pixel_size_m}, run);
+    return merge_tiles(options.inputs, options.output, {options.writing, options.pixel_size_m},
+                       run);
   }
   const bool poses = holds_poses(options);
   if (!poses) refuse_ignored(options);
@@ -236,12 +235,13 @@ int convert_file(int argc, char** argv) {
       options.output,
       "the same in the format of this extension, .vtp for ParaView, or .tif (GeoTIFF) for "
       "GIS; of tiles and shares the whole map, the same bytes as in one run");
-  command.parameters().add("encoding", options.encoding,
+  command.parameters().add("encoding", options.writing.encoding,
                            {{"ascii", FileEncoding::ascii},
                             {"binary", FileEncoding::binary},
                             {"binary_compressed", FileEncoding::binary_compressed}},
                            "how numbers are written, where the format has a choice");
-  command.parameters().add("big_endian", options.big_endian, "binary PLY with the high byte first");
+  command.parameters().add("big_endian", options.writing.big_endian,
+                           "binary PLY with the high byte first");
   command.parameters().add("pixel_size_m", options.pixel_size_m, libmap::not_negative,
                            "of .tif, m; 0: the map's voxel size");
   command.parameters().add("poses_format", options.poses_format, libmap::trajectory_format_names(),

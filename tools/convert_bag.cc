@@ -60,7 +60,11 @@ void bind(libmap::ParameterTable& table, BagCommandOptions& options) {
   table.add("arrow_m", options.arrow_m, libmap::positive, "length of the footholds' arrows, m");
   table.add("cell_size_m", options.cell_size_m, libmap::not_negative,
             "cells of the map's grids in a bag of ROS 2, m (0: the map's voxel size)");
-  table.add("compression", options.compression, libmap::bag_compression_names(),
+  table.add("compression", options.compression,
+            {{"none", libmap::BagCompression::none},
+             {"bz2", libmap::BagCompression::bz2},
+             {"lz4", libmap::BagCompression::lz4},
+             {"zstd", libmap::BagCompression::zstd}},
             "of the bag written: bz2 or lz4 in .bag, lz4 or zstd in .mcap");
 }
 

@@ -331,7 +331,8 @@ void bind_page(libmap::ParameterTable& table, RenderOptions& options) {
   table.add("column_titles", options.column_titles,
             "of several files: above the columns, with | between");
   table.add("row_titles", options.row_titles, "of several files: before the rows, with | between");
-  table.add("shared_view", sheet.shared_view, libmap::shared_view_names(),
+  table.add("shared_view", sheet.shared_view,
+            {{"sheet", libmap::SharedView::sheet}, {"row", libmap::SharedView::row}},
             "of several files: which maps share scale and extent: all, or those of a row");
 }
 

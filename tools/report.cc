@@ -48,7 +48,7 @@ constexpr double bytes_a_cell = 44.0 / 3.0;
 constexpr double maps_share = 0.4;
 constexpr double scenes_share = 0.4;
 
-std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::ReportPlan& plan) {
+std::size_t cells_a_map(const ReportCommandOptions& options, const libmap::PlannedSection& plan) {
   const std::size_t maps = plan.count(libmap::ItemKind::map);
   const double affordable = maps_share * options.max_size_mb * 1e6 / bytes_a_cell /
                             static_cast<double>(std::max<std::size_t>(maps, 1));
@@ -187,17 +187,13 @@ void make_report(ReportCommandOptions& options, Run& run) {
     throw UsageError(
         "--outline was removed: a report shows what its folder contains, in the order of the "
         "names");
-  std::error_code code;
-  if (!fs::is_directory(options.folder, code))
-    throw libmap::Error(fs::exists(options.folder, code) ? "is no folder" : "no such folder",
-                        {.file = options.folder});
+  libmap::PlannedSection plan = libmap::plan_report(options.folder);
+  if (!options.title.empty()) plan.heading = options.title;
   if (options.output.empty()) options.output = (fs::path(options.folder) / "report.html").string();
   const std::string extension = fs::path(options.output).extension().string();
   if (extension != ".html" && extension != ".htm")
     throw libmap::Error("reports are written as .html", {.file = options.output});
   run.claim_output(options.output);
-  libmap::ReportPlan plan = libmap::plan_report(options.folder);
-  if (!options.title.empty()) plan.title = options.title;
   const std::size_t max_cells = cells_a_map(options, plan);
   const bool has_views = (max_cells > 0 && plan.count(libmap::ItemKind::map) > 0) ||
                          plan.count(libmap::ItemKind::scene) > 0;

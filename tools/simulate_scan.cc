@@ -42,7 +42,10 @@ void bind(libmap::ParameterTable& table, SimulateScanOptions& options) {
   table.add("target", options.target,
             "what is looked at, X,Y,Z in the mesh's frame; auto: the site's center");
   bind(table, simulation.depth);
-  table.add("texture", simulation.texture, libmap::texture_source_names(),
+  table.add("texture", simulation.texture,
+            {{"auto", libmap::TextureSource::automatic},
+             {"mesh", libmap::TextureSource::mesh},
+             {"rock", libmap::TextureSource::rock}},
             "the mesh's own colors, or rock; auto: rock where the mesh has but one color");
   bind(table, simulation.photo);
   bind(table, simulation.faults);

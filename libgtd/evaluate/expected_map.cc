@@ -59,19 +59,6 @@ void check_columns(const libmap::Table& table) {
   }
 }
 
-std::optional<bool> verdict_of(const libmap::Table& table, std::size_t row) {
-  const std::string& cell = table.rows[row][table.column("graspable")];
-  if (libmap::trim(cell).empty()) return std::nullopt;
-  const std::optional<bool> verdict = parse_label(cell);
-  if (!verdict)
-    throw libmap::Error("not a verdict",
-                        {.file = table.file,
-                         .field = "row " + std::to_string(row + 1) + ", column 'graspable'",
-                         .value = "'" + cell + "'",
-                         .bound = "1, 0 or empty (undecided)"});
-  return verdict;
-}
-
 Eigen::Vector3d read_from(const libmap::Table& table, std::size_t row) {
   return {table.number(row, table.column("x")), table.number(row, table.column("y")),
           table.number(row, table.column("z"))};
@@ -173,15 +160,11 @@ ExpectedMap parse_expected_map(const libmap::Table& table) {
     region.from = read_from(table, row);
     region.to = read_to(table, row, region.from);
     region.radius_m = table.number(row, table.column("radius"));
-    region.graspable = verdict_of(table, row);
+    region.graspable = label_at(table, row, table.column("graspable"));
     region.why = table.rows[row][table.column("why")];
     expected.regions.push_back(std::move(region));
   }
-  try {
-    expected.check();
-  } catch (const libmap::Error& error) {
-    throw error.in_file(table.file);
-  }
+  libmap::in_file(table.file, [&] { expected.check(); });
   return expected;
 }
 

@@ -253,13 +253,11 @@ class TileLookup {
       if (v == 0 || visits[v].tile != visits[v - 1].tile) starts.push_back(v);
     starts.push_back(visits.size());
     std::vector<Finding> found(visits.size());
-    libmap::parallel_for(starts.size() - 1, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s < end; ++s) {
-        const libmap::PointCloud cloud = load_(visits[starts[s]].tile);
-        const MapPart tile(cloud, voxels_of_tile(cloud));
-        for (std::size_t v = starts[s]; v < starts[s + 1]; ++v)
-          found[v] = ask(tile, places[visits[v].place].in_map, options_);
-      }
+    libmap::parallel_each(starts.size() - 1, [&](std::size_t s) {
+      const libmap::PointCloud cloud = load_(visits[starts[s]].tile);
+      const MapPart tile(cloud, voxels_of_tile(cloud));
+      for (std::size_t v = starts[s]; v < starts[s + 1]; ++v)
+        found[v] = ask(tile, places[visits[v].place].in_map, options_);
     });
     for (std::size_t v = 0; v < visits.size(); ++v)
       join(findings[visits[v].place], std::move(found[v]), options_.mode);
@@ -273,12 +271,10 @@ class TileLookup {
 
 }  // namespace
 
-const std::vector<std::pair<std::string, LookupMode>>& lookup_mode_names() {
-  static const std::vector<std::pair<std::string, LookupMode>> names = {
-      {"nearest", LookupMode::nearest},
-      {"maximum", LookupMode::maximum},
-      {"mean", LookupMode::mean}};
-  return names;
+std::vector<std::pair<std::string, LookupMode>> lookup_mode_names() {
+  return {{"nearest", LookupMode::nearest},
+          {"maximum", LookupMode::maximum},
+          {"mean", LookupMode::mean}};
 }
 
 void bind(libmap::ParameterTable& table, LookupOptions& options) {
@@ -297,10 +293,9 @@ std::vector<LookupAnswer> look_up(const libmap::PointCloud& map,
   if (options.mode == LookupMode::maximum) values_of(map, "score");
   const MapPart whole(map);
   std::vector<LookupAnswer> answers(points.size());
-  libmap::parallel_for(points.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      answers[n] =
-          answer_of(points[n].allFinite() ? ask(whole, points[n], options) : Finding{}, options);
+  libmap::parallel_each(points.size(), 256, [&](std::size_t n) {
+    answers[n] =
+        answer_of(points[n].allFinite() ? ask(whole, points[n], options) : Finding{}, options);
   });
   return answers;
 }

@@ -19,7 +19,7 @@ namespace libgtd {
 // within the radius (the closest of equals). mean: the mean of each field within the radius. Of map
 // points that are equally good, the first in the map.
 enum class LookupMode { nearest, maximum, mean };
-const std::vector<std::pair<std::string, LookupMode>>& lookup_mode_names();
+std::vector<std::pair<std::string, LookupMode>> lookup_mode_names();
 
 struct LookupOptions {
   LookupMode mode = LookupMode::nearest;

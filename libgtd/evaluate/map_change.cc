@@ -65,11 +65,9 @@ std::vector<std::uint32_t> nearest_points(const std::vector<Eigen::Vector3d>& po
                                           double reach_m) {
   const libmap::PointTree tree(points);
   std::vector<std::uint32_t> nearest(places.size(), none);
-  libmap::parallel_for(places.size(), places_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const libmap::NeighborPoint near = tree.first_of_nearest(places[n]);
-      if (near.square_m2 <= reach_m * reach_m) nearest[n] = static_cast<std::uint32_t>(near.index);
-    }
+  libmap::parallel_each(places.size(), places_per_chunk, [&](std::size_t n) {
+    const libmap::NeighborPoint near = tree.first_of_nearest(places[n]);
+    if (near.square_m2 <= reach_m * reach_m) nearest[n] = static_cast<std::uint32_t>(near.index);
   });
   return nearest;
 }
@@ -131,18 +129,14 @@ ScoreDifference difference_of(const VoxelMap& map, const VoxelMap& other,
 ChangeSummary summarize(const VoxelMap& map, const MapSurface& surface, const VoxelMap& other,
                         const std::vector<VoxelPair>& pairs) {
   ChangeSummary summary;
-  std::vector<std::uint8_t> evaluated;
-  std::vector<std::uint8_t> reference;
   for (const VoxelPair& pair : pairs) {
-    evaluated.push_back(map.graspable[pair.map]);
-    reference.push_back(other.graspable[pair.other]);
+    summary.graspable.add(other.graspable[pair.other] != 0, map.graspable[pair.map] != 0);
     const auto area_m2 = static_cast<double>(surface.area_m2[pair.map]);
     const ChangeClass change = class_of(map, other, pair);
     summary.both_area_m2 += change == ChangeClass::both ? area_m2 : 0.0;
     summary.gained_area_m2 += change == ChangeClass::gained ? area_m2 : 0.0;
     summary.lost_area_m2 += change == ChangeClass::lost ? area_m2 : 0.0;
   }
-  summary.graspable = confusion_of(evaluated, reference);
   summary.kappa = cohens_kappa(summary.graspable);
   summary.difference = difference_of(map, other, pairs);
   return summary;

@@ -149,9 +149,8 @@ class NearestPairs {
         throw libmap::Error("joins more than 10 million pairs of regions",
                             {.field = "stride_m", .value = libmap::to_text(given_reach_m_)});
     }
-    libmap::parallel_for(sets_.size(), 8, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s < end; ++s)
-        of_set[s] = links_of(static_cast<std::uint32_t>(s), smaller[s]);
+    libmap::parallel_each(sets_.size(), 8, [&](std::size_t s) {
+      of_set[s] = links_of(static_cast<std::uint32_t>(s), smaller[s]);
     });
     std::vector<RegionLink> links;
     for (const std::vector<RegionLink>& part : of_set)

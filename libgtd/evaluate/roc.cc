@@ -182,9 +182,8 @@ std::optional<Interval> bootstrap_95(const Sample& sample, const RocOptions& opt
   if (options.bootstrap_replicates == 0) return std::nullopt;
   const Bootstrap bootstrap(sample);
   std::vector<double> areas(static_cast<std::size_t>(options.bootstrap_replicates));
-  libmap::parallel_for(areas.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      areas[i] = bootstrap.replicate(options.bootstrap_seed, i);
+  libmap::parallel_each(areas.size(), 64, [&](std::size_t i) {
+    areas[i] = bootstrap.replicate(options.bootstrap_seed, i);
   });
   std::sort(areas.begin(), areas.end());
   return Interval{quantile(areas, 0.025), quantile(areas, 0.975)};
@@ -196,14 +195,6 @@ std::string why_no_area(const Sample& sample) {
   const std::string number = std::to_string(sample.positives + sample.negatives);
   return "all " + number + " locations are labeled " + (sample.positives > 0 ? "true" : "false") +
          ": the area under the curve is not defined";
-}
-
-Confusion sum_of(Confusion a, const Confusion& b) {
-  a.true_positives += b.true_positives;
-  a.false_positives += b.false_positives;
-  a.true_negatives += b.true_negatives;
-  a.false_negatives += b.false_negatives;
-  return a;
 }
 
 double squared(double value) { return value * value; }
@@ -286,22 +277,6 @@ RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
   area.trapezoid_bootstrap_95 = bootstrap_95(sample, options);
   result.area = std::move(area);
   return result;
-}
-
-Confusion confusion_of(std::span<const std::uint8_t> evaluated,
-                       std::span<const std::uint8_t> reference) {
-  if (evaluated.size() != reference.size())
-    throw libmap::Error("the series differ in length", {.field = "evaluated",
-                                                        .value = std::to_string(evaluated.size()),
-                                                        .bound = std::to_string(reference.size())});
-  return libmap::parallel_reduce(
-      evaluated.size(), 1 << 16, Confusion{},
-      [&](std::size_t begin, std::size_t end) {
-        Confusion part;
-        for (std::size_t n = begin; n < end; ++n) part.add(reference[n] != 0, evaluated[n] != 0);
-        return part;
-      },
-      sum_of);
 }
 
 std::optional<Kappa> cohens_kappa(const Confusion& counts) {

@@ -11,7 +11,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <optional>
-#include <span>
 #include <string>
 #include <vector>
 
@@ -110,12 +109,6 @@ struct RocResult {
 RocResult evaluate_roc(const std::vector<std::optional<bool>>& labels,
                        const std::vector<std::optional<double>>& scores,
                        const RocOptions& options = {});
-
-// Counts of two series of one length, where not 0 is yes: `reference` is what Confusion calls
-// positive and negative, `evaluated` what it calls predicted. Throws libmap::Error if the lengths
-// differ.
-Confusion confusion_of(std::span<const std::uint8_t> evaluated,
-                       std::span<const std::uint8_t> reference);
 
 // Cohen's kappa: 1 all agree, 0 as many as chance gives, negative fewer.
 struct Kappa {

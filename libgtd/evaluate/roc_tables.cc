@@ -52,16 +52,8 @@ bool is_number_column(const Table& table, std::size_t column) {
 std::vector<std::optional<bool>> read_labels(const Table& table, const std::string& name) {
   const std::size_t column = table.column(name);
   std::vector<std::optional<bool>> labels;
-  for (std::size_t row = 0; row < table.rows.size(); ++row) {
-    const std::string& cell = table.rows[row][column];
-    labels.push_back(libmap::trim(cell).empty() ? std::nullopt : parse_label(cell));
-    if (!labels.back() && !libmap::trim(cell).empty())
-      throw libmap::Error("not a label",
-                          {.file = table.file,
-                           .field = "row " + std::to_string(row + 1) + ", column '" + name + "'",
-                           .value = "'" + cell + "'",
-                           .bound = "1/0, true/false, yes/no or graspable/not graspable"});
-  }
+  for (std::size_t row = 0; row < table.rows.size(); ++row)
+    labels.push_back(label_at(table, row, column));
   return labels;
 }
 
@@ -221,6 +213,18 @@ std::optional<bool> parse_label(std::string_view text) {
   if (letters == "notgraspable" || letters == "nongraspable" || letters == "ungraspable")
     return false;
   return std::nullopt;
+}
+
+std::optional<bool> label_at(const Table& table, std::size_t row, std::size_t column) {
+  const std::string& cell = table.rows[row][column];
+  if (libmap::trim(cell).empty()) return std::nullopt;
+  if (const std::optional<bool> label = parse_label(cell)) return label;
+  throw libmap::Error(
+      "not a label",
+      {.file = table.file,
+       .field = "row " + std::to_string(row + 1) + ", column '" + table.columns[column] + "'",
+       .value = "'" + cell + "'",
+       .bound = "1/0, true/false, yes/no, graspable/not graspable or empty"});
 }
 
 std::vector<std::string> default_score_columns(const Table& table, std::string_view label_column) {

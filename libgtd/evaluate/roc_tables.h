@@ -36,6 +36,9 @@ struct TableEvaluation {
 // '-', '_' or a space). Nothing for any other text.
 std::optional<bool> parse_label(std::string_view text);
 
+// The label in a cell; nothing for an empty one. Throws libmap::Error naming file, row and column.
+std::optional<bool> label_at(const libmap::Table& table, std::size_t row, std::size_t column);
+
 // All columns that hold numbers and empty cells alone, at least one number, and are neither the
 // label, nor an identity (id, point, hold, i, j, k), nor a position or distance (x, y, z, or a
 // name that ends with a unit of length such as "_m"), nor a look-up's flags found and edge.

@@ -132,17 +132,15 @@ void fill_values(const PointCloud& map, VoxelMap& result) {
   result.graspable.resize(count);
   result.border.resize(count);
   result.obstacle.resize(count);
-  libmap::parallel_for(count, voxels_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const std::uint32_t point = result.map_points[n];
-      const bool scored = std::isfinite(score[point]);
-      const bool blocked = obstacle != nullptr && (*obstacle)[point] > 0.0;
-      result.scores[n] =
-          scored ? static_cast<float>(score[point]) : std::numeric_limits<float>::quiet_NaN();
-      result.graspable[n] = scored && !blocked && graspable[point] > 0.0 ? 1 : 0;
-      result.border[n] = border != nullptr && (*border)[point] > 0.0 ? 1 : 0;
-      result.obstacle[n] = blocked ? 1 : 0;
-    }
+  libmap::parallel_each(count, voxels_per_chunk, [&](std::size_t n) {
+    const std::uint32_t point = result.map_points[n];
+    const bool scored = std::isfinite(score[point]);
+    const bool blocked = obstacle != nullptr && (*obstacle)[point] > 0.0;
+    result.scores[n] =
+        scored ? static_cast<float>(score[point]) : std::numeric_limits<float>::quiet_NaN();
+    result.graspable[n] = scored && !blocked && graspable[point] > 0.0 ? 1 : 0;
+    result.border[n] = border != nullptr && (*border)[point] > 0.0 ? 1 : 0;
+    result.obstacle[n] = blocked ? 1 : 0;
   });
 }
 

@@ -241,14 +241,13 @@ class HeightGrid {
             const Height& height) {
     if (z_.empty()) return;
     const StripLists lists = list_by_strip(placements);
-    libmap::parallel_for(lists.begins.size() - 1, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t s = begin; s < end; ++s)
-        for (std::size_t at = lists.begins[s]; at < lists.begins[s + 1]; ++at) {
-          const Placement& one = placements[lists.triangles[at]];
-          fill_columns(triangle_at(lists.triangles[at]),
-                       std::max<std::size_t>(one.first, s * columns_at_once),
-                       std::min<std::size_t>(one.last, (s + 1) * columns_at_once), height);
-        }
+    libmap::parallel_each(lists.begins.size() - 1, [&](std::size_t s) {
+      for (std::size_t at = lists.begins[s]; at < lists.begins[s + 1]; ++at) {
+        const Placement& one = placements[lists.triangles[at]];
+        fill_columns(triangle_at(lists.triangles[at]),
+                     std::max<std::size_t>(one.first, s * columns_at_once),
+                     std::min<std::size_t>(one.last, (s + 1) * columns_at_once), height);
+      }
     });
   }
 
@@ -332,14 +331,11 @@ void fill_triangles(const std::vector<Vector3d>& points, const std::vector<Corne
     return t;
   };
   std::vector<Placement> placements(triangles.size());
-  libmap::parallel_for(
-      triangles.size(), triangles_per_chunk, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t n = begin; n < end; ++n) {
-          const Triangle t = triangle_at(n);
-          placements[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
-          grid.place(placements[n], t);
-        }
-      });
+  libmap::parallel_each(triangles.size(), triangles_per_chunk, [&](std::size_t n) {
+    const Triangle t = triangle_at(n);
+    placements[n].refused = options.max_edge_m > 0 && longer_than(t, options.max_edge_m);
+    grid.place(placements[n], t);
+  });
   result.triangles = triangles.size();
   result.refused_triangles = static_cast<std::size_t>(std::count_if(
       placements.begin(), placements.end(), [](const Placement& one) { return one.refused; }));

@@ -264,9 +264,8 @@ void triangulate_between(const Points& points, const std::vector<Strip>& strips,
 
 PlanarTriangulation triangulate_in_plane(const Points& points, std::size_t points_a_strip) {
   std::vector<Strip> strips = cut_into_strips(points, std::max<std::size_t>(points_a_strip, 1));
-  libmap::parallel_for(strips.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t s = begin; s < end; ++s) triangulate_strip(points, strips[s]);
-  });
+  libmap::parallel_each(strips.size(),
+                        [&](std::size_t s) { triangulate_strip(points, strips[s]); });
   PlanarTriangulation whole;
   for (const Strip& strip : strips) {
     whole.vertices += strip.vertices;

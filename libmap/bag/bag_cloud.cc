@@ -194,11 +194,7 @@ BagCloudResult read(const std::filesystem::path& bag, const std::string& wanted,
 
 BagCloudResult read_bag_cloud(const std::filesystem::path& bag, const std::string& topic,
                               const std::optional<double>& stamp_s) {
-  try {
-    return read(bag, topic, stamp_s);
-  } catch (const Error& error) {
-    throw error.in_file(bag.string());
-  }
+  return in_file(bag, [&] { return read(bag, topic, stamp_s); });
 }
 
 }  // namespace libmap

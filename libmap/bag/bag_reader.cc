@@ -1,7 +1,6 @@
 #include "libmap/bag/bag_reader.h"
 
 #include <algorithm>
-#include <fstream>
 
 #include "libmap/bag/bag_storage.h"
 #include "libmap/bag/ros_messages.h"
@@ -15,17 +14,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string beginning_of(const fs::path& path) {
-  require_readable_file(path);
-  std::string head(16, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(file.gcount()));
-  return head;
-}
-
 const BagStorage& storage_of(const fs::path& file) {
-  const std::string head = beginning_of(file);
+  require_readable_file(file);
+  const std::string head = file_head(file, 16);
   if (head.starts_with("#ROSBAG V2.0\n") || head.starts_with("#ROSBAG V1.")) return ros1_storage;
   if (head.starts_with("SQLite format 3")) return sqlite_storage;
   if (head.starts_with("\x89MCAP0\r\n")) return mcap_storage;

@@ -95,11 +95,8 @@ void take_info(const BagMessage& message, SurveyedImages& images) {
 }
 
 void take_transforms(const BagMessage& message, TransformTree& tree) {
-  try {
-    add_transforms(message.topic.encoding, message.bytes, tree);
-  } catch (const Error& error) {
-    throw error.in_field(message.topic.name);
-  }
+  in_field(message.topic.name,
+           [&] { add_transforms(message.topic.encoding, message.bytes, tree); });
 }
 
 // "/camera/depth/image_raw" and "/camera/depth/image_raw/compressedDepth" -> "/camera/depth".
@@ -291,12 +288,10 @@ void rig_from_bag(const BagSurvey& survey, const BagListing& listing, const BagR
   for (std::size_t n = 0; n < survey.images.size(); ++n) {
     const SurveyedImages& images = survey.images[n];
     RigCamera& camera = plan.rig.cameras[n];
-    try {
+    in_field(images.topic, [&] {
       camera.camera = calibrated_camera(images, listing);
       camera.camera.base_from_camera = survey.transforms.target_from_source(base, images.frame);
-    } catch (const Error& error) {
-      throw error.in_field(images.topic);
-    }
+    });
   }
 }
 
@@ -453,11 +448,7 @@ std::vector<std::string> names_in_rig_folder(const BagRigPlan& plan) {
 
 BagRigPlan plan_bag_rig(const fs::path& bag, const BagRigOptions& options,
                         const std::optional<double>& stamp_s) {
-  try {
-    return plan_of(bag, options, stamp_s);
-  } catch (const Error& error) {
-    throw error.in_file(bag.string());
-  }
+  return in_file(bag, [&] { return plan_of(bag, options, stamp_s); });
 }
 
 }  // namespace libmap

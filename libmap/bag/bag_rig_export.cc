@@ -102,9 +102,7 @@ class ImageWriter {
   }
 
   void write_batch() {
-    parallel_for(batch_.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) encode(batch_[n]);
-    });
+    parallel_each(batch_.size(), [&](std::size_t n) { encode(batch_[n]); });
     for (const Waiting& one : batch_) {
       if (!one.error.empty()) {
         say_broken(one.image.camera, one.error);

@@ -123,15 +123,6 @@ BagFormat bag_format_of(const fs::path& path) {
                .bound = ".bag (ROS 1), .mcap, or none: a folder of .db3 (ROS 2)"});
 }
 
-const std::vector<std::pair<std::string, BagCompression>>& bag_compression_names() {
-  static const std::vector<std::pair<std::string, BagCompression>> names = {
-      {"none", BagCompression::none},
-      {"bz2", BagCompression::bz2},
-      {"lz4", BagCompression::lz4},
-      {"zstd", BagCompression::zstd}};
-  return names;
-}
-
 void write_bag(const fs::path& path, BagFormat format, const BagContent& content,
                BagCompression compression) {
   BagOutput bag(path, format, compression);

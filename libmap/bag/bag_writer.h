@@ -79,7 +79,6 @@ std::vector<std::string> names_in_bag_folder();
 
 // Of chunks: bz2 of ROS 1 alone, zstd of MCAP alone; a folder of sqlite has none.
 enum class BagCompression { none, bz2, lz4, zstd };
-const std::vector<std::pair<std::string, BagCompression>>& bag_compression_names();
 
 struct BagContent {
   double stamp_s = 1.0;                    // of all messages: from 1e-9 to 2^32 - 1 (ROS 2: 2^31)

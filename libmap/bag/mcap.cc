@@ -10,7 +10,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <cstring>
 #include <fstream>
 #include <map>
 #include <memory>
@@ -21,6 +20,7 @@
 #include "libmap/core/bytes.h"
 #include "libmap/core/error.h"
 #include "libmap/core/file_output.h"
+#include "libmap/core/output_lock.h"
 
 namespace libmap {
 
@@ -117,8 +117,8 @@ class McapReader {
   // Of each message: its topic's index, its stamp and its bytes.
   using Take = std::function<void(std::size_t, std::int64_t, std::string_view)>;
 
-  McapReader(const fs::path& path, const Take& take)
-      : path_(path), take_(take), file_(path, std::ios::binary) {
+  McapReader(const fs::path& path, RecordedTopics& topics, Take take)
+      : path_(path), topics_(topics), take_(std::move(take)), file_(path, std::ios::binary) {
     require_readable_file(path);
     left_ = fs::file_size(path);
     file_.seekg(-static_cast<std::streamoff>(magic.size()), std::ios::end);
@@ -139,8 +139,6 @@ class McapReader {
       throw error.in_file(path_.string());
     }
   }
-
-  RecordedTopics& topics() { return topics_; }
 
  private:
   const std::string& read_bytes(std::uint64_t count) {
@@ -218,43 +216,30 @@ class McapReader {
   }
 
   fs::path path_;
-  const Take& take_;
+  RecordedTopics& topics_;
+  Take take_;
   std::ifstream file_;
   std::uint64_t left_ = 0;
   std::string buffer_;
   std::map<std::uint16_t, std::string> types_;
   std::map<std::uint16_t, std::size_t> channels_;
-  RecordedTopics topics_;
 };
 
 void list_mcap(const fs::path& path, RecordedTopics& recorded) {
-  RecordedTopics* found = nullptr;
-  const McapReader::Take take = [&](std::size_t topic, std::int64_t stamp, std::string_view) {
-    found->add(topic, 1, stamp, stamp);
-  };
-  McapReader reader(path, take);
-  found = &reader.topics();
-  reader.read_all();
-  for (BagTopic topic : found->topics) {
-    const std::size_t messages = std::exchange(topic.messages, 0);
-    if (messages > 0)
-      recorded.add(recorded.index_of(topic), messages, found->first_ns, found->last_ns);
-  }
+  McapReader(path, recorded, [&](std::size_t topic, std::int64_t stamp, std::string_view) {
+    recorded.add(topic, 1, stamp, stamp);
+  }).read_all();
 }
 
 void read_mcap(const fs::path& path, const std::vector<BagRequest>& requests,
                const TakeMessage& take) {
-  const std::vector<BagTopic>* topics = nullptr;
-  const McapReader::Take take_wanted = [&](std::size_t index, std::int64_t stamp,
-                                           std::string_view bytes) {
-    const BagTopic& topic = (*topics)[index];
+  RecordedTopics recorded;
+  McapReader(path, recorded, [&](std::size_t index, std::int64_t stamp, std::string_view bytes) {
+    const BagTopic& topic = recorded.topics[index];
     for (const BagRequest& request : requests)
       if (request.topic == topic.name)
         return take({topic, stamp, bytes.substr(0, request.max_bytes)});
-  };
-  McapReader reader(path, take_wanted);
-  topics = &reader.topics().topics;
-  reader.read_all();
+  }).read_all();
 }
 
 }  // namespace
@@ -309,9 +294,7 @@ class McapSink : public BagSink {
 
  private:
   void require_written() const {
-    if (!file_)
-      throw Error(std::string("cannot be written: ") + std::strerror(errno),
-                  {.file = path_.string()}, ErrorKind::failed);
+    if (!file_) throw system_failure(path_, "cannot be written", errno);
   }
 
   void put(std::string_view bytes) {

@@ -10,31 +10,17 @@ namespace {
 using ros_message::Marker;
 
 ros_message::Quaternion to_ros_rotation(const Eigen::Matrix3d& rotation) {
-  Eigen::Quaterniond q(rotation);
-  q.normalize();
-  ros_message::Quaternion result;
-  result.x = q.x();
-  result.y = q.y();
-  result.z = q.z();
-  result.w = q.w();
-  return result;
+  const Eigen::Quaterniond q = Eigen::Quaterniond(rotation).normalized();
+  return {q.x(), q.y(), q.z(), q.w()};
 }
 
 ros_message::Point to_ros_point(const Eigen::Vector3d& point) {
-  ros_message::Point result;
-  result.x = point.x();
-  result.y = point.y();
-  result.z = point.z();
-  return result;
+  return {point.x(), point.y(), point.z()};
 }
 
 ros_message::ColorRGBA to_ros_color(const Color& color) {
-  ros_message::ColorRGBA result;
-  result.r = static_cast<float>(color[0]) / 255.0F;
-  result.g = static_cast<float>(color[1]) / 255.0F;
-  result.b = static_cast<float>(color[2]) / 255.0F;
-  result.a = 1.0F;
-  return result;
+  return {static_cast<float>(color[0]) / 255.0F, static_cast<float>(color[1]) / 255.0F,
+          static_cast<float>(color[2]) / 255.0F, 1.0F};
 }
 
 // Columns x, y, z, of which x is the direction.
@@ -56,12 +42,6 @@ Marker marker_of(const char* name, std::int32_t id, std::int32_t shape,
   marker.id = id;
   marker.shape = shape;
   return marker;
-}
-
-void set_scale(Marker& marker, double x, double y, double z) {
-  marker.scale.x = x;
-  marker.scale.y = y;
-  marker.scale.z = z;
 }
 
 }  // namespace
@@ -107,21 +87,16 @@ ros_message::TransformStamped encode_transform(const BagTransform& transform) {
   ros_message::TransformStamped message;
   message.header.frame_id = transform.parent;
   message.child_frame_id = transform.child;
-  const Eigen::Vector3d translation = transform.parent_from_child.translation();
-  message.transform.translation.x = translation.x();
-  message.transform.translation.y = translation.y();
-  message.transform.translation.z = translation.z();
-  message.transform.rotation = to_ros_rotation(transform.parent_from_child.linear());
+  message.transform = {{to_ros_point(transform.parent_from_child.translation())},
+                       to_ros_rotation(transform.parent_from_child.linear())};
   return message;
 }
 
 ros_message::PoseArray encode_poses(const std::vector<BagPlace>& places) {
   ros_message::PoseArray message;
   for (const BagPlace& place : places) {
-    ros_message::Pose pose;
-    pose.position = to_ros_point(place.place);
-    pose.orientation = to_ros_rotation(axes_along(place.direction));
-    message.poses.push_back(pose);
+    message.poses.push_back(
+        {to_ros_point(place.place), to_ros_rotation(axes_along(place.direction))});
   }
   return message;
 }
@@ -131,7 +106,7 @@ ros_message::MarkerArray encode_markers(const BagPlaces& places,
   ros_message::MarkerArray message;
   const double length = places.arrow_m;
   Marker balls = marker_of("place", 0, Marker::SPHERE_LIST, header);
-  set_scale(balls, length / 4, length / 4, length / 4);
+  balls.scale = {{length / 4, length / 4, length / 4}};
   balls.color.a = 1.0F;
   std::int32_t id = 0;
   for (const BagPlace& place : places.places) {
@@ -140,7 +115,7 @@ ros_message::MarkerArray encode_markers(const BagPlaces& places,
     Marker arrow = marker_of("approach", id, Marker::ARROW, header);
     const Eigen::Vector3d start = place.place - length * place.direction.normalized();
     arrow.points = {to_ros_point(start), to_ros_point(place.place)};
-    set_scale(arrow, length / 10, length / 5, length / 4);  // shaft, head, head's length
+    arrow.scale = {{length / 10, length / 5, length / 4}};  // shaft, head, head's length
     arrow.color = to_ros_color(place.color);
     Marker text = marker_of("text", id, Marker::TEXT_VIEW_FACING, header);
     text.pose.position = to_ros_point(start);

@@ -152,13 +152,11 @@ class GuardedBag {
   // The next topic or message and its bytes; nothing after the last.
   std::optional<Parcel> receive(std::string& bytes) {
     Parcel parcel;
-    try {
+    in_file(path_, [&] {
       input_.value(parcel);
       input_.array(bytes);
       if (parcel.kind == Parcel::Kind::error) throw Error(bytes);
-    } catch (const Error& error) {
-      throw error.in_file(path_.string());
-    }
+    });
     if (parcel.kind == Parcel::Kind::end) return std::nullopt;
     return parcel;
   }

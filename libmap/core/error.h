@@ -2,6 +2,7 @@
 // bound; a command prints what() as one line and ends with the exit code of its kind.
 #pragma once
 
+#include <filesystem>
 #include <stdexcept>
 #include <string>
 
@@ -38,5 +39,25 @@ class Error : public std::runtime_error {
   ErrorContext context_;
   ErrorKind kind_;
 };
+
+// The result of `step`; its Errors that name no file name `file`.
+template <typename Step>
+auto in_file(const std::filesystem::path& file, const Step& step) {
+  try {
+    return step();
+  } catch (const Error& error) {
+    throw error.in_file(file.string());
+  }
+}
+
+// The same of a field: what its Errors name is in `place`.
+template <typename Step>
+auto in_field(const std::string& place, const Step& step) {
+  try {
+    return step();
+  } catch (const Error& error) {
+    throw error.in_field(place);
+  }
+}
 
 }  // namespace libmap

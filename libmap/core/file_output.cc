@@ -174,6 +174,14 @@ void require_readable_file(const fs::path& path) {
     throw Error(std::string("cannot be read: ") + std::strerror(errno), {.file = path.string()});
 }
 
+std::string file_head(const fs::path& path, std::size_t max_bytes) {
+  std::ifstream file(path, std::ios::binary);
+  std::string head(max_bytes, '\0');
+  file.read(head.data(), static_cast<std::streamsize>(max_bytes));
+  head.resize(static_cast<std::size_t>(file.gcount()));
+  return head;
+}
+
 void require_file_size(const fs::path& path, std::uint64_t max_bytes) {
   std::error_code code;
   const std::uint64_t bytes = fs::file_size(path, code);

@@ -24,6 +24,9 @@ void require_file_size(const std::filesystem::path& path, std::uint64_t max_byte
 std::string read_whole_file(const std::filesystem::path& path,
                             std::uint64_t max_bytes = std::uint64_t{1} << 30);
 
+// The first bytes of a file, at most `max_bytes`; none if it cannot be read.
+std::string file_head(const std::filesystem::path& path, std::size_t max_bytes);
+
 // `content` straight to `path`, for callers that hold an OutputFile. Throws Error (failed).
 void write_text(const std::filesystem::path& path, std::string_view content);
 

@@ -2,6 +2,8 @@
 // column x, row y.
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -51,6 +53,25 @@ Image<T> crop_columns(const Image<T>& image, int x, int width) {
   for (int row = 0; row < image.height; ++row)
     for (int column = 0; column < width; ++column) part.at(column, row) = image.at(x + column, row);
   return part;
+}
+
+// The color between the centers of pixels, bilinear; the image goes on as at its border.
+template <typename Pixel>
+Eigen::Vector3f bilinear_color(const Image<Pixel>& image, double x, double y) {
+  const double within_x = std::clamp(x, 0.0, image.width - 1.0);
+  const double within_y = std::clamp(y, 0.0, image.height - 1.0);
+  const int left = std::min(static_cast<int>(within_x), std::max(image.width - 2, 0));
+  const int top = std::min(static_cast<int>(within_y), std::max(image.height - 2, 0));
+  const int right = std::min(left + 1, image.width - 1);
+  const int bottom = std::min(top + 1, image.height - 1);
+  const auto u = static_cast<float>(within_x - left);
+  const auto v = static_cast<float>(within_y - top);
+  const auto color_at = [&image](int column, int row) {
+    const Pixel& pixel = image.at(column, row);
+    return Eigen::Vector3f(pixel[0], pixel[1], pixel[2]);
+  };
+  return (1.0F - v) * ((1.0F - u) * color_at(left, top) + u * color_at(right, top)) +
+         v * ((1.0F - u) * color_at(left, bottom) + u * color_at(right, bottom));
 }
 
 }  // namespace libmap

@@ -13,7 +13,8 @@ namespace libmap {
 namespace fs = std::filesystem;
 
 Error system_failure(const fs::path& path, const std::string& what, int code) {
-  return Error(what + ": " + std::strerror(code), {.file = path.string()}, ErrorKind::failed);
+  const std::string message = code == 0 ? "" : std::string(": ") + std::strerror(code);
+  return Error(what + message, {.file = path.string()}, ErrorKind::failed);
 }
 
 void sync_file(const fs::path& path) {

@@ -9,7 +9,7 @@
 
 namespace libmap {
 
-// "WHAT: the system's message", kind failed. `code` is an errno.
+// "WHAT: the system's message", kind failed. `code` is an errno; 0: no message.
 Error system_failure(const std::filesystem::path& path, const std::string& what, int code);
 
 // Has what was written to a file or folder put on the disk. Throws Error (failed) naming `path`.

@@ -16,12 +16,16 @@ namespace libmap {
 void parallel_for(std::size_t count, std::size_t grain,
                   const std::function<void(std::size_t begin, std::size_t end)>& body);
 
-// step(n) for each n of 0..count-1, in parallel one by one.
+// Calls step(n) for each n of 0..count-1 in parallel, `grain` of them at a time or one by one.
 template <typename Step>
-void parallel_each(std::size_t count, const Step& step) {
-  parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
+void parallel_each(std::size_t count, std::size_t grain, const Step& step) {
+  parallel_for(count, grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t n = begin; n < end; ++n) step(n);
   });
+}
+template <typename Step>
+void parallel_each(std::size_t count, const Step& step) {
+  parallel_each(count, 1, step);
 }
 
 // chunk(begin, end) of each range, joined left to right with join(a, b).

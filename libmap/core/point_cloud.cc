@@ -1,20 +1,20 @@
 #include "libmap/core/point_cloud.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "libmap/core/error.h"
 
 namespace libmap {
 
-const ScalarField* PointCloud::find_field(std::string_view name) const {
+const ScalarField* find_field(const std::vector<ScalarField>& fields, std::string_view name) {
   const auto found = std::find_if(fields.begin(), fields.end(),
                                   [&](const ScalarField& field) { return field.name == name; });
   return found == fields.end() ? nullptr : &*found;
 }
 
-ScalarField* PointCloud::find_field(std::string_view name) {
-  const PointCloud& self = *this;
-  return const_cast<ScalarField*>(self.find_field(name));
+ScalarField* find_field(std::vector<ScalarField>& fields, std::string_view name) {
+  return const_cast<ScalarField*>(find_field(std::as_const(fields), name));
 }
 
 ScalarField& PointCloud::add_field(std::string_view name, ScalarType type) {

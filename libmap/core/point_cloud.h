@@ -25,6 +25,10 @@ struct ScalarField {
   bool operator==(const ScalarField&) const = default;
 };
 
+// The field of that name, or nullptr.
+const ScalarField* find_field(const std::vector<ScalarField>& fields, std::string_view name);
+ScalarField* find_field(std::vector<ScalarField>& fields, std::string_view name);
+
 using Color = std::array<std::uint8_t, 3>;  // red, green, blue
 
 // Positions in meters. `normals` and `colors` are either empty or as long as `positions`, and so is
@@ -43,8 +47,10 @@ struct PointCloud {
   bool has_colors() const { return !colors.empty(); }
 
   // The field of that name, or nullptr.
-  const ScalarField* find_field(std::string_view name) const;
-  ScalarField* find_field(std::string_view name);
+  const ScalarField* find_field(std::string_view name) const {
+    return libmap::find_field(fields, name);
+  }
+  ScalarField* find_field(std::string_view name) { return libmap::find_field(fields, name); }
 
   // Adds a field of size() zeros, or empties and retypes the one of that name.
   ScalarField& add_field(std::string_view name, ScalarType type);

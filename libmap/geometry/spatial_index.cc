@@ -165,11 +165,9 @@ double median_spacing(const std::vector<Eigen::Vector3d>& points) {
   if (points.size() < 2) return 0.0;
   const PointTree tree(points);
   std::vector<double> squares(std::min(points.size(), most));
-  parallel_for(squares.size(), 256, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const std::size_t index = n * points.size() / squares.size();
-      squares[n] = square_to_next(tree, points[index]);
-    }
+  parallel_each(squares.size(), 256, [&](std::size_t n) {
+    const std::size_t index = n * points.size() / squares.size();
+    squares[n] = square_to_next(tree, points[index]);
   });
   std::erase(squares, 0.0);
   if (squares.empty()) return 0.0;

@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "libmap/core/error.h"
+#include "libmap/core/file_output.h"
 #include "libmap/core/guarded_process.h"
 #include "libmap/core/output_lock.h"
 #include "libmap/core/text.h"
@@ -427,13 +428,7 @@ TriangleMesh decode_by_assimp(const std::string& bytes, const std::string& forma
 }
 
 DecodedModel decode_model_by_assimp(const std::filesystem::path& path, const std::string& format) {
-  if (format == "glb") {
-    std::string header(20, '\0');
-    std::ifstream file(path, std::ios::binary);
-    file.read(header.data(), static_cast<std::streamsize>(header.size()));
-    header.resize(static_cast<std::size_t>(file.gcount()));
-    require_sound_glb(header, std::filesystem::file_size(path));
-  }
+  if (format == "glb") require_sound_glb(file_head(path, 20), std::filesystem::file_size(path));
   const auto read = [&](Assimp::Importer& importer) { return importer.ReadFile(path.string(), 0); };
   return decode_guarded(std::filesystem::file_size(path),
                         [&] { return decode(format, read, model_of); });

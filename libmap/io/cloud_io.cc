@@ -5,10 +5,8 @@
 #include <boost/interprocess/mapped_region.hpp>
 #include <cerrno>
 #include <cmath>
-#include <cstring>
 #include <fstream>
 #include <limits>
-#include <sstream>
 #include <string>
 #include <utility>
 #include <vector>
@@ -168,11 +166,7 @@ std::string format_of(const std::filesystem::path& path) {
 }
 
 std::string read_head(const std::filesystem::path& path) {
-  std::string head(std::min<std::uint64_t>(std::filesystem::file_size(path), 1 << 20), '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(head.data(), static_cast<std::streamsize>(head.size()));
-  head.resize(static_cast<std::size_t>(file.gcount()));
-  return head;
+  return file_head(path, std::min<std::uint64_t>(std::filesystem::file_size(path), 1 << 20));
 }
 
 std::shared_ptr<const std::string> read_geometry_bytes(const std::filesystem::path& path) {
@@ -186,17 +180,10 @@ void write_geometry_file(const std::filesystem::path& path,
   errno = 0;
   std::ofstream file(path, std::ios::binary | std::ios::trunc);
   const auto require_good = [&] {
-    if (!file)
-      throw Error(std::string("cannot be written") +
-                      (errno == 0 ? "" : std::string(": ") + std::strerror(errno)),
-                  {.file = path.string()}, ErrorKind::failed);
+    if (!file) throw system_failure(path, "cannot be written", errno);
   };
   require_good();
-  try {
-    write(file);
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  in_file(path, [&] { write(file); });
   file.close();
   require_good();
 }
@@ -234,80 +221,48 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
   }
   require_cloud_file(path);
   if (is_dem_path(path)) return {read_dem_cloud(path), 0, dem_file_info(path)};
-  try {
+  return in_file(path, [&] {
     GeometryColumns content = decode(path);
     if (content.info.faces > 0)
       content.info.skipped.push_back(std::to_string(content.info.faces) + " faces");
     CloudFromColumns read = cloud_from_columns(content.vertices, NotFinite::drop);
     if (content.viewpoint) read.cloud.viewpoint = *content.viewpoint;
-    return {std::move(read.cloud), read.dropped_points, std::move(content.info)};
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+    return CloudReadResult{std::move(read.cloud), read.dropped_points, std::move(content.info)};
+  });
 }
 
 GeometryFileInfo read_cloud_info(const std::filesystem::path& path) {
   require_cloud_file(path);
   if (is_dem_path(path)) return dem_file_info(path);
   const std::string format = format_of(path);
-  try {
+  return in_file(path, [&] {
     if (format == ".pcd") return pcd_info(read_head(path), std::filesystem::file_size(path));
     if (format == ".ply") return ply_info(read_head(path), std::filesystem::file_size(path));
     return decode_csv(*read_geometry_bytes(path), {}).info;
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  });
 }
 
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
-                 const CloudWriteOptions& options) {
+                 const GeometryWriteOptions& options) {
   require_cloud_format(path);
   const std::string format = format_of(path);
   const NormalNames names = format == ".pcd" ? NormalNames::long_names : NormalNames::short_names;
   write_geometry_file(path, [&](std::ostream& out) {
     const ColumnSet columns = columns_of_cloud(cloud, names);
+    const GeometryContent content{.vertices = &columns, .viewpoint = &cloud.viewpoint};
     if (format == ".pcd")
       encode_pcd(columns, cloud.viewpoint, options.encoding, out);
     else if (format == ".ply")
-      encode_ply({.vertices = &columns, .viewpoint = &cloud.viewpoint},
-                 {options.encoding == FileEncoding::ascii, options.big_endian}, out);
+      encode_ply(content, options, out);
     else if (format == ".vtp")
-      encode_vtp({.vertices = &columns, .viewpoint = &cloud.viewpoint}, options.encoding, out);
+      encode_vtp(content, options.encoding, out);
     else
       encode_csv(columns, out);
   });
 }
 
-namespace {
-
-std::string encoded(const PointCloud& part, bool float64_positions) {
-  ColumnSet set = columns_of_cloud(part, NormalNames::long_names);
-  for (Column& column : set.columns)
-    if (column.name == "x" || column.name == "y" || column.name == "z")
-      column.type = float64_positions ? ScalarType::float64 : ScalarType::float32;
-  std::ostringstream out;
-  encode_pcd(set, part.viewpoint, FileEncoding::binary, out);
-  return std::move(out).str();
-}
-
-// The header's end: behind the line DATA.
-std::size_t data_begin(const std::string& bytes) {
-  return bytes.find('\n', bytes.find("\nDATA ") + 1) + 1;
-}
-
-void replace(std::string& text, const std::string& word, const std::string& by) {
-  text.replace(text.find(word), word.size(), by);
-}
-
-}  // namespace
-
 PcdPartsWriter::PcdPartsWriter(std::filesystem::path path, const PcdPartsOptions& options)
     : path_(std::move(path)), options_(options), file_(path_, std::ios::binary | std::ios::trunc) {
-  require_good();
-}
-
-void PcdPartsWriter::write(const std::string& bytes) {
-  file_.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
   require_good();
 }
 
@@ -322,19 +277,18 @@ void PcdPartsWriter::append(const PointCloud& part) {
   written_ += part.size();
   if (written_ > options_.points)
     throw Error("contains more points than were promised", {.file = path_.string()});
-  const std::string bytes = encoded(part, options_.float64_positions);
-  const std::size_t begin = data_begin(bytes);
-  std::string header = bytes.substr(0, begin);
-  const std::string own = std::to_string(part.size());
-  replace(header, "\nWIDTH " + own + "\n", "\nWIDTH " + std::to_string(options_.points) + "\n");
-  replace(header, "\nPOINTS " + own + "\n", "\nPOINTS " + std::to_string(options_.points) + "\n");
-  if (header_.empty()) {
-    write(header);
-    header_ = header;
-  } else if (header != header_) {
+  ColumnSet set = columns_of_cloud(part, NormalNames::long_names);
+  for (Column& column : set.columns)
+    if (column.name == "x" || column.name == "y" || column.name == "z")
+      column.type = options_.float64_positions ? ScalarType::float64 : ScalarType::float32;
+  const std::string header = pcd_header(set, options_.points, part.viewpoint, FileEncoding::binary);
+  if (header_.empty())
+    file_ << header;
+  else if (header != header_)
     throw Error("the parts have different fields", {.file = path_.string()});
-  }
-  write(bytes.substr(begin));
+  header_ = header;
+  encode_pcd_points(set, FileEncoding::binary, file_);
+  require_good();
 }
 
 void PcdPartsWriter::finish() {

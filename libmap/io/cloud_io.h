@@ -36,12 +36,6 @@ struct CloudReadResult {
   GeometryFileInfo info;
 };
 
-struct CloudWriteOptions {
-  FileEncoding encoding =
-      FileEncoding::binary;  // what a format does not have is the nearest it has
-  bool big_endian = false;   // PLY, binary
-};
-
 // The file itself, or the cloud files of a folder in the order of their names; hidden files are
 // passed over. Throws Error: nothing there, or a folder without a cloud file.
 std::vector<std::filesystem::path> cloud_pieces(const std::filesystem::path& file_or_folder);
@@ -58,7 +52,7 @@ GeometryFileInfo read_cloud_info(const std::filesystem::path& path);
 // temporary path. Throws Error: unknown extension, a field's name that the format cannot hold or
 // that would be read back as something else, a failed write (ErrorKind::failed).
 void write_cloud(const std::filesystem::path& path, const PointCloud& cloud,
-                 const CloudWriteOptions& options = {});
+                 const GeometryWriteOptions& options = {});
 
 // Throws Error unless clouds are written in the format that the extension names.
 void require_cloud_format(const std::filesystem::path& path);
@@ -102,7 +96,6 @@ class PcdPartsWriter {
   void finish();
 
  private:
-  void write(const std::string& bytes);
   void require_good() const;
 
   std::filesystem::path path_;

@@ -38,14 +38,12 @@ class CloudBlockReader {
   CloudBlockReader(fs::path path, const std::optional<Georeference>& georeference)
       : path_(std::move(path)) {
     require_cloud_file(path_);
-    try {
+    in_file(path_, [&] {
       if (is_dem_path(path_))
         open_dem(georeference);
       else if (!open_records())
         read_whole();
-    } catch (const Error& error) {
-      throw error.in_file(path_.string());
-    }
+    });
   }
 
   // Of the file as its header says: no points; with normals; cloud_from_sensor.

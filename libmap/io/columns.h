@@ -75,6 +75,14 @@ struct GeometryColumns {
   std::optional<Pose> viewpoint;
 };
 
+// What a codec writes; the pointers may be null.
+struct GeometryContent {
+  const ColumnSet* vertices = nullptr;
+  const std::vector<Triangle>* triangles = nullptr;
+  const ColumnSet* faces = nullptr;  // one row per triangle
+  const Pose* viewpoint = nullptr;   // not written if it is the identity
+};
+
 // `value` as `type` holds it: integers rounded and brought into range, NaN as 0.
 double as_type(double value, ScalarType type);
 // Whether a file may say `value` for that type.

@@ -13,6 +13,12 @@ namespace libmap {
 // How the numbers of a file are stored; PLY knows the first two.
 enum class FileEncoding { ascii, binary, binary_compressed };
 
+struct GeometryWriteOptions {
+  FileEncoding encoding =
+      FileEncoding::binary;  // what a format does not have is the nearest it has
+  bool big_endian = false;   // PLY, binary
+};
+
 struct FileField {
   std::string name;
   ScalarType type = ScalarType::float32;

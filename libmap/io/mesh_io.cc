@@ -257,22 +257,23 @@ ColumnSet columns_of_faces(const TriangleMesh& mesh) {
   return set;
 }
 
-void encode(const std::string& format, const TriangleMesh& mesh, const MeshWriteOptions& options,
-            std::ostream& out) {
-  const bool ascii = options.encoding == FileEncoding::ascii;
+void encode(const std::string& format, const TriangleMesh& mesh,
+            const GeometryWriteOptions& options, std::ostream& out) {
   if (format == ".obj") return write_obj(mesh, out);
   if (format == ".off") return write_off(mesh, out);
   if (format == ".stl" || format == ".glb") {
-    const std::string bytes = encode_by_assimp(mesh, format.substr(1), ascii);
+    const std::string bytes =
+        encode_by_assimp(mesh, format.substr(1), options.encoding == FileEncoding::ascii);
     out.write(bytes.data(), static_cast<std::streamsize>(bytes.size()));
     return;
   }
   const ColumnSet vertices = columns_of_vertices(mesh);
   const ColumnSet faces = columns_of_faces(mesh);
+  const GeometryContent content{&vertices, &mesh.triangles, &faces, nullptr};
   if (format == ".ply")
-    encode_ply({&vertices, &mesh.triangles, &faces, nullptr}, {ascii, options.big_endian}, out);
+    encode_ply(content, options, out);
   else
-    encode_vtp({&vertices, &mesh.triangles, &faces, nullptr}, options.encoding, out);
+    encode_vtp(content, options.encoding, out);
 }
 
 }  // namespace
@@ -311,13 +312,11 @@ MeshReadResult read_mesh(const std::filesystem::path& path) {
   if (is_dem_path(path)) return read_dem(path);
   if (!is_read(format_of(path))) throw no_mesh_format(path, ".ply, .obj, .stl, .off, .glb or .tif");
   const auto bytes = read_geometry_bytes(path);
-  try {
+  return in_file(path, [&] {
     MeshReadResult result = decode(format_of(path), bytes);
     if (result.mesh.triangles.empty()) throw Error("contains no triangle");
     return result;
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  });
 }
 
 void require_single_precision(const TriangleMesh& mesh, const std::string& format) {
@@ -332,7 +331,7 @@ void require_single_precision(const TriangleMesh& mesh, const std::string& forma
 }
 
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
-                const MeshWriteOptions& options) {
+                const GeometryWriteOptions& options) {
   require_mesh_format(path);
   mesh.check();
   for (std::size_t n = 0; n < mesh.vertices.size(); ++n)
@@ -340,12 +339,8 @@ void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
       throw Error("a vertex is not finite",
                   {.file = path.string(), .field = "vertex", .value = std::to_string(n)});
   const std::string format = format_of(path);
-  try {
-    if (format == ".obj" || format == ".stl" || format == ".glb")
-      require_single_precision(mesh, format);
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  if (format == ".obj" || format == ".stl" || format == ".glb")
+    in_file(path, [&] { require_single_precision(mesh, format); });
   write_geometry_file(path, [&](std::ostream& out) { encode(format, mesh, options, out); });
 }
 

@@ -31,12 +31,6 @@ struct MeshReadResult {
   GeometryFileInfo info;
 };
 
-struct MeshWriteOptions {
-  FileEncoding encoding =
-      FileEncoding::binary;  // what a format does not have is the nearest it has
-  bool big_endian = false;   // PLY, binary
-};
-
 enum class FileKind { cloud, mesh };  // what a file holds: points alone, or faces too
 
 // Of a folder all pieces together, vertices on seams once a piece, and the last one's info.
@@ -54,7 +48,7 @@ std::vector<std::filesystem::path> mesh_pieces(const std::filesystem::path& file
 // temporary path. What a format cannot keep (the table above) is left out. Throws Error: unknown
 // extension, a vertex not finite, an index out of range, a failed write (ErrorKind::failed).
 void write_mesh(const std::filesystem::path& path, const TriangleMesh& mesh,
-                const MeshWriteOptions& options = {});
+                const GeometryWriteOptions& options = {});
 
 // Throws Error unless meshes are written in the format that the extension names.
 void require_mesh_format(const std::filesystem::path& path);

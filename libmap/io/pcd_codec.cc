@@ -352,27 +352,11 @@ void add_text(const PcdHeader& header, std::string_view text, ColumnSet& set) {
   }
 }
 
-void require_name(const Column& column, bool is_color) {
+void require_name(const Column& column) {
   const bool reserved = column.name == "_" || column.name == "rgb" || column.name == "rgba";
-  if ((reserved && !is_color) || column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
+  if (reserved || column.name.find_first_of(" \t\r\n\v\f") != std::string::npos)
     throw Error("this name cannot be used in a PCD header",
                 {.field = "field '" + column.name + "'"});
-}
-
-std::string header_text(const ColumnSet& set, const Pose& viewpoint, FileEncoding encoding) {
-  std::string names, sizes, types, counts;
-  for (const Column& column : set.columns) {
-    const std::string type = to_text(column.type);
-    names += " " + column.name;
-    sizes += " " + std::to_string(size_of(stored_as(column.type)));
-    types += type.front() == 'f' ? " F" : type.front() == 'u' ? " U" : " I";
-    counts += " 1";
-  }
-  const std::string points = std::to_string(set.rows);
-  return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS" + names + "\nSIZE" +
-         sizes + "\nTYPE" + types + "\nCOUNT" + counts + "\nWIDTH " + points +
-         "\nHEIGHT 1\nVIEWPOINT" + viewpoint_words(viewpoint) + "\nPOINTS " + points + "\nDATA " +
-         to_text(encoding) + "\n";
 }
 
 void write_compressed(const ColumnSet& set, std::ostream& out) {
@@ -440,11 +424,28 @@ GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const v
   return content;
 }
 
-void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding encoding,
-                std::ostream& out) {
-  for (const Column& column : columns.columns) require_name(column, false);
+std::string pcd_header(const ColumnSet& columns, std::uint64_t points, const Pose& viewpoint,
+                       FileEncoding encoding) {
+  for (const Column& column : columns.columns) require_name(column);
+  ColumnSet empty = columns;
+  empty.rows = 0;
+  std::string names, sizes, types, counts;
+  for (const Column& column : with_packed_color(empty).columns) {
+    const std::string type = to_text(column.type);
+    names += " " + column.name;
+    sizes += " " + std::to_string(size_of(stored_as(column.type)));
+    types += type.front() == 'f' ? " F" : type.front() == 'u' ? " U" : " I";
+    counts += " 1";
+  }
+  const std::string number = std::to_string(points);
+  return "# .PCD v0.7 - Point Cloud Data file format\nVERSION 0.7\nFIELDS" + names + "\nSIZE" +
+         sizes + "\nTYPE" + types + "\nCOUNT" + counts + "\nWIDTH " + number +
+         "\nHEIGHT 1\nVIEWPOINT" + viewpoint_words(viewpoint) + "\nPOINTS " + number + "\nDATA " +
+         to_text(encoding) + "\n";
+}
+
+void encode_pcd_points(const ColumnSet& columns, FileEncoding encoding, std::ostream& out) {
   const ColumnSet set = with_packed_color(columns);
-  out << header_text(set, viewpoint, encoding);
   if (encoding == FileEncoding::binary_compressed) return write_compressed(set, out);
   write_rows(set.rows, out, [&](std::size_t begin, std::size_t end, std::string& text) {
     if (encoding == FileEncoding::ascii)
@@ -452,6 +453,12 @@ void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding en
     else
       append_records(set.columns, begin, end, false, text);
   });
+}
+
+void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding encoding,
+                std::ostream& out) {
+  out << pcd_header(columns, columns.rows, viewpoint, encoding);
+  encode_pcd_points(columns, encoding, out);
 }
 
 }  // namespace libmap

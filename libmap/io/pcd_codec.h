@@ -29,7 +29,10 @@ std::optional<BinaryRecords> pcd_records(std::string_view head, std::uint64_t fi
 GeometryColumns decode_pcd(std::string_view bytes, const std::shared_ptr<const void>& owner);
 
 // Colors are written as packed `rgb`, TYPE U. Throws Error: a field name that cannot stand in the
-// header, or more than 4 GiB to compress.
+// header, or more than 4 GiB to compress. encode_pcd: both, the header of these points alone.
+std::string pcd_header(const ColumnSet& columns, std::uint64_t points, const Pose& viewpoint,
+                       FileEncoding encoding);
+void encode_pcd_points(const ColumnSet& columns, FileEncoding encoding, std::ostream& out);
 void encode_pcd(const ColumnSet& columns, const Pose& viewpoint, FileEncoding encoding,
                 std::ostream& out);
 

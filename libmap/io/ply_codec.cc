@@ -400,11 +400,12 @@ void write_property_lines(const ColumnSet& set, std::ostream& out) {
   }
 }
 
-void write_header(const PlyContent& content, const PlyEncoding& encoding, std::ostream& out) {
+void write_header(const GeometryContent& content, const GeometryWriteOptions& options,
+                  std::ostream& out) {
   out << "ply\nformat "
-      << (encoding.ascii        ? "ascii"
-          : encoding.big_endian ? "binary_big_endian"
-                                : "binary_little_endian")
+      << (options.encoding == FileEncoding::ascii ? "ascii"
+          : options.big_endian                    ? "binary_big_endian"
+                                                  : "binary_little_endian")
       << " 1.0\n";
   if (content.viewpoint != nullptr && !content.viewpoint->matrix().isIdentity(0.0))
     out << "comment viewpoint" << viewpoint_words(*content.viewpoint) << '\n';
@@ -418,10 +419,10 @@ void write_header(const PlyContent& content, const PlyEncoding& encoding, std::o
   out << "end_header\n";
 }
 
-void write_rows(const ColumnSet& set, const PlyEncoding& encoding, std::ostream& out) {
-  const bool swap_bytes = encoding.big_endian == (std::endian::native == std::endian::little);
+void write_rows(const ColumnSet& set, const GeometryWriteOptions& options, std::ostream& out) {
+  const bool swap_bytes = options.big_endian == (std::endian::native == std::endian::little);
   libmap::write_rows(set.rows, out, [&](std::size_t begin, std::size_t end, std::string& text) {
-    if (encoding.ascii)
+    if (options.encoding == FileEncoding::ascii)
       append_rows_of_text(set.columns, begin, end, ' ', text);
     else
       append_records(set.columns, begin, end, swap_bytes, text);
@@ -429,7 +430,8 @@ void write_rows(const ColumnSet& set, const PlyEncoding& encoding, std::ostream&
 }
 
 // A list of three is written as four numbers: its length, and the corners.
-void write_faces(const PlyContent& content, const PlyEncoding& encoding, std::ostream& out) {
+void write_faces(const GeometryContent& content, const GeometryWriteOptions& options,
+                 std::ostream& out) {
   const std::vector<Triangle>& triangles = *content.triangles;
   const double three = 3.0;
   ColumnSet set;
@@ -443,7 +445,7 @@ void write_faces(const PlyContent& content, const PlyEncoding& encoding, std::os
   if (content.faces != nullptr)
     set.columns.insert(set.columns.end(), content.faces->columns.begin(),
                        content.faces->columns.end());
-  write_rows(set, encoding, out);
+  write_rows(set, options, out);
 }
 
 }  // namespace
@@ -487,14 +489,15 @@ GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes) {
   return content;
 }
 
-void encode_ply(const PlyContent& content, const PlyEncoding& encoding, std::ostream& out) {
+void encode_ply(const GeometryContent& content, const GeometryWriteOptions& options,
+                std::ostream& out) {
   if (content.triangles != nullptr &&
       content.vertices->rows > std::numeric_limits<std::int32_t>::max())
     throw Error("too many vertices for a PLY mesh",
                 {.field = "vertices", .value = std::to_string(content.vertices->rows)});
-  write_header(content, encoding, out);
-  write_rows(*content.vertices, encoding, out);
-  if (content.triangles != nullptr) write_faces(content, encoding, out);
+  write_header(content, options, out);
+  write_rows(*content.vertices, options, out);
+  if (content.triangles != nullptr) write_faces(content, options, out);
 }
 
 }  // namespace libmap

@@ -17,19 +17,6 @@
 
 namespace libmap {
 
-struct PlyEncoding {
-  bool ascii = false;
-  bool big_endian = false;  // of a binary file
-};
-
-// What is written; the pointers may be null.
-struct PlyContent {
-  const ColumnSet* vertices = nullptr;
-  const std::vector<Triangle>* triangles = nullptr;
-  const ColumnSet* faces = nullptr;  // one row per triangle
-  const Pose* viewpoint = nullptr;   // as a comment line; not written if it is the identity
-};
-
 // The header alone; `file_bytes` is the size of the whole file. Throws Error as decode_ply does.
 GeometryFileInfo ply_info(std::string_view head, std::uint64_t file_bytes);
 
@@ -43,7 +30,8 @@ std::optional<BinaryRecords> ply_records(std::string_view head, std::uint64_t fi
 // corners or with a corner that is no vertex.
 GeometryColumns decode_ply(const std::shared_ptr<const std::string>& bytes);
 
-// Throws Error: a field name that cannot stand in the header.
-void encode_ply(const PlyContent& content, const PlyEncoding& encoding, std::ostream& out);
+// The viewpoint is a comment line. Throws Error: a field name that cannot stand in the header.
+void encode_ply(const GeometryContent& content, const GeometryWriteOptions& options,
+                std::ostream& out);
 
 }  // namespace libmap

@@ -96,7 +96,7 @@ void set_points(const ColumnSet& set, vtkPolyData& data) {
   data.SetPoints(points);
 }
 
-void set_cells(const VtpContent& content, vtkPolyData& data) {
+void set_cells(const GeometryContent& content, vtkPolyData& data) {
   vtkNew<vtkCellArray> cells;
   if (content.triangles == nullptr) {
     for (std::size_t i = 0; i < content.vertices->rows; ++i)
@@ -129,7 +129,7 @@ bool all_finite(const ColumnSet* set) {
 
 }  // namespace
 
-void encode_vtp(const VtpContent& content, FileEncoding encoding, std::ostream& out) {
+void encode_vtp(const GeometryContent& content, FileEncoding encoding, std::ostream& out) {
   vtkNew<vtkPolyData> data;
   set_points(*content.vertices, *data);
   set_arrays(*content.vertices, *data->GetPointData());

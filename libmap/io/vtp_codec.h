@@ -5,21 +5,13 @@
 #pragma once
 
 #include <ostream>
-#include <vector>
 
 #include "libmap/io/columns.h"
 
 namespace libmap {
 
-// What is written; the pointers may be null. Without triangles every point is a vertex cell.
-struct VtpContent {
-  const ColumnSet* vertices = nullptr;
-  const std::vector<Triangle>* triangles = nullptr;
-  const ColumnSet* faces = nullptr;  // one row per triangle
-  const Pose* viewpoint = nullptr;   // not written if it is the identity
-};
-
-// VTK cannot read NaN and infinity as text: data that hold some are written as binary.
-void encode_vtp(const VtpContent& content, FileEncoding encoding, std::ostream& out);
+// Without triangles every point is a vertex cell. VTK cannot read NaN and infinity as text: data
+// that hold some are written as binary.
+void encode_vtp(const GeometryContent& content, FileEncoding encoding, std::ostream& out);
 
 }  // namespace libmap

@@ -173,13 +173,11 @@ NearestPlace ReferenceSurface::nearest(const Eigen::Vector3d& point) const {
 PointDistances distances_to(const ReferenceSurface& surface,
                             const std::vector<Eigen::Vector3d>& points) {
   PointDistances distances{std::vector<double>(points.size()), std::vector<double>(points.size())};
-  parallel_for(points.size(), points_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const NearestPlace place = surface.nearest(points[n]);
-      distances.distance_m[n] = place.distance_m;
-      distances.signed_distance_m[n] =
-          surface.is_oriented() ? place.signed_distance_m(points[n]) : place.distance_m;
-    }
+  parallel_each(points.size(), points_per_chunk, [&](std::size_t n) {
+    const NearestPlace place = surface.nearest(points[n]);
+    distances.distance_m[n] = place.distance_m;
+    distances.signed_distance_m[n] =
+        surface.is_oriented() ? place.signed_distance_m(points[n]) : place.distance_m;
   });
   return distances;
 }

@@ -53,11 +53,9 @@ std::vector<Pair> pairs_of(const std::vector<Eigen::Vector3d>& points, const Pos
                            const ReferenceSurface& surface,
                            const SurfaceAlignmentOptions& options) {
   std::vector<Pair> pairs(points.size());
-  parallel_for(points.size(), distances_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      pairs[n].point = moved * points[n];
-      pairs[n].place = surface.nearest(pairs[n].point);
-    }
+  parallel_each(points.size(), distances_per_chunk, [&](std::size_t n) {
+    pairs[n].point = moved * points[n];
+    pairs[n].place = surface.nearest(pairs[n].point);
   });
   std::erase_if(pairs, [&](const Pair& pair) {
     return pair.place.on_border || !(pair.place.distance_m <= options.max_distance_m);

@@ -112,9 +112,8 @@ std::vector<double> distances_to_surface(const std::vector<Eigen::Vector3d>& poi
                                          const TriangleMesh& mesh) {
   const SurfaceDistance surface(mesh);
   std::vector<double> distances(points.size());
-  parallel_for(points.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) distances[n] = surface.nearest(points[n]).distance_m;
-  });
+  parallel_each(points.size(), 1024,
+                [&](std::size_t n) { distances[n] = surface.nearest(points[n]).distance_m; });
   return distances;
 }
 
@@ -188,9 +187,8 @@ std::vector<bool> covered(const std::vector<Eigen::Vector3d>& samples,
   std::vector<char> flags(samples.size(), 0);
   if (!points.empty()) {
     const PointTree tree(points);
-    parallel_for(samples.size(), 1024, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        flags[n] = tree.nearest(samples[n]).square_m2 <= radius_m * radius_m ? 1 : 0;
+    parallel_each(samples.size(), 1024, [&](std::size_t n) {
+      flags[n] = tree.nearest(samples[n]).square_m2 <= radius_m * radius_m ? 1 : 0;
     });
   }
   return {flags.begin(), flags.end()};

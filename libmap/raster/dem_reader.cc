@@ -77,7 +77,7 @@ class DemReader::Process {
         process_(max_data_bytes,
                  [&](const GuardedProcess::Write& write) { serve(path_, frame, write); }),
         input_(process_, "is broken: GDAL crashed on it") {
-    in_file([&] {
+    in_file(path_, [&] {
       receive_parcel();
       pass_info(input_, info_);
     });
@@ -86,12 +86,11 @@ class DemReader::Process {
   const DemInfo& info() const { return info_; }
 
   bool next(DemBlock& block) {
-    bool is_block = false;
-    in_file([&] {
-      is_block = receive_parcel() == Parcel::block;
+    return in_file(path_, [&] {
+      const bool is_block = receive_parcel() == Parcel::block;
       if (is_block) pass_block(input_, block);
+      return is_block;
     });
-    return is_block;
   }
 
  private:
@@ -100,15 +99,6 @@ class DemReader::Process {
     Parcel parcel = Parcel::end;
     input_.value(parcel);
     return parcel;
-  }
-
-  template <typename Step>
-  void in_file(const Step& step) {
-    try {
-      step();
-    } catch (const Error& error) {
-      throw error.in_file(path_.string());
-    }
   }
 
   fs::path path_;

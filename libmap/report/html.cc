@@ -2,22 +2,14 @@
 
 #include <openssl/evp.h>
 
+#include <boost/algorithm/hex.hpp>
+#include <boost/algorithm/string/replace.hpp>
 #include <limits>
 
 #include "libmap/core/error.h"
 #include "libmap/core/manifest.h"
 
 namespace libmap {
-
-namespace {
-
-void replace_all(std::string& text, std::string_view what, std::string_view by) {
-  for (std::size_t at = text.find(what); at != std::string::npos;
-       at = text.find(what, at + by.size()))
-    text.replace(at, what.size(), by);
-}
-
-}  // namespace
 
 std::string escape_html(std::string_view text) {
   std::string escaped;
@@ -51,16 +43,16 @@ std::string breakable_html(std::string_view name) {
 }
 
 std::string escape_json_in_script(std::string json) {
-  replace_all(json, "<", "\\u003c");
+  boost::replace_all(json, "<", "\\u003c");
   return json;
 }
 
 std::string escape_code(std::string_view code) {
   std::string text(code);
   std::erase(text, '\r');
-  replace_all(text, "</script", "<\\/script");
-  replace_all(text, "</style", "<\\/style");
-  replace_all(text, "<!--", "<\\!--");
+  boost::replace_all(text, "</script", "<\\/script");
+  boost::replace_all(text, "</style", "<\\/style");
+  boost::replace_all(text, "<!--", "<\\!--");
   return text;
 }
 
@@ -79,11 +71,7 @@ std::string to_base64(std::string_view bytes) {
 }
 
 std::string csp_hash(std::string_view code) {
-  const std::string digits = sha256_of(code);
-  std::string bytes;
-  for (std::size_t n = 0; n + 1 < digits.size(); n += 2)
-    bytes += static_cast<char>(std::stoi(digits.substr(n, 2), nullptr, 16));
-  return "'sha256-" + to_base64(bytes) + "'";
+  return "'sha256-" + to_base64(boost::algorithm::unhex(sha256_of(code))) + "'";
 }
 
 std::string attribute(std::string_view name, std::string_view value) {

@@ -61,10 +61,8 @@ struct TimingRow {
 
 struct TimingTable {
   std::vector<std::string> cases;
-  std::vector<TimingRow> rows;  // by command and step, as they first came
-  // For each case: the number of manifests, and the numbers of threads that they ran with.
-  std::vector<std::size_t> manifests;
-  std::vector<std::vector<unsigned>> threads;
+  std::vector<TimingRow> rows;                 // by command and step, as they first came
+  std::vector<std::vector<unsigned>> threads;  // that the manifests of each case ran with
   // Steps that several manifests of one case name were added up.
   bool sums = false;
 };
@@ -105,10 +103,8 @@ struct ReportSource {
   std::string error{};
 };
 
-struct ReportContent {
-  std::string title{};
-  std::vector<ReportItem> items{};
-  std::vector<ReportSection> sections{};
+// The heading is the report's title.
+struct ReportContent : ReportSection {
   std::vector<ReportSource> sources{};
   std::size_t more_sources = 0;  // that are not listed
 };

@@ -198,7 +198,7 @@ std::string head_html(const ReportContent& content, const PageAssets& assets,
          escape_html(assets.version) +
          "\">\n"
          "<link rel=\"icon\" href=\"data:,\">\n<title>" +
-         escape_html(content.title) + "</title>\n<style>" + style + "</style>\n</head>\n";
+         escape_html(content.heading) + "</title>\n<style>" + style + "</style>\n</head>\n";
 }
 
 std::string count_text(const ReportContent& content, const PageAssets& assets) {
@@ -213,15 +213,14 @@ std::string count_text(const ReportContent& content, const PageAssets& assets) {
 }
 
 template <typename Visit>
-void each_item(std::vector<ReportItem>& items, std::vector<ReportSection>& sections,
-               const Visit& visit) {
-  for (ReportItem& item : items) visit(item);
-  for (ReportSection& section : sections) each_item(section.items, section.sections, visit);
+void each_item(ReportSection& section, const Visit& visit) {
+  for (ReportItem& item : section.items) visit(item);
+  for (ReportSection& inner : section.sections) each_item(inner, visit);
 }
 
 std::vector<ReportPicture*> pictures_of(ReportContent& content) {
   std::vector<ReportPicture*> found;
-  each_item(content.items, content.sections, [&](ReportItem& item) {
+  each_item(content, [&](ReportItem& item) {
     if (auto* pictures = std::get_if<ReportPictures>(&item.body))
       for (ReportPicture& picture : *pictures) found.push_back(&picture);
     auto* map = std::get_if<ReportMap>(&item.body);
@@ -233,7 +232,7 @@ std::vector<ReportPicture*> pictures_of(ReportContent& content) {
 // Keeps the first rows of each table. Returns whether a table was longer.
 bool cut_tables(ReportContent& content, std::size_t max_rows) {
   bool any = false;
-  each_item(content.items, content.sections, [&](ReportItem& item) {
+  each_item(content, [&](ReportItem& item) {
     auto* table = std::get_if<ReportTable>(&item.body);
     if (table == nullptr || table->table.rows.size() <= max_rows) return;
     any = true;
@@ -260,7 +259,7 @@ std::string report_page(const ReportContent& content, const PageAssets& assets) 
 
   std::string html = head_html(content, assets, style, scripts);
   html += "<body>\n<a class=\"skip\" href=\"#content\">Skip to the content</a>\n<header>\n<h1>" +
-          escape_html(content.title) + "</h1>\n<p>" + count_text(content, assets) +
+          escape_html(content.heading) + "</h1>\n<p>" + count_text(content, assets) +
           "</p>\n</header>\n<div class=\"page\">\n";
   if (!writer.contents().empty())
     html += "<nav aria-label=\"Contents\"><ol>\n" + writer.contents() + "</ol></nav>\n";

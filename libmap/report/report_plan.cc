@@ -333,22 +333,13 @@ class Finder {
   std::map<fs::path, std::optional<Manifest>> manifests_;  // of the folder at hand
 };
 
-std::size_t count_kind(const std::vector<PlannedItem>& items, ItemKind kind) {
-  return static_cast<std::size_t>(std::count_if(
-      items.begin(), items.end(), [&](const PlannedItem& item) { return item.kind == kind; }));
-}
-
-std::size_t count_kind(const std::vector<PlannedSection>& sections, ItemKind kind) {
-  std::size_t count = 0;
-  for (const PlannedSection& section : sections)
-    count += count_kind(section.items, kind) + count_kind(section.sections, kind);
-  return count;
-}
-
 }  // namespace
 
-std::size_t ReportPlan::count(ItemKind kind) const {
-  return count_kind(items, kind) + count_kind(sections, kind);
+std::size_t PlannedSection::count(ItemKind kind) const {
+  std::size_t count = 0;
+  for (const PlannedItem& item : items) count += item.kind == kind ? 1 : 0;
+  for (const PlannedSection& section : sections) count += section.count(kind);
+  return count;
 }
 
 bool natural_less(const std::string& a, const std::string& b) {
@@ -361,7 +352,7 @@ std::vector<ReportSource> manifests_below(const fs::path& folder, bool tiles) {
   return sources;
 }
 
-ReportPlan plan_report(const fs::path& folder) {
+PlannedSection plan_report(const fs::path& folder) {
   std::error_code code;
   if (!fs::is_directory(folder, code))
     throw Error(fs::exists(folder, code) ? "is no folder" : "no such folder",
@@ -370,15 +361,13 @@ ReportPlan plan_report(const fs::path& folder) {
   fs::path root = folder.lexically_normal();
   if (!root.has_filename()) root = root.parent_path();
   Finder finder(root, name);
-  PlannedSection found = finder.section_of(root, 0);
-  if (found.items.empty() && found.sections.empty())
+  PlannedSection plan = finder.section_of(root, 0);
+  if (plan.items.empty() && plan.sections.empty())
     throw Error("contains nothing that a report could show: no map, picture, table or text",
                 {.file = folder.string()});
-  ReportPlan plan;
-  plan.title = name.empty() ? "Report" : heading_of(name);
-  plan.items = finder.overview();
-  for (PlannedItem& item : found.items) plan.items.push_back(std::move(item));
-  plan.sections = std::move(found.sections);
+  plan.heading = name.empty() ? "Report" : heading_of(name);
+  const std::vector<PlannedItem> overview = finder.overview();
+  plan.items.insert(plan.items.begin(), overview.begin(), overview.end());
   for (PlannedSection& section : finder.running_times())
     plan.sections.push_back(std::move(section));
   return plan;

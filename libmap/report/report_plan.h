@@ -29,23 +29,17 @@ struct PlannedItem {
 struct PlannedSection {
   std::string heading{};
   std::filesystem::path folder{};
-  std::vector<PlannedItem> items{};
-  std::vector<PlannedSection> sections{};
-};
-
-struct ReportPlan {
-  std::string title{};
-  std::vector<PlannedItem> items{};  // before the first section
+  std::vector<PlannedItem> items{};  // before the first inner section
   std::vector<PlannedSection> sections{};
 
-  // Number of items of that kind, in all sections.
+  // Number of items of that kind, those of inner sections included.
   std::size_t count(ItemKind kind) const;
 };
 
-// The plan of what is in `folder`: a section for each inner folder, with its maps, scenes,
-// pictures, tables and texts; the parameters of all maps side by side; the running times. Throws
-// Error: no such folder, or nothing in it that a report can show.
-ReportPlan plan_report(const std::filesystem::path& folder);
+// The plan of what is in `folder`, under the report's title: a section for each inner folder, with
+// its maps, scenes, pictures, tables and texts; the parameters of all maps side by side; the
+// running times. Throws Error: no such folder, or nothing in it that a report can show.
+PlannedSection plan_report(const std::filesystem::path& folder);
 
 // The outputs below `folder` that have a manifest, in natural order. Those in folders of tiles only
 // with `tiles`, those in tile stores never. No deeper than 12 levels.

@@ -71,14 +71,10 @@ class Reader {
   Reader(const ReportReadOptions& options, const MapLoader& load_map, const SceneLoader& load_scene)
       : options_(options), load_map_(load_map), load_scene_(load_scene), root_(options.folder) {}
 
-  ReportReadResult read(const ReportPlan& plan) {
+  ReportReadResult read(const PlannedSection& plan) {
     ReportReadResult result;
-    ReportContent& content = result.content;
-    content.title = plan.title;
-    for (const PlannedItem& item : plan.items) content.items.push_back(read_item(item));
-    for (const PlannedSection& section : plan.sections)
-      content.sections.push_back(read_section(section));
-    add_sources(content);
+    static_cast<ReportSection&>(result.content) = read_section(plan);
+    add_sources(result.content);
     result.files = std::move(files_);
     return result;
   }
@@ -285,7 +281,7 @@ class Reader {
 
 }  // namespace
 
-ReportReadResult read_report_content(const ReportPlan& plan, const ReportReadOptions& options,
+ReportReadResult read_report_content(const PlannedSection& plan, const ReportReadOptions& options,
                                      const MapLoader& load_map, const SceneLoader& load_scene) {
   return Reader(options, load_map, load_scene).read(plan);
 }
@@ -325,7 +321,6 @@ TimingTable timing_table(const std::vector<std::pair<std::string, std::vector<Ma
   std::map<std::pair<std::string, std::string>, std::size_t> place_of;  // by command and step
   std::map<std::string, std::size_t> rank_of;                           // of a command
   for (std::size_t n = 0; n < cases.size(); ++n) {
-    table.manifests.push_back(cases[n].second.size());
     std::vector<unsigned>& threads = table.threads.emplace_back();
     for (const Manifest& manifest : cases[n].second) {
       if (std::find(threads.begin(), threads.end(), manifest.threads) == threads.end())

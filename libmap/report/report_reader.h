@@ -32,7 +32,7 @@ struct ReportReadResult {
 };
 
 // A damaged file is a gap in the content.
-ReportReadResult read_report_content(const ReportPlan& plan, const ReportReadOptions& options,
+ReportReadResult read_report_content(const PlannedSection& plan, const ReportReadOptions& options,
                                      const MapLoader& load_map, const SceneLoader& load_scene);
 
 // The first `max_rows` rows of a CSV file, however large it is. Throws Error: no table, a column

@@ -109,9 +109,8 @@ void ColmapBuilder::observe_points(int id, const CameraView& view, GrayImage& ta
   known.reserve(model_.points.size());
   for (const auto& [point, content] : model_.points) known.emplace_back(point, content.position);
   std::vector<std::optional<Eigen::Vector2d>> seen(known.size());
-  parallel_for(known.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      seen[i] = observe(view, camera_from_world * known[i].second, options_.depth_tolerance);
+  parallel_each(known.size(), 1024, [&](std::size_t i) {
+    seen[i] = observe(view, camera_from_world * known[i].second, options_.depth_tolerance);
   });
   for (std::size_t i = 0; i < known.size(); ++i) {
     if (!seen[i]) continue;

@@ -183,10 +183,8 @@ struct FrameFolder::Listing {
   }
 };
 
-const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names() {
-  static const std::vector<std::pair<std::string, PoseFrame>> names = {
-      {"camera", PoseFrame::camera}, {"base", PoseFrame::base}};
-  return names;
+std::vector<std::pair<std::string, PoseFrame>> pose_frame_names() {
+  return {{"camera", PoseFrame::camera}, {"base", PoseFrame::base}};
 }
 
 void bind(ParameterTable& table, FrameFolderOptions& options) {
@@ -417,11 +415,7 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
     if (name.empty()) return;
     const std::string field = "node " + std::to_string(node) + ": " + part;
     const fs::path file = path_ / name;
-    try {
-      decode(read_whole_file(file));
-    } catch (const Error& error) {
-      throw error.in_field(field).in_file(file.string());
-    }
+    in_file(file, [&] { in_field(field, [&] { decode(read_whole_file(file)); }); });
   };
   if (parts.color)
     read(of_node.color, "color",
@@ -442,14 +436,11 @@ RgbdFrame FrameFolder::read_frame(int node, FrameParts parts) const {
   }
   if (frame.stereo.empty())
     for (const std::size_t camera : of_node.cameras) frame.cameras.push_back(cameras_[camera]);
-  if (depth_camera_ && !frame.depth.empty()) {
-    try {
-      register_to_color(frame, *depth_camera_);
-    } catch (const Error& error) {
-      throw error.in_field("node " + std::to_string(node) + ": depth")
-          .in_file((path_ / of_node.depth).string());
-    }
-  }
+  if (depth_camera_ && !frame.depth.empty())
+    in_file(path_ / of_node.depth, [&] {
+      in_field("node " + std::to_string(node) + ": depth",
+               [&] { register_to_color(frame, *depth_camera_); });
+    });
   return frame;
 }
 

@@ -56,7 +56,7 @@ inline constexpr const char* calibration_folder = "calibration";
 
 // What a file of poses moves: the camera's optical frame, or the base.
 enum class PoseFrame { camera, base };
-const std::vector<std::pair<std::string, PoseFrame>>& pose_frame_names();
+std::vector<std::pair<std::string, PoseFrame>> pose_frame_names();
 
 // Defaults are those of the TUM benchmark.
 struct FrameFolderOptions {

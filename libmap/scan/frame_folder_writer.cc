@@ -54,19 +54,18 @@ bool do_stamps_tell_nodes(const PoseGraph& graph, const Trajectory& trajectory) 
 
 }  // namespace
 
-const std::vector<std::string>& frame_folder_names() {
-  static const std::vector<std::string> names = {files::options,
-                                                 files::nodes,
-                                                 files::associations,
-                                                 files::odometry,
-                                                 files::stored,
-                                                 files::truth,
-                                                 files::links,
-                                                 files::color_folder,
-                                                 files::depth_folder,
-                                                 files::right_folder,
-                                                 files::calibration_folder};
-  return names;
+std::vector<std::string> frame_folder_names() {
+  return {files::options,
+          files::nodes,
+          files::associations,
+          files::odometry,
+          files::stored,
+          files::truth,
+          files::links,
+          files::color_folder,
+          files::depth_folder,
+          files::right_folder,
+          files::calibration_folder};
 }
 
 FrameFolderWriter::FrameFolderWriter(fs::path folder) : folder_(std::move(folder)) {

@@ -14,7 +14,7 @@
 namespace libmap {
 
 // What may stand in such a folder, files and folders.
-const std::vector<std::string>& frame_folder_names();
+std::vector<std::string> frame_folder_names();
 
 // Image files to be kept as they are; empty: the frame's image becomes a PNG.
 struct StoredImages {

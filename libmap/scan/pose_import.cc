@@ -280,7 +280,7 @@ void bind(ParameterTable& table, PoseImportOptions& options) {
 ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,
                            const PoseImportOptions& options) {
   const TrajectoryFile file = read_trajectory(path, options.format);
-  try {
+  return in_file(path, [&] {
     ImportedPoses result;
     std::vector<CameraPose> cameras;
     if (file.images.empty()) {
@@ -297,9 +297,7 @@ ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,
     bind_to_nodes(cameras, result);
     check_motion(own, result);
     return result;
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  });
 }
 
 }  // namespace libmap

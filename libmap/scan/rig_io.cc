@@ -346,12 +346,8 @@ std::vector<RigImage> list_rig_images(const fs::path& folder, const CameraRig& r
 }
 
 Image<std::uint16_t> read_rig_units(const RigImage& image, const RigCamera& camera) {
-  Image<std::uint16_t> units;
-  try {
-    units = decode_gray16(read_whole_file(image.file));
-  } catch (const Error& error) {
-    throw error.in_file(image.file.string());
-  }
+  Image<std::uint16_t> units =
+      in_file(image.file, [&] { return decode_gray16(read_whole_file(image.file)); });
   const Camera& calibrated = camera.camera;
   if (units.width != calibrated.width || units.height != calibrated.height)
     throw Error("does not fit the calibration of " + camera.name,

@@ -109,16 +109,6 @@ void require_scan(const fs::path& path, const RtabmapColumns& columns) {
       refuse(std::string("its table ") + table + " has no column id");
 }
 
-// `step` with its Errors naming `part`.
-template <typename Step>
-void decode_part(const char* part, const Step& step) {
-  try {
-    step();
-  } catch (const Error& error) {
-    throw error.in_field(part);
-  }
-}
-
 }  // namespace
 
 RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts) {
@@ -127,7 +117,7 @@ RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts) {
   int width = 0;
   int height = 0;
   if (!blobs.image.empty())
-    decode_part("image", [&] {
+    in_field("image", [&] {
       const std::optional<ImageInfo> info = read_image_info(blobs.image);
       if (!info) throw Error("image ends in its header");
       width = info->width;
@@ -135,7 +125,7 @@ RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts) {
       if (parts.color) frame.color = decode_color(blobs.image);
     });
   if (!blobs.depth.empty())
-    decode_part("depth", [&] {
+    in_field("depth", [&] {
       const std::optional<DepthInfo> info = read_depth_info(blobs.depth);
       if (info && parts.depth) frame.depth = decode_depth(blobs.depth);
       if (!info && parts.depth) frame.right = decode_gray(blobs.depth);
@@ -145,7 +135,7 @@ RgbdFrame decode_frame(const FrameBlobs& blobs, FrameParts parts) {
       }
     });
   if (!blobs.calibration.empty())
-    decode_part("calibration", [&] {
+    in_field("calibration", [&] {
       const Calibration calibration = decode_calibration(blobs.calibration);
       frame.cameras = cameras_of(calibration, width, height);
       frame.stereo = stereo_cameras_of(calibration, width, height);

@@ -381,11 +381,9 @@ void write_calibration(SQLite::Database& database, const RtabmapDatabase& scan,
   for (const GraphNode& node : scan.graph().nodes) {
     const FrameBlobs blobs = scan.read_blobs(node.id);
     RgbdFrame frame = scan.read_frame(node.id, {.color = false, .depth = true});
-    try {
-      apply_calibration(frame, calibration);
-    } catch (const Error& error) {
-      throw error.in_field("node " + std::to_string(node.id)).in_file(scan.path().string());
-    }
+    in_file(scan.path(), [&] {
+      in_field("node " + std::to_string(node.id), [&] { apply_calibration(frame, calibration); });
+    });
     if (frame.cameras.empty()) continue;
     std::string depth = blobs.depth;
     if (!frame.depth.empty() && calibration.changes_depth())

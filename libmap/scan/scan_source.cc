@@ -172,10 +172,6 @@ class CalibratedScan : public ScanSource {
   CameraFile calibration_;
 };
 
-std::string size_of(const Camera& camera) {
-  return std::to_string(camera.width) + " x " + std::to_string(camera.height);
-}
-
 // Depth at a place between pixels whose four neighbors are of one surface, else at the nearest.
 double depth_between(const DepthImage& depth, const Eigen::Vector2d& at) {
   const int left = std::clamp(static_cast<int>(std::floor(at.x())), 0, depth.width - 2);
@@ -224,11 +220,9 @@ DepthImage registered_depth(const RgbdFrame& frame, const Pose& color_from_depth
 
 RgbdFrame CalibratedScan::read_frame(int node, FrameParts parts) const {
   RgbdFrame frame = scan_->read_frame(node, parts);
-  try {
-    apply_calibration(frame, calibration_);
-  } catch (const Error& error) {
-    throw error.in_field("node " + std::to_string(node)).in_file(scan_->path().string());
-  }
+  in_file(scan_->path(), [&] {
+    in_field("node " + std::to_string(node), [&] { apply_calibration(frame, calibration_); });
+  });
   return frame;
 }
 
@@ -245,7 +239,9 @@ void apply_calibration(RgbdFrame& frame, const CameraFile& calibration) {
   const Camera& known = calibration.camera;
   if (camera.width != known.width || camera.height != known.height)
     throw Error("the calibration is of another size",
-                {.field = "camera", .value = size_of(camera), .bound = size_of(known)});
+                {.field = "camera",
+                 .value = size_text(camera.width, camera.height),
+                 .bound = size_text(known.width, known.height)});
   const Pose base_from_camera = camera.base_from_camera;
   // By the stored camera, as it was estimated.
   const Pose color_from_depth = calibration.color_from_depth_at(frame.stamp_s);

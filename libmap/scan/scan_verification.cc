@@ -299,15 +299,13 @@ class DatabaseVerification {
                             [&](const SqliteRow& row) { ids.push_back(row.integer(0)); });
     });
     progress_.begin("verify", ids.size());
-    parallel_for(ids.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        const int node = ids[i] > 0 && ids[i] <= 0x7fffffff ? static_cast<int>(ids[i]) : 0;
-        findings_.attempt(node, table, [&] {
-          if (table == "Data") check_data(node, ids[i]);
-          if (scan_.graph().find_node(node) != nullptr) check_frame(node);
-        });
-        progress_.advance(1);
-      }
+    parallel_each(ids.size(), [&](std::size_t i) {
+      const int node = ids[i] > 0 && ids[i] <= 0x7fffffff ? static_cast<int>(ids[i]) : 0;
+      findings_.attempt(node, table, [&] {
+        if (table == "Data") check_data(node, ids[i]);
+        if (scan_.graph().find_node(node) != nullptr) check_frame(node);
+      });
+      progress_.advance(1);
     });
     progress_.end();
     result_.nodes = ids.size();
@@ -373,11 +371,9 @@ void verify_frames(const ScanSource& scan, ScanVerificationResult& result, Progr
   Findings findings(result);
   const std::vector<GraphNode>& nodes = scan.graph().nodes;
   progress.begin("verify", nodes.size());
-  parallel_for(nodes.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      findings.attempt(nodes[i].id, "frame", [&] { camera_views(scan.read_frame(nodes[i].id)); });
-      progress.advance(1);
-    }
+  parallel_each(nodes.size(), [&](std::size_t i) {
+    findings.attempt(nodes[i].id, "frame", [&] { camera_views(scan.read_frame(nodes[i].id)); });
+    progress.advance(1);
   });
   progress.end();
   result.nodes = nodes.size();

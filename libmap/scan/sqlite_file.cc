@@ -6,7 +6,6 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <fstream>
 #include <limits>
 #include <mutex>
 #include <string_view>
@@ -28,14 +27,6 @@ constexpr char wal_version = 2;
 
 SQLite::Column column_of(const void* statement, int column) {
   return static_cast<const SQLite::Statement*>(statement)->getColumn(column);
-}
-
-std::string read_header(const fs::path& path) {
-  std::string header(100, '\0');
-  std::ifstream file(path, std::ios::binary);
-  file.read(header.data(), static_cast<std::streamsize>(header.size()));
-  header.resize(static_cast<std::size_t>(file.gcount()));
-  return header;
 }
 
 fs::path beside(const fs::path& path, const char* suffix) { return fs::path(path).concat(suffix); }
@@ -135,7 +126,7 @@ bool SqliteRow::is_text(int column) const { return column_of(statement_, column)
 
 SqliteFile::SqliteFile(const fs::path& path) : path_(path) {
   require_readable_file(path);
-  const std::string header = read_header(path);
+  const std::string header = file_head(path, 100);
   if (header.empty()) throw Error("is empty: 0 bytes", {.file = path.string()});
   if (!header.starts_with(signature)) throw Error("is not an SQLite file", {.file = path.string()});
   if (header.size() < 100)
@@ -200,7 +191,7 @@ std::set<std::string> SqliteFile::columns(const std::string& table) const {
   return names;
 }
 
-bool is_sqlite_file(const fs::path& path) { return read_header(path).starts_with(signature); }
+bool is_sqlite_file(const fs::path& path) { return file_head(path, signature.size()) == signature; }
 
 Error copy_error(const fs::path& source, const fs::path& target, const SQLite::Exception& error) {
   if (error.getErrorCode() == SQLITE_CORRUPT) return read_error(source, error);

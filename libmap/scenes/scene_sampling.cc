@@ -146,9 +146,8 @@ class Sampler {
 std::vector<char> visible_of(const SceneGeometry& geometry, const SceneSolid& solid,
                              const std::vector<SurfaceTruth>& samples) {
   std::vector<char> visible(samples.size());
-  parallel_for(samples.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i)
-      visible[i] = geometry.is_visible(solid, samples[i].position, samples[i].normal) ? 1 : 0;
+  parallel_each(samples.size(), 4096, [&](std::size_t i) {
+    visible[i] = geometry.is_visible(solid, samples[i].position, samples[i].normal) ? 1 : 0;
   });
   return visible;
 }

@@ -130,14 +130,6 @@ void VisibleSurface::view_row(std::span<const Eigen::Vector2d> rays, const Pose&
                                : seen[i]->look(nearest[i], origin, directions[i], with_color));
 }
 
-const std::vector<std::pair<std::string, TextureSource>>& texture_source_names() {
-  static const std::vector<std::pair<std::string, TextureSource>> names = {
-      {"auto", TextureSource::automatic},
-      {"mesh", TextureSource::mesh},
-      {"rock", TextureSource::rock}};
-  return names;
-}
-
 VisibleSurface::VisibleSurface(const TriangleMesh& mesh, TextureSource texture,
                                std::uint64_t texture_seed, ShadingNormals normals) {
   const auto part = std::make_shared<Part>(Part{RayCaster(mesh), mesh, texture_seed});
@@ -185,25 +177,22 @@ SurfaceView VisibleSurface::view(const ViewRays& rays, const PoseOfRow& world_fr
     const auto count = static_cast<std::size_t>(width);
     return std::span<const Eigen::Vector2d>(all).subspan(row * count, count);
   };
-  parallel_for(
-      static_cast<std::size_t>(h) + 1, rows_a_task, [&](std::size_t begin, std::size_t end) {
-        for (std::size_t y = begin; y < end; ++y) {
-          const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
-          view_row(row_of(rays.corners, y, w + 1), world_from_camera(static_cast<double>(y) - 0.5),
-                   with_color, [&](std::size_t x, const Seen& seen) {
-                     view.corner_depth.pixels[corner_start + x] = seen.depth;
-                     if (with_color) corner_color.pixels[corner_start + x] = seen.color;
-                   });
-          if (y == static_cast<std::size_t>(h)) continue;
-          const std::size_t start = y * static_cast<std::size_t>(w);
-          view_row(row_of(rays.centers, y, w), world_from_camera(static_cast<double>(y)),
-                   with_color, [&](std::size_t x, const Seen& seen) {
-                     view.depth.pixels[start + x] = seen.depth;
-                     view.incidence_cos.pixels[start + x] = seen.incidence_cos;
-                     if (with_color) view.color.pixels[start + x] = seen.color;
-                   });
-        }
-      });
+  parallel_each(static_cast<std::size_t>(h) + 1, rows_a_task, [&](std::size_t y) {
+    const std::size_t corner_start = y * static_cast<std::size_t>(w + 1);
+    view_row(row_of(rays.corners, y, w + 1), world_from_camera(static_cast<double>(y) - 0.5),
+             with_color, [&](std::size_t x, const Seen& seen) {
+               view.corner_depth.pixels[corner_start + x] = seen.depth;
+               if (with_color) corner_color.pixels[corner_start + x] = seen.color;
+             });
+    if (y == static_cast<std::size_t>(h)) return;
+    const std::size_t start = y * static_cast<std::size_t>(w);
+    view_row(row_of(rays.centers, y, w), world_from_camera(static_cast<double>(y)), with_color,
+             [&](std::size_t x, const Seen& seen) {
+               view.depth.pixels[start + x] = seen.depth;
+               view.incidence_cos.pixels[start + x] = seen.incidence_cos;
+               if (with_color) view.color.pixels[start + x] = seen.color;
+             });
+  });
   for (int y = 0; with_color && y < h; ++y)
     for (int x = 0; x < w; ++x)
       view.color.at(x, y) = 0.5F * view.color.at(x, y) +
@@ -383,21 +372,21 @@ ColorImage take_photo(const SurfaceView& view, const PhotoOptions& options, std:
   ColorImage photo(w, h);
   const Eigen::Vector2d middle(0.5 * (w - 1), 0.5 * (h - 1));
   const double largest = std::max(middle.squaredNorm(), 1e-9);
-  parallel_for(static_cast<std::size_t>(h), rows_a_task, [&](std::size_t begin, std::size_t end) {
-    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
-      for (int x = 0; x < w; ++x) {
-        const std::size_t index = photo.index(x, y);
-        RandomStream random(seed, index);
-        const double radius2 = (Eigen::Vector2d(x, y) - middle).squaredNorm() / largest;
-        const double scale = 255.0 * (1.0 - options.vignetting * radius2);
-        for (std::size_t c = 0; c < 3; ++c) {
-          double value =
-              scale * static_cast<double>(view.color.pixels[index][static_cast<Eigen::Index>(c)]);
-          if (options.color_noise > 0) value += options.color_noise * random.normal();
-          photo.pixels[index][c] =
-              static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
-        }
+  parallel_each(static_cast<std::size_t>(h), rows_a_task, [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < w; ++x) {
+      const std::size_t index = photo.index(x, y);
+      RandomStream random(seed, index);
+      const double radius2 = (Eigen::Vector2d(x, y) - middle).squaredNorm() / largest;
+      const double scale = 255.0 * (1.0 - options.vignetting * radius2);
+      for (std::size_t c = 0; c < 3; ++c) {
+        double value =
+            scale * static_cast<double>(view.color.pixels[index][static_cast<Eigen::Index>(c)]);
+        if (options.color_noise > 0) value += options.color_noise * random.normal();
+        photo.pixels[index][c] =
+            static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0, 255.0)));
       }
+    }
   });
   return photo;
 }

@@ -43,7 +43,6 @@ struct SurfaceView {
 // Where colors come from: the mesh's vertices, or rock_color(); automatic: the vertices, unless
 // they have no colors or all the same.
 enum class TextureSource { automatic, mesh, rock };
-const std::vector<std::pair<std::string, TextureSource>>& texture_source_names();
 
 // Where the normals that light falls on come from: the mesh's vertices must have them.
 enum class ShadingNormals { estimated, of_vertices };

@@ -13,6 +13,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
 #include "libmap/geometry/symmetric_eigen.h"
+#include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {
 
@@ -24,79 +25,48 @@ constexpr double arc_share = 0.05;  // an edge of 26 degrees
 constexpr double tip_share = 0.04;
 constexpr double hollow_share = 0.06;  // of the radius: mean depth below the neighbors' planes
 
-// The mesh with what the search asks of it.
-class Surface {
- public:
-  explicit Surface(const TriangleMesh& mesh) : mesh_(mesh), first_(mesh.vertices.size() + 1, 0) {
-    for (const Triangle& triangle : mesh.triangles) {
-      normals_.push_back(0.5 * area_normal(mesh, triangle));
-      centers_.push_back(
-          (mesh.vertices[triangle[0]] + mesh.vertices[triangle[1]] + mesh.vertices[triangle[2]]) /
-          3.0);
-      for (const std::uint32_t vertex : triangle) ++first_[vertex + 1];
+// Triangles that are reached over the surface without leaving a ball around the vertex.
+std::vector<std::uint32_t> triangles_within(const TriangleMesh& mesh, const VertexTriangles& around,
+                                            std::uint32_t vertex, double radius_m) {
+  std::vector<std::uint32_t> found;
+  std::vector<std::uint32_t> open = {vertex};
+  std::vector<std::uint32_t> seen = {vertex};
+  while (!open.empty()) {
+    const std::uint32_t at = open.back();
+    open.pop_back();
+    for (const std::uint32_t triangle : around.of(at)) {
+      found.push_back(triangle);
+      for (const std::uint32_t next : mesh.triangles[triangle]) {
+        if ((mesh.vertices[next] - mesh.vertices[vertex]).norm() > radius_m) continue;
+        if (std::find(seen.begin(), seen.end(), next) != seen.end()) continue;
+        seen.push_back(next);
+        open.push_back(next);
+      }
     }
-    for (std::size_t n = 1; n < first_.size(); ++n) first_[n] += first_[n - 1];
-    around_.resize(3 * mesh.triangles.size());
-    std::vector<std::uint32_t> next(first_.begin(), first_.end() - 1);
-    for (std::uint32_t n = 0; n < mesh.triangles.size(); ++n)
-      for (const std::uint32_t vertex : mesh.triangles[n]) around_[next[vertex]++] = n;
   }
-
-  template <typename Visit>
-  void for_triangles_at(std::uint32_t vertex, const Visit& visit) const {
-    for (std::uint32_t n = first_[vertex]; n < first_[vertex + 1]; ++n) visit(around_[n]);
-  }
-
-  // Triangles that are reached over the surface without leaving a ball around the vertex.
-  std::vector<std::uint32_t> within(std::uint32_t vertex, double radius_m) const {
-    std::vector<std::uint32_t> found;
-    std::vector<std::uint32_t> open = {vertex};
-    std::vector<std::uint32_t> seen = {vertex};
-    while (!open.empty()) {
-      const std::uint32_t at = open.back();
-      open.pop_back();
-      for_triangles_at(at, [&](std::uint32_t triangle) {
-        found.push_back(triangle);
-        for (const std::uint32_t next : mesh_.triangles[triangle]) {
-          if ((mesh_.vertices[next] - mesh_.vertices[vertex]).norm() > radius_m) continue;
-          if (std::find(seen.begin(), seen.end(), next) != seen.end()) continue;
-          seen.push_back(next);
-          open.push_back(next);
-        }
-      });
-    }
-    std::sort(found.begin(), found.end());
-    found.erase(std::unique(found.begin(), found.end()), found.end());
-    return found;
-  }
-
-  const Eigen::Vector3d& area_vector(std::uint32_t triangle) const { return normals_[triangle]; }
-  const Eigen::Vector3d& center(std::uint32_t triangle) const { return centers_[triangle]; }
-
- private:
-  const TriangleMesh& mesh_;
-  std::vector<Eigen::Vector3d> normals_;  // their length is the area
-  std::vector<Eigen::Vector3d> centers_;
-  std::vector<std::uint32_t> first_;
-  std::vector<std::uint32_t> around_;
-};
+  std::sort(found.begin(), found.end());
+  found.erase(std::unique(found.begin(), found.end()), found.end());
+  return found;
+}
 
 // Kind and mean normal of the surroundings.
-void look_around(const Surface& surface, const TriangleMesh& mesh, std::uint32_t vertex,
+void look_around(const TriangleMesh& mesh, const VertexTriangles& around, std::uint32_t vertex,
                  double radius_m, FieldPoint& point) {
   Eigen::Matrix3d spread = Eigen::Matrix3d::Zero();
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   double area = 0.0;
   double hollow = 0.0;
-  for (const std::uint32_t triangle : surface.within(vertex, radius_m)) {
-    const Eigen::Vector3d& vector = surface.area_vector(triangle);
+  for (const std::uint32_t number : triangles_within(mesh, around, vertex, radius_m)) {
+    const Triangle& triangle = mesh.triangles[number];
+    const Eigen::Vector3d vector = 0.5 * area_normal(mesh, triangle);  // its length is the area
+    const Eigen::Vector3d center = center_of(mesh, triangle);
     const double own = vector.norm();
     if (own <= 0.0) continue;
     spread += vector * vector.transpose() / own;
     sum += vector;
     area += own;
-    hollow += std::max(0.0, (mesh.vertices[vertex] - surface.center(triangle)).dot(vector)) -
-              0.5 * std::max(0.0, (surface.center(triangle) - mesh.vertices[vertex]).dot(vector));
+    hollow += std::max(0.0, (mesh.vertices[vertex] - center).dot(vector)) -
+              0.5 * std::max(0.0, (center - mesh.vertices[vertex]).dot(vector));
   }
   if (area <= 0.0) return;
   point.normal = sum.normalized();
@@ -112,8 +82,7 @@ void look_around(const Surface& surface, const TriangleMesh& mesh, std::uint32_t
 }
 
 const ScalarField& rock_field(const TriangleMesh& mesh) {
-  for (const ScalarField& field : mesh.face_fields)
-    if (field.name == "rock") return field;
+  if (const ScalarField* field = find_field(mesh.face_fields, "rock")) return *field;
   throw Error("the mesh does not say which triangles are which rock's", {.field = "rock"});
 }
 
@@ -160,15 +129,13 @@ std::vector<Candidate> candidates_of(const RockSite& site, const TriangleMesh& m
     candidate.point.height_m = local.z() - relief.height(local.x(), local.y());
     if (candidate.point.height_m >= options.min_height_m) candidates.push_back(candidate);
   }
-  const Surface surface(mesh);
-  parallel_for(candidates.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      FieldPoint& point = candidates[n].point;
-      look_around(surface, mesh, candidates[n].vertex, options.radius_m, point);
-      const double up = (ground_from_site.linear() * point.normal).z();
-      point.slope_deg = std::acos(std::clamp(up, -1.0, 1.0)) * 180.0 / M_PI;
-      point.is_hard = point.slope_deg > hard_slope_deg;
-    }
+  const VertexTriangles around = triangles_at_vertices(mesh.triangles, mesh.vertices.size());
+  parallel_each(candidates.size(), 64, [&](std::size_t n) {
+    FieldPoint& point = candidates[n].point;
+    look_around(mesh, around, candidates[n].vertex, options.radius_m, point);
+    const double up = (ground_from_site.linear() * point.normal).z();
+    point.slope_deg = std::acos(std::clamp(up, -1.0, 1.0)) * 180.0 / M_PI;
+    point.is_hard = point.slope_deg > hard_slope_deg;
   });
   return candidates;
 }

@@ -67,20 +67,10 @@ std::string rock_place(std::size_t n, const SiteRock& rock) {
 
 }  // namespace
 
-const std::vector<std::pair<std::string, RockShape>>& rock_shape_names() {
-  static const std::vector<std::pair<std::string, RockShape>> names = {
-      {"block", RockShape::block}, {"dome", RockShape::dome},     {"cobble", RockShape::cobble},
-      {"jug", RockShape::jug},     {"sloper", RockShape::sloper}, {"crimp", RockShape::crimp},
-      {"pinch", RockShape::pinch}};
-  return names;
-}
-
-const std::vector<std::pair<std::string, GroundTexture>>& ground_texture_names() {
-  static const std::vector<std::pair<std::string, GroundTexture>> names = {
-      {"soil", GroundTexture::soil},
-      {"rock", GroundTexture::rock},
-      {"panel", GroundTexture::panel}};
-  return names;
+std::vector<std::pair<std::string, RockShape>> rock_shape_names() {
+  return {{"block", RockShape::block}, {"dome", RockShape::dome},     {"cobble", RockShape::cobble},
+          {"jug", RockShape::jug},     {"sloper", RockShape::sloper}, {"crimp", RockShape::crimp},
+          {"pinch", RockShape::pinch}};
 }
 
 bool is_hold(RockShape shape) {
@@ -114,7 +104,11 @@ ParameterTable ground_parameters(SiteGround& ground) {
   table.add("size_y_m", ground.size_y_m, ground_size_range, "length along y");
   table.add("unevenness_m", ground.unevenness_m, Range{0.0, 1.0}, "height of the random relief");
   table.add("tilt_deg", ground.tilt_deg, Range{0.0, 135.0}, "0: level, 90: an upright wall");
-  table.add("texture", ground.texture, ground_texture_names(), "colors");
+  table.add("texture", ground.texture,
+            {{"soil", GroundTexture::soil},
+             {"rock", GroundTexture::rock},
+             {"panel", GroundTexture::panel}},
+            "colors");
   return table;
 }
 

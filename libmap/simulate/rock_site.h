@@ -25,7 +25,7 @@ namespace libmap {
 // rounded hump that is wider the lower. Climbing holds, +y up: jug (a bowl behind a lip), sloper (a
 // flat dome), crimp (a small edge), pinch (narrow, undercut).
 enum class RockShape { block, cobble, dome, jug, sloper, crimp, pinch };
-const std::vector<std::pair<std::string, RockShape>>& rock_shape_names();
+std::vector<std::pair<std::string, RockShape>> rock_shape_names();
 bool is_hold(RockShape shape);
 
 struct SiteRock {
@@ -46,7 +46,6 @@ struct SiteRock {
 };
 
 enum class GroundTexture { soil, rock, panel };  // the colors of the ground
-const std::vector<std::pair<std::string, GroundTexture>>& ground_texture_names();
 
 struct SiteGround {
   double size_x_m = 4.0;

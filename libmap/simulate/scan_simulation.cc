@@ -343,13 +343,11 @@ ScanSimulationResult simulate_scan(const ScanScene& scene, const ScanSimulationO
     const std::vector<VisibleSurface> surfaces = scene.surfaces(poses, camera.range());
     std::array<RgbdFrame, batch> frames;
     std::array<DepthMeasurement, batch> measured;
-    parallel_for(count, 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) {
-        frames[i].node = truth[first + i].node;
-        frames[i].stamp_s = truth[first + i].stamp_s;
-        measured[i] = camera.take(recorded[first + i].images_of, surfaces[i], frames[i]);
-        frames[i].depth = std::move(measured[i].depth);
-      }
+    parallel_each(count, [&](std::size_t i) {
+      frames[i].node = truth[first + i].node;
+      frames[i].stamp_s = truth[first + i].stamp_s;
+      measured[i] = camera.take(recorded[first + i].images_of, surfaces[i], frames[i]);
+      frames[i].depth = std::move(measured[i].depth);
     });
     for (std::size_t i = 0; i < count; ++i) {
       result.pixels += frames[i].depth.pixels.size();

@@ -140,15 +140,15 @@ void add_multipath(SurfaceView& view, const VisibleSurface& surface, const ViewR
   // One node more than reaches over the image.
   Image<double> grid((rays.width - 1) / grid_px + 2, (rays.height - 1) / grid_px + 2,
                      std::numeric_limits<double>::quiet_NaN());
-  parallel_for(static_cast<std::size_t>(grid.height), 1, [&](std::size_t begin, std::size_t end) {
-    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
-      for (int x = 0; x < grid.width; ++x) {
-        const std::size_t pixel = view.depth.index(std::min(x * grid_px, rays.width - 1),
-                                                   std::min(y * grid_px, rays.height - 1));
-        const Eigen::Vector2d& ray = rays.centers[pixel];
-        if (ray.allFinite())
-          grid.at(x, y) = reflections.range_error(world_from_camera.linear() * ray.homogeneous());
-      }
+  parallel_each(static_cast<std::size_t>(grid.height), [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < grid.width; ++x) {
+      const std::size_t pixel = view.depth.index(std::min(x * grid_px, rays.width - 1),
+                                                 std::min(y * grid_px, rays.height - 1));
+      const Eigen::Vector2d& ray = rays.centers[pixel];
+      if (ray.allFinite())
+        grid.at(x, y) = reflections.range_error(world_from_camera.linear() * ray.homogeneous());
+    }
   });
   add_errors(view.depth, rays.centers, grid, 0.0);
   add_errors(view.corner_depth, rays.corners, grid, -0.5);
@@ -171,20 +171,6 @@ Eigen::Vector3d random_direction(RandomStream& random) {
     for (Eigen::Index axis = 0; axis < 3; ++axis) direction[axis] = random.normal();
   } while (!(direction.norm() > 1e-6));
   return direction.normalized();
-}
-
-// Between pixels; the nearest of the border outside.
-Eigen::Vector3f color_between(const Image<Eigen::Vector3f>& image, const Eigen::Vector2d& at) {
-  const double x = std::clamp(at.x(), 0.0, image.width - 1.0);
-  const double y = std::clamp(at.y(), 0.0, image.height - 1.0);
-  const int left = std::min(static_cast<int>(x), std::max(image.width - 2, 0));
-  const int top = std::min(static_cast<int>(y), std::max(image.height - 2, 0));
-  const int right = std::min(left + 1, image.width - 1);
-  const int bottom = std::min(top + 1, image.height - 1);
-  const auto u = static_cast<float>(x - left);
-  const auto v = static_cast<float>(y - top);
-  return (1.0F - v) * ((1.0F - u) * image.at(left, top) + u * image.at(right, top)) +
-         v * ((1.0F - u) * image.at(left, bottom) + u * image.at(right, bottom));
 }
 
 }  // namespace
@@ -352,25 +338,26 @@ void blur_by_motion(SurfaceView& view, const Camera& camera,
   const Pose first_from_now = now_from_later(-0.5 * exposure_s).inverse();
   const Pose last_from_now = now_from_later(0.5 * exposure_s).inverse();
   const double far_away = 1e3;
-  parallel_for(static_cast<std::size_t>(sharp.height), 8, [&](std::size_t begin, std::size_t end) {
-    for (int y = static_cast<int>(begin); y < static_cast<int>(end); ++y)
-      for (int x = 0; x < sharp.width; ++x) {
-        const auto ray = pixel_to_ray(camera, Eigen::Vector2d(x, y));
-        if (!ray) continue;
-        const auto z = static_cast<double>(view.depth.at(x, y));
-        const Eigen::Vector3d point = (z > 0.0 ? z : far_away) * ray->homogeneous();
-        const auto first = project_point(camera, first_from_now * point);
-        const auto last = project_point(camera, last_from_now * point);
-        if (!first || !last) continue;
-        const Eigen::Vector2d way = *last - *first;
-        const int steps =
-            std::clamp(static_cast<int>(std::ceil(way.norm())) + 1, 1, max_blur_steps);
-        Eigen::Vector3f sum = Eigen::Vector3f::Zero();
-        // What passes this pixel lies as far before it as the point goes on.
-        for (int n = 0; n < steps; ++n)
-          sum += color_between(sharp, Eigen::Vector2d(x, y) + ((n + 0.5) / steps - 0.5) * way);
-        view.color.at(x, y) = sum / static_cast<float>(steps);
+  parallel_each(static_cast<std::size_t>(sharp.height), 8, [&](std::size_t row) {
+    const int y = static_cast<int>(row);
+    for (int x = 0; x < sharp.width; ++x) {
+      const auto ray = pixel_to_ray(camera, Eigen::Vector2d(x, y));
+      if (!ray) continue;
+      const auto z = static_cast<double>(view.depth.at(x, y));
+      const Eigen::Vector3d point = (z > 0.0 ? z : far_away) * ray->homogeneous();
+      const auto first = project_point(camera, first_from_now * point);
+      const auto last = project_point(camera, last_from_now * point);
+      if (!first || !last) continue;
+      const Eigen::Vector2d way = *last - *first;
+      const int steps = std::clamp(static_cast<int>(std::ceil(way.norm())) + 1, 1, max_blur_steps);
+      Eigen::Vector3f sum = Eigen::Vector3f::Zero();
+      // What passes this pixel lies as far before it as the point goes on.
+      for (int n = 0; n < steps; ++n) {
+        const Eigen::Vector2d from = Eigen::Vector2d(x, y) + ((n + 0.5) / steps - 0.5) * way;
+        sum += bilinear_color(sharp, from.x(), from.y());
       }
+      view.color.at(x, y) = sum / static_cast<float>(steps);
+    }
   });
 }
 

@@ -286,12 +286,10 @@ Solid ground_solid(const RockSite& site, const GroundRelief& relief, double edge
   grid.columns = 1 + static_cast<std::size_t>(std::ceil(grid.size_x_m / edge_length_m - 1e-9));
   grid.rows = 1 + static_cast<std::size_t>(std::ceil(grid.size_y_m / edge_length_m - 1e-9));
   grid.heights_m.resize(grid.columns * grid.rows);
-  parallel_for(grid.rows, 8, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t row = begin; row < end; ++row) {
-      for (std::size_t column = 0; column < grid.columns; ++column) {
-        const Eigen::Vector2d at = grid.at(column, row);
-        grid.heights_m[row * grid.columns + column] = relief.height(at.x(), at.y());
-      }
+  parallel_each(grid.rows, 8, [&](std::size_t row) {
+    for (std::size_t column = 0; column < grid.columns; ++column) {
+      const Eigen::Vector2d at = grid.at(column, row);
+      grid.heights_m[row * grid.columns + column] = relief.height(at.x(), at.y());
     }
   });
   const double lowest = *std::min_element(grid.heights_m.begin(), grid.heights_m.end());
@@ -388,11 +386,9 @@ TriangleMesh painted(const Solid& solid, const RockSite& site) {
   const Pose site_from_ground = site.site_from_ground();
   mesh.vertices.resize(solid.vertices.size());
   mesh.vertex_colors.resize(solid.vertices.size());
-  parallel_for(solid.vertices.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      mesh.vertex_colors[n] = color_of(site, vertex_labels[n], solid.vertices[n]);
-      mesh.vertices[n] = site_from_ground * solid.vertices[n];
-    }
+  parallel_each(solid.vertices.size(), 4096, [&](std::size_t n) {
+    mesh.vertex_colors[n] = color_of(site, vertex_labels[n], solid.vertices[n]);
+    mesh.vertices[n] = site_from_ground * solid.vertices[n];
   });
   mesh.triangles = solid.triangles;
   mesh.face_fields.push_back({"rock", ScalarType::int32, std::move(rocks)});
@@ -405,11 +401,10 @@ TriangleMesh site_mesh(const RockSite& site, const SiteMeshOptions& options) {
   check(site, options);
   const GroundRelief relief(site);
   std::vector<Solid> solids(site.rocks.size() + 1);
-  parallel_for(solids.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      solids[n] = n == 0 ? ground_solid(site, relief, options.edge_length_m)
-                         : placed_rock(site.rocks[n - 1], static_cast<int>(n), relief,
-                                       options.edge_length_m);
+  parallel_each(solids.size(), [&](std::size_t n) {
+    solids[n] =
+        n == 0 ? ground_solid(site, relief, options.edge_length_m)
+               : placed_rock(site.rocks[n - 1], static_cast<int>(n), relief, options.edge_length_m);
   });
   Solid solid = part_of_ground(unite(solids, splinter_share * options.edge_length_m), site);
   if (!options.closed) solid = select(solid, [&](std::size_t n) { return solid.labels[n] >= 0; });

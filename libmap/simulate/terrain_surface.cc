@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "libmap/core/parallel.h"
+#include "libmap/mesh/mesh_parts.h"
 
 namespace libmap {
 
@@ -27,25 +28,6 @@ double circumradius(const Eigen::Vector2d& a, const Eigen::Vector2d& b, const Ei
   const Eigen::Vector2d ac = c - a;
   const double twice_area = ab.x() * ac.y() - ab.y() * ac.x();
   return 0.5 * ab.norm() * ac.norm() * (c - b).norm() / std::abs(twice_area);
-}
-
-// Drops vertices that no triangle has.
-TriangleMesh with_used_vertices(const TriangleMesh& mesh) {
-  constexpr std::uint32_t unused = 0xffffffff;
-  TriangleMesh used;
-  std::vector<std::uint32_t> renamed(mesh.vertices.size(), unused);
-  for (Triangle triangle : mesh.triangles) {
-    for (std::uint32_t& vertex : triangle) {
-      if (renamed[vertex] == unused) {
-        renamed[vertex] = static_cast<std::uint32_t>(used.vertices.size());
-        used.vertices.push_back(mesh.vertices[vertex]);
-        used.vertex_normals.push_back(mesh.vertex_normals[vertex]);
-      }
-      vertex = renamed[vertex];
-    }
-    used.triangles.push_back(triangle);
-  }
-  return used;
 }
 
 // Whether a camera may see some of the box: false only if all of it is beyond one side of the view.
@@ -96,13 +78,14 @@ TriangleMesh triangulate_plan(const std::vector<Eigen::Vector3d>& points,
   }
   // Of all triangles, those beyond the rectangle too.
   mesh.vertex_normals = estimate_vertex_normals(mesh);
-  std::erase_if(mesh.triangles, [&](const Triangle& triangle) {
+  std::vector<bool> is_kept;
+  for (const Triangle& triangle : mesh.triangles) {
     Eigen::AlignedBox2d box;
     for (const std::uint32_t vertex : triangle)
       box.extend(Eigen::Vector2d(points[vertex].head<2>()));
-    return !box.intersects(rectangle);
-  });
-  return with_used_vertices(mesh);
+    is_kept.push_back(box.intersects(rectangle));
+  }
+  return select_triangles(mesh, is_kept);
 }
 
 TerrainSurface::TerrainSurface(const PointTileStore& points, const GroundHeights& heights,

@@ -233,9 +233,8 @@ Frame find_frame(const Picture& picture, double white_level, const BorderBandOpt
                 {.field = "white_level", .value = to_text(white_level)});
   const double bin = 2.0 * picture.cell;
   std::vector<Frame> frames(180);
-  parallel_for(frames.size(), 4, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      frames[n] = best_frame(white, 0.5 * static_cast<double>(n) - 45.0, bin, options);
+  parallel_each(frames.size(), 4, [&](std::size_t n) {
+    frames[n] = best_frame(white, 0.5 * static_cast<double>(n) - 45.0, bin, options);
   });
   Frame best = *std::max_element(frames.begin(), frames.end(),
                                  [](const Frame& a, const Frame& b) { return a.score < b.score; });

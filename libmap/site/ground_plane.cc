@@ -80,9 +80,8 @@ std::optional<Plane> best_plane(const Points& points, const GroundPlaneOptions& 
   if (planes.empty()) return std::nullopt;
   const auto counts_on = [&](const std::vector<std::size_t>& which, std::size_t count) {
     std::vector<std::size_t> counts(which.size());
-    parallel_for(which.size(), 16, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        counts[n] = count_near(points, count, planes[which[n]], options.tolerance_m);
+    parallel_each(which.size(), 16, [&](std::size_t n) {
+      counts[n] = count_near(points, count, planes[which[n]], options.tolerance_m);
     });
     return counts;
   };

@@ -341,9 +341,8 @@ TriangleMesh mesh_of(TriangleMesh mesh, std::vector<Piece> kept) {
 TriangleMesh cut_mesh(TriangleMesh mesh, const ExtrudedPolygon& prism) {
   require_finite(mesh);
   std::vector<Place> places(mesh.triangles.size());
-  parallel_for(places.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) places[n] = place_of(mesh, mesh.triangles[n], prism);
-  });
+  parallel_each(places.size(), 4096,
+                [&](std::size_t n) { places[n] = place_of(mesh, mesh.triangles[n], prism); });
   std::vector<Piece> kept;
   std::vector<Piece> on_border;
   for (std::uint32_t n = 0; n < places.size(); ++n)

@@ -172,10 +172,8 @@ PlanPolygon make_rectangle(const Vector2d& min, const Vector2d& max) {
 
 PointCloud clip_cloud(const PointCloud& cloud, const ExtrudedPolygon& prism) {
   std::vector<char> inside(cloud.size());
-  parallel_for(cloud.size(), 8192, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      inside[n] = prism.contains(cloud.positions[n]) ? 1 : 0;
-  });
+  parallel_each(cloud.size(), 8192,
+                [&](std::size_t n) { inside[n] = prism.contains(cloud.positions[n]) ? 1 : 0; });
   std::vector<std::size_t> indices;
   for (std::size_t n = 0; n < cloud.size(); ++n)
     if (inside[n] != 0) indices.push_back(n);

@@ -192,9 +192,8 @@ std::vector<Direction> try_directions(const Ground& ground, const Vector2d& size
   const Eigen::Vector2i size(std::max(1, static_cast<int>(std::lround(size_m.x() / cell))),
                              std::max(1, static_cast<int>(std::lround(size_m.y() / cell))));
   std::vector<Direction> directions(yaws_deg.size());
-  parallel_for(yaws_deg.size(), 1, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n)
-      directions[n] = {yaws_deg[n], TurnedGround(ground, yaws_deg[n], cell).best(size)};
+  parallel_each(yaws_deg.size(), [&](std::size_t n) {
+    directions[n] = {yaws_deg[n], TurnedGround(ground, yaws_deg[n], cell).best(size)};
   });
   return directions;
 }

@@ -390,8 +390,7 @@ std::vector<BoundaryLoop> find_holes(const TriangleMesh& mesh, double max_hole_m
 }
 
 ScalarField& filled_marks(TriangleMesh& mesh) {
-  for (ScalarField& field : mesh.face_fields)
-    if (field.name == filled_field) return field;
+  if (ScalarField* marks = find_field(mesh.face_fields, filled_field)) return *marks;
   mesh.face_fields.push_back(
       {filled_field, ScalarType::uint8, std::vector<double>(mesh.triangles.size(), 0.0)});
   return mesh.face_fields.back();
@@ -411,10 +410,9 @@ HoleFilling fill_holes(TriangleMesh& mesh, const std::vector<BoundaryLoop>& hole
     for (std::size_t n = 0; n < holes.size(); ++n)
       if (!is_settled[n]) open.push_back(n);
     if (open.empty()) break;
-    parallel_for(open.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n)
-        patches[open[n]] = patcher.patch(holes[open[n]], shape);
-      if (shape == shapes.front()) progress.advance(end - begin);
+    parallel_each(open.size(), [&](std::size_t n) {
+      patches[open[n]] = patcher.patch(holes[open[n]], shape);
+      if (shape == shapes.front()) progress.advance(1);
     });
     std::vector<bool> is_free(holes.size(), true);
     if (check == PatchCheck::intersection) is_free = free_patches(mesh, holes, patches);

@@ -114,9 +114,7 @@ class ImplicitSurface {
   TriangleMesh run() {
     find_blocks();
     parts_.resize(blocks_.size());
-    parallel_for(blocks_.size(), 8, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) march(blocks_[n], parts_[n]);
-    });
+    parallel_each(blocks_.size(), 8, [&](std::size_t n) { march(blocks_[n], parts_[n]); });
     return joined();
   }
 

@@ -14,6 +14,7 @@
 #include "libmap/mesh/mesh_adjacency.h"
 #include "libmap/mesh/mesh_parts.h"
 #include "libmap/surface/mesh_repair.h"
+#include "libmap/surface/mesh_report.h"
 #include "libmap/surface/self_intersections.h"
 
 namespace libmap {
@@ -38,11 +39,6 @@ constexpr std::string_view component_field = "\x01component";
 // `filled` while this works: what was marked before keeps apart from what is put in now.
 constexpr double filled_before = 2.0;
 
-ScalarField& field_named(std::vector<ScalarField>& fields, std::string_view name) {
-  return *std::find_if(fields.begin(), fields.end(),
-                       [&](const ScalarField& field) { return field.name == name; });
-}
-
 void erase_field(std::vector<ScalarField>& fields, std::string_view name) {
   std::erase_if(fields, [&](const ScalarField& field) { return field.name == name; });
 }
@@ -62,7 +58,7 @@ std::vector<bool> bad_faces(const TriangleMesh& mesh) {
 // The pieces that removing triangles of `removed_m2` has cut off: smaller than that, and not the
 // largest piece of what was one component. `component_field` names the component of each triangle.
 void drop_fragments(TriangleMesh& mesh, std::size_t components_before, double removed_m2) {
-  const ScalarField& former = field_named(mesh.face_fields, component_field);
+  const ScalarField& former = *find_field(mesh.face_fields, component_field);
   const MeshComponents pieces = connected_components(mesh);
   std::vector<std::size_t> former_of(pieces.areas_m2.size());
   std::vector<double> largest(components_before, 0.0);
@@ -83,14 +79,11 @@ void drop_fragments(TriangleMesh& mesh, std::size_t components_before, double re
 
 // Loops that touch no boundary that was there before.
 std::vector<BoundaryLoop> new_loops(const TriangleMesh& mesh) {
-  const ScalarField* before = nullptr;
-  for (const ScalarField& field : mesh.vertex_fields)
-    if (field.name == boundary_field) before = &field;
+  const std::vector<double>& before = find_field(mesh.vertex_fields, boundary_field)->values;
   std::vector<BoundaryLoop> loops = loops_of(mesh);
   std::erase_if(loops, [&](const BoundaryLoop& loop) {
-    return std::any_of(loop.begin(), loop.end(), [&](HalfEdge h) {
-      return before->values[source_of(mesh.triangles, h)] != 0.0;
-    });
+    return std::any_of(loop.begin(), loop.end(),
+                       [&](HalfEdge h) { return before[source_of(mesh.triangles, h)] != 0.0; });
   });
   return loops;
 }
@@ -188,19 +181,17 @@ Neighbors neighbors_of(const TriangleMesh& mesh) {
 
 void smoothing_step(const Neighbors& neighbors, double share,
                     const std::vector<Eigen::Vector3d>& from, std::vector<Eigen::Vector3d>& to) {
-  parallel_for(from.size(), vertices_grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      Eigen::Vector3d towards = Eigen::Vector3d::Zero();
-      double weights = 0.0;
-      for (std::uint32_t n = neighbors.first[v]; n < neighbors.first[v + 1]; ++n) {
-        const Eigen::Vector3d edge = from[neighbors.vertices[n]] - from[v];
-        const double length = edge.norm();
-        if (length == 0.0) continue;
-        towards += edge / length;
-        weights += 1.0 / length;
-      }
-      to[v] = weights > 0.0 ? Eigen::Vector3d(from[v] + share / weights * towards) : from[v];
+  parallel_each(from.size(), vertices_grain, [&](std::size_t v) {
+    Eigen::Vector3d towards = Eigen::Vector3d::Zero();
+    double weights = 0.0;
+    for (std::uint32_t n = neighbors.first[v]; n < neighbors.first[v + 1]; ++n) {
+      const Eigen::Vector3d edge = from[neighbors.vertices[n]] - from[v];
+      const double length = edge.norm();
+      if (length == 0.0) continue;
+      towards += edge / length;
+      weights += 1.0 / length;
     }
+    to[v] = weights > 0.0 ? Eigen::Vector3d(from[v] + share / weights * towards) : from[v];
   });
 }
 
@@ -217,6 +208,13 @@ void smooth_mesh(TriangleMesh& mesh, int iterations) {
     smoothing_step(neighbors, inward, mesh.vertices, moved);
     smoothing_step(neighbors, outward, moved, mesh.vertices);
   }
+}
+
+// Each edge has at most two triangles, in opposite senses, each vertex one fan.
+bool is_oriented_manifold(const TriangleMesh& mesh) {
+  const MeshReport report = report_mesh(mesh, {.self_intersections = false});
+  return report.is_manifold() && report.is_oriented() &&
+         std::none_of(mesh.triangles.begin(), mesh.triangles.end(), names_a_vertex_twice);
 }
 
 class Cleaning {

@@ -156,11 +156,9 @@ std::vector<Deviation> deviations(const TriangleMesh& from, const TriangleMesh& 
                                   double allowed_m) {
   const DeviationBound bound(to, allowed_m);
   std::vector<Deviation> result(from.triangles.size());
-  parallel_for(result.size(), triangles_grain, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const Triangle& t = from.triangles[n];
-      result[n] = bound.of({from.vertices[t[0]], from.vertices[t[1]], from.vertices[t[2]]});
-    }
+  parallel_each(result.size(), triangles_grain, [&](std::size_t n) {
+    const Triangle& t = from.triangles[n];
+    result[n] = bound.of({from.vertices[t[0]], from.vertices[t[1]], from.vertices[t[2]]});
   });
   return result;
 }

@@ -472,22 +472,4 @@ ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m) {
   }
 }
 
-bool is_oriented_manifold(const TriangleMesh& mesh) {
-  const std::vector<HalfEdge> opposite = opposites_of(mesh);
-  for (HalfEdge h = 0; h < opposite.size(); ++h) {
-    if (opposite[h] == open_edge) continue;
-    if (!is_joined(opposite[h]) ||
-        source_of(mesh.triangles, h) == source_of(mesh.triangles, opposite[h]))
-      return false;
-  }
-  const std::vector<HalfEdge> fans = corner_fans(mesh.triangles, opposite);
-  std::vector<HalfEdge> fan_of(mesh.vertices.size(), open_edge);
-  for (HalfEdge corner = 0; corner < fans.size(); ++corner) {
-    HalfEdge& fan = fan_of[source_of(mesh.triangles, corner)];
-    if (fan == open_edge) fan = fans[corner];
-    if (fan != fans[corner]) return false;
-  }
-  return true;
-}
-
 }  // namespace libmap

@@ -56,7 +56,4 @@ struct ManifoldCuts {
 // order. No triangle may name a vertex twice.
 ManifoldCuts make_manifold(TriangleMesh& mesh, double min_gap_m = 0.0);
 
-// Each edge has at most two triangles, in opposite senses, each vertex one fan.
-bool is_oriented_manifold(const TriangleMesh& mesh);
-
 }  // namespace libmap

@@ -19,10 +19,9 @@ void report_triangles(const TriangleMesh& mesh, MeshReport& report) {
   report.area_m2 = surface_area(mesh);
   report.degenerate_triangles = count_of(degenerate_triangles(mesh));
   report.duplicate_triangles = count_of(repeated_triangles(mesh.triangles));
-  for (const ScalarField& field : mesh.face_fields)
-    if (field.name == filled_field)
-      report.filled_triangles = static_cast<std::size_t>(std::count_if(
-          field.values.begin(), field.values.end(), [](double v) { return v > 0.0; }));
+  if (const ScalarField* filled = find_field(mesh.face_fields, filled_field))
+    report.filled_triangles = static_cast<std::size_t>(std::count_if(
+        filled->values.begin(), filled->values.end(), [](double v) { return v > 0.0; }));
   const MeshComponents components = connected_components(mesh);
   report.components = components.areas_m2.size();
   for (const double area : components.areas_m2)

@@ -131,9 +131,8 @@ class BoxTree {
   BoxTree(const TriangleMesh& mesh, const std::vector<std::uint32_t>& triangles)
       : triangles_(in_z_order(mesh, triangles)), levels_(1) {
     levels_[0].resize(triangles_.size());
-    parallel_for(triangles_.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) levels_[0][n] = box_of(mesh, triangles_[n]);
-    });
+    parallel_each(triangles_.size(), 4096,
+                  [&](std::size_t n) { levels_[0][n] = box_of(mesh, triangles_[n]); });
     do {
       const std::vector<Box>& below = levels_.back();
       std::vector<Box> level((below.size() + 7) / 8);
@@ -171,12 +170,10 @@ class BoxTree {
     for (const std::uint32_t t : triangles) bounds.extend(center_of(mesh, mesh.triangles[t]));
     const double cells_per_m = (voxel_cell_limit - 1) / std::max(bounds.sizes().maxCoeff(), 1e-300);
     std::vector<std::pair<std::uint64_t, std::uint32_t>> order(triangles.size());
-    parallel_for(triangles.size(), 4096, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) {
-        const Eigen::Vector3d center = center_of(mesh, mesh.triangles[triangles[n]]);
-        const Eigen::Vector3i cell = ((center - bounds.min()) * cells_per_m).cast<int>();
-        order[n] = {z_order(pack({cell, 0})), triangles[n]};
-      }
+    parallel_each(triangles.size(), 4096, [&](std::size_t n) {
+      const Eigen::Vector3d center = center_of(mesh, mesh.triangles[triangles[n]]);
+      const Eigen::Vector3i cell = ((center - bounds.min()) * cells_per_m).cast<int>();
+      order[n] = {z_order(pack({cell, 0})), triangles[n]};
     });
     std::sort(order.begin(), order.end());
     std::vector<std::uint32_t> sorted;
@@ -221,9 +218,8 @@ bool is_collinear(const TriangleMesh& mesh, const Triangle& t) {
 // 1 for triangles with an area, of those that `only` marks.
 std::vector<char> find_marked(const TriangleMesh& mesh, const std::vector<bool>& only) {
   std::vector<char> marks(mesh.triangles.size(), 0);
-  parallel_for(marks.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t)
-      if ((only.empty() || only[t]) && !is_collinear(mesh, mesh.triangles[t])) marks[t] = 1;
+  parallel_each(marks.size(), 4096, [&](std::size_t t) {
+    if ((only.empty() || only[t]) && !is_collinear(mesh, mesh.triangles[t])) marks[t] = 1;
   });
   return marks;
 }

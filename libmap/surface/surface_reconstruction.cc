@@ -66,40 +66,37 @@ void carry_values(const PointCloud& cloud, const PointTree& tree, double cell_si
   for (const ScalarField& field : cloud.fields)
     mesh.vertex_fields.push_back({field.name, field.type, std::vector<double>(count, 0.0)});
   if (cloud.empty() || (!cloud.has_colors() && cloud.fields.empty())) return;
-  parallel_for(count, 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      auto neighbors = tree.nearest(mesh.vertices[v], value_neighbors);
-      while (neighbors.back().square_m2 > max_m * max_m && neighbors.size() > 1)
-        neighbors.pop_back();
-      const auto weight = [&](const NeighborPoint& point) {
-        return 1.0 / (point.square_m2 + radius_m * radius_m);
-      };
-      if (cloud.has_colors()) {
-        Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-        double weights = 0.0;
-        for (const NeighborPoint& point : neighbors) {
-          const Color& color = cloud.colors[point.index];
-          sum += weight(point) * Eigen::Vector3d(color[0], color[1], color[2]);
-          weights += weight(point);
-        }
-        for (std::size_t c = 0; c < 3; ++c)
-          mesh.vertex_colors[v][c] = static_cast<std::uint8_t>(
-              std::lround(std::clamp(sum[static_cast<Eigen::Index>(c)] / weights, 0.0, 255.0)));
+  parallel_each(count, 1024, [&](std::size_t v) {
+    auto neighbors = tree.nearest(mesh.vertices[v], value_neighbors);
+    while (neighbors.back().square_m2 > max_m * max_m && neighbors.size() > 1) neighbors.pop_back();
+    const auto weight = [&](const NeighborPoint& point) {
+      return 1.0 / (point.square_m2 + radius_m * radius_m);
+    };
+    if (cloud.has_colors()) {
+      Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+      double weights = 0.0;
+      for (const NeighborPoint& point : neighbors) {
+        const Color& color = cloud.colors[point.index];
+        sum += weight(point) * Eigen::Vector3d(color[0], color[1], color[2]);
+        weights += weight(point);
       }
-      for (std::size_t f = 0; f < cloud.fields.size(); ++f) {
-        const ScalarField& field = cloud.fields[f];
-        double& value = mesh.vertex_fields[f].values[v];
-        value = field.values[neighbors.front().index];
-        if (is_whole(field.type)) continue;
-        double sum = 0.0;
-        double weights = 0.0;
-        for (const NeighborPoint& point : neighbors) {
-          if (std::isnan(field.values[point.index])) continue;
-          sum += weight(point) * field.values[point.index];
-          weights += weight(point);
-        }
-        if (weights > 0.0) value = sum / weights;
+      for (std::size_t c = 0; c < 3; ++c)
+        mesh.vertex_colors[v][c] = static_cast<std::uint8_t>(
+            std::lround(std::clamp(sum[static_cast<Eigen::Index>(c)] / weights, 0.0, 255.0)));
+    }
+    for (std::size_t f = 0; f < cloud.fields.size(); ++f) {
+      const ScalarField& field = cloud.fields[f];
+      double& value = mesh.vertex_fields[f].values[v];
+      value = field.values[neighbors.front().index];
+      if (is_whole(field.type)) continue;
+      double sum = 0.0;
+      double weights = 0.0;
+      for (const NeighborPoint& point : neighbors) {
+        if (std::isnan(field.values[point.index])) continue;
+        sum += weight(point) * field.values[point.index];
+        weights += weight(point);
       }
+      if (weights > 0.0) value = sum / weights;
     }
   });
 }
@@ -327,16 +324,14 @@ void Reconstruction::find_spacings() {
                            : max_known_spacing(options_) * result_.cell_size_m;
   tree_.emplace(places_);
   const PointTree& tree = *tree_;
-  parallel_for(samples_.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
-      spacings_m_[n] = max_m;
-      if (is_part_ && neighbors.size() <= spacing_neighbors) continue;
-      // The disc that reaches the last of them holds so many.
-      const double count = static_cast<double>(neighbors.size()) - 0.5;
-      spacings_m_[n] =
-          std::min(max_m, std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count));
-    }
+  parallel_each(samples_.size(), 1024, [&](std::size_t n) {
+    const auto neighbors = tree.nearest(places_[n], spacing_neighbors + 1);
+    spacings_m_[n] = max_m;
+    if (is_part_ && neighbors.size() <= spacing_neighbors) return;
+    // The disc that reaches the last of them holds so many.
+    const double count = static_cast<double>(neighbors.size()) - 0.5;
+    spacings_m_[n] =
+        std::min(max_m, std::sqrt(std::numbers::pi * neighbors.back().square_m2 / count));
   });
   for (std::size_t n = 0; n < samples_.size(); ++n)
     samples_[n].spacing_m =
@@ -348,26 +343,22 @@ void Reconstruction::trim(TriangleMesh& surface) {
   const PointTree& tree = *tree_;
   std::vector<std::uint32_t> sample_of(surface.vertices.size());  // that is near a vertex; or none
   constexpr std::uint32_t none = 0xffffffff;
-  parallel_for(sample_of.size(), 1024, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t v = begin; v < end; ++v) {
-      const NeighborPoint nearest = tree.first_of_nearest(surface.vertices[v]);
-      const double reach =
-          options_.trim_distance_cells * std::max(result_.cell_size_m, spacings_m_[nearest.index]);
-      const bool is_far = nearest.square_m2 > reach * reach;
-      sample_of[v] = is_far ? none : static_cast<std::uint32_t>(nearest.index);
-    }
+  parallel_each(sample_of.size(), 1024, [&](std::size_t v) {
+    const NeighborPoint nearest = tree.first_of_nearest(surface.vertices[v]);
+    const double reach =
+        options_.trim_distance_cells * std::max(result_.cell_size_m, spacings_m_[nearest.index]);
+    const bool is_far = nearest.square_m2 > reach * reach;
+    sample_of[v] = is_far ? none : static_cast<std::uint32_t>(nearest.index);
   });
   tree_.reset();
   std::vector<char> near(surface.triangles.size());
-  parallel_for(near.size(), 4096, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t n = begin; n < end; ++n) {
-      const Triangle& triangle = surface.triangles[n];
-      const Eigen::Vector3d normal = area_normal(surface, triangle);
-      near[n] = std::none_of(triangle.begin(), triangle.end(), [&](std::uint32_t corner) {
-        const std::uint32_t sample = sample_of[corner];
-        return sample == none || samples_[sample].normal.cast<double>().dot(normal) < 0.0;
-      });
-    }
+  parallel_each(near.size(), 4096, [&](std::size_t n) {
+    const Triangle& triangle = surface.triangles[n];
+    const Eigen::Vector3d normal = area_normal(surface, triangle);
+    near[n] = std::none_of(triangle.begin(), triangle.end(), [&](std::uint32_t corner) {
+      const std::uint32_t sample = sample_of[corner];
+      return sample == none || samples_[sample].normal.cast<double>().dot(normal) < 0.0;
+    });
   });
   result_.trimmed_triangles = static_cast<std::size_t>(std::count(near.begin(), near.end(), 0));
   result_.mesh = select_triangles(surface, {near.begin(), near.end()});

@@ -32,14 +32,12 @@ bool is_long(const TriangleMesh& mesh, HalfEdge h, double max_side_m) {
 // Parts of a triangle that needs no cutting need none: `open` says which triangles still may.
 void close_triangles(const TriangleMesh& mesh, double max_side_m, const NeedsCutting& needs_cutting,
                      std::vector<std::uint8_t>& open) {
-  parallel_for(open.size(), edges_per_chunk, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t t = begin; t < end; ++t) {
-      if (open[t] == 0) continue;
-      const auto h = static_cast<HalfEdge>(3 * t);
-      const bool any_long = is_long(mesh, h, max_side_m) || is_long(mesh, h + 1, max_side_m) ||
-                            is_long(mesh, h + 2, max_side_m);
-      if (!any_long || !needs_cutting(mesh, mesh.triangles[t])) open[t] = 0;
-    }
+  parallel_each(open.size(), edges_per_chunk, [&](std::size_t t) {
+    if (open[t] == 0) return;
+    const auto h = static_cast<HalfEdge>(3 * t);
+    const bool any_long = is_long(mesh, h, max_side_m) || is_long(mesh, h + 1, max_side_m) ||
+                          is_long(mesh, h + 2, max_side_m);
+    if (!any_long || !needs_cutting(mesh, mesh.triangles[t])) open[t] = 0;
   });
 }
 

@@ -99,9 +99,8 @@ void AtlasMaker::find_charts(const std::vector<HalfEdge>& opposite,
     std::sort(chart.triangles.begin(), chart.triangles.end());
     whole_charts_.push_back(std::move(chart));
   }
-  parallel_for(whole_charts_.size(), 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) whole_charts_[i].scale = own_scale(whole_charts_[i]);
-  });
+  parallel_each(whole_charts_.size(), 16,
+                [&](std::size_t i) { whole_charts_[i].scale = own_scale(whole_charts_[i]); });
 }
 
 std::array<Eigen::Vector2d, 3> AtlasMaker::corners_px(const TextureChart& chart,
@@ -254,16 +253,14 @@ TexturedMesh TextureAtlas::make_model(const TriangleMesh& mesh, const TexturePho
     neutral.fill(Eigen::Vector2f::Zero());
   model.texture_coordinates.assign(mesh.triangles.size(), neutral);
   model.page_of_triangle.assign(mesh.triangles.size(), neutral_size > 0 ? neutral_page : no_page);
-  parallel_for(charts.size(), 16, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t i = begin; i < end; ++i) {
-      const TextureChart& chart = charts[i];
-      for (const std::uint32_t t : chart.triangles) {
-        model.page_of_triangle[t] = chart.page;
-        for (std::size_t k = 0; k < 3; ++k)
-          model.texture_coordinates[t][k] =
-              coordinate(chart.page, place_on_page(chart, photos[chart.photo].projector,
-                                                   mesh.vertices[mesh.triangles[t][k]]));
-      }
+  parallel_each(charts.size(), 16, [&](std::size_t i) {
+    const TextureChart& chart = charts[i];
+    for (const std::uint32_t t : chart.triangles) {
+      model.page_of_triangle[t] = chart.page;
+      for (std::size_t k = 0; k < 3; ++k)
+        model.texture_coordinates[t][k] =
+            coordinate(chart.page, place_on_page(chart, photos[chart.photo].projector,
+                                                 mesh.vertices[mesh.triangles[t][k]]));
     }
   });
   return model;

@@ -119,30 +119,6 @@ bool OccluderCells::has_any_above(float x, float y, const Eigen::Vector3d& norma
   return false;
 }
 
-Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y) {
-  const double cx = std::clamp(x, 0.0, image.width - 1.0);
-  const double cy = std::clamp(y, 0.0, image.height - 1.0);
-  const int column = std::min(static_cast<int>(cx), std::max(image.width - 2, 0));
-  const int row = std::min(static_cast<int>(cy), std::max(image.height - 2, 0));
-  const int next_column = std::min(column + 1, image.width - 1);
-  const int next_row = std::min(row + 1, image.height - 1);
-  const auto right = static_cast<float>(cx - column);
-  const auto below = static_cast<float>(cy - row);
-  const Color& a = image.at(column, row);
-  const Color& b = image.at(next_column, row);
-  const Color& c = image.at(column, next_row);
-  const Color& d = image.at(next_column, next_row);
-  Eigen::Vector3f color;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const float upper =
-        static_cast<float>(a[k]) * (1.0F - right) + static_cast<float>(b[k]) * right;
-    const float lower =
-        static_cast<float>(c[k]) * (1.0F - right) + static_cast<float>(d[k]) * right;
-    color[static_cast<Eigen::Index>(k)] = upper * (1.0F - below) + lower * below;
-  }
-  return color;
-}
-
 Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y) {
   const double cx = std::clamp(x, 0.0, image.width - 1.0);
   const double cy = std::clamp(y, 0.0, image.height - 1.0);
@@ -211,9 +187,7 @@ TexturePhotos::TexturePhotos(const ScanSource& scan, const Trajectory& world_fro
   std::vector<Frame> batch;
   for (std::size_t first = 0; first < poses.size(); first += batch.size()) {
     batch = std::vector<Frame>(std::min(frames_in_flight, poses.size() - first));
-    parallel_for(batch.size(), 1, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t i = begin; i < end; ++i) batch[i] = read_frame(poses[first + i]);
-    });
+    parallel_each(batch.size(), [&](std::size_t i) { batch[i] = read_frame(poses[first + i]); });
     for (std::size_t i = 0; i < batch.size(); ++i) {
       Frame& frame = batch[i];
       if (frame.fault) {

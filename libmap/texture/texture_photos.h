@@ -89,8 +89,7 @@ class OccluderCells {
   std::vector<Eigen::Vector3d> rays_;  // through its middle, z = 1, world's axes; zero: none
 };
 
-// Between the centers of pixels; the image goes on as at its border. Bicubic: Keys 1981, a = -1/2.
-Eigen::Vector3f sample_bilinear(const ColorImage& image, double x, double y);
+// As bilinear_color(), but bicubic: Keys 1981, a = -1/2.
 Eigen::Vector3f sample_bicubic(const ColorImage& image, double x, double y);
 
 class TexturePhotos {

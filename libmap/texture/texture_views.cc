@@ -447,7 +447,7 @@ void look_up_colors(const TexturePhotos& photos, std::vector<ColorObservation>& 
       ColorObservation& seen = observations[n];
       const Eigen::Vector2d pixel(static_cast<double>(seen.x), static_cast<double>(seen.y));
       seen.radius2 = static_cast<float>((pixel - middle).squaredNorm() / middle.squaredNorm());
-      seen.color = sample_bilinear(*image, pixel.x(), pixel.y());
+      seen.color = bilinear_color(*image, pixel.x(), pixel.y());
     }
   });
 }

@@ -192,11 +192,7 @@ void write_textured_glb(const fs::path& path, const TexturedMesh& model,
 ColorImage read_picture(const TexturePicture& picture, const fs::path& model) {
   if (!picture.bytes.empty()) return decode_color(picture.bytes, max_picture_pixels);
   const fs::path path = model.parent_path() / picture.path;
-  try {
-    return decode_color(read_whole_file(path), max_picture_pixels);
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  return in_file(path, [&] { return decode_color(read_whole_file(path), max_picture_pixels); });
 }
 
 }  // namespace
@@ -258,16 +254,14 @@ TexturedMesh read_textured_mesh(const fs::path& path) {
   require_textured_format(path);
   require_readable_file(path);
   require_file_size(path, machine_memory());
-  try {
+  return in_file(path, [&] {
     DecodedModel decoded = decode_model_by_assimp(path, format_of(path).substr(1));
     if (decoded.model.mesh.triangles.empty()) throw Error("contains no triangle");
     for (const TexturePicture& picture : decoded.pictures)
       decoded.model.pages.push_back(read_picture(picture, path));
     decoded.model.check();
     return std::move(decoded.model);
-  } catch (const Error& error) {
-    throw error.in_file(path.string());
-  }
+  });
 }
 
 }  // namespace libmap

@@ -61,12 +61,6 @@ constexpr std::array<NamedColor, 10> named_colors{{
     {"orange", {255, 140, 0}},
 }};
 
-const ScalarField* find(const ColorSource& source, std::string_view name) {
-  for (const ScalarField& field : source.fields)
-    if (field.name == name) return &field;
-  return nullptr;
-}
-
 [[noreturn]] void throw_unknown_field(const ColorSource& source, const std::string& name) {
   std::vector<std::string> known;
   for (const ScalarField& field : source.fields) known.push_back(field.name);
@@ -78,7 +72,7 @@ const ScalarField* find(const ColorSource& source, std::string_view name) {
 }
 
 std::vector<double> values_of(const ColorSource& source, const std::string& name) {
-  if (const ScalarField* field = find(source, name)) {
+  if (const ScalarField* field = find_field(source.fields, name)) {
     if (field->values.size() != source.positions.size())
       throw Error("the field has not one value per point",
                   {.field = name,
@@ -189,15 +183,15 @@ void color_by_field(const ColorSource& source, const Coloring& coloring, const s
 }
 
 void color_by_flags(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
-  const bool has_convex = find(source, "convex") != nullptr;
-  const bool has_graspable = find(source, "graspable") != nullptr;
+  const bool has_convex = find_field(source.fields, "convex") != nullptr;
+  const bool has_graspable = find_field(source.fields, "graspable") != nullptr;
   if (!has_convex && !has_graspable) throw_unknown_field(source, "convex");
   const std::size_t count = source.positions.size();
   const std::vector<double> convex =
       has_convex ? values_of(source, "convex") : std::vector<double>(count, 0.0);
   const std::vector<double> graspable =
       has_graspable ? values_of(source, "graspable") : std::vector<double>(count, 0.0);
-  const bool has_obstacles = find(source, "obstacle") != nullptr;
+  const bool has_obstacles = find_field(source.fields, "obstacle") != nullptr;
   const std::vector<double> obstacle =
       has_obstacles ? values_of(source, "obstacle") : std::vector<double>(count, 0.0);
   for (std::size_t i = 0; i < count; ++i)
@@ -219,7 +213,8 @@ void color_by_flags(const ColorSource& source, const Coloring& coloring, Colored
 
 ColorMode automatic_mode(const ColorSource& source, const std::string& field) {
   if (!field.empty()) return is_score(field) ? ColorMode::score : ColorMode::field;
-  if (find(source, "score") || find(source, hold_probability)) return ColorMode::score;
+  if (find_field(source.fields, "score") != nullptr ||
+      find_field(source.fields, hold_probability) != nullptr) return ColorMode::score;
   const auto& own = source.own_colors;
   const bool varied = std::any_of(own.begin(), own.end(),
                                   [&own](const Color& color) { return color != own.front(); });
@@ -253,17 +248,6 @@ Color interpolated(const Points& points, double full, double t) {
 void add_legend(const Legend& legend, std::vector<Legend>& legends) {
   if (!legend.empty() && std::find(legends.begin(), legends.end(), legend) == legends.end())
     legends.push_back(legend);
-}
-
-std::vector<std::pair<std::string, ColorMode>> color_mode_names() {
-  return {{"automatic", ColorMode::automatic}, {"own", ColorMode::own},
-          {"score", ColorMode::score},         {"field", ColorMode::field},
-          {"flags", ColorMode::flags},         {"height", ColorMode::height},
-          {"single", ColorMode::single},       {"texture", ColorMode::texture}};
-}
-
-std::vector<std::pair<std::string, ColorScale>> color_scale_names() {
-  return {{"viridis", ColorScale::viridis}, {"diverging", ColorScale::diverging}};
 }
 
 ColoredPoints color_points(const ColorSource& source, const Coloring& coloring) {

@@ -25,12 +25,10 @@ namespace libmap {
 // single: one color.
 // texture: the pictures that a textured mesh brings; `automatic` where there are any.
 enum class ColorMode { automatic, own, score, field, flags, height, single, texture };
-std::vector<std::pair<std::string, ColorMode>> color_mode_names();
 
 // Colors of continuous values. diverging: blue below and red above the gray middle, for values
 // with a sign.
 enum class ColorScale { viridis, diverging };
-std::vector<std::pair<std::string, ColorScale>> color_scale_names();
 
 // One box of a legend, or the color at one value of a scalar bar.
 struct LegendEntry {

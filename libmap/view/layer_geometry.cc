@@ -86,16 +86,12 @@ PreparedLayer prepare_cloud(const PointCloud& cloud, const SceneLayer& layer,
   return result;
 }
 
-bool has_field(const std::vector<ScalarField>& fields, const std::string& name) {
-  return std::any_of(fields.begin(), fields.end(),
-                     [&name](const ScalarField& field) { return field.name == name; });
-}
-
 // Whether the field that colors the mesh is one of its triangles, not of its vertices.
 bool colored_by_face(const TriangleMesh& mesh, const Coloring& coloring) {
   if (mesh.face_fields.empty()) return false;
   const auto only_faces = [&mesh](const std::string& name) {
-    return has_field(mesh.face_fields, name) && !has_field(mesh.vertex_fields, name);
+    return find_field(mesh.face_fields, name) != nullptr &&
+           find_field(mesh.vertex_fields, name) == nullptr;
   };
   switch (coloring.mode) {
     case ColorMode::automatic:
@@ -336,14 +332,6 @@ ColoredTriangles mesh_triangles(const PreparedLayer& layer, const SceneCamera& c
 
 }  // namespace
 
-PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene) {
-  if (const auto* cloud = std::get_if<PointCloud>(&layer.shape))
-    return prepare_cloud(*cloud, layer, terrain_from_scene);
-  if (const auto* textured = std::get_if<TexturedMesh>(&layer.shape))
-    return prepare_mesh(textured->mesh, layer, terrain_from_scene);
-  return prepare_mesh(std::get<TriangleMesh>(layer.shape), layer, terrain_from_scene);
-}
-
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene) {
   const auto* textured = std::get_if<TexturedMesh>(&layer.shape);
   const bool has_texture = textured != nullptr && textured->has_texture();
@@ -352,7 +340,11 @@ std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& t
     throw Error("the data bring no texture", {.field = "color mode", .value = "texture"});
   if (has_texture && (mode == ColorMode::texture || mode == ColorMode::automatic))
     return prepare_textured(*textured, layer, terrain_from_scene);
-  return {prepare_layer(layer, terrain_from_scene)};
+  if (const auto* cloud = std::get_if<PointCloud>(&layer.shape))
+    return {prepare_cloud(*cloud, layer, terrain_from_scene)};
+  const TriangleMesh& mesh =
+      textured != nullptr ? textured->mesh : std::get<TriangleMesh>(layer.shape);
+  return {prepare_mesh(mesh, layer, terrain_from_scene)};
 }
 
 PointSpacing estimate_spacing(const std::vector<Eigen::Vector3d>& positions) {

@@ -30,12 +30,9 @@ struct PreparedLayer {
   std::vector<Eigen::Vector2f> coordinates{};  // one a position, from the top left
 };
 
-// Not by its texture. Throws Error: arrays of a wrong length, and what color_points throws.
-PreparedLayer prepare_layer(const SceneLayer& layer, const Pose& terrain_from_scene);
-
-// The same, but a textured mesh that is to be shown so is a layer a page, which must outlive it;
-// triangles without a page are of the color of untextured_color. Throws Error too where the texture
-// is asked of a layer without any.
+// One layer, but of a textured mesh that is to be shown so a layer a page, which must outlive it;
+// triangles without a page are of the color of untextured_color. Throws Error: arrays of a wrong
+// length, the texture asked of a layer without any, and what color_points throws.
 std::vector<PreparedLayer> prepare_layers(const SceneLayer& layer, const Pose& terrain_from_scene);
 
 inline constexpr Color untextured_color{128, 128, 128};

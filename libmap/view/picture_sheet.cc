@@ -279,10 +279,6 @@ DrawnScene draw_scene(const SheetCell& cell, const PixelRect& rect,
 
 }  // namespace
 
-std::vector<std::pair<std::string, SharedView>> shared_view_names() {
-  return {{"sheet", SharedView::sheet}, {"row", SharedView::row}};
-}
-
 SheetLayout plan_sheet(const std::vector<SheetCell>& cells, const PictureSheetOptions& options,
                        const std::vector<Legend>& legends, double aspect) {
   check(cells, options);

@@ -26,7 +26,6 @@ struct SheetCell {
 
 // Which scenes are shown at the same scale and place, so that they can be compared cell by cell.
 enum class SharedView { sheet, row };
-std::vector<std::pair<std::string, SharedView>> shared_view_names();
 
 struct PictureSheetOptions {
   int columns = 0;  // 0: the fewest that make the page at least as wide as it is high

@@ -240,32 +240,38 @@ ColorImage draw_plot(const Setup& setup, const Color& background) {
 
 }  // namespace
 
-std::vector<std::pair<std::string, PointShape>> point_shape_names() {
-  return {{"automatic", PointShape::automatic},
-          {"cube", PointShape::cube},
-          {"square", PointShape::square}};
-}
-
-std::vector<std::pair<std::string, Shading>> shading_names() {
-  return {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}};
-}
-
 void bind(ParameterTable& table, SceneLayer& layer) {
   Coloring& coloring = layer.coloring;
-  table.add("color", coloring.mode, color_mode_names(), "what colors show");
+  table.add("color", coloring.mode,
+            {{"automatic", ColorMode::automatic},
+             {"own", ColorMode::own},
+             {"score", ColorMode::score},
+             {"field", ColorMode::field},
+             {"flags", ColorMode::flags},
+             {"height", ColorMode::height},
+             {"single", ColorMode::single},
+             {"texture", ColorMode::texture}},
+            "what colors show");
   table.add("field", coloring.field, "field that is shown with color: field or automatic");
   table.add("load_n", coloring.load_n, positive,
             "load of hold_probability, for the legend, N; auto: the map's own");
-  table.add("color_scale", coloring.scale, color_scale_names(),
+  table.add("color_scale", coloring.scale,
+            {{"viridis", ColorScale::viridis}, {"diverging", ColorScale::diverging}},
             "colors of continuous values; diverging: blue below and red above 0");
   table.add("range_min", coloring.range_min, any_number, "value at the lower end of the colors");
   table.add("range_max", coloring.range_max, any_number,
             "value at their upper end; equal to range_min: from the data");
   table.add("single_color", coloring.color, "color with color: single, #rrggbb");
-  table.add("point_shape", layer.point_shape, point_shape_names(), "shape of a point");
+  table.add("point_shape", layer.point_shape,
+            {{"automatic", PointShape::automatic},
+             {"cube", PointShape::cube},
+             {"square", PointShape::square}},
+            "shape of a point");
   table.add("point_size_m", layer.point_size_m, not_negative,
             "edge of a point, m; 0: from their spacing");
-  table.add("shading", layer.shading, shading_names(), "where light falls");
+  table.add("shading", layer.shading,
+            {{"automatic", Shading::automatic}, {"none", Shading::none}, {"full", Shading::full}},
+            "where light falls");
 }
 
 void bind(ParameterTable& table, SceneViewOptions& options) {

@@ -22,14 +22,12 @@ namespace libmap {
 // cube:      axis-aligned in the terrain frame.
 // square:    facing the camera.
 enum class PointShape { automatic, cube, square };
-std::vector<std::pair<std::string, PointShape>> point_shape_names();
 
 // automatic: meshes, the sides of cubes, and clouds of one color (by their normals) are shaded;
 //            all else has exactly the colors of the legend, or those of its texture.
 // none:      exact colors everywhere.
 // full:      squares of a cloud with normals and textures are shaded too.
 enum class Shading { automatic, none, full };
-std::vector<std::pair<std::string, Shading>> shading_names();
 
 // One cloud or mesh; a textured mesh that has no pages is a mesh. Points that are not finite are
 // left out, as are triangles with such corners.

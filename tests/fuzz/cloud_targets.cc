@@ -52,7 +52,7 @@ Seeds cloud_seeds() {
   Seeds seeds;
   for (const auto encoding : {libmap::FileEncoding::ascii, libmap::FileEncoding::binary,
                               libmap::FileEncoding::binary_compressed}) {
-    libmap::CloudWriteOptions options;
+    libmap::GeometryWriteOptions options;
     options.encoding = encoding;
     try {
       seeds.push_back(written(std::string("cloud") + extension, [&](const fs::path& path) {

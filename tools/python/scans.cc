@@ -133,25 +133,15 @@ void add_frames(py::module_& module) {
       .def_readonly("node", &RgbdFrame::node)
       .def_readonly("stamp_s", &RgbdFrame::stamp_s)
       .def_readonly("cameras", &RgbdFrame::cameras)
-      .def_property_readonly(
-          "color",
-          [](const py::object& self) {
-            return pixels_of<std::uint8_t>(self.cast<RgbdFrame&>().color, self);
-          },
-          "(height, width, 3) uint8, or None")
-      .def_property_readonly(
-          "depth",
-          [](const py::object& self) {
-            return pixels_of<float>(self.cast<RgbdFrame&>().depth, self);
-          },
-          "(height, width) float32: distance from the camera's plane, m; 0\n"
-          "where nothing was measured; or None")
-      .def_property_readonly(
-          "right",
-          [](const py::object& self) {
-            return pixels_of<std::uint8_t>(self.cast<RgbdFrame&>().right, self);
-          },
-          "(height, width) uint8 of a stereo pair, or None");
+      .def_property_readonly("color",
+                             viewing(&RgbdFrame::color, pixels_of<std::uint8_t, libmap::Color>),
+                             "(height, width, 3) uint8, or None")
+      .def_property_readonly("depth", viewing(&RgbdFrame::depth, pixels_of<float, float>),
+                             "(height, width) float32: distance from the camera's plane, m; 0\n"
+                             "where nothing was measured; or None")
+      .def_property_readonly("right",
+                             viewing(&RgbdFrame::right, pixels_of<std::uint8_t, std::uint8_t>),
+                             "(height, width) uint8 of a stereo pair, or None");
 }
 
 void add_poses(py::module_& module) {
@@ -266,7 +256,7 @@ py::dict refine(const ScanSource& scan, const std::vector<std::string>& known_le
     options.known_lengths.push_back(libmap::parse_known_length(text));
   if (board) options.board = libmap::parse_known_board(*board);
   libmap::RefinementResult result = run(threads, progress, [&](libmap::Progress& bar) {
-    return in_file(scan.path(), [&] { return libmap::refine_poses(scan, options, bar); });
+    return libmap::in_file(scan.path(), [&] { return libmap::refine_poses(scan, options, bar); });
   });
   py::dict made = dict_of(libmap::described(result));
   made["poses"] = shared(Poses{std::move(result.poses)});
@@ -285,8 +275,8 @@ py::dict fuse(const ScanSource& scan, const Poses& poses, const py::dict& values
               const py::object& progress, unsigned threads) {
   const auto options = options_from<libmap::DepthFusionOptions>(values);
   libmap::DepthFusionResult result = run(threads, progress, [&](libmap::Progress& bar) {
-    return in_file(scan.path(),
-                   [&] { return libmap::fuse_depth(scan, poses.poses, options, bar); });
+    return libmap::in_file(scan.path(),
+                           [&] { return libmap::fuse_depth(scan, poses.poses, options, bar); });
   });
   py::dict made = dict_of(libmap::described(result));
   made["cloud"] = shared(std::move(result.cloud));

@@ -35,6 +35,11 @@ py::array positions_of(const std::vector<Eigen::Vector3d>& positions, py::handle
   return view(data, rows(positions.size(), 3), owner);
 }
 
+py::array triangles_of(const std::vector<libmap::Triangle>& triangles, py::handle owner) {
+  const std::uint32_t* data = triangles.empty() ? nullptr : triangles.front().data();
+  return view(data, rows(triangles.size(), 3), owner);
+}
+
 py::dict fields_of(const std::vector<ScalarField>& fields, py::handle owner) {
   py::dict dict;
   for (const ScalarField& field : fields)
@@ -178,24 +183,14 @@ void add_cloud(py::module_& module) {
       .def(py::init(&make_cloud), py::arg("positions"), py::arg("normals") = py::none(),
            py::arg("colors") = py::none(), py::arg("fields") = py::dict(),
            py::arg("viewpoint") = py::none())
-      .def_property_readonly(
-          "positions",
-          [](const py::object& self) {
-            return positions_of(self.cast<PointCloud&>().positions, self);
-          },
-          "(N, 3) float64, m")
-      .def_property_readonly(
-          "normals",
-          [](const py::object& self) { return normals_of(self.cast<PointCloud&>().normals, self); },
-          "(N, 3) float32, or None")
-      .def_property_readonly(
-          "colors",
-          [](const py::object& self) { return colors_of(self.cast<PointCloud&>().colors, self); },
-          "(N, 3) uint8: red, green, blue; or None")
-      .def_property_readonly(
-          "fields",
-          [](const py::object& self) { return fields_of(self.cast<PointCloud&>().fields, self); },
-          "{name: (N,) float64}")
+      .def_property_readonly("positions", viewing(&PointCloud::positions, positions_of),
+                             "(N, 3) float64, m")
+      .def_property_readonly("normals", viewing(&PointCloud::normals, normals_of),
+                             "(N, 3) float32, or None")
+      .def_property_readonly("colors", viewing(&PointCloud::colors, colors_of),
+                             "(N, 3) uint8: red, green, blue; or None")
+      .def_property_readonly("fields", viewing(&PointCloud::fields, fields_of),
+                             "{name: (N,) float64}")
       .def_property_readonly(
           "field_types", [](const PointCloud& cloud) { return types_of(cloud.fields); },
           "{name: type of the numbers in files}")
@@ -219,44 +214,18 @@ void add_mesh(py::module_& module) {
       .def(py::init(&make_mesh), py::arg("vertices"), py::arg("triangles"),
            py::arg("vertex_normals") = py::none(), py::arg("vertex_colors") = py::none(),
            py::arg("vertex_fields") = py::dict(), py::arg("face_fields") = py::dict())
-      .def_property_readonly(
-          "vertices",
-          [](const py::object& self) {
-            return positions_of(self.cast<TriangleMesh&>().vertices, self);
-          },
-          "(V, 3) float64, m")
-      .def_property_readonly(
-          "triangles",
-          [](const py::object& self) {
-            const auto& triangles = self.cast<TriangleMesh&>().triangles;
-            return view(triangles.empty() ? nullptr : triangles.front().data(),
-                        rows(triangles.size(), 3), self);
-          },
-          "(T, 3) uint32: vertices, counter-clockwise from outside")
-      .def_property_readonly(
-          "vertex_normals",
-          [](const py::object& self) {
-            return normals_of(self.cast<TriangleMesh&>().vertex_normals, self);
-          },
-          "(V, 3) float32, or None")
-      .def_property_readonly(
-          "vertex_colors",
-          [](const py::object& self) {
-            return colors_of(self.cast<TriangleMesh&>().vertex_colors, self);
-          },
-          "(V, 3) uint8, or None")
-      .def_property_readonly(
-          "vertex_fields",
-          [](const py::object& self) {
-            return fields_of(self.cast<TriangleMesh&>().vertex_fields, self);
-          },
-          "{name: (V,) float64}")
-      .def_property_readonly(
-          "face_fields",
-          [](const py::object& self) {
-            return fields_of(self.cast<TriangleMesh&>().face_fields, self);
-          },
-          "{name: (T,) float64}")
+      .def_property_readonly("vertices", viewing(&TriangleMesh::vertices, positions_of),
+                             "(V, 3) float64, m")
+      .def_property_readonly("triangles", viewing(&TriangleMesh::triangles, triangles_of),
+                             "(T, 3) uint32: vertices, counter-clockwise from outside")
+      .def_property_readonly("vertex_normals", viewing(&TriangleMesh::vertex_normals, normals_of),
+                             "(V, 3) float32, or None")
+      .def_property_readonly("vertex_colors", viewing(&TriangleMesh::vertex_colors, colors_of),
+                             "(V, 3) uint8, or None")
+      .def_property_readonly("vertex_fields", viewing(&TriangleMesh::vertex_fields, fields_of),
+                             "{name: (V,) float64}")
+      .def_property_readonly("face_fields", viewing(&TriangleMesh::face_fields, fields_of),
+                             "{name: (T,) float64}")
       .def_property_readonly("area_m2", &libmap::surface_area);
 }
 

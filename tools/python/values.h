@@ -44,6 +44,12 @@ py::array view(const Number* data, Shape shape, py::handle owner, Shape strides 
   return array;
 }
 
+// Gets `view_of` a member of an object, which lives as long as the view does.
+template <typename Object, typename Member, typename ViewOf>
+auto viewing(Member Object::*member, ViewOf view_of) {
+  return [=](const py::object& self) { return view_of(self.cast<Object&>().*member, self); };
+}
+
 // An array of one number for each item.
 template <typename Number, typename Items, typename NumberOf>
 py::array_t<Number> column(const Items& items, const NumberOf& number_of) {
@@ -166,16 +172,6 @@ void write_whole(const std::filesystem::path& path, const Write& write) {
     write(output.temporary_path());
     output.commit();
   });
-}
-
-// What step() returns; an Error of it that names no file names `file`.
-template <typename Step>
-auto in_file(const std::filesystem::path& file, const Step& step) {
-  try {
-    return step();
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file.string());
-  }
 }
 
 template <typename T>

@@ -246,14 +246,12 @@ class MapGrasping {
       const std::vector<std::size_t>& members) const {
     std::vector<std::optional<Eigen::Vector3d>> candidates(members.size());
     constexpr std::size_t grain = 256;
-    libmap::parallel_for(members.size(), grain, [&](std::size_t begin, std::size_t end) {
-      for (std::size_t n = begin; n < end; ++n) {
-        const Eigen::Vector3d place = mesh_from_map_ * points.positions[members[n]];
-        // Along a normal the gripper comes from anywhere.
-        if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(place))
-          continue;
-        if (piece.ground.distance(place, options_.max_distance_m)) candidates[n] = place;
-      }
+    libmap::parallel_each(members.size(), grain, [&](std::size_t n) {
+      const Eigen::Vector3d place = mesh_from_map_ * points.positions[members[n]];
+      // Along a normal the gripper comes from anywhere.
+      if (options_.approach == libgtd::ApproachDirection::up && !piece.from_above.may_hold(place))
+        return;
+      if (piece.ground.distance(place, options_.max_distance_m)) candidates[n] = place;
     });
     return candidates;
   }

@@ -148,7 +148,7 @@ libmap::PointCloud load_row(const MapTiles& tiles, const std::string& store, con
 
 void merge_store(const std::string& store, const std::string& output, const MergeOptions& options,
                  Run& run) {
-  const libmap::CloudWriteOptions& writing = options.writing;
+  const libmap::GeometryWriteOptions& writing = options.writing;
   if (libmap::format_of(output) == ".pcd" && writing.encoding != libmap::FileEncoding::binary)
     throw libmap::Error("a tile store is written as binary .pcd",
                         {.file = output, .field = "--encoding"});
@@ -178,7 +178,7 @@ void merge_store(const std::string& store, const std::string& output, const Merg
 }  // namespace
 
 void write_merged(const MapTiles& tiles, const std::string& store,
-                  const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
+                  const std::filesystem::path& file, const libmap::GeometryWriteOptions& writing,
                   Run& run) {
   const std::vector<TileRow> rows = rows_of(tiles.index());
   run.progress().begin("merge", rows.size());

@@ -67,11 +67,11 @@ bool is_part_of_map(const std::string& file);
 // Writes the tiles of a store as one map, a PCD row by row of tiles; other formats need the whole
 // map in memory. Errors name `store`.
 void write_merged(const MapTiles& tiles, const std::string& store,
-                  const std::filesystem::path& file, const libmap::CloudWriteOptions& writing,
+                  const std::filesystem::path& file, const libmap::GeometryWriteOptions& writing,
                   Run& run);
 
 struct MergeOptions {
-  libmap::CloudWriteOptions writing;
+  libmap::GeometryWriteOptions writing;
   double pixel_size_m = 0.0;  // of a raster, .tif; 0: the voxel size
 };
 

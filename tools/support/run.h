@@ -25,15 +25,7 @@
 
 namespace graspmap_tools {
 
-// What `step` returns; an Error of it that names no file names `file`.
-template <typename Step>
-auto in_file(const std::string& file, const Step& step) {
-  try {
-    return step();
-  } catch (const libmap::Error& error) {
-    throw error.in_file(file);
-  }
-}
+using libmap::in_file;
 
 // For a terminal, of a text that may come from a file: one line of printable UTF-8. Control
 // characters and bytes that are no UTF-8 become \xNN, line breaks spaces; the middle of a long text

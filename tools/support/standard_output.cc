@@ -2,10 +2,10 @@
 
 #include <cerrno>
 #include <cstdio>
-#include <cstring>
 #include <iostream>
 
 #include "libmap/core/error.h"
+#include "libmap/core/output_lock.h"
 
 namespace graspmap_tools {
 
@@ -15,9 +15,7 @@ void require_printed() {
   std::fflush(stdout);
   // They tell of a failed write by their state alone.
   if (std::cout && std::ferror(stdout) == 0) return;
-  throw libmap::Error(std::string("cannot be written") +
-                          (errno == 0 ? "" : std::string(": ") + std::strerror(errno)),
-                      {.file = "standard output"}, libmap::ErrorKind::failed);
+  throw libmap::system_failure("standard output", "cannot be written", errno);
 }
 
 int exit_code_of_printing(const std::string& program) {

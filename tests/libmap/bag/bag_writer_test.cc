@@ -93,12 +93,12 @@ TEST(BagWriter, SameContentSameBytes) {
   BagContent content{.stamp_s = 1600000000.123456, .places = {places()}};
   content.transforms = {{"terrain", "base_link", libmap::Pose::Identity()}};
   content.clouds = {{"/map", "terrain", {}}};
-  for (const auto& [name, compression] : libmap::bag_compression_names()) {
-    if (compression == libmap::BagCompression::zstd) continue;
+  using libmap::BagCompression;
+  for (const auto compression : {BagCompression::none, BagCompression::bz2, BagCompression::lz4}) {
     libmap::write_bag(bag_path(), BagFormat::ros1, content, compression);
     const std::string first = read_text(bag_path());
     libmap::write_bag(bag_path(), BagFormat::ros1, content, compression);
-    EXPECT_EQ(first, read_text(bag_path())) << name;
+    EXPECT_EQ(first, read_text(bag_path())) << static_cast<int>(compression);
     const libmap::BagListing listing = libmap::list_bag(bag_path());
     EXPECT_EQ(listing.messages, 4U);
     EXPECT_NEAR(listing.start_s, content.stamp_s, 1e-6);

@@ -32,7 +32,7 @@ PointCloud random_cloud(std::size_t count, bool normals) {
 }
 
 std::filesystem::path write(const std::string& name, const PointCloud& cloud,
-                            const libmap::CloudWriteOptions& options = {}) {
+                            const libmap::GeometryWriteOptions& options = {}) {
   libmap::write_cloud(scratch_folder() / name, cloud, options);
   return scratch_folder() / name;
 }

@@ -41,7 +41,7 @@ const PageAssets assets{.style = "p { color: red }",
 TEST(ReportPage, NothingFromTheRunCanRun) {
   const std::string attack = "\"'><script>alert(1)</script><img src=x onerror=alert(2)>";
   ReportContent content;
-  content.title = attack;
+  content.heading = attack;
   libmap::ReportSection section;
   section.heading = section.folder = attack;
   libmap::ReportItem item;
@@ -85,7 +85,7 @@ TEST(ReportPage, LibrariesComeOnlyWithViews) {
   with_library.libraries = {"library();"};
   with_library.library_notice = "whose it is";
   ReportContent content;
-  content.title = "a";
+  content.heading = "a";
   EXPECT_EQ(libmap::report_page(content, with_library).find("library();"), std::string::npos);
   libmap::ReportMap map;
   map.view.cell_size_m = 0.01;
@@ -107,7 +107,7 @@ TEST(ReportPage, AScenesMesh) {
   scene.mesh.vertex_colors = {{1, 2, 3}, {4, 5, 6}, {7, 8, 9}};
   scene.legend = {{{255, 16, 0}, "a & b"}};
   ReportContent content;
-  content.title = "a";
+  content.heading = "a";
   content.items.push_back({.body = scene});
   const std::string html = libmap::report_page(content, with_library);
   const std::string bytes{0, 0, 1, 0,      2, 0,                              //
@@ -122,7 +122,7 @@ TEST(ReportPage, AScenesMesh) {
 
 TEST(ReportPage, PicturesAreMadeSmallerUntilThePageFits) {
   ReportContent content;
-  content.title = "a";
+  content.heading = "a";
   content.items.push_back({.body = ReportPictures{picture_of(noise(1600, 700))}});
   const libmap::FittedPage whole = libmap::fit_report_page(content, assets, 10'000'000);
   EXPECT_EQ(whole.picture_level, 0);
@@ -148,7 +148,7 @@ TEST(ReportPage, TablesAreCutIfSmallPicturesAreNotEnough) {
     table.table.rows.back().front() = "P" + std::to_string(n);
   }
   ReportContent content;
-  content.title = "a";
+  content.heading = "a";
   libmap::ReportSection section;
   section.items.push_back({.body = table});
   section.items.push_back({.body = ReportPictures{picture_of(noise(400, 300))}});

@@ -11,7 +11,7 @@ namespace report_plan_test {
 namespace fs = std::filesystem;
 using graspmap_test::error_of;
 using graspmap_test::scratch_folder;
-using libmap::ReportPlan;
+using libmap::PlannedSection;
 using report_test_support::put;
 using report_test_support::put_manifest;
 
@@ -34,7 +34,7 @@ TEST(ReportPlan, OfAFolder) {
   put_manifest("2_b/tiles/1-of-2.pcd", "score");
   put("2_b/.hidden/a.png", "");
   fs::create_directory_symlink(scratch_folder(), scratch_folder() / "2_b/loop");
-  const ReportPlan plan = libmap::plan_report(scratch_folder());
+  const PlannedSection plan = libmap::plan_report(scratch_folder());
   ASSERT_EQ(plan.sections.size(), 3U);
   EXPECT_EQ(plan.sections[0].heading, "2 B");
   EXPECT_EQ(plan.sections[1].heading, "10 C");
@@ -70,7 +70,7 @@ TEST(ReportPlan, OfMapsTogether) {
   put("sub/top.png", "");
   put("sub/evaluation/roc.csv", "a\n1\n");
   put_manifest("sub/evaluation", "evaluate");
-  const ReportPlan plan = libmap::plan_report(scratch_folder());
+  const PlannedSection plan = libmap::plan_report(scratch_folder());
   EXPECT_EQ(plan.items[0].labels,
             (std::vector<std::string>{"a.pcd", "b.pcd", "sub/map.pcd", "sub/second.pcd", "sub/c"}));
   EXPECT_EQ(plan.items[1].picture, scratch_folder() / "oblique.png");
@@ -96,7 +96,7 @@ TEST(ReportPlan, ScenesOfGrasp) {
   put("scenes.json", libmap::to_json(manifest));
   for (const char* name : {"P10.ply", "P2.ply", "other.ply", "locations"})
     put(std::string("scenes/") + name, "");
-  const ReportPlan plan = libmap::plan_report(scratch_folder());
+  const PlannedSection plan = libmap::plan_report(scratch_folder());
   const auto& items = plan.sections.at(0).items;
   ASSERT_EQ(items.size(), 2U);
   EXPECT_EQ(items[0].kind, libmap::ItemKind::scene);
@@ -111,11 +111,11 @@ TEST(ReportPlan, OfTheCurrentFolder) {
   put("run/b/c.txt", "");
   const fs::path before = fs::current_path();
   fs::current_path(scratch_folder() / "run");
-  const ReportPlan here = libmap::plan_report(".");
-  const ReportPlan there = libmap::plan_report("../run/");
+  const PlannedSection here = libmap::plan_report(".");
+  const PlannedSection there = libmap::plan_report("../run/");
   fs::current_path(before);
-  EXPECT_EQ(here.title, "Run");
-  EXPECT_EQ(there.title, "Run");
+  EXPECT_EQ(here.heading, "Run");
+  EXPECT_EQ(there.heading, "Run");
   EXPECT_EQ(here.items.at(0).files, std::vector<fs::path>{"./a.csv"});
   EXPECT_EQ(there.items.at(0).files, std::vector<fs::path>{"../run/a.csv"});
   EXPECT_EQ(here.sections.at(0).items.at(0).files, std::vector<fs::path>{"./b/c.txt"});

@@ -51,7 +51,7 @@ TEST(PrepareLayer, LeavesOutWhatIsNotFinite) {
   cloud.colors = {{1, 1, 1}, {2, 2, 2}, {3, 3, 3}, {4, 4, 4}};
   SceneLayer layer;
   layer.shape = cloud;
-  const PreparedLayer prepared = prepare_layer(layer, Pose::Identity());
+  const PreparedLayer prepared = prepare_layers(layer, Pose::Identity()).front();
   ASSERT_EQ(prepared.positions.size(), 2U);
   EXPECT_EQ(prepared.colors[1], (Color{4, 4, 4}));
 
@@ -60,13 +60,13 @@ TEST(PrepareLayer, LeavesOutWhatIsNotFinite) {
   mesh.triangles = {{0, 1, 3}, {0, 1, 2}};
   mesh.face_fields = {{.name = "score", .type = ScalarType::float32, .values = {0.1, 0.95}}};
   layer.shape = mesh;
-  const PreparedLayer faces = prepare_layer(layer, Pose::Identity());
+  const PreparedLayer faces = prepare_layers(layer, Pose::Identity()).front();
   ASSERT_EQ(faces.triangles.size(), 1U);
   ASSERT_EQ(faces.positions.size(), 3U);
   EXPECT_EQ(faces.colors[0], score_color(0.95));
   mesh.face_fields.clear();
   layer.shape = mesh;
-  EXPECT_EQ(prepare_layer(layer, Pose::Identity()).positions.size(), 3U)
+  EXPECT_EQ(prepare_layers(layer, Pose::Identity()).front().positions.size(), 3U)
       << "a vertex of no triangle is not drawn";
 }
 
@@ -79,7 +79,7 @@ TEST(PrepareLayer, ColorsInTheTerrainFrame) {
   layer.shape = cloud;
   layer.coloring.zero_plane_m = 0.0;
   const Pose upside_down = make_pose_from_rpy({0, 0, 1}, {180, 0, 0});
-  const PreparedLayer prepared = prepare_layer(layer, upside_down);
+  const PreparedLayer prepared = prepare_layers(layer, upside_down).front();
   EXPECT_NEAR(prepared.positions[0].z(), 6.0, 1e-12);
   EXPECT_EQ(prepared.colors[0], score_color(1.0));
   EXPECT_EQ(prepared.colors[1], below_plane_color);
@@ -94,7 +94,7 @@ TEST(TrianglesOf, CubesShowOneSideFromAboveAndThreeFromAslant) {
   layer.coloring.mode = ColorMode::own;
   layer.point_shape = PointShape::cube;
   layer.point_size_m = 2.0;
-  const PreparedLayer prepared = prepare_layer(layer, Pose::Identity());
+  const PreparedLayer prepared = prepare_layers(layer, Pose::Identity()).front();
   const PixelRect plot{0, 0, 100, 100};
   const ColoredTriangles top = triangles_of(
       prepared, fit_camera(Viewpoint::top, {}, prepared.positions, 1.0, plot), {0, 0, 0});
@@ -114,7 +114,7 @@ TEST(TrianglesOf, FarPointsStayVisible) {
   cloud.positions = {{0, 0, 0}, {1000, 0, 0}};
   layer.shape = cloud;
   layer.point_size_m = 0.001;
-  const PreparedLayer prepared = prepare_layer(layer, Pose::Identity());
+  const PreparedLayer prepared = prepare_layers(layer, Pose::Identity()).front();
   const SceneCamera camera =
       fit_camera(Viewpoint::top, {}, prepared.positions, 0.0, {0, 0, 100, 100});
   const ColoredTriangles triangles = triangles_of(prepared, camera, {0, 0, 0});
@@ -130,7 +130,7 @@ TEST(TrianglesOf, CountsFromTheGivenOrigin) {
   cloud.positions = {far, far + Eigen::Vector3d(0.001, 0, 0)};
   layer.shape = cloud;
   layer.point_size_m = 0.001;
-  const PreparedLayer prepared = prepare_layer(layer, Pose::Identity());
+  const PreparedLayer prepared = prepare_layers(layer, Pose::Identity()).front();
   const SceneCamera camera =
       fit_camera(Viewpoint::top, {}, prepared.positions, 0.001, {0, 0, 100, 100});
   const ColoredTriangles triangles = triangles_of(prepared, camera, far);
