@@ -184,6 +184,9 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
       throw libmap::Error(warning).in_file(path);
     run.warn("{}: {}", path, warning);
   }
+  if (scan->graph().nodes.empty())
+    throw libmap::Error("the scan has no nodes: nothing was recorded, or recording was interrupted",
+                        {.file = path});
   return camera ? libmap::with_calibration(std::move(scan), *camera) : std::move(scan);
 }
 
