@@ -34,7 +34,7 @@ constexpr double max_grid_cells = voxel_cell_limit;
 constexpr double min_width = 1e-4;
 
 // No surface passes between normals whose neighbors face opposite sides more often.
-constexpr double max_mixed_sides = 0.25;
+constexpr double max_mixed_sides = 0.4;
 
 constexpr std::size_t value_neighbors = 4;
 // Cells beyond which only the nearest point has a say in a vertex's values.

@@ -248,30 +248,6 @@ TEST(GroundPlane, LevelIsTheLeastRotation) {
   EXPECT_NEAR((over * Vector3d(7, 8, -3)).z(), 2, 1e-12);
 }
 
-TEST(GroundPlane, UpOfNormals) {
-  using Normals = std::vector<Eigen::Vector3f>;
-  const Vector3d z = Vector3d::UnitZ();
-  EXPECT_EQ(up_of_normals({}), z);
-  EXPECT_EQ(up_of_normals(Normals(5, Eigen::Vector3f::Zero())), z);
-  EXPECT_EQ(up_of_normals(Normals(5, Eigen::Vector3f(0.1F, 0, 3))), z) << "z will do";
-  const Eigen::Vector3f forward(0, 0.1F, -1);
-  EXPECT_LT(degrees_between(up_of_normals(Normals(5, forward)), forward.cast<double>()), 1e-4);
-  // A floor in a room: its walls cancel each other but one, which is as large as the floor.
-  Normals room(1000, {1, 0, 0});
-  room.insert(room.end(), 1000, {0, 0, 1});
-  room.insert(room.end(), 1000, {0, 0, -1});
-  room.insert(room.end(), 900, {0, 1, 0});
-  EXPECT_LT(degrees_between(up_of_normals(room), {1, 0, 0}), 1);
-  Normals everywhere;
-  for (int n = 0; n < 999; ++n) {
-    const double angle = n * 2 * std::numbers::pi / 999;
-    everywhere.emplace_back(static_cast<float>(std::cos(angle)),
-                            static_cast<float>(std::sin(angle)), 0.1F);
-  }
-  EXPECT_EQ(up_of_normals(everywhere), z);
-  EXPECT_EQ(up_of_normals({{std::numeric_limits<float>::quiet_NaN(), 0, 0}}), z);
-}
-
 TEST(GroundPlane, WhatCannotBe) {
   EXPECT_EQ(error_of([] { find_ground_plane({}); }).context().value, "0");
   EXPECT_EQ(error_of([&] { find_ground_plane({{0, 0, 0}, {1, 0, 0}}); }).context().value, "2");
