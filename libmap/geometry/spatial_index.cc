@@ -198,7 +198,7 @@ std::vector<Eigen::Vector3d> merge_near(const std::vector<Eigen::Vector3d>& poin
 
 }  // namespace
 
-PointSpacing point_spacing(const std::vector<Eigen::Vector3d>& points) {
+CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t most = 10000;
   if (points.size() < 2) return {};
   const PointTree tree(points);
@@ -211,7 +211,7 @@ PointSpacing point_spacing(const std::vector<Eigen::Vector3d>& points) {
   });
   std::erase(squares, 0.0);
   if (squares.empty()) return {};
-  PointSpacing spacing{std::sqrt(median(std::move(squares))), area_spacing(tree, points)};
+  CloudSpacing spacing{std::sqrt(median(std::move(squares))), area_spacing(tree, points)};
   if (spacing.nearest_m >= min_nearest_share * spacing.by_area_m) return spacing;
   const std::vector<Eigen::Vector3d> merged = merge_near(points, merged_share * spacing.by_area_m);
   if (merged.size() > area_neighbors) spacing.nearest_m = area_spacing(PointTree(merged), merged);

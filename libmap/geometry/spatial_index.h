@@ -52,11 +52,11 @@ class PointTree {
 // no two places.
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
 
-struct PointSpacing {
+struct CloudSpacing {
   double nearest_m = 0.0;  // median_spacing
   double by_area_m = 0.0;  // of a square grid with as many points per area
 };
-PointSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
+CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 
 // Points in a hashed grid of cubes. nanoflann's tree that grows takes 10 times as long for 74,000
 // samples. Cells share slots where their hashes meet, so that a search may see points that lie

@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <string>
 #include <optional>
+#include <string>
 #include <unordered_map>
 #include <unordered_set>
 #include <vector>
@@ -53,7 +53,8 @@ class ObjReader {
   static Numbers numbers(const TextLine& line, std::size_t least) {
     Numbers values = Numbers::Zero();
     if (line.words.size() <= least)
-      throw Error("too few numbers", {.field = name_of(line), .bound = ">= " + std::to_string(least)});
+      throw Error("too few numbers",
+                  {.field = name_of(line), .bound = ">= " + std::to_string(least)});
     for (std::size_t n = 1; n < std::min<std::size_t>(line.words.size(), 8); ++n) {
       const std::optional<double> value = parse_double(line.words[n]);
       if (!value)
@@ -123,8 +124,7 @@ class ObjReader {
   }
 
   void add_face(const TextLine& line) {
-    if (line.words.size() < 4)
-      throw Error("a face needs three corners", {.field = name_of(line)});
+    if (line.words.size() < 4) throw Error("a face needs three corners", {.field = name_of(line)});
     Triangle triangle{};
     for (std::size_t n = 1; n < line.words.size(); ++n) {
       triangle[1] = triangle[2];
@@ -173,8 +173,8 @@ class ObjReader {
   std::vector<Color> colors_;
   std::vector<Eigen::Vector3f> normals_;
   std::size_t texture_coordinates_ = 0;
-  std::vector<std::uint32_t> normal_of_;  // of each position, its first normal
-  std::vector<Eigen::Vector3f> mixed_;    // of each position, the sum of its normals
+  std::vector<std::uint32_t> normal_of_;           // of each position, its first normal
+  std::vector<Eigen::Vector3f> mixed_;             // of each position, the sum of its normals
   std::unordered_set<std::uint32_t> has_several_;  // positions with different normals
   std::vector<Triangle> triangles_;
   bool has_normals_ = true;

@@ -237,7 +237,7 @@ void Reconstruction::choose_cell_size() {
   const Eigen::Vector3d spread = symmetric_eigen(moments).values;
   if (!(spread[1] > min_width * min_width * spread[2]))
     throw too_thin("the points lie on a line: there is no surface through them");
-  const PointSpacing spacing = point_spacing(places);
+  const CloudSpacing spacing = point_spacing(places);
   result_.spacing_m = spacing.nearest_m;
   if (!(options_.cell_size_m > 0.0)) result_.cell_size_m = result_.spacing_m;
   area_m2_ = static_cast<double>(places.size()) * spacing.by_area_m * spacing.by_area_m;

@@ -117,8 +117,8 @@ TEST_F(ScoreBadInput, Grippers) {
                         {"gripper.yaml", "finger_lenght_mm", "did you mean 'finger_length_mm'"}));
   EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "# finger_length_mm: 40"),
                         {"gripper.yaml", "finger_length_mm", "missing"}));
-  EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 90"),
-                        {"gripper.yaml", "opening_angle_deg is 90", "< 90"}));
+  EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 95"),
+                        {"gripper.yaml", "opening_angle_deg is 95", "<= 90"}));
   EXPECT_TRUE(bad_input(with_gripper("name: SCAR-E", "name: SCAR-E\nname: other"),
                         {"gripper.yaml", "name", "is a duplicate"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", "scare"}),
