@@ -58,7 +58,6 @@ set(graspmap_public_headers
   libmap/fusion/surface_refinement.h
   libmap/fusion/surface_voxels.h
   libmap/fusion/tile_mask.h
-  libmap/geometry/normal_sides.h
   libmap/geometry/voxel_key.h
   libmap/io/cloud_io.h
   libmap/io/geometry_file.h

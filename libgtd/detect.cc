@@ -7,6 +7,7 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
 #include "libmap/core/stage_timer.h"
+#include "libmap/geometry/normal_sides.h"
 
 namespace libgtd {
 
@@ -230,11 +231,7 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
       "up_source",
       result.plane ? std::optional(std::string(to_text(result.plane->up_source))) : std::nullopt,
       "what determined which side of the plane is up");
-  table.add("up_normals_share",
-            result.plane && !result.plane->normals.empty()
-                ? std::optional(result.plane->normals.along /
-                                (result.plane->normals.along + result.plane->normals.against))
-                : std::nullopt,
+  table.add("up_normals_share", result.plane ? result.plane->normals_up : std::nullopt,
             "share of the normals that point up");
   table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
             "points after downsampling");

@@ -58,7 +58,7 @@ void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& p
     terrain_from_input = frame.plane->terrain_from_input;
     add("plane_rmse_m", frame.plane->rmse_m);
     add("up_source", std::string(to_text(frame.plane->up_source)));
-    if (!frame.plane->normals.empty()) add(opposing_normals, frame.plane->opposing_normals);
+    if (frame.plane->normals_up) add(opposing_normals, frame.plane->opposing_normals);
   }
   manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
   add("mask_side_voxels", std::int64_t{tiling.mask.side});

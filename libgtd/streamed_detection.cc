@@ -7,6 +7,7 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/normal_sides.h"
 
 namespace libgtd {
 
@@ -185,6 +186,10 @@ class StreamedDetection {
 };
 
 }  // namespace
+
+bool TerrainFrame::drops_normals() const {
+  return plane && plane->opposing_normals > libmap::max_opposing_share;
+}
 
 void require_streamable(const DetectionOptions& options) {
   const Method method = options.scenario.method;

@@ -25,9 +25,7 @@ struct TerrainFrame {
   Voxel max;
 
   // Normals with random sides are no outside of the surface.
-  bool drops_normals() const {
-    return plane && plane->opposing_normals > libmap::max_opposing_share;
-  }
+  bool drops_normals() const;
 };
 
 // Throws Error naming the option that needs the whole cloud in memory: `method` thesis or envelope

@@ -7,6 +7,7 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/cloud_pieces.h"
 #include "libmap/raster/dem_reader.h"
@@ -41,10 +42,11 @@ void report_plane(const libgtd::RegressionPlane& plane, const std::string& terra
   if (plane.up_source == libgtd::UpSource::direction) return;
   const bool by_normals = plane.up_source == libgtd::UpSource::normals;
   run.say("up from the {}{}", name_of(plane.up_source),
-          by_normals ? fmt::format(": {:.1f} % agree", 100.0 * plane.normals.share()) : "");
-  if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && !plane.normals.empty())
+          by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
+  if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
     run.warn("{}: {}: up is taken from the {}; --up X,Y,Z sets it", terrain,
-             libmap::disagreement_text(plane.normals.share(), plane.opposing_normals),
+             libmap::disagreement_text(std::max(*plane.normals_up, 1.0 - *plane.normals_up),
+                                       plane.opposing_normals),
              name_of(plane.up_source));
   // The viewpoint and normals that agree with z saw the outside; the relief agrees with itself.
   const bool doubtful = by_normals ? plane.terrain_from_input.linear()(2, 2) < 0.0

@@ -14,6 +14,7 @@
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/geometry/plane_fit.h"
 #include "libmap/geometry/robust.h"
 #include "libmap/geometry/symmetric_eigen.h"
@@ -425,7 +426,8 @@ RegressionPlane fit_regression_plane(const PointStream& points,
     fit.skewness = -fit.skewness;
     std::swap(fit.normals.along, fit.normals.against);
   }
-  plane.normals = fit.normals;
+  if (!fit.normals.empty())
+    plane.normals_up = fit.normals.along / (fit.normals.along + fit.normals.against);
   plane.opposing_normals = facts.opposing_normals;
   plane.rmse_m = fit.rmse;
   plane.relief_skewness = fit.skewness;

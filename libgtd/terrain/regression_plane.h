@@ -10,7 +10,6 @@
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/point_stream.h"
 #include "libmap/core/pose.h"
-#include "libmap/geometry/normal_sides.h"
 
 namespace libgtd {
 
@@ -43,11 +42,11 @@ struct RegressionPlane {
   libmap::Pose terrain_from_input = libmap::Pose::Identity();  // p' = R^T (p - c), R = [x, -y, n]
   double rmse_m = 0;                                           // of the points' heights
   UpSource up_source = UpSource::frame_z;
-  double relief_skewness = 0;   // of the heights over the plane; negative hints at upside down
-  libmap::NormalVotes normals;  // along: up
-  double opposing_normals = 0;  // share of neighboring normals (normal_sides.h)
-  std::size_t points = 0;       // finite points that were fitted
-  std::size_t skipped = 0;      // points with NaN or infinite coordinates
+  double relief_skewness = 0;        // of the heights over the plane; negative hints at upside down
+  std::optional<double> normals_up;  // share of the normals that point up, weighted by |cosine|
+  double opposing_normals = 0;       // share of neighbors on opposite sides (normal_sides.h)
+  std::size_t points = 0;            // finite points that were fitted
+  std::size_t skipped = 0;           // points with NaN or infinite coordinates
 };
 
 // Fits by the smallest eigenvector of the points' covariance (eq. 2-13..2-15). The origin is the

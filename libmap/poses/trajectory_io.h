@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "libmap/core/pose_graph.h"
-#include "libmap/poses/trajectory_text.h"
 
 namespace libmap {
 

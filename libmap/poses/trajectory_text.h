@@ -34,11 +34,6 @@ Trajectory parse_open3d(std::string_view text, const std::string& file);
 // Ground truth of EuRoC MAV: "timestamp [ns], x, y, z, qw, qx, qy, qz, ..."; of the body.
 Trajectory parse_euroc(std::string_view text, const std::string& file);
 
-// Where an image was taken.
-struct ImagePose {
-  std::string image{};                        // its name in the file
-  Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
-};
 // transforms.json of nerfstudio (instant-ngp, Blender): cameras with y up and z backward.
 std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string& file);
 
