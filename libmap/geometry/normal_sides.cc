@@ -69,8 +69,9 @@ double opposing_share(const std::vector<Eigen::Vector3d>& positions,
 
 std::string disagreement_text(double share, double opposing) {
   const auto percent = [](double value) { return to_fixed_text(100.0 * value, 1) + " %"; };
-  return "its normals do not agree on a side: " + percent(share) + " are on the larger one, " +
-         percent(opposing) + " of neighbors face opposite sides";
+  return "its normals do not agree on a side: " + percent(share) + " are on the larger one (" +
+         percent(min_agreeing_share) + " decide), " + percent(opposing) +
+         " of neighbors face opposite sides";
 }
 
 UpOfNormals up_of_normals(const std::vector<Eigen::Vector3d>& positions,

@@ -231,8 +231,18 @@ std::string remedy(const Points& points, const GroundPlaneOptions& options,
     if (!find_candidates(drawn_points(points, options.seed), rougher, up, share).empty())
       return "natural terrain needs --plane-tolerance " + to_text(rougher.tolerance_m);
   }
-  return "--level none keeps the frame's z (with --box or --polygon), --max-tilt and --up allow "
-         "steeper ground";
+  // Ground that leans more, or a frame whose z is not up.
+  const Eigen::Vector3d normal =
+      plane_of(weighted_spread(points, points.front(), points_per_chunk,
+                               [](const Eigen::Vector3d&) { return 1.0; }),
+               up)
+          .normal;
+  if (!find_candidates(drawn_points(points, options.seed), options, normal, share).empty()) {
+    const auto text = [](double value) { return to_fixed_text(value, 2); };
+    return "--up " + text(normal.x()) + "," + text(normal.y()) + "," + text(normal.z()) +
+           " (or its opposite) is the normal of the points";
+  }
+  return "--level none with --box or --polygon keeps the frame's z";
 }
 
 }  // namespace

@@ -248,6 +248,24 @@ TEST(GroundPlane, LevelIsTheLeastRotation) {
   EXPECT_NEAR((over * Vector3d(7, 8, -3)).z(), 2, 1e-12);
 }
 
+// Natural terrain: the error names a tolerance, and with it there is a plane.
+TEST(GroundPlane, RoughTerrainIsToldItsTolerance) {
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 100; ++i)
+    for (int j = 0; j < 100; ++j)
+      points.emplace_back(0.05 * i, 0.05 * j, graspmap_test::uniform(-1.5, 1.5));
+  const std::string option = "--plane-tolerance ";
+  const std::string reason = error_of([&] { find_ground_plane(points); }).reason();
+  const std::size_t at = reason.find(option);
+  ASSERT_NE(at, std::string::npos) << reason;
+  GroundPlaneOptions options;
+  options.tolerance_m = std::stod(reason.substr(at + option.size()));
+  EXPECT_LT(find_ground_plane(points, options).tilt_deg, 40.0);
+  // A wall, for which z is no up.
+  for (Vector3d& point : points) point = Vector3d(0.01 * point.z(), point.y(), point.x());
+  EXPECT_NE(error_of([&] { find_ground_plane(points); }).reason().find("--up "), std::string::npos);
+}
+
 TEST(GroundPlane, WhatCannotBe) {
   EXPECT_EQ(error_of([] { find_ground_plane({}); }).context().value, "0");
   EXPECT_EQ(error_of([&] { find_ground_plane({{0, 0, 0}, {1, 0, 0}}); }).context().value, "2");
