@@ -7,6 +7,7 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
 #include "libmap/core/stage_timer.h"
+#include "libmap/geometry/normal_sides.h"
 
 namespace libgtd {
 
@@ -62,9 +63,10 @@ DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
   return {.tile_voxels = tile_voxels(scenario),
           .downsampling_leaf_m =
               thesis && fits_plane ? std::optional(scenario.voxel_size_m) : std::nullopt,
-          .plane = fits_plane ? std::optional(RegressionPlaneOptions{plane_method(scenario.method),
-                                                                     options.up})
-                              : std::nullopt,
+          .plane = fits_plane
+                       ? std::optional(RegressionPlaneOptions{plane_method(scenario.method),
+                                                              options.up, options.max_tilt_deg})
+                       : std::nullopt,
           .interpolation = interpolation_of(scenario),
           .voxel_size_m = scenario.voxel_size_m,
           .thesis_lattice = thesis,
@@ -79,11 +81,15 @@ DetectionStages stages_of(const DetectionOptions& options, GripperMask mask) {
 // The terrain in the terrain frame.
 PointCloud prepare_terrain(const PointCloud& input, const DetectionStages& stages,
                            DetectionResult& result) {
-  if (!stages.plane) {
-    // No use is made of it, but points in one place or on a line are no terrain in any frame.
-    fit_regression_plane(input, {.method = PlaneMethod::corrected});
-    return input;
-  }
+  // Normals with random sides are no outside of the surface.
+  const auto with_sound_normals = [](PointCloud cloud, const RegressionPlane& plane) {
+    if (plane.opposing_normals > libmap::max_opposing_share) cloud.normals.clear();
+    return cloud;
+  };
+  if (!stages.plane)
+    // Points in one place or on a line are no terrain in any frame.
+    return with_sound_normals(input,
+                              fit_regression_plane(input, {.method = PlaneMethod::corrected}));
   PointCloud cloud = input;
   if (stages.downsampling_leaf_m) {
     cloud = libmap::timed(result.timings_s, "downsampling",
@@ -93,7 +99,8 @@ PointCloud prepare_terrain(const PointCloud& input, const DetectionStages& stage
   return libmap::timed(result.timings_s, "regression plane", [&] {
     result.plane = fit_regression_plane(cloud, *stages.plane);
     result.map.terrain_from_input = result.plane->terrain_from_input;
-    return transform_to_terrain(cloud, *result.plane, stages.plane->method);
+    return with_sound_normals(transform_to_terrain(cloud, *result.plane, stages.plane->method),
+                              *result.plane);
   });
 }
 
@@ -172,6 +179,8 @@ DetectionResult detect(const PointCloud& terrain, const DetectionOptions& option
                                  : voxelize(surface.positions, stages.voxel_size_m);
   });
   result.occupied_voxels = grid.voxels.size();
+  result.lone_voxels = count_lone(grid.voxels);
+  require_dense(result.lone_voxels, result.occupied_voxels, stages.voxel_size_m, surface.positions);
   result.grid_min = grid.min;
   result.grid_max = grid.max;
   result.map.lattice = grid.lattice;
@@ -215,6 +224,8 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
       "up_source",
       result.plane ? std::optional(std::string(to_text(result.plane->up_source))) : std::nullopt,
       "what determined which side of the plane is up");
+  table.add("up_normals_share", result.plane ? result.plane->normals_up : std::nullopt,
+            "share of the normals that point up");
   table.add("downsampled_points", only_if(result.downsampled_points > 0, result.downsampled_points),
             "points after downsampling");
   table.add("interpolated_points", only_if(has_grid, result.interpolated_points),
@@ -222,6 +233,7 @@ void describe(libmap::ResultTable& table, const DetectionResult& result) {
   table.add("interpolation_grid_m", only_if(has_grid, result.grid_spacing_m),
             "spacing of the grid of interpolation");
   table.add("occupied_voxels", result.occupied_voxels, "voxels with points");
+  table.add("lone_voxels", result.lone_voxels, "occupied voxels without a neighbor");
   table.add("mask_side_voxels", result.mask.side, "side of the gripper mask");
   table.add("mask_layers", result.mask.layers, "layers of the gripper mask");
   table.add("tiles", result.tiles, "tiles that were scored");

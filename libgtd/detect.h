@@ -28,6 +28,7 @@ struct DetectionOptions {
   std::optional<Gripper> gripper;  // default: the one that the scenario names
   PlaneSource plane = PlaneSource::fit;
   std::optional<Eigen::Vector3d> up;  // in the cloud's frame: which side of the plane is outside
+  double max_tilt_deg = 90.0;         // between `up` and the plane's normal
   libmap::TileShare share;            // score only these tiles
 };
 // The keys of the scenario, and `plane`.
@@ -42,6 +43,7 @@ struct DetectionResult {
   std::size_t interpolated_points = 0;
   double grid_spacing_m = 0.0;  // of the interpolation
   std::size_t occupied_voxels = 0;
+  std::size_t lone_voxels = 0;  // without an occupied one among their 26 neighbors
   Voxel grid_min;
   Voxel grid_max;
   std::size_t tiles = 0;             // that were scored
@@ -61,7 +63,8 @@ void describe(libmap::ResultTable& table, const DetectionResult& result);
 // find_gripper.
 Gripper gripper_of(const DetectionOptions& options);
 
-// Throws Error for an empty cloud, options out of their bounds, and what the steps throw.
+// Throws Error for an empty cloud, options out of their bounds, points too far apart for the voxels
+// (voxel_grid.h), and what the steps throw.
 DetectionResult detect(const libmap::PointCloud& terrain, const DetectionOptions& options,
                        libmap::Progress& progress = libmap::no_progress());
 

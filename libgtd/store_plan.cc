@@ -9,6 +9,8 @@ namespace libgtd {
 
 namespace {
 
+constexpr const char* opposing_normals = "opposing_normals";
+
 // The plan's key fits, but something else was changed.
 libmap::Error not_of_this_terrain(const std::filesystem::path& plan_file, const char* field) {
   return libmap::Error("is not of this terrain and these parameters: --force starts again",
@@ -54,6 +56,7 @@ void set_frame(const TerrainFrame& frame, const StoreTiling& tiling, TilePlan& p
     terrain_from_input = frame.plane->terrain_from_input;
     add("plane_rmse_m", frame.plane->rmse_m);
     add("up_source", std::string(to_text(frame.plane->up_source)));
+    if (frame.plane->normals_up) add(opposing_normals, frame.plane->opposing_normals);
   }
   manifest.transforms.emplace_back("terrain_from_input", terrain_from_input);
   add("mask_side_voxels", std::int64_t{tiling.mask.side});
@@ -72,6 +75,8 @@ TerrainFrame frame_of(const TilePlan& plan, const DetectionOptions& detection,
   frame.plane = RegressionPlane{};
   frame.plane->centroid = plan.centroid;
   frame.plane->terrain_from_input = plan.index.terrain_from_input();
+  if (const auto* share = plan.index.manifest.find_result(opposing_normals))
+    frame.plane->opposing_normals = std::get<double>(*share);
   return frame;
 }
 

@@ -7,6 +7,7 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/normal_sides.h"
 
 namespace libgtd {
 
@@ -44,6 +45,25 @@ class StreamedDetection {
         mask_(make_gripper_mask(gripper_of(options), mask_options(scenario_))),
         tile_voxels_(tile_voxels(scenario_)),
         halo_(halo_voxels(mask_, scenario_)) {}
+
+  // As libgtd::require_dense, for tiles spread over the wanted ones.
+  void require_dense(const std::vector<TileNumber>& wanted) const {
+    constexpr std::size_t max_tiles = 256, max_points = 1'000'000;
+    std::size_t lone = 0, voxels = 0;
+    std::vector<Eigen::Vector3d> points;
+    const std::size_t step = wanted.size() / max_tiles + 1;
+    for (std::size_t n = 0; n < wanted.size() && points.size() < max_points; n += step) {
+      const PointsRectangle places = points_for(columns_of_tile(wanted[n]), frame_, 0);
+      const std::size_t count = points_.count_in(places.low, places.high);
+      if (count == 0 || count > max_points_) continue;
+      const PointCloud cloud = points_.points_in(places.low, places.high);
+      const VoxelGrid grid = voxelize(cloud.positions, scenario_.voxel_size_m);
+      lone += count_lone(grid.voxels);
+      voxels += grid.voxels.size();
+      points.insert(points.end(), cloud.positions.begin(), cloud.positions.end());
+    }
+    libgtd::require_dense(lone, voxels, scenario_.voxel_size_m, points);
+  }
 
   // Halves a run of tiles until each part's points are few enough.
   void run(std::vector<TileNumber> tiles,
@@ -166,6 +186,10 @@ class StreamedDetection {
 
 }  // namespace
 
+bool TerrainFrame::drops_normals() const {
+  return plane && plane->opposing_normals > libmap::max_opposing_share;
+}
+
 void require_streamable(const DetectionOptions& options) {
   const Method method = options.scenario.method;
   if (follows_thesis(method))
@@ -183,8 +207,9 @@ void require_streamable(const DetectionOptions& options) {
 TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOptions& options) {
   TerrainFrame frame;
   if (options.plane == PlaneSource::fit)
-    frame.plane = fit_regression_plane(
-        points, {.method = plane_method(options.scenario.method), .up = options.up});
+    frame.plane = fit_regression_plane(points, {.method = plane_method(options.scenario.method),
+                                                .up = options.up,
+                                                .max_tilt_deg = options.max_tilt_deg});
   std::optional<libmap::Bounds3d> box;
   const auto positions = libmap::PointStream::Need::positions;
   points.for_each_block(positions, [&](const PointCloud& block) {
@@ -203,7 +228,10 @@ TerrainFrame frame_terrain(const libmap::PointStream& points, const DetectionOpt
 }
 
 PointCloud to_terrain(const PointCloud& block, const TerrainFrame& frame) {
-  return frame.plane ? transform_to_terrain(block, *frame.plane, PlaneMethod::corrected) : block;
+  if (!frame.plane) return block;
+  PointCloud terrain = transform_to_terrain(block, *frame.plane, PlaneMethod::corrected);
+  if (frame.drops_normals()) terrain.normals.clear();
+  return terrain;
 }
 
 std::vector<TileNumber> tiles_of(const TerrainFrame& frame, int tile_voxels,
@@ -245,6 +273,7 @@ void detect_streamed(const TerrainFrame& frame, const libmap::PointTileStore& po
   require_streamable(options);
   if (wanted.empty()) return;
   StreamedDetection detection(frame, points, options, streaming);
+  detection.require_dense(wanted);
   progress.begin("tiles", wanted.size());
   detection.run(wanted, visit, progress);
   progress.end();

@@ -23,6 +23,9 @@ struct TerrainFrame {
   VoxelLattice lattice;
   Voxel min;  // box of the terrain's voxels
   Voxel max;
+
+  // Normals with random sides are no outside of the surface.
+  bool drops_normals() const;
 };
 
 // Throws Error naming the option that needs the whole cloud in memory: `method` thesis or envelope

@@ -106,7 +106,7 @@ libmap::GroundPlane fit_ground(const EdgeData& shape, libmap::GroundPlaneOptions
                        libmap::sample_triangles(
                            *shape.mesh, samples / libmap::surface_area(*shape.mesh), options.seed))
                  : shape.cloud;
-  options.up = libmap::up_of_normals(cloud.normals);
+  options.up = libmap::up_of_normals(cloud.positions, cloud.normals).direction;
   return libmap::find_ground_plane(cloud.positions, options);
 }
 

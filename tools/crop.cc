@@ -129,7 +129,7 @@ std::string matrix_text(const libmap::Pose& pose) {
   return text;
 }
 
-void tell_ground(const libmap::CropReport& report, bool up_by_normals, Run& run) {
+void tell_ground(const std::string& input, const libmap::CropReport& report, Run& run) {
   if (!report.ground) return;
   const libmap::GroundPlane& ground = *report.ground;
   const double tilt =
@@ -140,7 +140,13 @@ void tell_ground(const libmap::CropReport& report, bool up_by_normals, Run& run)
                    {"up", report.up}});
   run.say("ground: {:.2f} deg from the map's z, {:.1f} mm RMSE over {:.1f} % of it", tilt,
           1e3 * ground.rmse_m, 1e2 * ground.share);
-  if (tilt > 45.0 && up_by_normals)
+  if (!report.up_of_normals) return;
+  const libmap::UpOfNormals& by_normals = *report.up_of_normals;
+  if (by_normals.share > 0.0) run.add_results({{"up_normals_share", by_normals.share}});
+  if (by_normals.share > 0.0 && !by_normals.decided)
+    run.warn("{}: {}: up is the map's z; --up X,Y,Z sets it", input,
+             libmap::disagreement_text(by_normals.share, by_normals.opposing));
+  else if (tilt > 45.0)
     run.warn("the map's z lies {:.0f} deg from up as its normals say; --up 0,0,1 takes the map's z",
              tilt);
 }
@@ -191,7 +197,7 @@ void tell(const CropCommandOptions& options, const libmap::CropReport& report,
   carry_truth_transform(options.input, run);
   carry_georeference(options.input, run);
   run.manifest().frame = "site";
-  tell_ground(report, !options.crop.up, run);
+  tell_ground(options.input, report, run);
   tell_site(report, bounds, run);
 }
 

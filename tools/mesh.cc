@@ -2,7 +2,9 @@
 #include <iostream>
 #include <nlohmann/json.hpp>
 
+#include "libmap/core/memory_budget.h"
 #include "libmap/fusion/normals.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/mesh_io.h"
 #include "libmap/io/piece_index.h"
@@ -43,7 +45,8 @@ void bind(libmap::ParameterTable& table, MeshOptions& options) {
             {{"auto", NormalSource::automatic},
              {"cloud", NormalSource::cloud},
              {"estimate", NormalSource::estimate}},
-            "auto: the cloud's, estimated if it has none; cloud: an error if it has none; "
+            "auto: the cloud's, estimated if it has none, oriented if neighbors face opposite "
+            "sides; cloud: as stored, an error if it has none; "
             "estimate: always estimated");
   libmap::bind(table, options.estimation);
   libmap::bind(table, options.surface.reconstruction);
@@ -63,12 +66,26 @@ libmap::PointCloud read_points(const std::string& input, Run& run) {
   return std::move(read.cloud);
 }
 
+// Chooses sides for normals that have none, as Open3D, PCL and a PCA leave them.
+void orient_if_mixed(const MeshOptions& options, libmap::PointCloud& cloud, Run& run) {
+  const double share = libmap::opposing_share(cloud.positions, cloud.normals);
+  run.add_results({{"opposing_normals", share}});
+  if (share <= libmap::max_opposing_share || options.normals == NormalSource::cloud) return;
+  const libmap::NormalEstimationResult oriented =
+      run.timed("normals", [&] { return libmap::orient_normals(cloud); });
+  cloud.normals = oriented.normals;
+  const std::string way(to_text(oriented.orientation));
+  run.warn("{}: {:.1f} % of neighboring normals face opposite sides: their sides are chosen by {}",
+           options.cloud, 100.0 * share, way);
+  run.add_results({{"normals_oriented_by", way}});
+}
+
 void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run& run) {
   const bool has_any = std::any_of(
       cloud.normals.begin(), cloud.normals.end(),
       [](const Eigen::Vector3f& normal) { return normal.allFinite() && !normal.isZero(0.0F); });
   if (options.normals != NormalSource::estimate && cloud.has_normals()) {
-    if (has_any) return;
+    if (has_any) return orient_if_mixed(options, cloud, run);
     throw libmap::Error(
         "none of the cloud's normals says a direction; --normals estimate makes others",
         {.file = options.cloud, .field = "normals", .value = "all zero or NaN"});
@@ -87,10 +104,21 @@ void prepare_normals(const MeshOptions& options, libmap::PointCloud& cloud, Run&
   run.add_results({{"normals_oriented_by", way}, {"normals_undefined", estimated.undefined}});
 }
 
+// Large work, before it begins.
+void announce(const libmap::SurfaceWork& work, Run& run) {
+  if (work.triangles < 2e6) return;
+  run.say("about {:.1f} million triangles: {:.1f} GB of memory, {:.0f} s on one thread",
+          1e-6 * work.triangles, 1e-9 * work.bytes, work.seconds);
+  if (work.bytes > static_cast<double>(libmap::machine_memory()))
+    run.warn(
+        "more than the machine's memory: a larger --cell-size or a folder of tiles takes less");
+}
+
 libmap::TriangleMesh reconstructed(const MeshOptions& options, const libmap::PointCloud& cloud,
                                    Run& run) {
   libmap::SurfaceReconstructionResult made =
-      libmap::reconstruct_surface(cloud, options.surface.reconstruction, run.progress());
+      libmap::reconstruct_surface(cloud, options.surface.reconstruction, run.progress(),
+                                  [&](const libmap::SurfaceWork& work) { announce(work, run); });
   if (made.dropped_points > 0)
     run.warn("{} of {} points have no normal and are left out", made.dropped_points, cloud.size());
   run.add_results({{"points", cloud.size()}});

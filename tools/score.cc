@@ -7,8 +7,10 @@
 #include "libgtd/tile_detection.h"
 #include "libmap/core/data_folder.h"
 #include "libmap/core/parallel.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/cloud_pieces.h"
+#include "libmap/raster/dem_reader.h"
 #include "tools/support/command_line.h"
 #include "tools/support/map_frame.h"
 #include "tools/support/map_tiles.h"
@@ -33,18 +35,45 @@ std::string_view name_of(libgtd::UpSource source) {
   return to_text(source);
 }
 
-// Reports what decided which side of the plane is up, unless it was given. Warns if that was the
-// frame's z axis and the relief contradicts it, as for a cloud in a camera's frame, whose z axis
-// points into the ground.
+// Reports what decided which side of the plane is up, unless it was given. Warns if the normals do
+// not agree, and if the relief contradicts the frame's z axis (as for a cloud in a camera's frame,
+// whose z axis points into the ground) or normals that face against it.
 void report_plane(const libgtd::RegressionPlane& plane, const std::string& terrain, Run& run) {
   if (plane.up_source == libgtd::UpSource::direction) return;
-  run.say("up from the {}", name_of(plane.up_source));
-  // Of the other sources, viewpoint and normals saw the outside, and the relief agrees with itself.
-  if (plane.up_source == libgtd::UpSource::frame_z && plane.relief_skewness < upside_down_skewness)
+  const bool by_normals = plane.up_source == libgtd::UpSource::normals;
+  run.say("up from the {}{}", name_of(plane.up_source),
+          by_normals ? fmt::format(": {:.1f} % agree", 100.0 * *plane.normals_up) : "");
+  if (!by_normals && plane.up_source != libgtd::UpSource::viewpoint && plane.normals_up)
+    run.warn("{}: {}: up is taken from the {}; --up X,Y,Z sets it", terrain,
+             libmap::disagreement_text(std::max(*plane.normals_up, 1.0 - *plane.normals_up),
+                                       plane.opposing_normals),
+             name_of(plane.up_source));
+  // The viewpoint and normals that agree with z saw the outside; the relief agrees with itself.
+  const bool doubtful = by_normals ? plane.terrain_from_input.linear()(2, 2) < 0.0
+                                   : plane.up_source == libgtd::UpSource::frame_z;
+  if (doubtful && plane.relief_skewness < upside_down_skewness)
     run.warn(
         "{}: its relief hangs below the plane: if this is upside down, give --up (--up=0,0,-1 for "
         "a cloud in a camera's frame)",
         terrain);
+}
+
+// Heights above a plane, or a folder of such pieces: z is up.
+bool is_dem(const std::string& terrain) {
+  return fs::exists(terrain) && libmap::is_dem_path(libmap::cloud_pieces(terrain).front());
+}
+
+// Throws Error for a mesh: its vertices alone are no surface.
+void refuse_mesh(const std::string& terrain) {
+  if (!fs::exists(terrain)) return;
+  fs::path first = terrain;
+  if (fs::is_directory(terrain)) first = libmap::cloud_pieces(terrain).front();
+  const std::string format = libmap::format_of(first);
+  if (format == ".obj" || format == ".stl" || format == ".off" || format == ".glb" ||
+      (format == ".ply" && libmap::read_cloud_info(first).faces > 0))
+    throw libmap::Error(
+        "is a mesh: `graspmap resample MESH --radius M -o CLOUD.pcd` samples its surface",
+        {.file = first.string()});
 }
 
 // Throws Error if no point is left, warns of those that were dropped.
@@ -53,7 +82,9 @@ void require_points(std::size_t points, std::size_t dropped, const std::string& 
     throw libmap::Error(dropped == 0 ? "the cloud has no points"
                                      : fmt::format("none of its {} points has a position", dropped),
                         {.file = terrain});
-  if (dropped > 0) run.warn("{}: {} points without a position were dropped", terrain, dropped);
+  if (dropped > 0)
+    run.warn("{}: {} points without a position{} were dropped", terrain, dropped,
+             is_dem(terrain) ? " (heights such as -9999, not declared as nodata)" : "");
 }
 
 std::int64_t modified_ns(const fs::path& path) {
@@ -123,7 +154,8 @@ class StoreScoring {
     if (!wanted.empty()) {
       libmap::PointTileStore points(
           store_.folder() / "progress",
-          {.tile_m = point_tile_m(), .has_normals = stream_.has_normals()});
+          {.tile_m = point_tile_m(),
+           .has_normals = stream_.has_normals() && !frame_.drops_normals()});
       run_.timed("sort points", [&] { fill(points, wanted); });
       run_.timed("tiles", [&] {
         libgtd::detect_streamed(frame_, points, wanted, options_.detection,
@@ -327,6 +359,14 @@ void say_result(const libgtd::DetectionResult& result, const ScoreOptions& optio
   run.add_timings(result.timings_s);
   run.say("{} points, {} occupied voxels, {} scored in {} tiles, {} graspable", result.points,
           result.occupied_voxels, result.map.voxels.size(), result.tiles, result.graspable_voxels);
+  if (10 * result.lone_voxels > result.occupied_voxels && result.occupied_voxels >= 10)
+    run.warn(
+        "{}: {:.1f} % of the voxels have no neighbor: the points are too far apart for voxels of "
+        "{:g} m (--interpolation, --voxel-size, or resample a mesh)",
+        options.terrain,
+        100.0 * static_cast<double>(result.lone_voxels) /
+            static_cast<double>(result.occupied_voxels),
+        options.detection.scenario.voxel_size_m);
   if (result.map.content.normals)
     run.say("mask tilted to the surface's normal within {:g} m, {} voxels without one",
             *result.normal_radius_m, result.unoriented_voxels);
@@ -348,12 +388,16 @@ libmap::PiecesReadResult read_terrain(const std::string& path) {
 void score(ScoreOptions& options, Run& run) {
   libgtd::Scenario& scenario = options.detection.scenario;
   options.detection.share = libmap::parse_share(options.tile);
-  if (options.up != "auto") options.detection.up = parse_vector(options.up, "--up");
+  if (options.up != "auto")
+    options.detection.up = parse_vector(options.up, "--up");
+  else if (is_dem(options.terrain) && options.detection.plane == libgtd::PlaneSource::fit)
+    options.detection.up = Eigen::Vector3d::UnitZ(), options.detection.max_tilt_deg = 75.0;
   scenario.check();
   scenario.set_defaults();
   libmap::ParameterTable in_force;
   bind(in_force, options);
   run.manifest().add_parameters(in_force);
+  refuse_mesh(options.terrain);
   if (options.detection.up && options.detection.plane == libgtd::PlaneSource::none)
     throw libmap::Error("says on which side of the fitted plane up is: with --plane none it is z",
                         {.field = "--up", .value = options.up});

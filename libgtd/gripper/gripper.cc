@@ -26,7 +26,7 @@ void bind(libmap::ParameterTable& table, Gripper& gripper) {
             "length of a spine, carrier to tip");
   table.add("spine_depth_mm", gripper.spine_depth_mm, not_negative,
             "depth of a spine in the ground");
-  table.add("opening_angle_deg", gripper.opening_angle_deg, angle,
+  table.add("opening_angle_deg", gripper.opening_angle_deg, {0.0, 90.0, true, false},
             "angle of a finger to the palm's axis, wide open");
   table.add("closing_angle_deg", gripper.closing_angle_deg, angle,
             "angle of a finger to the palm's axis, closed");

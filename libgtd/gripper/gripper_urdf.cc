@@ -66,6 +66,13 @@ Error wrong_joint(const std::string& name, const std::string& reason) {
   return Error(reason, {.field = "joint " + name});
 }
 
+// An angle as a function of that of a joint that mimics none.
+struct Drive {
+  std::string joint;
+  double multiplier = 1.0;
+  double offset = 0.0;
+};
+
 class Robot {
  public:
   explicit Robot(const std::string& xml) {
@@ -90,6 +97,19 @@ class Robot {
     const auto found = model_->joints_.find(name);
     if (found == model_->joints_.end()) throw missing(key, name, names_of(model_->joints_));
     return *found->second;
+  }
+  // Through all joints that mimic each other.
+  Drive drive_of(const urdf::Joint& joint) const {
+    Drive drive;
+    const urdf::Joint* at = &joint;
+    for (std::size_t step = 0; at->mimic; ++step) {
+      if (step > model_->joints_.size()) throw wrong_joint(joint.name, "mimics itself");
+      drive.offset += drive.multiplier * at->mimic->offset;
+      drive.multiplier *= at->mimic->multiplier;
+      at = &this->joint("joint that " + at->name + " mimics", at->mimic->joint_name);
+    }
+    drive.joint = at->name;
+    return drive;
   }
   bool has_joint(const std::string& name) const { return model_->joints_.contains(name); }
   bool has_link(const std::string& name) const { return model_->links_.contains(name); }
@@ -193,8 +213,7 @@ class Finger {
       require_limits(spine_);
     else if (spine_.type != urdf::Joint::FIXED)
       throw wrong_joint(spine_.name, "is neither revolute nor fixed");
-    if (spine_.mimic && spine_.mimic->joint_name != joint_.name)
-      throw wrong_joint(spine_.name, "mimics another joint than " + joint_.name);
+    if (spine_.mimic) couple(robot.drive_of(spine_), robot.drive_of(joint_));
     Pose palm = Pose::Identity();
     palm.linear() = axis_from_palm;
     joint_pose_ = palm * robot.fixed_pose(mapping.palm_link, joint_.parent_link_name) *
@@ -298,9 +317,17 @@ class Finger {
   }
   // Of the spine joint, when nothing touches the finger.
   double rest(double angle) const {
-    if (spine_.mimic) return spine_.mimic->multiplier * angle + spine_.mimic->offset;
+    if (spine_.mimic) return coupling_ * angle + coupling_offset_;
     if (spine_.type != urdf::Joint::REVOLUTE) return 0.0;
     return std::clamp(0.0, spine_.limits->lower, spine_.limits->upper);
+  }
+
+  // The spine's angle as a function of the finger's, if one motor drives both.
+  void couple(const Drive& spine, const Drive& finger) {
+    if (spine.joint != finger.joint || finger.multiplier == 0.0)
+      throw wrong_joint(spine_.name, "mimics another joint than " + joint_.name);
+    coupling_ = spine.multiplier / finger.multiplier;
+    coupling_offset_ = spine.offset - coupling_ * finger.offset;
   }
 
   void find_limits() {
@@ -319,6 +346,8 @@ class Finger {
   Eigen::Vector2d outward_ = Eigen::Vector2d::Zero();
   double open_ = 0.0;
   double closed_ = 0.0;
+  double coupling_ = 0.0;  // of a spine joint that mimics
+  double coupling_offset_ = 0.0;
 };
 
 Eigen::Matrix3d axis_from_palm(const UrdfMapping& mapping) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <string>
 #include <utility>
 #include <vector>
@@ -12,6 +13,8 @@
 #include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/random_stream.h"
+#include "libmap/core/text.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/geometry/plane_fit.h"
 #include "libmap/geometry/robust.h"
 #include "libmap/geometry/symmetric_eigen.h"
@@ -41,6 +44,7 @@ struct Sum {
 struct Moments {
   double second = 0;
   double third = 0;
+  libmap::NormalVotes normals{};
 };
 
 // Chunk by chunk in the points' order, so that blocks of whole chunks give the sum of all points
@@ -79,6 +83,7 @@ Sum& operator+=(Sum& a, const Sum& b) {
 Moments& operator+=(Moments& a, const Moments& b) {
   a.second += b.second;
   a.third += b.third;
+  a.normals += b.normals;
   return a;
 }
 
@@ -96,22 +101,12 @@ Vector3d mean_about(const Vector3d& origin, const Sum& sum) {
   return sum.count == 0 ? origin : origin + sum.of / static_cast<double>(sum.count);
 }
 
-void add_normals(const PointCloud& block, Vector3d& total) {
-  add_block(
-      block, Vector3d(Vector3d::Zero()),
-      [](Vector3d& sum, const PointCloud& of, std::size_t i) {
-        const Vector3d n = of.normals[i].cast<double>();
-        if (n.allFinite() && n.norm() > 0) sum += n.normalized();
-      },
-      total);
-}
-
 // What a first look at the points tells.
 struct Facts {
   std::size_t points = 0;         // finite or not
   std::optional<Vector3d> first;  // finite one
   Sum offsets;                    // of the finite points from the first
-  Vector3d normals = Vector3d::Zero();
+  double opposing_normals = 0;    // of the first block
   libmap::Pose viewpoint = libmap::Pose::Identity();
 };
 
@@ -124,7 +119,8 @@ Facts facts_of(const PointStream& points) {
     for (std::size_t i = 0; i < block.size() && !facts.first; ++i)
       if (block.positions[i].allFinite()) facts.first = block.positions[i];
     if (facts.first) add_offsets(block, *facts.first, facts.offsets);
-    if (block.has_normals()) add_normals(block, facts.normals);
+    if (block.has_normals() && facts.points == block.size())
+      facts.opposing_normals = libmap::opposing_share(block.positions, block.normals);
   });
   return facts;
 }
@@ -167,13 +163,22 @@ void check_spread(const Vector3d& variances, const Vector3d& centroid, std::size
     throw libmap::Error("all points lie on a line: no plane fits");
 }
 
+// Moments of the heights, and the normals' votes on the side of `normal`.
 Moments height_moments(const PointStream& points, const Vector3d& centroid,
                        const Vector3d& normal) {
-  return sum_over(points, Moments{}, [&](Moments& m, const PointCloud& block, std::size_t i) {
-    const double h = normal.dot(block.positions[i] - centroid);
-    m.second += h * h;
-    m.third += h * h * h;
+  Moments total;
+  points.for_each_block(PointStream::Need::positions_and_normals, [&](const PointCloud& all) {
+    add_block(
+        all, Moments{},
+        [&](Moments& m, const PointCloud& block, std::size_t i) {
+          const double h = normal.dot(block.positions[i] - centroid);
+          m.second += h * h;
+          m.third += h * h * h;
+          if (block.has_normals()) m.normals.add(block.normals[i], normal);
+        },
+        total);
   });
+  return total;
 }
 
 // The cosine between both; 0 if `direction` is unknown or within the plane.
@@ -322,6 +327,7 @@ struct Fit {
   Vector3d normal;
   double rmse = 0;
   double skewness = 0;
+  libmap::NormalVotes normals{};
 };
 
 // The sign of the normal: which of the two sides is up, and who said so.
@@ -335,6 +341,14 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
           "this direction does not say which side of the plane is up: it has no "
           "length or lies in the plane",
           {.field = "up"});
+    const double tilt_deg = std::acos(std::min(1.0, std::abs(side))) * 180.0 / std::numbers::pi;
+    if (tilt_deg > options.max_tilt_deg)
+      throw libmap::Error(
+          "the plane that fits the heights is too steep: if heights such as 0 or -9999 mean that "
+          "there is none, gdal_translate -a_nodata declares it",
+          {.field = "tilt of the plane, deg",
+           .value = libmap::to_fixed_text(tilt_deg, 1),
+           .bound = "<= " + libmap::to_text(options.max_tilt_deg)});
     return side;
   }
   double side = 0;
@@ -344,8 +358,8 @@ double choose_up(const Facts& facts, const RegressionPlaneOptions& options, cons
     if (side != 0) return side;
   }
   source = UpSource::normals;
-  side = side_of(fit.normal, facts.normals);
-  if (side != 0) return side;
+  if (fit.normals.agree() && facts.opposing_normals <= libmap::max_opposing_share)
+    return fit.normals.along - fit.normals.against;
   source = UpSource::frame_z;
   if (std::abs(fit.normal.z()) >= min_cosine_of_frame_z) return fit.normal.z();
   source = UpSource::camera_origin;
@@ -405,11 +419,16 @@ RegressionPlane fit_regression_plane(const PointStream& points,
   const double cube = fit.rmse * fit.rmse * fit.rmse;
   fit.skewness = cube > 0 ? moments.third / count / cube : 0;
   if (!std::isfinite(fit.skewness)) fit.skewness = 0;
+  fit.normals = moments.normals;
 
   if (choose_up(facts, options, fit, plane.up_source) < 0) {
     fit.normal = -fit.normal;
     fit.skewness = -fit.skewness;
+    std::swap(fit.normals.along, fit.normals.against);
   }
+  if (!fit.normals.empty())
+    plane.normals_up = fit.normals.along / (fit.normals.along + fit.normals.against);
+  plane.opposing_normals = facts.opposing_normals;
   plane.rmse_m = fit.rmse;
   plane.relief_skewness = fit.skewness;
   const Matrix3d rotation = options.method == PlaneMethod::thesis

@@ -8,6 +8,7 @@
 #include "libgtd/terrain/radix_sort.h"
 #include "libmap/core/error.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/spatial_index.h"
 
 namespace libgtd {
 
@@ -238,6 +239,28 @@ std::vector<Voxel> VoxelFields::all() const {
   std::vector<Voxel> voxels(values_[0]->size());
   for (std::size_t n = 0; n < voxels.size(); ++n) voxels[n] = at(n);
   return voxels;
+}
+
+std::size_t count_lone(const std::vector<Voxel>& voxels) {
+  std::vector<char> has_neighbor(voxels.size(), 0);
+  visit_pairs(voxels, 1,
+              [&](std::size_t n, std::size_t m) { has_neighbor[n] = has_neighbor[m] = 1; });
+  return static_cast<std::size_t>(std::count(has_neighbor.begin(), has_neighbor.end(), 0));
+}
+
+void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
+                   const std::vector<Eigen::Vector3d>& points) {
+  constexpr std::size_t min_voxels = 10;
+  if (voxels < min_voxels || 2 * lone <= voxels) return;
+  throw libmap::Error(
+      "the points are too far apart for these voxels: interpolate (--interpolation), use larger "
+      "voxels (--voxel-size), or sample the surface of a mesh (graspmap resample)",
+      {.field = "spacing of the points with voxels of " + libmap::to_text(voxel_size_m) + " m",
+       .value = libmap::to_text(static_cast<float>(libmap::median_spacing(points))) + " m; " +
+                libmap::to_fixed_text(
+                    100.0 * static_cast<double>(lone) / static_cast<double>(voxels), 1) +
+                " % of the voxels have no neighbor",
+       .bound = "<= 50 % of the voxels"});
 }
 
 }  // namespace libgtd

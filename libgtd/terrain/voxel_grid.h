@@ -65,6 +65,14 @@ void visit_pairs(const std::vector<Voxel>& voxels, int reach, const Visit& visit
   }
 }
 
+// Number of voxels without an occupied one among their 26 neighbors.
+std::size_t count_lone(const std::vector<Voxel>& voxels);
+
+// Throws Error naming the spacing of the points if more than half of the voxels are lone: such
+// points are no surface of these voxels.
+void require_dense(std::size_t lone, std::size_t voxels, double voxel_size_m,
+                   const std::vector<Eigen::Vector3d>& points);
+
 // Calls visit(first, last) for each row of voxels of one i in the columns, ascending: positions
 // first .. last - 1 in grid.voxels.
 template <typename Visit>

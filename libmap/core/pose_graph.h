@@ -100,4 +100,10 @@ Trajectory trajectory_of(const PoseGraph& graph, PoseSource source);
 // Sum of the distances between consecutive poses, m.
 double path_length(const Trajectory& trajectory);
 
+// Where an image was taken.
+struct ImagePose {
+  std::string image{};                        // its name in the file
+  Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
+};
+
 }  // namespace libmap

@@ -86,6 +86,11 @@ std::optional<double> Table::optional_number(std::size_t row, std::size_t column
 
 Table parse_csv(std::string_view text, const std::string& file) {
   if (text.starts_with("\xEF\xBB\xBF")) text.remove_prefix(3);
+  if (text.find('\n') == std::string_view::npos && text.find('\r') != std::string_view::npos) {
+    std::string lines(text);  // of classic Mac OS
+    std::replace(lines.begin(), lines.end(), '\r', '\n');
+    return parse_csv(lines, file);
+  }
   if (text.find('\0') != std::string_view::npos) throw Error("not a text file", {.file = file});
   Table table;
   table.file = file;
@@ -106,6 +111,12 @@ Table parse_csv(std::string_view text, const std::string& file) {
           throw Error("too many columns", {.field = "line " + std::to_string(first_line),
                                            .value = std::to_string(cells.size()) + " cells long",
                                            .bound = "<= " + std::to_string(max_columns)});
+        for (const char other : {';', '\t'})
+          if (cells.size() == 1 && cells.front().find(other) != std::string::npos)
+            throw Error("the columns need commas between them and points in numbers",
+                        {.field = "separator in line " + std::to_string(first_line),
+                         .value = other == ';' ? "';'" : "tab",
+                         .bound = "','"});
         for (std::string& cell : cells) table.columns.emplace_back(trim(cell));
         continue;
       }

@@ -24,8 +24,9 @@ struct Table {
   std::optional<double> optional_number(std::size_t row, std::size_t column) const;
 };
 
-// CSV text with a header line; quotes as in RFC 4180; CRLF or LF; a UTF-8 byte order mark, empty
-// lines and lines that begin with '#' are passed over. A row of another length is an Error.
+// CSV text with a header line; quotes as in RFC 4180; CRLF, LF or CR; a UTF-8 byte order mark,
+// empty lines and lines that begin with '#' are passed over. A row of another length and a header
+// with another separator are an Error.
 Table parse_csv(std::string_view text, const std::string& file);
 Table read_csv(const std::filesystem::path& path);
 std::string to_csv(const Table& table);

@@ -186,6 +186,30 @@ std::optional<std::array<const ScalarField*, 3>> view_fields(const PointCloud& c
   return fields;
 }
 
+void choose_sides(const PointCloud& cloud, const PointTree& tree, NormalEstimationResult& result) {
+  result.undefined = static_cast<std::size_t>(
+      std::count_if(result.normals.begin(), result.normals.end(),
+                    [](const Eigen::Vector3f& normal) { return !has_normal(normal); }));
+  if (const auto fields = view_fields(cloud)) {
+    result.orientation = NormalOrientation::view_fields;
+    const auto& [x, y, z] = *fields;
+    turn_to(
+        cloud.positions,
+        [x = x, y = y, z = z](std::size_t n) {
+          return Eigen::Vector3d(x->values[n], y->values[n], z->values[n]);
+        },
+        result.normals);
+  } else if (!cloud.viewpoint.matrix().isIdentity(0.0)) {
+    result.orientation = NormalOrientation::viewpoint;
+    turn_to(
+        cloud.positions, [&](std::size_t) { return cloud.viewpoint.translation(); },
+        result.normals);
+  } else {
+    result.orientation = NormalOrientation::spanning_tree;
+    result.parts = SpanningTree(cloud.positions, tree, result.normals).orient();
+  }
+}
+
 }  // namespace
 
 std::string_view to_text(NormalOrientation orientation) {
@@ -213,27 +237,17 @@ NormalEstimationResult estimate_normals(const PointCloud& cloud,
       result.normals[n] = plane_normal(cloud.positions, neighbors, cloud.positions[n]);
     }
   });
-  result.undefined = static_cast<std::size_t>(
-      std::count_if(result.normals.begin(), result.normals.end(),
-                    [](const Eigen::Vector3f& normal) { return !has_normal(normal); }));
-  if (const auto fields = view_fields(cloud)) {
-    result.orientation = NormalOrientation::view_fields;
-    const auto& [x, y, z] = *fields;
-    turn_to(
-        cloud.positions,
-        [x = x, y = y, z = z](std::size_t n) {
-          return Eigen::Vector3d(x->values[n], y->values[n], z->values[n]);
-        },
-        result.normals);
-  } else if (!cloud.viewpoint.matrix().isIdentity(0.0)) {
-    result.orientation = NormalOrientation::viewpoint;
-    turn_to(
-        cloud.positions, [&](std::size_t) { return cloud.viewpoint.translation(); },
-        result.normals);
-  } else {
-    result.orientation = NormalOrientation::spanning_tree;
-    result.parts = SpanningTree(cloud.positions, tree, result.normals).orient();
-  }
+  choose_sides(cloud, tree, result);
+  return result;
+}
+
+NormalEstimationResult orient_normals(const PointCloud& cloud) {
+  cloud.check();
+  NormalEstimationResult result;
+  for (const Eigen::Vector3f& normal : cloud.normals)
+    result.normals.push_back(normal.allFinite() ? normal.stableNormalized()
+                                                : Eigen::Vector3f::Zero());
+  choose_sides(cloud, PointTree(cloud.positions), result);
   return result;
 }
 

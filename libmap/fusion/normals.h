@@ -42,4 +42,7 @@ struct NormalEstimationResult {
 NormalEstimationResult estimate_normals(const PointCloud& cloud,
                                         const NormalEstimationOptions& options = {});
 
+// The cloud's own normals as unit vectors, with sides chosen in the same way; NaN becomes zero.
+NormalEstimationResult orient_normals(const PointCloud& cloud);
+
 }  // namespace libmap

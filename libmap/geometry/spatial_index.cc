@@ -4,9 +4,11 @@
 #include <cmath>
 #include <limits>
 #include <nanoflann.hpp>
+#include <numbers>
 #include <tuple>
 #include <utility>
 
+#include "libmap/core/median.h"
 #include "libmap/core/parallel.h"
 
 namespace libmap {
@@ -160,9 +162,45 @@ double square_to_next(const PointTree& tree, const Eigen::Vector3d& point) {
 
 }  // namespace
 
-double median_spacing(const std::vector<Eigen::Vector3d>& points) {
+namespace {
+
+constexpr std::size_t area_neighbors = 17;  // the point itself is one
+// A nearest neighbor at a smaller share of the spacing by area is a near-duplicate: random points
+// have 0.47, grids 1.
+constexpr double min_nearest_share = 0.3;
+constexpr double merged_share = 0.25;
+
+// Spacing of a square grid that has as many points per area: the median distance to the 16th
+// neighbor is the radius of a disc of 16 of them.
+double area_spacing(const PointTree& tree, const std::vector<Eigen::Vector3d>& points) {
+  constexpr std::size_t most = 2000;
+  std::vector<double> squares(std::min(points.size(), most));
+  const std::size_t count = std::min(area_neighbors, points.size());
+  parallel_for(squares.size(), 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t n = begin; n < end; ++n)
+      squares[n] = tree.nearest(points[n * points.size() / squares.size()], count).back().square_m2;
+  });
+  return std::sqrt(std::numbers::pi * median(std::move(squares)) / static_cast<double>(count - 1));
+}
+
+// The points, in their order, without those nearer than `distance_m` to one that is kept.
+std::vector<Eigen::Vector3d> merge_near(const std::vector<Eigen::Vector3d>& points,
+                                        double distance_m) {
+  GrowingGrid grid(points.front(), distance_m, points.size());
+  std::vector<Eigen::Vector3d> kept;
+  for (const Eigen::Vector3d& point : points) {
+    if (grid.any_nearer(point, distance_m, distance_m * distance_m)) continue;
+    grid.add(point);
+    kept.push_back(point);
+  }
+  return kept;
+}
+
+}  // namespace
+
+CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points) {
   constexpr std::size_t most = 10000;
-  if (points.size() < 2) return 0.0;
+  if (points.size() < 2) return {};
   const PointTree tree(points);
   std::vector<double> squares(std::min(points.size(), most));
   parallel_each(squares.size(), 256, [&](std::size_t n) {
@@ -170,10 +208,16 @@ double median_spacing(const std::vector<Eigen::Vector3d>& points) {
     squares[n] = square_to_next(tree, points[index]);
   });
   std::erase(squares, 0.0);
-  if (squares.empty()) return 0.0;
-  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
-  std::nth_element(squares.begin(), middle, squares.end());
-  return std::sqrt(*middle);
+  if (squares.empty()) return {};
+  CloudSpacing spacing{std::sqrt(median(std::move(squares))), area_spacing(tree, points)};
+  if (spacing.nearest_m >= min_nearest_share * spacing.by_area_m) return spacing;
+  const std::vector<Eigen::Vector3d> merged = merge_near(points, merged_share * spacing.by_area_m);
+  if (merged.size() > area_neighbors) spacing.nearest_m = area_spacing(PointTree(merged), merged);
+  return spacing;
+}
+
+double median_spacing(const std::vector<Eigen::Vector3d>& points) {
+  return point_spacing(points).nearest_m;
 }
 
 }  // namespace libmap

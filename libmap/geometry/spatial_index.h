@@ -47,8 +47,16 @@ class PointTree {
 };
 
 // Median of the distances from points to the nearest elsewhere, m; of at most 10000 of them, spread
-// evenly over the list. 0 if there are no two places.
+// evenly over the list. If most points are near-duplicates (first and last returns, joined clouds),
+// the spacing of a square grid with as many places per area, near-duplicates merged. 0 if there are
+// no two places.
 double median_spacing(const std::vector<Eigen::Vector3d>& points);
+
+struct CloudSpacing {
+  double nearest_m = 0.0;  // median_spacing
+  double by_area_m = 0.0;  // of a square grid with as many points per area
+};
+CloudSpacing point_spacing(const std::vector<Eigen::Vector3d>& points);
 
 // Points in a hashed grid of cubes. nanoflann's tree that grows takes 10 times as long for 74,000
 // samples. Cells share slots where their hashes meet, so that a search may see points that lie

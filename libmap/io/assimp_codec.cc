@@ -28,35 +28,10 @@
 #include "libmap/core/guarded_process.h"
 #include "libmap/core/output_lock.h"
 #include "libmap/core/text.h"
+#include "libmap/io/corner_key.h"
 
 namespace libmap {
 namespace {
-
-// A corner's numbers, bit for bit: position, normal, color.
-using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
-
-struct CornerHash {
-  std::size_t operator()(const Corner& corner) const {
-    // FNV-1a, a word at a time.
-    std::uint64_t hash = 14695981039346656037ULL;
-    for (const std::uint32_t word : corner) hash = (hash ^ word) * 1099511628211ULL;
-    return static_cast<std::size_t>(hash ^ (hash >> 32));
-  }
-};
-
-Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& normal,
-                 const Color& color) {
-  Corner corner{};
-  for (std::size_t axis = 0; axis < 3; ++axis) {
-    // Adding 0 makes -0 equal to 0.
-    const auto word = std::bit_cast<std::uint64_t>(position[static_cast<int>(axis)] + 0.0);
-    corner[2 * axis] = static_cast<std::uint32_t>(word);
-    corner[2 * axis + 1] = static_cast<std::uint32_t>(word >> 32);
-    corner[6 + axis] = std::bit_cast<std::uint32_t>(normal[static_cast<int>(axis)] + 0.0F);
-    corner[9] = corner[9] << 8 | color[axis];
-  }
-  return corner;
-}
 
 std::uint8_t to_byte(float fraction) {
   return static_cast<std::uint8_t>(std::lround(std::clamp(fraction, 0.0F, 1.0F) * 255.0F));
@@ -306,9 +281,13 @@ std::unique_ptr<aiMesh> mesh_of(const TriangleMesh& mesh, unsigned material) {
   return part;
 }
 
+// The first line of a message, without assimp's name for bytes in memory.
 std::string first_line(const char* text) {
   const std::string_view reason = text == nullptr ? "" : text;
-  return std::string(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
+  std::string line(reason.substr(0, std::min<std::size_t>(reason.find('\n'), 200)));
+  const std::size_t at = line.find("$$$___magic___$$$");
+  if (at == std::string::npos) return line;
+  return line.replace(at, line.find_first_of("'\" :,", at) - at, "the file");
 }
 
 // The picture of a material's own color, or nothing.

@@ -220,7 +220,11 @@ CloudReadResult read_cloud(const std::filesystem::path& path) {
     return joined;
   }
   require_cloud_file(path);
-  if (is_dem_path(path)) return {read_dem_cloud(path), 0, dem_file_info(path)};
+  if (is_dem_path(path)) {
+    CloudReadResult read{{}, 0, dem_file_info(path)};
+    read.cloud = read_dem_cloud(path, &read.dropped_points);
+    return read;
+  }
   return in_file(path, [&] {
     GeometryColumns content = decode(path);
     if (content.info.faces > 0)

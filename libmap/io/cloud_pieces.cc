@@ -117,8 +117,10 @@ class CloudBlockReader {
         if (!dem_->next(pixels_)) throw Error("ends too early", {.file = path_.string()});
         next_pixel_ = 0;
       }
-      if (!std::isnan(pixels_.heights_m[next_pixel_]))
+      if (std::isfinite(pixels_.heights_m[next_pixel_]))
         cloud.positions.push_back(point_of(dem_->info(), pixels_, next_pixel_));
+      else if (std::isinf(pixels_.heights_m[next_pixel_]))
+        ++dropped_;
     }
   }
 

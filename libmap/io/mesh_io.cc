@@ -17,6 +17,7 @@
 #include "libmap/io/cloud_columns.h"
 #include "libmap/io/cloud_io.h"
 #include "libmap/io/columns.h"
+#include "libmap/io/obj_codec.h"
 #include "libmap/io/ply_codec.h"
 #include "libmap/io/vtp_codec.h"
 #include "libmap/raster/dem_reader.h"
@@ -215,7 +216,8 @@ GeometryFileInfo info_of(const TriangleMesh& mesh, const std::string& format,
   info.bytes = bytes.size();
   info.points = mesh.vertices.size();
   info.faces = mesh.triangles.size();
-  const ScalarType type = format == "off" ? ScalarType::float64 : ScalarType::float32;
+  const bool is_double = format == "off" || format == "obj";
+  const ScalarType type = is_double ? ScalarType::float64 : ScalarType::float32;
   for (const char* const axis : {"x", "y", "z"}) info.fields.push_back({axis, type, 1});
   return info;
 }
@@ -227,7 +229,9 @@ MeshReadResult decode(const std::string& format, const std::shared_ptr<const std
     return {std::move(mesh), std::move(content.info)};
   }
   const std::string name = format.substr(1);
-  TriangleMesh mesh = name == "off" ? read_off(*bytes) : decode_by_assimp(*bytes, name);
+  TriangleMesh mesh = name == "off"   ? read_off(*bytes)
+                      : name == "obj" ? decode_obj(*bytes)
+                                      : decode_by_assimp(*bytes, name);
   GeometryFileInfo info = info_of(mesh, name, *bytes);
   return {std::move(mesh), std::move(info)};
 }

@@ -3,7 +3,7 @@
 //          read by         written by      kept
 //   .ply   ply_codec       ply_codec       doubles, normals, colors, vertex and face fields
 //   .vtp   not read        VTK             doubles, normals, colors, vertex and face fields
-//   .obj   assimp          this file       doubles written, float32 read; normals, colors
+//   .obj   obj_codec       this file       doubles; normals, colors
 //   .off   this file       this file       doubles; geometry alone
 //   .stl   assimp          assimp          float32; geometry alone
 //   .glb   assimp          assimp          float32; normals, colors

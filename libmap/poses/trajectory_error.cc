@@ -83,36 +83,74 @@ TrajectoryError summarize(const std::vector<double>& distances_m,
   return error;
 }
 
-// Whether the positions lie so near to a line that they do not tell a turn about it.
-bool is_straight(const Eigen::Matrix3Xd& positions) {
-  constexpr double min_width = 0.05;  // of the length
-  const Eigen::Matrix3Xd centered = positions.colwise() - positions.rowwise().mean();
-  const Eigen::Vector3d spreads =
-      symmetric_eigen(Eigen::Matrix3d(centered * centered.transpose())).values;
-  return spreads[1] <= min_width * min_width * spreads[2];
+// Root mean squares over all pairs.
+struct AlignmentResiduals {
+  double position_m = 0.0;
+  double rotation_rad = 0.0;  // chordal
+};
+
+// Positions about their means, as columns.
+Eigen::Matrix3Xd centered(const Eigen::Matrix3Xd& positions) {
+  return positions.colwise() - positions.rowwise().mean();
 }
 
-// Least squares of the positions (Umeyama 1991).
+// Bounds of the lever: the distance at which a rotation residual counts as much as a position
+// residual of the same arc.
+struct LeverRange {
+  double min_m;  // far below any real ratio; rotations complete what positions leave open
+  double max_m;
+};
+
+// Width of a path: its root mean square distance from its longest axis. Positions alone align wider
+// paths, as in the literature.
+constexpr double decisive_width_m = 0.5;
+
+LeverRange lever_range(const Eigen::Matrix3Xd& from) {
+  const Eigen::Vector3d squares =
+      symmetric_eigen(Eigen::Matrix3d(from * from.transpose())).values.cwiseMax(0.0) /
+      static_cast<double>(from.cols());
+  const double min_m = std::max(1e-6 * std::sqrt(squares[2]), 1e-9);
+  const double width_m = std::max(std::sqrt(squares[0] + squares[1]), 1e-9);
+  return {min_m, std::max(min_m, decisive_width_m * decisive_width_m / width_m - width_m)};
+}
+
+AlignmentResiduals residuals_of(const Eigen::Matrix3d& rotation, const Eigen::Matrix3Xd& from,
+                                const Eigen::Matrix3Xd& to, const std::vector<PosePair>& pairs) {
+  const double count = static_cast<double>(pairs.size());
+  double squares = 0.0;
+  for (const PosePair& pair : pairs)
+    squares += 0.5 * (rotation * pair.estimate.linear() - pair.truth.linear()).squaredNorm();
+  return {std::sqrt((rotation * from - to).squaredNorm() / count), std::sqrt(squares / count)};
+}
+
+// Least squares of positions (Umeyama 1991, without scale) and rotations (chordal). The lever is
+// the ratio of their residuals (variance components), found by iteration.
 Pose best_alignment(const std::vector<PosePair>& pairs) {
   const auto count = static_cast<Eigen::Index>(pairs.size());
-  Eigen::Matrix3Xd from(3, count);
-  Eigen::Matrix3Xd to(3, count);
+  Eigen::Matrix3Xd positions(3, count);
+  Eigen::Matrix3Xd true_positions(3, count);
+  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
   for (Eigen::Index i = 0; i < count; ++i) {
     const PosePair& pair = pairs[static_cast<std::size_t>(i)];
-    from.col(i) = pair.estimate.translation();
-    to.col(i) = pair.truth.translation();
+    positions.col(i) = pair.estimate.translation();
+    true_positions.col(i) = pair.truth.translation();
+    turns += pair.truth.linear() * pair.estimate.linear().transpose();
+  }
+  const Eigen::Matrix3Xd from = centered(positions);
+  const Eigen::Matrix3Xd to = centered(true_positions);
+  const Eigen::Matrix3d covariance = to * from.transpose();
+  const LeverRange range = lever_range(from);
+  double lever_m = range.min_m;
+  Eigen::Matrix3d rotation;
+  for (int iteration = 0; iteration < 20; ++iteration) {
+    rotation = nearest_rotation(covariance + 0.5 * lever_m * lever_m * turns);
+    const AlignmentResiduals residuals = residuals_of(rotation, from, to, pairs);
+    lever_m = std::clamp(residuals.position_m / std::max(residuals.rotation_rad, 1e-12),
+                         range.min_m, range.max_m);
   }
   Pose alignment = Pose::Identity();
-  if (!is_straight(from) && !is_straight(to)) {
-    alignment.matrix() = align_points(from, to, false);
-    return alignment;
-  }
-  // Positions on a line leave the turn about it open: the rotations tell it.
-  Eigen::Matrix3d turns = Eigen::Matrix3d::Zero();
-  for (const PosePair& pair : pairs)
-    turns += pair.truth.linear() * pair.estimate.linear().transpose();
-  alignment.linear() = nearest_rotation(turns);
-  alignment.translation() = to.rowwise().mean() - alignment.linear() * from.rowwise().mean();
+  alignment.linear() = rotation;
+  alignment.translation() = true_positions.rowwise().mean() - rotation * positions.rowwise().mean();
   return alignment;
 }
 

@@ -24,10 +24,11 @@ struct AbsoluteTrajectoryError : TrajectoryError {
   Pose truth_from_estimate = Pose::Identity();  // the alignment that was used
 };
 
-// Positions after the rigid alignment that fits them best (Umeyama 1991, without scale), or, where
-// they lie on a line, the one that fits the rotations best (their chordal mean); rotations
-// after the same alignment. Poses are paired by node, or by time (within 20 ms) where nodes are not
-// known. Throws Error if fewer than 3 pairs are there.
+// Errors after the rigid alignment that fits positions and rotations best (Umeyama 1991, without
+// scale; chordal distance of rotations). Their weights are estimated from their residuals. Paths
+// wider than 0.5 m (root mean square distance from the longest axis) are aligned by positions
+// alone. Poses are paired by node, or by time (within 20 ms) if nodes are unknown. Throws Error for
+// fewer than 3 pairs.
 AbsoluteTrajectoryError absolute_trajectory_error(const Trajectory& estimate,
                                                   const Trajectory& truth);
 

@@ -91,7 +91,11 @@ std::optional<TrajectoryFormat> format_of_extension(const fs::path& path) {
 
 TrajectoryFormat format_of_text(const std::string& text, const fs::path& path) {
   if (const auto format = format_of_extension(path)) return *format;
-  return *format_of_extension("poses" + recognize_poses(text, path.string()));
+  const std::string extension = recognize_poses(text, path.string());
+  if (extension == ".log") return TrajectoryFormat::open3d;
+  if (extension == ".json") return TrajectoryFormat::nerfstudio;
+  if (extension == ".euroc") return TrajectoryFormat::euroc;
+  return *format_of_extension("poses" + extension);
 }
 
 PoseAxes axes_of(TrajectoryFormat format) {
@@ -119,6 +123,11 @@ TrajectoryFile parse_poses(TrajectoryFormat format, const std::string& text,
       for (TrajectoryPose& pose : graph.poses) pose.node = 0;
     return {std::move(graph.poses), std::move(graph.links)};
   }
+  if (format == TrajectoryFormat::nerfstudio) read.images = parse_nerfstudio(text, file);
+  if (format == TrajectoryFormat::euroc) read.poses = parse_euroc(text, file);
+  read.of_cameras = format == TrajectoryFormat::open3d;
+  if (read.of_cameras) read.poses = parse_open3d(text, file);
+  if (format >= TrajectoryFormat::open3d) return read;
   const bool is_kitti =
       format == TrajectoryFormat::kitti || format == TrajectoryFormat::kitti_optical;
   read.poses = is_kitti ? parse_kitti(text, file) : parse_tum(text, file);
@@ -138,7 +147,10 @@ const std::vector<std::pair<std::string, TrajectoryFormat>>& trajectory_format_n
       {"kitti-optical", TrajectoryFormat::kitti_optical},
       {"toro", TrajectoryFormat::toro},
       {"g2o", TrajectoryFormat::g2o},
-      {"colmap", TrajectoryFormat::colmap}};
+      {"colmap", TrajectoryFormat::colmap},
+      {"open3d", TrajectoryFormat::open3d},
+      {"nerfstudio", TrajectoryFormat::nerfstudio},
+      {"euroc", TrajectoryFormat::euroc}};
   return names;
 }
 
@@ -219,6 +231,9 @@ void write_trajectory_as(TrajectoryFormat format, const fs::path& path,
                                   to_g2o(poses, trajectory.links));
     case TrajectoryFormat::automatic:
     case TrajectoryFormat::colmap:
+    case TrajectoryFormat::open3d:
+    case TrajectoryFormat::nerfstudio:
+    case TrajectoryFormat::euroc:
       break;
   }
   throw Error("no format of a file of poses", {.file = path.string()});

@@ -23,20 +23,18 @@ enum class TrajectoryFormat {
   kitti_optical,       // 2
   toro,                // 3
   g2o,                 // 4
-  colmap
+  colmap,
+  open3d,      // read only, as the next two
+  nerfstudio,  // transforms.json
+  euroc
 };
 const std::vector<std::pair<std::string, TrajectoryFormat>>& trajectory_format_names();
-
-// Where a photograph was taken.
-struct ImagePose {
-  std::string image{};                        // its name in the file
-  Pose world_from_camera = Pose::Identity();  // optical frame: z forward, x right, y down
-};
 
 struct TrajectoryFile {
   Trajectory poses;                 // node 0 and stamp 0 where the format has none
   std::vector<PoseLink> links;      // of g2o and TORO
-  std::vector<ImagePose> images{};  // of COLMAP, which has no poses
+  std::vector<ImagePose> images{};  // of COLMAP and nerfstudio, which have no poses
+  bool of_cameras = false;          // poses of the first camera's optical frame: Open3D
 };
 
 // Whether write_trajectory takes it: .tum, .kitti, .g2o, .toro. The second throws Error if not,

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <nlohmann/json.hpp>
 #include <optional>
 #include <set>
 
@@ -50,6 +51,23 @@ std::string pose_to_angles(const Pose& pose) {
   const Eigen::Vector3d angles_rad = (roll_pitch_yaw_deg(pose) * (M_PI / 180.0)).array() + 0.0;
   const Eigen::Vector3d t = pose.translation();
   return to_words({t.x(), t.y(), t.z(), angles_rad.x(), angles_rad.y(), angles_rad.z()});
+}
+
+// The first 12 numbers are [R|t], row by row.
+Pose pose_of_rows(const TextLine& line, const std::vector<double>& numbers,
+                  const std::string& file) {
+  Eigen::Matrix<double, 3, 4> matrix;
+  for (int i = 0; i < 12; ++i) matrix(i / 4, i % 4) = numbers[static_cast<std::size_t>(i)];
+  const Eigen::Matrix3d rotation = matrix.leftCols<3>();
+  const double deviation =
+      (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
+  if (!(deviation <= rotation_tolerance) || rotation.determinant() <= 0.0)
+    throw in_line("no rotation", line, file, to_text(rotation.determinant()),
+                  "a rotation matrix, determinant 1");
+  const Eigen::Matrix3d nearest = nearest_rotation(rotation);
+  Pose pose = pose_of(line, matrix.col(3), Eigen::Quaterniond(nearest), file);
+  pose.linear() = nearest;
+  return pose;
 }
 
 struct GraphFormat {
@@ -226,21 +244,66 @@ Trajectory parse_kitti(std::string_view text, const std::string& file) {
   for (const TextLine& line : split_lines(text)) {
     if (is_comment(line)) continue;
     if (line.words.size() != 12) throw wrong_columns("no pose", line, file, "12");
-    const std::vector<double> numbers = numbers_of(line, 0, 12, file);
-    Eigen::Matrix<double, 3, 4> matrix;
-    for (int i = 0; i < 12; ++i) matrix(i / 4, i % 4) = numbers[static_cast<std::size_t>(i)];
-    const Eigen::Matrix3d rotation = matrix.leftCols<3>();
-    const double deviation =
-        (rotation.transpose() * rotation - Eigen::Matrix3d::Identity()).cwiseAbs().maxCoeff();
-    if (!(deviation <= rotation_tolerance) || rotation.determinant() <= 0.0)
-      throw in_line("no rotation", line, file, to_text(rotation.determinant()),
-                    "a rotation matrix, determinant 1");
-    const Eigen::Matrix3d nearest = nearest_rotation(rotation);
-    Pose pose = pose_of(line, matrix.col(3), Eigen::Quaterniond(nearest), file);
-    pose.linear() = nearest;
-    trajectory.push_back({0, 0.0, pose});
+    trajectory.push_back({0, 0.0, pose_of_rows(line, numbers_of(line, 0, 12, file), file)});
   }
   return trajectory;
+}
+
+Trajectory parse_open3d(std::string_view text, const std::string& file) {
+  Trajectory trajectory;
+  std::vector<double> rows;
+  std::size_t number = 0;
+  for (const TextLine& line : split_lines(text)) {
+    const std::size_t row = number++ % 5;
+    if (line.words.size() != (row == 0 ? 3U : 4U))
+      throw wrong_columns("no pose of Open3D", line, file, row == 0 ? "3" : "4");
+    if (row == 0) rows.clear();
+    if (row == 0) continue;
+    const std::vector<double> numbers = numbers_of(line, 0, 4, file);
+    rows.insert(rows.end(), numbers.begin(), numbers.end());
+    if (row == 4) trajectory.push_back({0, 0.0, pose_of_rows(line, rows, file)});
+  }
+  if (number % 5 != 0)
+    throw Error("the last pose is truncated",
+                {.file = file, .field = "lines", .value = std::to_string(number)});
+  return trajectory;
+}
+
+Trajectory parse_euroc(std::string_view text, const std::string& file) {
+  Trajectory trajectory;
+  for (const TextLine& line : split_lines(text)) {
+    if (is_comment(line)) continue;
+    if (line.words.size() < 8)
+      throw wrong_columns("no pose", line, file, "timestamp [ns], x, y, z, qw, qx, qy, qz, ...");
+    const std::vector<double> n = numbers_of(line, 0, 8, file);
+    const Pose pose = pose_of(line, Eigen::Vector3d(n[1], n[2], n[3]),
+                              Eigen::Quaterniond(n[4], n[5], n[6], n[7]), file);
+    trajectory.push_back({0, 1e-9 * n[0], pose});
+  }
+  return trajectory;
+}
+
+std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string& file) {
+  std::vector<ImagePose> images;
+  try {
+    const auto json = nlohmann::json::parse(text);
+    for (const auto& frame : json.at("frames")) {
+      const TextLine entry{images.size() + 1, {}, {}};
+      std::vector<double> rows;
+      for (const auto& row : frame.at("transform_matrix"))
+        for (const auto& value : row) rows.push_back(value.get<double>());
+      if (rows.size() < 12)
+        throw in_line("no matrix", entry, file, std::to_string(rows.size()), "12 or 16 numbers");
+      Pose pose = pose_of_rows(entry, rows, file);
+      // OpenGL's camera: y up, z backward.
+      pose.linear().rightCols<2>() = -pose.linear().rightCols<2>();
+      images.push_back({frame.at("file_path").get<std::string>(), pose});
+    }
+  } catch (const nlohmann::json::exception& error) {
+    throw Error(std::string("is no transforms.json of nerfstudio: ") + error.what(),
+                {.file = file});
+  }
+  return images;
 }
 
 std::string to_kitti(const Trajectory& trajectory) {
@@ -323,8 +386,14 @@ Pose to_axes(PoseAxes axes, const Pose& world_from_base) {
 }
 
 std::string recognize_poses(std::string_view text, const std::string& file) {
+  if (const std::size_t begin = text.find_first_not_of("\xEF\xBB\xBF \t\r\n");
+      begin != std::string_view::npos && text[begin] == '{')
+    return ".json";
   for (const TextLine& line : split_lines(text)) {
+    // The header of EuRoC names its columns.
+    if (is_comment(line) && line.text.find("q_RS_w") < line.text.find("q_RS_x")) return ".euroc";
     if (is_comment(line)) continue;
+    if (line.words.size() == 3) return ".log";
     const std::string_view tag = line.words[0];
     for (const char* start : {"VERTEX_", "EDGE_", "PARAMS_", "FIX"})
       if (tag.starts_with(start)) return ".g2o";
@@ -333,7 +402,7 @@ std::string recognize_poses(std::string_view text, const std::string& file) {
     if (line.words.size() == 12) return ".kitti";
     if (line.words.size() == 8 || line.words.size() == 9) return ".tum";
     throw wrong_columns("no known format of poses", line, file,
-                        "8 or 9 of TUM, 12 of KITTI, or VERTEX... of g2o or TORO");
+                        "8 or 9 of TUM, 12 of KITTI, 3 of Open3D, or VERTEX... of g2o or TORO");
   }
   throw Error("contains no pose", {.file = file});
 }

@@ -27,6 +27,16 @@ std::string to_tum(const Trajectory& trajectory, bool nodes = false);
 Trajectory parse_kitti(std::string_view text, const std::string& file);
 std::string to_kitti(const Trajectory& trajectory);
 
+// Open3D's trajectory log: a line of three integers, then the 4 x 4 matrix of a camera's pose
+// (optical frame); neither stamps nor nodes.
+Trajectory parse_open3d(std::string_view text, const std::string& file);
+
+// Ground truth of EuRoC MAV: "timestamp [ns], x, y, z, qw, qx, qy, qz, ..."; of the body.
+Trajectory parse_euroc(std::string_view text, const std::string& file);
+
+// transforms.json of nerfstudio (instant-ngp, Blender): cameras with y up and z backward.
+std::vector<ImagePose> parse_nerfstudio(std::string_view text, const std::string& file);
+
 struct PoseGraphText {
   Trajectory poses;  // without stamps
   std::vector<PoseLink> links;
@@ -68,8 +78,8 @@ Pose from_axes(PoseAxes axes, const Pose& pose_in_file);
 Pose to_axes(PoseAxes axes, const Pose& world_from_base);
 
 // Which of the formats above a text is, by its first line that is no comment: by its tag or its
-// number of columns; as its extension, ".tum", ".kitti", ".toro" or ".g2o". Throws Error if it is
-// none of them.
+// number of columns; as its extension, ".tum", ".kitti", ".toro", ".g2o", ".log" (Open3D), ".json"
+// (nerfstudio) or ".euroc". Throws Error if it is none of them.
 std::string recognize_poses(std::string_view text, const std::string& file);
 
 }  // namespace libmap

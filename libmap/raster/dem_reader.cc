@@ -131,7 +131,7 @@ Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t
   return {place.x(), place.y(), block.heights_m[pixel]};
 }
 
-PointCloud read_dem_cloud(const fs::path& path) {
+PointCloud read_dem_cloud(const fs::path& path, std::size_t* undeclared) {
   DemReader reader(path);
   if (reader.info().pixels() > machine_memory() / (2 * sizeof(Eigen::Vector3d)))
     throw Error(
@@ -144,8 +144,10 @@ PointCloud read_dem_cloud(const fs::path& path) {
   DemBlock block;
   while (reader.next(block))
     for (std::size_t n = 0; n < block.heights_m.size(); ++n)
-      if (!std::isnan(block.heights_m[n]))
+      if (std::isfinite(block.heights_m[n]))
         cloud.positions.push_back(point_of(reader.info(), block, n));
+      else if (undeclared != nullptr && std::isinf(block.heights_m[n]))
+        ++*undeclared;
   return cloud;
 }
 
@@ -210,7 +212,7 @@ TriangleMesh read_dem_mesh(const std::filesystem::path& path) {
   TriangleMesh mesh;
   std::vector<std::uint32_t> vertex_of(info.pixels(), no_vertex);
   for (std::size_t n = 0; n < vertex_of.size(); ++n) {
-    if (std::isnan(whole.heights_m[n])) continue;
+    if (!std::isfinite(whole.heights_m[n])) continue;
     vertex_of[n] = static_cast<std::uint32_t>(mesh.vertices.size());
     mesh.vertices.push_back(point_of(info, whole, n));
   }

@@ -36,7 +36,9 @@ struct DemBlock {
   std::int64_t row = 0;
   std::int64_t columns = 0;
   std::int64_t rows = 0;
-  std::vector<double> heights_m;  // local; NaN where the DEM has none
+  // Local; NaN where the DEM has none, -infinity where only custom says so: -9999, -99999, -999999,
+  // -32767, -32768, not declared as nodata.
+  std::vector<double> heights_m;
 };
 
 // Reads one file from its first block to its last: memory is proportional to a block (a tile, or
@@ -73,9 +75,9 @@ class DemReader {
 // Local position of the center of a pixel, by its number in the block.
 Eigen::Vector3d point_of(const DemInfo& info, const DemBlock& block, std::size_t pixel);
 
-// The DEM as a cloud: the centers of pixels that have a height, block by block. Throws as
-// DemReader, and if there is not enough memory for the points.
-PointCloud read_dem_cloud(const std::filesystem::path& path);
+// The DEM as a cloud: the centers of pixels that have a height, block by block. Counts undeclared
+// nodata. Throws as DemReader, and if there is not enough memory for the points.
+PointCloud read_dem_cloud(const std::filesystem::path& path, std::size_t* undeclared = nullptr);
 
 // The georeference of a DEM, of the first DEM in a folder (in the order of names), or of any other
 // output by the manifest beside it; nothing if there is none.

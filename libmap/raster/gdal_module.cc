@@ -228,7 +228,7 @@ class Dem {
     double first = 0.0;
     for_each_block([&](const DemBlock& block) {
       const auto height = std::find_if(block.heights_m.begin(), block.heights_m.end(),
-                                       [](double one) { return !std::isnan(one); });
+                                       [](double one) { return std::isfinite(one); });
       if (height == block.heights_m.end()) return true;
       first = *height;
       return false;
@@ -255,6 +255,13 @@ class Dem {
                             std::to_string(block.row) + ")"});
   }
 
+  // Values that mean "no height" by custom; no ground is that deep.
+  bool is_undeclared_nodata(double raw) const {
+    constexpr std::array customary = {-9999.0, -32768.0, -32767.0, -99999.0, -999999.0};
+    return height_scale_ == 1.0 && height_offset_ == 0.0 &&
+           std::find(customary.begin(), customary.end(), raw) != customary.end();
+  }
+
   void read(DemBlock& block) const {
     const auto pixels = static_cast<std::size_t>(block.columns * block.rows);
     block.heights_m.assign(pixels, nan_value);
@@ -269,6 +276,10 @@ class Dem {
       double& height = block.heights_m[n];
       if ((!mask.empty() && mask[n] == 0) || !std::isfinite(height)) {
         height = nan_value;
+        continue;
+      }
+      if (is_undeclared_nodata(height)) {
+        height = -std::numeric_limits<double>::infinity();
         continue;
       }
       height = height * height_scale_ + height_offset_;

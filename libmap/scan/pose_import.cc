@@ -271,7 +271,7 @@ void bind(ParameterTable& table, PoseImportOptions& options) {
   table.add(
       "poses_of", options.frame, pose_frame_names(),
       "whose poses a file contains: the base's, or the first camera's optical frame's; those of "
-      "COLMAP are the cameras'");
+      "COLMAP, nerfstudio and Open3D are the cameras'");
   table.add("poses_scale", options.scale, not_negative,
             "meters a unit of a file's positions, COLMAP's being arbitrary; 0: the one that fits "
             "the scan's odometry best");
@@ -285,7 +285,8 @@ ImportedPoses import_poses(const fs::path& path, const ScanSource& scan,
     std::vector<CameraPose> cameras;
     if (file.images.empty()) {
       const NodeTrajectory assigned = assign_nodes(file.poses, scan.graph());
-      cameras = poses_of_nodes(assigned, scan, options.frame, result.warnings);
+      const PoseFrame frame = file.of_cameras ? PoseFrame::camera : options.frame;
+      cameras = poses_of_nodes(assigned, scan, frame, result.warnings);
       result.poses_in_file = file.poses.size();
     } else {
       cameras = poses_of_images(file.images, scan, result.warnings);

@@ -83,7 +83,12 @@ std::vector<Vector2d> moved(const std::vector<Vector2d>& corners, const Pose& po
 
 Pose level_frame(const Source& source, const CropOptions& options, CropReport& report) {
   if (!options.level) return Pose::Identity();
-  report.up = options.up ? *options.up : up_of_normals(source.normals);
+  if (options.up) {
+    report.up = *options.up;
+  } else {
+    report.up_of_normals = up_of_normals(source.ground_points, source.normals);
+    report.up = report.up_of_normals->direction;
+  }
   GroundPlaneOptions ground = options.ground;
   ground.up = report.up;
   report.ground = find_ground_plane(source.ground_points, ground);

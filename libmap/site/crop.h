@@ -9,6 +9,7 @@
 #include "libmap/core/parameters.h"
 #include "libmap/core/point_cloud.h"
 #include "libmap/core/triangle_mesh.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/site/border_band.h"
 #include "libmap/site/ground_plane.h"
 #include "libmap/site/plan_polygon.h"
@@ -26,7 +27,7 @@ enum class CropFrame { level, map };
 
 struct CropOptions {
   bool level = true;  // false: the map's z is up and its ground stays where it is
-  std::optional<Eigen::Vector3d> up = std::nullopt;  // none: as the normals say (up_of_normals)
+  std::optional<Eigen::Vector3d> up = std::nullopt;  // none: by the normals (up_of_normals)
   GroundPlaneOptions ground{};                       // its `up` is overwritten
   CropRegion region = CropRegion::whole;
   CropFrame frame = CropFrame::level;
@@ -47,7 +48,8 @@ void bind(ParameterTable& table, CropOptions& options);
 
 struct CropReport {
   Pose site_from_map = Pose::Identity();
-  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // in the map, that the ground was looked for by
+  Eigen::Vector3d up = Eigen::Vector3d::UnitZ();  // in the map, for finding the ground
+  std::optional<UpOfNormals> up_of_normals{};     // if that determined `up`
   std::optional<GroundPlane> ground{};            // in the map; none if it was not levelled
   std::vector<Eigen::Vector2d> outline{};         // in the site, counter-clockwise; may be empty
   std::optional<SiteRectangle> rectangle{};       // in the level frame

@@ -220,6 +220,30 @@ void require_plane_spread(const Points& points) {
 
 std::string percent(double share) { return to_fixed_text(100.0 * share, 1) + " %"; }
 
+// The option with which there is a ground plane: natural terrain is rougher than a floor.
+std::string remedy(const Points& points, const GroundPlaneOptions& options,
+                   const Eigen::Vector3d& up) {
+  GroundPlaneOptions rougher = options;
+  double share = 0.0;
+  for (int doubling = 0; doubling < 5; ++doubling) {
+    rougher.tolerance_m *= 2.0;
+    if (!find_candidates(drawn_points(points, options.seed), rougher, up, share).empty())
+      return "natural terrain needs --plane-tolerance " + to_text(rougher.tolerance_m);
+  }
+  // Ground that leans more, or a frame whose z is not up.
+  const Eigen::Vector3d normal =
+      plane_of(weighted_spread(points, points.front(), points_per_chunk,
+                               [](const Eigen::Vector3d&) { return 1.0; }),
+               up)
+          .normal;
+  if (!find_candidates(drawn_points(points, options.seed), options, normal, share).empty()) {
+    const auto text = [](double value) { return to_fixed_text(value, 2); };
+    return "--up " + text(normal.x()) + "," + text(normal.y()) + "," + text(normal.z()) +
+           " (or its opposite) is the normal of the points";
+  }
+  return "--level none with --box or --polygon keeps the frame's z";
+}
+
 }  // namespace
 
 void bind(ParameterTable& table, GroundPlaneOptions& options) {
@@ -248,7 +272,7 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
   if (candidates.empty())
     throw Error("no plane within " + to_text(options.max_tilt_deg) + " degrees of up, (" +
                     to_text(up.x()) + ", " + to_text(up.y()) + ", " + to_text(up.z()) +
-                    "), is large enough to be the ground",
+                    "), is large enough to be the ground: " + remedy(points, options, up),
                 {.field = "share of the points on the largest",
                  .value = percent(largest_share),
                  .bound = ">= " + percent(options.min_share)});
@@ -278,28 +302,6 @@ GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
   result.share = count / static_cast<double>(points.size());
   result.tilt_deg = degrees_between(result.normal, up);
   return result;
-}
-
-Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals) {
-  Eigen::Vector3d z = Eigen::Vector3d::UnitZ();
-  Eigen::Vector3d direction = Eigen::Vector3d::Zero();
-  // From wide to narrow: walls and rocks fall away, the ground stays.
-  for (const double within_deg : {180.0, 60.0, 45.0, 30.0, 30.0}) {
-    const double least = std::cos(within_deg * std::numbers::pi / 180.0);
-    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-    std::size_t count = 0;
-    for (const Eigen::Vector3f& each : normals) {
-      const Eigen::Vector3d normal = each.cast<double>();
-      const double length = normal.norm();
-      if (!(length > 0.0) || !std::isfinite(length)) continue;
-      if (within_deg < 180.0 && normal.dot(direction) < least * length) continue;
-      sum += normal / length;
-      ++count;
-    }
-    if (count == 0 || sum.norm() < 0.2 * static_cast<double>(count)) return z;
-    direction = sum.normalized();
-  }
-  return degrees_between(direction, z) <= 20.0 ? z : direction;
 }
 
 Pose level_from_map(const GroundPlane& plane) {

@@ -48,11 +48,6 @@ struct GroundPlane {
 GroundPlane find_ground_plane(const std::vector<Eigen::Vector3d>& points,
                               const GroundPlaneOptions& options = {});
 
-// Up as the surface itself says. Where the normals' mean, taken again and again among those around
-// it, lies within 20 degrees of +z, or there are no normals or they point everywhere, +z;
-// otherwise that mean. Normals of any length, zeros passed over.
-Eigen::Vector3d up_of_normals(const std::vector<Eigen::Vector3f>& normals);
-
 // Carries the plane to z = 0 by the least rotation, about `center`: x and y of the ground stay as
 // near as that allows.
 Pose level_from_map(const GroundPlane& plane);

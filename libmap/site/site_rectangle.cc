@@ -239,6 +239,19 @@ void require_ranges(const Vector2d& size_m, const SiteRectangleOptions& options)
                                .bound = "> 0 and finite"});
 }
 
+// The gap with which a site fits into sparse data. Nothing for gaps of a quarter of the site.
+std::string gap_remedy(const std::vector<Vector2d>& points, const Vector2d& size_m,
+                       SiteRectangleOptions options) {
+  options.max_gap_m = std::max(2.0 * options.max_gap_m, options.cell_m);
+  if (options.max_gap_m > 0.25 * size_m.minCoeff()) return "";
+  try {
+    find_site_rectangle(points, size_m, options);
+  } catch (const Error&) {
+    return "";
+  }
+  return "; --max-gap " + to_text(options.max_gap_m) + " closes more holes";
+}
+
 }  // namespace
 
 void bind(ParameterTable& table, SiteRectangleOptions& options) {
@@ -279,7 +292,7 @@ SiteRectangle find_site_rectangle(const std::vector<Vector2d>& points, const Vec
                           (best.fit ? size_text(size_m.array() +
                                                 2.0 * (result.clearance_m - options.margin_m))
                                     : std::string("0")) +
-                          ", the largest that fits"});
+                          ", the largest that fits" + gap_remedy(points, size_m, options)});
   result.center = best.fit->center;
   return result;
 }

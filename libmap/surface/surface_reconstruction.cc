@@ -11,6 +11,7 @@
 #include "libmap/core/error.h"
 #include "libmap/core/parallel.h"
 #include "libmap/core/text.h"
+#include "libmap/geometry/normal_sides.h"
 #include "libmap/geometry/spatial_index.h"
 #include "libmap/geometry/symmetric_eigen.h"
 #include "libmap/geometry/voxel_key.h"
@@ -31,6 +32,9 @@ constexpr int min_depth = 3;
 constexpr double max_grid_cells = voxel_cell_limit;
 // Smallest second standard deviation of a cloud's positions, against its first, of a surface.
 constexpr double min_width = 1e-4;
+
+// No surface passes between normals whose neighbors face opposite sides more often.
+constexpr double max_mixed_sides = 0.4;
 
 constexpr std::size_t value_neighbors = 4;
 // Cells beyond which only the nearest point has a say in a vertex's values.
@@ -116,12 +120,13 @@ class Reconstruction {
     if (is_part_) survey_ = *survey;
   }
 
-  SurfaceReconstructionResult run() {
+  SurfaceReconstructionResult run(const AnnounceWork& announce = {}) {
     if (is_part_ && cloud_.empty()) return {};
     timed("samples", [&] {
       choose_points();
       choose_cell_size();
       if (!is_part_) check_cell_size();
+      if (announce) announce(expected_work());
       make_samples();
       find_spacings();
     });
@@ -154,6 +159,7 @@ class Reconstruction {
 
   void choose_points();
   void choose_cell_size();
+  SurfaceWork expected_work() const;
   void check_cell_size();
   double weight_of(std::size_t point) const;
   void make_samples();
@@ -169,6 +175,7 @@ class Reconstruction {
   std::vector<std::size_t> used_;
   Eigen::Vector3d origin_ = Eigen::Vector3d::Zero();
   double median_error_m_ = 0.0;
+  double area_m2_ = 0.0;  // by the number and spacing of the points; not of a part
   const ScalarField* errors_ = nullptr;
   PoissonProblem problem_;
   std::vector<SurfaceSample> samples_;   // about the origin
@@ -186,6 +193,12 @@ void Reconstruction::choose_points() {
     if (has_normal(cloud_, n)) used_.push_back(n);
   result_.dropped_points = cloud_.size() - used_.size();
   if (survey_.points() == 0) throw Error("no point of the cloud has a normal");
+  const double opposing = opposing_share(cloud_.positions, cloud_.normals);
+  if (opposing > max_mixed_sides)
+    throw Error("the normals have no consistent sides: orient them, or use --normals estimate",
+                {.field = "neighbors whose normals face opposite sides",
+                 .value = to_fixed_text(100.0 * opposing, 1) + " %",
+                 .bound = "<= " + to_text(100.0 * max_mixed_sides) + " %"});
   // By position, so that the order of the points has no influence.
   const auto& positions = cloud_.positions;
   const auto& normals = cloud_.normals;
@@ -221,8 +234,21 @@ void Reconstruction::choose_cell_size() {
   const Eigen::Vector3d spread = symmetric_eigen(moments).values;
   if (!(spread[1] > min_width * min_width * spread[2]))
     throw too_thin("the points lie on a line: there is no surface through them");
-  result_.spacing_m = median_spacing(places);
+  const CloudSpacing spacing = point_spacing(places);
+  result_.spacing_m = spacing.nearest_m;
   if (!(options_.cell_size_m > 0.0)) result_.cell_size_m = result_.spacing_m;
+  area_m2_ = static_cast<double>(places.size()) * spacing.by_area_m * spacing.by_area_m;
+}
+
+// Measured on rolling ground of 1 million points, and on a site of 300,000 with Poisson.
+SurfaceWork Reconstruction::expected_work() const {
+  const double points = static_cast<double>(used_.size());
+  SurfaceWork work;
+  work.triangles = 2.7 * area_m2_ / (result_.cell_size_m * result_.cell_size_m);
+  const bool is_poisson = options_.method == SurfaceMethod::poisson;
+  work.bytes = 450.0 * points + (is_poisson ? 500.0 : 90.0) * work.triangles;
+  work.seconds = 6.5e-6 * points + (is_poisson ? 3e-5 : 4.3e-6) * work.triangles;
+  return work;
 }
 
 void Reconstruction::check_cell_size() {
@@ -416,9 +442,9 @@ void bind(ParameterTable& table, SurfaceReconstructionOptions& options) {
 
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options,
-                                                Progress& progress) {
+                                                Progress& progress, const AnnounceWork& announce) {
   check_parameters(options);
-  return Reconstruction(cloud, nullptr, options, progress).run();
+  return Reconstruction(cloud, nullptr, options, progress).run(announce);
 }
 
 SurfaceReconstructionResult reconstruct_part(const PointCloud& part, const SurfaceSurvey& survey,

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <functional>
 #include <map>
 
 #include "libmap/core/parameters.h"
@@ -24,7 +25,7 @@ struct SurfaceReconstructionOptions {
   SurfaceMethod method = SurfaceMethod::implicit;
   double support_cells = 2.5;  // >= 1.5: of a sample, with `implicit`; see surface_solvers.h
   // >= 0: of the grid, or of the octree's finest cells; edges of the mesh are about as long. 0: the
-  // median distance of points to their nearest neighbors.
+  // median distance of points to their nearest neighbors (median_spacing).
   double cell_size_m = 0.0;
   // poisson, >= 0: how much the surface is held to the points against being smooth
   double screening = 4.0;
@@ -78,16 +79,26 @@ struct SurfaceReconstructionResult {
 };
 void describe(ResultTable& table, const SurfaceReconstructionResult& result);
 
+// Estimated before the work, from the number and the spacing of the points.
+struct SurfaceWork {
+  double triangles = 0.0;
+  double bytes = 0.0;    // of memory
+  double seconds = 0.0;  // on one thread
+};
+using AnnounceWork = std::function<void(const SurfaceWork& work)>;
+
 // Oriented; open where points end. What is not manifold is for clean_mesh, and with poisson the
 // holes of single faces that PCL leaves out. PCL runs on one thread, since its result depends on
 // their number, and what it prints is kept from standard output and error, whoever writes there
 // meanwhile. The same bytes for any number of threads and any order of the points, but where points
 // of equal position and normal differ; a shift of the cloud shifts the mesh, but for rounding.
-// Throws Error: no normals, no point with a normal, fewer than 3 places or places on a line,
-// options out of their ranges, an octree deeper than max_octree_depth.
+// Throws Error: no normals, no point with a normal, normals whose neighbors face opposite sides,
+// fewer than 3 places or places on a line, options out of their ranges, an octree deeper than
+// max_octree_depth.
 SurfaceReconstructionResult reconstruct_surface(const PointCloud& cloud,
                                                 const SurfaceReconstructionOptions& options = {},
-                                                Progress& progress = no_progress());
+                                                Progress& progress = no_progress(),
+                                                const AnnounceWork& announce = {});
 
 // The same surface, but for rounding of the vertices' order, of a part of a cloud that `survey` has
 // seen whole: exactly so farther than surface_margin_m() inside of where points are missing. For

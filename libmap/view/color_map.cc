@@ -141,7 +141,7 @@ std::string title_of(std::string name, const Coloring& coloring) {
 }
 
 void color_by_score(const ColorSource& source, const Coloring& coloring, ColoredPoints& result) {
-  const bool is_held = coloring.mode == ColorMode::automatic && find(source, hold_probability);
+  const bool is_held = coloring.mode == ColorMode::automatic && find_field(source.fields, hold_probability) != nullptr;
   const std::string name = !coloring.field.empty() ? coloring.field
                            : is_held               ? hold_probability
                                                    : "score";

@@ -326,10 +326,22 @@ TEST_F(LookupBadInput, CloudsThatCannotHaveBeenMeasured) {
   EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
 }
 
-TEST(Lookup, NoPointsHaveNoAnswers) {
+TEST_F(LookupBadInput, TablesWithoutRows) {
   write_small_map();
   write_text(scratch("points.csv"), "x,y,z\n");
-  EXPECT_TRUE(looked_up({}).rows.empty());
+  const ProgramResult result = graspmap({"lookup", "map.pcd", "points.csv", "-o", "out.csv"});
+  EXPECT_TRUE(bad_input(result, {"points.csv", "no rows"}));
+  EXPECT_FALSE(std::filesystem::exists(scratch("out.csv")));
+}
+
+// CSV of Excel for the Macintosh.
+TEST(Lookup, CarriageReturnsEndRows) {
+  write_small_map();
+  write_text(scratch("points.csv"), "x,y,z\n0,0,0\n1,0,0\n");
+  const auto rows = looked_up({}).rows;
+  write_text(scratch("points.csv"), "x,y,z\r0,0,0\r1,0,0\r");
+  EXPECT_EQ(looked_up({}).rows, rows);
+  EXPECT_EQ(rows.size(), 2U);
 }
 
 }  // namespace lookup_test

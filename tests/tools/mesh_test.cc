@@ -87,6 +87,22 @@ TEST(Mesh, MissingNormalsAreEstimatedAndItIsSaid) {
                 {"ball.ply", "has no normals", "--normals"}));
 }
 
+// As Open3D, PCL and a PCA leave them.
+TEST(Mesh, NormalsWithoutSidesAreOriented) {
+  libmap::PointCloud cloud = ball(true);
+  for (std::size_t n = 0; n < cloud.size(); n += 2) cloud.normals[n] = -cloud.normals[n];
+  write_ball(cloud);
+  const auto result = graspmap({"mesh", "ball.ply", "-o", "mesh.ply"});
+  ASSERT_TRUE(succeeded(result));
+  EXPECT_NE(result.standard_error.find("warning"), std::string::npos);
+  const nlohmann::json results = json_of("mesh.ply.json").at("results");
+  EXPECT_GT(results.at("opposing_normals"), 0.4);
+  EXPECT_EQ(results.at("normals_oriented_by"), "a minimum spanning tree");
+  EXPECT_EQ(results.at("holes_filled"), 0);
+  EXPECT_TRUE(bad_input(graspmap({"mesh", "ball.ply", "-o", "as_is.ply", "--normals", "cloud"}),
+                        {"ball.ply", "opposite sides", "--normals estimate"}));
+}
+
 TEST(Mesh, NormalsThatAreAllZero) {
   libmap::PointCloud cloud = ball(true);
   for (Eigen::Vector3f& normal : cloud.normals) normal.setZero();

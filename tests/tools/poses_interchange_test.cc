@@ -112,6 +112,47 @@ TEST(ExtractColmap, IsReadAsPosesAgain) {
   EXPECT_EQ(json_of("two.json")["inputs"].size(), 2U);
 }
 
+// Cameras' poses of Open3D and of nerfstudio are the same as COLMAP's.
+TEST(Poses, OfOpen3dAndNerfstudio) {
+  write_example();
+  ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "one"})));
+  const auto first_cameras = [&](const std::string& folder) {
+    std::vector<libmap::ImagePose> images = libmap::read_trajectory(scratch(folder)).images;
+    std::erase_if(images,
+                  [](const auto& image) { return image.image.find('_') != std::string::npos; });
+    std::sort(images.begin(), images.end(),
+              [](const auto& a, const auto& b) { return a.image < b.image; });
+    return images;
+  };
+  const auto images = first_cameras("one");
+  std::string log;
+  nlohmann::json frames = nlohmann::json::array();
+  for (const libmap::ImagePose& image : images) {
+    log += "0 0 0\n";
+    nlohmann::json matrix = nlohmann::json::array();
+    for (int row = 0; row < 4; ++row) {
+      std::vector<double> open_gl;
+      for (int column = 0; column < 4; ++column) {
+        const double value = image.world_from_camera.matrix()(row, column);
+        log += libmap::to_text(value) + (column == 3 ? "\n" : " ");
+        open_gl.push_back(column == 1 || column == 2 ? -value : value);
+      }
+      matrix.push_back(open_gl);
+    }
+    frames.push_back({{"file_path", "./images/" + image.image}, {"transform_matrix", matrix}});
+  }
+  write_text(scratch("poses.log"), log);
+  write_text(scratch("transforms.json"), nlohmann::json{{"frames", frames}}.dump());
+  for (const std::string file : {"poses.log", "transforms.json"}) {
+    ASSERT_TRUE(
+        succeeded(graspmap({"convert", "scan.db", "--colmap", file + ".out", "--poses", file})));
+    const auto back = first_cameras(file + ".out");
+    ASSERT_EQ(back.size(), images.size()) << file;
+    for (std::size_t n = 0; n < images.size(); ++n)
+      EXPECT_TRUE(back[n].world_from_camera.isApprox(images[n].world_from_camera, 1e-9)) << file;
+  }
+}
+
 TEST(ExtractColmap, BesideOthersAndInADryRun) {
   write_example();
   ASSERT_TRUE(succeeded(graspmap({"convert", "scan.db", "--colmap", "out", "--dry-run"})));

@@ -95,6 +95,28 @@ TEST(Raster, AMapIsWhereItsDemIs) {
   EXPECT_EQ(best_in_raster, best);
 }
 
+// Undeclared -9999 is dropped; other values for "no height" turn the plane and are refused.
+TEST(Raster, HeightsThatWereNotMeasured) {
+  AsciiGrid grid = knob();
+  for (std::size_t row = 0; row < 20; ++row)
+    for (std::size_t column = 0; column < 20; ++column) grid.rows[row][column] = -9999;
+  const Words undeclared = with(utm, {"-a_nodata", "none"});
+  write_dem("dem.tif", grid, undeclared);
+  for (const std::string map : {"map.pcd", "map.tiles"}) {
+    const auto result = graspmap(with({"score", "dem.tif", "-o", map}, score));
+    ASSERT_TRUE(succeeded(result));
+    EXPECT_NE(result.standard_error.find("warning: dem.tif: 400 points"), std::string::npos);
+  }
+  const auto manifest = json_of("map.pcd.json");
+  EXPECT_EQ(manifest["results"]["input_points"], 6000);
+  EXPECT_EQ(manifest["results"]["up_source"], "direction");
+  for (std::size_t row = 0; row < 20; ++row)
+    for (std::size_t column = 0; column < 20; ++column) grid.rows[row][column] = 0;
+  write_dem("zeros.tif", grid, undeclared);
+  EXPECT_TRUE(bad_input(graspmap(with({"score", "zeros.tif", "-o", "zeros.pcd"}, score)),
+                        {"zeros.tif", "tilt of the plane", "<= 75", "-a_nodata"}));
+}
+
 // Ground that leans by 20 degrees: the fitted frame leans too, but not the raster.
 TEST(Raster, AFittedPlaneDoesNotMoveTheMap) {
   const double slope = std::tan(20.0 * M_PI / 180.0);

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "libmap/io/cloud_io.h"
+#include "libmap/io/mesh_io.h"
 #include "tests/tools/tool_test_support.h"
 
 namespace score_bad_input_test {
@@ -116,8 +117,8 @@ TEST_F(ScoreBadInput, Grippers) {
                         {"gripper.yaml", "finger_lenght_mm", "did you mean 'finger_length_mm'"}));
   EXPECT_TRUE(bad_input(with_gripper("finger_length_mm: 40", "# finger_length_mm: 40"),
                         {"gripper.yaml", "finger_length_mm", "missing"}));
-  EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 90"),
-                        {"gripper.yaml", "opening_angle_deg is 90", "< 90"}));
+  EXPECT_TRUE(bad_input(with_gripper("opening_angle_deg: 85", "opening_angle_deg: 95"),
+                        {"gripper.yaml", "opening_angle_deg is 95", "<= 90"}));
   EXPECT_TRUE(bad_input(with_gripper("name: SCAR-E", "name: SCAR-E\nname: other"),
                         {"gripper.yaml", "name", "is a duplicate"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--gripper", "scare"}),
@@ -224,6 +225,30 @@ TEST_F(ScoreBadInput, FlagsOutOfTheirBounds) {
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--solid-voxel-threshold", "0"}),
                         {"--solid-voxel-threshold is 0"}));
   EXPECT_TRUE(bad_input(score({"terrain.pcd", "--tile-size", "1e-9"}), {"tile_size_m is 1e-09"}));
+}
+
+TEST_F(ScoreBadInput, AMeshIsNoCloud) {
+  libmap::TriangleMesh mesh;
+  mesh.vertices = {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}};
+  mesh.triangles = {{0, 1, 2}};
+  for (const std::string name : {"mesh.ply", "mesh.obj"}) {
+    libmap::write_mesh(scratch(name), mesh);
+    EXPECT_TRUE(bad_input(score({name}), {name, "graspmap resample"}));
+  }
+}
+
+// Ground of 3 x 3 m, a point each 2.5 voxels: nothing but lone voxels.
+TEST_F(ScoreBadInput, PointsTooFarApartForTheVoxels) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 120; ++i)
+    for (int j = 0; j < 120; ++j) points.emplace_back(0.025 * i, 0.025 * j, 0.0);
+  const std::string cloud = cloud_of(points);
+  const Words named = {cloud, "0.025 m", "voxels of 0.01 m", "no neighbor"};
+  EXPECT_TRUE(bad_input(score({cloud, "--voxel-size", "0.01"}), named));
+  EXPECT_TRUE(
+      bad_input(graspmap({"score", cloud, "--voxel-size", "0.01", "-o", "map.tiles"}), named));
+  EXPECT_TRUE(graspmap_test::succeeded(graspmap(
+      {"score", cloud, "--voxel-size", "0.01", "--interpolation", "true", "-o", "out.pcd"})));
 }
 
 TEST_F(ScoreBadInput, OutputsThatCannotBe) {

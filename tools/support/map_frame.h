@@ -24,7 +24,8 @@ PointFrameNames listed_point_frame_names();
 PointFrame frame_of_points(const std::string& points, PointFrame asked, const std::string& map,
                            Run& run);
 
-// The columns x, y, z, in meters. Throws Error naming the file, the row and the column.
+// The columns x, y, z, in meters. Throws Error naming the file, the row and the column, and for a
+// table without rows.
 std::vector<Eigen::Vector3d> positions_of(const libmap::Table& table);
 
 // The transform of what was scored; nullptr if the manifest has none.

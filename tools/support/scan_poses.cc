@@ -184,6 +184,9 @@ std::unique_ptr<libmap::ScanSource> open_scan(const std::vector<std::string>& sc
       throw libmap::Error(warning).in_file(path);
     run.warn("{}: {}", path, warning);
   }
+  if (scan->graph().nodes.empty())
+    throw libmap::Error("the scan has no nodes: nothing was recorded, or recording was interrupted",
+                        {.file = path});
   return camera ? libmap::with_calibration(std::move(scan), *camera) : std::move(scan);
 }
 
@@ -223,7 +226,8 @@ libmap::Pose truth_from_poses(const libmap::ScanSource& scan, const libmap::Traj
   }
   const libmap::AbsoluteTrajectoryError error =
       in_file(path, [&] { return libmap::absolute_trajectory_error(poses, truth); });
-  run.say("aligned with {} true poses: RMSE {:.1f} mm", error.poses, 1e3 * error.rmse_m);
+  run.say("aligned with {} true poses: RMSE {:.1f} mm, {:.2f} deg", error.poses, 1e3 * error.rmse_m,
+          error.mean_rotation_deg);
   run.add_results({{"trajectory_rmse_m", error.rmse_m}});
   run.manifest().transforms.emplace_back(truth_from_poses_name, error.truth_from_estimate);
   return error.truth_from_estimate;

@@ -181,6 +181,40 @@ TEST(GripperUrdf, ACoupledSpineJointFollowsItsFinger) {
   EXPECT_FALSE(found.contains("fingers.curl_limit_deg"));
 }
 
+// One motor: all joints mimic the left finger's, through others.
+TEST(GripperUrdf, OneJointMayDriveAllFingers) {
+  Frames frames;
+  frames.spine_limits += "<mimic joint=\"left_root\" multiplier=\"0.5\" offset=\"0.1\"/>";
+  const std::string mimic = "<mimic joint=\"left_root\" multiplier=\"2\" offset=\"-0.25\"/>";
+  std::string xml = three_fingers(frames);
+  const auto drive = [&](const std::string& joint, const std::string& by) {
+    const std::string head = "<joint name=\"" + joint + "\" type=\"revolute\">";
+    xml = replaced(xml, head, head + by);
+  };
+  drive("right_root", mimic);
+  drive("rear_root", replaced(mimic, "left_root", "right_root"));
+  // Each spine as a function of its own finger: 0.5 q + 0.1 of the left one.
+  const auto spine = [&](const std::string& name, const std::string& by) {
+    const std::string head = name + "_carrier\"/><axis xyz=\"-1 0 0\"/>";
+    xml = replaced(xml, head + frames.spine_limits,
+                   head + replaced(frames.spine_limits,
+                                   "joint=\"left_root\" multiplier=\"0.5\" offset=\"0.1\"", by));
+  };
+  // right = 2 left - 0.25, so that left = (right + 0.25) / 2.
+  spine("right", "joint=\"left_root\" multiplier=\"1\" offset=\"-0.025\"");
+  // rear = 2 right - 0.25 = 4 left - 0.75.
+  spine("rear", "joint=\"left_root\" multiplier=\"2\" offset=\"-0.275\"");
+  const auto found = measures(xml, three_mapping({0, 0, 1}));
+  EXPECT_NEAR(found.at("fingers.curl_deg"), (0.1 + 0.5 * 1.25) * 180 / M_PI, 1e-4);
+  drive("left_root", replaced(mimic, "left_root", "rear_root"));
+  EXPECT_EQ(error_of([&] {
+              measures(xml, three_mapping({0, 0, 1}));
+            })
+                .context()
+                .field.substr(0, 6),
+            "joint ");
+}
+
 TEST(GripperUrdf, NamesMayBeListed) {
   UrdfMapping listed = three_mapping({0, 0, 1});
   listed.finger_joint = "rear_root, left_root, right_root";

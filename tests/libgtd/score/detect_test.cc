@@ -13,6 +13,7 @@ namespace detect_test {
 using graspmap_test::bumpy_cloud;
 using graspmap_test::error_of;
 using graspmap_test::gripper_named;
+using libgtd::Orientation;
 using libmap::PointCloud;
 
 DetectionOptions options_for(Method method) {
@@ -101,7 +102,7 @@ TEST(DetectionErrors, NameTheField) {
 }
 
 TEST(Detection, StrayPointFarAboveCostsNoMemory) {
-  PointCloud cloud = bumpy_cloud(0.4, 0.01);
+  PointCloud cloud = bumpy_cloud(0.3, 0.002);
   DetectionOptions options = options_for(Method::corrected);
   options.plane = PlaneSource::none;
   options.scenario.voxel_size_m = 0.002;
@@ -110,6 +111,29 @@ TEST(Detection, StrayPointFarAboveCostsNoMemory) {
   cloud.positions.emplace_back(0.0, 0.0, 900.0);
   const auto with_stray = detect(cloud, options).map.voxels;
   EXPECT_EQ(with_stray.size(), alone.size() + 1);
+}
+
+TEST(Detection, NormalsWithRandomSidesAreNoOutside) {
+  PointCloud cloud = bumpy_cloud(0.5, 0.009);
+  DetectionOptions options = options_for(Method::corrected);
+  options.scenario.orientation = Orientation::surface;
+  const auto without = detect(cloud, options);
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    cloud.normals.emplace_back(0, 0, graspmap_test::uniform(0, 1) < 0.5 ? -1 : 1);
+  const auto with = detect(cloud, options);
+  EXPECT_EQ(with.plane->up_source, libgtd::UpSource::frame_z);
+  EXPECT_EQ(with.map.terrain_from_input.matrix(), without.map.terrain_from_input.matrix());
+  ASSERT_EQ(with.map.voxels.size(), without.map.voxels.size());
+  for (std::size_t n = 0; n < with.map.voxels.size(); ++n)
+    EXPECT_EQ(with.map.voxels[n].score, without.map.voxels[n].score);
+}
+
+TEST(Detection, LoneVoxelsAreCountedAndRefused) {
+  DetectionOptions options = options_for(Method::corrected);
+  options.scenario.voxel_size_m = 0.01;
+  EXPECT_EQ(detect(bumpy_cloud(0.5, 0.008), options).lone_voxels, 0U);
+  const libmap::Error error = error_of([&] { detect(bumpy_cloud(0.5, 0.03), options); });
+  EXPECT_EQ(error.context().field, "spacing of the points with voxels of 0.01 m");
 }
 
 TEST(DetectionErrors, PointsInOnePlaceOrOnALineAreNoTerrain) {

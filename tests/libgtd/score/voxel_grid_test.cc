@@ -88,6 +88,15 @@ TEST(Downsampling, AveragesThePointsOfACell) {
 }
 
 // Boxes of few and of too many voxels to be numbered in 64 bits.
+TEST(CountLone, LooksAtAll26Neighbors) {
+  using libgtd::count_lone;
+  EXPECT_EQ(count_lone({}), 0U);
+  EXPECT_EQ(count_lone({{0, 0, 0}}), 1U);
+  EXPECT_EQ(count_lone({{0, 0, 0}, {1, 1, 1}}), 0U);
+  EXPECT_EQ(count_lone({{0, 0, 0}, {1, -1, 1}, {3, 0, 0}}), 1U);
+  EXPECT_EQ(count_lone({{0, 0, 0}, {0, 0, 2}, {0, 2, 0}, {2, 0, 0}}), 4U);
+}
+
 TEST(Voxelize, SortsVoxelsOfAnyBox) {
   for (const double extent_m : {0.05, 0.9, 2e6}) {
     std::vector<Eigen::Vector3d> points;

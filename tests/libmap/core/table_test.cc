@@ -41,6 +41,21 @@ TEST(TableTest, ByteOrderMarkAndLineEndings) {
   }
 }
 
+TEST(TableTest, CarriageReturnsAloneEndLines) {
+  const Table table = parse_csv("x,y\r1,2\r# no row\r3,4\r", "");
+  EXPECT_EQ(table.columns, (std::vector<std::string>{"x", "y"}));
+  EXPECT_EQ(table.rows, (Rows{{"1", "2"}, {"3", "4"}}));
+}
+
+TEST(TableTest, OtherSeparatorsAreNamed) {
+  for (const auto& [text, name] : {std::pair{"x;y\n1,5;2\n", "';'"}, {"x\ty\n1\t2\n", "tab"}}) {
+    const libmap::Error error = error_of([&, text = text] { parse_csv(text, "t.csv"); });
+    EXPECT_EQ(error.context().file, "t.csv");
+    EXPECT_EQ(error.context().value, name);
+    EXPECT_EQ(error.context().bound, "','");
+  }
+}
+
 TEST(TableTest, LineEndingsInQuotesAreKept) {
   EXPECT_EQ(parse_csv("a\r\n\"1\r\n2\"\r\n", "").rows, (Rows{{"1\r\n2"}}));
 }

@@ -48,6 +48,23 @@ TEST(Normals, OfATiltedPlaneAreExactAndUp) {
   EXPECT_EQ(result.undefined, 0U);
 }
 
+// The axes of the given normals stay; their sides become those of estimated normals.
+TEST(Normals, GivenNormalsAreOriented) {
+  PointCloud cloud = ground(20, 0.5);
+  const Eigen::Vector3f truth = Eigen::Vector3f(-0.5F, 0, 1).normalized();
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    cloud.normals.push_back(truth * (uniform(0, 1) < 0.5 ? -2.0F : 2.0F));
+  cloud.normals[7].setConstant(std::numeric_limits<float>::quiet_NaN());
+  const NormalEstimationResult result = orient_normals(cloud);
+  ASSERT_EQ(result.normals.size(), cloud.size());
+  EXPECT_EQ(result.undefined, 1U);
+  EXPECT_TRUE(result.normals[7].isZero(0.0F));
+  for (std::size_t n = 8; n < cloud.size(); ++n)
+    EXPECT_LT((result.normals[n] - truth).norm(), 1e-6F);
+  cloud.viewpoint.translation() = Eigen::Vector3d(0, 0, -5);
+  EXPECT_LT((orient_normals(cloud).normals[0] + truth).norm(), 1e-6F);
+}
+
 TEST(Normals, OfABallLookOutwards) {
   const Eigen::Vector3d center(5, -3, 2);
   const PointCloud cloud = ball(4000, 0.3, center);

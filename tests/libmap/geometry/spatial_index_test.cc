@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 
 #include "tests/support/test_support.h"
 
@@ -118,6 +119,28 @@ TEST(PointTree, SpacingOfALattice) {
   EXPECT_EQ(median_spacing(std::vector<Eigen::Vector3d>(9, {1, 2, 3})), 0.0);
   EXPECT_EQ(median_spacing({{1, 2, 3}}), 0.0);
   EXPECT_EQ(median_spacing({}), 0.0);
+}
+
+// First and last returns of a lidar, 1 to 2 mm apart, on points 5 cm apart.
+TEST(MedianSpacing, NearDuplicatesAreOnePlace) {
+  std::vector<Eigen::Vector3d> points;
+  for (int i = 0; i < 80; ++i)
+    for (int j = 0; j < 80; ++j) {
+      const Eigen::Vector3d place(0.05 * i + uniform(-0.01, 0.01), 0.05 * j + uniform(-0.01, 0.01),
+                                  0.3 * std::sin(0.06 * i) * std::cos(0.05 * j));
+      points.push_back(place);
+      points.emplace_back(place.x() + uniform(-0.001, 0.001), place.y(), place.z() - 0.001);
+    }
+  EXPECT_NEAR(median_spacing(points), 0.05, 0.004);
+  EXPECT_NEAR(libmap::point_spacing(points).by_area_m, 0.05 / std::sqrt(2.0), 0.003);
+}
+
+TEST(MedianSpacing, RandomPointsKeepTheirNearestDistance) {
+  std::vector<Eigen::Vector3d> points;
+  for (int n = 0; n < 10000; ++n) points.emplace_back(uniform(0, 1), uniform(0, 1), 0);
+  // Of a Poisson process: the median of the nearest distance is sqrt(ln 2 / (pi n)).
+  EXPECT_NEAR(median_spacing(points), std::sqrt(std::log(2) / std::numbers::pi / 10000), 2e-4);
+  EXPECT_NEAR(libmap::point_spacing(points).by_area_m, 0.01, 4e-4);
 }
 
 // Every point of the box is visited, before and after the grid has grown.

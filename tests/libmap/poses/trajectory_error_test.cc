@@ -73,6 +73,55 @@ TEST(AbsoluteTrajectoryError, StraightWaysAreTurnedByTheirRotations) {
   EXPECT_LT(error.max_m, 0.002);
 }
 
+// Positions within a few mm of a line: their noise must not turn the poses.
+TEST(AbsoluteTrajectoryError, NarrowPathsAreAlignedByRotationsToo) {
+  for (int draw = 0; draw < 20; ++draw) {
+    const Pose estimate_from_truth = random_pose();
+    Trajectory truth;
+    Trajectory estimate;
+    for (int i = 0; i < 9; ++i) {
+      Pose pose = libmap::make_pose(
+          Eigen::Vector3d(0.0125 * i, 0.0035 * std::sin(i), 0.002 * std::cos(2 * i)),
+          Eigen::Quaterniond(Eigen::AngleAxisd(0.05 * i, Eigen::Vector3d::UnitZ())));
+      truth.push_back({i + 1, 0.1 * i, pose});
+      for (Eigen::Index axis = 0; axis < 3; ++axis) {
+        pose.translation()[axis] += graspmap_test::uniform(-0.0005, 0.0005);
+        pose.rotate(
+            Eigen::AngleAxisd(graspmap_test::uniform(-0.001, 0.001), Eigen::Vector3d::Unit(axis)));
+      }
+      estimate.push_back({i + 1, 0.1 * i, estimate_from_truth * pose});
+    }
+    const auto error = libmap::absolute_trajectory_error(estimate, truth);
+    const Pose deviation = error.truth_from_estimate * estimate_from_truth;
+    EXPECT_LT(Eigen::AngleAxisd(deviation.linear()).angle(), 0.001);
+    EXPECT_LT(error.mean_rotation_deg, 0.1);
+    EXPECT_LT(error.max_m, 0.002);
+  }
+}
+
+// Rotations of another convention leave the alignment by positions as it is.
+TEST(AbsoluteTrajectoryError, RotationsThatDisagreeDoNotCount) {
+  Trajectory truth = random_trajectory(20);
+  Trajectory estimate = moved(random_pose(), truth);
+  for (libmap::TrajectoryPose& pose : estimate) {
+    pose.world_from_base.rotate(Eigen::AngleAxisd(1.5, Eigen::Vector3d(1, 2, 3).normalized()));
+    for (Eigen::Index axis = 0; axis < 3; ++axis)
+      pose.world_from_base.translation()[axis] += graspmap_test::uniform(-0.001, 0.001);
+  }
+  EXPECT_LT(libmap::absolute_trajectory_error(estimate, truth).max_m, 0.003);
+}
+
+// Two poses in one place and a third beside them: positions on a line, without noise.
+TEST(AbsoluteTrajectoryError, ExactPositionsOnALineAreTurnedByTheRotations) {
+  const Pose estimate_from_truth = random_pose();
+  Trajectory truth = random_trajectory(3);
+  for (std::size_t i = 0; i < 3; ++i)
+    truth[i].world_from_base.translation() = Eigen::Vector3d(i == 2 ? 0.1 : 0.0, 0.0, 0.0);
+  const auto error = libmap::absolute_trajectory_error(moved(estimate_from_truth, truth), truth);
+  EXPECT_LT(error.max_m, 1e-9);
+  EXPECT_LT(error.max_rotation_deg, 1e-2);
+}
+
 TEST(AbsoluteTrajectoryError, KeepsScaleErrors) {
   const auto error = libmap::absolute_trajectory_error(poses_on_axes(1.01), poses_on_axes(1.0));
   EXPECT_NEAR(error.rmse_m, 0.01, 1e-12);

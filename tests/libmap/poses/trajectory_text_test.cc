@@ -391,6 +391,61 @@ TEST(PoseAxes, ThereAndBack) {
   }
 }
 
+// A camera that looks along the world's y with its image upright, at (1, 2, 3).
+Pose looking_along_y() {
+  Pose pose = Pose::Identity();
+  pose.linear() << 1, 0, 0, 0, 0, 1, 0, -1, 0;
+  pose.translation() = Eigen::Vector3d(1, 2, 3);
+  return pose;
+}
+
+TEST(Open3dLog, MatricesOfCameras) {
+  const std::string text =
+      "0 0 1\n1 0 0 1\n0 0 1 2\n0 -1 0 3\n0 0 0 1\n1 1 2\n1 0 0 0\n0 1 0 0\n0 0 1 0\n0 0 0 1\n";
+  EXPECT_EQ(libmap::recognize_poses(text, "poses.log"), ".log");
+  const Trajectory poses = libmap::parse_open3d(text, "poses.log");
+  ASSERT_EQ(poses.size(), 2U);
+  EXPECT_TRUE(poses[0].world_from_base.isApprox(looking_along_y(), 1e-14));
+  EXPECT_TRUE(poses[1].world_from_base.isApprox(Pose::Identity(), 1e-14));
+  for (const std::string& bad : {text.substr(0, text.size() - 8), text + "2 2\n",
+                                 std::string("0 0 1\n1 0 0 1\n0 2 0 2\n0 0 1 3\n0 0 0 1\n")})
+    EXPECT_EQ(
+        graspmap_test::error_of([&] { libmap::parse_open3d(bad, "poses.log"); }).context().file,
+        "poses.log");
+}
+
+// Its cameras have y up and z backward.
+TEST(Nerfstudio, CamerasOfOpenGl) {
+  const std::string text =
+      R"({"w": 640, "frames": [{"file_path": "images/000007.jpg", "transform_matrix":
+         [[1, 0, 0, 1], [0, 0, -1, 2], [0, 1, 0, 3], [0, 0, 0, 1]]}]})";
+  EXPECT_EQ(libmap::recognize_poses(text, "transforms.json"), ".json");
+  const auto images = libmap::parse_nerfstudio(text, "transforms.json");
+  ASSERT_EQ(images.size(), 1U);
+  EXPECT_EQ(images[0].image, "images/000007.jpg");
+  EXPECT_TRUE(images[0].world_from_camera.isApprox(looking_along_y(), 1e-14));
+  for (const std::string bad : {"{", "{}", R"({"frames": [{"file_path": "a"}]})",
+                                R"({"frames": [{"file_path": "a", "transform_matrix": [[1]]}]})"})
+    EXPECT_EQ(
+        graspmap_test::error_of([&] { libmap::parse_nerfstudio(bad, "t.json"); }).context().file,
+        "t.json");
+}
+
+// The quaternion's w comes first, and stamps are in nanoseconds.
+TEST(Euroc, GroundTruth) {
+  const std::string text =
+      "#timestamp, p_RS_R_x [m], p_RS_R_y [m], p_RS_R_z [m], q_RS_w [], q_RS_x [], q_RS_y [], "
+      "q_RS_z [], v_RS_R_x [m s^-1]\n1403636580838555648,1,2,3,0.8,0.6,0,0,0.5\n";
+  EXPECT_EQ(libmap::recognize_poses(text, "data.csv"), ".euroc");
+  const Trajectory poses = libmap::parse_euroc(text, "data.csv");
+  ASSERT_EQ(poses.size(), 1U);
+  EXPECT_NEAR(poses[0].stamp_s, 1403636580.838555648, 1e-6);
+  const Eigen::Quaterniond rotation(poses[0].world_from_base.linear());
+  EXPECT_NEAR(std::abs(rotation.x()), 0.6, 1e-12);
+  EXPECT_EQ(poses[0].world_from_base.translation(), Eigen::Vector3d(1, 2, 3));
+  EXPECT_THROW(libmap::parse_euroc("1,2,3\n", "data.csv"), libmap::Error);
+}
+
 TEST(RecognizePoses, ByTagOrColumns) {
   const auto format = [](const std::string& text) {
     return libmap::recognize_poses("\xEF\xBB\xBF# 1 2 3\r\n\r\n" + text + "\n", "poses.txt");

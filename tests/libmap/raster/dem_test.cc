@@ -47,6 +47,23 @@ TEST(Dem, PixelCentersKeepTheirPlaceAndHeight) {
             Eigen::Vector3d(451239.5, 5412346.25, 807.125));
 }
 
+// As many rasters come: -9999 means no height, but the file does not say so.
+TEST(Dem, UndeclaredNodataIsDroppedAndCounted) {
+  AsciiGrid grid = small_grid();
+  grid.rows[0][0] = -9999;
+  const fs::path declared = write_dem("declared.tif", grid, utm);
+  std::vector<std::string> words = utm;
+  words.insert(words.end(), {"-a_nodata", "none"});
+  const fs::path undeclared = write_dem("undeclared.tif", grid, words);
+  EXPECT_EQ(libmap::read_cloud(declared).dropped_points, 0U);
+  const libmap::CloudReadResult read = libmap::read_cloud(undeclared);
+  EXPECT_EQ(read.dropped_points, 2U);
+  EXPECT_EQ(read.cloud.positions, libmap::read_cloud(declared).cloud.positions);
+  EXPECT_EQ(libmap::survey_tile(undeclared).dropped_points, 2U);
+  EXPECT_EQ(libmap::survey_tile(undeclared).points, 10U);
+  EXPECT_EQ(libmap::read_mesh(undeclared).mesh.vertices, libmap::read_mesh(declared).mesh.vertices);
+}
+
 TEST(Dem, TilesStripsAndPixelIsPointAreTheSamePoints) {
   AsciiGrid grid{.west = 100, .south = 50, .pixel = 0.5, .rows = {}};
   for (int row = 0; row < 70; ++row) {

@@ -248,28 +248,22 @@ TEST(GroundPlane, LevelIsTheLeastRotation) {
   EXPECT_NEAR((over * Vector3d(7, 8, -3)).z(), 2, 1e-12);
 }
 
-TEST(GroundPlane, UpOfNormals) {
-  using Normals = std::vector<Eigen::Vector3f>;
-  const Vector3d z = Vector3d::UnitZ();
-  EXPECT_EQ(up_of_normals({}), z);
-  EXPECT_EQ(up_of_normals(Normals(5, Eigen::Vector3f::Zero())), z);
-  EXPECT_EQ(up_of_normals(Normals(5, Eigen::Vector3f(0.1F, 0, 3))), z) << "z will do";
-  const Eigen::Vector3f forward(0, 0.1F, -1);
-  EXPECT_LT(degrees_between(up_of_normals(Normals(5, forward)), forward.cast<double>()), 1e-4);
-  // A floor in a room: its walls cancel each other but one, which is as large as the floor.
-  Normals room(1000, {1, 0, 0});
-  room.insert(room.end(), 1000, {0, 0, 1});
-  room.insert(room.end(), 1000, {0, 0, -1});
-  room.insert(room.end(), 900, {0, 1, 0});
-  EXPECT_LT(degrees_between(up_of_normals(room), {1, 0, 0}), 1);
-  Normals everywhere;
-  for (int n = 0; n < 999; ++n) {
-    const double angle = n * 2 * std::numbers::pi / 999;
-    everywhere.emplace_back(static_cast<float>(std::cos(angle)),
-                            static_cast<float>(std::sin(angle)), 0.1F);
-  }
-  EXPECT_EQ(up_of_normals(everywhere), z);
-  EXPECT_EQ(up_of_normals({{std::numeric_limits<float>::quiet_NaN(), 0, 0}}), z);
+// Natural terrain: the error names a tolerance, and with it there is a plane.
+TEST(GroundPlane, RoughTerrainIsToldItsTolerance) {
+  std::vector<Vector3d> points;
+  for (int i = 0; i < 100; ++i)
+    for (int j = 0; j < 100; ++j)
+      points.emplace_back(0.05 * i, 0.05 * j, graspmap_test::uniform(-1.5, 1.5));
+  const std::string option = "--plane-tolerance ";
+  const std::string reason = error_of([&] { find_ground_plane(points); }).reason();
+  const std::size_t at = reason.find(option);
+  ASSERT_NE(at, std::string::npos) << reason;
+  GroundPlaneOptions options;
+  options.tolerance_m = std::stod(reason.substr(at + option.size()));
+  EXPECT_LT(find_ground_plane(points, options).tilt_deg, 40.0);
+  // A wall, for which z is no up.
+  for (Vector3d& point : points) point = Vector3d(0.01 * point.z(), point.y(), point.x());
+  EXPECT_NE(error_of([&] { find_ground_plane(points); }).reason().find("--up "), std::string::npos);
 }
 
 TEST(GroundPlane, WhatCannotBe) {

@@ -406,6 +406,39 @@ TEST_P(Reconstruction, AFewPointsDoNoHarm) {
   }
 }
 
+TEST_P(Reconstruction, NormalsWithoutSidesAreRefused) {
+  PointCloud cloud = plane(0.3, 0.01);
+  for (std::size_t n = 0; n < cloud.size(); ++n)
+    if (uniform(0, 1) < 0.5) cloud.normals[n] = -cloud.normals[n];
+  const Error error = error_of([&] { reconstruct(cloud); });
+  EXPECT_EQ(error.context().field, "neighbors whose normals face opposite sides");
+}
+
+// First and last returns, 1 mm apart.
+TEST_P(Reconstruction, NearDuplicatesAreNoSpacing) {
+  PointCloud cloud = plane(1.0, 0.02);
+  const PointCloud once = cloud;
+  for (std::size_t n = 0; n < once.size(); ++n) {
+    cloud.positions.push_back(once.positions[n] + Eigen::Vector3d(0.0005, 0, -0.001));
+    cloud.normals.push_back(once.normals[n]);
+  }
+  EXPECT_NEAR(reconstruct(cloud).cell_size_m, 0.02, 0.002);
+}
+
+TEST_P(Reconstruction, WorkIsAnnounced) {
+  SurfaceReconstructionOptions options = cells_of(0.01);
+  options.method = GetParam();
+  SurfaceWork work;
+  const auto result = reconstruct_surface(plane(1.0, 0.02), options, no_progress(),
+                                          [&](const SurfaceWork& announced) { work = announced; });
+  const auto triangles = static_cast<double>(result.mesh.triangles.size());
+  // Poisson's octree is coarser where points are sparse.
+  const double factor = GetParam() == SurfaceMethod::poisson ? 4.0 : 1.6;
+  EXPECT_LT(std::abs(std::log(work.triangles / triangles)), std::log(factor));
+  EXPECT_GT(work.bytes, 0.0);
+  EXPECT_GT(work.seconds, 0.0);
+}
+
 TEST_P(Reconstruction, OptionsOutOfTheirRangesAreNamed) {
   const PointCloud cloud = plane(0.2, 0.01);
   const auto refusal = [&](const auto& change) {

@@ -1,0 +1,40 @@
+// Corners of faces that are equal bit for bit become one vertex.
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <bit>
+#include <cstddef>
+#include <cstdint>
+
+#include "libmap/core/point_cloud.h"
+
+namespace libmap {
+
+// A corner's numbers: position, normal, color.
+using Corner = std::array<std::uint32_t, 6 + 3 + 1>;
+
+struct CornerHash {
+  std::size_t operator()(const Corner& corner) const {
+    // FNV-1a, a word at a time.
+    std::uint64_t hash = 14695981039346656037ULL;
+    for (const std::uint32_t word : corner) hash = (hash ^ word) * 1099511628211ULL;
+    return static_cast<std::size_t>(hash ^ (hash >> 32));
+  }
+};
+
+inline Corner corner_of(const Eigen::Vector3d& position, const Eigen::Vector3f& normal,
+                        const Color& color) {
+  Corner corner{};
+  for (std::size_t axis = 0; axis < 3; ++axis) {
+    // Adding 0 makes -0 equal to 0.
+    const auto word = std::bit_cast<std::uint64_t>(position[static_cast<int>(axis)] + 0.0);
+    corner[2 * axis] = static_cast<std::uint32_t>(word);
+    corner[2 * axis + 1] = static_cast<std::uint32_t>(word >> 32);
+    corner[6 + axis] = std::bit_cast<std::uint32_t>(normal[static_cast<int>(axis)] + 0.0F);
+    corner[9] = corner[9] << 8 | color[axis];
+  }
+  return corner;
+}
+
+}  // namespace libmap

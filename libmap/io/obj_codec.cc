@@ -1,0 +1,197 @@
+#include "libmap/io/obj_codec.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+#include <string>
+#include <unordered_map>
+#include <unordered_set>
+#include <vector>
+
+#include "libmap/core/error.h"
+#include "libmap/core/text.h"
+#include "libmap/core/text_lines.h"
+#include "libmap/io/corner_key.h"
+
+namespace libmap {
+namespace {
+
+constexpr std::uint32_t none = std::numeric_limits<std::uint32_t>::max();
+
+class ObjReader {
+ public:
+  TriangleMesh read(std::string_view text) {
+    LineReader lines(text);
+    TextLine line;
+    while (lines.next(line)) {
+      drop_comment(line);
+      if (line.words.empty()) continue;
+      const std::string_view key = line.words[0];
+      if (key == "v")
+        add_position(line);
+      else if (key == "vn")
+        normals_.push_back(numbers(line, 3).head<3>().cast<float>());
+      else if (key == "vt")
+        ++texture_coordinates_;
+      else if (key == "f")
+        add_face(line);
+    }
+    return weld();
+  }
+
+ private:
+  using Numbers = Eigen::Matrix<double, 7, 1>;
+
+  static void drop_comment(TextLine& line) {
+    const auto comment = std::find_if(line.words.begin(), line.words.end(),
+                                      [](std::string_view word) { return word.front() == '#'; });
+    line.words.erase(comment, line.words.end());
+  }
+
+  // The numbers behind the key, at least `least`, up to seven; 0 beyond.
+  static Numbers numbers(const TextLine& line, std::size_t least) {
+    Numbers values = Numbers::Zero();
+    if (line.words.size() <= least)
+      throw Error("too few numbers",
+                  {.field = name_of(line), .bound = ">= " + std::to_string(least)});
+    for (std::size_t n = 1; n < std::min<std::size_t>(line.words.size(), 8); ++n) {
+      const std::optional<double> value = parse_double(line.words[n]);
+      if (!value)
+        throw Error("not a number",
+                    {.field = name_of(line),
+                     .value = "'" + std::string(line.words[n].substr(0, 40)) + "'"});
+      values[static_cast<Eigen::Index>(n - 1)] = *value;
+    }
+    return values;
+  }
+
+  // x y z, x y z w, x y z r g b or x y z w r g b.
+  void add_position(const TextLine& line) {
+    const Numbers values = numbers(line, 3);
+    const std::size_t count = line.words.size() - 1;
+    const bool has_weight = count == 4 || count == 7;
+    positions_.push_back(values.head<3>() / (has_weight ? values[3] : 1.0));
+    if (!positions_.back().allFinite())
+      throw Error("position is not finite",
+                  {.field = "vertex " + std::to_string(positions_.size() - 1)});
+    Color color{};
+    for (std::size_t channel = 0; channel < 3 && count >= 6; ++channel)
+      color[channel] = static_cast<std::uint8_t>(std::lround(
+          255.0 * std::clamp(values[static_cast<Eigen::Index>(count - 3 + channel)], 0.0, 1.0)));
+    colors_.push_back(color);
+    has_colors_ = has_colors_ && count >= 6;
+    normal_of_.push_back(none);
+    mixed_.push_back(Eigen::Vector3f::Zero());
+  }
+
+  // From 1 on, or from the last backwards: -1.
+  static std::uint32_t index_of(const TextLine& line, std::string_view word, std::size_t count,
+                                const char* what) {
+    const std::optional<std::int64_t> number = parse_integer(word);
+    const auto size = static_cast<std::int64_t>(count);
+    const std::int64_t index = !number ? -1 : *number < 0 ? size + *number : *number - 1;
+    if (index < 0 || index >= size)
+      throw Error(std::string("a corner refers to no ") + what,
+                  {.field = name_of(line),
+                   .value = "'" + std::string(word.substr(0, 40)) + "'",
+                   .bound = "1 to " + std::to_string(count)});
+    return static_cast<std::uint32_t>(index);
+  }
+
+  // v, v/vt, v//vn or v/vt/vn; the index of v.
+  std::uint32_t add_corner(const TextLine& line, std::string_view word) {
+    const std::size_t first = std::min(word.find('/'), word.size());
+    const std::size_t second = std::min(word.find('/', first + 1), word.size());
+    const std::uint32_t vertex = index_of(line, word.substr(0, first), positions_.size(), "vertex");
+    if (second > first + 1)
+      index_of(line, word.substr(first + 1, second - first - 1), texture_coordinates_,
+               "texture coordinate");
+    if (second + 1 >= word.size()) {
+      has_normals_ = false;
+      return vertex;
+    }
+    add_normal(vertex, index_of(line, word.substr(second + 1), normals_.size(), "normal"));
+    return vertex;
+  }
+
+  // One normal stays as it is; of several, the mean.
+  void add_normal(std::uint32_t vertex, std::uint32_t normal) {
+    std::uint32_t& known = normal_of_[vertex];
+    if (known == none) known = normal;
+    mixed_[vertex] += normals_[normal];
+    if (normals_[known] != normals_[normal]) has_several_.insert(vertex);
+  }
+
+  void add_face(const TextLine& line) {
+    if (line.words.size() < 4) throw Error("a face needs three corners", {.field = name_of(line)});
+    Triangle triangle{};
+    for (std::size_t n = 1; n < line.words.size(); ++n) {
+      triangle[1] = triangle[2];
+      triangle[2] = add_corner(line, line.words[n]);
+      if (n == 1) triangle[0] = triangle[2];
+      if (n >= 3) triangles_.push_back(triangle);
+    }
+  }
+
+  Eigen::Vector3f normal_at(std::uint32_t vertex) const {
+    if (!has_normals_) return Eigen::Vector3f::Zero();
+    const Eigen::Vector3f& first = normals_[normal_of_[vertex]];
+    if (!has_several_.contains(vertex) || mixed_[vertex].isZero(1e-6F)) return first;
+    return mixed_[vertex].stableNormalized();
+  }
+
+  TriangleMesh weld() {
+    TriangleMesh mesh;
+    std::unordered_map<Corner, std::uint32_t, CornerHash> known;
+    std::vector<std::uint32_t> welded(positions_.size(), none);
+    has_colors_ = has_colors_ && !positions_.empty();
+    for (Triangle& triangle : triangles_) {
+      for (std::uint32_t& corner : triangle) {
+        std::uint32_t& vertex = welded[corner];
+        if (vertex == none) {
+          const Color color = has_colors_ ? colors_[corner] : Color{};
+          const Eigen::Vector3f normal = normal_at(corner);
+          const auto [found, is_new] =
+              known.try_emplace(corner_of(positions_[corner], normal, color),
+                                static_cast<std::uint32_t>(mesh.vertices.size()));
+          vertex = found->second;
+          if (is_new) {
+            mesh.vertices.push_back(positions_[corner]);
+            if (has_normals_) mesh.vertex_normals.push_back(normal);
+            if (has_colors_) mesh.vertex_colors.push_back(color);
+          }
+        }
+        corner = vertex;
+      }
+    }
+    mesh.triangles = std::move(triangles_);
+    return mesh;
+  }
+
+  std::vector<Eigen::Vector3d> positions_;
+  std::vector<Color> colors_;
+  std::vector<Eigen::Vector3f> normals_;
+  std::size_t texture_coordinates_ = 0;
+  std::vector<std::uint32_t> normal_of_;           // of each position, its first normal
+  std::vector<Eigen::Vector3f> mixed_;             // of each position, the sum of its normals
+  std::unordered_set<std::uint32_t> has_several_;  // positions with different normals
+  std::vector<Triangle> triangles_;
+  bool has_normals_ = true;
+  bool has_colors_ = true;
+};
+
+}  // namespace
+
+TriangleMesh decode_obj(std::string_view text) {
+  // A backslash continues a line.
+  const std::string_view continued = "\\\n";
+  if (text.find(continued) == std::string_view::npos) return ObjReader().read(text);
+  std::string joined(text);
+  for (std::size_t at = joined.find(continued); at != std::string::npos;
+       at = joined.find(continued, at))
+    joined.replace(at, 2, "  ");
+  return ObjReader().read(joined);
+}
+
+}  // namespace libmap
